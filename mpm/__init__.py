@@ -1,0 +1,23 @@
+"""The solver: a Scene in, a ForceRecord out. Importing this package does not import Taichi."""
+
+from __future__ import annotations
+
+from mpm.errors import CutcalError, SceneError, SimulationError
+from mpm.record import ForceRecord
+from mpm.scene import Board, EdgeLaw, Food, Knife, Material, Motion, Numerics, Scene, Shape
+
+__all__ = [
+    "Board",
+    "CutcalError",
+    "EdgeLaw",
+    "Food",
+    "ForceRecord",
+    "Knife",
+    "Material",
+    "Motion",
+    "Numerics",
+    "Scene",
+    "SceneError",
+    "Shape",
+    "SimulationError",
+]

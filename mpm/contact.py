@@ -1,0 +1,76 @@
+"""Knife and board as signed distance fields, Coulomb contact at a particle, and the cutting edge's law."""
+
+import taichi as ti
+
+
+@ti.func
+def blade_distance(y, above, spine, cos_h, sin_h):
+    """Signed distance to the right half of the blade's wedge and its outward normal, in the plane across the blade.
+
+    Args:
+        y: Distance from the blade plane towards the particle's own side [m]; negative beyond the plane.
+        above: Height above the cutting edge [m], positive.
+        spine: Thickness of the spine [m].
+        cos_h: Cosine of half the included angle.
+        sin_h: Sine of half the included angle.
+
+    Returns:
+        Distance [m], negative inside, and the unit normal (0, n_y, n_z) of the face, n_y > 0.
+    """
+    d = y * cos_h - above * sin_h
+    n = ti.Vector([0.0, cos_h, -sin_h])
+    if y - 0.5 * spine > d:
+        d = y - 0.5 * spine
+        n = ti.Vector([0.0, 1.0, 0.0])
+    return d, n
+
+
+@ti.func
+def coulomb(jn, tangent, mu):
+    """Friction impulse per mass of a projected velocity: mu jn, but never more than stops the sliding."""
+    speed = tangent.norm()
+    return -ti.min(mu * jn, speed) * tangent / ti.max(speed, 1e-12)
+
+
+@ti.func
+def stick_slip(stick, slide, depth, mu):
+    """Elastic-sticking Coulomb friction: tangential spring as stiff as the normal one, capped at mu times its force.
+
+    Capping each step's impulse at the one that stops the particle would make friction viscous, because the grid takes
+    most of that impulse away again; the spring remembers.
+
+    Args:
+        stick: Tangential stretch of the spring so far [m], 3-vector.
+        slide: Sliding of the particle along the tool in this step [m], 3-vector, tangential.
+        depth: Penetration [m].
+        mu: Friction coefficient [-].
+
+    Returns:
+        New stretch [m].
+    """
+    out = stick + slide
+    size, cap = out.norm(), mu * depth
+    if size > cap:
+        out *= cap / size
+    return out
+
+
+@ti.func
+def edge_level(cut, softening, start, resistance):
+    """Line force that the edge can carry after cutting ``cut`` deep [N/m].
+
+    It falls from the force at which the cut started to the propagation resistance over the softening length.
+    """
+    return resistance + (start - resistance) * ti.exp(-cut / softening)
+
+
+@ti.func
+def bspline(r):
+    """Quadratic B-spline of unit width [-]."""
+    q = ti.abs(r)
+    out = 0.0
+    if q < 0.5:
+        out = 0.75 - q * q
+    elif q < 1.5:
+        out = 0.5 * (1.5 - q) ** 2
+    return out

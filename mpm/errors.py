@@ -1,0 +1,25 @@
+"""Errors a user may meet: each says what was wrong, where, and what to do."""
+
+from __future__ import annotations
+
+
+class CutcalError(Exception):
+    """Base of every error that cutcal raises on purpose; the command line prints it without a traceback."""
+
+
+class SceneError(CutcalError):
+    """A scene (food, knife, board, motion, numerics) that cannot be simulated as asked."""
+
+
+class SimulationError(CutcalError):
+    """A run that broke down after it had started.
+
+    Attributes:
+        reason: Typed reason, one of ``not_finite``, ``inverted``, ``left_grid``, ``stopped``.
+        fraction: Part of the stroke that was completed [-], 0 to 1.
+    """
+
+    def __init__(self, message: str, *, reason: str, fraction: float) -> None:
+        super().__init__(message)
+        self.reason = reason
+        self.fraction = fraction

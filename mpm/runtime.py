@@ -1,0 +1,63 @@
+"""One place where Taichi is started; a process has one Taichi runtime at a time."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import Any
+
+from mpm.errors import SceneError
+
+ARCHES = ("cpu", "cuda", "vulkan", "metal", "gpu")
+
+
+@dataclass(frozen=True)
+class Runtime:
+    """Device on which kernels run. Attributes: arch; threads (0 = all cores)."""
+
+    arch: str = "cpu"
+    threads: int = 0
+
+    def __post_init__(self) -> None:
+        if self.arch not in ARCHES:
+            raise SceneError(f"arch: {self.arch!r} is not one of {', '.join(ARCHES)}")
+
+    @property
+    def cpu_threads(self) -> int:
+        """Threads that a CPU kernel uses."""
+        return self.threads or os.cpu_count() or 1
+
+
+_state: dict[str, Any] = {"key": None, "serial": 0}
+
+
+def start(runtime: Runtime, precision: str) -> int:
+    """Start Taichi for this device and precision, or keep the one that runs.
+
+    Returns:
+        Serial number of the runtime: fields made under another number no longer exist.
+
+    Raises:
+        SceneError: The device is not available.
+    """
+    import taichi as ti
+
+    key = (runtime, precision)
+    if _state["key"] == key:
+        return _state["serial"]
+    arch = getattr(ti, runtime.arch)
+    real = ti.f64 if precision == "f64" else ti.f32
+    ti.init(
+        arch=arch,
+        default_fp=real,
+        cpu_max_num_threads=runtime.cpu_threads,
+        offline_cache=True,
+        log_level=ti.ERROR,
+        random_seed=0,
+        enable_fallback=False,
+    )
+    if runtime.arch != "cpu" and ti.lang.impl.current_cfg().arch == ti.cpu:
+        raise SceneError(f"arch: {runtime.arch} is not available on this machine; use --arch cpu")
+    _state["key"] = key
+    _state["serial"] += 1
+    return _state["serial"]

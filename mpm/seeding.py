@@ -1,0 +1,57 @@
+"""Particles from a shape: one at a random place in each cell of a cubic lattice, so never aligned with the blade."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mpm.errors import SceneError
+from mpm.scene import Scene
+from mpm.shapes import inside, surface, volume
+
+MAX_PARTICLES = 20_000_000
+
+
+@dataclass(frozen=True)
+class Seeds:
+    """Particles at rest.
+
+    Attributes:
+        x: Positions [m], shape (n, 3); only the modelled half or quarter when mirrors are on.
+        volume: Volume of one particle [m^3]; the particles of all mirror images add up to the shape's volume.
+        spacing: Lattice spacing [m].
+        foot: Distance of each particle from the lower surface, at most half a spacing [m], shape (n,).
+    """
+
+    x: np.ndarray
+    volume: float
+    spacing: float
+    foot: np.ndarray
+
+
+def seed(scene: Scene) -> Seeds:
+    """Fill the food with particles.
+
+    Stratified (jittered) sampling: the quadrature noise of plain random points without the alignment of a lattice.
+
+    Raises:
+        SceneError: More particles than fit into memory.
+    """
+    shape, num = scene.food.shape, scene.numerics
+    h = num.dx / num.ppc
+    mirror_x, mirror_y = scene.mirrors
+    low = np.array([0.0 if mirror_x else -shape.width / 2, -shape.length / 2, 0.0])
+    high = np.array([shape.width / 2, 0.0 if mirror_y else shape.length / 2, shape.height])
+    counts = np.ceil((high - low) / h - 1e-9).astype(int)
+    if counts.prod() > MAX_PARTICLES:
+        raise SceneError(f"numerics: dx = {num.dx * 1e3:g} mm makes {counts.prod():,} particles; use a larger dx")
+    # the lattice starts on the mirror planes (x = 0 below, y = 0 above) and on the board
+    origin = np.array([low[0], high[1] - counts[1] * h, 0.0])
+    cells = np.stack(np.meshgrid(*[np.arange(n) for n in counts], indexing="ij"), -1).reshape(-1, 3)
+    rng = np.random.default_rng(num.seed)
+    points = origin + (cells + rng.uniform(0.0, 1.0, cells.shape)) * h
+    points = points[inside(shape, points)]
+    bottom, _ = surface(shape, points[:, 0], points[:, 1])
+    images = (2 if mirror_x else 1) * (2 if mirror_y else 1)
+    return Seeds(points, volume(shape) / images / len(points), h, np.minimum(points[:, 2] - bottom, h / 2))

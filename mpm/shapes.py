@@ -1,0 +1,103 @@
+"""Outlines of foods: inside test, volume, and the top and bottom surface. Plain NumPy."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from mpm.scene import Shape
+
+SHAPE_KINDS = ("block", "cylinder", "half_cylinder", "sphere", "hemisphere", "ellipsoid", "capsule")
+_FLAT_DOWN = ("half_cylinder", "hemisphere")
+
+
+def _radius2(shape: Shape, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Squared distance from the vertical axis (or plane) in units of the outline: 1 on the rim [-]."""
+    a, b = shape.width / 2, shape.length / 2
+    if shape.kind in ("cylinder", "half_cylinder"):
+        return np.where(np.abs(y) <= b, (x / a) ** 2, np.inf)
+    if shape.kind == "capsule":
+        cap = min(a, b)
+        return (x / a) ** 2 + (np.maximum(np.abs(y) - (b - cap), 0.0) / cap) ** 2
+    return (x / a) ** 2 + (y / b) ** 2
+
+
+def surface(shape: Shape, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Height of the lower and upper surface over points (x, y).
+
+    Args:
+        shape: The outline.
+        x: Positions along the blade [m], any shape.
+        y: Positions across the blade [m], same shape.
+
+    Returns:
+        ``(bottom, top)`` [m], NaN where there is no food above the point.
+    """
+    x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+    if shape.kind == "block":
+        inside = (np.abs(x) <= shape.width / 2) & (np.abs(y) <= shape.length / 2)
+        return np.where(inside, 0.0, np.nan), np.where(inside, shape.height, np.nan)
+    r2 = _radius2(shape, x, y)
+    rise = np.sqrt(np.where(r2 <= 1, 1 - r2, np.nan))
+    if shape.kind in _FLAT_DOWN:
+        return 0.0 * rise, shape.height * rise
+    half = shape.height / 2
+    return half * (1 - rise), half * (1 + rise)
+
+
+def inside(shape: Shape, points: np.ndarray) -> np.ndarray:
+    """Which points lie in the food. Args: points [m], shape (n, 3). Returns: bool, shape (n,)."""
+    bottom, top = surface(shape, points[:, 0], points[:, 1])
+    with np.errstate(invalid="ignore"):
+        return (points[:, 2] >= bottom) & (points[:, 2] <= top)
+
+
+def volume(shape: Shape) -> float:
+    """Volume of the food [m^3], closed form."""
+    box = shape.length * shape.width * shape.height
+    if shape.kind == "block":
+        return box
+    if shape.kind in ("cylinder", "half_cylinder"):
+        return math.pi / 4 * box
+    if shape.kind == "capsule":
+        cap = min(shape.width, shape.length) / 2
+        section = math.pi / 4 * shape.width * shape.height
+        return section * (shape.length - 2 * cap) + section * 4 / 3 * cap
+    return math.pi / 6 * box
+
+
+def section_area(shape: Shape) -> float:
+    """Area of the section in the blade plane y = 0 [m^2]: what a complete cut severs."""
+    box = shape.width * shape.height
+    return box if shape.kind == "block" else math.pi / 4 * box
+
+
+def skin_path(shape: Shape, x: np.ndarray, thickness: float) -> np.ndarray:
+    """Vertical way of the edge through the upper skin in the blade plane.
+
+    The skin is the layer between the outline and the outline shrunk by its thickness, so the way grows towards the
+    flanks, where the edge meets the skin at a slant, up to the whole height where only skin is left.
+
+    Args:
+        shape: The outline.
+        x: Positions along the blade [m], shape (n,).
+        thickness: Skin thickness [m].
+
+    Returns:
+        Way through the skin [m], shape (n,), 0 where there is no food.
+    """
+    x = np.asarray(x, float)
+    bottom, top = surface(shape, x, np.zeros_like(x))
+    inner_width = max(shape.width - 2 * thickness, 1e-9)
+    lift = 0.0 if shape.kind in (*_FLAT_DOWN, "block") else thickness
+    inner_height = max(shape.height - thickness - lift, 1e-9)
+    if shape.kind == "block":
+        inner_top = np.where(np.abs(x) <= inner_width / 2, inner_height, bottom)
+    else:
+        rise = np.sqrt(np.maximum(1 - (2 * x / inner_width) ** 2, 0.0))
+        inner_top = inner_height * rise if shape.kind in _FLAT_DOWN else shape.height / 2 + inner_height / 2 * rise
+        inner_top = np.where(np.abs(x) <= inner_width / 2, inner_top, bottom)
+    return np.nan_to_num(np.maximum(top - inner_top, 0.0))

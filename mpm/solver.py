@@ -1,0 +1,261 @@
+"""The time loop: what is active, dt, the tool's motion, impulses to forces."""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from mpm import kernels as kn
+from mpm.errors import SimulationError
+from mpm.record import ForceRecord
+from mpm.runtime import Runtime, start
+from mpm.scene import BAND_CELLS, Material, Scene
+from mpm.seeding import seed
+from mpm.shapes import section_area, skin_path
+
+PAD = 3  # empty cells around the food: a quadratic kernel reaches 1.5 cells, the rest is room to move
+MARGIN = 2  # cells by which the active window exceeds the particles; renewed at every output interval
+SPREAD = 0.2  # room for the food to widen while it is pressed, part of its size
+APPROACH = 0.1  # way of the blade above the food before contact, in cells
+ZONE_FULL = 5 / 6  # kernel mass of a process zone whose edge touches a flat surface, over rho dx zone^2 (exact)
+EDGE_STEP = 0.5  # dt times the frequency of the edge's cohesive spring, 2 is unstable
+
+Progress = Callable[[float, float], None]
+
+
+class Simulation:
+    """A scene made ready to run; candidates of its material run without recompiling.
+
+    Args:
+        scene: What to simulate.
+        runtime: Device.
+
+    Raises:
+        SceneError: The device is missing or the scene does not fit into memory.
+    """
+
+    def __init__(self, scene: Scene, runtime: Runtime | None = None) -> None:
+        self.scene = scene
+        self.runtime = runtime or Runtime()
+        self.serial = start(self.runtime, scene.numerics.precision)
+        self.seeds = seed(scene)
+        self._layout()
+        threads = self.runtime.cpu_threads if self.runtime.arch == "cpu" else 0
+        damage = scene.food.material.tensile_strength is not None
+        nodal = scene.numerics.contact == "nodal"
+        self.k: Any = kn.Kernels(
+            len(self.seeds.x), self.nodes, scene.numerics.dx, self.origin, self.planes, threads, nodal, damage
+        )
+
+    def _layout(self) -> None:
+        """Place the grid: around the food with room to widen, nodes on the mirror planes."""
+        shape, num = self.scene.food.shape, self.scene.numerics
+        dx = num.dx
+        mirror = (*self.scene.mirrors, False)
+        low, high, zero = [], [], []
+        for axis, size in enumerate((shape.width, shape.length, shape.height)):
+            shift = num.grid_shift[axis] % 1.0
+            room = PAD + math.ceil(SPREAD * size / 2 / dx)
+            bottom = -PAD if axis == 2 else -math.ceil(size / 2 / dx) - room
+            top = math.ceil(size / dx) + PAD if axis == 2 else math.ceil(size / 2 / dx) + room
+            if mirror[axis] and axis == 0:
+                bottom = -2
+            if mirror[axis] and axis == 1:
+                top = 2
+            low.append(bottom)
+            high.append(top + 1)
+            zero.append(shift)
+        self.nodes = tuple(h - b + 1 for b, h in zip(low, high, strict=True))
+        self.origin = np.array([(b - z) * dx for b, z in zip(low, zero, strict=True)])
+        self.planes = (-low[0] if mirror[0] else -1, -low[1] if mirror[1] else -1)
+        self.images = (2 if mirror[0] else 1) * (2 if mirror[1] else 1)
+
+    def _retardation(self, material: Material) -> float:
+        """Kelvin-Voigt retardation time that gives the loss factor at the first axial mode c/(4 height) [s]."""
+        return material.loss_factor * 4 * self.scene.food.shape.height / (2 * math.pi * material.p_wave)
+
+    def _time_step(self, material: Material) -> float:
+        """Largest sound step: elastic limit of a lone particle, and of the edge's spring [s]."""
+        num, edge = self.scene.numerics, self.scene.edge
+        speed = self.scene.motion.mach * material.p_wave
+        omega = 2 * (material.stability_speed + speed) / num.dx  # highest frequency of a lone particle
+        zeta = self._retardation(material) * omega / 2
+        dt = num.safety * 2 / omega * (math.sqrt(1 + zeta * zeta) - zeta)
+        if num.contact == "cohesive":
+            spring = math.sqrt(max(material.start, 1e-12) / (edge.slip * material.rho * edge.zone**2))
+            dt = min(dt, EDGE_STEP / spring)
+        return dt
+
+    def _load(self, material: Material) -> None:
+        """Write seeds and constants into the fields."""
+        k, scene, num, edge = self.k, self.scene, self.scene.numerics, self.scene.edge
+        real = np.float64 if num.precision == "f64" else np.float32
+        k.x.from_numpy(self.seeds.x.astype(real))
+        k.foot.from_numpy(self.seeds.foot.astype(real))
+        k.reset()
+        knife = scene.knife
+        table = np.zeros(kn.N_PARAMETERS)
+        table[kn.MU], table[kn.LAM] = material.shear, material.lame
+        table[kn.YIELD] = min(material.yield_stress, 1e30)
+        table[kn.MASS], table[kn.VOL] = material.rho * self.seeds.volume, self.seeds.volume
+        table[kn.FRICTION], table[kn.BOARD_MU] = material.mu, scene.board.mu
+        table[kn.R_FLESH], table[kn.R_START], table[kn.DEPTH] = material.R, material.start, material.initiation_depth
+        table[kn.SLIP], table[kn.ZONE] = edge.slip, edge.zone
+        table[kn.FULL] = ZONE_FULL * material.rho * num.dx * edge.zone**2
+        if material.tensile_strength is not None and material.fracture_energy is not None:
+            eps0 = material.tensile_strength / material.E
+            band = BAND_CELLS * num.dx
+            table[kn.EPS0] = eps0
+            table[kn.EPSF] = eps0 / 2 + material.fracture_energy / (material.tensile_strength * band)
+        table[kn.SPINE], table[kn.BLADE], table[kn.HALF_LENGTH] = knife.spine, knife.height, knife.length / 2
+        table[kn.COS], table[kn.SIN] = math.cos(knife.angle / 2), math.sin(knife.angle / 2)
+        table[kn.GRAVITY], table[kn.REACH] = num.gravity, self.seeds.spacing / 2
+        beta = self._retardation(material)
+        table[kn.ETA_S], table[kn.ETA_B] = beta * material.shear, beta * (material.lame + 2 / 3 * material.shear)
+        k.par.from_numpy(table.astype(real))
+        xs = self.origin[0] + num.dx * np.arange(self.nodes[0])
+        over = np.clip((knife.length / 2 - np.abs(xs)) / num.dx + 0.5, 0.0, 1.0)
+        k.cover.from_numpy(over.astype(real))
+        path = skin_path(scene.food.shape, xs, material.skin_thickness) if material.skin_thickness > 0 else 0 * xs
+        k.soften.from_numpy((edge.slip + path).astype(real))
+
+    def run(self, material: Material | None = None, progress: Progress | None = None) -> ForceRecord:
+        """Simulate the cut.
+
+        Args:
+            material: Other constants than the scene's; the kernels are not recompiled.
+            progress: Called after each output interval with (part of the stroke done, knife force [N]).
+
+        Returns:
+            The record. A run that breaks down returns what it had, with its reason in ``status``.
+        """
+        scene = self.scene.with_material(**vars(material)) if material is not None else self.scene
+        material = scene.food.material
+        self._load(material)
+        num, height = scene.numerics, scene.food.shape.height
+        dt = self._time_step(material)
+        speed = scene.motion.mach * material.p_wave
+        every = max(1, round(num.output / (speed * dt)))
+        gap = APPROACH * num.dx
+        total = math.ceil((scene.motion.stroke + gap) / (speed * dt))
+        rows: list[list[float]] = []
+        began = clock.perf_counter()
+        status, done, last = "done", 0, np.zeros(3)
+        while done < total:
+            count = min(every, total - done)
+            window = self._window()
+            for n in range(done, done + count):
+                self._step(dt, height + gap - speed * dt * n, speed, window)
+            done += count
+            sums, state = self.k.sums.to_numpy(), self._state()
+            self._clear_sums()
+            row = self._row(sums, state, last, count * dt, material, num.gravity)
+            last = np.array(row[0])
+            rows.append([speed * dt * done - gap, dt * done, *(v for part in row for v in part)])
+            status = _health(sums, state)
+            if status != "done":
+                break
+            if progress is not None:
+                progress(done / total, rows[-1][4 + 3] + rows[-1][4 + 6])
+        return self._record(rows, status, done / total, dt, done, speed, clock.perf_counter() - began)
+
+    def _window(self) -> Any:
+        """Nodes that the particles can reach before the next output interval; planes keep their ghosts."""
+        e = np.array(self.k.extent())
+        low, high = np.maximum(e[:3] - MARGIN, 0), np.minimum(e[3:] + MARGIN + 1, self.nodes)
+        for axis, plane in enumerate(self.planes):
+            if plane >= 0:
+                low[axis], high[axis] = min(low[axis], plane - 2), max(high[axis], plane + 3)
+        return kn.IVEC6([*np.maximum(low, 0), *np.minimum(high, self.nodes)])
+
+    def _step(self, dt: float, tip: float, speed: float, window: Any) -> None:
+        """One time step, with the nodes of the process zone."""
+        zone, dx = self.scene.edge.zone, self.scene.numerics.dx
+        j_low = max(0, math.floor((-1.5 * zone - self.origin[1]) / dx))
+        j_high = min(self.nodes[1], math.ceil((1.5 * zone - self.origin[1]) / dx) + 1)
+        k_low = max(0, math.floor((tip - 2 * zone - self.origin[2]) / dx))
+        k_high = min(self.nodes[2], math.ceil((tip + zone - self.origin[2]) / dx) + 1)
+        self.k.step(dt, tip, tip - speed * dt, speed, window, j_low, j_high, k_low, k_high)
+        if self.k.damage:
+            self.k.smooth_strain()
+
+    def _state(self) -> np.ndarray:
+        self.k.measure()
+        return self.k.state.to_numpy()
+
+    def _clear_sums(self) -> None:
+        self.k.sums.fill(0.0)
+
+    def _row(self, sums, state, last, span, material, gravity) -> list[list[float]]:
+        """Momentum, edge, face, board, gravity, residual, energies of one interval."""
+        mirror = np.array([0.0 if m else 1.0 for m in (*self.scene.mirrors, False)])
+        momentum = state[:3] * self.images * mirror
+        edge, face, board = (sums[r : r + 3] / span for r in (kn.EDGE, kn.FACE, kn.BOARD))
+        weight = np.array([0.0, 0.0, -material.rho * self.seeds.volume * len(self.seeds.x) * self.images * gravity])
+        residual = (momentum - last) / span - weight + edge + face + board
+        lost = [self.images * self.seeds.volume * sums[r] for r in (kn.PLASTIC, kn.DAMAGE, kn.VISCOUS)]
+        energy = [state[3] * self.images, state[4] * self.images, *lost]
+        return [list(momentum), list(edge), list(face), list(board), list(weight), list(residual), energy]
+
+    def _record(self, rows, status, fraction, dt, steps, speed, wall) -> ForceRecord:
+        """Columns of the rows as a record."""
+        a = np.array(rows)
+        parts = {n: a[:, 2 + 3 * k : 5 + 3 * k] for k, n in enumerate(("p", "edge", "face", "board", "g", "res"))}
+        kinetic, elastic = a[:, 20], a[:, 21]
+        plastic, damage, viscous = np.cumsum(a[:, 22:25], axis=0).T
+        shape = self.scene.food.shape
+        return ForceRecord(
+            stroke=a[:, 0],
+            time=a[:, 1],
+            edge=parts["edge"],
+            face=parts["face"],
+            board=parts["board"],
+            gravity=parts["g"],
+            momentum=parts["p"],
+            residual=parts["res"],
+            kinetic=kinetic,
+            elastic=elastic,
+            plastic=plastic,
+            damage=damage,
+            viscous=viscous,
+            speed=speed,
+            dt=dt,
+            steps=steps,
+            particles=len(self.seeds.x),
+            images=self.images,
+            cells=int(np.prod(self.nodes)),
+            severed_area=section_area(shape),
+            counters={},
+            wall=wall,
+            status=status,
+            fraction=fraction,
+        )
+
+
+def _health(sums: np.ndarray, state: np.ndarray) -> str:
+    """``done`` for a sound interval, else the typed reason why the run cannot go on."""
+    if not np.isfinite(state).all() or not np.isfinite(sums).all():
+        return "not_finite"
+    if sums[kn.OUTSIDE] > 0:
+        return "left_grid"
+    return "done"
+
+
+def simulate(scene: Scene, *, runtime: Runtime | None = None, progress: Progress | None = None) -> ForceRecord:
+    """Run one cut and insist on its end.
+
+    Raises:
+        SimulationError: The run broke down; the message names reason and stroke.
+    """
+    record = Simulation(scene, runtime).run(progress=progress)
+    if record.status != "done":
+        raise SimulationError(
+            f"the simulation stopped at {record.fraction:.0%} of the stroke: {record.status}",
+            reason=record.status,
+            fraction=record.fraction,
+        )
+    return record
