@@ -324,8 +324,13 @@ class Kernels:
         return force
 
     @ti.func
-    def cut_slice(self, i, j_low, j_high, k_low, k_high, dt, tip, speed):
+    def cut_slice(self, i, dt, tip, speed):
         """The cutting edge in one slice along the blade: slip, line force, reaction on the grid."""
+        reach = 1.5 * self.par[ZONE]
+        j_low = ti.max(0, ti.floor((-reach - self.oy) * self.inv, ti.i32))
+        j_high = ti.min(self.nodes[1], ti.ceil((reach - self.oy) * self.inv, ti.i32) + 1)
+        k_low = ti.max(0, ti.floor((tip - self.par[ZONE] / 2 - reach - self.oz) * self.inv, ti.i32))
+        k_high = ti.min(self.nodes[2], ti.ceil((tip - self.par[ZONE] / 2 + reach - self.oz) * self.inv, ti.i32) + 1)
         mass, mom = 0.0, 0.0
         for j in range(j_low, j_high):
             for k in range(k_low, k_high):
@@ -343,11 +348,11 @@ class Kernels:
                 for k in range(k_low, k_high):
                     push = dv * self.zone_weight(j, k, tip)
                     for s in ti.static(range(self.sides)):
-                        self.u[s, i, j, k][2] -= push
+                        self.u[s, i, j, k][2] = self.u[s, i, j, k][2] - push
                         if ti.static(self.mx):
                             image = 2 * self.i0 - i
                             if i > self.i0 and image >= 0:
-                                self.u[s, image, j, k][2] -= push
+                                self.u[s, image, j, k][2] = self.u[s, image, j, k][2] - push
             self.tool(EDGE, 0.0, 0.0, impulse * self.images_x(i))
         else:
             self.elastic_slip[i] = 0.0
@@ -408,12 +413,9 @@ class Kernels:
         self.v[p] = u
         self.x[p] = at
 
-    @ti.kernel
-    def step(self, dt: float, tip: float, tip_next: float, speed: float, w: IVEC6, jl: int, jh: int, kl: int, kh: int):
-        """One time step with the edge at height ``tip``.
-
-        ``w`` bounds the nodes that particles can reach (three lower, three upper), jl..kh those of the process zone.
-        """
+    @ti.func
+    def advance(self, dt, tip, speed, w):
+        """One time step with the edge at height ``tip``; ``w`` bounds the nodes that particles can reach."""
         for i, j, k in ti.ndrange((w[0], w[3]), (w[1], w[4]), (w[2], w[5])):
             for s in ti.static(range(self.threads * self.sides)):
                 self.g[s, i, j, k] = ti.Vector.zero(float, 4)
@@ -422,6 +424,12 @@ class Kernels:
                 row = self.scatter(p, 0, dt, tip)
                 for r in ti.static(range(5)):
                     self.sums[PLASTIC + r] += row[r]
+        elif ti.static(self.threads == 1):
+            total = ti.Vector.zero(float, 5)
+            for p in range(self.n):
+                total += self.scatter(p, 0, dt, tip)
+            for r in ti.static(range(5)):
+                self.sums[PLASTIC + r] += total[r]
         else:
             for block in range(self.threads * CPU_BLOCK):
                 if block % CPU_BLOCK == 0:
@@ -452,11 +460,27 @@ class Kernels:
                         self.near[i] += ti.cast(self.start[i + d] > 0, ti.i32)
             for i in range(self.nodes[0]):
                 if self.cover[i] > 0 and i >= self.i0:
-                    self.cut_slice(i, jl, jh, kl, kh, dt, tip, speed)
-        for p in self.x:
-            self.gather(p, dt, tip_next, speed)
+                    self.cut_slice(i, dt, tip, speed)
+        for p in range(self.n):
+            self.gather(p, dt, tip - speed * dt, speed)
 
     @ti.kernel
+    def step(self, dt: float, tip: float, speed: float, w: IVEC6):
+        """One time step, its loops in parallel."""
+        self.advance(dt, tip, speed, w)
+        if ti.static(self.damage):
+            self.smooth_strain()
+
+    @ti.kernel
+    def steps(self, count: int, dt: float, tip: float, speed: float, w: IVEC6):
+        """Several time steps on one thread without leaving the kernel."""
+        ti.loop_config(serialize=True)
+        for n in range(count):
+            self.advance(dt, tip - speed * dt * n, speed, w)
+            if ti.static(self.damage):
+                self.smooth_strain()
+
+    @ti.func
     def smooth_strain(self):
         """Replace each particle's driving strain by its mean over the grid's weights (one pass)."""
         for i, j, k in self.smooth:

@@ -59,7 +59,7 @@ class Material:
     mu: float = 0.0
     tensile_strength: float | None = None
     fracture_energy: float | None = None
-    loss_factor: float = 0.1
+    loss_factor: float = 0.0
 
     def __post_init__(self) -> None:
         w = "material"

@@ -147,9 +147,7 @@ class Simulation:
         status, done, last = "done", 0, np.zeros(3)
         while done < total:
             count = min(every, total - done)
-            window = self._window()
-            for n in range(done, done + count):
-                self._step(dt, height + gap - speed * dt * n, speed, window)
+            self._advance(count, dt, height + gap - speed * dt * done, speed)
             done += count
             sums, state = self.k.sums.to_numpy(), self._state()
             self._clear_sums()
@@ -172,16 +170,14 @@ class Simulation:
                 low[axis], high[axis] = min(low[axis], plane - 2), max(high[axis], plane + 3)
         return kn.IVEC6([*np.maximum(low, 0), *np.minimum(high, self.nodes)])
 
-    def _step(self, dt: float, tip: float, speed: float, window: Any) -> None:
-        """One time step, with the nodes of the process zone."""
-        zone, dx = self.scene.edge.zone, self.scene.numerics.dx
-        j_low = max(0, math.floor((-1.5 * zone - self.origin[1]) / dx))
-        j_high = min(self.nodes[1], math.ceil((1.5 * zone - self.origin[1]) / dx) + 1)
-        k_low = max(0, math.floor((tip - 2 * zone - self.origin[2]) / dx))
-        k_high = min(self.nodes[2], math.ceil((tip + zone - self.origin[2]) / dx) + 1)
-        self.k.step(dt, tip, tip - speed * dt, speed, window, j_low, j_high, k_low, k_high)
-        if self.k.damage:
-            self.k.smooth_strain()
+    def _advance(self, count: int, dt: float, tip: float, speed: float) -> None:
+        """Some time steps with the edge at ``tip`` in the first one [m]."""
+        window = self._window()
+        if self.k.threads == 1 and not self.k.atomic:
+            self.k.steps(count, dt, tip, speed, window)
+            return
+        for n in range(count):
+            self.k.step(dt, tip - speed * dt * n, speed, window)
 
     def _state(self) -> np.ndarray:
         self.k.measure()
@@ -222,6 +218,7 @@ class Simulation:
             plastic=plastic,
             damage=damage,
             viscous=viscous,
+            cell=self.scene.numerics.dx,
             speed=speed,
             dt=dt,
             steps=steps,

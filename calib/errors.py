@@ -1,0 +1,21 @@
+"""Errors of the calibration side: traces, curves, materials and output folders."""
+
+from __future__ import annotations
+
+from mpm.errors import CutcalError
+
+
+class TraceError(CutcalError):
+    """A force trace that cannot be read, or in which no cut can be found."""
+
+
+class CurveError(CutcalError, ValueError):
+    """Force curves that cannot be filtered, compared or rated as given."""
+
+
+class MaterialError(CutcalError):
+    """A food or a material property that is unknown, incomplete or out of its range."""
+
+
+class OutputError(CutcalError):
+    """An output folder or file that cannot be written, or that belongs to another calibration."""

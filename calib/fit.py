@@ -1,0 +1,387 @@
+"""The search for the material: few, noisy, expensive simulations, run two or more at a time.
+
+1. Design: the given values, the centre of the prior and a scrambled Sobol sample of its 95 % box, on the
+   coarse evaluator if there is one.  Quasi-static forces scale with the stress-like parameters, so every run
+   of the design stands for a whole line of materials; the best points of the best lines are run next.
+2. Differences: one wide step along each parameter from the best point.
+3. Rounds: a Gaussian process through all smoothed curves so far (not through the misfit, which hides which
+   part of a curve is wrong) proposes one batch: the point of least *expected* chi-square near the best one,
+   the most promising point elsewhere if that is another one, and probes inside the present 95 % region.
+4. When neither the process nor the runs give a gain worth its noise: differences about the best point, and
+   again 3 if the process now promises a gain.  The Jacobian there is that of the process, in which the noise
+   of single runs is averaged out; plain differences of noisy curves would make every parameter look well
+   identified.
+
+The best run ever made is returned, not the last one.
+
+Sources: composite objectives, Astudillo & Frazier (2019), Proc. ICML 97; regression models for noisy least
+squares, Cartis et al. (2019), ACM TOMS 45:32, doi 10.1145/3338517.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import minimize_scalar
+from scipy.stats import qmc
+
+from calib.errors import MaterialError
+from calib.objective import Evaluation, Evaluator, Objective, Trial
+from calib.parameters import ParameterSet
+from calib.progress import Progress
+from calib.uncertainty import CurveProcess, coordinate_unit
+from mpm.errors import SimulationError
+
+FloatArray = npt.NDArray[np.float64]
+
+#: Points are rounded to this part of a coordinate unit (0.1 % of a log parameter): far below the noise of a
+#: run, and a resumed fit asks for exactly the points that are in the store.
+LATTICE = 1e-3
+#: The process is trusted this far from the best point: a factor e of a log parameter, the prior range of
+#: another.
+RADIUS = 1.0
+#: A promising point elsewhere must be this far from the one nearby [coordinate units].
+ELSEWHERE = 0.2
+#: Weight of not knowing the curve in the expected chi-square: 1 is the expectation; less elsewhere, for the
+#: sake of basins that are unexplored but promising.
+CAUTION_NEAR, CAUTION_FAR = 1.0, 0.3
+#: Points from which the most promising one is sought: random ones besides all runs, and how many are
+#: followed.
+STARTS, FOLLOWED = 16, 3
+#: Probes are drawn from the normal approximation of the posterior, this much wider (in 24 synthetic cuts with
+#: 1 % noise 1.5 left a tenth of the excess chi-square of isotropic probes), and may cost this much more than
+#: the best run: about a 90 % region of one parameter, where curvature matters for the intervals.
+PROBE_SPREAD, PROBE_COST, PROBES = 1.5, 3.0, 200
+#: Rounds without promise and gain after which the search has converged; rounds without gain after which it
+#: stalls.
+CALM_ROUNDS, STALLED_ROUNDS = 2, 4
+#: Designs that may break down completely before the search gives up.
+LARGEST_DESIGNS = 3
+#: Largest joint scaling of the design's materials, as a logarithm: a factor 20 either way.
+LARGEST_SCALE = 3.0
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """How much to spend on a fit.
+
+    Attributes:
+        budget: Largest number of simulations, coarse ones counted by their cost.
+        batch: Simulations that run at the same time (worker processes).
+        design: Space-filling runs at the start, besides the given values and the prior centre.
+        coarse_cost: Cost of a coarse simulation in fine ones [-]; half the resolution costs about a quarter
+            or less.
+        tolerance: Gain in chi-square that is worth a round [-], times the reduced chi-square where that
+            exceeds 1. 0.2 is a twentieth of what bounds a 95 % interval (3.84).
+        seed: Seed of the design and of the probes.
+
+    Raises:
+        ValueError: A number that is not positive.
+    """
+
+    budget: float = 70.0
+    batch: int = 2
+    design: int = 7
+    coarse_cost: float = 0.25
+    tolerance: float = 0.2
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if min(self.budget, self.batch, self.design, self.coarse_cost, self.tolerance) <= 0 or self.seed < 0:
+            raise ValueError(f"{self} has a number that is not positive; give positive ones.")
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """Outcome of a fit.
+
+    Attributes:
+        status: ``converged`` (no gain in sight), ``stalled`` (gains promised, none realised), ``budget``
+            (spent) or ``interrupted``.
+        best: Best finished run on the fine evaluator.
+        parameters: The fitted parameters with the best values [SI].
+        jacobian: Derivative of the residual vector at the best point by internal coordinates (n + 2 + p, p);
+            None when the search was interrupted before there were enough runs.
+        repeatability: Noise of a simulated curve as seen by the fit, part of the peak [-]; NaN without
+            Jacobian.
+        history: All runs in the order of the search.
+    """
+
+    status: str
+    best: Trial
+    parameters: ParameterSet
+    jacobian: FloatArray | None
+    repeatability: float
+    history: tuple[Trial, ...]
+
+    @property
+    def simulations(self) -> int:
+        """Number of runs on the fine evaluator."""
+        return sum(not t.coarse for t in self.history)
+
+    @property
+    def coarse_simulations(self) -> int:
+        """Number of runs on the coarse evaluator."""
+        return sum(t.coarse for t in self.history)
+
+    @property
+    def failed(self) -> int:
+        """Number of runs that did not finish their stroke."""
+        return sum(not t.ok for t in self.history)
+
+
+def calibrate(
+    objective: Objective,
+    evaluator: Evaluator,
+    *,
+    coarse: Evaluator | None = None,
+    options: FitOptions | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> FitResult:
+    """Fit the objective's parameters with few simulations; see the module for the method.
+
+    Args:
+        objective: Target, parameters and error model.
+        evaluator: Runs simulations at the resolution that counts.
+        coarse: Runs cheaper simulations for the design.
+        options: Budget and the like.
+        progress: Called after each simulation.
+
+    Returns:
+        The best run, its Jacobian and the history; after Ctrl-C what there is so far, with status
+        ``interrupted``.
+
+    Raises:
+        MaterialError: A budget too small for the number of parameters.
+        SimulationError: No simulation of the design reached the end of its stroke.
+        KeyboardInterrupt: Interrupted before any simulation reached the end of its stroke.
+    """
+    options = FitOptions() if options is None else options
+    least = 2 * len(objective.parameters) + options.design + 2
+    if options.budget < least:
+        raise MaterialError(
+            f"a budget of {options.budget:g} simulations is too small for "
+            f"{len(objective.parameters)} parameters; give at least {least}, or fit fewer."
+        )
+    search = _Search(objective, evaluator, coarse, options, progress)
+    try:
+        status = search.run()
+    except KeyboardInterrupt:
+        if not search.finished:
+            raise
+        status = "interrupted"
+    return search.result(status)
+
+
+class _Search:
+    """The rounds of one fit and all their runs."""
+
+    def __init__(
+        self,
+        objective: Objective,
+        evaluator: Evaluator,
+        coarse: Evaluator | None,
+        options: FitOptions,
+        progress: Callable[[Progress], None] | None,
+    ) -> None:
+        self.objective, self.options, self.progress = objective, options, progress
+        self.parameters = objective.parameters
+        self.fine, self.coarse = evaluator, coarse
+        self.trials: list[Trial] = []
+        self.random = np.random.default_rng(options.seed)
+        self.unit = coordinate_unit(self.parameters)
+        self.hyper: FloatArray | None = None
+        self.centre: FloatArray | None = None
+
+    @property
+    def finished(self) -> list[Trial]:
+        """Finished runs on the fine evaluator."""
+        return [t for t in self.trials if t.ok and not t.coarse]
+
+    @property
+    def best(self) -> Trial:
+        """Best finished run on the fine evaluator; there is one after the design."""
+        return min(self.finished, key=lambda t: t.misfit)
+
+    @property
+    def spent(self) -> float:
+        """Budget spent [fine simulations]."""
+        return sum(self.options.coarse_cost if t.coarse else 1.0 for t in self.trials)
+
+    @property
+    def worth(self) -> float:
+        """Gain in chi-square that is worth a round [-]."""
+        return self.options.tolerance * max(1.0, self.best.misfit / self.objective.effective_rows)
+
+    def run(self) -> str:
+        """Search until there is nothing to gain or to spend; return the status."""
+        self._start()
+        self._differences()
+        while True:
+            status, best = self._rounds(), self.best
+            if status == "budget" or not self._differences():
+                return status
+            process = self._process()
+            if self.best is best and _promise(process, _near(process)) < self.worth:
+                return status
+
+    def result(self, status: str) -> FitResult:
+        """What was found, with a Jacobian if there are runs enough for one."""
+        best, jacobian, repeatability = self.best, None, math.nan
+        if len(self.finished) > len(self.parameters):
+            process = self._process()
+            jacobian, repeatability = process.jacobian(best.z), process.noise
+        parameters = self.parameters.with_values(best.evaluation.parameters)
+        return FitResult(status, best, parameters, jacobian, repeatability, tuple(self.trials))
+
+    def _start(self) -> None:
+        """Design and the best of its lines; again with another design while every run breaks down."""
+        low, high = self.parameters.box
+        sobol = qmc.Sobol(len(low), scramble=True, seed=self.options.seed)
+        sample = sobol.random_base2(math.ceil(math.log2(LARGEST_DESIGNS * self.options.design)))
+        points = [self.parameters.start, self.parameters.prior_mean]
+        for k in range(LARGEST_DESIGNS):
+            part = sample[k * self.options.design : (k + 1) * self.options.design]
+            self._evaluate(points + list(low + (high - low) * (0.1 + 0.8 * part)), "design", coarse=True)
+            lines = sorted((self._scaled(t) for t in self.trials if t.ok), key=lambda line: line[0])
+            self._evaluate([z for _, z in lines[: self.options.batch]], "scaled")
+            if self.finished:
+                return
+            points = []
+        furthest = max((t.evaluation for t in self.trials), key=lambda e: e.fraction)
+        raise SimulationError(
+            f"none of {len(self.trials)} simulations reached the end of its stroke; the furthest got to "
+            f"{furthest.fraction:.0%} ({furthest.reason}) at {furthest.parameters}; check the scene, or "
+            "narrow the prior ranges.",
+            reason=furthest.reason,
+            fraction=furthest.fraction,
+        )
+
+    def _scaled(self, trial: Trial) -> tuple[float, FloatArray]:
+        """Least chi-square that jointly scaled stress-like parameters would give, and the point of it."""
+        along = self.parameters.stress_like()
+
+        def cost(log_k: float) -> float:
+            z = self.parameters.clip(trial.z + log_k * along)
+            rows = self.objective.residual(trial.curve * math.exp(log_k), 1.0, z)
+            return float(rows @ rows)
+
+        found = minimize_scalar(cost, bounds=(-LARGEST_SCALE, LARGEST_SCALE), method="bounded")
+        return float(found.fun), trial.z + float(found.x) * along
+
+    def _differences(self) -> bool:
+        """Step along each parameter from the best point; False where that was done or cannot be paid."""
+        z, steps = self.best.z, self.parameters.steps
+        done = self.centre is not None and bool(np.all(np.abs(z - self.centre) < steps))
+        if done or self._room() < len(steps):
+            return False
+        self.centre = z
+        inwards = np.where(z > self.parameters.prior_mean, -1.0, 1.0)
+        self._evaluate([z + d for d in np.diag(inwards * steps)], "difference")
+        return True
+
+    def _rounds(self) -> str:
+        """Rounds of one batch each, until they are calm or only the last differences can still be paid."""
+        calm = stalled = 0
+        while self._room() >= self.options.batch + len(self.parameters):
+            before, worth, process = self.best.misfit, self.worth, self._process()
+            near = _near(process)
+            points, promise = [near], _promise(process, near)
+            far = self._far(process)
+            if np.abs((far - near) / self.unit).max() > ELSEWHERE:
+                points.append(far)
+            points += self._probes(process, near, self.options.batch - len(points))
+            self._evaluate(points[: self.options.batch], "round")
+            gained = before - self.best.misfit >= worth
+            stalled = 0 if gained else stalled + 1
+            calm = 0 if gained or promise >= worth else calm + 1
+            if calm >= CALM_ROUNDS or stalled >= STALLED_ROUNDS:
+                return "converged" if calm >= CALM_ROUNDS else "stalled"
+        return "budget"
+
+    def _far(self, process: CurveProcess) -> FloatArray:
+        """The most promising point within the bounds, sought from random points and all runs."""
+        low, high = self.parameters.box
+        starts = list(self.random.uniform(low, high, (STARTS, len(low)))) + [t.z for t in self.trials]
+        starts.sort(key=lambda z: process.expected(z, CAUTION_FAR))
+        found = [process.least(z, math.inf, CAUTION_FAR) for z in starts[:FOLLOWED]]
+        return min(found, key=lambda z: process.expected(z, CAUTION_FAR))
+
+    def _probes(self, process: CurveProcess, near: FloatArray, count: int) -> list[FloatArray]:
+        """Of points drawn from the posterior about ``near`` the ``count`` least known good ones."""
+        if count < 1:
+            return []
+        rows = process.jacobian(near)
+        spread = PROBE_SPREAD * np.linalg.inv(np.linalg.cholesky(rows.T @ rows))
+        points = self.parameters.clip(near + self.random.standard_normal((PROBES, len(near))) @ spread)
+        cost = np.array([process.expected(z, 0.0) for z in points])
+        doubt = np.array([process.doubt(z) for z in points])
+        good = cost < max(process.best.misfit, cost.min()) + PROBE_COST
+        return [points[i] for i in np.argsort(np.where(good, -doubt, 0.0))[:count]]
+
+    def _process(self) -> CurveProcess:
+        process = CurveProcess(self.objective, self.trials, self.best, self.hyper)
+        self.hyper = process.hyper
+        return process
+
+    def _room(self) -> int:
+        """Fine simulations that the budget still holds."""
+        return int(self.options.budget - self.spent + 1e-9)
+
+    def _evaluate(self, points: Sequence[FloatArray], stage: str, *, coarse: bool = False) -> None:
+        """Run those points that are new and can be paid; the history keeps the order of the points."""
+        coarse = coarse and self.coarse is not None
+        cost = self.options.coarse_cost if coarse else 1.0
+        grid = LATTICE * self.unit
+        known = [t.z for t in self.trials if t.coarse == coarse]
+        batch: list[FloatArray] = []
+        for point in points:
+            z = self.parameters.clip(np.round(point / grid) * grid)
+            new = all(np.any(np.abs(z - other) > 0.5 * grid) for other in known + batch)
+            if new and self.spent + (len(batch) + 1) * cost <= self.options.budget + 1e-9:
+                batch.append(z)
+        first, order = len(self.trials), []
+        for evaluation in self._simulate([self.parameters.to_dict(z) for z in batch], coarse):
+            self.trials.append(self.objective.trial(evaluation, coarse=coarse, stage=stage))
+            order.append(evaluation.index)
+            self._report(stage)
+        self.trials[first:] = [self.trials[first + i] for i in np.argsort(order)]
+
+    def _simulate(self, batch: list[dict[str, float]], coarse: bool) -> Iterator[Evaluation]:
+        evaluator = self.coarse if coarse and self.coarse is not None else self.fine
+        return evaluator.evaluate(batch) if batch else iter(())
+
+    def _report(self, stage: str) -> None:
+        """Call the progress callback."""
+        if self.progress is None:
+            return
+        seconds = [
+            t.evaluation.seconds / (self.options.coarse_cost if t.coarse else 1.0) for t in self.trials
+        ]
+        rest = self.options.budget - self.spent
+        misfit = self.best.misfit if self.finished else math.inf
+        self.progress(
+            Progress(
+                done=len(self.trials),
+                spent=self.spent,
+                budget=self.options.budget,
+                failed=sum(not t.ok for t in self.trials),
+                misfit=misfit,
+                eta_s=float(np.mean(seconds)) * rest / self.options.batch,
+                stage=stage,
+            )
+        )
+
+
+def _near(process: CurveProcess) -> FloatArray:
+    """Point of least expected chi-square near the best one."""
+    return process.least(process.best.z, RADIUS, CAUTION_NEAR)
+
+
+def _promise(process: CurveProcess, z: FloatArray) -> float:
+    """Gain in chi-square that the process expects of z over the best point [-]."""
+    return process.expected(process.best.z, CAUTION_NEAR) - process.expected(z, CAUTION_NEAR)

@@ -1,0 +1,316 @@
+"""The misfit of a simulated cut against the conditioned real curve, as a vector of residuals.
+
+Rows of the vector (n grid points, p parameters; all without dimension, one standard deviation each):
+
+    0 .. n-1   w (m_i - r_i) / sigma     m: simulated, r: real force, both smoothed alike, on the trace's
+    stroke grid n          (max m - max r) / s_peak  the headline figure, which n correlated points would
+    otherwise outvote n+1        P (1 - fraction)          zero for a run that reached the end of the stroke
+    n+2 ..     (z_j - mean_j) / sd_j     literature priors in internal coordinates
+
+    sigma^2  = noise_sd^2 + (discrepancy * max r)^2
+    s_peak^2 = peak_sd^2 + (peak * max r)^2
+    w        = sqrt(n_eff / n),   n_eff = stroke length / correlation length
+
+A run that broke down gives a vector of the same length: where it computed nothing, its last mean difference
+to the real curve is held.  The vector is finite, continuous in ``fraction``, and passes into that of a
+finished run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from calib.errors import TraceError
+from calib.parameters import ParameterSet
+
+FloatArray = npt.NDArray[np.float64]
+
+#: Smooths a raw record like the real one was: (grid [m] (n,), stroke [m] (k,), force [N] (k,)) -> force [N]
+#: (n,).
+Smoother = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+
+#: Model discrepancy as a part of the peak.  Seven-parameter curves fitted to single cuts of apple, cucumber
+#: and potato leave 2-7 % of the peak; a simulator with five constants is not credited with more than the
+#: better half.
+DISCREPANCY = 0.03
+
+#: Correlation length of that discrepancy as a part of the stroke: structural misfit (a skin peak, a slope, a
+#: plateau) extends over about a twentieth of a cut, so at most 20 of the grid points count as independent.
+CORRELATION = 0.05
+
+#: Tolerance of the peak, as a part of it, so that an error of 5 % (the limit of a passed calibration) costs
+#: 2.5 sd.
+PEAK = 0.02
+
+#: Samples further than this many real peaks from the real curve count as that far: a spike of a run that
+#: blows up must not overflow the sum of squares.
+LARGEST_DIFFERENCE = 10.0
+
+#: A run that broke down is continued at the mean difference over this last part of the stroke: over less, the
+#: spike with which it broke down would be held.
+TAIL = 0.05
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One simulation as it came back.
+
+    Attributes:
+        index: Place in the batch that asked for it.
+        parameters: Values [SI] by name.
+        status: ``ok`` or the kind of failure (``failed``, ``crashed``, ``timeout``...).
+        reason: Typed reason of a failure, empty when ok.
+        fraction: Part of the stroke that was completed [-], 0 to 1.
+        stroke: Knife path from first contact [m] (k,), rising; may be empty after a failure.
+        force: Force of the food on the knife, upwards positive [N] (k,).
+        scalars: Named results: momentum_residual, ke_over_ie, wall_s, ...
+        seconds: Wall time of the run [s].
+
+    Raises:
+        ValueError: A fraction outside [0, 1], or stroke and force that are not vectors of one length.
+    """
+
+    index: int
+    parameters: dict[str, float]
+    status: str
+    reason: str
+    fraction: float
+    stroke: FloatArray
+    force: FloatArray
+    scalars: dict[str, float] = field(default_factory=dict)
+    seconds: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.fraction <= 1.0:
+            raise ValueError(
+                f"evaluation {self.index} completed the fraction {self.fraction} of its stroke; "
+                "it must be in [0, 1]."
+            )
+        if self.stroke.ndim != 1 or self.stroke.shape != self.force.shape:
+            raise ValueError(
+                f"evaluation {self.index} has {self.stroke.shape} strokes and {self.force.shape} forces; "
+                "they must be two vectors of equal length."
+            )
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run reached the end of its stroke."""
+        return self.status == "ok"
+
+
+class Evaluator(Protocol):
+    """Whatever runs simulations: a pool of processes, a cache before it, or a fake."""
+
+    def evaluate(self, batch: Sequence[Mapping[str, float]]) -> Iterator[Evaluation]:
+        """Run each set of ``batch``; yield in order of completion, ``index`` = place in the batch."""
+
+
+@dataclass(frozen=True)
+class ErrorModel:
+    """How far a right model may be from the trace; see the constants of this module for the reasons.
+
+    Attributes:
+        discrepancy: Model discrepancy along the curve, part of the real peak [-].
+        correlation: Correlation length of the residuals, part of the stroke [-], at most 1.
+        peak: Tolerance of the peak force, part of the real peak [-].
+    """
+
+    discrepancy: float = DISCREPANCY
+    correlation: float = CORRELATION
+    peak: float = PEAK
+
+    def __post_init__(self) -> None:
+        if not (self.discrepancy > 0.0 and self.peak > 0.0 and 0.0 < self.correlation <= 1.0):
+            raise TraceError(
+                f"error model {self} needs discrepancy > 0, peak > 0 and 0 < correlation <= 1; "
+                "give parts of the peak and of the stroke, for instance 0.03."
+            )
+
+
+@dataclass(frozen=True)
+class Target:
+    """The conditioned real curve that a simulation is compared with.
+
+    Attributes:
+        stroke: Uniform stroke grid from 0 [m] (n,).
+        curve: Smoothed real force [N] (n,).
+        noise_sd: Standard deviation of the noise of ``curve`` [N].
+        peak_sd: Standard deviation of its peak [N].
+        smooth: Puts a raw simulated record on given strokes, smoothed like ``curve``.
+
+    Raises:
+        TraceError: A curve that is not finite, not matching its grid, or without a positive peak.
+    """
+
+    stroke: FloatArray
+    curve: FloatArray
+    noise_sd: float
+    peak_sd: float
+    smooth: Smoother
+
+    def __post_init__(self) -> None:
+        if self.stroke.ndim != 1 or self.stroke.shape != self.curve.shape or self.stroke.size < 2:
+            raise TraceError(
+                f"target has {self.stroke.shape} strokes and {self.curve.shape} forces; give two "
+                "vectors of equal length, at least 2."
+            )
+        if not (np.isfinite(self.curve).all() and np.all(np.diff(self.stroke) > 0.0)):
+            raise TraceError(
+                "target has forces that are not finite or strokes that do not rise; condition it first."
+            )
+        if not self.peak > 0.0:
+            raise TraceError(
+                f"target has the peak {self.peak:g} N; it must be positive, check the sign of the force."
+            )
+        if not (0.0 <= self.noise_sd < math.inf and 0.0 <= self.peak_sd < math.inf):
+            raise TraceError(
+                f"target has noise_sd {self.noise_sd:g} N and peak_sd {self.peak_sd:g} N; "
+                "give finite values that are not negative."
+            )
+
+    @property
+    def peak(self) -> float:
+        """Largest force of the real curve [N]."""
+        return float(self.curve.max())
+
+    @property
+    def length(self) -> float:
+        """Length of the stroke [m]."""
+        return float(self.stroke[-1] - self.stroke[0])
+
+
+@dataclass(frozen=True)
+class Trial:
+    """An evaluation as the objective sees it.
+
+    Attributes:
+        z: Internal coordinates (p,).
+        evaluation: The simulation.
+        curve: Its smoothed force on the target's grid [N] (n,).
+        residual: Its residual vector (n + 2 + p,).
+        coarse: Whether it was run at the coarse resolution.
+        stage: Why it was run: design, scaled, difference or round.
+    """
+
+    z: FloatArray
+    evaluation: Evaluation
+    curve: FloatArray
+    residual: FloatArray
+    coarse: bool = False
+    stage: str = "design"
+
+    @property
+    def misfit(self) -> float:
+        """Chi-square with priors [-]."""
+        return float(self.residual @ self.residual)
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run reached the end of its stroke."""
+        return self.evaluation.ok
+
+
+@dataclass(frozen=True)
+class Objective:
+    """Residual vector and chi-square of evaluations against one target, with priors.
+
+    Attributes:
+        target: The real curve.
+        parameters: The fitted parameters with their priors.
+        errors: The error model.
+    """
+
+    target: Target
+    parameters: ParameterSet
+    errors: ErrorModel = field(default_factory=ErrorModel)
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of one point of the curve [N]."""
+        return math.hypot(self.target.noise_sd, self.errors.discrepancy * self.target.peak)
+
+    @property
+    def sigma_peak(self) -> float:
+        """Standard deviation of the peak [N]."""
+        return math.hypot(self.target.peak_sd, self.errors.peak * self.target.peak)
+
+    @property
+    def effective_points(self) -> float:
+        """Effective number of independent points of the curve [-]."""
+        return min(float(self.target.stroke.size), 1.0 / self.errors.correlation)
+
+    @property
+    def effective_rows(self) -> float:
+        """Effective number of independent data: those of the curve and the peak [-]."""
+        return self.effective_points + 1.0
+
+    @property
+    def data_rows(self) -> int:
+        """Length of :meth:`data_residual`: grid points, peak, failure."""
+        return self.target.stroke.size + 2
+
+    @property
+    def failure_weight(self) -> float:
+        """Penalty P of a run that computed nothing: the misfit of predicting no force at all [-]."""
+        return float(np.linalg.norm(self._compare(np.zeros_like(self.target.curve))))
+
+    def curve(self, evaluation: Evaluation) -> tuple[FloatArray, float]:
+        """Smoothed force on the target's grid [N] (n,) and the part of the stroke [-] that was completed.
+
+        Samples from the first one that is not finite on, and those that do not advance the stroke, are left
+        out. Beyond the last sample the record is continued at its last mean difference to the real curve.
+        """
+        target = self.target
+        stroke, force, fraction = _usable(evaluation, target)
+        if stroke.size < 2:
+            return target.curve.copy(), fraction
+        limit = LARGEST_DIFFERENCE * target.peak
+        force = np.clip(force, -limit, limit)
+        beyond = target.stroke > stroke[-1]
+        if beyond.any():
+            tail = stroke > stroke[-1] - TAIL * target.length
+            held = np.mean(force[tail] - np.interp(stroke[tail], target.stroke, target.curve))
+            stroke = np.append(stroke, target.stroke[beyond])
+            force = np.append(force, target.curve[beyond] + held)
+        return target.smooth(target.stroke, stroke, force), fraction
+
+    def data_residual(self, curve: FloatArray, fraction: float = 1.0) -> FloatArray:
+        """Rows of curve, peak and failure (n + 2,) of a curve [N] (n,) that completed ``fraction``."""
+        return np.append(self._compare(curve), self.failure_weight * (1.0 - fraction))
+
+    def residual(self, curve: FloatArray, fraction: float, z: FloatArray) -> FloatArray:
+        """All rows (n + 2 + p,) of a curve [N] (n,) from a run at ``z`` (p,) that completed ``fraction``."""
+        return np.concatenate([self.data_residual(curve, fraction), self.parameters.prior_residual(z)])
+
+    def trial(self, evaluation: Evaluation, *, coarse: bool = False, stage: str = "design") -> Trial:
+        """Curve and residual vector of an evaluation; always finite."""
+        z = self.parameters.to_vector(evaluation.parameters)
+        curve, fraction = self.curve(evaluation)
+        return Trial(z, evaluation, curve, self.residual(curve, fraction, z), coarse, stage)
+
+    def _compare(self, curve: FloatArray) -> FloatArray:
+        """Rows of curve and peak (n + 1,)."""
+        weight = math.sqrt(self.effective_points / curve.size) / self.sigma
+        peak = (float(curve.max()) - self.target.peak) / self.sigma_peak
+        return np.append(weight * (curve - self.target.curve), peak)
+
+
+def _usable(evaluation: Evaluation, target: Target) -> tuple[FloatArray, FloatArray, float]:
+    """Finite samples of a rising stroke [m] with their force [N], and the completed part of the stroke."""
+    stroke, force = np.asarray(evaluation.stroke, float), np.asarray(evaluation.force, float)
+    fraction = 1.0 if evaluation.ok else evaluation.fraction
+    bad = ~(np.isfinite(stroke) & np.isfinite(force))
+    end = int(np.argmax(bad)) if bad.any() else stroke.size
+    advance = np.diff(np.maximum.accumulate(stroke[:end]), prepend=-math.inf) > 0.0
+    stroke, force = stroke[:end][advance], force[:end][advance]
+    if stroke.size < 2:
+        fraction = 0.0
+    elif bad.any():
+        fraction = min(fraction, max((float(stroke[-1]) - float(target.stroke[0])) / target.length, 0.0))
+    return stroke, force, fraction

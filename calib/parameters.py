@@ -1,0 +1,254 @@
+"""Parameters of a fit: value, hard bounds, literature prior and the coordinate the optimiser works in.
+
+Stiffness-like quantities live over decades and are fitted by their logarithm; ``nu`` and ``mu`` linearly.
+In that *internal* coordinate ``z`` the prior is normal, and its 95 % range is the range of the literature:
+
+    mean = (z(prior_low) + z(prior_high)) / 2,    sd = (z(prior_high) - z(prior_low)) / (2 * 1.96)
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from calib.errors import MaterialError
+
+FloatArray = npt.NDArray[np.float64]
+Scale = Literal["log", "linear"]
+
+#: Half width of a normal distribution's central 95 % in standard deviations.
+Z95 = 1.959963984540054
+
+#: Width of a finite difference in a log coordinate: 10 %.  An explicit solver repeats its curve to 0.5-1 %,
+#: so a parameter the force is proportional to then moves it by ten times the noise; the truncation error of a
+#: forward difference of a power law with exponent below 1 stays under 1 % of the force.
+LOG_STEP = math.log(1.1)
+
+#: Width of a finite difference in a linear coordinate, as a part of the prior's 95 % range (same argument).
+LINEAR_STEP = 0.1
+
+#: Material properties with the dimension of a stress or of a force per length.  Multiplying all of them by k
+#: multiplies every quasi-static force by k and leaves the geometry of the cut alone.
+STRESS_LIKE = ("E", "yield_stress", "R", "R_initiation", "R_skin", "tensile_strength", "fracture_energy")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One fitted material property.
+
+    Attributes:
+        name: Property name as in ``materials.yaml``.
+        value: Present value [unit], inside the hard bounds.
+        low: Hard lower bound [unit]; never crossed.
+        high: Hard upper bound [unit]; never crossed.
+        unit: Unit of all values, for people.
+        prior_low: Lower end of the literature's 95 % range [unit].
+        prior_high: Upper end of the literature's 95 % range [unit].
+        scale: ``log`` or ``linear``: the coordinate in which the prior is normal and the fit works.
+
+    Raises:
+        MaterialError: A number that is not finite, an empty interval, a value or prior centre outside the
+        hard
+            bounds, or a log parameter that is not positive.
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    unit: str
+    prior_low: float
+    prior_high: float
+    scale: Scale = "log"
+
+    def __post_init__(self) -> None:
+        numbers = (self.value, self.low, self.high, self.prior_low, self.prior_high)
+        if not all(math.isfinite(x) for x in numbers):
+            raise self._error(f"has a number that is not finite among {numbers}", "give finite numbers")
+        if self.scale not in ("log", "linear"):
+            raise self._error(f"has scale {self.scale!r}", "use 'log' or 'linear'")
+        if self.scale == "log" and min(numbers) <= 0.0:
+            raise self._error(f"is on a log scale but {min(numbers):g} is not positive", "use scale 'linear'")
+        if not self.low < self.high:
+            raise self._error(f"has bounds [{self.low:g}, {self.high:g}]", "give low < high")
+        if not self.prior_low < self.prior_high:
+            raise self._error(
+                f"has the prior range [{self.prior_low:g}, {self.prior_high:g}]", "give low < high"
+            )
+        centre = math.exp(self.prior_mean) if self.log else self.prior_mean
+        for what, x in (("value", self.value), ("prior centre", centre)):
+            if not self.low <= x <= self.high:
+                raise self._error(
+                    f"has its {what} {x:g} outside the bounds [{self.low:g}, {self.high:g}]",
+                    "widen the bounds or correct it",
+                )
+
+    def _error(self, what: str, remedy: str) -> MaterialError:
+        return MaterialError(f"parameter {self.name} [{self.unit}] {what}; {remedy}.")
+
+    @property
+    def log(self) -> bool:
+        """Whether the parameter is fitted by its logarithm."""
+        return self.scale == "log"
+
+    @property
+    def prior_mean(self) -> float:
+        """Centre of the prior in the internal coordinate."""
+        return 0.5 * (self.to_internal(self.prior_low) + self.to_internal(self.prior_high))
+
+    @property
+    def prior_sd(self) -> float:
+        """Standard deviation of the prior in the internal coordinate."""
+        return (self.to_internal(self.prior_high) - self.to_internal(self.prior_low)) / (2.0 * Z95)
+
+    @property
+    def prior_centre(self) -> float:
+        """Centre of the prior [unit] (its median)."""
+        return self.from_internal(self.prior_mean)
+
+    @property
+    def step(self) -> float:
+        """Width of a finite difference in the internal coordinate."""
+        return LOG_STEP if self.log else LINEAR_STEP * (self.prior_high - self.prior_low)
+
+    def to_internal(self, value: float) -> float:
+        """Internal coordinate of a value [unit]: its logarithm on a log scale, else itself."""
+        return math.log(value) if self.log else float(value)
+
+    def from_internal(self, z: float) -> float:
+        """Value [unit] at an internal coordinate, never beyond the hard bounds; inverts ``to_internal``."""
+        low, high = self.to_internal(self.low), self.to_internal(self.high)
+        if z <= low or z >= high:
+            return self.low if z <= low else self.high
+        return min(max(math.exp(z), self.low), self.high) if self.log else float(z)
+
+    def round_trip_error(self, samples: int = 33) -> float:
+        """Largest error of value -> internal -> value, relative to the larger bound [-]."""
+        z = np.linspace(self.to_internal(self.low), self.to_internal(self.high), samples)
+        there = [self.from_internal(x) for x in z]
+        back = [self.from_internal(self.to_internal(x)) for x in there]
+        return float(np.max(np.abs(np.subtract(there, back))) / max(abs(self.low), abs(self.high)))
+
+
+@dataclass(frozen=True)
+class ParameterSet:
+    """The fitted parameters in a fixed order, as a vector in internal coordinates or as a dictionary [units].
+
+    Attributes:
+        items: The parameters; names must be unique and there must be at least one.
+
+    Raises:
+        MaterialError: No parameter, or a name given twice.
+    """
+
+    items: tuple[Parameter, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "items", tuple(self.items))
+        if not self.items:
+            raise MaterialError("there is no parameter to fit; name at least one, for instance E.")
+        twice = sorted({n for n in self.names if self.names.count(n) > 1})
+        if twice:
+            raise MaterialError(
+                f"parameter {', '.join(twice)} is given more than once; name each parameter once."
+            )
+
+    def __len__(self) -> int:
+        return len(self.items)
+
+    def __iter__(self) -> Iterator[Parameter]:
+        return iter(self.items)
+
+    def __getitem__(self, name: str) -> Parameter:
+        return self.items[self.names.index(name)]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names in order, (p,)."""
+        return tuple(p.name for p in self.items)
+
+    @property
+    def start(self) -> FloatArray:
+        """Internal coordinates of the present values, (p,)."""
+        return self.to_vector({p.name: p.value for p in self.items})
+
+    @property
+    def lower(self) -> FloatArray:
+        """Internal coordinates of the hard lower bounds, (p,)."""
+        return np.array([p.to_internal(p.low) for p in self.items])
+
+    @property
+    def upper(self) -> FloatArray:
+        """Internal coordinates of the hard upper bounds, (p,)."""
+        return np.array([p.to_internal(p.high) for p in self.items])
+
+    @property
+    def prior_mean(self) -> FloatArray:
+        """Prior centre in internal coordinates, (p,)."""
+        return np.array([p.prior_mean for p in self.items])
+
+    @property
+    def prior_sd(self) -> FloatArray:
+        """Prior standard deviation in internal coordinates, (p,)."""
+        return np.array([p.prior_sd for p in self.items])
+
+    @property
+    def steps(self) -> FloatArray:
+        """Finite-difference widths in internal coordinates, (p,)."""
+        return np.array([p.step for p in self.items])
+
+    @property
+    def box(self) -> tuple[FloatArray, FloatArray]:
+        """The prior's 95 % box inside the hard bounds, in internal coordinates: two arrays (p,)."""
+        reach = Z95 * self.prior_sd
+        return np.maximum(self.lower, self.prior_mean - reach), np.minimum(
+            self.upper, self.prior_mean + reach
+        )
+
+    def to_vector(self, values: Mapping[str, float]) -> FloatArray:
+        """Internal coordinates (p,) of a mapping name -> value [unit].
+
+        Raises:
+            MaterialError: A fitted parameter is missing, or outside the domain of its scale.
+        """
+        missing = [n for n in self.names if n not in values]
+        if missing:
+            raise MaterialError(
+                f"parameter {', '.join(missing)} has no value; give one for each of {self.names}."
+            )
+        bad = [p for p in self.items if p.log and not values[p.name] > 0.0]
+        if bad:
+            raise MaterialError(
+                f"parameter {bad[0].name} = {values[bad[0].name]:g} {bad[0].unit} must be positive "
+                "because it is fitted on a log scale; give a positive value."
+            )
+        return np.array([p.to_internal(values[p.name]) for p in self.items])
+
+    def to_dict(self, z: Sequence[float] | FloatArray) -> dict[str, float]:
+        """Values [unit] by name at internal coordinates ``z`` (p,)."""
+        return {p.name: p.from_internal(float(x)) for p, x in zip(self.items, z, strict=True)}
+
+    def clip(self, z: FloatArray) -> FloatArray:
+        """The point (p,) of the hard bounds that is nearest to ``z`` (p,)."""
+        return np.clip(z, self.lower, self.upper)
+
+    def prior_residual(self, z: FloatArray) -> FloatArray:
+        """Distance from the prior centre in prior standard deviations, (p,)."""
+        return (z - self.prior_mean) / self.prior_sd
+
+    def prior_jacobian(self) -> FloatArray:
+        """Derivative of :meth:`prior_residual`, (p, p): diagonal, 1 / prior_sd."""
+        return np.diag(1.0 / self.prior_sd)
+
+    def stress_like(self, names: Sequence[str] = STRESS_LIKE) -> FloatArray:
+        """Direction (p,) of a joint scaling of the stress-like parameters: 1 for each on a log scale."""
+        return np.array([1.0 if p.log and p.name in names else 0.0 for p in self.items])
+
+    def with_values(self, values: Mapping[str, float]) -> ParameterSet:
+        """The same parameters with other present values [unit]; names not mentioned keep theirs."""
+        return ParameterSet(tuple(replace(p, value=float(values.get(p.name, p.value))) for p in self.items))

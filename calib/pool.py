@@ -1,0 +1,124 @@
+"""Worker processes that run candidates of a scene, one Taichi runtime each, kernels compiled once per scene."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
+from multiprocessing import get_context
+from typing import Any
+
+import numpy as np
+
+from calib.objective import Evaluation
+from mpm.scene import Material, Scene
+
+DIED = "worker_died"  # reason of a run whose process was killed, for instance for lack of memory
+
+_simulations: dict[Scene, Any] = {}
+
+
+def _ignore_interrupt() -> None:
+    """Ctrl-C is handled by the main process, which then ends the workers."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.environ.setdefault("TI_LOG_LEVEL", "error")
+    os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
+
+
+def _run(scene: Scene, values: dict[str, float], arch: str, threads: int) -> dict[str, Any]:
+    """One simulation in a worker; everything that is sent back is plain data."""
+    from mpm.runtime import Runtime
+    from mpm.solver import Simulation
+
+    simulation = _simulations.get(scene)
+    if simulation is None:
+        simulation = _simulations[scene] = Simulation(scene, Runtime(arch, threads))
+    material: Material = replace(scene.food.material, **values)
+    record = simulation.run(material)
+    scalars = {
+        "peak_N": record.peak,
+        "work_J": record.work,
+        "momentum_residual": record.momentum_residual,
+        "ke_over_ie": record.ke_over_ie,
+        "ripple_N": record.ripple,
+        "steps": float(record.steps),
+        "particles": float(record.particles),
+    }
+    return {
+        "status": "ok" if record.status == "done" else "failed",
+        "reason": "" if record.status == "done" else record.status,
+        "fraction": record.fraction,
+        "stroke": record.stroke,
+        "force": record.resolved,
+        "scalars": scalars,
+        "seconds": record.wall,
+    }
+
+
+class Pool:
+    """A pool of worker processes; a context manager that ends them.
+
+    Args:
+        workers: Number of processes.
+        arch: Taichi device of each.
+        threads: CPU threads of each.
+    """
+
+    def __init__(self, workers: int = 2, arch: str = "cpu", threads: int = 1) -> None:
+        self.workers, self.arch, self.threads = workers, arch, threads
+        self._executor = self._start()
+
+    def _start(self) -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(self.workers, mp_context=get_context("spawn"), initializer=_ignore_interrupt)
+
+    def __enter__(self) -> Pool:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the workers at once; runs that have not finished are lost."""
+        processes = list((getattr(self._executor, "_processes", None) or {}).values())
+        self._executor.shutdown(wait=False, cancel_futures=True)
+        for process in processes:
+            process.terminate()
+
+    def evaluator(self, scene: Scene) -> SceneEvaluator:
+        """Evaluator of material candidates of one scene."""
+        return SceneEvaluator(self, scene)
+
+    def submit(self, scene: Scene, values: Mapping[str, float]) -> Future[dict[str, Any]]:
+        """Queue one run; a broken pool is started anew first."""
+        args = (scene, dict(values), self.arch, self.threads)
+        try:
+            return self._executor.submit(_run, *args)
+        except BrokenProcessPool:
+            self._executor = self._start()
+            return self._executor.submit(_run, *args)
+
+
+class SceneEvaluator:
+    """Runs material candidates of one scene in a pool."""
+
+    def __init__(self, pool: Pool, scene: Scene) -> None:
+        self.pool, self.scene = pool, scene
+
+    def evaluate(self, batch: Sequence[Mapping[str, float]]) -> Iterator[Evaluation]:
+        """Run each candidate; yields in order of completion, ``index`` is the place in the batch."""
+        waiting = {self.pool.submit(self.scene, values): k for k, values in enumerate(batch)}
+        while waiting:
+            done, _ = wait(waiting, return_when=FIRST_COMPLETED)
+            for future in done:
+                index = waiting.pop(future)
+                yield self._result(index, dict(batch[index]), future)
+
+    def _result(self, index: int, values: dict[str, float], future: Future[dict[str, Any]]) -> Evaluation:
+        try:
+            return Evaluation(index=index, parameters=values, **future.result())
+        except BrokenProcessPool:
+            empty = np.empty(0)
+            return Evaluation(index, values, "failed", DIED, 0.0, empty, empty)

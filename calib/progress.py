@@ -1,0 +1,112 @@
+"""One line about a running fit: on a terminal it is rewritten in place, elsewhere printed now and then."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import TextIO
+
+#: Width of the bar in characters.
+BAR = 20
+
+#: Without a terminal (log file, pipe) a line is printed at most this often [s].
+PLAIN_INTERVAL_S = 30.0
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a fit stands.
+
+    Attributes:
+        done: Simulations finished, failed ones included.
+        spent: Budget spent, in simulations on the fine grid [-].
+        budget: Budget, in the same measure [-].
+        failed: Simulations that did not finish their stroke.
+        misfit: Smallest chi-square of a finished run so far [-]; infinite while there is none.
+        eta_s: Time that the rest of the budget would take [s]; a fit that converges ends earlier.
+        stage: What the last simulation was run for.
+    """
+
+    done: int
+    spent: float
+    budget: float
+    failed: int
+    misfit: float
+    eta_s: float
+    stage: str
+
+    def line(self) -> str:
+        """One line of plain text without bar, such as ``12 simulations of 80, ...``."""
+        parts = [f"{self.done} simulations ({self.spent:.4g} of {self.budget:.4g})"]
+        if self.failed:
+            parts.append(f"{self.failed} failed")
+        parts.append(f"chi2 {self.misfit:.4g}" if math.isfinite(self.misfit) else "chi2 -")
+        parts.append(f"at most {clock(self.eta_s)} left")
+        parts.append(self.stage)
+        return ", ".join(parts)
+
+
+def clock(seconds: float) -> str:
+    """A duration [s] as ``m:ss`` or ``h:mm:ss``; ``?`` when it is not known.
+
+    >>> clock(75.2), clock(3675), clock(float("nan"))
+    ('1:15', '1:01:15', '?')
+    """
+    if not math.isfinite(seconds):
+        return "?"
+    minutes, rest = divmod(round(max(seconds, 0.0)), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
+
+class ProgressBar:
+    """Callback that shows :class:`Progress` on a stream; a context manager that ends the line it rewrites.
+
+    Args:
+        stream: Where to write; standard error when None, so that ``--json`` output stays clean.
+        interval_s: Shortest time between two lines when the stream is no terminal [s].
+        now: Clock [s] for that interval.
+    """
+
+    def __init__(
+        self,
+        stream: TextIO | None = None,
+        *,
+        interval_s: float = PLAIN_INTERVAL_S,
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._stream = sys.stderr if stream is None else stream
+        self._interval = interval_s
+        self._now = now
+        self._terminal = self._stream.isatty()
+        self._width = 0
+        self._last = -math.inf
+
+    def __call__(self, progress: Progress) -> None:
+        """Show ``progress``."""
+        if self._terminal:
+            self._rewrite(progress)
+        elif self._now() - self._last >= self._interval:
+            self._last = self._now()
+            print(progress.line(), file=self._stream, flush=True)
+
+    def _rewrite(self, progress: Progress) -> None:
+        """Replace the line on the terminal."""
+        full = min(BAR, int(BAR * progress.spent / progress.budget))
+        text = f"[{'#' * full}{'.' * (BAR - full)}] {progress.line()}"
+        print("\r" + text.ljust(self._width), end="", file=self._stream, flush=True)
+        self._width = len(text)
+
+    def __enter__(self) -> ProgressBar:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._width:
+            print(file=self._stream, flush=True)
+            self._width = 0

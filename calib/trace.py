@@ -1,0 +1,365 @@
+"""Reading a measured force trace: columns, units and signs, and everything that can be wrong with a file."""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import hashlib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from calib.errors import TraceError
+
+MIN_SAMPLES = 20
+"""Fewest samples of a trace: below this, baseline, onset and ramp have under seven samples each."""
+MS_SUSPICION_S = 1.0
+"""Median sampling interval [s] above which a time column is taken for milliseconds: no cut is sampled so
+slowly."""
+CLOCK_JITTER = 0.5
+"""Largest deviation of a step from the mean step for a column that looks like a clock [-]."""
+DISABLED = "none"
+"""Value of ``position_col`` that leaves a position column unused."""
+LABELS = ("measured", "reconstructed")
+
+_UNITS = {
+    "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6},
+    "force": {"N": 1.0, "n": 1.0, "kN": 1e3, "KN": 1e3, "kn": 1e3, "mN": 1e-3, "mn": 1e-3},
+    "position": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6},
+}
+_TIME_STEM = re.compile(r"time|t|timestamp|elapsed(_time)?")
+_FORCE_STEM = re.compile(r"(.*_)?(force|load|resistance|f|fz)(_z)?")
+_HEIGHT_STEM = re.compile(r"((ee|knife|tool|tcp|blade)_)?(z|height|position|pos)(_z)?")
+_DEPTH_STEM = re.compile(r"(.*_)?(stroke|displacement|travel|depth|extension|penetration)")
+_KNOWN_FORCE = {"base_fz": -1.0, "knife_fz": 1.0}
+"""Columns whose sign is known: robot logs hold the force on the world in the base frame, downwards
+negative."""
+_KNOWN_POSITION = ("ee_z",)
+_EXPECTED = {
+    "time": ("time_s", "time_ms", "t_s"),
+    "force": ("force_N", "fz_N", "base_Fz_N", "force_kN", "force_mN"),
+    "position": ("ee_z_m", "position_m", "position_mm", "stroke_m", "displacement_mm"),
+}
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A force trace as recorded, in SI units.
+
+    Attributes:
+        time: Time of each sample, strictly increasing [s], shape (n,).
+        force: Vertical force, resistance to the downward knife positive, not tared [N], shape (n,).
+        position: Height of the tool, z up [m], shape (n,), or None.
+        source: File name.
+        sha256: SHA-256 of the file, empty for a trace made in memory.
+        columns: The column used for each of ``time``, ``force`` and ``position``.
+        label: ``measured`` or ``reconstructed``.
+    """
+
+    time: np.ndarray
+    force: np.ndarray
+    position: np.ndarray | None
+    source: str
+    sha256: str
+    columns: dict[str, str]
+    label: str = "measured"
+
+    def __post_init__(self) -> None:
+        if self.label not in LABELS:
+            raise TraceError(f"{self.source}: label {self.label!r} is not one of {', '.join(LABELS)}")
+        if len(self.time) < MIN_SAMPLES:
+            raise TraceError(
+                f"{self.source}: {len(self.time)} samples, at least {MIN_SAMPLES} are needed; record the "
+                "whole cut with the approach before it, or at a higher rate"
+            )
+        for name, values in (("force", self.force), ("position", self.position)):
+            if values is not None and values.shape != self.time.shape:
+                raise TraceError(f"{self.source}: {name} has shape {values.shape}, time {self.time.shape}")
+            if values is not None and not np.all(np.isfinite(values)):
+                raise TraceError(f"{self.source}: {name} holds NaN or infinite values")
+        if not (np.all(np.isfinite(self.time)) and np.all(np.diff(self.time) > 0.0)):
+            raise TraceError(f"{self.source}: time is not strictly increasing")
+
+    @property
+    def dt(self) -> float:
+        """Median sampling interval [s]."""
+        return float(np.median(np.diff(self.time)))
+
+
+@dataclass(frozen=True)
+class _Table:
+    """Text of a CSV file: column names, rows and their line numbers in the file."""
+
+    source: str
+    names: list[str]
+    rows: list[list[str]]
+    lines: list[int]
+    label: str
+    sha256: str
+
+
+@dataclass(frozen=True)
+class _Column:
+    """One chosen column and the factor that turns its numbers into SI with our sign."""
+
+    name: str
+    index: int
+    factor: float
+
+
+def read_trace(
+    path: str | Path,
+    *,
+    time_col: str | None = None,
+    force_col: str | None = None,
+    position_col: str | None = None,
+    sign: str | int | None = None,
+) -> Trace:
+    """Read a force trace from a CSV file.
+
+    Columns are found by their names, which carry the unit: ``time_s``, ``time_ms``, ``t_s``; ``force_N``,
+        ``fz_N``,
+    ``force_kN``; heights ``ee_z_m``, ``position_mm``; depths ``stroke_m``, ``displacement_mm`` (positive
+    downwards, turned into heights). ``base_Fz_N`` of a robot log is preferred to a derived ``cut_force_z_N``
+    and has its sign turned round. Lines that start with ``#`` are comments; ``# label: reconstructed`` sets
+    the label.
+
+    Args:
+        path: CSV file with one header line.
+        time_col: Column to use as time; without a unit in its name it is taken as seconds.
+        force_col: Column to use as force; without a unit in its name it is taken as newtons.
+        position_col: Column to use as position (metres if its name has no unit); ``none`` uses no position.
+        sign: ``+`` or 1 if positive numbers mean resistance to the knife, ``-`` or -1 if negative ones do.
+
+    Returns:
+        The trace in SI units.
+
+    Raises:
+        TraceError: The file or a column cannot be used; the message names file, column and row.
+    """
+    table = _read_table(Path(path))
+    columns = {
+        "time": _choose(table, "time", time_col),
+        "force": _choose(table, "force", force_col),
+    }
+    if position_col != DISABLED and (position_col is not None or _candidates(table, "position")):
+        columns["position"] = _choose(table, "position", position_col)
+    if sign is not None:
+        force = columns["force"]
+        columns["force"] = _Column(force.name, force.index, abs(force.factor) * _parse_sign(sign))
+    if len(table.rows) < MIN_SAMPLES:
+        raise TraceError(f"{table.source}: {len(table.rows)} rows of data, at least {MIN_SAMPLES} are needed")
+    values = {role: _numbers(table, column) for role, column in columns.items()}
+    _check_clock(table, columns["time"], columns["force"], values["time"], values["force"])
+    return Trace(
+        time=values["time"],
+        force=values["force"],
+        position=values.get("position"),
+        source=table.source,
+        sha256=table.sha256,
+        columns={role: column.name for role, column in columns.items()},
+        label=table.label,
+    )
+
+
+def _parse_sign(sign: str | int) -> float:
+    """The factor of a ``--sign`` option."""
+    signs = {"+": 1.0, "-": -1.0, "1": 1.0, "+1": 1.0, "-1": -1.0}
+    if str(sign) not in signs:
+        raise TraceError(f"sign {sign!r} is not one of +, -, 1, -1 (option --sign)")
+    return signs[str(sign)]
+
+
+def _read_table(path: Path) -> _Table:
+    """Split a CSV file into header and rows; comments and blank lines are dropped, line numbers kept."""
+    if path.is_dir():
+        raise TraceError(f"{path} is a directory; name a CSV file")
+    if not path.is_file():
+        near = difflib.get_close_matches(path.name, _names_beside(path), n=3)
+        hint = f"; did you mean {' or '.join(near)}?" if near else ""
+        raise TraceError(f"{path}: no such file{hint}")
+    raw = path.read_bytes()
+    if not raw.strip():
+        raise TraceError(f"{path.name} is empty")
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise TraceError(f"{path.name}: not a text CSV file (byte {error.start} is not UTF-8)") from error
+    if "\0" in text:
+        raise TraceError(f"{path.name}: not a text CSV file (it holds zero bytes)")
+    numbered = [(i, line) for i, line in enumerate(text.splitlines(), start=1) if line.strip()]
+    comments = [line for _, line in numbered if line.lstrip().startswith("#")]
+    body = [(i, line) for i, line in numbered if not line.lstrip().startswith("#")]
+    if len(body) < 2:
+        raise TraceError(f"{path.name}: {'a header but no data' if body else 'nothing but comments'}")
+    delimiter = max(",;\t", key=body[0][1].count)
+    cells = list(csv.reader([line for _, line in body], delimiter=delimiter))
+    names = [name.strip() for name in cells[0]]
+    _check_header(path.name, names)
+    return _Table(
+        source=path.name,
+        names=names,
+        rows=cells[1:],
+        lines=[i for i, _ in body[1:]],
+        label=_label(comments),
+        sha256=hashlib.sha256(raw).hexdigest(),
+    )
+
+
+def _names_beside(path: Path) -> list[str]:
+    """File names in the folder where a missing file was looked for."""
+    return [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
+
+
+def _check_header(source: str, names: list[str]) -> None:
+    """Refuse a header with one column, without names, or with a name twice."""
+    if len(names) < 2:
+        raise TraceError(
+            f"{source}: not a CSV file with a time and a force column (header: {names[0][:60]!r})"
+        )
+    if all(_as_float(name) is not None for name in names):
+        raise TraceError(f"{source}: the first row holds numbers; add a header such as time_s,force_N")
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise TraceError(
+            f"{source}: column name {twice[0]!r} occurs {names.count(twice[0])} times; rename one"
+        )
+
+
+def _label(comments: list[str]) -> str:
+    """The label that a ``# label: ...`` comment gives, ``measured`` without one."""
+    for comment in comments:
+        found = re.match(r"\s*#\s*label\s*:\s*(\S+)", comment)
+        if found:
+            return found.group(1).lower()
+    return LABELS[0]
+
+
+def _as_float(cell: str) -> float | None:
+    """The number in a cell, or None."""
+    try:
+        return float(cell)
+    except ValueError:
+        return None
+
+
+def _split_unit(name: str) -> tuple[str, str]:
+    """Stem (lower case, words joined by _) and unit of a column name such as ``force_N`` or ``Force [N]``."""
+    found = re.fullmatch(r"(.+?)(?:[\s_]+|\s*[\[(])\[?\(?([A-Za-z]+)[\])]?", name)
+    stem, unit = (found.group(1), found.group(2)) if found else (name, "")
+    return re.sub(r"[^a-z0-9]+", "_", stem.lower()).strip("_"), unit
+
+
+def _stem_matches(role: str, stem: str) -> bool:
+    """Whether a stem names the role."""
+    patterns = {"time": (_TIME_STEM,), "force": (_FORCE_STEM,), "position": (_HEIGHT_STEM, _DEPTH_STEM)}
+    return any(pattern.fullmatch(stem) for pattern in patterns[role])
+
+
+def _candidates(table: _Table, role: str) -> list[str]:
+    """Columns whose name and unit fit a role; known ones alone if there are any."""
+    fitting = []
+    for name in table.names:
+        stem, unit = _split_unit(name)
+        if unit in _UNITS[role] and _stem_matches(role, stem):
+            fitting.append(name)
+    known: Sequence[str] = {"force": tuple(_KNOWN_FORCE), "position": _KNOWN_POSITION, "time": ()}[role]
+    for stem in known:
+        preferred = [name for name in fitting if _split_unit(name)[0] == stem]
+        if preferred:
+            return preferred
+    return fitting
+
+
+def _choose(table: _Table, role: str, wanted: str | None) -> _Column:
+    """The column of a role, by name if the user gave one."""
+    option = f"--{role}-col"
+    if wanted is not None:
+        if wanted not in table.names:
+            raise TraceError(
+                f"{table.source}: no column {wanted!r} ({option}){_did_you_mean([wanted], table.names)}"
+            )
+        return _column(table, role, wanted)
+    fitting = _candidates(table, role)
+    if len(fitting) == 1:
+        return _column(table, role, fitting[0])
+    if fitting:
+        raise TraceError(
+            f"{table.source}: several columns could be the {role}: {', '.join(fitting)}; choose one with "
+            f"{option}"
+        )
+    raise TraceError(
+        f"{table.source}: no {role} column with its unit in the name, such as "
+        f"{', '.join(_EXPECTED[role][:3])}{_did_you_mean(_EXPECTED[role], table.names)}; name one with "
+        f"{option}"
+    )
+
+
+def _did_you_mean(wanted: Sequence[str], names: list[str]) -> str:
+    """A hint with the nearest existing names, or with all of them."""
+    lower = {name.lower(): name for name in names}
+    near = [n for w in wanted for n in difflib.get_close_matches(w.lower(), lower, n=1, cutoff=0.7)]
+    if near:
+        return f"; did you mean {lower[near[0]]!r}?"
+    return f"; the columns are {', '.join(names)}"
+
+
+def _column(table: _Table, role: str, name: str) -> _Column:
+    """Index and factor of a named column: unit, known sign of a force, depth turned into height."""
+    stem, unit = _split_unit(name)
+    factor = _UNITS[role].get(unit, 1.0)
+    if role == "force":
+        factor *= _KNOWN_FORCE.get(stem, 1.0)
+    if role == "position" and _DEPTH_STEM.fullmatch(stem):
+        factor = -factor
+    return _Column(name, table.names.index(name), factor)
+
+
+def _numbers(table: _Table, column: _Column) -> np.ndarray:
+    """The numbers of a column in SI [shape (rows,)]; the first cell that is none is named."""
+    values = np.empty(len(table.rows))
+    for i, (row, line) in enumerate(zip(table.rows, table.lines, strict=True)):
+        where = f"{table.source}, row {line}"
+        if len(row) != len(table.names):
+            raise TraceError(f"{where}: {len(row)} cells, the header has {len(table.names)}")
+        cell = row[column.index].strip()
+        number = _as_float(cell)
+        if number is None:
+            hint = "; write decimals with a point" if _as_float(cell.replace(",", ".")) is not None else ""
+            shown = repr(cell) if cell else "an empty cell"
+            raise TraceError(f"{where}, column {column.name}: {shown} is not a number{hint}")
+        if not np.isfinite(number):
+            raise TraceError(
+                f"{where}, column {column.name}: {cell!r} is not finite; remove or repair the row"
+            )
+        values[i] = number
+    return values * column.factor
+
+
+def _check_clock(table: _Table, time: _Column, force: _Column, t: np.ndarray, f: np.ndarray) -> None:
+    """Refuse a time that does not increase, columns that look swapped, and milliseconds named as seconds."""
+    steps = np.diff(t)
+    if np.any(steps <= 0.0):
+        force_steps = np.abs(np.diff(f)) if np.all(np.diff(f) > 0) or np.all(np.diff(f) < 0) else np.zeros(1)
+        mean = float(force_steps.mean())
+        if mean > 0.0 and np.all(np.abs(force_steps - mean) <= CLOCK_JITTER * mean):
+            raise TraceError(
+                f"{table.source}: columns {time.name} and {force.name} look swapped ({force.name} rises in "
+                f"equal steps like a clock, {time.name} does not); exchange their names or use --time-col "
+                "and --force-col"
+            )
+        i = int(np.argmax(steps <= 0.0))
+        raise TraceError(
+            f"{table.source}, row {table.lines[i + 1]}, column {time.name}: time does not increase "
+            f"({t[i]:g} s, then {t[i + 1]:g} s); remove repeated rows, or cut the file where the clock "
+            "restarts"
+        )
+    median = float(np.median(steps))
+    if median > MS_SUSPICION_S:
+        raise TraceError(
+            f"{table.source}, column {time.name}: samples are {median:g} s apart; this looks like "
+            "milliseconds: name the column time_ms"
+        )

@@ -1,0 +1,356 @@
+"""What a fit does not know: of the curve between its runs, and of the parameters at its end.
+
+:class:`CurveProcess` is a Gaussian process through all simulated curves of a fit (Rasmussen & Williams
+(2006), Gaussian Processes for Machine Learning, MIT Press, chapters 2 and 5); it proposes points and gives
+the Jacobian.
+
+:func:`uncertainty` gives 95 % intervals from the curvature of chi-square at the optimum, in internal
+coordinates (so those of log parameters are asymmetric in SI), with J_d the rows of the data and J_p those of
+the priors:
+
+    covariance = (J_d^T J_d / s + J_p^T J_p)^-1,   s = max(1, reduced chi-square of the data)
+
+Where the model misses the curve by more than the stated errors, s widens what the data say; it does not touch
+the literature, so no parameter ends up known less than before.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import cho_factor, cho_solve, eigh
+from scipy.optimize import least_squares, minimize
+
+from calib.objective import LARGEST_DIFFERENCE, Objective, Trial
+from calib.parameters import LINEAR_STEP, Z95, Parameter, ParameterSet
+
+FloatArray = npt.NDArray[np.float64]
+Verdict = Literal["identified", "weak", "not_seen", "at_bound"]
+
+#: Standard deviations in the process, parts of the peak: what a broken-down and a coarse run say about the
+#: curve of a whole, fine one; the offset common to all coarse curves; the offset of the best curve by its own
+#: noise.
+BROKEN_SD, COARSE_SD, COARSE_OFFSET, OFFSET = 0.3, 0.02, 0.2, 0.05
+#: Log-normal priors (mean, sd) and ranges of the process's hyperparameters: amplitude of its curved and its
+#: linear part and its noise (parts of the peak), and the length scale of each parameter (coordinate units).
+AMPLITUDE_PRIOR = (math.log(0.4), 1.0, math.log(0.08), math.log(2.0))
+LENGTH_PRIOR = (math.log(1.5), 0.7, math.log(0.3), math.log(8.0))
+NOISE_PRIOR = (math.log(0.012), 0.4, math.log(0.004), math.log(0.04))
+
+#: A parameter is identified when its posterior is narrower than this part of its prior, and not seen when it
+#: is wider than the other: below one half the cut says more than the literature, above 0.9 next to nothing.
+IDENTIFIED, NOT_SEEN = 0.5, 0.9
+#: An estimate this close to a hard bound, in posterior standard deviations, lies on it.
+ON_BOUND = 0.1
+#: Two parameters that correlate more are only known together.
+TIED = 0.95
+
+
+def coordinate_unit(parameters: ParameterSet) -> FloatArray:
+    """Unit of the internal coordinates (p,): 1 for a log parameter, the prior's 95 % range for another."""
+    return np.array([1.0 if p.log else p.step / LINEAR_STEP for p in parameters])
+
+
+class CurveProcess:
+    """Gaussian process through the smoothed curves of a fit, with the scaling of force by stress built in.
+
+        curve(z) = e^s (c + q g(x)),   x = (z - z_best) / unit,   s = mean of z - z_best over stress-like
+        parameters
+
+    c and q are the best run's curve and peak; g has mean zero and the covariance :meth:`_kernel`, the same
+    for each point of the curve.  One more output is the part of the stroke that is missing.
+
+    Args:
+        objective: Turns curves into residuals.
+        trials: Runs so far.
+        best: The run about which the process is written.
+        guess: Hyperparameters of an earlier process to start from (p + 3,).
+    """
+
+    def __init__(
+        self, objective: Objective, trials: Sequence[Trial], best: Trial, guess: FloatArray | None = None
+    ) -> None:
+        self.objective, self.best = objective, best
+        law = objective.parameters.stress_like()
+        self._law = law / max(float(law.sum()), 1.0)
+        self.unit = coordinate_unit(objective.parameters)
+        self._peak = float(np.abs(best.curve).max())
+        used = [t for t in trials if t.evaluation.stroke.size > 1]
+        self._x = np.array([(t.z - best.z) / self.unit for t in used])
+        self._coarse = np.array([float(t.coarse) for t in used])
+        self._extra = np.array([t.coarse * COARSE_SD**2 + (not t.ok) * BROKEN_SD**2 for t in used])
+        curves = np.array([t.curve * math.exp(-self._scale(t.z)) for t in used])
+        missing = np.array([0.0 if t.ok else 1.0 - t.evaluation.fraction for t in used])
+        outputs = np.column_stack([(curves - best.curve) / self._peak, missing])
+        outputs = np.clip(outputs, -LARGEST_DIFFERENCE, LARGEST_DIFFERENCE)
+        self.hyper = self._learn(outputs[:, :-1], guess)
+        self._factor = cho_factor(self._covariance(self.hyper))
+        self._weights = cho_solve(self._factor, outputs)
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of one simulated curve about the process, part of the peak [-]."""
+        return math.exp(self.hyper[-1])
+
+    def _scale(self, z: FloatArray) -> float:
+        return float(self._law @ (z - self.best.z))
+
+    def _kernel(self, a: FloatArray, b: FloatArray, h: FloatArray) -> FloatArray:
+        """Covariance (k, l) of g between points (k, p) and (l, p): offset + linear + squared exponential."""
+        gap = ((a[:, None] - b[None]) / np.exp(h[2:-1])) ** 2
+        out: FloatArray = (
+            OFFSET**2 + np.exp(2.0 * h[1]) * (a @ b.T) + np.exp(2.0 * h[0] - 0.5 * gap.sum(axis=2))
+        )
+        return out
+
+    def _covariance(self, h: FloatArray) -> FloatArray:
+        """Covariance of the runs (m, m) with their noise."""
+        own = self._kernel(self._x, self._x, h) + np.diag(self._extra + math.exp(2.0 * h[-1]))
+        out: FloatArray = own + COARSE_OFFSET**2 * np.outer(self._coarse, self._coarse)
+        return out
+
+    def _learn(self, y: FloatArray, guess: FloatArray | None) -> FloatArray:
+        """Hyperparameters (p + 3,), logarithms, of largest posterior."""
+        priors = [AMPLITUDE_PRIOR, AMPLITUDE_PRIOR, *[LENGTH_PRIOR] * len(self.unit), NOISE_PRIOR]
+        mean, sd, low, high = np.array(priors).T
+        count = self.objective.effective_points
+        gram = y @ y.T * (count / y.shape[1])
+
+        def cost(h: FloatArray) -> float:
+            factor = cho_factor(self._covariance(h), lower=True)
+            fit = 0.5 * float(np.trace(cho_solve(factor, gram)))
+            volume = count * float(np.log(np.diag(factor[0])).sum())
+            return fit + volume + 0.5 * float((((h - mean) / sd) ** 2).sum())
+
+        found = minimize(
+            cost,
+            mean if guess is None else guess,
+            bounds=np.column_stack([low, high]),
+            method="L-BFGS-B",
+            options={"maxiter": 15},
+        )
+        return np.asarray(found.x)
+
+    def predict(self, z: FloatArray) -> tuple[FloatArray, float, float]:
+        """Expected curve [N] (n,), its standard deviation [N] and the completed part of the stroke at z."""
+        x = ((z - self.best.z) / self.unit)[None]
+        k = self._kernel(x, self._x, self.hyper)
+        variance = float((self._kernel(x, x, self.hyper) - k @ cho_solve(self._factor, k.T))[0, 0])
+        out = (k @ self._weights)[0]
+        size = math.exp(self._scale(z))
+        curve = size * (self.best.curve + self._peak * out[:-1])
+        sd = size * self._peak * math.sqrt(max(variance, 0.0))
+        return curve, sd, min(max(1.0 - float(out[-1]), 0.0), 1.0)
+
+    def residual(self, z: FloatArray) -> FloatArray:
+        """Residual vector (n + 2 + p,) of the expected curve at z."""
+        curve, _, fraction = self.predict(z)
+        return self.objective.residual(curve, fraction, z)
+
+    def doubt(self, z: FloatArray) -> float:
+        """Square root of the chi-square that not knowing the curve adds at z [-]."""
+        return self.predict(z)[1] * math.sqrt(self.objective.effective_points) / self.objective.sigma
+
+    def expected(self, z: FloatArray, caution: float) -> float:
+        """Chi-square at z [-], the part from not knowing the curve weighted by ``caution``."""
+        rows = self._cautious(z, caution)
+        return float(rows @ rows)
+
+    def _cautious(self, z: FloatArray, caution: float) -> FloatArray:
+        curve, sd, fraction = self.predict(z)
+        doubt = sd * math.sqrt(caution * self.objective.effective_points) / self.objective.sigma
+        return np.append(self.objective.residual(curve, fraction, z), doubt)
+
+    def least(self, start: FloatArray, radius: float, caution: float) -> FloatArray:
+        """Point (p,) of least ``expected`` within the bounds and ``radius`` units of the best run."""
+        parameters = self.objective.parameters
+        edge = 1e-9 * self.unit
+        low = np.maximum(parameters.lower, self.best.z - radius * self.unit) - edge
+        high = np.minimum(parameters.upper, self.best.z + radius * self.unit) + edge
+        inside = np.clip(start, low + 0.5 * edge, high - 0.5 * edge)
+        found = least_squares(
+            self._cautious, inside, bounds=(low, high), x_scale=self.unit, max_nfev=15, args=(caution,)
+        )
+        return parameters.clip(np.asarray(found.x))
+
+    def jacobian(self, z: FloatArray) -> FloatArray:
+        """Derivative (n + 2 + p, p) of ``residual`` at z, less what is only the noise of the runs.
+
+        A noisy Jacobian J + D has the information (J + D)^T (J + D), on average J^T J + E[D^T D]: too much,
+        and a parameter without influence looks identified.  E[D^T D] follows from the weights that the
+        process gives to each run; the directions of J are shrunk until J^T J is without it, to zero where
+        there is nothing else.
+        """
+        objective, p = self.objective, len(self.unit)
+        steps = 1e-3 * self.unit
+        moves = np.diag(steps)
+        rows = np.array([self.residual(z + d) - self.residual(z - d) for d in moves]).T / (2.0 * steps)
+        x = np.array([z + d for d in moves] + [z - d for d in moves])
+        k = self._kernel((x - self.best.z) / self.unit, self._x, self.hyper)
+        weights = cho_solve(self._factor, ((k[:p] - k[p:]) / (2.0 * steps[:, None])).T)
+        noise = (weights.T * (self._extra + self.noise**2)) @ weights
+        per_row = objective.effective_points / objective.sigma**2 + 1.0 / objective.sigma_peak**2
+        noise *= self._peak**2 * per_row
+        data = rows[: objective.data_rows]
+        ratio, basis = eigh(data.T @ data, noise)
+        kept = np.sqrt(np.maximum(ratio - 1.0, 0.0) / np.maximum(ratio, 1.0))
+        return np.vstack([data @ (basis * kept) @ np.linalg.inv(basis), rows[objective.data_rows :]])
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A fitted parameter with its 95 % interval.
+
+    Attributes:
+        parameter: The parameter with its best value.
+        low95: Lower end [unit], not below the hard bound.
+        high95: Upper end [unit], not above the hard bound.
+        clipped: Whether a hard bound cut the interval off.
+        width: Posterior over prior standard deviation in the internal coordinate [-].
+        verdict: ``at_bound``: the best value lies on a hard bound; else by width ``identified`` (below 0.5),
+            ``weak``, or ``not_seen`` (above 0.9: the interval is the literature's).
+    """
+
+    parameter: Parameter
+    low95: float
+    high95: float
+    clipped: bool
+    width: float
+    verdict: Verdict
+
+    def as_dict(self) -> dict[str, float | str]:
+        """Entry of ``summary.json``: value, unit, low95, high95, prior_low, prior_high, verdict."""
+        p = self.parameter
+        return {
+            "value": p.value,
+            "unit": p.unit,
+            "low95": self.low95,
+            "high95": self.high95,
+            "prior_low": p.prior_low,
+            "prior_high": p.prior_high,
+            "verdict": self.verdict,
+        }
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A principal direction of the posterior, measured in prior standard deviations.
+
+    Attributes:
+        width: Posterior over prior standard deviation along it [-]: 0 = set by the cut, 1 = by the
+            literature.
+        weights: Components by parameter name, of unit length together.
+    """
+
+    width: float
+    weights: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Tie:
+    """Two parameters that the cut determines only together.
+
+    Attributes:
+        combination: What is known better than either of them: ``a * b`` (correlation -1) or ``a / b`` (+1).
+        correlation: Posterior correlation [-].
+    """
+
+    combination: str
+    correlation: float
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Posterior about the best point, in the normal approximation.
+
+    Attributes:
+        intervals: One per parameter.
+        covariance: In internal coordinates (p, p).
+        correlation: Its correlation matrix (p, p).
+        directions: Principal directions, best known first.
+        only_as_product: Pairs with a correlation beyond 0.95 either way.
+        reduced_chi2: Chi-square of the data per degree of freedom [-]; above 1 the data's part was widened by
+            it.
+    """
+
+    intervals: tuple[Interval, ...]
+    covariance: FloatArray
+    correlation: FloatArray
+    directions: tuple[Direction, ...]
+    only_as_product: tuple[Tie, ...]
+    reduced_chi2: float
+
+
+def uncertainty(
+    parameters: ParameterSet, jacobian: FloatArray, residual: FloatArray, *, effective_rows: float
+) -> Uncertainty:
+    """95 % intervals, correlations and a verdict per parameter from the curvature at the optimum.
+
+    Args:
+        parameters: The parameters with their best values.
+        jacobian: Derivative of the residual vector by internal coordinates (k + p, p), prior rows last.
+        residual: Residual vector (k + p,) at the best values.
+        effective_rows: Effective number of independent rows among the k rows of data.
+    """
+    p = len(parameters)
+    data, prior = jacobian[:-p], parameters.prior_jacobian()
+    information, own = data.T @ data, prior.T @ prior
+    first = np.linalg.inv(information + own)
+    freedom = max(effective_rows - float(np.trace(first @ information)), 1.0)
+    reduced = float(residual[:-p] @ residual[:-p]) / freedom
+    covariance: FloatArray = np.asarray(
+        np.linalg.inv(information / max(1.0, reduced) + own), dtype=np.float64
+    )
+    sd = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(sd, sd)
+    intervals = tuple(_interval(q, z, s) for q, z, s in zip(parameters, parameters.start, sd, strict=True))
+    return Uncertainty(
+        intervals,
+        covariance,
+        correlation,
+        _directions(parameters, covariance),
+        _ties(parameters.names, correlation),
+        reduced,
+    )
+
+
+def _interval(parameter: Parameter, z: float, sd: float) -> Interval:
+    """Interval and verdict of one parameter with posterior standard deviation ``sd`` about ``z``."""
+    low, high = parameter.to_internal(parameter.low), parameter.to_internal(parameter.high)
+    ends = z - Z95 * sd, z + Z95 * sd
+    width = sd / parameter.prior_sd
+    verdict: Verdict = "identified" if width < IDENTIFIED else "not_seen" if width > NOT_SEEN else "weak"
+    if min(z - low, high - z) < ON_BOUND * sd:
+        verdict = "at_bound"
+    return Interval(
+        parameter,
+        parameter.from_internal(ends[0]),
+        parameter.from_internal(ends[1]),
+        ends[0] < low or ends[1] > high,
+        width,
+        verdict,
+    )
+
+
+def _directions(parameters: ParameterSet, covariance: FloatArray) -> tuple[Direction, ...]:
+    """Eigenvectors of the covariance in units of the prior standard deviations, best known first."""
+    variance, vectors = np.linalg.eigh(covariance / np.outer(parameters.prior_sd, parameters.prior_sd))
+    return tuple(
+        Direction(math.sqrt(max(v, 0.0)), dict(zip(parameters.names, map(float, w), strict=True)))
+        for v, w in zip(variance, vectors.T, strict=True)
+    )
+
+
+def _ties(names: Sequence[str], correlation: FloatArray) -> tuple[Tie, ...]:
+    """Pairs of names with a correlation beyond :data:`TIED`."""
+    pairs = [(i, j) for j in range(len(names)) for i in range(j) if abs(correlation[i, j]) > TIED]
+    sign = {True: "/", False: "*"}
+    return tuple(
+        Tie(f"{names[i]} {sign[correlation[i, j] > 0.0]} {names[j]}", float(correlation[i, j]))
+        for i, j in pairs
+    )

@@ -1,0 +1,381 @@
+"""Vector figures of a report: SVG bytes that are equal for equal data, readable in black and white.
+
+Every curve has its own dash pattern and its own lightness besides its colour (Okabe and Ito's palette, which readers
+with colour-blindness tell apart). Legends stand outside the axes, so that no text covers a curve. Letters are drawn
+as paths: no font is needed to show a figure.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+MM = 1.0 / 25.4
+#: Width of a figure [mm]: the text width of the report, so that letters keep their size in print.
+WIDTH = 170.0
+#: A record is drawn with its extremes in this many columns: more than a printer resolves on the page.
+COLUMNS = 900
+#: Axis of the parameter figure: at most this factor either side of the middle of the literature's range.
+LARGEST_FACTOR = 1e3
+
+BLACK, GREY, LIGHT = "#000000", "#767676", "#dddddd"
+BLUE, SKY, GREEN, ORANGE, RED = "#0072B2", "#56B4E9", "#009E73", "#E69F00", "#D55E00"
+
+STYLE: dict[str, Any] = {
+    "svg.fonttype": "path",
+    "svg.hashsalt": "cutcal",
+    "text.parse_math": False,
+    "axes.formatter.use_mathtext": False,
+    "axes.unicode_minus": True,
+    "font.family": "DejaVu Sans",
+    "font.size": 7.5,
+    "axes.labelsize": 7.5,
+    "axes.titlesize": 7.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "legend.fontsize": 7.5,
+    "legend.frameon": False,
+    "legend.handlelength": 3.4,
+    "legend.columnspacing": 1.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.6,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e6e6e6",
+    "grid.linewidth": 0.5,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "lines.linewidth": 1.2,
+    "hatch.linewidth": 0.5,
+}
+
+MEASURED: dict[str, Any] = {"color": BLACK, "lw": 1.8}
+SIMULATED: dict[str, Any] = {"color": RED, "lw": 1.8, "dashes": (4.5, 1.4)}
+EDGE: dict[str, Any] = {"color": BLUE, "lw": 1.1, "dashes": (1.2, 1.2)}
+FACE: dict[str, Any] = {"color": GREEN, "lw": 1.1, "dashes": (7.0, 1.6, 1.2, 1.6)}
+NULLS: dict[str, dict[str, Any]] = {
+    "ramp_N": {"label": "ramp", "color": BLUE, "lw": 0.8, "dashes": (1.5, 1.5)},
+    "half_sine_N": {"label": "half sine", "color": GREEN, "lw": 0.8, "dashes": (8.0, 2.0)},
+    "three_term_N": {"label": "three-term", "color": ORANGE, "lw": 0.8, "dashes": (8.0, 2.0, 1.5, 2.0)},
+    "start_N": {"label": "simulation at literature values", "color": GREY, "lw": 0.8},
+}
+
+Curves = Mapping[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Record:
+    """What the conditioning of a trace is drawn from.
+
+    Attributes:
+        time: Time of the whole record [s], shape (n,).
+        raw: Force as recorded [N], shape (n,).
+        tared: Force less its baseline [N], shape (n,).
+        onset: Time of contact [s].
+        onset_sd: Its standard uncertainty [s], or None.
+        end: End of the downward stroke [s].
+        end_sd: Its standard uncertainty [s], or None.
+        window: Start and end of the baseline window [s], or None where it was not saved.
+        baseline_kind: ``constant`` or ``air``.
+        peak: Peak of the filtered curve [N].
+        peak_sd: Its standard uncertainty [N], or None.
+    """
+
+    time: np.ndarray
+    raw: np.ndarray
+    tared: np.ndarray
+    onset: float
+    onset_sd: float | None
+    end: float
+    end_sd: float | None
+    window: tuple[float, float] | None
+    baseline_kind: str
+    peak: float | None
+    peak_sd: float | None
+
+
+@dataclass(frozen=True)
+class Row:
+    """One fitted parameter of the parameter figure; numbers over the middle of the literature's range [-].
+
+    Attributes:
+        name: Name as in ``materials.yaml``.
+        note: Text at the right: value and verdict.
+        value: Fitted value.
+        low, high: Its 95 % interval, None where there is none.
+        prior_low, prior_high: The literature's range, None where there is none.
+    """
+
+    name: str
+    note: str
+    value: float
+    low: float | None
+    high: float | None
+    prior_low: float | None
+    prior_high: float | None
+
+
+def forces(curves: Curves, measured: str, simulated: str) -> bytes:
+    """Measured and simulated force over stroke, with the parts of the simulation.
+
+    Args:
+        curves: Columns of ``curves.csv``: stroke [m] and forces [N], shape (n,).
+        measured, simulated: Labels of the two curves in the legend.
+    """
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        x = 1e3 * curves["stroke_m"]
+        axes.axhline(0.0, color=BLACK, lw=0.5)
+        axes.plot(x, curves["edge_N"], label="edge part of the simulation", **EDGE)
+        axes.plot(x, curves["face_N"], label="face part of the simulation", **FACE)
+        axes.plot(x, curves["real_N"], label=measured, **MEASURED)
+        axes.plot(x, curves["sim_N"], label=simulated, **SIMULATED)
+        _stroke_axis(axes, x)
+        axes.set_ylabel("force on the knife [N]")
+        handles, labels = axes.get_legend_handles_labels()
+        order = [2, 0, 3, 1]
+        figure.legend([handles[i] for i in order], [labels[i] for i in order], loc="outside upper left", ncols=2)
+
+    return _svg(draw, 82.0)
+
+
+def conditioning(record: Record, curves: Curves) -> bytes:
+    """Raw record with baseline, contact and end; the tared record about contact; the filtered curve."""
+
+    def draw(figure: Figure) -> None:
+        panels = figure.subplot_mosaic([["raw", "raw"], ["onset", "curve"]], height_ratios=[1.15, 1.0])
+        _raw(panels["raw"], record)
+        _contact(panels["onset"], record)
+        _filtered(panels["curve"], record, curves)
+        handles, labels = panels["raw"].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper left", ncols=3)
+
+    return _svg(draw, 125.0)
+
+
+def fit(curves: Curves, noise_sd: float) -> bytes:
+    """Both curves divided by their own peak, and the residual over stroke with the noise of the trace.
+
+    Args:
+        curves: Columns of ``curves.csv``.
+        noise_sd: Standard deviation of one unfiltered sample before contact [N].
+    """
+
+    def draw(figure: Figure) -> None:
+        shape, residual = figure.subplots(2, 1, sharex=True, height_ratios=[1.5, 1.0])
+        x, real, sim = 1e3 * curves["stroke_m"], curves["real_N"], curves["sim_N"]
+        shape.plot(x, real / np.max(real), label="measured, over its own peak", **MEASURED)
+        if np.max(sim) > 0.0:
+            shape.plot(x, sim / np.max(sim), label="simulated, over its own peak", **SIMULATED)
+        shape.set_ylabel("force / own peak")
+        residual.axhspan(-noise_sd, noise_sd, facecolor=LIGHT, edgecolor=GREY, hatch="////", lw=0.0,
+                         label="± 1 sd of one raw sample before contact")  # fmt: skip
+        residual.axhline(0.0, color=BLACK, lw=0.5)
+        residual.plot(x, curves["residual_N"], color=BLUE, lw=1.3, label="simulated − measured")
+        residual.set_ylabel("residual [N]")
+        _stroke_axis(residual, x)
+        handles, labels = zip(*(a.get_legend_handles_labels() for a in (shape, residual)), strict=True)
+        figure.legend(sum(handles, []), sum(labels, []), loc="outside upper left", ncols=2)
+        figure.align_ylabels()
+
+    return _svg(draw, 88.0)
+
+
+def nulls(curves: Curves) -> bytes:
+    """Measured and simulated force with the null models and the simulation before the fit."""
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        x = 1e3 * curves["stroke_m"]
+        axes.axhline(0.0, color=BLACK, lw=0.5)
+        axes.plot(x, curves["real_N"], label="measured", **MEASURED)
+        axes.plot(x, curves["sim_N"], label="simulated, fitted", **SIMULATED)
+        top = 1.5 * max(np.max(curves["real_N"]), np.max(curves["sim_N"]))
+        bottom, highest = min(0.0, np.min(curves["real_N"]), np.min(curves["sim_N"])), 0.0
+        for column, look in NULLS.items():
+            y = curves[column]
+            if np.all(np.isnan(y)):
+                continue
+            peak = float(np.nanmax(y))
+            cut = {"label": f"{look['label']} (leaves the axis, peak {peak:.3g} N)"} if peak > top else {}
+            axes.plot(x, y, **{**look, **cut})
+            highest = max(highest, min(peak, top))
+        highest = max(highest, top / 1.5)
+        axes.set_ylim(bottom - 0.04 * highest, 1.05 * highest)
+        axes.set_ylabel("force on the knife [N]")
+        _stroke_axis(axes, x)
+        figure.legend(loc="outside upper left", ncols=3)
+
+    return _svg(draw, 68.0)
+
+
+def parameters(rows: Sequence[Row]) -> bytes:
+    """Fitted values with their intervals against the literature's ranges, one row each, on a log axis."""
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        low, high = _factors(rows)
+        for i, row in enumerate(rows):
+            if row.prior_low is not None and row.prior_high is not None:
+                ends = np.clip([row.prior_low, row.prior_high], low, high)
+                axes.barh(i, ends[1] - ends[0], left=ends[0], height=0.46, facecolor=LIGHT, edgecolor=GREY, lw=0.7)
+            x = float(np.clip(row.value, low, high))
+            axes.plot(x, i, marker="o", ms=5.0, color=BLACK, ls="none", zorder=3)
+            if row.low is not None and row.high is not None:
+                span = np.clip([row.low, row.high], low, high)
+                axes.plot(span, [i, i], color=BLACK, lw=1.6, zorder=3, solid_capstyle="butt")
+                for end, whole, mark in zip(span, (row.low, row.high), ("<", ">"), strict=True):
+                    inside = low < whole < high
+                    axes.plot(end, i, marker="|" if inside else mark, ms=7.0 if inside else 5.0,
+                              color=BLACK, ls="none", zorder=3, clip_on=False)  # fmt: skip
+            axes.annotate(row.note, (1.0, i), xycoords=axes.get_yaxis_transform(), xytext=(6, 0),
+                          textcoords="offset points", va="center", annotation_clip=False)  # fmt: skip
+        axes.axvline(1.0, color=GREY, lw=0.6)
+        axes.set_xscale("log")
+        axes.set_xlim(low, high)
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+        axes.xaxis.set_minor_formatter(FuncFormatter(lambda x, _: ""))
+        axes.set_ylim(len(rows) - 0.5, -0.5)
+        axes.set_yticks(range(len(rows)), [row.name for row in rows])
+        axes.tick_params(axis="y", length=0)
+        axes.grid(visible=False, axis="y")
+        axes.spines["left"].set_visible(False)
+        axes.set_xlabel("value / middle of the literature's range")
+
+    return _svg(draw, 20.0 + 8.5 * max(len(rows), 2))
+
+
+def misfit(history: Sequence[tuple[float, float]]) -> bytes:
+    """Best misfit so far over the number of simulations.
+
+    Args:
+        history: Pairs of evaluation number and best misfit [-], in order.
+    """
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        x, y = np.array(history, dtype=float).T
+        axes.step(x, y, where="post", color=BLACK, lw=1.4)
+        axes.plot(x[-1], y[-1], marker="o", ms=4.0, color=BLACK)
+        if np.all(y > 0.0) and np.max(y) > 10.0 * np.min(y):
+            axes.set_yscale("log")
+            axes.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        axes.margins(x=0.02, y=0.08)
+        axes.set_xlabel("simulation number")
+        axes.set_ylabel("best misfit so far (chi-square)")
+
+    return _svg(draw, 48.0)
+
+
+def envelope(x: np.ndarray, y: np.ndarray, columns: int = COLUMNS) -> tuple[np.ndarray, np.ndarray]:
+    """A long record with only the lowest and highest sample of each of ``columns`` equal parts, in their order.
+
+    Args:
+        x, y: Record, shape (n,).
+        columns: Number of parts.
+
+    Returns:
+        The record itself if it has no more than two samples a part, else at most 2 ``columns`` samples.
+    """
+    if len(x) <= 2 * columns:
+        return x, y
+    edges = np.linspace(0, len(x), columns + 1).astype(int)
+    keep = {a + int(f(y[a:b])) for a, b in zip(edges[:-1], edges[1:], strict=True) for f in (np.argmin, np.argmax)}
+    kept = np.array(sorted(keep))
+    return x[kept], y[kept]
+
+
+def _svg(draw: Any, height: float) -> bytes:
+    """SVG of a figure of the report's width and ``height`` [mm]."""
+    with matplotlib.rc_context({**matplotlib.rcParamsDefault, **STYLE}):
+        figure = Figure(figsize=(WIDTH * MM, height * MM), layout="constrained")
+        FigureCanvasSVG(figure)
+        draw(figure)
+        out = io.BytesIO()
+        figure.savefig(out, format="svg", transparent=True, metadata={"Date": None})
+    return out.getvalue()
+
+
+def _stroke_axis(axes: Axes, x: np.ndarray) -> None:
+    axes.set_xlim(float(x[0]), float(x[-1]))
+    axes.set_xlabel("stroke from contact [mm]")
+
+
+def _raw(axes: Axes, r: Record) -> None:
+    """Raw record over time with what was subtracted and where the cut begins and ends."""
+    x, y = envelope(r.time, r.raw)
+    axes.plot(x, y, color=BLACK, lw=0.7, label="raw force")
+    bx, by = envelope(r.time, r.raw - r.tared)
+    name = "baseline" if r.baseline_kind == "constant" else "air run, shifted"
+    axes.plot(bx, by, color=RED, lw=1.2, dashes=(5.0, 2.0), label=name)
+    if r.window is not None:
+        axes.axvspan(*r.window, facecolor=LIGHT, edgecolor=GREY, hatch="////", lw=0.0, label="baseline window")
+    _moment(axes, r.onset, r.onset_sd, "contact", BLUE, (1.2, 1.2))
+    _moment(axes, r.end, r.end_sd, "end of the downward stroke", GREEN, (7.0, 1.6, 1.2, 1.6))
+    axes.set_xlim(float(r.time[0]), float(r.time[-1]))
+    axes.set_title("a  record as measured")
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("force [N]")
+
+
+def _moment(
+    axes: Axes, at: float, sd: float | None, name: str, color: str, dashes: tuple[float, ...]
+) -> None:
+    """A marked time with its uncertainty."""
+    with_sd = sd is not None and sd > 0.0
+    label = f"{name} (band ± 1 sd)" if with_sd else name
+    axes.axvline(at, color=color, lw=1.2, dashes=dashes, label=label)
+    if with_sd and sd is not None:
+        axes.axvspan(at - sd, at + sd, facecolor=color, alpha=0.25, lw=0.0)
+
+
+def _contact(axes: Axes, r: Record) -> None:
+    """Tared record around contact."""
+    half = max(0.12 * (r.end - r.onset), 4.0 * (r.onset_sd or 0.0))
+    inside = (r.time >= r.onset - half) & (r.time <= r.onset + half)
+    axes.axhline(0.0, color=BLACK, lw=0.5)
+    if np.any(inside):
+        few = np.count_nonzero(inside) <= 120
+        axes.plot(*envelope(r.time[inside], r.tared[inside], COLUMNS // 2), color=BLACK, lw=0.8,
+                  marker="o" if few else None, ms=1.8)  # fmt: skip
+    _moment(axes, r.onset, r.onset_sd, "contact", BLUE, (1.2, 1.2))
+    axes.set_xlim(r.onset - half, r.onset + half)
+    axes.set_title("b  tared, around contact")
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("force less baseline [N]")
+    axes.xaxis.set_major_locator(MaxNLocator(5))
+
+
+def _filtered(axes: Axes, r: Record, curves: Curves) -> None:
+    """Filtered curve over stroke with the uncertainty of its peak."""
+    x, y = 1e3 * curves["stroke_m"], curves["real_N"]
+    axes.axhline(0.0, color=BLACK, lw=0.5)
+    axes.plot(x, y, **MEASURED)
+    if r.peak is not None:
+        axes.errorbar(x[np.argmax(y)], r.peak, yerr=r.peak_sd, color=RED, marker="o", ms=3.5, mfc="white",
+                      capsize=2.5, lw=1.0, zorder=4)  # fmt: skip
+    _stroke_axis(axes, x)
+    axes.margins(y=0.08)
+    axes.set_title("c  filtered, over stroke (circle: peak ± 1 sd)")
+    axes.set_ylabel("force [N]")
+
+
+def _factors(rows: Sequence[Row]) -> tuple[float, float]:
+    """Limits of the axis that hold all positive numbers, at least a factor 3 and at most LARGEST_FACTOR either side."""
+    numbers = [x for r in rows for x in (r.value, r.low, r.high, r.prior_low, r.prior_high)]
+    positive = [x for x in numbers if x is not None and x > 0.0]
+    low = max(min([1 / 3.0, *positive]) / 1.3, 1.0 / LARGEST_FACTOR)
+    high = min(max([3.0, *positive]) * 1.3, LARGEST_FACTOR)
+    return low, high
