@@ -37,7 +37,13 @@ def _run(scene: Scene, values: dict[str, float], arch: str, threads: int) -> dic
     if simulation is None:
         simulation = _simulations[scene] = Simulation(scene, Runtime(arch, threads))
     material: Material = replace(scene.food.material, **values)
-    record = simulation.run(material)
+    parent = os.getppid()
+
+    def watch(done: float, force: float) -> None:
+        if os.getppid() != parent:  # the main process was killed: nobody waits for this result
+            os._exit(1)
+
+    record = simulation.run(material, progress=watch)
     scalars = {
         "peak_N": record.peak,
         "work_J": record.work,

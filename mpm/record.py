@@ -36,6 +36,7 @@ class ForceRecord:
         images: Mirror images that each particle stands for (1, 2 or 4).
         cells: Number of grid nodes.
         severed_area: Area of the section that the edge has passed [m^2].
+        whole: Part of the food's particles that the edge has not passed [-].
         counters: How often each exceptional branch was taken, e.g. ``inverted``; all zero in a sound run.
         wall: Run time of the time loop [s].
         status: ``done``, or the reason why the run stopped early.
@@ -63,6 +64,7 @@ class ForceRecord:
     images: int
     cells: int
     severed_area: float
+    whole: float
     counters: dict[str, int]
     wall: float
     status: str = "done"
@@ -96,6 +98,11 @@ class ForceRecord:
     def peak(self) -> float:
         """Largest resolved upward force on the knife [N]."""
         return float(self.resolved.max()) if len(self.stroke) else 0.0
+
+    @property
+    def severed(self) -> bool:
+        """Whether the edge has passed all of the food, so that it is in two pieces."""
+        return self.whole == 0.0
 
     @property
     def work(self) -> float:
@@ -142,6 +149,8 @@ class ForceRecord:
             "dt_s": self.dt,
             "speed_m_s": self.speed,
             "wall_s": self.wall,
+            "severed": self.severed,
+            "components": 2 if self.severed else 1,
             "momentum_residual": self.momentum_residual,
             "ke_over_ie": self.ke_over_ie,
             "counters": dict(self.counters),

@@ -145,12 +145,15 @@ class Simulation:
         rows: list[list[float]] = []
         began = clock.perf_counter()
         status, done, last = "done", 0, np.zeros(3)
+        self.counters = {"inverted": 0, "outside": 0}
         while done < total:
             count = min(every, total - done)
             self._advance(count, dt, height + gap - speed * dt * done, speed)
             done += count
             sums, state = self.k.sums.to_numpy(), self._state()
-            self._clear_sums()
+            self.k.sums.fill(0.0)
+            self.counters["inverted"] += int(sums[kn.INVERTED])
+            self.counters["outside"] += int(sums[kn.OUTSIDE])
             row = self._row(sums, state, last, count * dt, material, num.gravity)
             last = np.array(row[0])
             rows.append([speed * dt * done - gap, dt * done, *(v for part in row for v in part)])
@@ -158,7 +161,7 @@ class Simulation:
             if status != "done":
                 break
             if progress is not None:
-                progress(done / total, rows[-1][4 + 3] + rows[-1][4 + 6])
+                progress(done / total, row[1][2] + row[2][2])
         return self._record(rows, status, done / total, dt, done, speed, clock.perf_counter() - began)
 
     def _window(self) -> Any:
@@ -183,10 +186,9 @@ class Simulation:
         self.k.measure()
         return self.k.state.to_numpy()
 
-    def _clear_sums(self) -> None:
-        self.k.sums.fill(0.0)
-
-    def _row(self, sums, state, last, span, material, gravity) -> list[list[float]]:
+    def _row(
+        self, sums: np.ndarray, state: np.ndarray, last: np.ndarray, span: float, material: Material, gravity: float
+    ) -> list[list[float]]:
         """Momentum, edge, face, board, gravity, residual, energies of one interval."""
         mirror = np.array([0.0 if m else 1.0 for m in (*self.scene.mirrors, False)])
         momentum = state[:3] * self.images * mirror
@@ -197,7 +199,16 @@ class Simulation:
         energy = [state[3] * self.images, state[4] * self.images, *lost]
         return [list(momentum), list(edge), list(face), list(board), list(weight), list(residual), energy]
 
-    def _record(self, rows, status, fraction, dt, steps, speed, wall) -> ForceRecord:
+    def _record(
+        self,
+        rows: list[list[float]],
+        status: str,
+        fraction: float,
+        dt: float,
+        steps: int,
+        speed: float,
+        wall: float,
+    ) -> ForceRecord:
         """Columns of the rows as a record."""
         a = np.array(rows)
         parts = {n: a[:, 2 + 3 * k : 5 + 3 * k] for k, n in enumerate(("p", "edge", "face", "board", "g", "res"))}
@@ -226,7 +237,8 @@ class Simulation:
             images=self.images,
             cells=int(np.prod(self.nodes)),
             severed_area=section_area(shape),
-            counters={},
+            whole=float(np.mean(self.k.side.to_numpy() == 0)),
+            counters=self.counters,
             wall=wall,
             status=status,
             fraction=fraction,
@@ -239,6 +251,8 @@ def _health(sums: np.ndarray, state: np.ndarray) -> str:
         return "not_finite"
     if sums[kn.OUTSIDE] > 0:
         return "left_grid"
+    if sums[kn.INVERTED] > 0:
+        return "inverted"
     return "done"
 
 

@@ -1,25 +1,22 @@
 """The report of a calibration: ``summary.json``, ``curves.csv`` and ``evaluations.h5`` become ``report.pdf``.
 
-Here are the numbers and the sentences that depend on them; ``templates/calibration.typ`` has the rest of the words.
+Numbers and the sentences that depend on them are made here; the other words are in
+``templates/calibration.typ``.
 """
 
 from __future__ import annotations
 
-import json
 import math
 import shlex
-from collections.abc import Callable
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from calib.errors import CurveError
 from calib.metrics import compare
 from calib.properties import PROPERTIES
-from reports import ReportError, figures
+from reports import figures
 from reports.document import (
     DASH,
     breakable,
@@ -27,72 +24,48 @@ from reports.document import (
     duration,
     interval,
     listed,
-    moment,
     plain,
     quantity,
     typeset,
     uncertain,
     write_whole,
 )
+from reports.finished import Data, Finished, read_finished
 
-Data = dict[str, Any]
-
-#: Correlations of fitted parameters from here on are worth a sentence: at 0.9 an interval is 2.3 times as wide as it
-#: would be if the other parameter were known, 1 / sqrt(1 - r^2).
+#: Correlations of fitted parameters from here on are worth a sentence: at 0.9 an interval is 2.3 times as
+#: wide as it would be if the other parameter were known, 1 / sqrt(1 - r^2).
 STRONG = 0.9
-COLUMNS = ("stroke_m", "real_N", "sim_N", "residual_N", "edge_N", "face_N", "start_N", "ramp_N", "half_sine_N",
-           "three_term_N")  # fmt: skip
-#: These must be finite; a part of the simulation or a null model may be missing (NaN).
-COMPLETE = COLUMNS[:4]
-MEASURES = (("nrmse", "NRMSE", "fraction"), ("shape_error", "shape error", "-"), ("R", "rating R", "-"))
+#: First page [mm]: what title, sentence and facts leave, a line of the table, a banner; letters in a line of a
+#: note; least and largest height of the main figure.
+PAGE_ROOM, LINE_HEIGHT, BANNER_HEIGHT, NOTE_LETTERS, FIGURE_HEIGHT = 168.0, 5.2, 20.0, 50, (70.0, 115.0)
+#: What the null models are compared in: key, label, unit, and whether more is better.
+MEASURES = (
+    ("nrmse", "NRMSE", "fraction", False),
+    ("shape_error", "shape error", "-", False),
+    ("R", "rating R", "-", True),
+)
 NULLS = {
-    "ramp": "straight ramp, 1 number",
-    "half_sine": "half sine, 1 number",
-    "three_term": "three-term curve, 7 numbers",
+    "ramp": "straight ramp (1 number)",
+    "half_sine": "half sine (1 number)",
+    "three_term": "three-term curve (7 numbers)",
 }
-IDENTIFIABILITY = {"weak": "weakly identified", "not_seen": "not seen by this trace", "at_bound": "at its bound"}
-REMEDY = "run the same calibrate command again with --resume"
-
-#: What summary.json must hold: names -> kind. A kind is a tuple of types, {name: kind} ("*": any name) or [kind].
-_NULL = type(None)
-_NUM, _OPT, _TEXT, _MAYBE, _ANY = (int, float), (int, float, _NULL), (str,), (str, _NULL), (object,)
-SCHEMA: Data = {
-    "food created status trace_sha256 baseline_kind stroke_source": _TEXT,
-    "passed": (bool,),
-    "baseline_N onset_s end_s stroke_m noise_sd_N filter_sd_m peak_real_N peak_sim_N dx_m": _NUM,
-    "baseline_sd_N onset_sd_s peak_real_sd_N peak_error shape_error nrmse work_error wall_s particles mach": _OPT,
-    "momentum_residual ke_over_ie ripple_N": _OPT,
-    "simulations failed_simulations": (int,),
-    "metrics": (dict,),
-    "air": (dict, _NULL),
-    "seed mirror_images": _ANY,
-    "git device": _MAYBE,
-    "command warnings limits": [_TEXT],
-    "misfit_history": [[_OPT]],
-    "versions": {"*": _ANY},
-    "correlations": {"*": _OPT},
-    "verdicts": [{"name": _TEXT, "value limit": _ANY, "unit note": _MAYBE, "passed": (bool, _NULL)}],
-    "trace": {"source label sha256": _TEXT, "samples": (int,), "duration_s": _NUM, "columns": (dict,)},
-    "sprague_geers": {"M P C": _OPT},
-    "iso18571": {"Z EP EM ES R shift": _OPT, "at_bound": _ANY},
-    "null_models": {"*": {"nrmse shape_error peak_error work_error R": _OPT}},
-    "parameters": {"*": {"value": _NUM, "low95 high95 prior_low prior_high": _OPT, "unit verdict status": _TEXT,
-                         "source": _MAYBE}},
-    "fixed_parameters": {"*": {"value": _OPT, "unit status": _TEXT, "source": _MAYBE}},
-    "failures": [{"reason": _TEXT, "fraction": _OPT, "parameters": (dict,)}],
-    "shape": {"kind": _TEXT, "length width height": _NUM},
-    "knife": {"name": _TEXT, "spine angle height length": _NUM},
-}  # fmt: skip
+RELATIONS = {"<=": "≤ ", ">=": "≥ "}
+IDENTIFIABILITY = {
+    "weak": "weakly identified",
+    "not_seen": "not seen by this trace",
+    "at_bound": "at its bound",
+}
+STATUS = {"paper_table2": "paper, Table 2"}
 
 
 def write_report(run: Path) -> Path:
     """Write ``report.pdf`` of a finished or interrupted calibration into its folder.
 
-    The same files give the same bytes. A report that cannot be made leaves an older one as it is.
+    The same files give the same bytes. If the report cannot be made, an older one stays as it is.
 
     Args:
         run: Folder with ``summary.json``, ``curves.csv`` and ``evaluations.h5``. The summary may also hold
-            ``baseline_window_s`` (two times) and ``end_sd_s``; both are then drawn.
+            ``baseline_window_s`` (two times) and ``end_sd_s``, and its verdicts a ``relation`` (<= or >=).
 
     Returns:
         Path of the report.
@@ -101,121 +74,25 @@ def write_report(run: Path) -> Path:
         ReportError: A file is missing, damaged or incomplete, or the report cannot be written.
     """
     run = Path(run)
-    if not run.is_dir():
-        raise ReportError(f"{run}: no such folder; give the output folder of a calibration")
-    summary, created = _read_summary(run / "summary.json")
-    curves = _read_curves(run / "curves.csv")
-    record = _read_record(run / "evaluations.h5", summary)
-    pictures = _pictures(summary, curves, record)
-    content = {**_content(summary, curves, created), "figures": sorted(pictures)}
+    done = read_finished(run)
+    pictures = _pictures(done)
+    content = {**_content(done), "figures": sorted(pictures)}
     target = run / "report.pdf"
-    write_whole(target, typeset("calibration.typ", content, pictures, date=created))
+    write_whole(target, typeset("calibration.typ", content, pictures, date=done.created))
     return target
 
 
-def _read_summary(path: Path) -> tuple[Data, datetime]:
-    """The summary, checked; numbers that are not finite become None."""
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"), parse_constant=lambda _: None)
-    except OSError as e:
-        raise _unreadable(path, e) from None
-    except ValueError as e:
-        raise ReportError(f"{path}: damaged, not JSON ({e}); {REMEDY}") from None
-    _check(path, "", data, SCHEMA)
-    if data["status"] not in ("done", "interrupted"):
-        raise ReportError(f"{path}: status is {data['status']!r}, not 'done' or 'interrupted'; {REMEDY}")
-    try:
-        return data, moment(data["created"])
-    except ValueError:
-        raise ReportError(f"{path}: created is {data['created']!r}, not an ISO date and time; {REMEDY}") from None
-
-
-def _check(path: Path, place: str, value: Any, kind: Any) -> None:
-    """Refuse a value of another kind than SCHEMA says, and name its place."""
-    if isinstance(kind, tuple):
-        numeric_flag = isinstance(value, bool) and bool not in kind and object not in kind
-        if numeric_flag or not isinstance(value, kind):
-            raise ReportError(f"{path}: {place} is {json.dumps(value)[:60]}, which it cannot be; {REMEDY}")
-        return
-    if not isinstance(value, type(kind)):
-        want = "a list" if isinstance(kind, list) else "a mapping of names to values"
-        raise ReportError(f"{path}: {place or 'the top level'} is not {want}; {REMEDY}")
-    if isinstance(kind, list):
-        for i, item in enumerate(value):
-            _check(path, f"{place}[{i}]", item, kind[0])
-        return
-    for names, inner in kind.items():
-        for name in value if names == "*" else names.split():
-            where = f"{place}.{name}" if place else name
-            if name not in value:
-                raise ReportError(f"{path}: {where} is missing; the summary is incomplete or of another version of "
-                                  f"cutcal: {REMEDY}")  # fmt: skip
-            _check(path, where, value[name], inner)
-
-
-def _read_curves(path: Path) -> dict[str, np.ndarray]:
-    """Columns of curves.csv by name, shape (n,)."""
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-        header = [name.strip() for name in lines[0].split(",")] if lines else []
-        rows = np.array([[float(x or "nan") for x in line.split(",")] for line in lines[1:] if line.strip()])
-    except OSError as e:
-        raise _unreadable(path, e) from None
-    except ValueError as e:
-        raise ReportError(f"{path}: damaged, not a table of numbers ({e}); {REMEDY}") from None
-    missing = [name for name in COLUMNS if name not in header]
-    if missing:
-        raise ReportError(f"{path}: column {', '.join(missing)} is missing; {REMEDY}")
-    if rows.ndim != 2 or rows.shape[0] < 2 or rows.shape[1] != len(header):
-        raise ReportError(f"{path}: shape {rows.shape} for {len(header)} columns; the file is cut off: {REMEDY}")
-    curves = {name: rows[:, header.index(name)] for name in COLUMNS}
-    bad = [name for name in COMPLETE if not np.all(np.isfinite(curves[name]))]
-    if bad or np.any(np.diff(curves["stroke_m"]) <= 0.0) or not np.max(curves["real_N"]) > 0.0:
-        what = f"column {bad[0]} has gaps" if bad else "the stroke does not rise or no force is positive"
-        raise ReportError(f"{path}: damaged, {what}; {REMEDY}")
-    return curves
-
-
-def _read_record(path: Path, s: Data) -> figures.Record:
-    """The conditioned record in evaluations.h5, with the marks of the summary."""
-    try:
-        if not path.is_file():
-            raise FileNotFoundError(2, "No such file")
-        with h5py.File(path, "r") as store:
-            group = store["conditioning"]
-            time, raw, tared = (np.asarray(group[name][()], float) for name in ("time_s", "raw_N", "tared_N"))
-    except KeyError as e:
-        raise ReportError(f"{path}: the record of the trace is not in it ({e.args[0]}); {REMEDY}") from None
-    except FileNotFoundError as e:
-        raise _unreadable(path, e) from None
-    except OSError as e:
-        raise ReportError(f"{path}: damaged or in use by another process ({e}); wait for it, or {REMEDY}") from None
-    whole = all(np.all(np.isfinite(x)) for x in (time, raw, tared))
-    if time.ndim != 1 or len(time) < 2 or not time.shape == raw.shape == tared.shape or not whole:
-        raise ReportError(f"{path}: conditioning holds records of different lengths or with gaps; {REMEDY}")
-    window = s.get("baseline_window_s")
-    return figures.Record(
-        time=time, raw=raw, tared=tared, onset=s["onset_s"], onset_sd=s["onset_sd_s"], end=s["end_s"],
-        end_sd=s.get("end_sd_s"), window=None if window is None else (float(window[0]), float(window[1])),
-        baseline_kind=s["baseline_kind"], peak=s["peak_real_N"], peak_sd=s["peak_real_sd_N"],
-    )  # fmt: skip
-
-
-def _unreadable(path: Path, e: OSError) -> ReportError:
-    what = "no such file" if isinstance(e, FileNotFoundError) else f"cannot be read ({e.strerror})"
-    return ReportError(f"{path}: {what}; a report needs it: {REMEDY}")
-
-
-def _pictures(s: Data, curves: dict[str, np.ndarray], record: figures.Record) -> dict[str, bytes]:
+def _pictures(done: Finished) -> dict[str, bytes]:
     """The figures by file name."""
-    real = f"measured, peak {uncertain(s['peak_real_N'], s['peak_real_sd_N'], 'N')}"
-    if s["trace"]["label"] == "reconstructed":
-        real = real.replace("measured", "reconstructed")
+    s, curves = done.summary, done.curves
+    trace = s["trace"]["label"]
+    real = f"{trace}, peak {uncertain(s['peak_real_N'], s['peak_real_sd_N'], 'N')}"
+    simulated = f"simulated, peak {quantity(s['peak_sim_N'], 'N')}"
     found = {
-        "forces.svg": figures.forces(curves, real, f"simulated, peak {quantity(s['peak_sim_N'], 'N')}"),
-        "conditioning.svg": figures.conditioning(record, curves),
-        "fit.svg": figures.fit(curves, s["noise_sd_N"]),
-        "nulls.svg": figures.nulls(curves),
+        "forces.svg": figures.forces(curves, real, simulated, _room(s)),
+        "conditioning.svg": figures.conditioning(_record(done), curves),
+        "fit.svg": figures.fit(curves, s["noise_sd_N"], trace),
+        "nulls.svg": figures.nulls(curves, trace),
     }
     rows = [_row(name, p) for name, p in s["parameters"].items()]
     if rows:
@@ -226,62 +103,118 @@ def _pictures(s: Data, curves: dict[str, np.ndarray], record: figures.Record) ->
     return found
 
 
+def _room(s: Data) -> float:
+    """Height for the main figure that fills the first page [mm]: what the lines above it leave."""
+    banners = (s["trace"]["label"] == "reconstructed") + (s["status"] == "interrupted")
+    lines = sum(1 + len(v["note"] or "") // NOTE_LETTERS for v in s["verdicts"])
+    return min(max(PAGE_ROOM - LINE_HEIGHT * lines - BANNER_HEIGHT * banners, FIGURE_HEIGHT[0]), FIGURE_HEIGHT[1])
+
+
+def _record(done: Finished) -> figures.Record:
+    s = done.summary
+    window = s.get("baseline_window_s")
+    return figures.Record(
+        time=done.time,
+        raw=done.raw,
+        tared=done.tared,
+        onset=s["onset_s"],
+        onset_sd=s["onset_sd_s"],
+        end=s["end_s"],
+        end_sd=s.get("end_sd_s"),
+        window=None if window is None else (float(window[0]), float(window[1])),
+        baseline_kind=s["baseline_kind"],
+        peak=s["peak_real_N"],
+        peak_sd=s["peak_real_sd_N"],
+    )
+
+
 def _row(name: str, p: Data) -> figures.Row:
-    """A parameter over the middle of its literature range: geometric, or arithmetic where the range starts at 0."""
-    low, high = p["prior_low"], p["prior_high"]
-    known = low is not None and high is not None and low + high > 0.0
-    middle = 1.0 if not known else math.sqrt(low * high) if low > 0.0 else 0.5 * (low + high)
-    middle = middle if known else abs(p["value"]) or 1.0
-    over = [None if x is None else x / middle for x in (p["low95"], p["high95"], low, high)]
+    """A parameter over the middle of its literature range."""
+    middle = _middle(p)
+    over = [None if p[k] is None else p[k] / middle for k in ("low95", "high95", "prior_low", "prior_high")]
     note = f"{quantity(p['value'], p['unit'])}, {_verdict(p)}"
     return figures.Row(name, note, p["value"] / middle, *over)
 
 
-def _content(s: Data, curves: dict[str, np.ndarray], created: datetime) -> Data:
+def _middle(p: Data) -> float:
+    """Geometric middle of the literature range; arithmetic if it starts at 0, the value if there is none."""
+    low, high = p["prior_low"], p["prior_high"]
+    if low is None or high is None or not low + high > 0.0:
+        return abs(p["value"]) or 1.0
+    return math.sqrt(low * high) if low > 0.0 else 0.5 * (low + high)
+
+
+def _content(done: Finished) -> Data:
     """Everything the template prints, as text."""
-    trace, shape, knife = s["trace"], s["shape"], s["knife"]
-    mean_speed = s["stroke_m"] / (s["end_s"] - s["onset_s"]) if s["end_s"] > s["onset_s"] else None
-    sd = s["onset_sd_s"]
-    sizes = " × ".join(plain(1e3 * shape[k]) for k in ("length", "width", "height"))
+    s = done.summary
     return {
         "food": s["food"].replace("_", " ").capitalize(),
         "cutcal": str(s["versions"].get("cutcal", "")),
-        "created": created.strftime("%Y-%m-%d %H:%M"),
+        "created": done.created.strftime("%Y-%m-%d %H:%M"),
         "interrupted": s["status"] == "interrupted",
-        "reconstructed": trace["label"] == "reconstructed",
+        "reconstructed": s["trace"]["label"] == "reconstructed",
         "passed": s["passed"],
         "sentence": _sentence(s),
         "verdicts": [_verdict_line(v) for v in s["verdicts"]],
-        "trace": {
-            "source": breakable(trace["source"]), "samples": count(trace["samples"]), "label": trace["label"],
-            "duration": quantity(trace["duration_s"], "s"),
-            "rate": quantity(trace["samples"] / trace["duration_s"], "Hz") if trace["duration_s"] > 0.0 else DASH,
-            "columns": [[str(k), breakable(str(v))] for k, v in trace["columns"].items()],
-            "air": breakable(str(s["air"].get("source", "?"))) if s["air"] else None,
-        },
-        "specimen": f"{shape['kind'].replace('_', ' ')}, {sizes} mm (across, along the blade, height)",
-        "knife": {"name": breakable(knife["name"]), "angle": quantity(knife["angle"], "rad"),
-                  **{k: quantity(knife[k], "m") for k in ("spine", "height", "length")}},
-        "baseline": uncertain(s["baseline_N"], s["baseline_sd_N"], "N"), "baseline_kind": s["baseline_kind"],
-        "noise": quantity(s["noise_sd_N"], "N"), "filter": quantity(s["filter_sd_m"], "m", digits=None),
-        "onset": uncertain(s["onset_s"], sd, "s"), "end": uncertain(s["end_s"], s.get("end_sd_s"), "s"),
-        "onset_stroke": None if not (sd and mean_speed) else quantity(sd * mean_speed, "m", digits=2),
-        "speed": quantity(mean_speed, "m/s"), "stroke": quantity(s["stroke_m"], "m"),
-        "stroke_source": s["stroke_source"], "samples_stroke": count(len(curves["stroke_m"])),
-        "peak_real": uncertain(s["peak_real_N"], s["peak_real_sd_N"], "N"),
-        "null_rows": _null_rows(s, curves), "null_sentences": _null_sentences(s), "metrics": _metrics(s),
+        "trace": _trace(s),
+        "specimen": _specimen(s["shape"]),
+        "knife": _knife(s["knife"]),
+        "conditioning": _conditioning(done),
+        "null_rows": _null_rows(done),
+        "null_sentences": _null_sentences(s),
+        "metrics": _metrics(s),
         "parameters": [_parameter(name, p) for name, p in s["parameters"].items()],
         "correlations": _correlations(s["correlations"]),
-        "fixed": [[name, _meaning(name), quantity(p["value"], p["unit"]), _words(p["status"]), p["source"] or ""]
-                  for name, p in s["fixed_parameters"].items()],
+        "fixed": [_fixed(name, p) for name, p in s["fixed_parameters"].items()],
         "numerics": _numerics(s),
         "failures": _failures(s["failures"]),
-        "failed": f"{s['failed_simulations']} of {s['simulations']}",
         "provenance": _provenance(s),
-        "command": breakable(shlex.join(s["command"])),
-        "limits": s["limits"],
-        "warnings": s["warnings"],
-    }  # fmt: skip
+        "limits": [_capital(text) for text in s["limits"]],
+        "warnings": [_capital(text) for text in s["warnings"]],
+    }
+
+
+def _specimen(shape: Data) -> str:
+    sizes = " × ".join(plain(1e3 * shape[k]) for k in ("length", "width", "height"))
+    return f"{_words(shape['kind'])}, {sizes} mm (across the blade, along it, height)"
+
+
+def _knife(knife: Data) -> Data:
+    sizes = {k: quantity(knife[k], "m") for k in ("spine", "height", "length")}
+    return {"name": breakable(knife["name"]), "angle": quantity(knife["angle"], "rad"), **sizes}
+
+
+def _trace(s: Data) -> Data:
+    trace, air = s["trace"], s["air"]
+    seconds = trace["duration_s"]
+    return {
+        "source": breakable(trace["source"]),
+        "label": trace["label"],
+        "samples": count(trace["samples"]),
+        "duration": quantity(seconds, "s"),
+        "rate": quantity(trace["samples"] / seconds if seconds > 0.0 else None, "Hz"),
+        "columns": [[str(k), breakable(str(v))] for k, v in trace["columns"].items()],
+        "air": breakable(str(air.get("source", "without a name"))) if air else None,
+    }
+
+
+def _conditioning(done: Finished) -> Data:
+    s, sd = done.summary, done.summary["onset_sd_s"]
+    seconds = s["end_s"] - s["onset_s"]
+    speed = s["stroke_m"] / seconds if seconds > 0.0 else None
+    return {
+        "baseline": uncertain(s["baseline_N"], s["baseline_sd_N"], "N"),
+        "noise": quantity(s["noise_sd_N"], "N"),
+        "filter": quantity(s["filter_sd_m"], "m", digits=None),
+        "onset": uncertain(s["onset_s"], sd, "s"),
+        "onset_stroke": quantity(sd * speed, "m", digits=2) if sd and speed else None,
+        "end": uncertain(s["end_s"], s.get("end_sd_s"), "s"),
+        "speed": quantity(speed, "m/s"),
+        "stroke": quantity(s["stroke_m"], "m"),
+        "stroke_source": s["stroke_source"],
+        "steps": count(len(done.curves["stroke_m"])),
+        "peak": uncertain(s["peak_real_N"], s["peak_real_sd_N"], "N"),
+    }
 
 
 def _sentence(s: Data) -> str:
@@ -295,18 +228,20 @@ def _sentence(s: Data) -> str:
         text += f", except in {listed(failed)}, which does not decide." if failed else "."
     elif failed:
         text = f"Not passed: {lines} of the table failed ({listed(failed)})."
+    elif s["status"] == "interrupted":
+        text = "Not passed: the fit was interrupted. No line of the table has failed so far."
     else:
         text = "Not passed: no line of the table failed, but not all that decides was tested."
     return text + (f" Not run: {listed(absent)}." if absent else "")
 
 
 def _verdict_line(v: Data) -> Data:
-    """One line of the verdict table; the direction of the limit follows from value, limit and outcome."""
+    """One line of the verdict table; without a ``relation`` it follows from value, limit and outcome."""
     value, limit, unit, passed = v["value"], v["limit"], v["unit"] or "-", v["passed"]
-    relation = ""
+    relation = RELATIONS.get(v.get("relation") or "", "")
     numbers = [isinstance(x, (int, float)) and not isinstance(x, bool) for x in (value, limit)]
-    if all(numbers) and passed is not None:
-        relation = "≤ " if (abs(value) <= limit) == passed else "≥ "
+    if not relation and all(numbers) and passed is not None and abs(value) != limit:
+        relation = "≤ " if (abs(value) < limit) == passed else "≥ "
     mark = "none" if value is None or passed is None else "yes" if passed else "no"
     signed = unit == "fraction" and numbers[0] and value < 0.0
     return {
@@ -328,22 +263,28 @@ def _shown(x: Any, unit: str, digits: int | None, signed: bool) -> str:
     return breakable(listed([str(i) for i in x]) if isinstance(x, list) else str(x))
 
 
-def _null_rows(s: Data, curves: dict[str, np.ndarray]) -> list[list[str]]:
+def _null_rows(done: Finished) -> list[list[str]]:
     """Simulation, null models and the simulation before the fit: name, NRMSE, shape, R, peak, work."""
-    ours = {**{k: s[k] for k in ("nrmse", "shape_error", "peak_error", "work_error")}, "R": s["iso18571"]["R"]}
-    rows = [("simulation, fitted", ours), *((NULLS.get(k, _words(k)), m) for k, m in s["null_models"].items())]
+    s = done.summary
+    keys = ("nrmse", "shape_error", "peak_error", "work_error")
+    rows: list[tuple[str, Data]] = [
+        ("simulation, fitted", {**{k: s[k] for k in keys}, "R": s["iso18571"]["R"]}),
+        *((NULLS.get(name, _words(name)), model) for name, model in s["null_models"].items()),
+    ]
+    curves = done.curves
     if np.all(np.isfinite(curves["start_N"])):
         try:
             m = compare(curves["stroke_m"], curves["real_N"], curves["start_N"])
-            start = {k: getattr(m, k) for k in ("nrmse", "shape_error", "peak_error", "work_error")}
-            rows.append(("simulation at literature values", {**start, "R": m.iso18571.R}))
-        except CurveError:
-            rows.append(("simulation at literature values (no positive force)", dict.fromkeys(ours)))
-    return [
-        [name, quantity(m["nrmse"], "fraction"), quantity(m["shape_error"], "-"), quantity(m["R"], "-"),
-         quantity(m["peak_error"], "fraction", signed=True), quantity(m["work_error"], "fraction", signed=True)]
-        for name, m in rows
-    ]  # fmt: skip
+            start = {**{k: getattr(m, k) for k in keys}, "R": m.iso18571.R}
+        except CurveError:  # a simulation without any positive force cannot be rated
+            start = dict.fromkeys((*keys, "R"))
+        rows.append(("simulation at literature values", start))
+    return [[name, *_rating(model)] for name, model in rows]
+
+
+def _rating(m: Data) -> list[str]:
+    signed = [quantity(m[k], "fraction", signed=True) for k in ("peak_error", "work_error")]
+    return [quantity(m[key], unit) for key, _, unit, _ in MEASURES] + signed
 
 
 def _null_sentences(s: Data) -> list[str]:
@@ -352,82 +293,75 @@ def _null_sentences(s: Data) -> list[str]:
     said = []
     for name, model in s["null_models"].items():
         better = []
-        for key, label, unit in MEASURES:
-            if ours[key] is None or model[key] is None:
-                continue
-            if (model[key] > ours[key]) if key == "R" else (model[key] < ours[key]):
-                better.append(f"{label} ({quantity(model[key], unit)} against {quantity(ours[key], unit)})")
+        for key, label, unit, more in MEASURES:
+            a, b = model[key], ours[key]
+            if a is not None and b is not None and (a > b if more else a < b):
+                better.append(f"{label} ({quantity(a, unit)} against {quantity(b, unit)})")
         if better:
-            said.append(f"The {NULLS.get(name, _words(name))}, is closer to the trace than the simulation in "
-                        f"{listed(better)}.")  # fmt: skip
-    names = listed([label for _, label, _ in MEASURES])
+            model_name = NULLS.get(name, _words(name))
+            said.append(f"The {model_name} is closer to the trace than the simulation in {listed(better)}.")
+    names = listed([label for _, label, _, _ in MEASURES])
     return said or [f"No null model is closer to the trace than the simulation in {names}."]
 
 
-def _metrics(s: Data) -> list[list[str]]:
-    """All figures of the comparison as label and value."""
+def _metrics(s: Data) -> Data:
+    """The figures of the comparison by name; the template labels them."""
     m, g, iso = s["metrics"], s["sprague_geers"], s["iso18571"]
-
-    def get(key: str, unit: str = "fraction", signed: bool = True) -> str:
-        return quantity(m.get(key), unit, signed=signed)
-
-    windows = " / ".join(get(f"shape_{k}", "-", False) for k in ("ramp", "peak", "release"))
-    bound = " (at the end of its range: EP says nothing)" if iso["at_bound"] else ""
-    shift = "" if iso["shift"] is None else f", lag {plain(iso['shift'], None)} of 240 samples{bound}"
-    return [
-        ["Peak, simulated against measured", f"{get('peak_sim_N', 'N', False)}, {get('peak_error')}"],
-        ["Position of the peak, of the stroke", get("peak_position_error")],
-        ["Work, simulated / measured", f"{get('work_sim_J', 'J', False)} / {get('work_real_J', 'J', False)}, "
-         + get("work_error")],
-        ["Initial stiffness", get("stiffness_error")],
-        ["Relative L2 norm of the residual", get("relative_l2", signed=False)],
-        ["Shape error: ramp / peak / release", windows],
-        ["Best scale on the simulation, what then remains",
-         f"{get('best_scale', '-', False)}, {get('best_scale_residual', signed=False)}"],
-        ["Sprague–Geers M, P, C", ", ".join(quantity(g[k], "fraction", signed=k == "M") for k in "MPC")],
-        ["ISO/TS 18571-style Z, EP, EM, ES → R",
-         ", ".join(quantity(iso[k], "-") for k in ("Z", "EP", "EM", "ES")) + " → " + quantity(iso["R"], "-") + shift],
-    ]  # fmt: skip
-
-
-def _parameter(name: str, p: Data) -> Data:
-    low, high, value = p["prior_low"], p["prior_high"], p["value"]
-    outside = (low is not None and value < low) or (high is not None and value > high)
+    units = {"peak_sim_N": "N", "work_sim_J": "J", "work_real_J": "J", "shape_ramp": "-", "shape_peak": "-",
+             "shape_release": "-", "best_scale": "-", "relative_l2": "fraction",
+             "best_scale_residual": "fraction"}  # fmt: skip
+    signed = ("peak_error", "peak_position_error", "work_error", "stiffness_error")
     return {
-        "name": name, "meaning": _meaning(name), "value": quantity(value, p["unit"]),
-        "interval": interval(p["low95"], p["high95"], p["unit"]), "literature": interval(low, high, p["unit"]),
-        "verdict": _verdict(p), "outside": outside, "status": _words(p["status"]), "source": p["source"] or "",
+        **{name: quantity(m.get(name), unit) for name, unit in units.items()},
+        **{name: quantity(m.get(name), "fraction", signed=True) for name in signed},
+        "sprague_geers": [quantity(g[k], "fraction", signed=k == "M") for k in "MPC"],
+        "iso": {k: quantity(iso[k], "-") for k in ("Z", "EP", "EM", "ES", "R")},
+        "shift": DASH if iso["shift"] is None else plain(iso["shift"], None),
+        "at_bound": bool(iso["at_bound"]),
     }  # fmt: skip
 
 
+def _parameter(name: str, p: Data) -> Data:
+    low, high, value, unit = p["prior_low"], p["prior_high"], p["value"], p["unit"]
+    return {
+        "name": name,
+        "meaning": _meaning(name),
+        "value": quantity(value, unit),
+        "interval": interval(p["low95"], p["high95"], unit),
+        "literature": interval(low, high, unit),
+        "verdict": _verdict(p),
+        "outside": (low is not None and value < low) or (high is not None and value > high),
+        "status": STATUS.get(p["status"], _words(p["status"])),
+        "source": p["source"] or "",
+    }
+
+
+def _fixed(name: str, p: Data) -> list[str]:
+    value = "none" if p["value"] is None else quantity(p["value"], p["unit"])
+    return [name, _meaning(name), value, STATUS.get(p["status"], _words(p["status"])), p["source"] or ""]
+
+
 def _correlations(correlations: Data) -> list[str]:
-    strong = sorted(((n, r) for n, r in correlations.items() if r is not None and abs(r) >= STRONG),
-                    key=lambda item: (-abs(item[1]), item[0]))  # fmt: skip
-    means = {True: "their ratio is known better than either", False: "their product is known better than either"}
-    return [f"{listed(n.split(','))}: r = {plain(r, 2)}; {means[r > 0.0]}." for n, r in strong]
+    """Pairs that one force curve cannot tell apart, the strongest first."""
+    strong = [(names, r) for names, r in correlations.items() if r is not None and abs(r) >= STRONG]
+    means = {True: "raising both together", False: "raising one and lowering the other"}
+    return [f"{listed(names.split(','))}, r = {plain(r, 2)}: {means[r > 0.0]} hardly changes the force."
+            for names, r in sorted(strong, key=lambda item: -abs(item[1]))]  # fmt: skip
 
 
-def _numerics(s: Data) -> list[list[str]]:
-    """Numerical settings and audits as label, value and what a good value is."""
-    images = s["mirror_images"]
-    mirrored = "none" if images in (None, False, 1) else "yes" if images is True else str(images)
-    ripple = quantity(s["ripple_N"], "N")
-    if s["ripple_N"] is not None and s["peak_sim_N"] > 0.0:
-        ripple += f" ({quantity(s['ripple_N'] / s['peak_sim_N'], 'fraction', digits=2)} of the simulated peak)"
-    return [
-        ["Cell size dx", quantity(s["dx_m"], "m"), f"{plain(s['shape']['height'] / s['dx_m'], 2)} cells over the "
-         "height of the food"],
-        ["Particles", DASH if s["particles"] is None else count(s["particles"]), f"mirror images: {mirrored}"],
-        ["Mach number of the knife", quantity(s["mach"], "-"), "simulated speed over the pressure wave's; under 0.01 "
-         "the force hardly depends on it"],
-        ["Momentum residual", quantity(s["momentum_residual"], "fraction"), "impulse that the balance misses; should "
-         "be under 1 %"],
-        ["Kinetic over internal energy", quantity(s["ke_over_ie"], "fraction"), "a quasi-static cut has a few per "
-         "cent at most"],
-        ["Ripple on the force", ripple, "standard deviation of what the filter removes from the simulation"],
-        ["Run time", duration(s["wall_s"]), f"{s['simulations']} simulations, {s['failed_simulations']} of them "
-         "failed"],
-    ]  # fmt: skip
+def _numerics(s: Data) -> Data:
+    """Numerical settings and audits by name; the template labels them."""
+    images, ripple = s["mirror_images"], s["ripple_N"]
+    part = None if ripple is None or not s["peak_sim_N"] > 0.0 else ripple / s["peak_sim_N"]
+    return {
+        "dx": quantity(s["dx_m"], "m"), "cells": plain(s["shape"]["height"] / s["dx_m"], 2),
+        "particles": DASH if s["particles"] is None else count(s["particles"]),
+        "images": "none" if images in (None, False, 1) else "yes" if images is True else str(images),
+        "mach": quantity(s["mach"], "-"), "momentum": quantity(s["momentum_residual"], "fraction"),
+        "kinetic": quantity(s["ke_over_ie"], "fraction"), "ripple": quantity(ripple, "N"),
+        "ripple_part": quantity(part, "fraction", digits=2), "wall": duration(s["wall_s"]),
+        "simulations": count(s["simulations"]), "failed": count(s["failed_simulations"]),
+    }  # fmt: skip
 
 
 def _failures(failures: list[Data]) -> list[list[str]]:
@@ -436,24 +370,21 @@ def _failures(failures: list[Data]) -> list[list[str]]:
     for reason in sorted({f["reason"] for f in failures}):
         same = [f for f in failures if f["reason"] == reason]
         parts = [100.0 * f["fraction"] for f in same if f["fraction"] is not None]
-        span = f"{min(parts):.0f} to {max(parts):.0f}\u00a0%" if parts else DASH
+        ends = sorted({f"{f(parts):.0f}" for f in (min, max)}, key=float) if parts else [DASH]
+        span = " to ".join(ends) + "\u00a0%"
         first = [f"{k} = {_shown(v, PROPERTIES[k].unit if k in PROPERTIES else '-', 3, False)}"
                  for k, v in same[0]["parameters"].items()]  # fmt: skip
         rows.append([breakable(_words(reason)), str(len(same)), span, "; ".join(first)])
     return rows
 
 
-def _provenance(s: Data) -> list[list[str]]:
-    air = s["air"]
-    versions: Callable[[str], str] = lambda name: f"{name}\u00a0{s['versions'][name]}"
-    rows = [
-        ["Trace, SHA-256", breakable(s["trace_sha256"])],
-        ["Air run, SHA-256", breakable(str(air.get("sha256", DASH))) if air else "no air run"],
-        ["Commit", breakable(s["git"]) if s["git"] else "not run from a checkout"],
-        ["Seed, device", f"{s['seed']}, {s['device'] or 'not recorded'}"],
-        ["Versions", ", ".join(versions(name) for name in sorted(s["versions"]))],
-    ]
-    return rows
+def _provenance(s: Data) -> Data:
+    return {
+        "trace": s["trace_sha256"], "commit": s["git"] or "",
+        "air": str(s["air"].get("sha256", DASH)) if s["air"] else "",
+        "seed": str(s["seed"]), "device": s["device"] or "not recorded", "command": breakable(shlex.join(s["command"])),
+        "versions": ", ".join(f"{name}\u00a0{s['versions'][name]}" for name in sorted(s["versions"])),
+    }  # fmt: skip
 
 
 def _verdict(p: Data) -> str:
@@ -462,6 +393,12 @@ def _verdict(p: Data) -> str:
 
 def _meaning(name: str) -> str:
     return PROPERTIES[name].meaning if name in PROPERTIES else ""
+
+
+def _capital(text: str) -> str:
+    """A sentence with a capital, unless it begins with a name: of a property, a file or a column."""
+    first = text.split(" ", 1)[0]
+    return text[:1].upper() + text[1:] if first.isalpha() and first not in PROPERTIES else text
 
 
 def _words(name: str) -> str:

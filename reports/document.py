@@ -1,7 +1,8 @@
 """Numbers written for people, and typesetting: SI values become text, text and figures become a PDF.
 
-Every number of a report passes through :func:`quantity` or one of its neighbours, so that one quantity has one unit
-and one precision everywhere. Texts travel to the templates as JSON, never as markup: a file name cannot break a page.
+Every number of a report passes through :func:`quantity` or one of its neighbours, so that one quantity has
+one unit and one precision everywhere. Texts travel to the templates as JSON, never as markup: a file name
+cannot break a page.
 """
 
 from __future__ import annotations
@@ -25,33 +26,40 @@ NBSP = "\u00a0"
 MINUS = "\u2212"
 DASH = "\u2013"
 
-#: SI unit -> (factor, text) from the smallest to the largest unit that people use for it.
-LADDERS: dict[str, tuple[tuple[float, str], ...]] = {
-    "Pa": ((1.0, "Pa"), (1e3, "kPa"), (1e6, "MPa"), (1e9, "GPa")),
-    "m": ((1e-6, "µm"), (1e-3, "mm"), (1.0, "m")),
-    "N": ((1e-3, "mN"), (1.0, "N"), (1e3, "kN")),
-    "J": ((1e-3, "mJ"), (1.0, "J"), (1e3, "kJ")),
-    "J/m^2": ((1.0, "J/m²"), (1e3, "kJ/m²")),
-    "N/m": ((1.0, "N/m"), (1e3, "kN/m")),
-    "s": ((1e-3, "ms"), (1.0, "s")),
-    "m/s": ((1e-3, "mm/s"), (1.0, "m/s")),
-    "Hz": ((1.0, "Hz"), (1e3, "kHz")),
-    "kg/m^3": ((1.0, "kg/m³"),),
-    "rad": ((math.pi / 180.0, "°"),),
-    "fraction": ((1e-2, "%"),),
-    "-": ((1.0, ""),),
-    "": ((1.0, ""),),
+#: SI unit -> rungs (value from which it is used, factor, text), smallest first: the units that people use.
+LADDERS: dict[str, tuple[tuple[float, float, str], ...]] = {
+    "Pa": ((0.0, 1.0, "Pa"), (1e3, 1e3, "kPa"), (1e6, 1e6, "MPa"), (1e9, 1e9, "GPa")),
+    "m": ((0.0, 1e-6, "µm"), (1e-4, 1e-3, "mm"), (1.0, 1.0, "m")),
+    "N": ((0.0, 1.0, "N"), (1e4, 1e3, "kN")),
+    "J": ((0.0, 1e-3, "mJ"), (1.0, 1.0, "J")),
+    "J/m^2": ((0.0, 1.0, "J/m²"), (1e4, 1e3, "kJ/m²")),
+    "N/m": ((0.0, 1.0, "N/m"), (1e4, 1e3, "kN/m")),
+    "m/s": ((0.0, 1e-3, "mm/s"), (1.0, 1.0, "m/s")),
+    "Hz": ((0.0, 1.0, "Hz"), (1e3, 1e3, "kHz")),
+    "kg/m^3": ((0.0, 1.0, "kg/m³"),),
+    "rad": ((0.0, math.pi / 180.0, "°"),),
+    "fraction": ((0.0, 1e-2, "%"),),
+    "-": ((0.0, 1.0, ""),),
+    "": ((0.0, 1.0, ""),),
 }
-#: A value within this part of the next unit counts as reaching it: 1e-3 m is 1 mm whatever the last bit says.
+#: Decimals of a per cent that are worth printing.
+PERCENT_PLACES = 2
+#: A range whose lower end is below this part of its unit gets a unit for each end: 50 kPa to 2 MPa.
+SMALL_END = 0.1
+#: A value this close to the next unit counts as reaching it: 1e-3 m is 1 mm whatever the last bit says.
 ROUNDING = 1e-9
 #: Outside this range a number is written with a power of ten.
 PLAIN_RANGE = (1e-4, 1e6)
-#: Digits from which on thousands are set apart.
+#: Numbers from here on have their thousands set apart.
 GROUP_FROM = 1e4
 
+#: With more decimals than this, a value and its much smaller uncertainty are written apart.
+MOST_PLACES = 6
+
 _SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
-_BREAKS = re.compile(r"(?<=[/_=,;:@+&?.\\-])(?=[^\s])")
-_LONG = re.compile(r"[^\s\u200b]{18}(?=[^\s\u200b]{3})")
+_LONG_WORD = re.compile(r"\S{29,}")
+_BREAKS = re.compile(r"(?<=[/_=,;:@+&?.\\-])(?=.)")
+_SOLID = re.compile(r"[^\u200b]{18}(?=[^\u200b]{3})")
 _TEMPLATES = Path(__file__).resolve().parent / "templates"
 
 
@@ -65,18 +73,16 @@ def plain(x: float, digits: int | None = 3) -> str:
         return "0"
     if not PLAIN_RANGE[0] <= abs(x) < PLAIN_RANGE[1]:
         mantissa, exponent = f"{x:.{(digits or 6) - 1}e}".split("e")
-        if digits is None:
-            mantissa = f"{float(mantissa):g}"
+        mantissa = f"{float(mantissa):g}" if digits is None else mantissa
         return f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}".replace("-", MINUS)
     if digits is None:
         return f"{x:.6g}".replace("-", MINUS)
     rounded = float(f"{x:.{digits - 1}e}")
-    places = max(0, digits - 1 - math.floor(math.log10(abs(rounded))))
-    return _grouped(rounded, places)
+    return _grouped(rounded, max(0, digits - 1 - math.floor(math.log10(abs(rounded)))))
 
 
 def count(n: float) -> str:
-    """A whole number with its thousands set apart.
+    """A whole number, thousands set apart from ten thousand on.
 
     >>> count(1234567).replace(NBSP, " "), count(1234)
     ('1 234 567', '1234')
@@ -89,7 +95,8 @@ def quantity(value: float | None, unit: str, *, digits: int | None = 3, signed: 
 
     Args:
         value: In the SI unit; None or not finite means there is none.
-        unit: SI unit as in ``materials.yaml``; ``fraction`` is shown in per cent; an unknown one is kept.
+        unit: SI unit as in ``materials.yaml``; ``fraction`` is shown in per cent, with two decimals at most;
+            an unknown unit is kept.
         digits: Significant digits; None for the shortest text (limits, settings).
         signed: Whether a positive value gets its sign.
 
@@ -99,22 +106,27 @@ def quantity(value: float | None, unit: str, *, digits: int | None = 3, signed: 
     if value is None or not math.isfinite(value):
         return DASH
     factor, name = _rung(unit, abs(value))
-    sign = "+" if signed and value > 0.0 else ""
-    return sign + _with_unit(plain(value / factor, digits), name)
+    x = value / factor
+    few = name == "%" and digits is not None and 0.0 < abs(x) < 10.0 ** (digits - PERCENT_PLACES)
+    text = _grouped(x, PERCENT_PLACES) if few else plain(x, digits)
+    return _with_unit(("+" if signed and text.strip("0.") and x > 0.0 else "") + text, name)
 
 
 def interval(low: float | None, high: float | None, unit: str) -> str:
-    """A range in one unit, three digits; a dash for an end that is not known, one dash if neither is.
+    """A range to three digits; a dash for an end that is not known, one dash if neither is.
 
-    >>> interval(5e4, 2e6, "Pa").replace(NBSP, " ")
-    '0.0500 to 2.00 MPa'
+    >>> interval(0.8e6, 2e6, "Pa").replace(NBSP, " "), interval(5e4, 2e6, "Pa").replace(NBSP, " ")
+    ('0.8 to 2 MPa', '50 kPa to 2 MPa')
     """
     ends = [x if x is not None and math.isfinite(x) else None for x in (low, high)]
     known = [abs(x) for x in ends if x is not None]
     if not known:
         return DASH
     factor, name = _rung(unit, max(known))
-    texts = [DASH if x is None else plain(x / factor) for x in ends]
+    own = [DASH if x is None else quantity(_three(x), unit, digits=None) for x in ends]
+    if any(0.0 < x < SMALL_END * factor for x in known) and _rung(unit, min(known))[1] != name:
+        return f"{own[0]} to {own[1]}"
+    texts = [DASH if x is None else plain(_three(x / factor), None) for x in ends]
     return _with_unit(f"{texts[0]} to {texts[1]}", name)
 
 
@@ -129,9 +141,9 @@ def uncertain(value: float | None, sd: float | None, unit: str) -> str:
     factor, name = _rung(unit, max(abs(value), sd))
     x, s = value / factor, sd / factor
     places = max(0, 1 - math.floor(math.log10(s)))
-    if places > 6:
-        return f"{quantity(value, unit)} ± {quantity(sd, unit, digits=2)}"
-    text = f"{_grouped(x, places)} ± {_grouped(s, places)}"
+    if places > MOST_PLACES:
+        return f"{quantity(value, unit)}{NBSP}±{NBSP}{quantity(sd, unit, digits=2)}"
+    text = f"{_grouped(x, places)}{NBSP}±{NBSP}{_grouped(s, places)}"
     return _with_unit(f"({text})" if name in ("%", "°") else text, name)
 
 
@@ -152,8 +164,8 @@ def duration(seconds: float | None) -> str:
 
 
 def breakable(text: str) -> str:
-    """Text with break opportunities inside long words (paths, hashes, options), invisible on paper."""
-    return _LONG.sub(lambda m: m.group() + "\u200b", _BREAKS.sub("\u200b", text))
+    """Text in which long words (paths, options) may break: zero-width spaces, in words of 29 letters or more."""
+    return _LONG_WORD.sub(lambda m: _SOLID.sub("\\g<0>\u200b", _BREAKS.sub("\u200b", m.group())), text)
 
 
 def listed(names: list[str]) -> str:
@@ -165,19 +177,12 @@ def listed(names: list[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
-def moment(created: str) -> datetime:
-    """Date and time of an ISO text; the time zone is kept as written.
-
-    Raises:
-        ValueError: No ISO date and time.
-    """
-    return datetime.fromisoformat(re.sub(r"[zZ]$", "+00:00", created))
-
-
-def typeset(template: str, content: Mapping[str, Any], figures: Mapping[str, bytes], *, date: datetime) -> bytes:
+def typeset(
+    template: str, content: Mapping[str, Any], figures: Mapping[str, bytes], *, date: datetime
+) -> bytes:
     """Typeset a template; the same arguments give the same bytes.
 
-    Only fonts that come with the typesetter and with matplotlib are used, so the machine's own fonts do not matter.
+    Only fonts that come with the typesetter and with matplotlib are used: those of the machine do not matter.
 
     Args:
         template: File name in ``reports/templates``.
@@ -216,7 +221,8 @@ def write_whole(path: Path, data: bytes) -> None:
         os.replace(part, path)
     except OSError as e:
         raise ReportError(
-            f"{path}: cannot be written ({e.strerror}); free space or permissions, then run cutcal report again"
+            f"{path}: cannot be written ({e.strerror}); free the disk or the permission, then make the "
+            "report again with cutcal report"
         ) from None
     finally:
         part.unlink(missing_ok=True)
@@ -224,17 +230,23 @@ def write_whole(path: Path, data: bytes) -> None:
 
 def _rung(unit: str, size: float) -> tuple[float, str]:
     """Factor and text of the unit for a value of this size [SI unit]."""
-    ladder = LADDERS.get(unit, ((1.0, unit.replace("^2", "²").replace("^3", "³")),))
+    ladder = LADDERS.get(unit, ((0.0, 1.0, unit.replace("^2", "²").replace("^3", "³")),))
     if size == 0.0:
-        return next((r for r in ladder if r[0] == 1.0), ladder[0])
-    fits = [rung for rung in ladder if float(f"{size:.2e}") >= rung[0] * (1.0 - ROUNDING)]
-    return fits[-1] if fits else ladder[0]
+        return next(((factor, name) for _, factor, name in ladder if factor == 1.0), ladder[0][1:])
+    size = _three(size)
+    return [(factor, name) for start, factor, name in ladder if size >= start * (1.0 - ROUNDING)][-1]
+
+
+def _three(x: float) -> float:
+    """The number rounded to three significant digits."""
+    return float(f"{x:.2e}")
 
 
 def _grouped(x: float, places: int) -> str:
     text = f"{x:,.{places}f}" if abs(x) >= GROUP_FROM else f"{x:.{places}f}"
-    return text.replace(",", NBSP).replace("-", MINUS)
+    text = text.replace(",", NBSP)
+    return text.replace("-", MINUS if text.strip("-0.") else "")
 
 
 def _with_unit(text: str, name: str) -> str:
-    return text + ("" if not name else name if name == "°" else NBSP + name)
+    return text + (name if name in ("", "°") else NBSP + name)

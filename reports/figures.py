@@ -1,8 +1,8 @@
 """Vector figures of a report: SVG bytes that are equal for equal data, readable in black and white.
 
-Every curve has its own dash pattern and its own lightness besides its colour (Okabe and Ito's palette, which readers
-with colour-blindness tell apart). Legends stand outside the axes, so that no text covers a curve. Letters are drawn
-as paths: no font is needed to show a figure.
+Every curve has its own dash pattern and its own lightness besides its colour (Okabe and Ito's palette, which
+readers with colour-blindness tell apart). Legends stand outside the axes, so that no text covers a curve.
+Letters are drawn as paths: no font is needed to show a figure.
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 MM = 1.0 / 25.4
 #: Width of a figure [mm]: the text width of the report, so that letters keep their size in print.
@@ -26,6 +27,8 @@ WIDTH = 170.0
 COLUMNS = 900
 #: Axis of the parameter figure: at most this factor either side of the middle of the literature's range.
 LARGEST_FACTOR = 1e3
+#: Ratio of the ends of a log axis up to which 1, 2 and 5 of each decade have room for their numbers.
+FEW_DECADES = 1e3
 
 BLACK, GREY, LIGHT = "#000000", "#767676", "#dddddd"
 BLUE, SKY, GREEN, ORANGE, RED = "#0072B2", "#56B4E9", "#009E73", "#E69F00", "#D55E00"
@@ -63,6 +66,7 @@ MEASURED: dict[str, Any] = {"color": BLACK, "lw": 1.8}
 SIMULATED: dict[str, Any] = {"color": RED, "lw": 1.8, "dashes": (4.5, 1.4)}
 EDGE: dict[str, Any] = {"color": BLUE, "lw": 1.1, "dashes": (1.2, 1.2)}
 FACE: dict[str, Any] = {"color": GREEN, "lw": 1.1, "dashes": (7.0, 1.6, 1.2, 1.6)}
+BAND: dict[str, Any] = {"facecolor": LIGHT, "edgecolor": GREY, "hatch": "////", "lw": 0.0}
 NULLS: dict[str, dict[str, Any]] = {
     "ramp_N": {"label": "ramp", "color": BLUE, "lw": 0.8, "dashes": (1.5, 1.5)},
     "half_sine_N": {"label": "half sine", "color": GREEN, "lw": 0.8, "dashes": (8.0, 2.0)},
@@ -125,12 +129,13 @@ class Row:
     prior_high: float | None
 
 
-def forces(curves: Curves, measured: str, simulated: str) -> bytes:
+def forces(curves: Curves, measured: str, simulated: str, height: float) -> bytes:
     """Measured and simulated force over stroke, with the parts of the simulation.
 
     Args:
         curves: Columns of ``curves.csv``: stroke [m] and forces [N], shape (n,).
         measured, simulated: Labels of the two curves in the legend.
+        height: Height of the figure [mm].
     """
 
     def draw(figure: Figure) -> None:
@@ -144,10 +149,10 @@ def forces(curves: Curves, measured: str, simulated: str) -> bytes:
         _stroke_axis(axes, x)
         axes.set_ylabel("force on the knife [N]")
         handles, labels = axes.get_legend_handles_labels()
-        order = [2, 0, 3, 1]
-        figure.legend([handles[i] for i in order], [labels[i] for i in order], loc="outside upper left", ncols=2)
+        handles, labels = ([items[i] for i in (2, 3, 0, 1)] for items in (handles, labels))
+        figure.legend(handles, labels, loc="outside upper left", ncols=2)
 
-    return _svg(draw, 82.0)
+    return _svg(draw, height)
 
 
 def conditioning(record: Record, curves: Curves) -> bytes:
@@ -159,47 +164,47 @@ def conditioning(record: Record, curves: Curves) -> bytes:
         _contact(panels["onset"], record)
         _filtered(panels["curve"], record, curves)
         handles, labels = panels["raw"].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper left", ncols=3)
+        figure.legend(handles, labels, loc="outside upper left", ncols=4 if len(labels) < 5 else 3)
 
-    return _svg(draw, 125.0)
+    return _svg(draw, 138.0)
 
 
-def fit(curves: Curves, noise_sd: float) -> bytes:
+def fit(curves: Curves, noise_sd: float, trace: str) -> bytes:
     """Both curves divided by their own peak, and the residual over stroke with the noise of the trace.
 
     Args:
         curves: Columns of ``curves.csv``.
         noise_sd: Standard deviation of one unfiltered sample before contact [N].
+        trace: What the real curve is called: measured or reconstructed.
     """
 
     def draw(figure: Figure) -> None:
         shape, residual = figure.subplots(2, 1, sharex=True, height_ratios=[1.5, 1.0])
         x, real, sim = 1e3 * curves["stroke_m"], curves["real_N"], curves["sim_N"]
-        shape.plot(x, real / np.max(real), label="measured, over its own peak", **MEASURED)
+        shape.plot(x, real / np.max(real), label=f"{trace}, over its own peak", **MEASURED)
         if np.max(sim) > 0.0:
             shape.plot(x, sim / np.max(sim), label="simulated, over its own peak", **SIMULATED)
         shape.set_ylabel("force / own peak")
-        residual.axhspan(-noise_sd, noise_sd, facecolor=LIGHT, edgecolor=GREY, hatch="////", lw=0.0,
-                         label="± 1 sd of one raw sample before contact")  # fmt: skip
+        residual.axhspan(-noise_sd, noise_sd, label="± 1 sd of one raw sample before contact", **BAND)
         residual.axhline(0.0, color=BLACK, lw=0.5)
-        residual.plot(x, curves["residual_N"], color=BLUE, lw=1.3, label="simulated − measured")
+        residual.plot(x, sim - real, color=BLUE, lw=1.3, label=f"simulated − {trace}")
         residual.set_ylabel("residual [N]")
         _stroke_axis(residual, x)
         handles, labels = zip(*(a.get_legend_handles_labels() for a in (shape, residual)), strict=True)
         figure.legend(sum(handles, []), sum(labels, []), loc="outside upper left", ncols=2)
         figure.align_ylabels()
 
-    return _svg(draw, 88.0)
+    return _svg(draw, 80.0)
 
 
-def nulls(curves: Curves) -> bytes:
-    """Measured and simulated force with the null models and the simulation before the fit."""
+def nulls(curves: Curves, trace: str) -> bytes:
+    """Real and simulated force with the null models and the simulation before the fit."""
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
         x = 1e3 * curves["stroke_m"]
         axes.axhline(0.0, color=BLACK, lw=0.5)
-        axes.plot(x, curves["real_N"], label="measured", **MEASURED)
+        axes.plot(x, curves["real_N"], label=trace, **MEASURED)
         axes.plot(x, curves["sim_N"], label="simulated, fitted", **SIMULATED)
         top = 1.5 * max(np.max(curves["real_N"]), np.max(curves["sim_N"]))
         bottom, highest = min(0.0, np.min(curves["real_N"]), np.min(curves["sim_N"])), 0.0
@@ -217,7 +222,7 @@ def nulls(curves: Curves) -> bytes:
         _stroke_axis(axes, x)
         figure.legend(loc="outside upper left", ncols=3)
 
-    return _svg(draw, 68.0)
+    return _svg(draw, 62.0)
 
 
 def parameters(rows: Sequence[Row]) -> bytes:
@@ -229,7 +234,8 @@ def parameters(rows: Sequence[Row]) -> bytes:
         for i, row in enumerate(rows):
             if row.prior_low is not None and row.prior_high is not None:
                 ends = np.clip([row.prior_low, row.prior_high], low, high)
-                axes.barh(i, ends[1] - ends[0], left=ends[0], height=0.46, facecolor=LIGHT, edgecolor=GREY, lw=0.7)
+                axes.barh(i, ends[1] - ends[0], left=ends[0], height=0.46, facecolor=LIGHT, edgecolor=GREY,
+                          lw=0.7)  # fmt: skip
             x = float(np.clip(row.value, low, high))
             axes.plot(x, i, marker="o", ms=5.0, color=BLACK, ls="none", zorder=3)
             if row.low is not None and row.high is not None:
@@ -244,8 +250,7 @@ def parameters(rows: Sequence[Row]) -> bytes:
         axes.axvline(1.0, color=GREY, lw=0.6)
         axes.set_xscale("log")
         axes.set_xlim(low, high)
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
-        axes.xaxis.set_minor_formatter(FuncFormatter(lambda x, _: ""))
+        _log_ticks(axes.xaxis, low, high)
         axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.set_yticks(range(len(rows)), [row.name for row in rows])
         axes.tick_params(axis="y", length=0)
@@ -270,7 +275,7 @@ def misfit(history: Sequence[tuple[float, float]]) -> bytes:
         axes.plot(x[-1], y[-1], marker="o", ms=4.0, color=BLACK)
         if np.all(y > 0.0) and np.max(y) > 10.0 * np.min(y):
             axes.set_yscale("log")
-            axes.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+            _log_ticks(axes.yaxis, float(np.min(y)), float(np.max(y)))
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.margins(x=0.02, y=0.08)
         axes.set_xlabel("simulation number")
@@ -280,7 +285,7 @@ def misfit(history: Sequence[tuple[float, float]]) -> bytes:
 
 
 def envelope(x: np.ndarray, y: np.ndarray, columns: int = COLUMNS) -> tuple[np.ndarray, np.ndarray]:
-    """A long record with only the lowest and highest sample of each of ``columns`` equal parts, in their order.
+    """A long record with only the lowest and highest sample of each of ``columns`` equal parts, in order.
 
     Args:
         x, y: Record, shape (n,).
@@ -292,8 +297,8 @@ def envelope(x: np.ndarray, y: np.ndarray, columns: int = COLUMNS) -> tuple[np.n
     if len(x) <= 2 * columns:
         return x, y
     edges = np.linspace(0, len(x), columns + 1).astype(int)
-    keep = {a + int(f(y[a:b])) for a, b in zip(edges[:-1], edges[1:], strict=True) for f in (np.argmin, np.argmax)}
-    kept = np.array(sorted(keep))
+    parts = list(zip(edges[:-1], edges[1:], strict=True))
+    kept = np.array(sorted({a + int(f(y[a:b])) for a, b in parts for f in (np.argmin, np.argmax)}))
     return x[kept], y[kept]
 
 
@@ -313,6 +318,14 @@ def _stroke_axis(axes: Axes, x: np.ndarray) -> None:
     axes.set_xlabel("stroke from contact [mm]")
 
 
+def _log_ticks(axis: Axis, low: float, high: float) -> None:
+    """Plain numbers at 1, 2 and 5 of each decade, or at 1 only where there are many decades."""
+    subs = (1.0, 2.0, 5.0) if high / low < FEW_DECADES else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs))
+    axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
 def _raw(axes: Axes, r: Record) -> None:
     """Raw record over time with what was subtracted and where the cut begins and ends."""
     x, y = envelope(r.time, r.raw)
@@ -321,11 +334,11 @@ def _raw(axes: Axes, r: Record) -> None:
     name = "baseline" if r.baseline_kind == "constant" else "air run, shifted"
     axes.plot(bx, by, color=RED, lw=1.2, dashes=(5.0, 2.0), label=name)
     if r.window is not None:
-        axes.axvspan(*r.window, facecolor=LIGHT, edgecolor=GREY, hatch="////", lw=0.0, label="baseline window")
+        axes.axvspan(*r.window, label="baseline window", **BAND)
     _moment(axes, r.onset, r.onset_sd, "contact", BLUE, (1.2, 1.2))
     _moment(axes, r.end, r.end_sd, "end of the downward stroke", GREEN, (7.0, 1.6, 1.2, 1.6))
     axes.set_xlim(float(r.time[0]), float(r.time[-1]))
-    axes.set_title("a  record as measured")
+    axes.set_title("a  whole record, as read")
     axes.set_xlabel("time [s]")
     axes.set_ylabel("force [N]")
 
@@ -373,7 +386,7 @@ def _filtered(axes: Axes, r: Record, curves: Curves) -> None:
 
 
 def _factors(rows: Sequence[Row]) -> tuple[float, float]:
-    """Limits of the axis that hold all positive numbers, at least a factor 3 and at most LARGEST_FACTOR either side."""
+    """Limits of the axis that hold all positive numbers: a factor 3 to LARGEST_FACTOR either side."""
     numbers = [x for r in rows for x in (r.value, r.low, r.high, r.prior_low, r.prior_high)]
     positive = [x for x in numbers if x is not None and x > 0.0]
     low = max(min([1 / 3.0, *positive]) / 1.3, 1.0 / LARGEST_FACTOR)

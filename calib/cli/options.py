@@ -1,0 +1,72 @@
+"""Options that several sub-commands share, and the checks of their values."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+
+from calib.materials import FoodSpec, check_override, load_food, load_material_file
+from calib.scenes import Sizing
+from mpm.errors import CutcalError
+from mpm.runtime import ARCHES
+from mpm.shapes import SHAPE_KINDS
+
+
+def number(low: float, high: float, unit: str) -> Callable[[str], float]:
+    """Type of an option that takes a number between two limits (both excluded)."""
+
+    def convert(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+        if not (math.isfinite(value) and low < value < high):
+            raise argparse.ArgumentTypeError(f"{text} must lie between {low:g} and {high:g} {unit}")
+        return value
+
+    return convert
+
+
+def add_food(p: argparse.ArgumentParser) -> None:
+    """Options that say what is cut with what."""
+    p.add_argument("--food", required=True, metavar="NAME", help="food of materials.yaml (cutcal foods lists them)")
+    p.add_argument("--material", metavar="YAML", help="take the food from this file, e.g. a calibration's material.yaml")
+    p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="give a property another value [SI]")
+    p.add_argument("--knife", default="kitchen", metavar="NAME", help="knife of knives.yaml, or a YAML file")
+    p.add_argument("--shape", choices=SHAPE_KINDS, help="outline of the specimen")
+    for name, what in (("height", "height"), ("width", "width along the blade"), ("length", "length across the blade")):
+        p.add_argument(f"--{name}", type=number(1e-3, 1.0, "m"), metavar="M", help=f"{what} of the specimen [m]")
+    p.add_argument("--dx", type=number(1e-4, 0.02, "m"), metavar="M", help="cell size [m]")
+
+
+def add_run(p: argparse.ArgumentParser) -> None:
+    """Options that say where and how."""
+    p.add_argument("--out", metavar="DIR", help="folder of the results; never overwritten")
+    p.add_argument("--seed", type=int, default=0, help="seed of the particles and of the search")
+    p.add_argument("--arch", choices=ARCHES, default="cpu", help="device of the simulations")
+    p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
+
+
+def food_of(args: argparse.Namespace) -> FoodSpec:
+    """The food that the options name.
+
+    Raises:
+        MaterialError: Unknown food, bad file, or an impossible value.
+        CutcalError: ``--set`` without a value.
+    """
+    food = load_food(args.food) if args.material is None else load_material_file(args.material)
+    if args.material is not None and food.name != args.food:
+        raise CutcalError(f"--material {args.material}: holds {food.name}, but --food is {args.food}")
+    values = {}
+    for item in args.set:
+        name, sign, value = item.partition("=")
+        if not sign:
+            raise CutcalError(f"--set {item}: write NAME=VALUE, for instance --set E=2e5")
+        values[name.strip()] = check_override(name.strip(), value.strip())
+    return food.with_values(values) if values else food
+
+
+def sizing_of(args: argparse.Namespace) -> Sizing:
+    """Sizes that the user gave."""
+    return Sizing(args.shape, args.height, args.width, args.length)

@@ -1,0 +1,69 @@
+"""The output folder: made once, never overwritten, files written whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from calib.errors import OutputError
+
+MARKS = ("summary.json", "material.yaml", "curves.csv", "report.pdf", "force.csv", "evaluations.h5", "evaluations.journal")
+
+
+def prepare(out: Path, *, resume: bool) -> None:
+    """Make the folder, or accept an empty one; with ``resume`` also one that holds an unfinished run.
+
+    Raises:
+        OutputError: Another run's results are there, or the folder cannot be written.
+    """
+    if out.exists() and not out.is_dir():
+        raise OutputError(f"--out {out}: is a file, not a folder; choose another name")
+    found = [m for m in MARKS if (out / m).exists()]
+    if found and not resume:
+        raise OutputError(
+            f"--out {out}: holds another run ({', '.join(found)}) and is never overwritten; choose another folder, "
+            "or add --resume to continue that run"
+        )
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        probe = out / ".write-test"
+        probe.write_text("")
+        probe.unlink()
+    except OSError as e:
+        raise OutputError(f"--out {out}: cannot be written ({e.strerror}); choose another folder") from None
+
+
+def write_json(path: Path, content: dict[str, Any]) -> None:
+    """Write a JSON document atomically; NaN and infinity become null."""
+    _replace(path, json.dumps(_finite(content), indent=2, ensure_ascii=False) + "\n")
+
+
+def write_csv(path: Path, columns: dict[str, Any]) -> None:
+    """Write columns of equal length atomically, 9 significant digits."""
+    _replace(path, pd.DataFrame(columns).to_csv(index=False, float_format="%.9g"))
+
+
+def _replace(path: Path, text: str) -> None:
+    temporary = path.with_name(path.name + ".part")
+    try:
+        temporary.write_text(text, encoding="utf-8")
+        os.replace(temporary, path)
+    except OSError as e:
+        raise OutputError(f"{path}: cannot be written ({e.strerror})") from None
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(k): _finite(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(v) for v in value]
+    if hasattr(value, "item"):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

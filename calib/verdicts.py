@@ -1,0 +1,118 @@
+"""The lines of a report's verdict table: value, limit, passed; and in words what was not shown."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from calib.metrics import Metrics
+
+# Limits of a single in-sample calibration. Peak: the figure that published work quotes (CulinaryCut, "within 5 %").
+# Curve and shape: twice the target of a validated model (5 %), because absolute forces of the sensors that such traces
+# come from are themselves uncertain by 10 % and more.
+PEAK_LIMIT = 0.05
+NRMSE_LIMIT = 0.08
+SHAPE_LIMIT = 0.08
+MOMENTUM_LIMIT = 0.01
+KINETIC_LIMIT = 0.10  # explicit quasi-static practice: kinetic energy below 5 to 10 % of internal energy
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One line of the table. ``passed`` None: not run."""
+
+    name: str
+    value: float | None
+    limit: float | None
+    unit: str
+    passed: bool | None
+    note: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return asdict(self)
+
+
+def _below(name: str, value: float, limit: float, unit: str = "", note: str = "") -> Verdict:
+    return Verdict(name, value, limit, unit, bool(abs(value) <= limit), note)
+
+
+def judge(
+    metrics: Metrics,
+    nulls: Mapping[str, Metrics],
+    *,
+    momentum_residual: float,
+    ke_over_ie: float,
+    parameters: Mapping[str, Mapping[str, Any]],
+) -> list[Verdict]:
+    """The verdict table of a calibration.
+
+    Args:
+        metrics: Simulation against trace.
+        nulls: Null models against trace.
+        momentum_residual: Momentum balance that does not close, part of the peak [-].
+        ke_over_ie: Kinetic over internal energy [-].
+        parameters: Fitted parameters with their verdicts.
+
+    Returns:
+        All lines; those with ``passed`` None were not run and decide nothing.
+    """
+    lines = [
+        _below("peak force error", metrics.peak_error, PEAK_LIMIT),
+        _below("curve error (NRMSE)", metrics.nrmse, NRMSE_LIMIT),
+        _below("normalised-shape error", metrics.shape_error, SHAPE_LIMIT),
+    ]
+    simple = {n: m for n, m in nulls.items() if n in ("ramp", "half_sine")}
+    best = min(simple, key=lambda n: simple[n].shape_error)
+    lines.append(
+        Verdict(
+            "shape better than ramp and half sine",
+            metrics.shape_error,
+            simple[best].shape_error,
+            "",
+            metrics.shape_error < simple[best].shape_error,
+            f"best null model: {best.replace('_', ' ')}",
+        )
+    )
+    lines.append(_below("momentum balance residual", momentum_residual, MOMENTUM_LIMIT, "", "part of the peak force"))
+    lines.append(_below("kinetic over internal energy", ke_over_ie, KINETIC_LIMIT))
+    at_bound = [n for n, p in parameters.items() if p["verdict"] == "at_bound"]
+    lines.append(Verdict("parameters at a bound", len(at_bound), 0, "", not at_bound, ", ".join(at_bound)))
+    for name in ("held-out specimens", "grid convergence of the calibrated force", "repeated cuts"):
+        lines.append(Verdict(name, None, None, "", None, "not run"))
+    return lines
+
+
+def limits(
+    label: str,
+    stroke_source: str,
+    baseline_kind: str,
+    verdicts: list[Verdict],
+    parameters: Mapping[str, Mapping[str, Any]],
+    assumptions: list[str],
+) -> list[str]:
+    """What the calibration does not show, one sentence each."""
+    said = []
+    if label != "measured":
+        said.append(f"The trace is {label}, not a measurement: agreement with it says nothing about a real food.")
+    said.append("All figures are in-sample: the same trace was fitted and compared. Nothing here is validated.")
+    said += [f"{v.name}: failed; see the first page." for v in verdicts if v.passed is False]
+    unseen = [n for n, p in parameters.items() if p["verdict"] in ("not_seen", "weak")]
+    if unseen:
+        said.append(
+            f"The trace hardly sees {', '.join(unseen)}: these values are the literature's as much as the trace's."
+        )
+    if stroke_source != "position":
+        how = "one constant speed" if stroke_source == "speed" else "one constant speed and a stroke of the food's height"
+        said.append(f"The trace has no position: its stroke axis rests on {how}.")
+    if baseline_kind == "constant":
+        said.append("A constant baseline was subtracted: drift of the sensor along the stroke is in the force.")
+    said += [a[0].upper() + a[1:] + "." for a in assumptions]
+    said.append("One cut of one specimen says nothing about the scatter between specimens.")
+    said.append(
+        "The laws are independent of rate; relaxation, adhesion and moisture are not modelled, and the lower skin of a "
+        "whole fruit is not cut."
+    )
+    said.append("The default grid was used; the discretisation error of the calibrated force was not measured in this run.")
+    return said
