@@ -52,6 +52,7 @@ class Conditioned:
         baseline_kind: ``constant`` or ``air``.
         onset_s: Time of contact on the trace's clock [s].
         onset_sd_s: Its standard uncertainty [s].
+        end_s: Time at which the downward stroke ends [s].
         time: Time of the whole record [s], shape (n,).
         force: Tared, unfiltered force of the whole record [N], shape (n,).
         stroke: Uniform stroke from contact to the end of the downward stroke [m], shape (240,).
@@ -72,6 +73,7 @@ class Conditioned:
     baseline_kind: str
     onset_s: float
     onset_sd_s: float
+    end_s: float
     time: np.ndarray
     force: np.ndarray
     stroke: np.ndarray
@@ -146,6 +148,7 @@ def condition(
         baseline_kind="constant" if air is None else "air",
         onset_s=contact.onset,
         onset_sd_s=contact.onset_sd,
+        end_s=float(trace.time[int(np.argmax(stroke >= grid[-1] * (1 - 1e-9)))]),
         time=trace.time,
         force=tared,
         stroke=grid,

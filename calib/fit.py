@@ -41,23 +41,20 @@ FloatArray = npt.NDArray[np.float64]
 #: Points are rounded to this part of a coordinate unit (0.1 % of a log parameter): far below the noise of a
 #: run, and a resumed fit asks for exactly the points that are in the store.
 LATTICE = 1e-3
-#: The process is trusted this far from the best point: a factor e of a log parameter, the prior range of
-#: another.
+#: The process is trusted this far from the best point: a factor e of a log parameter.
 RADIUS = 1.0
 #: A promising point elsewhere must be this far from the one nearby [coordinate units].
 ELSEWHERE = 0.2
 #: Weight of not knowing the curve in the expected chi-square: 1 is the expectation; less elsewhere, for the
 #: sake of basins that are unexplored but promising.
 CAUTION_NEAR, CAUTION_FAR = 1.0, 0.3
-#: Points from which the most promising one is sought: random ones besides all runs, and how many are
-#: followed.
+#: Random points from which, besides all runs, the most promising one is sought; how many are followed.
 STARTS, FOLLOWED = 16, 3
 #: Probes are drawn from the normal approximation of the posterior, this much wider (in 24 synthetic cuts with
 #: 1 % noise 1.5 left a tenth of the excess chi-square of isotropic probes), and may cost this much more than
 #: the best run: about a 90 % region of one parameter, where curvature matters for the intervals.
 PROBE_SPREAD, PROBE_COST, PROBES = 1.5, 3.0, 200
-#: Rounds without promise and gain after which the search has converged; rounds without gain after which it
-#: stalls.
+#: Rounds without promise and gain after which the search has converged; rounds without gain: stalled.
 CALM_ROUNDS, STALLED_ROUNDS = 2, 4
 #: Designs at most: further ones while every run breaks down, and where the search ends with a chi-square
 #: above the number of independent data.  In 96 synthetic cuts 6 ended in such side minima, 5 of which one
@@ -85,7 +82,7 @@ class FitOptions:
         ValueError: A number that is not positive.
     """
 
-    budget: float = 70.0
+    budget: float = 80.0
     batch: int = 2
     design: int = 7
     coarse_cost: float = 0.25
@@ -200,10 +197,9 @@ class _Search:
         self.centre: FloatArray | None = None
         low, high = self.parameters.box
         sobol = qmc.Sobol(len(low), scramble=True, seed=options.seed)
-        sample = sobol.random_base2(math.ceil(math.log2(DESIGNS * options.design)))[
-            : DESIGNS * options.design
-        ]
-        self.designs = list(np.reshape(low + (high - low) * (0.1 + 0.8 * sample), (DESIGNS, -1, len(low))))
+        count = DESIGNS * options.design
+        sample = low + (high - low) * (0.1 + 0.8 * sobol.random_base2(math.ceil(math.log2(count)))[:count])
+        self.designs = np.split(sample, DESIGNS)
 
     @property
     def finished(self) -> list[Trial]:
@@ -261,7 +257,7 @@ class _Search:
         return len(self.designs) > 0 and self._room() > cost * self.options.design + 2 * self.options.batch
 
     def _design(self, points: list[FloatArray]) -> None:
-        """Run ``points`` and the next part of the sample, and then the best points of the lines they stand for."""
+        """Run ``points`` and the next part of the sample, then the best of the lines they stand for."""
         first = len(self.trials)
         self._evaluate(points + list(self.designs.pop(0)), "design", coarse=True)
         lines = sorted((self._scaled(t) for t in self.trials[first:] if t.ok), key=lambda line: line[0])
@@ -271,7 +267,7 @@ class _Search:
         """The error that no run reached the end of its stroke."""
         furthest = max((t.evaluation for t in self.trials), key=lambda e: e.fraction)
         return SimulationError(
-            f"none of {len(self.trials)} simulations reached the end of its stroke; the furthest got to "
+            f"none of {len(self.trials)} simulations led to one that ends its stroke; the furthest got to "
             f"{furthest.fraction:.0%} ({furthest.reason}) at {furthest.parameters}; check the scene, or "
             "narrow the prior ranges.",
             reason=furthest.reason,

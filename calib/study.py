@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +15,7 @@ from calib.filters import filter_simulated
 from calib.fit import FitOptions, FitResult, calibrate
 from calib.knives import load_knife
 from calib.materials import FoodSpec, dump_material
-from calib.metrics import Metrics, compare
+from calib.metrics import compare
 from calib.nulls import NullModel, null_models
 from calib.objective import Objective, Target
 from calib.outputs import prepare, write_csv, write_json
@@ -26,68 +23,19 @@ from calib.parameters import Parameter, ParameterSet
 from calib.pool import Pool
 from calib.progress import Progress
 from calib.properties import rule_of
-from calib.provenance import code_key, git_commit, key_of, versions
-from calib.scenes import Sizing, cut_scene, specimen
-from calib.store import EvaluationStore, StoredEvaluator
+from calib.provenance import code_key, key_of
+from calib.request import Request, Setup
+from calib.scenes import cut_scene, specimen
+from calib.store import CachedEvaluator, EvaluationStore, Header
+from calib.summary import add_conditioning, summarise
 from calib.trace import read_trace
-from calib.uncertainty import Uncertainty, assess
-from calib.verdicts import judge, limits
+from calib.uncertainty import uncertainty
 from mpm.record import ForceRecord
 from mpm.scene import Scene
 
 # Hard bounds reach this factor beyond the literature's range, so that a trace may contradict the literature.
 BOUND_FACTOR = 5.0
 LINEAR = {"nu": (0.0, 0.49), "mu": (0.0, 1.2)}  # fitted on a linear scale, with their hard bounds
-
-
-@dataclass(frozen=True)
-class Request:
-    """What to calibrate.
-
-    Attributes:
-        food: The food with its literature ranges.
-        trace: CSV of the cut.
-        air: CSV of the same motion without food, or None.
-        columns: ``time_col``, ``force_col``, ``position_col``, ``sign`` for reading the CSVs.
-        knife: Name or YAML file.
-        speed: Knife speed [m/s], or None.
-        t_end: End of the record [s], or None.
-        sizing: What is known of the specimen.
-        fit: Names of the fitted properties; None for the food's default.
-        dx: Cell size [m], or None.
-        budget: Largest number of simulations.
-        workers: Simulations at a time.
-        seed: Seed of particles and search.
-        arch: Device.
-        command: Command line, for provenance.
-    """
-
-    food: FoodSpec
-    trace: Path
-    air: Path | None = None
-    columns: Mapping[str, Any] = field(default_factory=dict)
-    knife: str = "kitchen"
-    speed: float | None = None
-    t_end: float | None = None
-    sizing: Sizing = field(default_factory=Sizing)
-    fit: tuple[str, ...] | None = None
-    dx: float | None = None
-    budget: float = 40
-    workers: int = 2
-    seed: int = 0
-    arch: str = "cpu"
-    command: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class _Setup:
-    """Everything that is decided before the first simulation."""
-
-    curve: Conditioned
-    fine: Scene
-    coarse: Scene
-    objective: Objective
-    assumed: list[str]
 
 
 def fit_parameters(food: FoodSpec, names: tuple[str, ...]) -> ParameterSet:
@@ -112,7 +60,7 @@ def fit_parameters(food: FoodSpec, names: tuple[str, ...]) -> ParameterSet:
     return ParameterSet(tuple(chosen))
 
 
-def _set_up(request: Request) -> _Setup:
+def _set_up(request: Request) -> Setup:
     food = request.food
     trace = read_trace(request.trace, **request.columns)
     air = read_trace(request.air, **request.columns) if request.air is not None else None
@@ -125,7 +73,7 @@ def _set_up(request: Request) -> _Setup:
     coarse = cut_scene(food, shape, knife, coarse=True, **common)
     target = Target(curve.stroke, curve.curve, curve.noise_sd_N, curve.peak_sd_N, filter_simulated)
     objective = Objective(target, fit_parameters(food, request.fit or food.default_fit))
-    return _Setup(curve, fine, coarse, objective, assumed)
+    return Setup(curve, fine, coarse, objective, assumed)
 
 
 def run(
@@ -157,17 +105,19 @@ def run(
     for text in [*request.food.warnings(), *setup.curve.warnings, *setup.assumed]:
         say(text)
     prepare(out, resume=resume)
-    header = {"trace_sha256": setup.curve.trace.sha256, "scene": key_of(setup.fine.as_dict()), "code": code_key()}
+    header = Header(setup.curve.trace.sha256, key_of(setup.fine.as_dict()))
     options = FitOptions(budget=request.budget, batch=request.workers, seed=request.seed)
-    with EvaluationStore(out / "evaluations.h5", header) as store, Pool(request.workers, request.arch) as pool:
-        fine = StoredEvaluator(store, pool.evaluator(setup.fine), "fine", setup.fine.as_dict())
-        coarse = StoredEvaluator(store, pool.evaluator(setup.coarse), "coarse", setup.coarse.as_dict())
+    with EvaluationStore(out / "evaluations.h5", header, resume=resume) as store, Pool(request.workers, request.arch) as pool:
+        fine, coarse = (
+            CachedEvaluator(pool.evaluator(scene), store, scene=scene.as_dict(), code=code_key(), fidelity=name)
+            for name, scene in (("fine", setup.fine), ("coarse", setup.coarse))
+        )
         result = calibrate(setup.objective, fine, coarse=coarse, options=options, progress=progress)
-        say("simulating the best values once more for their full record")
-        record = _record(setup.fine, result.best.evaluation.parameters, request.arch)
-        start = _start_curve(setup, request, fine)
-    doubt = assess(result, setup.objective)
-    return _write(request, setup, result, record, start, doubt, out, time.monotonic() - began)
+        start = _start_curve(setup, result, fine)
+    say("simulating the best values once more for their full record")
+    record = _record(setup.fine, result.best.evaluation.parameters, request.arch)
+    add_conditioning(out / "evaluations.h5", setup.curve)
+    return _write(request, setup, result, record, start, out, time.monotonic() - began)
 
 
 def _record(scene: Scene, values: Mapping[str, float], arch: str) -> ForceRecord:
@@ -177,10 +127,54 @@ def _record(scene: Scene, values: Mapping[str, float], arch: str) -> ForceRecord
     return Simulation(scene.with_material(**values), Runtime(arch)).run()
 
 
-def _start_curve(setup: _Setup, request: Request, evaluator: StoredEvaluator) -> np.ndarray:
-    """Smoothed curve of the literature values [N], shape (240,); NaN where that run broke down."""
-    values = {p.name: p.value for p in setup.objective.parameters}
-    evaluation = next(iter(evaluator.evaluate([values])))
+def _start_curve(setup: Setup, result: FitResult, fine: CachedEvaluator) -> np.ndarray:
+    """Smoothed curve of the literature values [N], shape (240,); NaN where that run broke down or was not reached."""
+    empty = np.full_like(setup.curve.stroke, np.nan)
+    if result.status == "interrupted":
+        return empty
+    evaluation = next(iter(fine.evaluate([{p.name: p.value for p in setup.objective.parameters}])))
     if not evaluation.ok:
-        return np.full_like(setup.curve.stroke, np.nan)
+        return empty
     return filter_simulated(setup.curve.stroke, evaluation.stroke, evaluation.force)
+
+
+def _write(
+    request: Request,
+    setup: Setup,
+    result: FitResult,
+    record: ForceRecord,
+    start: np.ndarray,
+    out: Path,
+    wall: float,
+) -> dict[str, Any]:
+    """Write curves.csv, material.yaml, summary.json and report.pdf; returns the summary."""
+    from reports.calibration import write_report
+
+    curve, best = setup.curve, result.best
+    metrics = compare(curve.stroke, curve.curve, best.curve)
+    nulls = null_models(curve.stroke, curve.curve)
+    doubt = None
+    if result.jacobian is not None:
+        rows = setup.objective.effective_rows
+        doubt = uncertainty(result.parameters, result.jacobian, best.residual, effective_rows=rows)
+    summary = summarise(request, setup, result, record, metrics, nulls, doubt)
+    summary["wall_s"] = wall
+    write_csv(out / "curves.csv", _curves(curve, best.curve, record, start, nulls))
+    fitted = request.food.with_values(best.evaluation.parameters, status="fitted", source=f"fitted to {curve.trace.source}")
+    keep = ("created", "trace_sha256", "passed", "peak_error", "nrmse", "shape_error", "git", "versions")
+    dump_material(fitted, out / "material.yaml", {k: summary[k] for k in keep} | {"trace": curve.trace.label})
+    write_json(out / "summary.json", summary)
+    write_report(out)
+    return summary
+
+
+def _curves(
+    curve: Conditioned, best: np.ndarray, record: ForceRecord, start: np.ndarray, nulls: Mapping[str, NullModel]
+) -> dict[str, np.ndarray]:
+    """Columns of curves.csv, all on the trace's stroke grid."""
+    parts = {
+        "edge_N": filter_simulated(curve.stroke, record.stroke, record.edge[:, 2]),
+        "face_N": filter_simulated(curve.stroke, record.stroke, record.resolved_face),
+    }
+    columns = {"stroke_m": curve.stroke, "real_N": curve.curve, "sim_N": best, "residual_N": best - curve.curve}
+    return columns | parts | {"start_N": start} | {f"{name}_N": n.curve for name, n in nulls.items()}

@@ -11,7 +11,7 @@ import taichi as ti
 POLAR_STEPS = 12
 POLAR_TOLERANCE = 1e-12  # squared change of R at which the iteration stops; the error is then its square
 RETURN_STEPS = 8  # contraction of the J2 return: 3 steps give 1e-5, 8 give rounding
-RETURN_TOLERANCE = 1e-7  # overshoot of the yield stress that ends the return [-]
+RETURN_TOLERANCE = 1e-7  # distance from the yield stress that ends the return [-]
 
 
 @ti.func
@@ -80,7 +80,7 @@ def j2_return(s, j, mu, yield_stress):
             out = mean * ti.Matrix.identity(float, 3) + a * d
             out *= (j / out.determinant()) ** (1.0 / 3.0)
             q = mises(out, mu)
-            if q < yield_stress * (1 + RETURN_TOLERANCE):
+            if ti.abs(q - yield_stress) < yield_stress * RETURN_TOLERANCE:
                 break
     return out
 

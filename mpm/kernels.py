@@ -250,14 +250,16 @@ class Kernels:
             d, nrm, vel, mu = at[2], ti.Vector([0.0, 0.0, 1.0]), ti.Vector.zero(float, 3), self.par[BOARD_MU]
             if ti.static(which == 1):
                 d, nrm = blade_distance(ti.abs(at[1]), at[2] - tip, self.par[SPINE], self.par[COS], self.par[SIN])
-                if at[1] < 0:
+                if ti.abs(at[1]) < 1e-6 * self.dx:  # both faces are equally near: their mean normal is downwards
+                    nrm = ti.Vector([0.0, 0.0, -1.0])
+                elif at[1] < 0:
                     nrm[1] = -nrm[1]
                 vel, mu = ti.Vector([0.0, 0.0, -speed]), self.par[FRICTION]
                 if at[2] < tip or at[2] - tip > self.par[BLADE] or ti.abs(at[0]) > self.par[HALF_LENGTH]:
                     d = 1.0
             rel = u - vel
             vn = rel.dot(nrm)
-            if d < 0 and vn < 0:
+            if d <= 0 and vn < 0:
                 t = rel - vn * nrm
                 new = vel + t + coulomb(-vn, t, mu)
                 dj = mult * q[3] * (u - new)

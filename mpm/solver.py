@@ -21,7 +21,7 @@ PAD = 3  # empty cells around the food: a quadratic kernel reaches 1.5 cells, th
 MARGIN = 2  # cells by which the active window exceeds the particles; renewed at every output interval
 SPREAD = 0.2  # room for the food to widen while it is pressed, part of its size
 APPROACH = 0.1  # way of the blade above the food before contact, in cells
-ZONE_FULL = 5 / 6  # kernel mass of a process zone whose edge touches a flat surface, over rho dx zone^2 (exact)
+ZONE_FULL = 0.95  # kernel mass over rho dx zone^2 at which a process zone counts as full: what a cut leaves around it
 EDGE_STEP = 0.5  # dt times the frequency of the edge's cohesive spring, 2 is unstable
 
 Progress = Callable[[float, float], None]

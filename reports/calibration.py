@@ -17,45 +17,35 @@ from calib.errors import CurveError
 from calib.metrics import compare
 from calib.properties import PROPERTIES
 from reports import figures
-from reports.document import (
-    DASH,
-    breakable,
-    count,
-    duration,
-    interval,
-    listed,
-    plain,
-    quantity,
-    typeset,
-    uncertain,
-    write_whole,
-)
+from reports.document import breakable, count, duration, interval, listed, plain, publish, quantity, uncertain
 from reports.finished import Data, Finished, read_finished
 
 #: Correlations of fitted parameters from here on are worth a sentence: at 0.9 an interval is 2.3 times as
 #: wide as it would be if the other parameter were known, 1 / sqrt(1 - r^2).
 STRONG = 0.9
-#: First page [mm]: what title, sentence and facts leave, a line of the table, a banner; letters in a line of a
-#: note; least and largest height of the main figure.
-PAGE_ROOM, LINE_HEIGHT, BANNER_HEIGHT, NOTE_LETTERS, FIGURE_HEIGHT = 168.0, 5.2, 20.0, 50, (70.0, 115.0)
+#: First page [mm]: what title, sentence and facts leave, a line of the table, a banner; letters in a line of
+#: a note; least and largest height of the main figure.
+PAGE_ROOM, LINE_HEIGHT, BANNER_HEIGHT, NOTE_LETTERS, FIGURE_HEIGHT = 193.0, 5.2, 20.0, 50, (70.0, 125.0)
 #: What the null models are compared in: key, label, unit, and whether more is better.
 MEASURES = (
     ("nrmse", "NRMSE", "fraction", False),
     ("shape_error", "shape error", "-", False),
     ("R", "rating R", "-", True),
 )
-NULLS = {
+RELATIONS = {"<=": "≤ ", ">=": "≥ "}
+#: Names of the files in words; what is not here loses its underscores.
+WORDS = {
     "ramp": "straight ramp (1 number)",
     "half_sine": "half sine (1 number)",
     "three_term": "three-term curve (7 numbers)",
-}
-RELATIONS = {"<=": "≤ ", ">=": "≥ "}
-IDENTIFIABILITY = {
     "weak": "weakly identified",
     "not_seen": "not seen by this trace",
     "at_bound": "at its bound",
+    "unknown": "not determined",
+    "paper_table2": "paper, Table 2",
 }
-STATUS = {"paper_table2": "paper, Table 2"}
+#: Letters of names and verdicts in the parameter figure.
+LABEL, VERDICT = 20, 30
 
 
 def write_report(run: Path) -> Path:
@@ -78,7 +68,7 @@ def write_report(run: Path) -> Path:
     pictures = _pictures(done)
     content = {**_content(done), "figures": sorted(pictures)}
     target = run / "report.pdf"
-    write_whole(target, typeset("calibration.typ", content, pictures, date=done.created))
+    publish(target, "calibration.typ", content, pictures, date=done.created)
     return target
 
 
@@ -107,7 +97,8 @@ def _room(s: Data) -> float:
     """Height for the main figure that fills the first page [mm]: what the lines above it leave."""
     banners = (s["trace"]["label"] == "reconstructed") + (s["status"] == "interrupted")
     lines = sum(1 + len(v["note"] or "") // NOTE_LETTERS for v in s["verdicts"])
-    return min(max(PAGE_ROOM - LINE_HEIGHT * lines - BANNER_HEIGHT * banners, FIGURE_HEIGHT[0]), FIGURE_HEIGHT[1])
+    left = PAGE_ROOM - LINE_HEIGHT * lines - BANNER_HEIGHT * banners
+    return min(max(left, FIGURE_HEIGHT[0]), FIGURE_HEIGHT[1])
 
 
 def _record(done: Finished) -> figures.Record:
@@ -132,8 +123,8 @@ def _row(name: str, p: Data) -> figures.Row:
     """A parameter over the middle of its literature range."""
     middle = _middle(p)
     over = [None if p[k] is None else p[k] / middle for k in ("low95", "high95", "prior_low", "prior_high")]
-    note = f"{quantity(p['value'], p['unit'])}, {_verdict(p)}"
-    return figures.Row(name, note, p["value"] / middle, *over)
+    note = f"{quantity(p['value'], p['unit'])}\n{_short(_words(p['verdict']), VERDICT)}"
+    return figures.Row(_short(name, LABEL), note, p["value"] / middle, *over)
 
 
 def _middle(p: Data) -> float:
@@ -164,7 +155,7 @@ def _content(done: Finished) -> Data:
         "null_sentences": _null_sentences(s),
         "metrics": _metrics(s),
         "parameters": [_parameter(name, p) for name, p in s["parameters"].items()],
-        "correlations": _correlations(s["correlations"]),
+        "correlations": _correlations(s["correlations"]) if s["correlations"] else None,
         "fixed": [_fixed(name, p) for name, p in s["fixed_parameters"].items()],
         "numerics": _numerics(s),
         "failures": _failures(s["failures"]),
@@ -204,7 +195,7 @@ def _conditioning(done: Finished) -> Data:
     speed = s["stroke_m"] / seconds if seconds > 0.0 else None
     return {
         "baseline": uncertain(s["baseline_N"], s["baseline_sd_N"], "N"),
-        "noise": quantity(s["noise_sd_N"], "N"),
+        "noise": quantity(s["noise_sd_N"], "N", digits=2),
         "filter": quantity(s["filter_sd_m"], "m", digits=None),
         "onset": uncertain(s["onset_s"], sd, "s"),
         "onset_stroke": quantity(sd * speed, "m", digits=2) if sd and speed else None,
@@ -232,7 +223,9 @@ def _sentence(s: Data) -> str:
         text = "Not passed: the fit was interrupted. No line of the table has failed so far."
     else:
         text = "Not passed: no line of the table failed, but not all that decides was tested."
-    return text + (f" Not run: {listed(absent)}." if absent else "")
+    if s["trace"]["label"] == "reconstructed":
+        text += " The trace is a reconstruction, so this says nothing about a real cut."
+    return breakable(text + (f" Not run: {listed(absent)}." if absent else ""))
 
 
 def _verdict_line(v: Data) -> Data:
@@ -246,20 +239,18 @@ def _verdict_line(v: Data) -> Data:
     signed = unit == "fraction" and numbers[0] and value < 0.0
     return {
         "name": breakable(v["name"]), "value": "not run" if value is None else _shown(value, unit, 3, signed),
-        "limit": relation + _shown(limit, unit, None, False), "mark": mark, "note": v["note"] or "",
+        "limit": relation + _shown(float(f"{limit:.3g}") if numbers[1] else limit, unit, None, False), "mark": mark, "note": v["note"] or "",
     }  # fmt: skip
 
 
 def _shown(x: Any, unit: str, digits: int | None, signed: bool) -> str:
     """A value or limit of any type as text."""
-    if x is None:
-        return DASH
     if isinstance(x, bool):
         return "yes" if x else "no"
     if isinstance(x, int) and unit == "-":
         return count(x)
-    if isinstance(x, (int, float)):
-        return quantity(float(x), unit, digits=digits, signed=signed)
+    if x is None or isinstance(x, (int, float)):
+        return quantity(x, unit, digits=digits, signed=signed)
     return breakable(listed([str(i) for i in x]) if isinstance(x, list) else str(x))
 
 
@@ -269,7 +260,7 @@ def _null_rows(done: Finished) -> list[list[str]]:
     keys = ("nrmse", "shape_error", "peak_error", "work_error")
     rows: list[tuple[str, Data]] = [
         ("simulation, fitted", {**{k: s[k] for k in keys}, "R": s["iso18571"]["R"]}),
-        *((NULLS.get(name, _words(name)), model) for name, model in s["null_models"].items()),
+        *((_words(name), model) for name, model in s["null_models"].items()),
     ]
     curves = done.curves
     if np.all(np.isfinite(curves["start_N"])):
@@ -298,8 +289,7 @@ def _null_sentences(s: Data) -> list[str]:
             if a is not None and b is not None and (a > b if more else a < b):
                 better.append(f"{label} ({quantity(a, unit)} against {quantity(b, unit)})")
         if better:
-            model_name = NULLS.get(name, _words(name))
-            said.append(f"The {model_name} is closer to the trace than the simulation in {listed(better)}.")
+            said.append(f"The {_words(name)} is closer to the trace than the simulation in {listed(better)}.")
     names = listed([label for _, label, _, _ in MEASURES])
     return said or [f"No null model is closer to the trace than the simulation in {names}."]
 
@@ -316,7 +306,7 @@ def _metrics(s: Data) -> Data:
         **{name: quantity(m.get(name), "fraction", signed=True) for name in signed},
         "sprague_geers": [quantity(g[k], "fraction", signed=k == "M") for k in "MPC"],
         "iso": {k: quantity(iso[k], "-") for k in ("Z", "EP", "EM", "ES", "R")},
-        "shift": DASH if iso["shift"] is None else plain(iso["shift"], None),
+        "shift": count(iso["shift"]),
         "at_bound": bool(iso["at_bound"]),
     }  # fmt: skip
 
@@ -324,21 +314,21 @@ def _metrics(s: Data) -> Data:
 def _parameter(name: str, p: Data) -> Data:
     low, high, value, unit = p["prior_low"], p["prior_high"], p["value"], p["unit"]
     return {
-        "name": name,
+        "name": breakable(name),
         "meaning": _meaning(name),
         "value": quantity(value, unit),
         "interval": interval(p["low95"], p["high95"], unit),
         "literature": interval(low, high, unit),
-        "verdict": _verdict(p),
+        "verdict": _words(p["verdict"]),
         "outside": (low is not None and value < low) or (high is not None and value > high),
-        "status": STATUS.get(p["status"], _words(p["status"])),
+        "status": _words(p["status"]),
         "source": p["source"] or "",
     }
 
 
 def _fixed(name: str, p: Data) -> list[str]:
     value = "none" if p["value"] is None else quantity(p["value"], p["unit"])
-    return [name, _meaning(name), value, STATUS.get(p["status"], _words(p["status"])), p["source"] or ""]
+    return [breakable(name), _meaning(name), value, _words(p["status"]), p["source"] or ""]
 
 
 def _correlations(correlations: Data) -> list[str]:
@@ -355,12 +345,14 @@ def _numerics(s: Data) -> Data:
     part = None if ripple is None or not s["peak_sim_N"] > 0.0 else ripple / s["peak_sim_N"]
     return {
         "dx": quantity(s["dx_m"], "m"), "cells": plain(s["shape"]["height"] / s["dx_m"], 2),
-        "particles": DASH if s["particles"] is None else count(s["particles"]),
+        "particles": count(s["particles"]),
         "images": "none" if images in (None, False, 1) else "yes" if images is True else str(images),
         "mach": quantity(s["mach"], "-"), "momentum": quantity(s["momentum_residual"], "fraction"),
         "kinetic": quantity(s["ke_over_ie"], "fraction"), "ripple": quantity(ripple, "N"),
         "ripple_part": quantity(part, "fraction", digits=2), "wall": duration(s["wall_s"]),
         "simulations": count(s["simulations"]), "failed": count(s["failed_simulations"]),
+        "coarse": count(s["coarse_simulations"]) if s.get("coarse_simulations") else None,
+        "counters": [f"{_words(name)} {count(n)}" for name, n in sorted((s.get("counters") or {}).items()) if n],
     }  # fmt: skip
 
 
@@ -369,9 +361,8 @@ def _failures(failures: list[Data]) -> list[list[str]]:
     rows = []
     for reason in sorted({f["reason"] for f in failures}):
         same = [f for f in failures if f["reason"] == reason]
-        parts = [100.0 * f["fraction"] for f in same if f["fraction"] is not None]
-        ends = sorted({f"{f(parts):.0f}" for f in (min, max)}, key=float) if parts else [DASH]
-        span = " to ".join(ends) + "\u00a0%"
+        parts = [f["fraction"] for f in same if f["fraction"] is not None]
+        span = interval(min(parts), max(parts), "fraction") if parts else ""
         first = [f"{k} = {_shown(v, PROPERTIES[k].unit if k in PROPERTIES else '-', 3, False)}"
                  for k, v in same[0]["parameters"].items()]  # fmt: skip
         rows.append([breakable(_words(reason)), str(len(same)), span, "; ".join(first)])
@@ -380,15 +371,14 @@ def _failures(failures: list[Data]) -> list[list[str]]:
 
 def _provenance(s: Data) -> Data:
     return {
-        "trace": s["trace_sha256"], "commit": s["git"] or "",
-        "air": str(s["air"].get("sha256", DASH)) if s["air"] else "",
-        "seed": str(s["seed"]), "device": s["device"] or "not recorded", "command": breakable(shlex.join(s["command"])),
+        "trace": s["trace_sha256"],
+        "air": str(s["air"].get("sha256", "not recorded")) if s["air"] else "",
+        "commit": s["git"] or "",
+        "seed": str(s["seed"]),
+        "device": breakable(s["device"] or "not recorded"),
+        "command": [breakable(shlex.quote(word)) for word in s["command"]],
         "versions": ", ".join(f"{name}\u00a0{s['versions'][name]}" for name in sorted(s["versions"])),
-    }  # fmt: skip
-
-
-def _verdict(p: Data) -> str:
-    return IDENTIFIABILITY.get(p["verdict"], _words(p["verdict"]))
+    }
 
 
 def _meaning(name: str) -> str:
@@ -402,4 +392,8 @@ def _capital(text: str) -> str:
 
 
 def _words(name: str) -> str:
-    return name.replace("_", " ")
+    return WORDS.get(name, name.replace("_", " "))
+
+
+def _short(text: str, letters: int) -> str:
+    return text if len(text) <= letters else text[: letters - 1] + "…"

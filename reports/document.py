@@ -81,13 +81,13 @@ def plain(x: float, digits: int | None = 3) -> str:
     return _grouped(rounded, max(0, digits - 1 - math.floor(math.log10(abs(rounded)))))
 
 
-def count(n: float) -> str:
-    """A whole number, thousands set apart from ten thousand on.
+def count(n: float | None) -> str:
+    """A whole number, thousands set apart from ten thousand on; a dash where there is none.
 
     >>> count(1234567).replace(NBSP, " "), count(1234)
     ('1 234 567', '1234')
     """
-    return _grouped(n, 0)
+    return DASH if n is None else _grouped(n, 0)
 
 
 def quantity(value: float | None, unit: str, *, digits: int | None = 3, signed: bool = False) -> str:
@@ -113,7 +113,7 @@ def quantity(value: float | None, unit: str, *, digits: int | None = 3, signed: 
 
 
 def interval(low: float | None, high: float | None, unit: str) -> str:
-    """A range to three digits; a dash for an end that is not known, one dash if neither is.
+    """A range to three digits; a bound if one end is not known, a dash if neither is.
 
     >>> interval(0.8e6, 2e6, "Pa").replace(NBSP, " "), interval(5e4, 2e6, "Pa").replace(NBSP, " ")
     ('0.8 to 2 MPa', '50 kPa to 2 MPa')
@@ -122,12 +122,14 @@ def interval(low: float | None, high: float | None, unit: str) -> str:
     known = [abs(x) for x in ends if x is not None]
     if not known:
         return DASH
+    own = ["" if x is None else quantity(_three(x), unit, digits=None) for x in ends]
+    if not all(own):
+        return f"above {own[0]}" if own[0] else f"below {own[1]}"
     factor, name = _rung(unit, max(known))
-    own = [DASH if x is None else quantity(_three(x), unit, digits=None) for x in ends]
-    if any(0.0 < x < SMALL_END * factor for x in known) and _rung(unit, min(known))[1] != name:
+    if 0.0 < min(known) < SMALL_END * factor and _rung(unit, min(known))[1] != name:
         return f"{own[0]} to {own[1]}"
-    texts = [DASH if x is None else plain(_three(x / factor), None) for x in ends]
-    return _with_unit(f"{texts[0]} to {texts[1]}", name)
+    texts = [plain(_three(x / factor), None) for x in ends if x is not None]
+    return _with_unit(" to ".join(texts if texts[0] != texts[1] else texts[:1]), name)
 
 
 def uncertain(value: float | None, sd: float | None, unit: str) -> str:
@@ -164,7 +166,7 @@ def duration(seconds: float | None) -> str:
 
 
 def breakable(text: str) -> str:
-    """Text in which long words (paths, options) may break: zero-width spaces, in words of 29 letters or more."""
+    """Text in which words of 29 letters or more (paths, options) may break, by zero-width spaces."""
     return _LONG_WORD.sub(lambda m: _SOLID.sub("\\g<0>\u200b", _BREAKS.sub("\u200b", m.group())), text)
 
 
@@ -177,22 +179,40 @@ def listed(names: list[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
-def typeset(
-    template: str, content: Mapping[str, Any], figures: Mapping[str, bytes], *, date: datetime
-) -> bytes:
-    """Typeset a template; the same arguments give the same bytes.
+def publish(
+    target: Path, template: str, content: Mapping[str, Any], figures: Mapping[str, bytes], *, date: datetime
+) -> None:
+    """Typeset a template and write the PDF; ``target`` is either the old file or the whole new one.
 
-    Only fonts that come with the typesetter and with matplotlib are used: those of the machine do not matter.
+    The same arguments give the same bytes.
 
     Args:
+        target: File to write.
         template: File name in ``reports/templates``.
-        content: What the template reads as ``content.json``.
+        content: What the template reads as ``content.json``; this adds ``date``.
         figures: SVG documents by file name.
         date: Date of the document.
 
-    Returns:
-        The PDF.
+    Raises:
+        ReportError: The file cannot be written.
     """
+    pdf = _typeset(template, content, figures, date)
+    part = target.with_name(target.name + ".part")
+    try:
+        part.write_bytes(pdf)
+        os.replace(part, target)
+    except OSError as e:
+        part.unlink(missing_ok=True)
+        raise ReportError(
+            f"{target}: cannot be written ({e.strerror}); free the disk or the permission, then make the "
+            "report again with cutcal report"
+        ) from None
+
+
+def _typeset(
+    template: str, content: Mapping[str, Any], figures: Mapping[str, bytes], date: datetime
+) -> bytes:
+    """The PDF, set in fonts of the typesetter and of matplotlib: those of the machine do not matter."""
     with tempfile.TemporaryDirectory(prefix="cutcal-") as name:
         folder = Path(name)
         for source in sorted(_TEMPLATES.glob("*.typ")):
@@ -207,25 +227,6 @@ def typeset(
             font_paths=[Path(matplotlib.get_data_path()) / "fonts" / "ttf"],
         )
         return bytes(typst.compile(folder / template, root=folder, font_paths=fonts, format="pdf"))
-
-
-def write_whole(path: Path, data: bytes) -> None:
-    """Write a file so that it is either the old one or the whole new one.
-
-    Raises:
-        ReportError: It cannot be written.
-    """
-    part = path.with_name(path.name + ".part")
-    try:
-        part.write_bytes(data)
-        os.replace(part, path)
-    except OSError as e:
-        raise ReportError(
-            f"{path}: cannot be written ({e.strerror}); free the disk or the permission, then make the "
-            "report again with cutcal report"
-        ) from None
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _rung(unit: str, size: float) -> tuple[float, str]:

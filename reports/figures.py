@@ -12,8 +12,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import matplotlib
 import numpy as np
+from matplotlib import style
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -194,7 +194,7 @@ def fit(curves: Curves, noise_sd: float, trace: str) -> bytes:
         figure.legend(sum(handles, []), sum(labels, []), loc="outside upper left", ncols=2)
         figure.align_ylabels()
 
-    return _svg(draw, 80.0)
+    return _svg(draw, 76.0)
 
 
 def nulls(curves: Curves, trace: str) -> bytes:
@@ -222,7 +222,7 @@ def nulls(curves: Curves, trace: str) -> bytes:
         _stroke_axis(axes, x)
         figure.legend(loc="outside upper left", ncols=3)
 
-    return _svg(draw, 62.0)
+    return _svg(draw, 57.0)
 
 
 def parameters(rows: Sequence[Row]) -> bytes:
@@ -231,6 +231,9 @@ def parameters(rows: Sequence[Row]) -> bytes:
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
         low, high = _factors(rows)
+        axes.set_xscale("log")
+        axes.set_xlim(low, high)
+        _log_ticks(axes.xaxis, low, high)
         for i, row in enumerate(rows):
             if row.prior_low is not None and row.prior_high is not None:
                 ends = np.clip([row.prior_low, row.prior_high], low, high)
@@ -238,22 +241,14 @@ def parameters(rows: Sequence[Row]) -> bytes:
                           lw=0.7)  # fmt: skip
             x = float(np.clip(row.value, low, high))
             axes.plot(x, i, marker="o", ms=5.0, color=BLACK, ls="none", zorder=3)
-            if row.low is not None and row.high is not None:
-                span = np.clip([row.low, row.high], low, high)
-                axes.plot(span, [i, i], color=BLACK, lw=1.6, zorder=3, solid_capstyle="butt")
-                for end, whole, mark in zip(span, (row.low, row.high), ("<", ">"), strict=True):
-                    inside = low < whole < high
-                    axes.plot(end, i, marker="|" if inside else mark, ms=7.0 if inside else 5.0,
-                              color=BLACK, ls="none", zorder=3, clip_on=False)  # fmt: skip
-            axes.annotate(row.note, (1.0, i), xycoords=axes.get_yaxis_transform(), xytext=(6, 0),
-                          textcoords="offset points", va="center", annotation_clip=False)  # fmt: skip
+            _interval(axes, i, row)
+            axes.annotate(row.note, (1.0, i), xycoords=axes.get_yaxis_transform(), xytext=(9, 0),
+                          textcoords="offset points", va="center", linespacing=1.15,
+                          annotation_clip=False)  # fmt: skip
         axes.axvline(1.0, color=GREY, lw=0.6)
-        axes.set_xscale("log")
-        axes.set_xlim(low, high)
-        _log_ticks(axes.xaxis, low, high)
         axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.set_yticks(range(len(rows)), [row.name for row in rows])
-        axes.tick_params(axis="y", length=0)
+        axes.tick_params(axis="y", length=0, pad=7.0)
         axes.grid(visible=False, axis="y")
         axes.spines["left"].set_visible(False)
         axes.set_xlabel("value / middle of the literature's range")
@@ -279,7 +274,7 @@ def misfit(history: Sequence[tuple[float, float]]) -> bytes:
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.margins(x=0.02, y=0.08)
         axes.set_xlabel("simulation number")
-        axes.set_ylabel("best misfit so far (chi-square)")
+        axes.set_ylabel("best chi-square so far")
 
     return _svg(draw, 48.0)
 
@@ -304,7 +299,7 @@ def envelope(x: np.ndarray, y: np.ndarray, columns: int = COLUMNS) -> tuple[np.n
 
 def _svg(draw: Any, height: float) -> bytes:
     """SVG of a figure of the report's width and ``height`` [mm]."""
-    with matplotlib.rc_context({**matplotlib.rcParamsDefault, **STYLE}):
+    with style.context(["default", STYLE]):
         figure = Figure(figsize=(WIDTH * MM, height * MM), layout="constrained")
         FigureCanvasSVG(figure)
         draw(figure)
@@ -326,6 +321,20 @@ def _log_ticks(axis: Axis, low: float, high: float) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
+def _interval(axes: Axes, i: int, row: Row) -> None:
+    """The 95 % interval in row ``i``; an arrow where it leaves the axis or has no end."""
+    if row.low is None and row.high is None:
+        return
+    low, high = axes.get_xlim()
+    ends = (row.low if row.low is not None else 0.0, row.high if row.high is not None else np.inf)
+    span = np.clip(ends, low, high)
+    axes.plot(span, [i, i], color=BLACK, lw=1.6, zorder=3, solid_capstyle="butt")
+    for at, end, arrow in zip(span, ends, ("<", ">"), strict=True):
+        inside = low < end < high
+        axes.plot(at, i, marker="|" if inside else arrow, ms=7.0 if inside else 5.0, color=BLACK, ls="none",
+                  zorder=3, clip_on=False)  # fmt: skip
+
+
 def _raw(axes: Axes, r: Record) -> None:
     """Raw record over time with what was subtracted and where the cut begins and ends."""
     x, y = envelope(r.time, r.raw)
@@ -343,14 +352,11 @@ def _raw(axes: Axes, r: Record) -> None:
     axes.set_ylabel("force [N]")
 
 
-def _moment(
-    axes: Axes, at: float, sd: float | None, name: str, color: str, dashes: tuple[float, ...]
-) -> None:
+def _moment(axes: Axes, at: float, sd: float | None, name: str, color: str, dashes: Sequence[float]) -> None:
     """A marked time with its uncertainty."""
-    with_sd = sd is not None and sd > 0.0
-    label = f"{name} (band ± 1 sd)" if with_sd else name
+    label = f"{name} (band ± 1 sd)" if sd else name
     axes.axvline(at, color=color, lw=1.2, dashes=dashes, label=label)
-    if with_sd and sd is not None:
+    if sd:
         axes.axvspan(at - sd, at + sd, facecolor=color, alpha=0.25, lw=0.0)
 
 

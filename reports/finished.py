@@ -57,6 +57,9 @@ SCHEMA: Data = {
     "knife": {"name": _TEXT, "spine angle height length": _NUM},
 }  # fmt: skip
 
+#: What it may hold besides, or leave out.
+EXTRA: Data = {"baseline_window_s": [_NUM], "end_sd_s": _OPT, "counters": {"*": _NUM}, "coarse_simulations": (int,)}
+
 
 @dataclass(frozen=True)
 class Finished:
@@ -103,6 +106,11 @@ def _read_summary(path: Path) -> tuple[Data, datetime]:
     except ValueError as e:
         raise ReportError(f"{path}: damaged, not JSON ({e}); {REMEDY}") from None
     _check(path, "", data, SCHEMA)
+    for name, kind in EXTRA.items():
+        if data.get(name) is not None:
+            _check(path, name, data[name], kind)
+    if len(data.get("baseline_window_s") or (0.0, 0.0)) != 2:
+        raise ReportError(f"{path}: baseline_window_s is not a pair of times; {REMEDY}")
     if data["trace"]["label"] not in LABELS:
         raise ReportError(f"{path}: trace.label is not {' or '.join(LABELS)}; {REMEDY}")
     if data["status"] not in STATUS:

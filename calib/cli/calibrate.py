@@ -1,0 +1,129 @@
+"""``calibrate`` (also ``cutcal calibrate``): fit a food to a knife-force trace and report."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from calib.cli.options import add_food, add_run, food_of, number, sizing_of
+from calib.progress import ProgressBar
+from calib.request import Request
+from mpm.errors import CutcalError
+
+HELP = "fit a food to a measured knife-force trace and write a report"
+DESCRIPTION = """Fit a food's cutting properties to a knife-force trace.
+
+Writes summary.json, material.yaml, evaluations.h5, curves.csv and report.pdf
+to --out. The trace is a CSV with units in its column names (time_s, force_N,
+position_m, ...); robot logs with base_Fz_N and ee_z_m are known."""
+EPILOG = """examples:
+  calibrate --food banana --trace force_data/banana_reconstructed.csv
+  calibrate --food potato --trace cut.csv --air air.csv --knife edc --out runs/potato
+
+Ctrl-C keeps what was computed; the same command with --resume goes on.
+Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass."""
+
+
+def add_args(p: argparse.ArgumentParser) -> None:
+    """Options of this command."""
+    add_food(p)
+    p.add_argument("--trace", required=True, metavar="CSV", help="record of the cut")
+    p.add_argument("--air", metavar="CSV", help="the same motion without food, subtracted at equal time")
+    p.add_argument("--time-col", metavar="NAME", help="column of the time")
+    p.add_argument("--force-col", metavar="NAME", help="column of the force on the knife")
+    p.add_argument("--position-col", metavar="NAME", help="column of the knife's height ('none': there is none)")
+    p.add_argument("--sign", choices=("+", "-"), help="sign that makes resistance to the knife positive")
+    p.add_argument("--speed", type=number(0, 10, "m/s"), metavar="M/S", help="knife speed, where the trace has no position")
+    p.add_argument("--t-end", type=float, metavar="S", help="ignore the record after this time (board contact)")
+    p.add_argument("--fit", metavar="NAMES", help="properties to fit, e.g. E,nu,R,mu (default: those that cutting sees)")
+    p.add_argument("--budget", type=number(0, 1e6, ""), default=40, help="largest number of simulations (default 40)")
+    p.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
+    p.add_argument("--resume", action="store_true", help="go on with the run in --out; nothing is simulated twice")
+    add_run(p)
+
+
+def request_of(args: argparse.Namespace, command: Sequence[str]) -> Request:
+    """The request that the options make.
+
+    Raises:
+        CutcalError: An impossible value, an unknown name, a missing file.
+    """
+    if args.workers < 1:
+        raise CutcalError(f"--workers {args.workers}: at least 1")
+    columns: dict[str, Any] = {
+        "time_col": args.time_col,
+        "force_col": args.force_col,
+        "position_col": args.position_col,
+        "sign": args.sign,
+    }
+    return Request(
+        food=food_of(args),
+        trace=Path(args.trace),
+        air=None if args.air is None else Path(args.air),
+        columns=columns,
+        knife=args.knife,
+        speed=args.speed,
+        t_end=args.t_end,
+        sizing=sizing_of(args),
+        fit=None if args.fit is None else tuple(n.strip() for n in args.fit.split(",") if n.strip()),
+        dx=args.dx,
+        budget=args.budget,
+        workers=args.workers,
+        seed=args.seed,
+        arch=args.arch,
+        command=tuple(command),
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Calibrate; prints the verdict, or the summary as JSON."""
+    from calib.study import run as calibrate
+
+    command = ["calibrate", *(a for a in sys.argv[1:] if a != "calibrate")]
+    request = request_of(args, command)
+    out = Path(args.out or f"cutcal-{request.food.name}-{request.trace.stem}")
+
+    def say(text: str) -> None:
+        print(f"note: {text}", file=sys.stderr, flush=True)
+
+    with ProgressBar() as bar:
+        summary = calibrate(request, out, resume=args.resume, progress=bar, say=say)
+    if args.json:
+        print((out / "summary.json").read_text(encoding="utf-8"), end="")
+    else:
+        print(verdict_text(summary, out))
+    return 0 if summary["passed"] else 2
+
+
+def verdict_text(summary: dict[str, Any], out: Path) -> str:
+    """What the terminal shows at the end."""
+    lines = []
+    for v in summary["verdicts"]:
+        mark = {True: "pass", False: "FAIL", None: "not run"}[v["passed"]]
+        value = "" if v["value"] is None else f"{v['value']:.3g}"
+        limit = "" if v["limit"] is None else f"limit {v['limit']:.3g}"
+        lines.append(f"  {mark:8s}{v['name']:42s}{value:>10s}  {limit}")
+    lines.append(f"  {'fitted':8s}{'95 % interval':>42s}")
+    for name, p in summary["parameters"].items():
+        interval = "" if p["low95"] is None else f"{p['low95']:.3g} to {p['high95']:.3g}"
+        lines.append(f"  {'':8s}{name:18s}{p['value']:>10.4g} {p['unit']:6s}{interval:>24s}  {p['verdict']}")
+    state = "interrupted" if summary["status"] == "interrupted" else "passed" if summary["passed"] else "not passed"
+    head = (
+        f"{summary['food']}: {state}; peak {summary['peak_sim_N']:.2f} N against {summary['peak_real_N']:.2f} N "
+        f"({summary['trace']['label']}), {summary['simulations']} simulations in {summary['wall_s']:.0f} s"
+    )
+    return "\n".join([head, *lines, f"  wrote {out}"])
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point of the ``calibrate`` script."""
+    from calib.cli.main import main as cutcal
+
+    return cutcal(["calibrate", *(sys.argv[1:] if argv is None else argv)])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

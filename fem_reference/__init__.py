@@ -1,0 +1,1 @@
+"""Finite-element reference of the solver (scikit-fem). Knows nothing of Taichi."""
