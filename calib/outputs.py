@@ -12,7 +12,15 @@ import pandas as pd
 
 from calib.errors import OutputError
 
-MARKS = ("summary.json", "material.yaml", "curves.csv", "report.pdf", "force.csv", "evaluations.h5", "evaluations.journal")
+MARKS = (
+    "summary.json",
+    "material.yaml",
+    "curves.csv",
+    "report.pdf",
+    "force.csv",
+    "evaluations.h5",
+    "evaluations.journal",
+)
 
 
 def prepare(out: Path, *, resume: bool) -> None:

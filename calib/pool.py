@@ -24,8 +24,6 @@ _simulations: dict[Scene, Any] = {}
 def _ignore_interrupt() -> None:
     """Ctrl-C is handled by the main process, which then ends the workers."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.environ.setdefault("TI_LOG_LEVEL", "error")
-    os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
 
 
 def _run(scene: Scene, values: dict[str, float], arch: str, threads: int) -> dict[str, Any]:
@@ -114,17 +112,20 @@ class SceneEvaluator:
         self.pool, self.scene = pool, scene
 
     def evaluate(self, batch: Sequence[Mapping[str, float]]) -> Iterator[Evaluation]:
-        """Run each candidate; yields in order of completion, ``index`` is the place in the batch."""
-        waiting = {self.pool.submit(self.scene, values): k for k, values in enumerate(batch)}
+        """Run each candidate; yields in order of completion, ``index`` is the place in the batch.
+
+        A run whose process was killed is made once more before it counts as failed: the killed one may have been its
+        neighbour's.
+        """
+        waiting = {self.pool.submit(self.scene, values): (k, False) for k, values in enumerate(batch)}
         while waiting:
             done, _ = wait(waiting, return_when=FIRST_COMPLETED)
             for future in done:
-                index = waiting.pop(future)
-                yield self._result(index, dict(batch[index]), future)
-
-    def _result(self, index: int, values: dict[str, float], future: Future[dict[str, Any]]) -> Evaluation:
-        try:
-            return Evaluation(index=index, parameters=values, **future.result())
-        except BrokenProcessPool:
-            empty = np.empty(0)
-            return Evaluation(index, values, "failed", DIED, 0.0, empty, empty)
+                index, again = waiting.pop(future)
+                values = dict(batch[index])
+                if not isinstance(future.exception(), BrokenProcessPool):
+                    yield Evaluation(index=index, parameters=values, **future.result())
+                elif not again:
+                    waiting[self.pool.submit(self.scene, values)] = (index, True)
+                else:
+                    yield Evaluation(index, values, "failed", DIED, 0.0, np.empty(0), np.empty(0))

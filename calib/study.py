@@ -68,9 +68,10 @@ def _set_up(request: Request) -> Setup:
     curve = condition(trace, air=air, speed=request.speed, height=known, t_end=request.t_end)
     shape, assumed = specimen(food, curve, request.sizing)
     knife = load_knife(request.knife)
-    common = {"stroke": curve.stroke_length_m, "dx": request.dx, "seed": request.seed}
-    fine = cut_scene(food, shape, knife, **common)
-    coarse = cut_scene(food, shape, knife, coarse=True, **common)
+    fine, coarse = (
+        cut_scene(food, shape, knife, stroke=curve.stroke_length_m, dx=request.dx, seed=request.seed, coarse=screening)
+        for screening in (False, True)
+    )
     target = Target(curve.stroke, curve.curve, curve.noise_sd_N, curve.peak_sd_N, filter_simulated)
     objective = Objective(target, fit_parameters(food, request.fit or food.default_fit))
     return Setup(curve, fine, coarse, objective, assumed)
@@ -107,7 +108,10 @@ def run(
     prepare(out, resume=resume)
     header = Header(setup.curve.trace.sha256, key_of(setup.fine.as_dict()))
     options = FitOptions(budget=request.budget, batch=request.workers, seed=request.seed)
-    with EvaluationStore(out / "evaluations.h5", header, resume=resume) as store, Pool(request.workers, request.arch) as pool:
+    with (
+        EvaluationStore(out / "evaluations.h5", header, resume=resume) as store,
+        Pool(request.workers, request.arch) as pool,
+    ):
         fine, coarse = (
             CachedEvaluator(pool.evaluator(scene), store, scene=scene.as_dict(), code=code_key(), fidelity=name)
             for name, scene in (("fine", setup.fine), ("coarse", setup.coarse))
@@ -160,7 +164,9 @@ def _write(
     summary = summarise(request, setup, result, record, metrics, nulls, doubt)
     summary["wall_s"] = wall
     write_csv(out / "curves.csv", _curves(curve, best.curve, record, start, nulls))
-    fitted = request.food.with_values(best.evaluation.parameters, status="fitted", source=f"fitted to {curve.trace.source}")
+    fitted = request.food.with_values(
+        best.evaluation.parameters, status="fitted", source=f"fitted to {curve.trace.source}"
+    )
     keep = ("created", "trace_sha256", "passed", "peak_error", "nrmse", "shape_error", "git", "versions")
     dump_material(fitted, out / "material.yaml", {k: summary[k] for k in keep} | {"trace": curve.trace.label})
     write_json(out / "summary.json", summary)

@@ -42,10 +42,13 @@ AMPLITUDE_PRIOR = (math.log(0.4), 1.0, math.log(0.08), math.log(2.0))
 LENGTH_PRIOR = (math.log(1.5), 0.7, math.log(0.3), math.log(8.0))
 NOISE_PRIOR = (math.log(0.012), 0.4, math.log(0.004), math.log(0.04))
 
-#: 95 % point of chi-square with 20 degrees of freedom over 20: how much more than its mean the information that
-#: noise feigns along one direction may be in 20 independent points of a curve.
+#: 95 % point of chi-square with 20 degrees of freedom over 20: how much more than its mean the information
+#: that noise feigns along one direction may be in 20 independent points of a curve.
 NOISE_MARGIN = 1.57
-MODE,DEAD=0,0.
+
+#: An expected missing part of the stroke up to this is not held against a point: the process is smooth, the
+#: limit of what can be simulated is not, so that whole runs beside it would be shunned.
+OVERSHOOT = 0.1
 
 #: A parameter is identified when its posterior is narrower than this part of its prior, and not seen when it
 #: is wider than the other: below one half the cut says more than the literature, above 0.9 next to nothing.
@@ -95,7 +98,7 @@ class CurveProcess:
         self.hyper = self._learn(y, guess)
         self._factor = cho_factor(self._covariance(self.hyper))
         exact = self._kernel(self._x, self._x, self.hyper) + self.noise**2 * np.eye(len(used))
-        self._weights = np.column_stack([cho_solve(self._factor, y), np.linalg.solve(exact, missing) if MODE else cho_solve(self._factor, missing)])
+        self._weights = np.column_stack([cho_solve(self._factor, y), np.linalg.solve(exact, missing)])
 
     @property
     def noise(self) -> float:
@@ -150,7 +153,7 @@ class CurveProcess:
         size = math.exp(self._scale(z))
         curve = size * (self.best.curve + self._peak * out[:-1])
         sd = size * self._peak * math.sqrt(max(variance, 0.0))
-        return curve, sd, min(max(1.0 - max(float(out[-1])-DEAD,0.), 0.0), 1.0)
+        return curve, sd, 1.0 - min(max(float(out[-1]) - OVERSHOOT, 0.0), 1.0)
 
     def residual(self, z: FloatArray) -> FloatArray:
         """Residual vector (n + 2 + p,) of the expected curve at z."""
@@ -202,6 +205,7 @@ class CurveProcess:
         per_row = objective.effective_points / objective.sigma**2 + 1.0 / objective.sigma_peak**2
         noise *= self._peak**2 * per_row
         data = rows[: objective.data_rows]
+        data[-1] = 0.0  # the penalty of a failure is no measurement
         ratio, basis = eigh(data.T @ data, noise)
         kept = np.sqrt(np.maximum(ratio - NOISE_MARGIN, 0.0) / np.maximum(ratio, NOISE_MARGIN))
         return np.vstack([data @ (basis * kept) @ np.linalg.inv(basis), rows[objective.data_rows :]])

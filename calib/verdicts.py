@@ -104,7 +104,9 @@ def limits(
             f"The trace hardly sees {', '.join(unseen)}: these values are the literature's as much as the trace's."
         )
     if stroke_source != "position":
-        how = "one constant speed" if stroke_source == "speed" else "one constant speed and a stroke of the food's height"
+        how = (
+            "one constant speed" if stroke_source == "speed" else "one constant speed and a stroke of the food's height"
+        )
         said.append(f"The trace has no position: its stroke axis rests on {how}.")
     if baseline_kind == "constant":
         said.append("A constant baseline was subtracted: drift of the sensor along the stroke is in the force.")
@@ -114,5 +116,7 @@ def limits(
         "The laws are independent of rate; relaxation, adhesion and moisture are not modelled, and the lower skin of a "
         "whole fruit is not cut."
     )
-    said.append("The default grid was used; the discretisation error of the calibrated force was not measured in this run.")
+    said.append(
+        "The default grid was used; the discretisation error of the calibrated force was not measured in this run."
+    )
     return said

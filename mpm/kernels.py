@@ -14,7 +14,9 @@ from mpm.constitutive import (
 from mpm.contact import blade_distance, bspline, coulomb, edge_level, stick_slip
 
 # Rows of the parameter table that kernels read at run time.
-MU, LAM, YIELD, MASS, VOL, FRICTION, BOARD_MU, R_FLESH, R_START, SLIP, ZONE, FULL, EPS0, EPSF, SPINE, COS, SIN, HALF_LENGTH, BLADE, GRAVITY, REACH, DEPTH, ETA_S, ETA_B = range(24)
+MU, LAM, YIELD, MASS, VOL, FRICTION, BOARD_MU = range(7)
+R_FLESH, R_START, DEPTH, SLIP, ZONE, FULL, EPS0, EPSF = range(7, 15)
+SPINE, COS, SIN, HALF_LENGTH, BLADE, GRAVITY, REACH, ETA_S, ETA_B = range(15, 24)
 N_PARAMETERS = 24
 # Rows of the accumulator table, cleared by the host at each output interval.
 EDGE, FACE, BOARD = 0, 3, 6
@@ -71,6 +73,7 @@ class Kernels:
 
     @ti.kernel
     def reset(self):
+        """Particles at rest and unstrained, nothing cut, nothing booked."""
         for p in self.x:
             self.v[p] = ti.Vector.zero(float, 3)
             self.C[p] = ti.Matrix.zero(float, 3, 3)
@@ -96,10 +99,12 @@ class Kernels:
 
     @ti.func
     def weights(self, fx):
+        """Quadratic B-spline weights of three nodes along each axis."""
         return [0.5 * (1.5 - fx) ** 2, 0.75 - (fx - 1) ** 2, 0.5 * (fx - 0.5) ** 2]
 
     @ti.func
     def node(self, i, j, k):
+        """Position of a node [m]."""
         return ti.Vector([self.ox + i * self.dx, self.oy + j * self.dx, self.oz + k * self.dx])
 
     @ti.func

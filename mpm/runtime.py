@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 from dataclasses import dataclass
 from typing import Any
@@ -40,6 +42,7 @@ def start(runtime: Runtime, precision: str) -> int:
     Raises:
         SceneError: The device is not available.
     """
+    os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")  # stdout belongs to the caller
     import taichi as ti
 
     key = (runtime, precision)
@@ -47,15 +50,16 @@ def start(runtime: Runtime, precision: str) -> int:
         return _state["serial"]
     arch = getattr(ti, runtime.arch)
     real = ti.f64 if precision == "f64" else ti.f32
-    ti.init(
-        arch=arch,
-        default_fp=real,
-        cpu_max_num_threads=runtime.cpu_threads,
-        offline_cache=True,
-        log_level=ti.ERROR,
-        random_seed=0,
-        enable_fallback=False,
-    )
+    with contextlib.redirect_stdout(io.StringIO()):
+        ti.init(
+            arch=arch,
+            default_fp=real,
+            cpu_max_num_threads=runtime.cpu_threads,
+            offline_cache=True,
+            log_level=ti.ERROR,
+            random_seed=0,
+            enable_fallback=False,
+        )
     if runtime.arch != "cpu" and ti.lang.impl.current_cfg().arch == ti.cpu:
         raise SceneError(f"arch: {runtime.arch} is not available on this machine; use --arch cpu")
     _state["key"] = key

@@ -79,12 +79,16 @@ class Material:
             if getattr(self, name) is not None:
                 _number(w, name, getattr(self, name), -1e-300, 1e6, "N/m")
         if (self.tensile_strength is None) != (self.fracture_energy is None):
-            raise SceneError("material: tensile_strength and fracture_energy make bulk damage together; give both or none")
+            raise SceneError(
+                "material: tensile_strength and fracture_energy make bulk damage together; give both or none"
+            )
         if self.tensile_strength is not None and self.fracture_energy is not None:
             _number(w, "tensile_strength", self.tensile_strength, 0.0, 1e12, "Pa")
             _number(w, "fracture_energy", self.fracture_energy, 0.0, 1e9, "J/m^2")
         if self.skin_thickness > 0 and self.R_skin is None:
-            raise SceneError("material: skin_thickness > 0 needs R_skin, the force per width that goes through the skin")
+            raise SceneError(
+                "material: skin_thickness > 0 needs R_skin, the force per width that goes through the skin"
+            )
 
     @property
     def shear(self) -> float:
@@ -304,4 +308,6 @@ class Scene:
         return asdict(self)
 
 
-BAND_CELLS = 2.5  # width of a crack band of grid-smoothed damage, in cells (measured: dissipation within 15 % over dx x 4)
+BAND_CELLS = (
+    2.5  # width of a crack band of grid-smoothed damage, in cells (measured: dissipation within 15 % over dx x 4)
+)

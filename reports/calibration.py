@@ -239,7 +239,7 @@ def _verdict_line(v: Data) -> Data:
     signed = unit == "fraction" and numbers[0] and value < 0.0
     return {
         "name": breakable(v["name"]), "value": "not run" if value is None else _shown(value, unit, 3, signed),
-        "limit": relation + _shown(float(f"{limit:.3g}") if numbers[1] else limit, unit, None, False), "mark": mark, "note": v["note"] or "",
+        "limit": relation + _shown(limit, unit, None, False), "mark": mark, "note": v["note"] or "",
     }  # fmt: skip
 
 
@@ -352,7 +352,7 @@ def _numerics(s: Data) -> Data:
         "ripple_part": quantity(part, "fraction", digits=2), "wall": duration(s["wall_s"]),
         "simulations": count(s["simulations"]), "failed": count(s["failed_simulations"]),
         "coarse": count(s["coarse_simulations"]) if s.get("coarse_simulations") else None,
-        "counters": [f"{_words(name)} {count(n)}" for name, n in sorted((s.get("counters") or {}).items()) if n],
+        "counters": s.get("counters"),
     }  # fmt: skip
 
 

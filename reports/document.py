@@ -64,7 +64,7 @@ _TEMPLATES = Path(__file__).resolve().parent / "templates"
 
 
 def plain(x: float, digits: int | None = 3) -> str:
-    """A number with ``digits`` significant digits, or the shortest text that is exact to six for None.
+    """A number with ``digits`` significant digits, or the shortest text that has three for None.
 
     >>> plain(-0.12345), plain(5.0, None), plain(1234567.0)
     ('−0.123', '5', '1.23 × 10⁶')
@@ -72,11 +72,11 @@ def plain(x: float, digits: int | None = 3) -> str:
     if x == 0.0:
         return "0"
     if not PLAIN_RANGE[0] <= abs(x) < PLAIN_RANGE[1]:
-        mantissa, exponent = f"{x:.{(digits or 6) - 1}e}".split("e")
+        mantissa, exponent = f"{x:.{(digits or 3) - 1}e}".split("e")
         mantissa = f"{float(mantissa):g}" if digits is None else mantissa
         return f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}".replace("-", MINUS)
     if digits is None:
-        return f"{x:.6g}".replace("-", MINUS)
+        return f"{_three(x):.6g}".replace("-", MINUS)
     rounded = float(f"{x:.{digits - 1}e}")
     return _grouped(rounded, max(0, digits - 1 - math.floor(math.log10(abs(rounded)))))
 
@@ -122,13 +122,13 @@ def interval(low: float | None, high: float | None, unit: str) -> str:
     known = [abs(x) for x in ends if x is not None]
     if not known:
         return DASH
-    own = ["" if x is None else quantity(_three(x), unit, digits=None) for x in ends]
+    own = ["" if x is None else quantity(x, unit, digits=None) for x in ends]
     if not all(own):
         return f"above {own[0]}" if own[0] else f"below {own[1]}"
     factor, name = _rung(unit, max(known))
     if 0.0 < min(known) < SMALL_END * factor and _rung(unit, min(known))[1] != name:
         return f"{own[0]} to {own[1]}"
-    texts = [plain(_three(x / factor), None) for x in ends if x is not None]
+    texts = [plain(x / factor, None) for x in ends if x is not None]
     return _with_unit(" to ".join(texts if texts[0] != texts[1] else texts[:1]), name)
 
 

@@ -58,7 +58,12 @@ SCHEMA: Data = {
 }  # fmt: skip
 
 #: What it may hold besides, or leave out.
-EXTRA: Data = {"baseline_window_s": [_NUM], "end_sd_s": _OPT, "counters": {"*": _NUM}, "coarse_simulations": (int,)}
+EXTRA: Data = {
+    "baseline_window_s": [_NUM],
+    "end_sd_s": _OPT,
+    "counters": {"*": (int,)},
+    "coarse_simulations": (int,),
+}
 
 
 @dataclass(frozen=True)

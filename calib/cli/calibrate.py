@@ -36,9 +36,13 @@ def add_args(p: argparse.ArgumentParser) -> None:
     p.add_argument("--force-col", metavar="NAME", help="column of the force on the knife")
     p.add_argument("--position-col", metavar="NAME", help="column of the knife's height ('none': there is none)")
     p.add_argument("--sign", choices=("+", "-"), help="sign that makes resistance to the knife positive")
-    p.add_argument("--speed", type=number(0, 10, "m/s"), metavar="M/S", help="knife speed, where the trace has no position")
+    p.add_argument(
+        "--speed", type=number(0, 10, "m/s"), metavar="M/S", help="knife speed, where the trace has no position"
+    )
     p.add_argument("--t-end", type=float, metavar="S", help="ignore the record after this time (board contact)")
-    p.add_argument("--fit", metavar="NAMES", help="properties to fit, e.g. E,nu,R,mu (default: those that cutting sees)")
+    p.add_argument(
+        "--fit", metavar="NAMES", help="properties to fit, e.g. E,nu,R,mu (default: those that cutting sees)"
+    )
     p.add_argument("--budget", type=number(0, 1e6, ""), default=40, help="largest number of simulations (default 40)")
     p.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
     p.add_argument("--resume", action="store_true", help="go on with the run in --out; nothing is simulated twice")

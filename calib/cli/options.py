@@ -31,8 +31,12 @@ def number(low: float, high: float, unit: str) -> Callable[[str], float]:
 def add_food(p: argparse.ArgumentParser) -> None:
     """Options that say what is cut with what."""
     p.add_argument("--food", required=True, metavar="NAME", help="food of materials.yaml (cutcal foods lists them)")
-    p.add_argument("--material", metavar="YAML", help="take the food from this file, e.g. a calibration's material.yaml")
-    p.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="give a property another value [SI]")
+    p.add_argument(
+        "--material", metavar="YAML", help="take the food from this file, e.g. a calibration's material.yaml"
+    )
+    p.add_argument(
+        "--set", action="append", default=[], metavar="NAME=VALUE", help="give a property another value [SI]"
+    )
     p.add_argument("--knife", default="kitchen", metavar="NAME", help="knife of knives.yaml, or a YAML file")
     p.add_argument("--shape", choices=SHAPE_KINDS, help="outline of the specimen")
     for name, what in (("height", "height"), ("width", "width along the blade"), ("length", "length across the blade")):

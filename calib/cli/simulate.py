@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from pathlib import Path
 
@@ -24,8 +23,12 @@ def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
     add_food(p)
     p.add_argument("--speed", type=number(0, 10, "m/s"), metavar="M/S", help="real speed of the knife, for the record")
-    p.add_argument("--stroke", type=number(1e-4, 1, "m"), metavar="M", help="way of the edge; the whole height by default")
-    p.add_argument("--offset", type=number(-10, 10, "cells"), default=0.0, metavar="CELLS", help="blade against the grid")
+    p.add_argument(
+        "--stroke", type=number(1e-4, 1, "m"), metavar="M", help="way of the edge; the whole height by default"
+    )
+    p.add_argument(
+        "--offset", type=number(-10, 10, "cells"), default=0.0, metavar="CELLS", help="blade against the grid"
+    )
     p.add_argument("--contact", choices=CONTACTS, default="cohesive", help="nodal: plain projection, for comparison")
     p.add_argument("--mach", type=number(0, 0.05, ""), default=0.01, help="blade speed over the P-wave speed")
     p.add_argument("--threads", type=int, default=0, help="CPU threads, 0 = all cores")
@@ -49,10 +52,10 @@ def run(args: argparse.Namespace) -> int:
         seed=args.seed,
     )
     prepare(out, resume=False)
+    import time
+
     from mpm.runtime import Runtime
     from mpm.solver import Simulation
-
-    import time
 
     began = time.monotonic()
 

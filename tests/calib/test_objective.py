@@ -39,10 +39,14 @@ def objective(**errors: float) -> Objective:
     return Objective(Target(GRID, wave(GRID), 0.0, 0.0, interpolate), PARAMETERS, ErrorModel(**errors))
 
 
-def run(force: np.ndarray, stroke: np.ndarray = FINE, *, fraction: float = 1.0, **values: float) -> Evaluation:
+def run(
+    force: np.ndarray, stroke: np.ndarray = FINE, *, fraction: float = 1.0, **values: float
+) -> Evaluation:
     """An evaluation at the prior centre, failed when its fraction is below 1."""
     status = "ok" if fraction == 1.0 else "failed"
-    return Evaluation(0, CENTRE | values, status, "" if status == "ok" else "inverted", fraction, stroke, force)
+    return Evaluation(
+        0, CENTRE | values, status, "" if status == "ok" else "inverted", fraction, stroke, force
+    )
 
 
 def cut_off(fraction: float, factor: float = 1.1) -> Evaluation:
@@ -61,7 +65,8 @@ def test_the_real_curve_has_no_residual() -> None:
 def test_chi_square_of_a_wrong_scale_in_closed_form() -> None:
     """10 % too strong: sum of 20 independent points at 3 % of the peak, plus the peak at 2 %.
 
-    Mean of (0.1 sin)^2 over 240 points is 0.005 * 239/240, so chi-square = 20 * that / 0.03^2 + (0.1 / 0.02)^2.
+    Mean of (0.1 sin)^2 over 240 points is 0.005 * 239/240, so chi-square = 20 * that / 0.03^2 + (0.1 /
+    0.02)^2.
     """
     expected = 20.0 * 0.005 * 239.0 / 240.0 / 0.03**2 + 25.0
     assert objective().trial(run(1.1 * wave(FINE))).misfit == pytest.approx(expected, rel=1e-3)
@@ -81,7 +86,9 @@ def test_chi_square_does_not_count_correlated_points_twice() -> None:
     coarse = objective(peak=1e6).trial(strong).misfit
     finer = Objective(Target(fine, wave(fine), 0.0, 0.0, interpolate), PARAMETERS, ErrorModel(peak=1e6))
     assert finer.trial(strong).misfit == pytest.approx(coarse, rel=0.01)
-    assert objective(peak=1e6, correlation=0.025).trial(strong).misfit == pytest.approx(2.0 * coarse, rel=1e-6)
+    assert objective(peak=1e6, correlation=0.025).trial(strong).misfit == pytest.approx(
+        2.0 * coarse, rel=1e-6
+    )
 
 
 def test_chi_square_of_a_right_model_is_its_number_of_data() -> None:

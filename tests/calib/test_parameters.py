@@ -34,7 +34,9 @@ def test_prior_centre_is_geometric_on_a_log_scale() -> None:
 def test_round_trip(parameter: Parameter) -> None:
     """Value -> internal -> value is the identity to rounding between the hard bounds."""
     assert parameter.round_trip_error() < 1e-14
-    assert parameter.from_internal(parameter.to_internal(parameter.value)) == pytest.approx(parameter.value, rel=1e-14)
+    assert parameter.from_internal(parameter.to_internal(parameter.value)) == pytest.approx(
+        parameter.value, rel=1e-14
+    )
 
 
 def test_values_never_leave_the_bounds() -> None:
@@ -65,7 +67,8 @@ def test_steps_are_wide() -> None:
 )
 def test_nonsense_is_refused(change: dict[str, float], words: str) -> None:
     """Each impossible parameter is refused on creation, naming parameter, unit and number."""
-    given = {"name": "E", "value": 4e5, "low": 1e4, "high": 1e7, "unit": "Pa", "prior_low": 1e5, "prior_high": 1e6}
+    given = {"name": "E", "value": 4e5, "low": 1e4, "high": 1e7, "unit": "Pa"}
+    given |= {"prior_low": 1e5, "prior_high": 1e6}
     with pytest.raises(MaterialError, match=r"parameter E \[Pa\].*" + words):
         Parameter(**(given | change))
 

@@ -33,7 +33,14 @@ def test_line_tells_count_budget_failures_misfit_and_time() -> None:
 
 @pytest.mark.parametrize(
     ("seconds", "text"),
-    [(0.0, "0:00"), (59.6, "1:00"), (3599.7, "1:00:00"), (3675.0, "1:01:15"), (-1.0, "0:00"), (math.nan, "?")],
+    [
+        (0.0, "0:00"),
+        (59.6, "1:00"),
+        (3599.7, "1:00:00"),
+        (3675.0, "1:01:15"),
+        (-1.0, "0:00"),
+        (math.nan, "?"),
+    ],
 )
 def test_clock(seconds: float, text: str) -> None:
     """Durations are rounded before they are split, so that there is no 0:60."""
@@ -48,7 +55,9 @@ def test_terminal_line_is_rewritten() -> None:
         bar(progress(60))
     pieces = stream.getvalue().split("\r")
     assert stream.getvalue().count("\n") == 1 and stream.getvalue().endswith("\n")
-    assert pieces[1].startswith("[##########..........] 40") and pieces[2].startswith("[###############.....] 60")
+    assert pieces[1].startswith("[##########..........] 40") and pieces[2].startswith(
+        "[###############.....] 60"
+    )
     assert len(pieces[2].rstrip("\n")) >= len(pieces[1])
 
 

@@ -57,7 +57,9 @@ def evaluate():
 
 def random_f(rng: np.random.Generator, size: float) -> np.ndarray:
     """A deformation gradient with strains up to ``size`` and any rotation."""
-    return Rotation.random(random_state=rng.integers(1 << 31)).as_matrix() @ (np.eye(3) + rng.uniform(-size, size, (3, 3)))
+    return Rotation.random(random_state=rng.integers(1 << 31)).as_matrix() @ (
+        np.eye(3) + rng.uniform(-size, size, (3, 3))
+    )
 
 
 def test_polar_rotation_agrees_with_scipy(evaluate):

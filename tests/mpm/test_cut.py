@@ -146,7 +146,11 @@ def test_nodal_contact_loses_a_thin_blade_between_nodes():
         ({"motion": Motion(0.03)}, "below the board"),
         ({"food": Food(Shape("block", 0.03, 0.024, 0.011), FLESH), "motion": Motion(0.01)}, "under 4 cells"),
         (
-            {"food": Food(Shape("block", 0.03, 0.024, 0.024), replace(FLESH, tensile_strength=1e6, fracture_energy=10.0))},
+            {
+                "food": Food(
+                    Shape("block", 0.03, 0.024, 0.024), replace(FLESH, tensile_strength=1e6, fracture_energy=10.0)
+                )
+            },
             "snap back",
         ),
     ],

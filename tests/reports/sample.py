@@ -139,6 +139,7 @@ def _base(kind: str) -> dict[str, Any]:
         "simulations": 61, "failed_simulations": 2, "failures": _failures(2),
         "misfit_history": [[1, 412.0], [3, 160.0], [9, 71.0], [14, 30.2], [22, 21.0], [31, 18.7], [58, 18.5]],
         "wall_s": 2531.0, "dx_m": 1.5e-3, "particles": 118344, "mirror_images": 2, "mach": 0.0086,
+        "counters": {"inverted": 0, "left_grid": 0}, "coarse_simulations": 9,
         "momentum_residual": 0.0021, "ke_over_ie": 0.013, "ripple_N": 0.11,
         "shape": {"kind": "cylinder", "length": 0.1, "width": 0.033, "height": 0.033},
         "knife": {"name": "kitchen", "spine": 2e-3, "angle": 0.0445, "height": 0.045, "length": 0.2},
@@ -192,7 +193,8 @@ def _reconstruct(data: dict[str, Any]) -> None:
 def _fail(data: dict[str, Any]) -> None:
     data |= {"passed": False, "simulations": 70, "failed_simulations": 21, "failures": _failures(21),
              "air": {"source": "air_run01.csv", "sha256": "c0ffee00" * 8}, "baseline_kind": "air",
-             "baseline_sd_N": 0.031, "momentum_residual": 0.034}  # fmt: skip
+             "baseline_sd_N": 0.031, "momentum_residual": 0.034,
+             "counters": {"inverted": 12, "left_grid": 3}}  # fmt: skip
     for line in data["verdicts"]:
         if line["name"] in ("Momentum residual", "Parameters at a bound"):
             line |= {"passed": False, "value": 0.034 if line["unit"] == "fraction" else 1}

@@ -108,7 +108,7 @@ def test_unknown_numbers_and_empty_lists_leave_no_hole(tmp_path: Path) -> None:
     mappings = ("parameters", "correlations", "fixed_parameters", "null_models", "metrics", "versions")
     lists = ("verdicts", "failures", "misfit_history", "warnings", "limits", "command")
     empty: dict[str, Any] = {name: {} for name in mappings} | {name: [] for name in lists}
-    empty |= dict.fromkeys(unknown)
+    empty |= dict.fromkeys(unknown) | {"counters": None}
     empty |= {name: dict.fromkeys(s[name]) for name in ("sprague_geers", "iso18571")}
     run = sample.write_run(tmp_path, **empty)
     assert pages(write_report(run).read_bytes()) == 5
@@ -150,6 +150,7 @@ def test_passed_with_a_failed_line_is_not_covered_up(content: Content) -> None:
     [
         (-0.08, 0.05, "fraction", False, None, "−8.00 %", "≤ 5 %"),
         (0.04, 0.05, "fraction", True, None, "4.00 %", "≤ 5 %"),
+        (0.041, 0.3561234, "", True, None, "0.0410", "≤ 0.356"),
         (0.85, 0.9, "-", False, None, "0.850", "≥ 0.9"),
         (0.95, 0.9, "-", True, None, "0.950", "≥ 0.9"),
         (2, 2, "-", True, ">=", "2", "≥ 2"),
