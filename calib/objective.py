@@ -57,7 +57,7 @@ LARGEST_DIFFERENCE = 10.0
 TAIL = 0.05
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Evaluation:
     """One simulation as it came back.
 
@@ -185,7 +185,7 @@ class Target:
         return float(self.stroke[-1] - self.stroke[0])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trial:
     """An evaluation as the objective sees it.
 

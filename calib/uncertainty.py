@@ -129,20 +129,28 @@ class CurveProcess:
         count = self.objective.effective_points
         gram = y @ y.T * (count / y.shape[1])
 
-        def cost(h: FloatArray) -> float:
+        def cost(h: FloatArray) -> tuple[float, FloatArray]:
+            """Minus the logarithm of the posterior, and its gradient (Rasmussen & Williams, eq. 5.9)."""
             factor = cho_factor(self._covariance(h), lower=True)
-            fit = 0.5 * float(np.trace(cho_solve(factor, gram)))
-            volume = count * float(np.log(np.diag(factor[0])).sum())
-            return fit + volume + 0.5 * float((((h - mean) / sd) ** 2).sum())
+            inverse = cho_solve(factor, np.eye(len(y)))
+            pull = (h - mean) / sd
+            value = 0.5 * float(np.sum(inverse * gram)) + count * float(np.log(np.diag(factor[0])).sum())
+            inner = 0.5 * (count * inverse - inverse @ gram @ inverse)
+            slope = [float(np.sum(inner * d)) for d in self._derivatives(h)]
+            return value + 0.5 * float(pull @ pull), np.array(slope) + pull / sd
 
-        found = minimize(
-            cost,
-            mean if guess is None else guess,
-            bounds=np.column_stack([low, high]),
-            method="L-BFGS-B",
-            options={"maxiter": 15},
-        )
+        start = mean if guess is None else guess
+        bounds = np.column_stack([low, high])
+        found = minimize(cost, start, jac=True, bounds=bounds, method="L-BFGS-B", options={"maxiter": 15})
         return np.asarray(found.x)
+
+    def _derivatives(self, h: FloatArray) -> list[FloatArray]:
+        """Derivatives of the covariance of the runs (m, m) by each hyperparameter."""
+        gap = ((self._x[:, None] - self._x[None]) / np.exp(h[2:-1])) ** 2
+        curved = np.exp(2.0 * h[0] - 0.5 * gap.sum(axis=2))
+        linear = math.exp(2.0 * h[1]) * (self._x @ self._x.T)
+        noise = math.exp(2.0 * h[-1]) * np.eye(len(self._x))
+        return [2.0 * curved, 2.0 * linear, *(curved * g for g in np.moveaxis(gap, 2, 0)), 2.0 * noise]
 
     def predict(self, z: FloatArray) -> tuple[FloatArray, float, float]:
         """Expected curve [N] (n,), its standard deviation [N] and the completed part of the stroke at z."""

@@ -11,109 +11,38 @@ from mpm.constitutive import (
     mises,
     polar_rotation,
 )
-from mpm.contact import blade_distance, bspline, coulomb, edge_level, stick_slip
+from mpm.contact import blade_distance, stick_slip
+from mpm.fields import (
+    BLADE,
+    BOARD,
+    BOARD_MU,
+    COS,
+    EPS0,
+    EPSF,
+    ETA_B,
+    ETA_S,
+    FACE,
+    FRICTION,
+    HALF_LENGTH,
+    LAM,
+    MASS,
+    MU,
+    PLASTIC,
+    REACH,
+    SIN,
+    SPINE,
+    VOL,
+    YIELD,
+)
+from mpm.nodes import Nodes
 
-# Rows of the parameter table that kernels read at run time.
-MU, LAM, YIELD, MASS, VOL, FRICTION, BOARD_MU = range(7)
-R_FLESH, R_START, DEPTH, SLIP, ZONE, FULL, EPS0, EPSF = range(7, 15)
-SPINE, COS, SIN, HALF_LENGTH, BLADE, GRAVITY, REACH, ETA_S, ETA_B = range(15, 24)
-N_PARAMETERS = 24
-# Rows of the accumulator table, cleared by the host at each output interval.
-EDGE, FACE, BOARD = 0, 3, 6
-PLASTIC, DAMAGE, VISCOUS, INVERTED, OUTSIDE = 9, 10, 11, 12, 13
-N_SUMS = 14
-EMPTY_ZONE = 0.05  # a process zone filled less than this carries no edge
+IVEC6 = ti.types.vector(6, ti.i32)
 CPU_BLOCK = 512  # Taichi runs CPU loops shorter than this on one thread, so one iteration in 512 works for a thread
 
 
-IVEC6 = ti.types.vector(6, ti.i32)
-
-
 @ti.data_oriented
-class Kernels:
-    """Fields and kernels of one discretised scene.
-
-    Args:
-        n: Number of particles.
-        nodes: Grid nodes along x, y, z.
-        dx: Cell size [m].
-        origin: Position of node (0, 0, 0) [m].
-        planes: Node index of the mirror planes (x, y), -1 where there is none.
-        threads: CPU threads, 0 on a GPU.
-        nodal: Plain nodal projection instead of the cohesive edge and particle contact.
-        damage: Bulk damage on.
-    """
-
-    def __init__(self, n, nodes, dx, origin, planes, threads, nodal, damage):
-        self.n, self.nodes, self.dx, self.inv = n, nodes, float(dx), 1.0 / float(dx)
-        self.ox, self.oy, self.oz = (float(o) for o in origin)
-        self.i0, self.j0 = planes
-        self.mx, self.my = self.i0 >= 0, self.j0 >= 0
-        self.threads, self.nodal, self.damage = max(threads, 1), nodal, damage
-        self.atomic = threads == 0
-        self.sides = 1 if nodal or self.my else 2
-        real = ti.lang.impl.get_runtime().default_fp
-        vec3, vec4 = ti.types.vector(3, real), ti.types.vector(4, real)
-        mat3 = ti.types.matrix(3, 3, real)
-        self.x, self.v = vec3.field(shape=n), vec3.field(shape=n)
-        self.C, self.F = mat3.field(shape=n), mat3.field(shape=n)
-        self.side, self.gap = ti.field(ti.i32, n), ti.field(real, n)
-        self.foot, self.kappa = ti.field(real, n), ti.field(real, n)
-        self.strain = ti.field(real, n if damage else 1)
-        self.stick = vec3.field(shape=(2, n))  # board, blade
-        self.g = vec4.field(shape=(self.threads * self.sides, *nodes))
-        self.u = vec4.field(shape=(self.sides, *nodes))
-        self.smooth = ti.Vector.field(2, real, nodes if damage else (1, 1, 1))
-        self.elastic_slip, self.cut = ti.field(real, nodes[0]), ti.field(real, nodes[0])
-        self.soften, self.cover = ti.field(real, nodes[0]), ti.field(real, nodes[0])
-        self.start, self.near = ti.field(real, nodes[0]), ti.field(ti.i32, nodes[0])
-        self.par = ti.field(real, N_PARAMETERS)
-        self.sums = ti.field(ti.f64, N_SUMS)
-        self.state = ti.field(ti.f64, 8)
-
-    @ti.kernel
-    def reset(self):
-        """Particles at rest and unstrained, nothing cut, nothing booked."""
-        for p in self.x:
-            self.v[p] = ti.Vector.zero(float, 3)
-            self.C[p] = ti.Matrix.zero(float, 3, 3)
-            self.F[p] = ti.Matrix.identity(float, 3)
-            self.side[p] = 0
-            self.gap[p] = 0.0
-            self.kappa[p] = 0.0
-            for b in ti.static(range(2)):
-                self.stick[b, p] = ti.Vector.zero(float, 3)
-        for i in self.cut:
-            self.elastic_slip[i] = 0.0
-            self.cut[i] = 0.0
-            self.start[i] = 0.0
-        for k in self.sums:
-            self.sums[k] = 0.0
-
-    @ti.func
-    def local(self, q):
-        """Lowest node of the 27 that a point reaches, and its offset in cells."""
-        u = (q - ti.Vector([self.ox, self.oy, self.oz])) * self.inv
-        base = ti.floor(u - 0.5).cast(ti.i32)
-        return base, u - base.cast(float)
-
-    @ti.func
-    def weights(self, fx):
-        """Quadratic B-spline weights of three nodes along each axis."""
-        return [0.5 * (1.5 - fx) ** 2, 0.75 - (fx - 1) ** 2, 0.5 * (fx - 0.5) ** 2]
-
-    @ti.func
-    def node(self, i, j, k):
-        """Position of a node [m]."""
-        return ti.Vector([self.ox + i * self.dx, self.oy + j * self.dx, self.oz + k * self.dx])
-
-    @ti.func
-    def half(self, p):
-        """Velocity field of a particle: 0 left of the blade plane, 1 right of it."""
-        out = 0
-        if ti.static(self.sides > 1):
-            out = self.side[p] - 1 if self.side[p] > 0 else ti.cast(self.x[p][1] >= 0, ti.i32)
-        return out
+class Kernels(Nodes):
+    """Transfers, contact of particles, and the loops of a time step."""
 
     @ti.func
     def sever(self, p, tip):
@@ -192,177 +121,6 @@ class Kernels:
                     at = ti.Vector([base[0] + i, base[1] + j, base[2] + k])
                     self.g[slot, at[0], at[1], at[2]] = self.g[slot, at[0], at[1], at[2]] + val
         return ti.Vector([loss[0], loss[1], loss[2], loss[3], outside])
-
-    @ti.func
-    def fold_x(self, slot, j, k):
-        """Add the mirror image across the node plane i0 to one line of nodes."""
-        for h in ti.static(range(1, 3)):
-            if ti.static(self.i0 - h >= 0):
-                a, b = self.g[slot, self.i0 + h, j, k], self.g[slot, self.i0 - h, j, k]
-                b[0] = -b[0]
-                a += b
-                self.g[slot, self.i0 + h, j, k] = a
-                a[0] = -a[0]
-                self.g[slot, self.i0 - h, j, k] = a
-        c = 2.0 * self.g[slot, self.i0, j, k]
-        c[0] = 0.0
-        self.g[slot, self.i0, j, k] = c
-
-    @ti.func
-    def other(self, i, j, k):
-        """Momentum and mass of the right half at a node; with the mirror it is the image of the left half."""
-        q = ti.Vector.zero(float, 4)
-        if ti.static(self.my):
-            jm = 2 * self.j0 - j
-            if 0 <= jm < self.nodes[1]:
-                q = self.g[0, i, jm, k]
-                q[1] = -q[1]
-        elif ti.static(self.sides > 1):
-            q = self.g[1, i, j, k]
-        return q
-
-    @ti.func
-    def images_x(self, i):
-        """How many mirror images across x = 0 a node stands for: 0 for ghosts, 1 on the plane, else 2."""
-        out = 1.0
-        if ti.static(self.mx):
-            out = 0.0 if i < self.i0 else (1.0 if i == self.i0 else 2.0)
-        return out
-
-    @ti.func
-    def images(self, i, j):
-        """How many mirror images a node stands for."""
-        out = self.images_x(i)
-        if ti.static(self.my):
-            out *= 0.0 if j > self.j0 else (1.0 if j == self.j0 else 2.0)
-        return out
-
-    @ti.func
-    def tool(self, row, jx, jy, jz):
-        """Book an impulse of the food on a tool; mirror images cancel across their plane."""
-        if ti.static(not self.mx):
-            self.sums[row] += jx
-        if ti.static(not self.my):
-            self.sums[row + 1] += jy
-        self.sums[row + 2] += jz
-
-    @ti.func
-    def nodal_contact(self, i, j, k, q, u, tip, speed):
-        """The plain rule: velocities at nodes inside a tool are projected, with Coulomb friction."""
-        at = self.node(i, j, k)
-        mult = self.images(i, j)
-        for which in ti.static(range(2)):
-            d, nrm, vel, mu = at[2], ti.Vector([0.0, 0.0, 1.0]), ti.Vector.zero(float, 3), self.par[BOARD_MU]
-            if ti.static(which == 1):
-                d, nrm = blade_distance(ti.abs(at[1]), at[2] - tip, self.par[SPINE], self.par[COS], self.par[SIN])
-                if ti.abs(at[1]) < 1e-6 * self.dx:  # both faces are equally near: their mean normal is downwards
-                    nrm = ti.Vector([0.0, 0.0, -1.0])
-                elif at[1] < 0:
-                    nrm[1] = -nrm[1]
-                vel, mu = ti.Vector([0.0, 0.0, -speed]), self.par[FRICTION]
-                if at[2] < tip or at[2] - tip > self.par[BLADE] or ti.abs(at[0]) > self.par[HALF_LENGTH]:
-                    d = 1.0
-            rel = u - vel
-            vn = rel.dot(nrm)
-            if d <= 0 and vn < 0:
-                t = rel - vn * nrm
-                new = vel + t + coulomb(-vn, t, mu)
-                dj = mult * q[3] * (u - new)
-                self.tool(FACE if ti.static(which == 1) else BOARD, dj[0], dj[1], dj[2])
-                u = new
-        return u
-
-    @ti.func
-    def update_node(self, i, j, k, dt, tip, speed):
-        """Momentum to velocity at a node: below the edge one body, above it two halves with a velocity each."""
-        a, b = self.g[0, i, j, k], self.other(i, j, k)
-        q = a + b
-        left, right = ti.Vector.zero(float, 4), ti.Vector.zero(float, 4)
-        if q[3] > 0:
-            fall = ti.Vector([0.0, 0.0, -self.par[GRAVITY] * dt])
-            u = ti.Vector([q[0], q[1], q[2]]) / q[3] + fall
-            if ti.static(self.nodal):
-                u = self.nodal_contact(i, j, k, q, u, tip, speed)
-            va, vb = u, u
-            if ti.static(not self.nodal):
-                at = self.node(i, j, k)
-                if a[3] > 0 and b[3] > 0 and at[2] > tip - 0.5 * self.dx and ti.abs(at[0]) < self.par[HALF_LENGTH]:
-                    va = ti.Vector([a[0], a[1], a[2]]) / a[3] + fall
-                    vb = ti.Vector([b[0], b[1], b[2]]) / b[3] + fall
-                    # behind the blade the halves may close on each other, but not pass through
-                    if at[2] > tip + self.par[BLADE] and va[1] > vb[1]:
-                        va[1] = u[1]
-                        vb[1] = u[1]
-            left = ti.Vector([va[0], va[1], va[2], a[3]])
-            right = ti.Vector([vb[0], vb[1], vb[2], b[3]])
-        self.u[0, i, j, k] = left
-        if ti.static(self.sides > 1):
-            self.u[1, i, j, k] = right
-
-    @ti.func
-    def zone_weight(self, j, k, tip):
-        """Weight of a node in the process zone of the edge, centred half a zone below it."""
-        z = self.par[ZONE]
-        wy = bspline((self.oy + j * self.dx) / z)
-        wz = bspline((self.oz + k * self.dx - tip) / z + 0.5)
-        return wy * wz
-
-    @ti.func
-    def edge_force(self, i, advance):
-        """Line force of the edge in one slice after it advanced against the material [N/m].
-
-        A cut starts where the force reaches the threshold, at the indentation that belongs to it, and from there runs
-        along the blade to every slice that already carries the propagation resistance: growing a crack takes less
-        than starting one. Then the force falls to that resistance.
-        """
-        slip, flesh = self.par[SLIP], self.par[R_FLESH]
-        e = ti.max(self.elastic_slip[i] + advance, 0.0)
-        force = 0.0
-        if self.start[i] <= 0:
-            force = self.par[R_START] * e / self.par[DEPTH]
-            if force >= self.par[R_START] or (self.near[i] > 0 and force >= flesh):
-                self.start[i] = ti.max(force, 1e-9)
-                e = slip
-        else:
-            self.cut[i] += ti.max(e - slip, 0.0)
-            e = ti.min(e, slip)
-            force = edge_level(self.cut[i], self.soften[i], self.start[i], flesh) * e / slip
-        self.elastic_slip[i] = e
-        return force
-
-    @ti.func
-    def cut_slice(self, i, dt, tip, speed):
-        """The cutting edge in one slice along the blade: slip, line force, reaction on the grid."""
-        reach = 1.5 * self.par[ZONE]
-        j_low = ti.max(0, ti.floor((-reach - self.oy) * self.inv, ti.i32))
-        j_high = ti.min(self.nodes[1], ti.ceil((reach - self.oy) * self.inv, ti.i32) + 1)
-        k_low = ti.max(0, ti.floor((tip - self.par[ZONE] / 2 - reach - self.oz) * self.inv, ti.i32))
-        k_high = ti.min(self.nodes[2], ti.ceil((tip - self.par[ZONE] / 2 + reach - self.oz) * self.inv, ti.i32) + 1)
-        mass, mom = 0.0, 0.0
-        for j in range(j_low, j_high):
-            for k in range(k_low, k_high):
-                for s in ti.static(range(self.sides)):
-                    q = self.u[s, i, j, k]
-                    wt = ti.static(2.0 if self.my else 1.0) * self.zone_weight(j, k, tip) * q[3]
-                    mass += wt
-                    mom += wt * q[2]
-        if mass > EMPTY_ZONE * self.par[FULL]:
-            force = self.edge_force(i, (speed + mom / mass) * dt)
-            fill = ti.min(1.0, mass / self.par[FULL])
-            impulse = force * fill * self.cover[i] * self.dx * dt
-            dv = impulse / mass
-            for j in range(j_low, j_high):
-                for k in range(k_low, k_high):
-                    push = dv * self.zone_weight(j, k, tip)
-                    for s in ti.static(range(self.sides)):
-                        self.u[s, i, j, k][2] = self.u[s, i, j, k][2] - push
-                        if ti.static(self.mx):
-                            image = 2 * self.i0 - i
-                            if i > self.i0 and image >= 0:
-                                self.u[s, image, j, k][2] = self.u[s, image, j, k][2] - push
-            self.tool(EDGE, 0.0, 0.0, impulse * self.images_x(i))
-        else:
-            self.elastic_slip[i] = 0.0
 
     @ti.func
     def touch(self, p, tip, speed, dt, u, at):

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from mpm import kernels as kn
+from mpm import fields as kn
 from mpm.errors import SimulationError
+from mpm.kernels import IVEC6, Kernels
 from mpm.record import ForceRecord
 from mpm.runtime import Runtime, start
 from mpm.scene import BAND_CELLS, Material, Scene
@@ -21,7 +22,6 @@ PAD = 3  # empty cells around the food: a quadratic kernel reaches 1.5 cells, th
 MARGIN = 2  # cells by which the active window exceeds the particles; renewed at every output interval
 SPREAD = 0.2  # room for the food to widen while it is pressed, part of its size
 APPROACH = 0.1  # way of the blade above the food before contact, in cells
-ZONE_FULL = 0.95  # kernel mass over rho dx zone^2 at which a process zone counts as full: what a cut leaves around it
 EDGE_STEP = 0.5  # dt times the frequency of the edge's cohesive spring, 2 is unstable
 
 Progress = Callable[[float, float], None]
@@ -47,7 +47,7 @@ class Simulation:
         threads = self.runtime.cpu_threads if self.runtime.arch == "cpu" else 0
         damage = scene.food.material.tensile_strength is not None
         nodal = scene.numerics.contact == "nodal"
-        self.k: Any = kn.Kernels(
+        self.k: Any = Kernels(
             len(self.seeds.x), self.nodes, scene.numerics.dx, self.origin, self.planes, threads, nodal, damage
         )
 
@@ -105,7 +105,7 @@ class Simulation:
         table[kn.FRICTION], table[kn.BOARD_MU] = material.mu, scene.board.mu
         table[kn.R_FLESH], table[kn.R_START], table[kn.DEPTH] = material.R, material.start, material.initiation_depth
         table[kn.SLIP], table[kn.ZONE] = edge.slip, edge.zone
-        table[kn.FULL] = ZONE_FULL * material.rho * num.dx * edge.zone**2
+        table[kn.FULL] = material.rho * num.dx * edge.zone**2
         if material.tensile_strength is not None and material.fracture_energy is not None:
             eps0 = material.tensile_strength / material.E
             band = BAND_CELLS * num.dx
@@ -171,7 +171,7 @@ class Simulation:
         for axis, plane in enumerate(self.planes):
             if plane >= 0:
                 low[axis], high[axis] = min(low[axis], plane - 2), max(high[axis], plane + 3)
-        return kn.IVEC6([*np.maximum(low, 0), *np.minimum(high, self.nodes)])
+        return IVEC6([*np.maximum(low, 0), *np.minimum(high, self.nodes)])
 
     def _advance(self, count: int, dt: float, tip: float, speed: float) -> None:
         """Some time steps with the edge at ``tip`` in the first one [m]."""

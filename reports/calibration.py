@@ -236,21 +236,21 @@ def _verdict_line(v: Data) -> Data:
     if not relation and all(numbers) and passed is not None and abs(value) != limit:
         relation = "≤ " if (abs(value) < limit) == passed else "≥ "
     mark = "none" if value is None or passed is None else "yes" if passed else "no"
-    signed = unit == "fraction" and numbers[0] and value < 0.0
     return {
-        "name": breakable(v["name"]), "value": "not run" if value is None else _shown(value, unit, 3, signed),
-        "limit": relation + _shown(limit, unit, None, False), "mark": mark, "note": v["note"] or "",
+        "name": breakable(v["name"]), "value": "not run" if value is None else _shown(value, unit, 3),
+        "limit": relation + _shown(limit, unit, None), "mark": mark,
+        "note": "" if v["note"] in (None, "not run") else v["note"],
     }  # fmt: skip
 
 
-def _shown(x: Any, unit: str, digits: int | None, signed: bool) -> str:
+def _shown(x: Any, unit: str, digits: int | None) -> str:
     """A value or limit of any type as text."""
     if isinstance(x, bool):
         return "yes" if x else "no"
     if isinstance(x, int) and unit == "-":
         return count(x)
     if x is None or isinstance(x, (int, float)):
-        return quantity(x, unit, digits=digits, signed=signed)
+        return quantity(x, unit, digits=digits)
     return breakable(listed([str(i) for i in x]) if isinstance(x, list) else str(x))
 
 
@@ -363,7 +363,7 @@ def _failures(failures: list[Data]) -> list[list[str]]:
         same = [f for f in failures if f["reason"] == reason]
         parts = [f["fraction"] for f in same if f["fraction"] is not None]
         span = interval(min(parts), max(parts), "fraction") if parts else ""
-        first = [f"{k} = {_shown(v, PROPERTIES[k].unit if k in PROPERTIES else '-', 3, False)}"
+        first = [f"{k} = {_shown(v, PROPERTIES[k].unit if k in PROPERTIES else '-', 3)}"
                  for k, v in same[0]["parameters"].items()]  # fmt: skip
         rows.append([breakable(_words(reason)), str(len(same)), span, "; ".join(first)])
     return rows

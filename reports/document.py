@@ -209,9 +209,7 @@ def publish(
         ) from None
 
 
-def _typeset(
-    template: str, content: Mapping[str, Any], figures: Mapping[str, bytes], date: datetime
-) -> bytes:
+def _typeset(template: str, content: Mapping[str, Any], figures: Mapping[str, bytes], date: datetime) -> bytes:
     """The PDF, set in fonts of the typesetter and of matplotlib: those of the machine do not matter."""
     with tempfile.TemporaryDirectory(prefix="cutcal-") as name:
         folder = Path(name)

@@ -189,6 +189,7 @@ def fit(curves: Curves, noise_sd: float, trace: str) -> bytes:
         residual.axhline(0.0, color=BLACK, lw=0.5)
         residual.plot(x, sim - real, color=BLUE, lw=1.3, label=f"simulated − {trace}")
         residual.set_ylabel("residual [N]")
+        residual.yaxis.set_major_locator(MaxNLocator(4))
         _stroke_axis(residual, x)
         handles, labels = zip(*(a.get_legend_handles_labels() for a in (shape, residual)), strict=True)
         figure.legend(sum(handles, []), sum(labels, []), loc="outside upper left", ncols=2)
@@ -386,7 +387,6 @@ def _filtered(axes: Axes, r: Record, curves: Curves) -> None:
         axes.errorbar(x[np.argmax(y)], r.peak, yerr=r.peak_sd, color=RED, marker="o", ms=3.5, mfc="white",
                       capsize=2.5, lw=1.0, zorder=4)  # fmt: skip
     _stroke_axis(axes, x)
-    axes.margins(y=0.08)
     axes.set_title("c  filtered, over stroke (circle: peak ± 1 sd)")
     axes.set_ylabel("force [N]")
 

@@ -146,8 +146,7 @@ def _check(path: Path, place: str, value: Any, kind: Any) -> None:
             where = f"{place}.{name}" if place else name
             if name not in value:
                 raise ReportError(
-                    f"{path}: {where} is missing; the file is incomplete or of another version of cutcal: "
-                    f"{REMEDY}"
+                    f"{path}: {where} is missing; the file is incomplete or of another version of cutcal: {REMEDY}"
                 )
             _check(path, where, value[name], inner)
 

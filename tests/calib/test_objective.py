@@ -1,4 +1,4 @@
-"""The residual vector: its size, its weights, and that broken-down runs give finite, graded, continuous ones."""
+"""The residual vector: its size and weights, and that broken-down runs give finite, graded ones."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def cut_off(fraction: float, factor: float = 1.1) -> Evaluation:
 
 
 def test_the_real_curve_has_no_residual() -> None:
-    """A simulation equal to the trace at the centre of the prior has chi-square zero (up to interpolation)."""
+    """A simulation equal to the trace at the centre of the prior has chi-square zero."""
     trial = objective().trial(run(wave(FINE)))
     assert trial.residual.shape == (240 + 2 + 2,)
     assert trial.misfit < 1e-6
@@ -80,7 +80,7 @@ def test_noise_and_discrepancy_add_in_squares() -> None:
 
 
 def test_chi_square_does_not_count_correlated_points_twice() -> None:
-    """Twice as fine a stroke grid leaves chi-square alone; half the correlation length doubles the curve's part."""
+    """Twice as fine a grid leaves chi-square alone; half the correlation length doubles the curve's part."""
     fine = np.linspace(0.0, LENGTH, 480)
     strong = run(1.1 * wave(FINE))
     coarse = objective(peak=1e6).trial(strong).misfit
@@ -92,7 +92,7 @@ def test_chi_square_does_not_count_correlated_points_twice() -> None:
 
 
 def test_chi_square_of_a_right_model_is_its_number_of_data() -> None:
-    """Errors drawn from the stated model (correlated over a twentieth of the stroke) give chi-square 20 on average."""
+    """Errors drawn from the stated model, correlated over a twentieth of the stroke, give 20 on average."""
     goal = objective(peak=1e6)
     x = np.linspace(0.0, 1.0, 240)
     sd = 0.05 / (2.0 * math.sqrt(math.pi))  # of the kernel whose correlation integrates to 0.05
@@ -110,7 +110,7 @@ def test_prior_rows_come_last() -> None:
 
 
 def test_penalty_grows_as_less_is_computed() -> None:
-    """The earlier a run breaks down the worse it is, and each is worse than a whole run with the same error."""
+    """The earlier a run breaks down the worse it is; a whole run with the same error is best."""
     goal = objective()
     misfits = [goal.trial(run(1.1 * wave(FINE))).misfit]
     misfits += [goal.trial(cut_off(f)).misfit for f in (0.99, 0.9, 0.7, 0.4, 0.1)]
@@ -118,7 +118,7 @@ def test_penalty_grows_as_less_is_computed() -> None:
 
 
 def test_residual_is_continuous_in_the_fraction() -> None:
-    """A run that breaks down 1e-4 of the stroke later has nearly the same vector, also over a point of the grid.
+    """A run that breaks down 1e-4 of the stroke later has nearly the same vector.
 
     The bound is ten times what a vector that changes evenly from nothing to everything would need.
     """
@@ -183,7 +183,7 @@ def test_record_that_ends_a_little_early_is_whole() -> None:
 
 
 def test_works_with_the_filter_of_real_curves() -> None:
-    """With the zero-phase filter that conditions traces, the same cut smoothed the same way has no residual."""
+    """With the filter that conditions traces, the same cut smoothed the same way has no residual."""
     real = filter_simulated(GRID, FINE, wave(FINE))
     goal = Objective(Target(GRID, real, 0.0, 0.0, filter_simulated), PARAMETERS)
     assert goal.trial(run(wave(FINE))).misfit < 1e-12

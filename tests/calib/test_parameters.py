@@ -25,7 +25,7 @@ def test_prior_ends_lie_at_the_95_percent_points() -> None:
 
 
 def test_prior_centre_is_geometric_on_a_log_scale() -> None:
-    """The median of a log-normal prior is the geometric mean of its range, that of a normal one the middle."""
+    """The median of a log-normal prior is the geometric mean of its range, of a normal one the middle."""
     assert E.prior_centre == pytest.approx(math.sqrt(1e5 * 1e6))
     assert NU.prior_centre == pytest.approx(0.395)
 

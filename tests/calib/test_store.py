@@ -137,7 +137,7 @@ def test_a_write_that_fails_half_way_spoils_no_other(tmp_path: Path) -> None:
 
 
 def kill_while_writing(path: Path, after: int, *options: str) -> int:
-    """Start the writer, kill -9 it after some acknowledged runs; return the number of the last one acknowledged."""
+    """Start the writer, kill -9 it after some runs; return the number of the last one acknowledged."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-c", WRITER, str(path), *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
@@ -152,7 +152,7 @@ def kill_while_writing(path: Path, after: int, *options: str) -> int:
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs kill -9")
 @pytest.mark.parametrize("options", [(), ("reopen",)], ids=["journal", "journal and HDF5"])
 def test_kill_while_writing(tmp_path: Path, options: tuple[str, ...]) -> None:
-    """Killed while it writes, the store opens and has every acknowledged run whole; at most one more, none torn."""
+    """Killed while it writes, the store opens and has every acknowledged run whole, at most one more."""
     path = tmp_path / "evaluations.h5"
     last = kill_while_writing(path, 17, *options)
     with EvaluationStore(path, HEADER, resume=True) as store:
@@ -165,7 +165,7 @@ def test_kill_while_writing(tmp_path: Path, options: tuple[str, ...]) -> None:
 
 
 def test_kill_between_rename_and_removal(tmp_path: Path) -> None:
-    """With both the new file and the old journal on disk (and a half-written draft) each run is there once."""
+    """With the new file, the old journal and a half-written draft on disk each run is there once."""
     path = tmp_path / "evaluations.h5"
     store = EvaluationStore(path, HEADER)
     for k in range(3):
@@ -281,7 +281,7 @@ def test_known_runs_are_not_run_again(tmp_path: Path) -> None:
 def test_only_repeatable_failures_are_remembered(
     tmp_path: Path, status: str, reason: str, again: bool
 ) -> None:
-    """A material that breaks the solver breaks it again; a killed worker or a timeout may not, and is replaced."""
+    """A material that breaks the solver breaks it again; a killed worker or a timeout is tried again."""
     with EvaluationStore(tmp_path / "evaluations.h5", HEADER) as store:
         list(CachedEvaluator(Counting(status, reason), store, scene=SCENE, code="1").evaluate([{"E": 1.0}]))
         second = Counting()

@@ -34,7 +34,7 @@ def correlated_noise(random: np.random.Generator) -> np.ndarray:
 
 
 def linear_fit(random: np.random.Generator, noise: float) -> tuple[np.ndarray, Uncertainty]:
-    """Draw a truth from the prior, make its noisy trace, fit it exactly; the truth and what the fit says of it."""
+    """Draw a truth from the prior and fit its noisy trace exactly; the truth and what the fit says of it."""
     truth = random.standard_normal(3)
     data = BASIS @ truth + noise * correlated_noise(random)
     jacobian = np.vstack([WEIGHT * BASIS, np.eye(3)])
@@ -61,13 +61,13 @@ def test_95_percent_intervals_cover_95_percent() -> None:
 
 
 def test_intervals_cover_where_errors_are_three_times_the_stated_ones() -> None:
-    """Understated errors show in chi-square; widened by it, the intervals still cover, which they do not without."""
+    """Understated errors show in chi-square; widened by it, the intervals still cover."""
     hits = coverage(noise=3.0)
     assert np.all(hits >= 88), hits
 
 
 def known(jacobian: np.ndarray, *, reduced: float = 0.5, count: int | None = None) -> Uncertainty:
-    """Uncertainty for data rows (k, p) at the prior centre, with a residual of the given reduced chi-square."""
+    """Uncertainty for data rows (k, p) at the prior centre with a given chi-square per row."""
     p = jacobian.shape[1] if count is None else count
     rows = np.vstack([jacobian, np.eye(p)])
     residual = np.zeros(len(rows))
@@ -76,7 +76,7 @@ def known(jacobian: np.ndarray, *, reduced: float = 0.5, count: int | None = Non
 
 
 def test_closed_form_of_one_parameter() -> None:
-    """Sensitivity 3 and prior sd 1: posterior variance 1 / (9 + 1), an interval that is symmetric in the logarithm."""
+    """Sensitivity 3 and prior sd 1: posterior variance 1 / (9 + 1), symmetric in the logarithm."""
     found = known(np.array([[3.0]]), reduced=0.5)
     interval = found.intervals[0]
     assert interval.width == pytest.approx(math.sqrt(0.1))
@@ -193,7 +193,7 @@ def true_jacobian(z: np.ndarray) -> np.ndarray:
 
 
 def test_process_goes_through_the_runs_and_knows_where_it_does_not() -> None:
-    """Between noise-free runs the curve is met to 1 % of the peak; doubt is small there and large far away."""
+    """Between noise-free runs the curve is met to 1 % of the peak; doubt is small there, large far away."""
     runs = trials(25, noise=0.0)
     process = CurveProcess(goal(), runs, runs[0])
     z = THREE.start + np.array([0.15, -0.1, 0.1])
@@ -202,7 +202,7 @@ def test_process_goes_through_the_runs_and_knows_where_it_does_not() -> None:
 
 
 def test_process_scales_force_with_stress_exactly() -> None:
-    """From a single run the force at k times the stress-like parameter is k times the force, however large k is."""
+    """From a single run the force at 5 times the stress-like parameter is 5 times the force."""
     run = trials(1, noise=0.0)
     process = CurveProcess(goal(), run, run[0])
     z = THREE.start + np.array([math.log(5.0), 0.0, 0.0])
@@ -223,8 +223,10 @@ def test_jacobian_of_noise_free_runs_is_the_true_one() -> None:
 
 
 def test_noise_does_not_pass_for_information() -> None:
-    """With 2 % noise the idle parameter stays unseen, in nine of ten fits; forward differences over 10 % of the same
-    noise would call it identified nearly always."""
+    """With 2 % noise the idle parameter stays unseen in nine of ten fits.
+
+    Forward differences over 10 % of the same curves call it identified nearly always.
+    """
     unseen = claimed = 0
     for seed in range(10):
         runs = trials(25, noise=0.02, seed=seed)
@@ -241,7 +243,7 @@ def test_noise_does_not_pass_for_information() -> None:
 
 
 def test_coarse_runs_inform_through_their_common_offset() -> None:
-    """Coarse curves that are all 8 % too strong teach the shape of the response without moving the fine curve."""
+    """Coarse curves that are all 8 % too strong teach the response without moving the fine curve."""
     runs = trials(1, noise=0.0)
     for t in trials(15, noise=0.0, seed=3)[1:]:
         runs.append(Trial(t.z, t.evaluation, 1.08 * t.curve, t.residual, coarse=True))
@@ -252,7 +254,7 @@ def test_coarse_runs_inform_through_their_common_offset() -> None:
 
 
 def test_broken_runs_are_expected_to_break_again() -> None:
-    """Where a run broke down at 40 % of the stroke the process expects that, and a large chi-square; not at a good one."""
+    """Where a run broke down at 40 % of the stroke the process expects that again; not at a good one."""
     runs = trials(8, noise=0.0)
     z = THREE.start + np.array([0.0, 0.0, 1.5])
     part = slice(0, 96)
@@ -264,7 +266,7 @@ def test_broken_runs_are_expected_to_break_again() -> None:
 
 
 def test_least_stays_within_bounds_and_radius() -> None:
-    """The proposed point is better than the best run, within the radius, and never outside the hard bounds."""
+    """The proposed point is better than the best run, within the radius and the hard bounds."""
     runs = trials(25, noise=0.0)[1:]
     best = min(runs, key=lambda t: t.misfit)
     process = CurveProcess(goal(), runs, best)

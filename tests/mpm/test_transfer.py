@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpm import kernels as kn
+from mpm import fields as kn
 from mpm.runtime import Runtime
 from mpm.scene import Board, Food, Knife, Material, Motion, Numerics, Scene, Shape
 from mpm.solver import Simulation

@@ -44,9 +44,7 @@ def content(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Content:
 # ---- the document
 
 
-@pytest.mark.parametrize(
-    ("kind", "count"), [("good", 5), ("reconstructed", 5), ("failed", 6), ("interrupted", 5)]
-)
+@pytest.mark.parametrize(("kind", "count"), [("good", 5), ("reconstructed", 5), ("failed", 6), ("interrupted", 5)])
 def test_every_outcome_gives_a_pdf_of_the_planned_length(tmp_path: Path, kind: str, count: int) -> None:
     """Each section keeps to its page; only the failed run's twelve warnings need a sixth."""
     path = write_report(sample.write_run(tmp_path, kind))

@@ -1,0 +1,338 @@
+"""The search: finds known materials within the budget, survives noise, failures and interruption."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calib.errors import MaterialError
+from calib.fit import FitOptions, FitResult, calibrate
+from calib.objective import Evaluation, Evaluator, Objective, Target
+from calib.parameters import Parameter, ParameterSet
+from calib.progress import Progress
+from calib.store import CachedEvaluator, EvaluationStore, Header
+from calib.uncertainty import uncertainty
+from mpm.errors import SimulationError
+
+LENGTH, WIDTH = 0.04, 0.03
+STROKE = np.linspace(0.0, LENGTH, 500)
+GRID = np.linspace(0.0, LENGTH, 240)
+NOISE = 0.01
+
+FIVE = ParameterSet(
+    (
+        Parameter("E", 5e5, 2e4, 1e7, "Pa", 1e5, 2e6),
+        Parameter("yield_stress", 5e4, 2e3, 2e6, "Pa", 1e4, 3e5),
+        Parameter("R", 300.0, 10.0, 5e3, "J/m^2", 80.0, 1200.0),
+        Parameter("R_skin", 300.0, 5.0, 9e3, "N/m", 60.0, 2000.0),
+        Parameter("mu", 0.3, 0.0, 1.0, "-", 0.05, 0.6, "linear"),
+    )
+)
+TRUTHS = [
+    {"E": 3.0e5, "yield_stress": 4.0e4, "R": 500.0, "R_skin": 200.0, "mu": 0.2},
+    {"E": 9.0e5, "yield_stress": 1.0e5, "R": 150.0, "R_skin": 700.0, "mu": 0.4},
+]
+TWO = ParameterSet((FIVE["R"], FIVE["mu"]))
+TWO_TRUTH = {"R": 600.0, "mu": 0.15}
+
+
+def three_terms(p: Mapping[str, float]) -> np.ndarray:
+    """Force of a cut [N] (500,): skin that is pierced, flesh that is parted, faces that are pressed and rub.
+
+    The skin gives way at a depth that follows from its stiffness, the pressure on the faces saturates at the
+    yield stress, friction multiplies it (so that mu and yield_stress are known mainly as a product).
+    """
+    pierced = 0.004 * math.sqrt((p["R_skin"] / 300.0) / (p["E"] / 5e5))
+    skin = np.where(STROKE < pierced, (STROKE / pierced) ** 1.5, np.exp(-(STROKE - pierced) / 0.002))
+    rise = 0.002 * math.sqrt((p["R"] / 300.0) / (p["E"] / 5e5))
+    flesh = 1.0 - np.exp(-np.maximum(STROKE - 0.7 * pierced, 0.0) / rise)
+    pressure = 1.0 / (1.0 / (0.12 * p["E"]) + 1.0 / p["yield_stress"])
+    faces = pressure * 0.002 * (1.0 + p["mu"] / 0.2) * np.minimum(STROKE / 0.02, 1.0) ** 1.2
+    release = np.sqrt(np.minimum((LENGTH - STROKE) / 0.004, 1.0))
+    return WIDTH * (p["R_skin"] * skin + p["R"] * flesh + faces) * release
+
+
+def two_terms(p: Mapping[str, float]) -> np.ndarray:
+    """A quick fake: a plateau for R, a ramp of 4 N for mu = 0.2 [N] (500,)."""
+    return WIDTH * p["R"] * (1.0 - np.exp(-STROKE / 0.002)) + 20.0 * p["mu"] * STROKE / LENGTH
+
+
+def noise(p: Mapping[str, float], size: float) -> np.ndarray:
+    """Smooth noise (500,) that depends on the parameters like that of a chaotic, repeatable solver."""
+    digest = hashlib.sha256(repr(sorted(p.items())).encode()).digest()
+    kernel = np.exp(-0.5 * (np.arange(-30, 31) / 10.0) ** 2)
+    white = np.random.default_rng(list(digest)).standard_normal(560)
+    return size * np.convolve(white, kernel / np.linalg.norm(kernel), "valid")
+
+
+class Fake:
+    """An analytic simulator with noise that breaks down at 40 % of the stroke where ``breaks`` says so."""
+
+    def __init__(
+        self,
+        force: Callable[[Mapping[str, float]], np.ndarray] = three_terms,
+        *,
+        noisy: float = NOISE,
+        breaks: Callable[[Mapping[str, float]], bool] = lambda p: False,
+        backwards: bool = True,
+        interrupt_after: int | None = None,
+    ) -> None:
+        self.force, self.noisy, self.breaks, self.backwards = force, noisy, breaks, backwards
+        self.interrupt_after = interrupt_after
+        self.runs = 0
+        self.batches: list[int] = []
+
+    def evaluate(self, batch: Sequence[Mapping[str, float]]) -> Iterator[Evaluation]:
+        """Runs in reverse order of the batch (or in order), as if the last had finished first."""
+        self.batches.append(len(batch))
+        for index in sorted(range(len(batch)), reverse=self.backwards):
+            if self.runs == self.interrupt_after:
+                raise KeyboardInterrupt
+            self.runs += 1
+            p = dict(batch[index])
+            force = self.force(p)
+            force = force + self.noisy * force.max() * noise(p, 1.0)
+            if self.breaks(p):
+                yield Evaluation(index, p, "failed", "inverted", 0.4, STROKE[:200], force[:200], {}, 2.0)
+            else:
+                yield Evaluation(index, p, "ok", "", 1.0, STROKE, force, {"peak_N": float(force.max())}, 4.0)
+
+
+def unstable(p: Mapping[str, float]) -> bool:
+    """A yield stress above 0.3 E breaks the fake: a tenth of the prior box, beside the truths."""
+    return p["yield_stress"] > 0.3 * p["E"]
+
+
+def goal(
+    truth: Mapping[str, float],
+    parameters: ParameterSet = FIVE,
+    force: Callable[[Mapping[str, float]], np.ndarray] = three_terms,
+) -> Objective:
+    """Objective whose real curve is the truth's with its own 1 % of noise."""
+    curve = force(truth)
+    curve = np.interp(GRID, STROKE, curve + NOISE * curve.max() * noise({"trace": 1.0}, 1.0))
+    target = Target(GRID, curve, NOISE * curve.max(), NOISE * curve.max(), np.interp)
+    return Objective(target, parameters)
+
+
+def two_goal() -> Objective:
+    """The quick problem of two parameters."""
+    return goal(TWO_TRUTH, TWO, two_terms)
+
+
+def noise_free(objective: Objective, values: Mapping[str, float]) -> float:
+    """Chi-square without the noise of the run at the given values."""
+    run = Evaluation(0, dict(values), "ok", "", 1.0, STROKE, three_terms(values))
+    return objective.trial(run).misfit
+
+
+def values(result: FitResult) -> dict[str, float]:
+    """Fitted values [SI]."""
+    return {p.name: p.value for p in result.parameters}
+
+
+QUICK = FitOptions(budget=30, design=3)
+
+
+@pytest.mark.parametrize("truth", TRUTHS, ids=["soft", "tough skin"])
+def test_recovers_five_parameters_within_eighty_runs(truth: dict[str, float]) -> None:
+    """With noise and failures the misfit without noise is as good as the truth's.
+
+    E, R and R_skin come out within 15 %, the product of yield stress and friction on the faces within 20 %;
+    and each truth lies in its 95 % interval.
+    """
+    objective, fake = goal(truth), Fake(breaks=unstable)
+    result = calibrate(objective, fake)
+    assert result.simulations == fake.runs <= 80 and result.status in ("converged", "stalled")
+    assert noise_free(objective, values(result)) < noise_free(objective, truth) + 1.0
+    for name in ("E", "R", "R_skin"):
+        assert values(result)[name] == pytest.approx(truth[name], rel=0.15)
+    faces = [p["yield_stress"] * (1.0 + p["mu"] / 0.2) for p in (values(result), truth)]
+    assert faces[0] == pytest.approx(faces[1], rel=0.2)
+    assert result.jacobian is not None
+    found = uncertainty(
+        result.parameters, result.jacobian, result.best.residual, effective_rows=objective.effective_rows
+    )
+    assert all(i.low95 <= truth[i.parameter.name] <= i.high95 for i in found.intervals)
+    assert found.intervals[2].verdict == "identified"
+    assert result.repeatability == pytest.approx(NOISE, rel=0.3)
+
+
+def test_failures_in_most_of_the_box_do_not_break_it() -> None:
+    """Where three quarters of the prior box break down, a truth just inside the rest is still found."""
+    truth = {"E": 8e5, "yield_stress": 3e4, "R": 400.0, "R_skin": 400.0, "mu": 0.3}
+    fake = Fake(breaks=lambda p: p["yield_stress"] > 0.05 * p["E"])
+    objective = goal(truth)
+    result = calibrate(objective, fake)
+    assert result.failed >= 5 and result.best.ok
+    assert all(np.isfinite(t.residual).all() for t in result.history)
+    assert noise_free(objective, values(result)) < noise_free(objective, truth) + 3.0
+
+
+def test_all_failed_is_an_error_that_says_where() -> None:
+    """When no run of three designs ends its stroke, the error says how far the best came and why."""
+    fake = Fake(two_terms, breaks=lambda p: True)
+    with pytest.raises(SimulationError, match=r"got to 40% \(inverted\)") as caught:
+        calibrate(two_goal(), fake, options=QUICK)
+    assert caught.value.fraction == 0.4 and caught.value.reason == "inverted"
+    assert fake.runs == 2 - 1 + 3 * QUICK.design + 1
+
+
+def test_the_best_run_is_returned_not_the_last() -> None:
+    """No finished run of the history is better than the result, and the result is one of them."""
+    result = calibrate(two_goal(), Fake(two_terms), options=QUICK)
+    assert result.best in result.history
+    assert result.best.misfit == min(t.misfit for t in result.history if t.ok)
+    assert values(result) == result.best.evaluation.parameters
+
+
+@pytest.mark.parametrize("budget", [11, 17, 24])
+def test_budget_is_never_exceeded(budget: int) -> None:
+    """However small the budget, not one more simulation is run, and there is a result."""
+    fake = Fake(two_terms)
+    result = calibrate(two_goal(), fake, options=FitOptions(budget=budget, design=3))
+    assert fake.runs == result.simulations <= budget and math.isfinite(result.best.misfit)
+
+
+def test_order_of_completion_does_not_matter() -> None:
+    """Which worker is done first must not change the search, or a resumed one would take another path."""
+    forward = calibrate(two_goal(), Fake(two_terms, backwards=False), options=QUICK)
+    backward = calibrate(two_goal(), Fake(two_terms, backwards=True), options=QUICK)
+    assert [t.evaluation.parameters for t in forward.history] == [
+        t.evaluation.parameters for t in backward.history
+    ]
+
+
+def test_workers_are_kept_busy() -> None:
+    """Every round asks for exactly as many runs as there are workers."""
+    for workers in (1, 2, 4):
+        fake = Fake(two_terms)
+        result = calibrate(two_goal(), fake, options=FitOptions(budget=40, design=3, batch=workers))
+        rounds = sum(t.stage == "round" for t in result.history)
+        assert rounds > 0 and rounds % workers == 0
+        assert fake.batches.count(workers) >= rounds // workers
+
+
+def test_scaling_the_start_finds_a_material_of_equal_proportions_at_once() -> None:
+    """A truth of 2.5 times the given values in all stress-like parameters is met by a scaled run."""
+    truth = {p.name: p.value * (2.5 if p.log else 1.0) for p in FIVE}
+    wide = ParameterSet(
+        tuple(
+            Parameter(p.name, p.value, p.low, p.high, p.unit, p.low * 2.0 + 1e-3, p.high / 2.0, p.scale)
+            for p in FIVE
+        )
+    )
+    objective = goal(truth, wide)
+    result = calibrate(objective, Fake(noisy=0.0), options=FitOptions(budget=24))
+    scaled = min(t.misfit for t in result.history if t.stage == "scaled")
+    design = min(t.misfit for t in result.history if t.stage == "design")
+    assert scaled < 20.0 < 100.0 < design
+
+
+def test_design_on_the_coarse_grid_saves_fine_runs() -> None:
+    """A coarse evaluator 6 % too strong serves the design only: fewer fine runs, and the fine answer."""
+    objective, fine = goal(TRUTHS[0]), Fake()
+    coarse = Fake(lambda p: 1.06 * three_terms(p))
+    result = calibrate(objective, fine, coarse=coarse, options=FitOptions(budget=60))
+    assert result.coarse_simulations == coarse.runs >= 9 and result.simulations == fine.runs
+    assert fine.runs + 0.25 * coarse.runs <= 60.0
+    assert not result.best.coarse and all(t.coarse == (t.stage == "design") for t in result.history)
+    assert noise_free(objective, values(result)) < noise_free(objective, TRUTHS[0]) + 3.0
+
+
+def test_single_linear_parameter() -> None:
+    """One parameter that is no stress (no scaling, one dimension) is found to the lattice without noise."""
+    alone = ParameterSet((FIVE["mu"],))
+    fake = Fake(lambda p: two_terms({"R": 300.0, "mu": p["mu"]}), noisy=0.0)
+    curve = np.interp(GRID, STROKE, two_terms({"R": 300.0, "mu": 0.325}))
+    objective = Objective(Target(GRID, curve, 0.0, 0.0, np.interp), alone)
+    result = calibrate(objective, fake, options=QUICK)
+    assert values(result)["mu"] == pytest.approx(0.325, abs=0.005) and result.status == "converged"
+
+
+def store_at(path: Path) -> EvaluationStore:
+    """The store of the quick problem, new or resumed."""
+    return EvaluationStore(
+        path,
+        Header("ab" * 32, "quick"),
+        resume=path.exists() or path.with_name(path.name + ".journal").exists(),
+    )
+
+
+def fit_with_store(path: Path, fake: Evaluator) -> tuple[FitResult, int]:
+    """Fit the quick problem through a store; the result and the number of runs that were computed."""
+    with store_at(path) as store:
+        cached = CachedEvaluator(fake, store, scene={"fake": 1}, code="1")
+        return calibrate(two_goal(), cached, options=QUICK), cached.computed
+
+
+def test_resumed_fit_computes_nothing_and_finds_the_same(tmp_path: Path) -> None:
+    """A second run of a finished fit reads everything from the store and agrees exactly."""
+    fake = Fake(two_terms, breaks=lambda p: p["R"] < 200.0)
+    first, computed = fit_with_store(tmp_path / "evaluations.h5", fake)
+    again, recomputed = fit_with_store(tmp_path / "evaluations.h5", Fake(interrupt_after=0))
+    assert computed == fake.runs == len(first.history) and recomputed == 0
+    assert values(again) == values(first) and again.status == first.status
+    assert first.jacobian is not None and again.jacobian == pytest.approx(first.jacobian)
+
+
+def test_interrupted_fit_keeps_its_runs_and_goes_on(tmp_path: Path) -> None:
+    """Ctrl-C gives the best so far; resumed, the fit needs just the missing runs, and ends the same."""
+    whole = calibrate(two_goal(), Fake(two_terms), options=QUICK)
+    part, computed = fit_with_store(tmp_path / "evaluations.h5", Fake(two_terms, interrupt_after=12))
+    assert part.status == "interrupted" and computed == len(part.history) == 12
+    assert part.best.misfit == min(t.misfit for t in part.history if t.ok)
+    resumed, recomputed = fit_with_store(tmp_path / "evaluations.h5", Fake(two_terms))
+    assert recomputed == len(whole.history) - 12
+    assert values(resumed) == values(whole) and resumed.status == whole.status
+
+
+def test_interrupt_in_the_middle_of_a_batch_keeps_its_finished_runs() -> None:
+    """Of a batch in which the last of five runs was interrupted the other four count."""
+    result = calibrate(two_goal(), Fake(two_terms, interrupt_after=4), options=QUICK)
+    assert result.status == "interrupted" and len(result.history) == 4
+    assert result.best.ok and math.isfinite(result.best.misfit)
+
+
+def test_interrupt_before_any_result_is_passed_on() -> None:
+    """With nothing to return Ctrl-C stays Ctrl-C."""
+    with pytest.raises(KeyboardInterrupt):
+        calibrate(two_goal(), Fake(two_terms, interrupt_after=0), options=QUICK)
+
+
+def test_jacobian_needs_enough_runs() -> None:
+    """Interrupted after two runs there is a best run, but no curvature and so no interval to claim."""
+    result = calibrate(two_goal(), Fake(two_terms, interrupt_after=2), options=QUICK)
+    assert result.jacobian is None and math.isnan(result.repeatability)
+
+
+def test_progress_is_reported_after_each_run() -> None:
+    """Counts rise by one, the best misfit never rises, the time left is that of the rest of the budget."""
+    seen: list[Progress] = []
+    fake = Fake(two_terms, breaks=lambda p: p["R"] < 200.0)
+    result = calibrate(two_goal(), fake, options=QUICK, progress=seen.append)
+    assert [p.done for p in seen] == list(range(1, len(result.history) + 1))
+    assert all(a.misfit >= b.misfit for a, b in zip(seen, seen[1:], strict=False))
+    assert seen[-1].failed == result.failed > 0 and seen[-1].misfit == result.best.misfit
+    mean = (4.0 * (seen[-1].done - result.failed) + 2.0 * result.failed) / seen[-1].done
+    assert seen[-1].eta_s == pytest.approx(mean * (30.0 - seen[-1].spent) / 2.0)
+
+
+def test_noise_is_not_fitted() -> None:
+    """Noise alone must not keep the search going: it stops well before a large budget."""
+    fake = Fake(two_terms)
+    result = calibrate(two_goal(), fake, options=FitOptions(budget=200, design=3))
+    assert result.status in ("converged", "stalled") and fake.runs < 40
+
+
+def test_impossible_options_are_refused() -> None:
+    """A budget that cannot hold design and differences, and numbers that are not positive, are refused."""
+    with pytest.raises(MaterialError, match="budget of 12 simulations is too small for 5 parameters"):
+        calibrate(goal(TRUTHS[0]), Fake(), options=FitOptions(budget=12))
+    with pytest.raises(ValueError, match="not positive"):
+        FitOptions(batch=0)
