@@ -19,7 +19,7 @@ MARKS = (
     "report.pdf",
     "force.csv",
     "evaluations.h5",
-    "evaluations.journal",
+    "evaluations.h5.journal",
 )
 
 

@@ -62,3 +62,4 @@ class Setup:
     coarse: Scene
     objective: Objective
     assumed: list[str]
+    air_sha256: str | None = None

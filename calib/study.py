@@ -74,7 +74,7 @@ def _set_up(request: Request) -> Setup:
     )
     target = Target(curve.stroke, curve.curve, curve.noise_sd_N, curve.peak_sd_N, filter_simulated)
     objective = Objective(target, fit_parameters(food, request.fit or food.default_fit))
-    return Setup(curve, fine, coarse, objective, assumed)
+    return Setup(curve, fine, coarse, objective, assumed, None if air is None else air.sha256)
 
 
 def run(

@@ -64,7 +64,7 @@ def summarise(
         "search": result.status,
         "passed": not stopped and all(v.passed is not False for v in verdicts),
         "verdicts": [v.as_dict() for v in verdicts],
-        **_trace(request, setup.curve),
+        **_trace(request, setup),
         **_agreement(metrics, nulls),
         "peak_real_sd_N": setup.curve.peak_sd_N,
         "parameters": parameters,
@@ -77,7 +77,8 @@ def summarise(
     }
 
 
-def _trace(request: Request, curve: Conditioned) -> dict[str, Any]:
+def _trace(request: Request, setup: Setup) -> dict[str, Any]:
+    curve = setup.curve
     trace = curve.trace
     return {
         "trace": {
@@ -89,7 +90,7 @@ def _trace(request: Request, curve: Conditioned) -> dict[str, Any]:
             "columns": dict(trace.columns),
         },
         "trace_sha256": trace.sha256,
-        "air": None if request.air is None else {"source": request.air.name},
+        "air": None if request.air is None else {"source": request.air.name, "sha256": setup.air_sha256},
         "baseline_N": curve.baseline_N,
         "baseline_sd_N": curve.baseline_sd_N,
         "baseline_kind": curve.baseline_kind,

@@ -34,7 +34,7 @@ class Verdict:
         return asdict(self)
 
 
-def _below(name: str, value: float, limit: float, unit: str = "", note: str = "") -> Verdict:
+def _below(name: str, value: float, limit: float, unit: str = "fraction", note: str = "") -> Verdict:
     return Verdict(name, value, limit, unit, bool(abs(value) <= limit), note)
 
 
@@ -70,12 +70,12 @@ def judge(
             "shape better than ramp and half sine",
             metrics.shape_error,
             simple[best].shape_error,
-            "",
+            "fraction",
             metrics.shape_error < simple[best].shape_error,
             f"best null model: {best.replace('_', ' ')}",
         )
     )
-    lines.append(_below("momentum balance residual", momentum_residual, MOMENTUM_LIMIT, "", "part of the peak force"))
+    lines.append(_below("momentum balance residual", momentum_residual, MOMENTUM_LIMIT, note="part of the peak force"))
     lines.append(_below("kinetic over internal energy", ke_over_ie, KINETIC_LIMIT))
     at_bound = [n for n, p in parameters.items() if p["verdict"] == "at_bound"]
     lines.append(Verdict("parameters at a bound", len(at_bound), 0, "", not at_bound, ", ".join(at_bound)))
@@ -117,6 +117,6 @@ def limits(
         "whole fruit is not cut."
     )
     said.append(
-        "The default grid was used; the discretisation error of the calibrated force was not measured in this run."
+        "One grid was used; the discretisation error of the calibrated force was not measured in this run."
     )
     return said
