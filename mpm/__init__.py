@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
+
 from mpm.errors import CutcalError, SceneError, SimulationError
 from mpm.record import ForceRecord
 from mpm.scene import Board, EdgeLaw, Food, Knife, Material, Motion, Numerics, Scene, Shape
+
+os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")  # stdout belongs to the caller
 
 __all__ = [
     "Board",

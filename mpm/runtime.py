@@ -42,7 +42,6 @@ def start(runtime: Runtime, precision: str) -> int:
     Raises:
         SceneError: The device is not available.
     """
-    os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")  # stdout belongs to the caller
     import taichi as ti
 
     key = (runtime, precision)

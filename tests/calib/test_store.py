@@ -136,6 +136,29 @@ def test_a_write_that_fails_half_way_spoils_no_other(tmp_path: Path) -> None:
     assert_same(again.get("k1"), evaluation(2.0))
 
 
+def test_a_damaged_line_is_noticed(tmp_path: Path) -> None:
+    """One changed character inside a curve fails the checksum: that run is dropped, not returned wrong."""
+    store = EvaluationStore(tmp_path / "evaluations.h5", HEADER)
+    store.append("k0", evaluation(1.0), "fine")
+    store.append("k1", evaluation(2.0), "fine")
+    content = bytearray(store.journal.read_bytes())
+    place = content.rindex(b'"force": "') + 100
+    content[place] = ord("B") if content[place] == ord("A") else ord("A")
+    store.journal.write_bytes(content)
+    again = EvaluationStore(tmp_path / "evaluations.h5", HEADER, resume=True)
+    assert again.torn == 1 and [r.key for r in again] == ["k0"]
+
+
+def test_a_closed_store_can_be_appended_to(tmp_path: Path) -> None:
+    """Closing is a checkpoint: runs appended afterwards are as safe as those before."""
+    store = EvaluationStore(tmp_path / "evaluations.h5", HEADER)
+    for k in range(3):
+        store.append(f"k{k}", evaluation(1.0 + k), "fine")
+        if k == 1:
+            store.close()
+    assert len(EvaluationStore(tmp_path / "evaluations.h5", HEADER, resume=True)) == 3
+
+
 def kill_while_writing(path: Path, after: int, *options: str) -> int:
     """Start the writer, kill -9 it after some runs; return the number of the last one acknowledged."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

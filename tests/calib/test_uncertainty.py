@@ -265,6 +265,17 @@ def test_broken_runs_are_expected_to_break_again() -> None:
     assert process.expected(z, 0.0) > process.expected(THREE.start, 0.0) + 100.0
 
 
+def test_a_failure_is_no_measurement() -> None:
+    """The penalty of runs that broke down adds nothing to the information of the Jacobian."""
+    runs = trials(8, noise=0.0)
+    z = THREE.start + np.array([0.0, 0.0, 1.5])
+    part = slice(0, 96)
+    broken = Evaluation(0, THREE.to_dict(z), "failed", "inverted", 0.4, 0.04 * X[part], cut(z)[part])
+    process = CurveProcess(goal(), [*runs, goal().trial(broken)], runs[0])
+    assert process.residual(z)[goal().data_rows - 1] > 10.0
+    assert np.all(process.jacobian(z)[goal().data_rows - 1] == 0.0)
+
+
 def test_least_stays_within_bounds_and_radius() -> None:
     """The proposed point is better than the best run, within the radius and the hard bounds."""
     runs = trials(25, noise=0.0)[1:]
