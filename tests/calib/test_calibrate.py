@@ -124,6 +124,19 @@ def test_another_trace_is_not_mixed_in(finished, tmp_path, capsys):
     frame = pd.read_csv(TRACE, comment="#")
     frame["force_N"] *= 1.1
     frame.to_csv(other, index=False)
-    code = main(["calibrate", "--food", "banana", "--trace", str(other), "--dx", "4.1e-3", "--out", str(finished[0]), "--resume"])
+    code = main(
+        [
+            "calibrate",
+            "--food",
+            "banana",
+            "--trace",
+            str(other),
+            "--dx",
+            "4.1e-3",
+            "--out",
+            str(finished[0]),
+            "--resume",
+        ]
+    )
     assert code == 1
     assert "evaluations.h5" in capsys.readouterr().err

@@ -68,7 +68,8 @@ def test_bad_trace_is_one_clear_error(case, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("content", "words"), [(None, ["no such file", "missing.csv"]), ("", ["empty"]), ("time_s;force_N\n0;1\n", ["missing.csv"])]
+    ("content", "words"),
+    [(None, ["no such file", "missing.csv"]), ("", ["empty"]), ("time_s;force_N\n0;1\n", ["missing.csv"])],
 )
 def test_missing_and_empty_files_are_said(content, words, tmp_path, capsys):
     """A missing, an empty and a semicolon-separated file each get their own sentence."""

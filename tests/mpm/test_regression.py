@@ -15,7 +15,15 @@ SCENE = Scene(
     Food(
         Shape("cylinder", 0.024, 0.03, 0.03),
         Material(
-            E=5e5, nu=0.35, rho=1000, yield_stress=5e4, R=200.0, R_skin=400.0, skin_thickness=5e-4, initiation_depth=2e-3, mu=0.3
+            E=5e5,
+            nu=0.35,
+            rho=1000,
+            yield_stress=5e4,
+            R=200.0,
+            R_skin=400.0,
+            skin_thickness=5e-4,
+            initiation_depth=2e-3,
+            mu=0.3,
         ),
     ),
     Knife("wedge", 2e-3, np.deg2rad(11.0), 0.0104, 0.2),
@@ -39,7 +47,8 @@ def test_force_curve_is_that_of_the_reference(contact, num_regression):
         "edge_N": np.interp(grid, record.stroke, record.edge[:, 2]),
         "face_N": np.interp(grid, record.stroke, record.resolved_face),
         "knife_N": np.interp(grid, record.stroke, record.resolved),
-        "work_mJ": 1e3 * np.interp(grid, record.stroke, np.cumsum(record.knife[:, 2] * np.diff(record.stroke, prepend=0))),
+        "work_mJ": 1e3
+        * np.interp(grid, record.stroke, np.cumsum(record.knife[:, 2] * np.diff(record.stroke, prepend=0))),
     }
     force = {"atol": TOLERANCE * record.peak, "rtol": 0.0}
     work = {"atol": TOLERANCE * float(columns["work_mJ"].max()), "rtol": 0.0}

@@ -1,0 +1,171 @@
+"""The parts between trace and fit: sizes of the specimen, verdicts, provenance, pool, imports."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from calib.conditioning import condition
+from calib.errors import MaterialError
+from calib.knives import load_knife
+from calib.materials import load_food, load_foods
+from calib.metrics import compare
+from calib.nulls import null_models
+from calib.outputs import prepare, write_json
+from calib.pool import DIED, SceneEvaluator
+from calib.provenance import code_key, key_of, versions
+from calib.scenes import Sizing, cut_scene, specimen
+from calib.study import fit_parameters
+from calib.trace import Trace
+from calib.verdicts import judge, limits
+from mpm.shapes import SHAPE_KINDS
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def trace(loaded: bool) -> Any:
+    """A cut with a position over 40 mm that ends under load or released."""
+    t = np.arange(0, 3, 0.01)
+    s = np.clip((t - 0.5) * 0.02, 0, 0.04)
+    force = 20 * (1 - np.exp(-s / 0.005)) if loaded else 20 * np.sin(np.pi * s / 0.04)
+    noisy = force + np.random.default_rng(0).normal(0, 0.05, len(t))
+    position = 0.06 - 0.02 * np.minimum(t, 2.5)
+    raw = Trace(time=t, force=noisy, position=position, source="made.csv", sha256="", columns={}, label="measured")
+    return condition(raw)
+
+
+def test_height_follows_the_stroke():
+    """A trace that ends released cut through: height = stroke; one that ends under load leaves food below, and says so."""
+    food = load_food("cucumber")
+    through, said = specimen(food, trace(loaded=False), Sizing())
+    assert through.height == pytest.approx(0.04, rel=0.03)
+    short, words = specimen(food, trace(loaded=True), Sizing())
+    assert short.height == pytest.approx(0.048, rel=0.03)
+    assert "under load" in words[0] and "released" in said[0]
+    assert any("width" in w for w in words)
+
+
+def test_given_sizes_are_taken_and_not_assumed():
+    """Sizes that the user gives are used as they are, without a word about assumptions."""
+    shape, said = specimen(load_food("apple"), None, Sizing("block", 0.03, 0.04, 0.05))
+    assert (shape.kind, shape.height, shape.width, shape.length) == ("block", 0.03, 0.04, 0.05)
+    assert said == []
+
+
+@pytest.mark.parametrize("name", list(load_foods()))
+def test_every_food_makes_a_scene_that_can_run(name):
+    """Each food of materials.yaml gives a fine and a coarse scene, and its default fit has priors inside its bounds."""
+    food = load_food(name)
+    shape, _ = specimen(food, None, Sizing())
+    assert shape.kind in SHAPE_KINDS
+    fine = cut_scene(food, shape, load_knife("kitchen"))
+    coarse = cut_scene(food, shape, load_knife("kitchen"), coarse=True)
+    assert coarse.numerics.dx > fine.numerics.dx
+    assert fine.edge.zone >= fine.numerics.dx
+    assert len(fit_parameters(food, food.default_fit)) == 6
+
+
+def test_fit_takes_any_property_and_refuses_others():
+    """nu and rho join on request; a property without a value and an unknown one are refused."""
+    food = load_food("banana")
+    assert fit_parameters(food, ("E", "nu", "rho")).names == ("E", "nu", "rho")
+    with pytest.raises(MaterialError, match="tensile_strength"):
+        fit_parameters(food, ("tensile_strength",))
+
+
+def test_verdicts_fail_what_fails():
+    """A curve 20 % too strong fails the peak and the curve; a parameter at a bound fails its line; unrun lines decide
+    nothing; and the limits name what failed."""
+    s = np.linspace(0, 0.04, 240)
+    real = 10 * np.sin(np.pi * s / 0.05)
+    nulls = {n: m.metrics for n, m in null_models(s, real).items()}
+    parameters = {"E": {"verdict": "at_bound"}, "R": {"verdict": "identified"}}
+    lines = judge(compare(s, real, 1.2 * real), nulls, momentum_residual=0.02, ke_over_ie=0.2, parameters=parameters)
+    failed = {v.name for v in lines if v.passed is False}
+    assert failed == {
+        "peak force error",
+        "curve error (NRMSE)",
+        "momentum balance residual",
+        "kinetic over internal energy",
+        "parameters at a bound",
+    }
+    assert sum(v.passed is None for v in lines) == 3
+    said = limits("measured", "speed", "constant", lines, parameters, ["the width is assumed"])
+    for word in ("peak force error", "no position", "constant baseline", "The width is assumed.", "in-sample"):
+        assert any(word in text for text in said)
+
+
+def test_keys_follow_the_content():
+    """The key of plain data does not depend on its order and changes with any value; the code key is stable."""
+    assert key_of({"a": 1, "b": [2, 3]}) == key_of({"b": [2, 3], "a": 1})
+    assert key_of({"a": 1}) != key_of({"a": 1.0000001})
+    assert code_key() == code_key()
+    assert versions()["cutcal"].count(".") == 2
+
+
+def test_json_is_written_whole_and_finite(tmp_path):
+    """NaN becomes null, NumPy numbers become numbers, and no temporary file stays behind."""
+    write_json(tmp_path / "s.json", {"a": np.float64(np.nan), "b": (np.int64(2), True)})
+    assert (tmp_path / "s.json").read_text().split() == ["{", '"a":', "null,", '"b":', "[", "2,", "true", "]", "}"]
+    assert [p.name for p in tmp_path.iterdir()] == ["s.json"]
+
+
+def test_prepare_makes_folders_once(tmp_path):
+    """A new folder is made with its parents and left empty."""
+    prepare(tmp_path / "a" / "b", resume=False)
+    assert list((tmp_path / "a" / "b").iterdir()) == []
+
+
+class FlakyPool:
+    """A pool whose first ``deaths`` runs lose their process."""
+
+    def __init__(self, deaths: int) -> None:
+        self.deaths, self.runs = deaths, 0
+
+    def submit(self, scene: object, values: dict[str, float]) -> Future[dict[str, Any]]:
+        self.runs += 1
+        future: Future[dict[str, Any]] = Future()
+        if self.runs <= self.deaths:
+            future.set_exception(BrokenProcessPool("killed"))
+            return future
+        curve = np.linspace(0, 1, 5)
+        future.set_result(
+            {
+                "status": "ok",
+                "reason": "",
+                "fraction": 1.0,
+                "stroke": curve,
+                "force": curve,
+                "scalars": {},
+                "seconds": 0.1,
+            }
+        )
+        return future
+
+
+def test_killed_worker_is_tried_once_more():
+    """One death costs one more run; a run that dies twice is a failed evaluation with a typed reason, not a crash."""
+    pool = FlakyPool(deaths=1)
+    (one,) = SceneEvaluator(pool, None).evaluate([{"E": 1.0}])  # type: ignore[arg-type]
+    assert one.ok and pool.runs == 2
+    (two,) = SceneEvaluator(FlakyPool(deaths=2), None).evaluate([{"E": 1.0}])  # type: ignore[arg-type]
+    assert (two.status, two.reason, two.fraction) == ("failed", DIED, 0.0)
+
+
+def test_imports_stay_light():
+    """Importing calib and mpm loads neither Taichi nor any plotting; nothing is printed."""
+    code = (
+        "import sys, calib, mpm, calib.study, calib.cli.main\n"
+        "heavy = {'taichi', 'matplotlib', 'pyvista', 'typst', 'skfem'} & set(sys.modules)\n"
+        "assert not heavy, heavy"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == ""

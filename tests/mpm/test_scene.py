@@ -1,0 +1,122 @@
+"""Shapes, seeds, records and the refusals of impossible scenes: plain NumPy."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpm.record import _moving_mean
+from mpm.scene import SHAPE_KINDS, Food, Knife, Material, Motion, Numerics, Scene, SceneError, Shape
+from mpm.seeding import seed
+from mpm.shapes import inside, section_area, skin_path, surface, volume
+
+MATERIAL = Material(E=1e6, nu=0.35, rho=1000.0)
+KNIFE = Knife("k", 2e-3, 0.1, 0.04, 0.2)
+
+
+def scene(kind: str, **numerics: object) -> Scene:
+    """A food of one kind, 60 x 40 x 30 mm."""
+    return Scene(
+        Food(Shape(kind, 0.06, 0.04, 0.03), MATERIAL), KNIFE, Motion(0.02), numerics=Numerics(dx=3e-3, **numerics)
+    )
+
+
+@pytest.mark.parametrize("kind", SHAPE_KINDS)
+def test_volume_and_section_agree_with_counting(kind):
+    """The closed forms agree with a count of random points within 3 standard deviations, and the surface with inside."""
+    shape = Shape(kind, 0.06, 0.04, 0.03)
+    rng = np.random.default_rng(0)
+    n, box = 200_000, 0.06 * 0.04 * 0.03
+    points = rng.uniform([-0.02, -0.03, 0], [0.02, 0.03, 0.03], (n, 3))
+    share = inside(shape, points).mean()
+    assert volume(shape) / box == pytest.approx(share, abs=3 * math.sqrt(0.25 / n))
+    x = np.linspace(-0.02, 0.02, 20001)
+    bottom, top = surface(shape, x, 0 * x)
+    assert section_area(shape) == pytest.approx(np.trapezoid(np.nan_to_num(top - bottom), x), rel=1e-3)
+
+
+@pytest.mark.parametrize("kind", SHAPE_KINDS)
+@pytest.mark.parametrize("mirror", [True, False])
+def test_particles_add_up_to_the_food(kind, mirror):
+    """All images of the particles have the volume of the shape, lie in it, and fill the modelled quarter evenly."""
+    sc = scene(kind, mirror=mirror)
+    seeds = seed(sc)
+    images = 4 if mirror else 1
+    assert seeds.volume * len(seeds.x) * images == pytest.approx(volume(sc.food.shape), rel=1e-12)
+    assert inside(sc.food.shape, seeds.x).all()
+    assert seeds.volume == pytest.approx(seeds.spacing**3, rel=0.06)
+    assert (seeds.foot >= 0).all() and seeds.foot.max() <= seeds.spacing / 2
+    if mirror:
+        assert seeds.x[:, 0].min() >= 0 and seeds.x[:, 1].max() <= 0
+
+
+def test_seeds_repeat_and_differ():
+    """The same seed gives the same particles, another one others."""
+    a, b, c = (seed(scene("cylinder", seed=s)).x for s in (1, 1, 2))
+    np.testing.assert_array_equal(a, b)
+    assert a.shape != c.shape or not np.allclose(a, c)
+
+
+def test_particles_are_no_lattice_aligned_with_the_blade():
+    """Distances from the blade plane are spread over the whole cell, not stacked on planes."""
+    y = seed(scene("block", mirror=False)).x[:, 1]
+    phase = (y / 1.5e-3) % 1.0
+    counts, _ = np.histogram(phase, bins=10, range=(0, 1))
+    assert counts.min() > 0.8 * counts.mean()
+
+
+def test_mirrors_follow_the_grid():
+    """Mirrors are used where nodes lie on their planes, and not by the nodal rule across the blade."""
+    assert scene("block").mirrors == (True, True)
+    assert scene("block", grid_shift=(0.0, 0.5, 0.3)).mirrors == (True, False)
+    assert scene("block", grid_shift=(0.25, 0.0, 0.0)).mirrors == (False, True)
+    assert scene("block", contact="nodal").mirrors == (True, False)
+    assert scene("block", mirror=False).mirrors == (False, False)
+
+
+def test_skin_path_is_the_thickness_on_top_and_longer_on_the_flanks():
+    """In the middle the edge crosses the skin's thickness; at the flank of a circle the chord of the ring; outside none."""
+    circle, t = Shape("cylinder", 0.06, 0.04, 0.04), 1e-3
+    x = np.array([0.0, 0.015, 0.0195, 0.03])
+    outer, inner = np.sqrt(0.02**2 - np.minimum(x, 0.02) ** 2), np.sqrt(np.maximum(0.019**2 - x**2, 0))
+    expected = np.where(x < 0.019, outer - inner, 2 * outer)
+    np.testing.assert_allclose(skin_path(circle, x, t), np.where(x > 0.02, 0, expected), atol=1e-12)
+    np.testing.assert_allclose(skin_path(Shape("block", 0.06, 0.04, 0.03), np.array([0.0]), t), [t])
+
+
+def test_moving_mean_removes_a_ripple_of_its_width():
+    """A ripple of exactly one cell vanishes, a constant and a straight line stay."""
+    s = np.arange(1, 401) * 1e-4
+    ripple = np.sin(2 * np.pi * s / 3e-3)
+    inner = slice(40, -40)
+    np.testing.assert_allclose(_moving_mean(s, 5 + ripple, 3e-3)[inner], 5, atol=0.01)
+    np.testing.assert_allclose(_moving_mean(s, 100 * s, 3e-3)[inner], 100 * s[inner], atol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"nu": 0.5}, "nu"),
+        ({"E": -1.0}, "E = -1.0"),
+        ({"rho": math.nan}, "rho"),
+        ({"tensile_strength": 1e5}, "both or none"),
+        ({"skin_thickness": 1e-3}, "R_skin"),
+    ],
+)
+def test_impossible_materials_are_refused(change, says):
+    """A material that cannot be is refused by the name and value of the property."""
+    with pytest.raises(SceneError, match=says):
+        replace(MATERIAL, **change)
+
+
+def test_unknown_kinds_are_refused_with_the_list():
+    """Unknown shape, contact and precision name the ones there are."""
+    with pytest.raises(SceneError, match="cylinder"):
+        Shape("cube", 0.1, 0.1, 0.1)
+    with pytest.raises(SceneError, match="cohesive"):
+        Numerics(contact="sticky")
+    with pytest.raises(SceneError, match="f64"):
+        Numerics(precision="f16")
