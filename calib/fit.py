@@ -298,9 +298,9 @@ class _Search:
         return True
 
     def _rounds(self) -> str:
-        """Rounds of one batch each, until they are calm or only the last differences can still be paid."""
+        """Rounds of one batch each, until they are calm or the budget is spent."""
         calm = stalled = 0
-        while self._room() >= self.options.batch + len(self.parameters):
+        while self._room() > 0:
             before, worth, process = self.best.misfit, self.worth, self._process()
             near = _near(process)
             points, promise = [near], _promise(process, near)

@@ -67,11 +67,10 @@ def coordinate_unit(parameters: ParameterSet) -> FloatArray:
 class CurveProcess:
     """Gaussian process through the smoothed curves of a fit, with the scaling of force by stress built in.
 
-        curve(z) = e^s (c + q g(x)),   x = (z - z_best) / unit,   s = mean of z - z_best over stress-like
-        parameters
+        curve(z) = e^s (c + q g(x)),   x = (z - z_best) / unit
 
-    c and q are the best run's curve and peak; g has mean zero and the covariance :meth:`_kernel`, the same
-    for each point of the curve.  One more output is the part of the stroke that is missing.
+    s is the mean of z - z_best over the stress-like parameters, c and q are the best run's curve and peak; g
+    has mean zero and the covariance :meth:`_kernel`, the same for each point of the curve.  One more output is the part of the stroke that is missing.
 
     Args:
         objective: Turns curves into residuals.

@@ -248,15 +248,15 @@ class Kernels(Nodes):
     @ti.func
     def smooth_strain(self):
         """Replace each particle's driving strain by its mean over the grid's weights (one pass)."""
-        for i, j, k in self.smooth:
+        for i, j, k in ti.ndrange(*self.nodes):
             self.smooth[i, j, k] = ti.Vector.zero(float, 2)
-        for p in self.x:
+        for p in range(self.n):
             base, fx = self.local(self.x[p])
             w = self.weights(fx)
             for i, j, k in ti.static(ti.ndrange(3, 3, 3)):
                 wt = w[i][0] * w[j][1] * w[k][2]
                 self.smooth[base[0] + i, base[1] + j, base[2] + k] += ti.Vector([wt * self.strain[p], wt])
-        for p in self.x:
+        for p in range(self.n):
             base, fx = self.local(self.x[p])
             w = self.weights(fx)
             e = 0.0

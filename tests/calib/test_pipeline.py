@@ -81,12 +81,17 @@ def test_fit_takes_any_property_and_refuses_others():
 
 
 def test_verdicts_fail_what_fails():
-    """A curve 20 % too strong fails the peak and the curve; a parameter at a bound fails its line; unrun lines decide
+    """A curve 20 % too strong fails the peak and the curve; a parameter at a bound of ours fails its line
+    (no friction is a natural limit); unrun lines decide
     nothing; and the limits name what failed."""
     s = np.linspace(0, 0.04, 240)
     real = 10 * np.sin(np.pi * s / 0.05)
     nulls = {n: m.metrics for n, m in null_models(s, real).items()}
-    parameters = {"E": {"verdict": "at_bound"}, "R": {"verdict": "identified"}}
+    parameters = {
+        "E": {"verdict": "at_bound", "value": 1e4},
+        "mu": {"verdict": "at_bound", "value": 0.0},
+        "R": {"verdict": "identified", "value": 300.0},
+    }
     lines = judge(compare(s, real, 1.2 * real), nulls, momentum_residual=0.02, ke_over_ie=0.2, parameters=parameters)
     failed = {v.name for v in lines if v.passed is False}
     assert failed == {
@@ -97,6 +102,8 @@ def test_verdicts_fail_what_fails():
         "parameters at a bound",
     }
     assert sum(v.passed is None for v in lines) == 3
+    bounds = next(v for v in lines if v.name == "parameters at a bound")
+    assert bounds.value == 1 and "mu at its natural limit" in bounds.note
     said = limits("measured", "speed", "constant", lines, parameters, ["the width is assumed"])
     for word in ("peak force error", "no position", "constant baseline", "The width is assumed.", "in-sample"):
         assert any(word in text for text in said)

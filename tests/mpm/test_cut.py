@@ -160,3 +160,15 @@ def test_scenes_that_cannot_be_right_are_refused(change, says):
     """An edge between nodes, a stroke into the board, too few cells and a snapping crack band are refused by name."""
     with pytest.raises(SceneError, match=says):
         replace(PRISM, **change)
+
+
+def test_bulk_damage_dissipates_and_weakens():
+    """With a tensile strength that the wedge exceeds, bulk damage dissipates energy, the force drops, balance closes."""
+    brittle = replace(FLESH, tensile_strength=2e4, fracture_energy=20.0)
+    scene = replace(PRISM, knife=WEDGE, food=replace(PRISM.food, material=brittle))
+    tough, weak = cut(replace(PRISM, knife=WEDGE)), cut(scene)
+    assert tough.damage[-1] == 0.0
+    assert weak.damage[-1] > 0.01 * weak.work
+    assert (np.diff(weak.damage) >= 0).all()
+    assert weak.face[:, 2].mean() < tough.face[:, 2].mean()
+    assert weak.momentum_residual < 1e-10 and weak.status == "done"
