@@ -70,7 +70,8 @@ class CurveProcess:
         curve(z) = e^s (c + q g(x)),   x = (z - z_best) / unit
 
     s is the mean of z - z_best over the stress-like parameters, c and q are the best run's curve and peak; g
-    has mean zero and the covariance :meth:`_kernel`, the same for each point of the curve.  One more output is the part of the stroke that is missing.
+    has mean zero and the covariance :meth:`_kernel`, the same for each point of the curve.  One more output
+    is the part of the stroke that is missing.
 
     Args:
         objective: Turns curves into residuals.

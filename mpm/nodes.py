@@ -164,7 +164,8 @@ class Nodes(Fields):
                     wt = ti.static(2.0 if self.my else 1.0) * self.zone_weight(j, k, tip) * q[3]
                     mass += wt
                     mom += wt * q[2]
-        if mass > EMPTY_ZONE * self.par[FULL]:
+        # the zone reaches below the edge, so where the food begins is asked of its outline and not of the zone
+        if tip < self.top[i] and mass > EMPTY_ZONE * self.par[FULL]:
             whole = self.start[i] <= 0
             force = self.edge_force(i, (speed + mom / mass) * dt)
             full = SURFACE_FILL if whole else BURIED_FILL

@@ -340,7 +340,7 @@ def test_noise_is_not_fitted() -> None:
     With five times the usual noise the process keeps promising gains, and only the lack of them ends it.
     """
     statuses = []
-    for size, seed in ((0.01, 0), (0.05, 0), (0.05, 1), (0.05, 2)):
+    for size, seed in ((0.01, 0), (0.05, 0), (0.05, 1)):
         fake = Fake(two_terms, noisy=size)
         result = calibrate(two_goal(), fake, options=FitOptions(budget=150, design=3, seed=seed))
         assert fake.runs < 100

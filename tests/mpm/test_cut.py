@@ -172,3 +172,13 @@ def test_bulk_damage_dissipates_and_weakens():
     assert (np.diff(weak.damage) >= 0).all()
     assert weak.face[:, 2].mean() < tough.face[:, 2].mean()
     assert weak.momentum_residual < 1e-10 and weak.status == "done"
+
+
+def test_edge_waits_for_the_food_on_a_round_top():
+    """On a lying cylinder the edge's force starts at contact and follows the chord: half the chord, half the force."""
+    round_food = Food(Shape("cylinder", 0.03, 0.03, 0.03), replace(FLESH, E=5e6, yield_stress=1e6))
+    record = cut(replace(PRISM, food=round_food, motion=Motion(0.012, 0.01)))
+    chord = 2 * np.sqrt(np.maximum(0.015**2 - (0.015 - record.stroke) ** 2, 0))
+    late = (record.stroke > 4e-3) & (record.stroke < 11e-3)
+    assert record.edge[record.stroke < 0, 2].max() == 0.0
+    np.testing.assert_allclose(record.edge[late, 2], 300 * chord[late], rtol=0.06)
