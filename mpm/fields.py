@@ -50,7 +50,7 @@ class Fields:
         self.smooth = ti.Vector.field(2, real, nodes if damage else (1, 1, 1))
         self.elastic_slip, self.cut = ti.field(real, nodes[0]), ti.field(real, nodes[0])
         self.soften, self.cover = ti.field(real, nodes[0]), ti.field(real, nodes[0])
-        self.top = ti.field(real, nodes[0])
+        self.top, self.low, self.width = (ti.field(real, nodes[0]) for _ in range(3))
         self.start, self.near = ti.field(real, nodes[0]), ti.field(ti.i32, nodes[0])
         self.par = ti.field(real, N_PARAMETERS)
         self.sums = ti.field(ti.f64, N_SUMS)

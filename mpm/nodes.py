@@ -24,11 +24,9 @@ from mpm.fields import (
     Fields,
 )
 
-# Kernel mass of the process zone in one slice, over rho dx zone^2, at which it counts as full: when the edge touches a
-# flat surface (exact, the zone is centred half a zone below the edge), and when it is buried (measured: the opening
-# behind the edge takes up to a twentieth). Below, the force fades, as at the ends of the cut.
+# Kernel mass of the process zone of an edge that touches a flat surface, over rho dx zone^2 (exact: the zone is centred
+# half a zone below the edge). With less food than that around it, as before the board, the edge's force fades.
 SURFACE_FILL = 5 / 6
-BURIED_FILL = 0.95
 EMPTY_ZONE = 0.05  # a process zone filled less than this carries no edge
 
 
@@ -164,13 +162,12 @@ class Nodes(Fields):
                     wt = ti.static(2.0 if self.my else 1.0) * self.zone_weight(j, k, tip) * q[3]
                     mass += wt
                     mom += wt * q[2]
-        # the zone reaches below the edge, so where the food begins is asked of its outline and not of the zone
-        if tip < self.top[i] and mass > EMPTY_ZONE * self.par[FULL]:
-            whole = self.start[i] <= 0
+        # the zone reaches below the edge and beside the food, so the width that is cut is that of the outline
+        width = self.dx * self.width[i] * ti.math.clamp((self.top[i] - tip) / (self.top[i] - self.low[i]), 0.0, 1.0)
+        full = SURFACE_FILL * self.par[FULL] * width * self.inv
+        if width > 0 and mass > EMPTY_ZONE * full:
             force = self.edge_force(i, (speed + mom / mass) * dt)
-            full = SURFACE_FILL if whole else BURIED_FILL
-            fill = ti.min(1.0, mass / (full * self.par[FULL]))
-            impulse = force * fill * self.cover[i] * self.dx * dt
+            impulse = force * ti.min(1.0, mass / full) * width * self.cover[i] * dt
             dv = impulse / mass
             for j in range(j_low, j_high):
                 for k in range(k_low, k_high):

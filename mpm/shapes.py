@@ -101,3 +101,28 @@ def skin_path(shape: Shape, x: np.ndarray, thickness: float) -> np.ndarray:
         inner_top = inner_height * rise if shape.kind in _FLAT_DOWN else shape.height / 2 + inner_height / 2 * rise
         inner_top = np.where(np.abs(x) <= inner_width / 2, inner_top, bottom)
     return np.nan_to_num(np.maximum(top - inner_top, 0.0))
+
+
+SLICE_SAMPLES = 65  # points at which a slice's outline is looked up
+
+
+def slices(shape: Shape, x: np.ndarray, dx: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Upper outline in the blade plane, slice by slice.
+
+    Args:
+        shape: The outline.
+        x: Middle of each slice [m], shape (n,).
+        dx: Width of a slice [m].
+
+    Returns:
+        Highest and lowest height of the upper surface over each slice [m] and the part of the slice that has food [-],
+        each of shape (n,); a slice without food is 0 high and has the part 0. The highest is above the lowest.
+    """
+    offsets = (np.arange(SLICE_SAMPLES) + 0.5) / SLICE_SAMPLES - 0.5
+    points = x[:, None] + dx * offsets
+    _, top = surface(shape, points, np.zeros_like(points))
+    there = np.isfinite(top)
+    high = np.where(there, top, 0.0).max(axis=1)
+    low = np.where(there, top, np.inf).min(axis=1)
+    low = np.where(there.any(axis=1), low, 0.0)
+    return high, np.minimum(low, high - 1e-6 * dx), there.mean(axis=1)

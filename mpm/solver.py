@@ -16,7 +16,7 @@ from mpm.record import ForceRecord
 from mpm.runtime import Runtime, start
 from mpm.scene import BAND_CELLS, Material, Scene
 from mpm.seeding import seed
-from mpm.shapes import section_area, skin_path, surface
+from mpm.shapes import section_area, skin_path, slices
 
 PAD = 3  # empty cells around the food: a quadratic kernel reaches 1.5 cells, the rest is room to move
 MARGIN = 2  # cells by which the active window exceeds the particles; renewed at every output interval
@@ -121,9 +121,8 @@ class Simulation:
         over = np.clip((knife.length / 2 - np.abs(xs)) / num.dx + 0.5, 0.0, 1.0)
         k.cover.from_numpy(over.astype(real))
         path = skin_path(scene.food.shape, xs, material.skin_thickness) if material.skin_thickness > 0 else 0 * xs
-        rim = scene.food.shape.width / 2 * (1 - 1e-9)  # food that bulges out is met at the height of the rim
-        _, top = surface(scene.food.shape, np.clip(xs, -rim, rim), 0 * xs)
-        k.top.from_numpy(top.astype(real))
+        for field, values in zip((k.top, k.low, k.width), slices(scene.food.shape, xs, num.dx), strict=True):
+            field.from_numpy(values.astype(real))
         k.soften.from_numpy((edge.slip + path).astype(real))
 
     def run(self, material: Material | None = None, progress: Progress | None = None) -> ForceRecord:

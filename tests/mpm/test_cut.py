@@ -181,4 +181,4 @@ def test_edge_waits_for_the_food_on_a_round_top():
     chord = 2 * np.sqrt(np.maximum(0.015**2 - (0.015 - record.stroke) ** 2, 0))
     late = (record.stroke > 4e-3) & (record.stroke < 11e-3)
     assert record.edge[record.stroke < 0, 2].max() == 0.0
-    np.testing.assert_allclose(record.edge[late, 2], 300 * chord[late], rtol=0.06)
+    np.testing.assert_allclose(record.edge[late, 2], 300 * chord[late], rtol=0.05)
