@@ -93,6 +93,15 @@ class FitOptions:
         if min(self.budget, self.batch, self.design, self.coarse_cost, self.tolerance) <= 0 or self.seed < 0:
             raise ValueError(f"{self} has a number that is not positive; give positive ones.")
 
+    def check(self, parameters: int) -> None:
+        """Raise MaterialError when the budget is too small for this number of parameters."""
+        least = 2 * parameters + self.design + 2
+        if self.budget < least:
+            raise MaterialError(
+                f"a budget of {self.budget:g} simulations is too small for {parameters} parameters; give at least "
+                f"{least}, or fit fewer."
+            )
+
 
 @dataclass(frozen=True)
 class FitResult:
@@ -160,12 +169,7 @@ def calibrate(
         KeyboardInterrupt: Interrupted before any simulation reached the end of its stroke.
     """
     options = FitOptions() if options is None else options
-    least = 2 * len(objective.parameters) + options.design + 2
-    if options.budget < least:
-        raise MaterialError(
-            f"a budget of {options.budget:g} simulations is too small for "
-            f"{len(objective.parameters)} parameters; give at least {least}, or fit fewer."
-        )
+    options.check(len(objective.parameters))
     search = _Search(objective, evaluator, coarse, options, progress)
     try:
         status = search.run()

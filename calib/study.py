@@ -105,9 +105,10 @@ def run(
     setup = _set_up(request)
     for text in [*request.food.warnings(), *setup.curve.warnings, *setup.assumed]:
         say(text)
+    options = FitOptions(budget=request.budget, batch=request.workers, seed=request.seed)
+    options.check(len(setup.objective.parameters))
     prepare(out, resume=resume)
     header = Header(setup.curve.trace.sha256, key_of(setup.fine.as_dict()))
-    options = FitOptions(budget=request.budget, batch=request.workers, seed=request.seed)
     with (
         EvaluationStore(out / "evaluations.h5", header, resume=resume) as store,
         Pool(request.workers, request.arch) as pool,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+import shutil
 from collections.abc import Mapping
 from datetime import datetime, timezone
 from pathlib import Path
@@ -198,18 +200,23 @@ def _numerics(request: Request, setup: Setup, record: ForceRecord) -> dict[str, 
 
 
 def add_conditioning(path: Path, curve: Conditioned) -> None:
-    """Write the whole record into ``/conditioning`` of a store: time [s], raw and tared force [N].
+    """Write the whole record into ``/conditioning`` of a closed store: time [s], raw and tared force [N].
+
+    A copy is changed and put in place of the store, so that a kill on the way leaves the store as it was.
 
     Raises:
         OutputError: The file cannot be written.
     """
     columns = {"time_s": curve.time, "raw_N": curve.trace.force, "tared_N": curve.force}
+    draft = path.with_name(path.name + ".part")
     try:
-        with h5py.File(path, "a") as file:
+        shutil.copyfile(path, draft)
+        with h5py.File(draft, "a") as file:
             if "conditioning" in file:
                 del file["conditioning"]
             group = file.create_group("conditioning")
             for name, values in columns.items():
                 group[name] = values
+        os.replace(draft, path)
     except OSError as e:
         raise OutputError(f"{path}: cannot be written ({e}); check the disk") from None

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import random
 
-import numpy as np
-import pytest
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: more threads only make the tests slower
+
+import numpy as np  # noqa: E402
+import pytest  # noqa: E402
 
 
 @pytest.fixture(autouse=True)
