@@ -139,7 +139,15 @@ def test_cut_starts_no_easier_than_it_goes_on(name: str, foods: dict[str, FoodSp
 
 def test_default_fit_follows_the_skin(foods: dict[str, FoodSpec]) -> None:
     """With a skin R_skin is fitted, without one R_initiation."""
-    assert foods["cucumber"].default_fit == ("E", "yield_stress", "R", "R_skin", "initiation_depth", "mu")
+    assert foods["cucumber"].default_fit == (
+        "E",
+        "yield_stress",
+        "R",
+        "R_skin",
+        "skin_thickness",
+        "initiation_depth",
+        "mu",
+    )
     assert foods["potato"].default_fit == ("E", "yield_stress", "R", "R_initiation", "initiation_depth", "mu")
 
 
@@ -149,9 +157,7 @@ def test_import_is_light() -> None:
         "import sys; from calib.materials import load_foods; load_foods();"
         "sys.exit(len({'taichi', 'matplotlib', 'pyvista', 'skfem'} & set(sys.modules)))"
     )
-    assert (
-        subprocess.run([sys.executable, "-c", code], cwd=data_path("materials.yaml").parent).returncode == 0
-    )
+    assert subprocess.run([sys.executable, "-c", code], cwd=data_path("materials.yaml").parent).returncode == 0
 
 
 # Warnings -----------------------------------------------------------------------------------------
@@ -175,9 +181,7 @@ def test_the_used_value_is_compared_too() -> None:
 def test_fitted_value_outside_its_range(foods: dict[str, FoodSpec]) -> None:
     """A fitted value may leave the literature's range, and a warning then says so."""
     food = foods["kiwi"].with_values({"E": 9e6}, status="fitted", source="a trace")
-    assert any(
-        "outside the literature's range" in w and w.startswith("kiwi.properties.E") for w in food.warnings()
-    )
+    assert any("outside the literature's range" in w and w.startswith("kiwi.properties.E") for w in food.warnings())
 
 
 def test_half_of_bulk_damage(foods: dict[str, FoodSpec]) -> None:
@@ -196,14 +200,10 @@ def test_half_of_bulk_damage(foods: dict[str, FoodSpec]) -> None:
 def test_with_values(foods: dict[str, FoodSpec]) -> None:
     """The named values change, with their provenance; everything else and the original stay."""
     food = foods["banana"].with_values({"E": 4e5, "mu": 0.0})
-    assert (
-        food.value("E") == 4e5 and food.value("mu") == 0.0 and food.value("R") == foods["banana"].value("R")
-    )
+    assert food.value("E") == 4e5 and food.value("mu") == 0.0 and food.value("R") == foods["banana"].value("R")
     assert food.properties["E"].status == "given" and food.prior("E") == foods["banana"].prior("E")
     assert foods["banana"].value("E") == 3e5
-    fitted = foods["banana"].with_values(
-        {"E": 4e5, "tensile_strength": 2e5}, status="fitted", source="trace 7"
-    )
+    fitted = foods["banana"].with_values({"E": 4e5, "tensile_strength": 2e5}, status="fitted", source="trace 7")
     for name in ("E", "tensile_strength"):
         assert (fitted.properties[name].status, fitted.properties[name].source) == ("fitted", "trace 7")
     assert fitted.prior("tensile_strength") == (2e4, 2e6)
@@ -217,9 +217,7 @@ def test_sizes_by_hand(foods: dict[str, FoodSpec]) -> None:
     assert (shape.kind, shape.length, shape.width, shape.height) == ("block", 0.06, 0.05, 0.047)
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "expected"), [("E", "3e5", 3e5), ("nu", 0.3, 0.3), ("mu", "0", 0.0)]
-)
+@pytest.mark.parametrize(("name", "value", "expected"), [("E", "3e5", 3e5), ("nu", 0.3, 0.3), ("mu", "0", 0.0)])
 def test_check_override(name: str, value: Any, expected: float) -> None:
     """Numbers, and text that is one, become numbers."""
     assert check_override(name, value) == expected
@@ -250,9 +248,7 @@ def test_check_override_errors(name: str, value: Any, words: tuple[str, ...]) ->
 
 def test_unknown_food() -> None:
     """An unknown food is answered with the nearest one and the list."""
-    with pytest.raises(
-        MaterialError, match="unknown food 'Bananna', did you mean 'banana'.*known: banana, cucumber"
-    ):
+    with pytest.raises(MaterialError, match="unknown food 'Bananna', did you mean 'banana'.*known: banana, cucumber"):
         load_food("Bananna")
     with pytest.raises(MaterialError, match="unknown food 'granite'; known: banana"):
         load_food("granite")
@@ -271,9 +267,7 @@ def test_prior_of_a_missing_property(foods: dict[str, FoodSpec]) -> None:
 @pytest.mark.parametrize("name", FOODS)
 def test_round_trip(name: str, tmp_path: Path, foods: dict[str, FoodSpec]) -> None:
     """A written food comes back equal, to the last bit, with sources, flags and missing properties."""
-    food = foods[name].with_values(
-        {"E": 123456.7890123456, "R": 1 / 3}, status="fitted", source="trace: a, b"
-    )
+    food = foods[name].with_values({"E": 123456.7890123456, "R": 1 / 3}, status="fitted", source="trace: a, b")
     path = tmp_path / "material.yaml"
     dump_material(
         food, path, {"trace_sha256": "7e12345", "seeds": [1, 2], "versions": {"cutcal": "0.1.0"}, "gpu": None}
@@ -328,10 +322,7 @@ def test_unknown_key(tmp_path: Path, document: dict[str, Any]) -> None:
 def test_unknown_key_without_a_near_one(tmp_path: Path, document: dict[str, Any]) -> None:
     """A key that is like none is answered with the list."""
     document["banana"]["colour"] = "yellow"
-    assert (
-        message(write(tmp_path, document))
-        == "materials.yaml: banana.colour: unknown key; known: shape, properties"
-    )
+    assert message(write(tmp_path, document)) == "materials.yaml: banana.colour: unknown key; known: shape, properties"
 
 
 def test_missing_key(tmp_path: Path, document: dict[str, Any]) -> None:
