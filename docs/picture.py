@@ -23,7 +23,7 @@ def main(run: Path, picture: Path) -> None:
     axes.plot(s, c["face_N"], color="#009e73", lw=1.2, ls="-.", label="of it the blade's faces")
     axes.plot(s, c["start_N"], color="0.6", lw=1, ls=":", label="simulation at literature values")
     axes.set(xlabel="stroke [mm]", ylabel="force on the knife [N]", xlim=(0, s.max()), ylim=(0, None))
-    axes.legend(frameon=False, loc="lower center", ncols=2, fontsize=8)
+    axes.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=8)
     axes.spines[["top", "right"]].set_visible(False)
     figure.tight_layout()
     figure.savefig(picture, metadata={"Software": None})

@@ -83,6 +83,15 @@ class Fields:
         return base, u - base.cast(float)
 
     @ti.func
+    def inside(self, base):
+        """1 when the 27 nodes above ``base`` are in the grid, else 0."""
+        out = 1.0
+        for d in ti.static(range(3)):
+            if base[d] < 0 or base[d] + 2 >= self.nodes[d]:
+                out = 0.0
+        return out
+
+    @ti.func
     def weights(self, fx):
         """Quadratic B-spline weights of three nodes along each axis."""
         return [0.5 * (1.5 - fx) ** 2, 0.75 - (fx - 1) ** 2, 0.5 * (fx - 0.5) ** 2]

@@ -99,10 +99,7 @@ class Kernels(Nodes):
         self.sever(p, tip)
         loss, tau = self.stress(p, dt)
         base, fx = self.local(self.x[p])
-        outside = 0.0
-        for d in ti.static(range(3)):
-            if base[d] < 0 or base[d] + 2 >= self.nodes[d]:
-                outside = 1.0
+        outside = 1.0 - self.inside(base)
         if outside == 0.0:
             w = self.weights(fx)
             m = self.par[MASS]
@@ -163,6 +160,12 @@ class Kernels(Nodes):
     def gather(self, p, dt, tip, speed):
         """Grid to particle, then contact."""
         base, fx = self.local(self.x[p])
+        if self.inside(base) > 0:  # one that has left the grid stays where it is; the run ends at the next output
+            self.move(p, base, fx, dt, tip, speed)
+
+    @ti.func
+    def move(self, p, base, fx, dt, tip, speed):
+        """Velocity, gradient and position of a particle from the 27 nodes above ``base``."""
         w = self.weights(fx)
         u, b = ti.Vector.zero(float, 3), ti.Matrix.zero(float, 3, 3)
         s = self.half(p)

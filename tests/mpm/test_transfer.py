@@ -152,3 +152,16 @@ def test_block_at_rest_weighs_its_weight():
             total, n = total - sums[kn.BOARD + 2], n + 20
     weight = 1000 * 9.81 * 0.024**3
     assert total / (n * dt) == pytest.approx(weight, rel=0.02)
+
+
+def test_food_that_leaves_the_grid_is_counted_and_does_not_crash(block):
+    """Particles thrown out of the grid are counted, also with positions that are not numbers, and touch no memory."""
+    block.k.reset()
+    block.k.x.from_numpy(block.x0)
+    block.start(np.full_like(block.x0, 1e4), np.zeros((3, 3)))
+    block.k.sums.fill(0.0)
+    block.advance(40)
+    assert block.k.sums.to_numpy()[kn.OUTSIDE] > 0
+    block.k.x.from_numpy(np.full_like(block.x0, np.nan))
+    block.advance(2)
+    block.k.reset()
