@@ -83,11 +83,11 @@ class Fields:
         return base, u - base.cast(float)
 
     @ti.func
-    def inside(self, base):
-        """1 when the 27 nodes above ``base`` are in the grid, else 0."""
+    def inside(self, base, window):
+        """1 when the 27 nodes above ``base`` are in the ``window`` of active nodes, else 0."""
         out = 1.0
         for d in ti.static(range(3)):
-            if base[d] < 0 or base[d] + 2 >= self.nodes[d]:
+            if base[d] < window[d] or base[d] + 2 >= window[d + 3]:
                 out = 0.0
         return out
 

@@ -94,12 +94,12 @@ class Kernels(Nodes):
         return ti.Vector([plastic, lost, heat, bad]), tau
 
     @ti.func
-    def scatter(self, p, thread, dt, tip):
+    def scatter(self, p, thread, dt, tip, window):
         """Particle to grid; returns (plastic, damage, viscous loss per volume, inverted, outside)."""
         self.sever(p, tip)
         loss, tau = self.stress(p, dt)
         base, fx = self.local(self.x[p])
-        outside = 1.0 - self.inside(base)
+        outside = 1.0 - self.inside(base, window)
         if outside == 0.0:
             w = self.weights(fx)
             m = self.par[MASS]
@@ -157,10 +157,12 @@ class Kernels(Nodes):
         return u
 
     @ti.func
-    def gather(self, p, dt, tip, speed):
+    def gather(self, p, dt, tip, speed, window):
         """Grid to particle, then contact."""
         base, fx = self.local(self.x[p])
-        if self.inside(base) > 0:  # one that has left the grid stays where it is; the run ends at the next output
+        if (
+            self.inside(base, window) > 0
+        ):  # one that has left the grid stays where it is; the run ends at the next output
             self.move(p, base, fx, dt, tip, speed)
 
     @ti.func
@@ -189,13 +191,13 @@ class Kernels(Nodes):
                 self.g[s, i, j, k] = ti.Vector.zero(float, 4)
         if ti.static(self.atomic):
             for p in self.x:
-                row = self.scatter(p, 0, dt, tip)
+                row = self.scatter(p, 0, dt, tip, w)
                 for r in ti.static(range(5)):
                     self.sums[PLASTIC + r] += row[r]
         elif ti.static(self.threads == 1):
             total = ti.Vector.zero(float, 5)
             for p in range(self.n):
-                total += self.scatter(p, 0, dt, tip)
+                total += self.scatter(p, 0, dt, tip, w)
             for r in ti.static(range(5)):
                 self.sums[PLASTIC + r] += total[r]
         else:
@@ -204,7 +206,7 @@ class Kernels(Nodes):
                     t = block // CPU_BLOCK
                     total = ti.Vector.zero(float, 5)
                     for p in range(self.n * t // self.threads, self.n * (t + 1) // self.threads):
-                        total += self.scatter(p, t, dt, tip)
+                        total += self.scatter(p, t, dt, tip, w)
                     for r in ti.static(range(5)):
                         self.sums[PLASTIC + r] += total[r]
         if ti.static(self.threads > 1):
@@ -230,14 +232,14 @@ class Kernels(Nodes):
                 if self.cover[i] > 0 and i >= self.i0:
                     self.cut_slice(i, dt, tip, speed)
         for p in range(self.n):
-            self.gather(p, dt, tip - speed * dt, speed)
+            self.gather(p, dt, tip - speed * dt, speed, w)
 
     @ti.kernel
     def step(self, dt: float, tip: float, speed: float, w: IVEC6):
         """One time step, its loops in parallel."""
         self.advance(dt, tip, speed, w)
         if ti.static(self.damage):
-            self.smooth_strain()
+            self.smooth_strain(w)
 
     @ti.kernel
     def steps(self, count: int, dt: float, tip: float, speed: float, w: IVEC6):
@@ -246,27 +248,29 @@ class Kernels(Nodes):
         for n in range(count):
             self.advance(dt, tip - speed * dt * n, speed, w)
             if ti.static(self.damage):
-                self.smooth_strain()
+                self.smooth_strain(w)
 
     @ti.func
-    def smooth_strain(self):
+    def smooth_strain(self, window):
         """Replace each particle's driving strain by its mean over the grid's weights (one pass)."""
         for i, j, k in ti.ndrange(*self.nodes):
             self.smooth[i, j, k] = ti.Vector.zero(float, 2)
         for p in range(self.n):
             base, fx = self.local(self.x[p])
-            w = self.weights(fx)
-            for i, j, k in ti.static(ti.ndrange(3, 3, 3)):
-                wt = w[i][0] * w[j][1] * w[k][2]
-                self.smooth[base[0] + i, base[1] + j, base[2] + k] += ti.Vector([wt * self.strain[p], wt])
+            if self.inside(base, window) > 0:
+                w = self.weights(fx)
+                for i, j, k in ti.static(ti.ndrange(3, 3, 3)):
+                    wt = w[i][0] * w[j][1] * w[k][2]
+                    self.smooth[base[0] + i, base[1] + j, base[2] + k] += ti.Vector([wt * self.strain[p], wt])
         for p in range(self.n):
             base, fx = self.local(self.x[p])
-            w = self.weights(fx)
-            e = 0.0
-            for i, j, k in ti.static(ti.ndrange(3, 3, 3)):
-                q = self.smooth[base[0] + i, base[1] + j, base[2] + k]
-                e += w[i][0] * w[j][1] * w[k][2] * q[0] / ti.max(q[1], 1e-30)
-            self.strain[p] = e
+            if self.inside(base, window) > 0:
+                w = self.weights(fx)
+                e = 0.0
+                for i, j, k in ti.static(ti.ndrange(3, 3, 3)):
+                    q = self.smooth[base[0] + i, base[1] + j, base[2] + k]
+                    e += w[i][0] * w[j][1] * w[k][2] * q[0] / ti.max(q[1], 1e-30)
+                self.strain[p] = e
 
     @ti.kernel
     def measure(self):

@@ -19,7 +19,7 @@ from mpm.seeding import seed
 from mpm.shapes import section_area, skin_path, slices
 
 PAD = 3  # empty cells around the food: a quadratic kernel reaches 1.5 cells, the rest is room to move
-MARGIN = 2  # cells by which the active window exceeds the particles; renewed at every output interval
+MARGIN = 3  # cells by which the active window exceeds the particles; renewed at every output interval
 SPREAD = 0.5  # room for the food to widen while it is pressed, part of its size
 APPROACH = 0.1  # way of the blade above the food before contact, in cells
 EDGE_STEP = 0.5  # dt times the frequency of the edge's cohesive spring, 2 is unstable
