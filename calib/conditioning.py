@@ -119,9 +119,7 @@ def condition(
     trace = _cropped(trace, t_end)
     warnings: list[str] = []
     if trace.label == "reconstructed":
-        warnings.append(
-            f"{trace.source} is a reconstruction, not a measurement: nothing fitted to it is validated"
-        )
+        warnings.append(f"{trace.source} is a reconstruction, not a measurement: nothing fitted to it is validated")
     force = trace.force
     if air is not None:
         force = force - _air_force(trace, air)

@@ -38,9 +38,7 @@ def resample(stroke: np.ndarray, force: np.ndarray, grid: np.ndarray) -> np.ndar
     """
     step = _uniform_step(grid)
     if stroke.shape != force.shape or len(stroke) < 2 or np.any(np.diff(stroke) < 0.0):
-        raise CurveError(
-            "resampling needs a force and a stroke of equal length with a stroke that never decreases"
-        )
+        raise CurveError("resampling needs a force and a stroke of equal length with a stroke that never decreases")
     if stroke[0] > grid[0] + UNIFORM_TOLERANCE * step or stroke[-1] < grid[-1] - UNIFORM_TOLERANCE * step:
         raise CurveError(
             f"the record covers strokes {stroke[0]:g} to {stroke[-1]:g} m, the grid asks for {grid[0]:g} to "
@@ -103,9 +101,7 @@ def smooth(
     return line[len(lead) :]
 
 
-def filter_simulated(
-    grid: np.ndarray, stroke: np.ndarray, force: np.ndarray, sd_m: float = FILTER_SD_M
-) -> np.ndarray:
+def filter_simulated(grid: np.ndarray, stroke: np.ndarray, force: np.ndarray, sd_m: float = FILTER_SD_M) -> np.ndarray:
     """Put a simulated force on the stroke grid of a trace and filter it exactly as the trace was.
 
     The force before contact is zero.

@@ -376,9 +376,7 @@ class _Search:
         """Call the progress callback."""
         if self.progress is None:
             return
-        seconds = [
-            t.evaluation.seconds / (self.options.coarse_cost if t.coarse else 1.0) for t in self.trials
-        ]
+        seconds = [t.evaluation.seconds / (self.options.coarse_cost if t.coarse else 1.0) for t in self.trials]
         rest = self.options.budget - self.spent
         misfit = self.best.misfit if self.finished else math.inf
         self.progress(

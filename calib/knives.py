@@ -64,9 +64,7 @@ def load_knife(name: str | Path) -> Knife:
     if isinstance(name, Path) or name.endswith((".yaml", ".yml")):
         knives = load_knives(name)
         if len(knives) != 1:
-            raise SceneError(
-                f"{name}: has {len(knives)} knives, but one is needed; leave one of: {', '.join(knives)}"
-            )
+            raise SceneError(f"{name}: has {len(knives)} knives, but one is needed; leave one of: {', '.join(knives)}")
         return next(iter(knives.values()))
     knives = load_knives()
     if name not in knives:
@@ -85,9 +83,7 @@ def _read_knife(place: Place, raw: Any) -> Knife:
     given = mapping(place, raw)
     check_keys(place, given, UNITS, synonyms=_SYNONYMS)
     value = {field: _read_field(place.at(field), field, given[field]) for field in UNITS}
-    knife = Knife(
-        place.path[-1], value["spine"], math.radians(value["angle"]), value["height"], value["length"]
-    )
+    knife = Knife(place.path[-1], value["spine"], math.radians(value["angle"]), value["height"], value["length"])
     top = 2.0 * knife.height * math.tan(0.5 * knife.angle)
     if top < (1.0 - TOLERANCE) * knife.spine:
         angle = math.degrees(2.0 * math.atan(0.5 * knife.spine / knife.height))

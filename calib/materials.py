@@ -125,9 +125,7 @@ class FoodSpec:
             x = check_override(name, raw)
             old = new.get(name)
             if old is None:
-                new[name] = Property(
-                    name, x, x / GIVEN_SPREAD, x * GIVEN_SPREAD, PROPERTIES[name].unit, source, status
-                )
+                new[name] = Property(name, x, x / GIVEN_SPREAD, x * GIVEN_SPREAD, PROPERTIES[name].unit, source, status)
             else:
                 new[name] = replace(old, value=x, status=status, source=source)
         return replace(self, properties=new)
@@ -166,7 +164,9 @@ class FoodSpec:
         Raises:
             SceneError: A shape or size that the solver cannot take.
         """
-        from mpm.scene import Food, Material, Shape
+        from mpm.material import Material
+        from mpm.scene import Food
+        from mpm.shapes import Shape
 
         sizes = {"length": length, "width": width, "height": height}
         size = {n: self.dims[n].value if given is None else given for n, given in sizes.items()}

@@ -248,15 +248,11 @@ def iso18571(stroke: np.ndarray, real: np.ndarray, sim: np.ndarray) -> IsoRating
     return IsoRating(corridor, phase, magnitude, slope, rating, shift, abs(shift) == most)
 
 
-def _checked(
-    stroke: np.ndarray, real: np.ndarray, sim: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _checked(stroke: np.ndarray, real: np.ndarray, sim: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The curves as float arrays, or an error that says why they cannot be compared."""
     s, r, m = (np.asarray(x, dtype=float) for x in (stroke, real, sim))
     if s.ndim != 1 or not s.shape == r.shape == m.shape:
-        raise CurveError(
-            f"stroke, measured and simulated curve have shapes {s.shape}, {r.shape} and {m.shape}"
-        )
+        raise CurveError(f"stroke, measured and simulated curve have shapes {s.shape}, {r.shape} and {m.shape}")
     if len(s) < MIN_SAMPLES:
         raise CurveError(f"curves of {len(s)} samples cannot be rated; at least {MIN_SAMPLES} are needed")
     for name, values in (("stroke", s), ("measured curve", r), ("simulated curve", m)):
@@ -268,13 +264,9 @@ def _checked(
         raise CurveError(f"the stroke does not increase at sample {i + 1} ({s[i]:g} m, then {s[i + 1]:g} m)")
     for name, values in (("measured", r), ("simulated", m)):
         if not values.max() > 0.0:
-            raise CurveError(
-                f"the {name} curve has no positive force (its largest value is {values.max():g} N)"
-            )
+            raise CurveError(f"the {name} curve has no positive force (its largest value is {values.max():g} N)")
     if not _integral(s, r) > 0.0:
-        raise CurveError(
-            f"the measured curve does no work ({_integral(s, r):g} J); check its sign and its baseline"
-        )
+        raise CurveError(f"the measured curve does no work ({_integral(s, r):g} J); check its sign and its baseline")
     return s, r, m
 
 

@@ -67,9 +67,7 @@ def null_models(stroke: np.ndarray, real: np.ndarray) -> dict[str, NullModel]:
         "half_sine": (peak * np.sin(np.pi * x), {"peak_N": peak}),
         "three_term": (three_term(stroke - stroke[0], **numbers), numbers),
     }
-    return {
-        name: NullModel(name, curve, compare(stroke, real, curve), p) for name, (curve, p) in curves.items()
-    }
+    return {name: NullModel(name, curve, compare(stroke, real, curve), p) for name, (curve, p) in curves.items()}
 
 
 def three_term(

@@ -89,8 +89,7 @@ class Evaluation:
     def __post_init__(self) -> None:
         if not 0.0 <= self.fraction <= 1.0:
             raise ValueError(
-                f"evaluation {self.index} completed the fraction {self.fraction} of its stroke; "
-                "it must be in [0, 1]."
+                f"evaluation {self.index} completed the fraction {self.fraction} of its stroke; it must be in [0, 1]."
             )
         if self.stroke.ndim != 1 or self.stroke.shape != self.force.shape:
             raise ValueError(
@@ -161,13 +160,9 @@ class Target:
                 "vectors of equal length, at least 2."
             )
         if not (np.isfinite(self.curve).all() and np.all(np.diff(self.stroke) > 0.0)):
-            raise TraceError(
-                "target has forces that are not finite or strokes that do not rise; condition it first."
-            )
+            raise TraceError("target has forces that are not finite or strokes that do not rise; condition it first.")
         if not self.peak > 0.0:
-            raise TraceError(
-                f"target has the peak {self.peak:g} N; it must be positive, check the sign of the force."
-            )
+            raise TraceError(f"target has the peak {self.peak:g} N; it must be positive, check the sign of the force.")
         if not (0.0 <= self.noise_sd < math.inf and 0.0 <= self.peak_sd < math.inf):
             raise TraceError(
                 f"target has noise_sd {self.noise_sd:g} N and peak_sd {self.peak_sd:g} N; "

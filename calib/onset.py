@@ -156,9 +156,7 @@ def estimate_baseline(time: np.ndarray, force: np.ndarray, start: int, stop: int
     slope_sd = float(np.sqrt(inflation * power / max(n - 2, 1) / (centred @ centred)))
     statistical = noise * np.sqrt(MEDIAN_VARIANCE * inflation / n)
     drift = slope * (t[-1] - t[0]) / np.sqrt(12.0)
-    return Baseline(
-        level, float(np.hypot(statistical, drift)), noise, inflation, slope, slope_sd, start, stop
-    )
+    return Baseline(level, float(np.hypot(statistical, drift)), noise, inflation, slope, slope_sd, start, stop)
 
 
 def first_sustained(mask: np.ndarray) -> int | None:
@@ -260,9 +258,7 @@ def _hinge_onset(time: np.ndarray, force: np.ndarray, index: int, coarse: _Coars
     return kink, float(np.sqrt(variance + dt**2 / 12.0 + (0.5 * (kink - other)) ** 2))
 
 
-def _averaged_hinge(
-    time: np.ndarray, force: np.ndarray, noise: float, inflation: float
-) -> tuple[float, float]:
+def _averaged_hinge(time: np.ndarray, force: np.ndarray, noise: float, inflation: float) -> tuple[float, float]:
     """Kink averaged over the powers of the rise with Akaike weights, and its variance [s, s^2]."""
     fits = np.array([_fit_hinge(time, force, power) for power in HINGE_POWERS])
     kink, variance, total = fits.T

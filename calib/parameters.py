@@ -77,9 +77,7 @@ class Parameter:
         if not self.low < self.high:
             raise self._error(f"has bounds [{self.low:g}, {self.high:g}]", "give low < high")
         if not self.prior_low < self.prior_high:
-            raise self._error(
-                f"has the prior range [{self.prior_low:g}, {self.prior_high:g}]", "give low < high"
-            )
+            raise self._error(f"has the prior range [{self.prior_low:g}, {self.prior_high:g}]", "give low < high")
         centre = math.exp(self.prior_mean) if self.log else self.prior_mean
         for what, x in (("value", self.value), ("prior centre", centre)):
             if not self.low <= x <= self.high:
@@ -154,9 +152,7 @@ class ParameterSet:
             raise MaterialError("there is no parameter to fit; name at least one, for instance E.")
         twice = sorted({n for n in self.names if self.names.count(n) > 1})
         if twice:
-            raise MaterialError(
-                f"parameter {', '.join(twice)} is given more than once; name each parameter once."
-            )
+            raise MaterialError(f"parameter {', '.join(twice)} is given more than once; name each parameter once.")
 
     def __len__(self) -> int:
         return len(self.items)
@@ -206,9 +202,7 @@ class ParameterSet:
     def box(self) -> tuple[FloatArray, FloatArray]:
         """The prior's 95 % box inside the hard bounds, in internal coordinates: two arrays (p,)."""
         reach = Z95 * self.prior_sd
-        return np.maximum(self.lower, self.prior_mean - reach), np.minimum(
-            self.upper, self.prior_mean + reach
-        )
+        return np.maximum(self.lower, self.prior_mean - reach), np.minimum(self.upper, self.prior_mean + reach)
 
     def to_vector(self, values: Mapping[str, float]) -> FloatArray:
         """Internal coordinates (p,) of a mapping name -> value [unit].
@@ -218,9 +212,7 @@ class ParameterSet:
         """
         missing = [n for n in self.names if n not in values]
         if missing:
-            raise MaterialError(
-                f"parameter {', '.join(missing)} has no value; give one for each of {self.names}."
-            )
+            raise MaterialError(f"parameter {', '.join(missing)} has no value; give one for each of {self.names}.")
         bad = [p for p in self.items if p.log and not values[p.name] > 0.0]
         if bad:
             raise MaterialError(

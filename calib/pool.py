@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from calib.objective import Evaluation
-from mpm.scene import Material, Scene
+from mpm.material import Material
+from mpm.scene import Scene
 
 DIED = "worker_died"  # reason of a run whose process was killed, for instance for lack of memory
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from calib.conditioning import Conditioned
 from calib.materials import FoodSpec
-from mpm.scene import EdgeLaw, Knife, Motion, Numerics, Scene, Shape
+from mpm.scene import EdgeLaw, Knife, Motion, Numerics, Scene
+from mpm.shapes import Shape
 
 ZONE_M = 4e-3  # process zone of the edge; small foods get an eighth of their height
 ZONE_PARTS = 8

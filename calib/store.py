@@ -247,9 +247,7 @@ class EvaluationStore:
                 self._stream = None
             self.journal.unlink(missing_ok=True)
         except OSError as error:
-            raise OutputError(
-                f"{self.path} cannot be written: {error}; its journal holds all runs."
-            ) from error
+            raise OutputError(f"{self.path} cannot be written: {error}; its journal holds all runs.") from error
 
 
 class CachedEvaluator:
@@ -349,9 +347,7 @@ def _write_records(file: h5py.File, records: Sequence[Record]) -> None:
     ):
         file.create_group(group)
         for name in sorted({name for column in columns for name in column}):
-            file[group].create_dataset(
-                name, data=[column.get(name, np.nan) for column in columns], dtype="f8"
-            )
+            file[group].create_dataset(name, data=[column.get(name, np.nan) for column in columns], dtype="f8")
     start = np.cumsum([0] + [e.stroke.size for e in runs])
     file.create_dataset("curves/start", data=start, dtype="i8")
     for name, curves in (("stroke", [e.stroke for e in runs]), ("force", [e.force for e in runs])):

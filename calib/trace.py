@@ -217,16 +217,12 @@ def _names_beside(path: Path) -> list[str]:
 def _check_header(source: str, names: list[str]) -> None:
     """Refuse a header with one column, without names, or with a name twice."""
     if len(names) < 2:
-        raise TraceError(
-            f"{source}: not a CSV file with a time and a force column (header: {names[0][:60]!r})"
-        )
+        raise TraceError(f"{source}: not a CSV file with a time and a force column (header: {names[0][:60]!r})")
     if all(_as_float(name) is not None for name in names):
         raise TraceError(f"{source}: the first row holds numbers; add a header such as time_s,force_N")
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise TraceError(
-            f"{source}: column name {twice[0]!r} occurs {names.count(twice[0])} times; rename one"
-        )
+        raise TraceError(f"{source}: column name {twice[0]!r} occurs {names.count(twice[0])} times; rename one")
 
 
 def _label(comments: list[str]) -> str:
@@ -279,17 +275,14 @@ def _choose(table: _Table, role: str, wanted: str | None) -> _Column:
     option = f"--{role}-col"
     if wanted is not None:
         if wanted not in table.names:
-            raise TraceError(
-                f"{table.source}: no column {wanted!r} ({option}){_did_you_mean([wanted], table.names)}"
-            )
+            raise TraceError(f"{table.source}: no column {wanted!r} ({option}){_did_you_mean([wanted], table.names)}")
         return _column(table, role, wanted)
     fitting = _candidates(table, role)
     if len(fitting) == 1:
         return _column(table, role, fitting[0])
     if fitting:
         raise TraceError(
-            f"{table.source}: several columns could be the {role}: {', '.join(fitting)}; choose one with "
-            f"{option}"
+            f"{table.source}: several columns could be the {role}: {', '.join(fitting)}; choose one with {option}"
         )
     raise TraceError(
         f"{table.source}: no {role} column with its unit in the name, such as "
@@ -332,9 +325,7 @@ def _numbers(table: _Table, column: _Column) -> np.ndarray:
             shown = repr(cell) if cell else "an empty cell"
             raise TraceError(f"{where}, column {column.name}: {shown} is not a number{hint}")
         if not np.isfinite(number):
-            raise TraceError(
-                f"{where}, column {column.name}: {cell!r} is not finite; remove or repair the row"
-            )
+            raise TraceError(f"{where}, column {column.name}: {cell!r} is not finite; remove or repair the row")
         values[i] = number
     return values * column.factor
 

@@ -111,9 +111,7 @@ class CurveProcess:
     def _kernel(self, a: FloatArray, b: FloatArray, h: FloatArray) -> FloatArray:
         """Covariance (k, l) of g between points (k, p) and (l, p): offset + linear + squared exponential."""
         gap = ((a[:, None] - b[None]) / np.exp(h[2:-1])) ** 2
-        out: FloatArray = (
-            OFFSET**2 + np.exp(2.0 * h[1]) * (a @ b.T) + np.exp(2.0 * h[0] - 0.5 * gap.sum(axis=2))
-        )
+        out: FloatArray = OFFSET**2 + np.exp(2.0 * h[1]) * (a @ b.T) + np.exp(2.0 * h[0] - 0.5 * gap.sum(axis=2))
         return out
 
     def _covariance(self, h: FloatArray) -> FloatArray:
@@ -320,9 +318,7 @@ def uncertainty(
     first = np.linalg.inv(information + own)
     freedom = max(effective_rows - float(np.trace(first @ information)), 1.0)
     reduced = float(residual[:-p] @ residual[:-p]) / freedom
-    covariance: FloatArray = np.asarray(
-        np.linalg.inv(information / max(1.0, reduced) + own), dtype=np.float64
-    )
+    covariance: FloatArray = np.asarray(np.linalg.inv(information / max(1.0, reduced) + own), dtype=np.float64)
     sd = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(sd, sd)
     intervals = tuple(_interval(q, z, s) for q, z, s in zip(parameters, parameters.start, sd, strict=True))
@@ -368,6 +364,5 @@ def _ties(names: Sequence[str], correlation: FloatArray) -> tuple[Tie, ...]:
     pairs = [(i, j) for j in range(len(names)) for i in range(j) if abs(correlation[i, j]) > TIED]
     sign = {True: "/", False: "*"}
     return tuple(
-        Tie(f"{names[i]} {sign[correlation[i, j] > 0.0]} {names[j]}", float(correlation[i, j]))
-        for i, j in pairs
+        Tie(f"{names[i]} {sign[correlation[i, j] > 0.0]} {names[j]}", float(correlation[i, j])) for i, j in pairs
     )

@@ -121,7 +121,5 @@ def limits(
         "The laws are independent of rate; relaxation, adhesion and moisture are not modelled, and the lower skin of a "
         "whole fruit is not cut."
     )
-    said.append(
-        "One grid was used; the discretisation error of the calibrated force was not measured in this run."
-    )
+    said.append("One grid was used; the discretisation error of the calibrated force was not measured in this run.")
     return said

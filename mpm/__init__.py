@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 
 from mpm.errors import CutcalError, SceneError, SimulationError
+from mpm.material import Material
 from mpm.record import ForceRecord
-from mpm.scene import Board, EdgeLaw, Food, Knife, Material, Motion, Numerics, Scene, Shape
+from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
+from mpm.shapes import Shape
 
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")  # stdout belongs to the caller
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 
 class CutcalError(Exception):
     """Base of every error that cutcal raises on purpose; the command line prints it without a traceback."""
@@ -23,3 +25,10 @@ class SimulationError(CutcalError):
         super().__init__(message)
         self.reason = reason
         self.fraction = fraction
+
+
+def check_number(where: str, name: str, value: float, low: float, high: float, unit: str) -> None:
+    """Raise SceneError unless ``low < value < high`` (both open) and ``value`` is a finite number."""
+    ok = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    if not ok or not low < value < high:
+        raise SceneError(f"{where}: {name} = {value!r} {unit} must be a number between {low:g} and {high:g} {unit}")

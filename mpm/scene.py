@@ -10,131 +10,12 @@ import math
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from mpm.errors import SceneError
-from mpm.shapes import SHAPE_KINDS
+from mpm.errors import SceneError, check_number
+from mpm.material import Material
+from mpm.shapes import Shape
 
 CONTACTS = ("cohesive", "nodal")
 PRECISIONS = ("f64", "f32")
-MAX_POISSON = 0.49  # above it a single-field quadratic MPM locks volumetrically and dt falls as sqrt(1 - 2 nu)
-
-
-def _number(where: str, name: str, value: float, low: float, high: float, unit: str) -> None:
-    """Raise SceneError unless ``low < value < high`` (both open) and ``value`` is a finite number."""
-    ok = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-    if not ok or not low < value < high:
-        raise SceneError(f"{where}: {name} = {value!r} {unit} must be a number between {low:g} and {high:g} {unit}")
-
-
-@dataclass(frozen=True)
-class Material:
-    """Constants of one food.
-
-    Attributes:
-        E: Young's modulus [Pa].
-        nu: Poisson's ratio [-].
-        rho: Density [kg/m^3].
-        yield_stress: von Mises yield stress (Kirchhoff) [Pa]; ``inf`` keeps the food elastic.
-        R: Cutting (propagation) resistance of the flesh [J/m^2 = N/m] (Atkins 2009, "The Science of Cutting").
-        R_initiation: Force per width at which a cut starts in bare flesh [N/m]; at least R.
-        R_skin: Force per width at which the edge goes through the skin [N/m].
-        skin_thickness: Thickness of the skin [m]; 0 = no skin.
-        initiation_depth: Indentation under the edge at which a cut starts [m]; soft solids go deep before a cut
-            nucleates (Reyssat et al. 2012, Phys. Rev. Lett. 109:244301).
-        mu: Coulomb friction of food on the blade's faces [-].
-        tensile_strength: Stress at which bulk damage starts [Pa], or None.
-        fracture_energy: Energy per crack area of bulk damage [J/m^2], or None. Both or none.
-        loss_factor: Mechanical loss factor tan(delta) [-] at the first axial mode of the specimen, Kelvin-Voigt. Apple
-            tissue loses 0.13-0.4 of the energy of a cycle (J. Texture Stud. 14:155, 1983), i.e. about 0.04-0.13.
-    """
-
-    E: float
-    nu: float
-    rho: float
-    yield_stress: float = math.inf
-    R: float = 0.0
-    R_initiation: float | None = None
-    R_skin: float | None = None
-    skin_thickness: float = 0.0
-    initiation_depth: float = 1e-3
-    mu: float = 0.0
-    tensile_strength: float | None = None
-    fracture_energy: float | None = None
-    loss_factor: float = 0.0
-
-    def __post_init__(self) -> None:
-        w = "material"
-        _number(w, "E", self.E, 0.0, 1e12, "Pa")
-        if not (isinstance(self.nu, (int, float)) and -1.0 < self.nu <= MAX_POISSON):
-            raise SceneError(
-                f"material: nu = {self.nu!r} must lie in (-1, {MAX_POISSON}]; an isotropic solid has nu < 0.5 and the "
-                f"solver locks above {MAX_POISSON}"
-            )
-        _number(w, "rho", self.rho, 0.0, 1e5, "kg/m^3")
-        if self.yield_stress != math.inf:
-            _number(w, "yield_stress", self.yield_stress, 0.0, 1e12, "Pa")
-        for name, unit in (("R", "J/m^2"), ("skin_thickness", "m"), ("mu", ""), ("loss_factor", "")):
-            _number(w, name, getattr(self, name), -1e-300, 1e6, unit)
-        _number(w, "initiation_depth", self.initiation_depth, 1e-5, 0.1, "m")
-        for name in ("R_initiation", "R_skin"):
-            if getattr(self, name) is not None:
-                _number(w, name, getattr(self, name), -1e-300, 1e6, "N/m")
-        if (self.tensile_strength is None) != (self.fracture_energy is None):
-            raise SceneError(
-                "material: tensile_strength and fracture_energy make bulk damage together; give both or none"
-            )
-        if self.tensile_strength is not None and self.fracture_energy is not None:
-            _number(w, "tensile_strength", self.tensile_strength, 0.0, 1e12, "Pa")
-            _number(w, "fracture_energy", self.fracture_energy, 0.0, 1e9, "J/m^2")
-        if self.skin_thickness > 0 and self.R_skin is None:
-            raise SceneError(
-                "material: skin_thickness > 0 needs R_skin, the force per width that goes through the skin"
-            )
-
-    @property
-    def shear(self) -> float:
-        """Shear modulus mu = E / (2 (1 + nu)) [Pa]."""
-        return self.E / (2 * (1 + self.nu))
-
-    @property
-    def lame(self) -> float:
-        """First Lame constant [Pa]."""
-        return self.E * self.nu / ((1 + self.nu) * (1 - 2 * self.nu))
-
-    @property
-    def start(self) -> float:
-        """Force per width at which a cut starts: that of the skin where there is one, never below R [N/m]."""
-        threshold = self.R_skin if self.skin_thickness > 0 else self.R_initiation
-        return max(self.R, threshold or 0.0)
-
-    @property
-    def p_wave(self) -> float:
-        """Speed of longitudinal waves sqrt((lambda + 2 mu) / rho) [m/s]."""
-        return math.sqrt((self.lame + 2 * self.shear) / self.rho)
-
-    @property
-    def stability_speed(self) -> float:
-        """Speed that bounds dt [m/s]: sqrt(max(3 K, lambda + 2 mu) / rho).
-
-        A lone particle of quadratic MLS-MPM has the highest frequency (2/dx) sqrt(3 K / rho), above that of the bulk.
-        """
-        bulk3 = 3 * self.lame + 2 * self.shear
-        return math.sqrt(max(bulk3, self.lame + 2 * self.shear) / self.rho)
-
-
-@dataclass(frozen=True)
-class Shape:
-    """Outline of the food. Attributes: kind, length along y [m], width along x [m], height along z [m]."""
-
-    kind: str
-    length: float
-    width: float
-    height: float
-
-    def __post_init__(self) -> None:
-        if self.kind not in SHAPE_KINDS:
-            raise SceneError(f"shape: unknown kind {self.kind!r}; one of {', '.join(SHAPE_KINDS)}")
-        for name in ("length", "width", "height"):
-            _number("shape", name, getattr(self, name), 1e-3, 1.0, "m")
 
 
 @dataclass(frozen=True)
@@ -160,10 +41,10 @@ class Knife:
 
     def __post_init__(self) -> None:
         w = f"knife {self.name}"
-        _number(w, "spine", self.spine, 1e-5, 0.1, "m")
-        _number(w, "angle", self.angle, 1e-3, math.pi / 2, "rad")
-        _number(w, "height", self.height, 1e-3, 1.0, "m")
-        _number(w, "length", self.length, 1e-3, 1.0, "m")
+        check_number(w, "spine", self.spine, 1e-5, 0.1, "m")
+        check_number(w, "angle", self.angle, 1e-3, math.pi / 2, "rad")
+        check_number(w, "height", self.height, 1e-3, 1.0, "m")
+        check_number(w, "length", self.length, 1e-3, 1.0, "m")
 
 
 @dataclass(frozen=True)
@@ -173,7 +54,7 @@ class Board:
     mu: float = 0.5
 
     def __post_init__(self) -> None:
-        _number("board", "mu", self.mu, -1e-300, 10.0, "")
+        check_number("board", "mu", self.mu, -1e-300, 10.0, "")
 
 
 @dataclass(frozen=True)
@@ -190,8 +71,8 @@ class Motion:
     mach: float = 0.01
 
     def __post_init__(self) -> None:
-        _number("motion", "stroke", self.stroke, 1e-4, 1.0, "m")
-        _number("motion", "mach", self.mach, 1e-5, 0.1, "")
+        check_number("motion", "stroke", self.stroke, 1e-4, 1.0, "m")
+        check_number("motion", "mach", self.mach, 1e-5, 0.1, "")
 
 
 @dataclass(frozen=True)
@@ -207,8 +88,8 @@ class EdgeLaw:
     slip: float = 1e-3
 
     def __post_init__(self) -> None:
-        _number("edge", "zone", self.zone, 1e-5, 0.05, "m")
-        _number("edge", "slip", self.slip, 1e-5, 0.05, "m")
+        check_number("edge", "zone", self.zone, 1e-5, 0.05, "m")
+        check_number("edge", "slip", self.slip, 1e-5, 0.05, "m")
 
 
 @dataclass(frozen=True)
@@ -241,10 +122,10 @@ class Numerics:
 
     def __post_init__(self) -> None:
         w = "numerics"
-        _number(w, "dx", self.dx, 1e-5, 0.05, "m")
-        _number(w, "ppc", self.ppc, 0.5, 8.5, "")
-        _number(w, "safety", self.safety, 0.0, 0.9001, "of the stability limit")
-        _number(w, "output", self.output, 0.0, 0.1, "m")
+        check_number(w, "dx", self.dx, 1e-5, 0.05, "m")
+        check_number(w, "ppc", self.ppc, 0.5, 8.5, "")
+        check_number(w, "safety", self.safety, 0.0, 0.9001, "of the stability limit")
+        check_number(w, "output", self.output, 0.0, 0.1, "m")
         if self.contact not in CONTACTS:
             raise SceneError(f"numerics: contact {self.contact!r} is not one of {', '.join(CONTACTS)}")
         if self.precision not in PRECISIONS:

@@ -3,15 +3,30 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from mpm.scene import Shape
+from mpm.errors import SceneError, check_number
 
 SHAPE_KINDS = ("block", "cylinder", "half_cylinder", "sphere", "hemisphere", "ellipsoid", "capsule")
 _FLAT_DOWN = ("half_cylinder", "hemisphere")
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Outline of the food. Attributes: kind, length along y [m], width along x [m], height along z [m]."""
+
+    kind: str
+    length: float
+    width: float
+    height: float
+
+    def __post_init__(self) -> None:
+        if self.kind not in SHAPE_KINDS:
+            raise SceneError(f"shape: unknown kind {self.kind!r}; one of {', '.join(SHAPE_KINDS)}")
+        for name in ("length", "width", "height"):
+            check_number("shape", name, getattr(self, name), 1e-3, 1.0, "m")
 
 
 def _radius2(shape: Shape, x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -12,9 +12,10 @@ import numpy as np
 from mpm import fields as kn
 from mpm.errors import SimulationError
 from mpm.kernels import IVEC6, Kernels
+from mpm.material import Material
 from mpm.record import ForceRecord
 from mpm.runtime import Runtime, start
-from mpm.scene import BAND_CELLS, Material, Scene
+from mpm.scene import BAND_CELLS, Scene
 from mpm.seeding import seed
 from mpm.shapes import section_area, skin_path, slices
 

@@ -241,9 +241,7 @@ def test_noise_alone_is_no_contact(seed: int) -> None:
     """A trace without a cut is refused with its largest excursion and its noise."""
     trace = made()
     noise = 0.2 * np.random.default_rng(seed).normal(size=len(trace.time))
-    with pytest.raises(
-        TraceError, match="no contact found: the largest excursion is 0.* N against a noise of 0.(1|2)"
-    ):
+    with pytest.raises(TraceError, match="no contact found: the largest excursion is 0.* N against a noise of 0.(1|2)"):
         condition(replace(trace, force=LEVEL + noise), speed=SPEED)
 
 
@@ -258,9 +256,7 @@ def test_skin_that_gives_way_does_not_end_or_start_the_cut() -> None:
     """Contact is the first rise although the force falls back to nothing after it and then rises higher."""
     trace = made(noise=0.0)
     t = trace.time
-    force = np.select(
-        [t < 1.0, t < 1.2, t < 1.4, t < 2.5], [0 * t, 50.0 * (t - 1.0), 0 * t, 30.0 * (t - 1.4)]
-    )
+    force = np.select([t < 1.0, t < 1.2, t < 1.4, t < 2.5], [0 * t, 50.0 * (t - 1.0), 0 * t, 30.0 * (t - 1.4)])
     noise = 0.1 * np.random.default_rng(4).normal(size=len(t))
     cut = condition(replace(trace, force=force + LEVEL + noise), speed=SPEED)
     assert cut.onset_s == pytest.approx(1.0, abs=0.01)
@@ -322,9 +318,7 @@ def test_position_that_does_not_descend() -> None:
     """A depth given as a height rises after contact and is refused, with the option that helps."""
     cut = made(position=True)
     assert cut.position is not None
-    with pytest.raises(
-        TraceError, match="column ee_z_m: the position does not descend after contact.*--position-col"
-    ):
+    with pytest.raises(TraceError, match="column ee_z_m: the position does not descend after contact.*--position-col"):
         condition(replace(cut, position=-cut.position))
 
 
@@ -421,9 +415,7 @@ def test_resampling_averages_instead_of_picking() -> None:
 def test_resampling_is_exact_for_lines_and_for_repeated_strokes() -> None:
     """A straight line survives any uneven sampling; samples at one stroke count by their mean."""
     uneven = np.sort(np.concatenate([[0.0, 0.04], 0.04 * np.random.default_rng(0).random(300)]))
-    np.testing.assert_allclose(
-        resample(uneven, 2.0 + 300.0 * uneven, grid()), 2.0 + 300.0 * grid(), atol=1e-9
-    )
+    np.testing.assert_allclose(resample(uneven, 2.0 + 300.0 * uneven, grid()), 2.0 + 300.0 * grid(), atol=1e-9)
     twice = np.repeat(uneven, 2)
     force = 2.0 + 300.0 * twice + np.tile([1.0, -1.0], len(uneven))
     np.testing.assert_allclose(resample(twice, force, grid()), 2.0 + 300.0 * grid(), atol=1e-9)
@@ -488,9 +480,7 @@ PUBLISHED = [
 def measured(cut: str, air: str) -> Conditioned:
     """A conditioned robot log with its air run."""
     folder = "franka_knife_cutting"
-    return condition(
-        read_trace(data_file(folder, f"{cut}.csv")), air=read_trace(data_file(folder, f"{air}.csv"))
-    )
+    return condition(read_trace(data_file(folder, f"{cut}.csv")), air=read_trace(data_file(folder, f"{air}.csv")))
 
 
 @pytest.mark.parametrize(("cut", "air", "contact", "travel", "peak", "work"), PUBLISHED)

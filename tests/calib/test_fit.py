@@ -205,9 +205,7 @@ def test_order_of_completion_does_not_matter() -> None:
     """Which worker is done first must not change the search, or a resumed one would take another path."""
     forward = calibrate(two_goal(), Fake(two_terms, backwards=False), options=QUICK)
     backward = calibrate(two_goal(), Fake(two_terms, backwards=True), options=QUICK)
-    assert [t.evaluation.parameters for t in forward.history] == [
-        t.evaluation.parameters for t in backward.history
-    ]
+    assert [t.evaluation.parameters for t in forward.history] == [t.evaluation.parameters for t in backward.history]
 
 
 def test_workers_are_kept_busy() -> None:
@@ -225,8 +223,7 @@ def test_scaling_the_start_finds_a_material_of_equal_proportions_at_once() -> No
     truth = {p.name: p.value * (2.5 if p.log else 1.0) for p in FIVE}
     wide = ParameterSet(
         tuple(
-            Parameter(p.name, p.value, p.low, p.high, p.unit, p.low * 2.0 + 1e-3, p.high / 2.0, p.scale)
-            for p in FIVE
+            Parameter(p.name, p.value, p.low, p.high, p.unit, p.low * 2.0 + 1e-3, p.high / 2.0, p.scale) for p in FIVE
         )
     )
     objective = goal(truth, wide)

@@ -87,9 +87,7 @@ def test_wedge_and_spine(angle: str, good: bool, tmp_path: Path) -> None:
 
 def test_unknown_knife() -> None:
     """An unknown name is answered with the nearest one and the list."""
-    with pytest.raises(
-        SceneError, match="unknown knife 'kichen', did you mean 'kitchen'.*known: edc, slicing"
-    ):
+    with pytest.raises(SceneError, match="unknown knife 'kichen', did you mean 'kitchen'.*known: edc, slicing"):
         load_knife("kichen")
     with pytest.raises(SceneError, match=r"unknown knife 'laser'; known: edc.*path of a \.yaml file"):
         load_knife("laser")

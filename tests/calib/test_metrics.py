@@ -57,9 +57,7 @@ def test_ten_percent_too_strong() -> None:
     assert m.shape_error == pytest.approx(0.0, abs=1e-12)
     assert m.best_scale == pytest.approx(1.0 / 1.1)
     assert m.best_scale_residual == pytest.approx(0.0, abs=1e-7)
-    assert (m.sprague_geers.M, m.sprague_geers.P, m.sprague_geers.C) == pytest.approx(
-        (0.1, 0.0, 0.1), abs=1e-7
-    )
+    assert (m.sprague_geers.M, m.sprague_geers.P, m.sprague_geers.C) == pytest.approx((0.1, 0.0, 0.1), abs=1e-7)
     assert (m.russell.M, m.russell.C) == pytest.approx((0.0759, 0.0672), abs=5e-5)
     assert m.work_real_J == pytest.approx(12.0 * 0.03 * 2.0 / np.pi, rel=1e-6)
     assert m.peak_sim_N == pytest.approx(13.2)
@@ -222,9 +220,7 @@ def test_iso_warping_stays_in_its_window() -> None:
         (S, HALF_SINE - 11.0, HALF_SINE, "measured curve does no work"),
     ],
 )
-def test_curves_that_cannot_be_compared(
-    stroke: np.ndarray, real: np.ndarray, sim: np.ndarray, message: str
-) -> None:
+def test_curves_that_cannot_be_compared(stroke: np.ndarray, real: np.ndarray, sim: np.ndarray, message: str) -> None:
     """Each unusable input is named; the error is both a ValueError and one that the command line prints."""
     with pytest.raises(ValueError, match=message):
         compare(stroke, real, sim)

@@ -35,9 +35,7 @@ def test_ramp_is_exact_on_a_ramp() -> None:
 def test_half_sine_is_exact_on_a_half_sine() -> None:
     """A half sine over the stroke is met exactly, a ramp is not."""
     nulls = null_models(S, 7.0 * np.sin(np.pi * S / 0.04))
-    assert nulls["half_sine"].metrics.nrmse == pytest.approx(
-        0.0, abs=1e-3
-    )  # the peak lies between two samples
+    assert nulls["half_sine"].metrics.nrmse == pytest.approx(0.0, abs=1e-3)  # the peak lies between two samples
     assert nulls["ramp"].metrics.nrmse > 0.3
     assert nulls["ramp"].metrics.peak_error == pytest.approx(0.0)
 
@@ -103,9 +101,7 @@ def test_unusable_curves_are_refused() -> None:
 def test_three_terms_describe_real_cuts(cut: str, air: str, left: float) -> None:
     """On robot cuts of three foods the description leaves as little as expected, and ramps leave much."""
     folder = "franka_knife_cutting"
-    real = condition(
-        read_trace(data_file(folder, f"{cut}.csv")), air=read_trace(data_file(folder, f"{air}.csv"))
-    )
+    real = condition(read_trace(data_file(folder, f"{cut}.csv")), air=read_trace(data_file(folder, f"{air}.csv")))
     nulls = null_models(real.stroke, real.curve)
     assert 0.7 * left < nulls["three_term"].metrics.nrmse < 1.1 * left
     assert nulls["ramp"].metrics.nrmse > 0.2

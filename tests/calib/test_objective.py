@@ -39,14 +39,10 @@ def objective(**errors: float) -> Objective:
     return Objective(Target(GRID, wave(GRID), 0.0, 0.0, interpolate), PARAMETERS, ErrorModel(**errors))
 
 
-def run(
-    force: np.ndarray, stroke: np.ndarray = FINE, *, fraction: float = 1.0, **values: float
-) -> Evaluation:
+def run(force: np.ndarray, stroke: np.ndarray = FINE, *, fraction: float = 1.0, **values: float) -> Evaluation:
     """An evaluation at the prior centre, failed when its fraction is below 1."""
     status = "ok" if fraction == 1.0 else "failed"
-    return Evaluation(
-        0, CENTRE | values, status, "" if status == "ok" else "inverted", fraction, stroke, force
-    )
+    return Evaluation(0, CENTRE | values, status, "" if status == "ok" else "inverted", fraction, stroke, force)
 
 
 def cut_off(fraction: float, factor: float = 1.1) -> Evaluation:
@@ -86,9 +82,7 @@ def test_chi_square_does_not_count_correlated_points_twice() -> None:
     coarse = objective(peak=1e6).trial(strong).misfit
     finer = Objective(Target(fine, wave(fine), 0.0, 0.0, interpolate), PARAMETERS, ErrorModel(peak=1e6))
     assert finer.trial(strong).misfit == pytest.approx(coarse, rel=0.01)
-    assert objective(peak=1e6, correlation=0.025).trial(strong).misfit == pytest.approx(
-        2.0 * coarse, rel=1e-6
-    )
+    assert objective(peak=1e6, correlation=0.025).trial(strong).misfit == pytest.approx(2.0 * coarse, rel=1e-6)
 
 
 def test_chi_square_of_a_right_model_is_its_number_of_data() -> None:

@@ -34,9 +34,7 @@ def test_prior_centre_is_geometric_on_a_log_scale() -> None:
 def test_round_trip(parameter: Parameter) -> None:
     """Value -> internal -> value is the identity to rounding between the hard bounds."""
     assert parameter.round_trip_error() < 1e-14
-    assert parameter.from_internal(parameter.to_internal(parameter.value)) == pytest.approx(
-        parameter.value, rel=1e-14
-    )
+    assert parameter.from_internal(parameter.to_internal(parameter.value)) == pytest.approx(parameter.value, rel=1e-14)
 
 
 def test_values_never_leave_the_bounds() -> None:

@@ -55,9 +55,7 @@ def test_terminal_line_is_rewritten() -> None:
         bar(progress(60))
     pieces = stream.getvalue().split("\r")
     assert stream.getvalue().count("\n") == 1 and stream.getvalue().endswith("\n")
-    assert pieces[1].startswith("[##########..........] 40") and pieces[2].startswith(
-        "[###############.....] 60"
-    )
+    assert pieces[1].startswith("[##########..........] 40") and pieces[2].startswith("[###############.....] 60")
     assert len(pieces[2].rstrip("\n")) >= len(pieces[1])
 
 

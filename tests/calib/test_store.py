@@ -49,9 +49,7 @@ def evaluation(number: float = 1.0, status: str = "ok", reason: str = "", size: 
     """A run whose every number follows from ``number``."""
     s = np.linspace(0.0, 0.04, size)
     fraction = 1.0 if status == "ok" else 0.4
-    return Evaluation(
-        7, {"E": 1e5 * number, "mu": 0.1}, status, reason, fraction, s, number * s, {"a": number}, 2.5
-    )
+    return Evaluation(7, {"E": 1e5 * number, "mu": 0.1}, status, reason, fraction, s, number * s, {"a": number}, 2.5)
 
 
 def assert_same(a: Evaluation | None, b: Evaluation) -> None:
@@ -73,9 +71,7 @@ class Counting:
         for index in reversed(range(len(batch))):
             self.runs += 1
             s = np.linspace(0.0, 0.04, 10)
-            yield Evaluation(
-                index, dict(batch[index]), self.status, self.reason, 1.0, s, s * batch[index]["E"]
-            )
+            yield Evaluation(index, dict(batch[index]), self.status, self.reason, 1.0, s, s * batch[index]["E"])
 
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:
@@ -250,9 +246,7 @@ def test_plain_h5py_and_pandas_can_read_it(tmp_path: Path) -> None:
     path = tmp_path / "evaluations.h5"
     with EvaluationStore(path, HEADER) as store:
         store.append("k0", evaluation(1.0, size=5), "fine")
-        store.append(
-            "k1", Evaluation(0, {"R": 3.0}, "failed", "inverted", 0.4, np.arange(3.0), np.arange(3.0)), "fine"
-        )
+        store.append("k1", Evaluation(0, {"R": 3.0}, "failed", "inverted", 0.4, np.arange(3.0), np.arange(3.0)), "fine")
     with h5py.File(path) as f:
         table = pd.DataFrame({name: column[()] for name, column in f["parameters"].items()})
         table["status"] = f["status"].asstr()[()]
@@ -301,9 +295,7 @@ def test_known_runs_are_not_run_again(tmp_path: Path) -> None:
     ("status", "reason", "again"),
     [("failed", "inverted", False), ("failed", "worker_died", True), ("timeout", "", True)],
 )
-def test_only_repeatable_failures_are_remembered(
-    tmp_path: Path, status: str, reason: str, again: bool
-) -> None:
+def test_only_repeatable_failures_are_remembered(tmp_path: Path, status: str, reason: str, again: bool) -> None:
     """A material that breaks the solver breaks it again; a killed worker or a timeout is tried again."""
     with EvaluationStore(tmp_path / "evaluations.h5", HEADER) as store:
         list(CachedEvaluator(Counting(status, reason), store, scene=SCENE, code="1").evaluate([{"E": 1.0}]))

@@ -54,9 +54,7 @@ def test_force_units_come_from_the_name(tmp_path: Path, name: str, scale: float)
     assert trace.position is None
 
 
-@pytest.mark.parametrize(
-    ("name", "scale"), [("time_s", 1.0), ("t_s", 1.0), ("time_ms", 1e3), ("Time [s]", 1.0)]
-)
+@pytest.mark.parametrize(("name", "scale"), [("time_s", 1.0), ("t_s", 1.0), ("time_ms", 1e3), ("Time [s]", 1.0)])
 def test_time_units_come_from_the_name(tmp_path: Path, name: str, scale: float) -> None:
     """Seconds and milliseconds give the same clock."""
     trace = read_trace(write(tmp_path, f"{name},force_N", [clock() * scale, load()]))

@@ -121,9 +121,7 @@ def test_interval_ends_at_the_hard_bound() -> None:
     near = Parameter("mu", 0.02, 0.0, 1.0, "-", 0.0, 0.6, "linear")
     rows = np.array([[20.0], [1.0 / near.prior_sd]])
     for value, verdict in ((0.02, "identified"), (0.0, "at_bound")):
-        found = uncertainty(
-            ParameterSet((near,)).with_values({"mu": value}), rows, np.zeros(2), effective_rows=20.0
-        )
+        found = uncertainty(ParameterSet((near,)).with_values({"mu": value}), rows, np.zeros(2), effective_rows=20.0)
         interval = found.intervals[0]
         assert interval.low95 == 0.0 and interval.clipped and interval.verdict == verdict
         assert interval.high95 > value + 0.05

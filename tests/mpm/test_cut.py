@@ -7,9 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mpm.errors import SceneError
+from mpm.material import Material
 from mpm.record import ForceRecord
 from mpm.runtime import Runtime
-from mpm.scene import EdgeLaw, Food, Knife, Material, Motion, Numerics, Scene, SceneError, Shape
+from mpm.scene import EdgeLaw, Food, Knife, Motion, Numerics, Scene
+from mpm.shapes import Shape
 from mpm.solver import Simulation
 
 THIN = Knife("thin", 0.2e-3, np.deg2rad(1.0), 0.05, 0.2)

@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mpm.material import Material
 from mpm.runtime import Runtime
-from mpm.scene import EdgeLaw, Food, Knife, Material, Motion, Numerics, Scene, Shape
+from mpm.scene import EdgeLaw, Food, Knife, Motion, Numerics, Scene
+from mpm.shapes import Shape
 from mpm.solver import Simulation
 
 SCENE = Scene(

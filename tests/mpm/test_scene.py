@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mpm.errors import SceneError
+from mpm.material import Material
 from mpm.record import _moving_mean
-from mpm.scene import SHAPE_KINDS, Food, Knife, Material, Motion, Numerics, Scene, SceneError, Shape
+from mpm.scene import Food, Knife, Motion, Numerics, Scene
 from mpm.seeding import seed
-from mpm.shapes import inside, section_area, skin_path, surface, volume
+from mpm.shapes import SHAPE_KINDS, Shape, inside, section_area, skin_path, surface, volume
 
 MATERIAL = Material(E=1e6, nu=0.35, rho=1000.0)
 KNIFE = Knife("k", 2e-3, 0.1, 0.04, 0.2)

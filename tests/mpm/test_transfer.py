@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from mpm import fields as kn
+from mpm.material import Material
 from mpm.runtime import Runtime
-from mpm.scene import Board, Food, Knife, Material, Motion, Numerics, Scene, Shape
+from mpm.scene import Board, Food, Knife, Motion, Numerics, Scene
+from mpm.shapes import Shape
 from mpm.solver import Simulation
 
 DX = 3e-3
