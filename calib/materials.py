@@ -170,7 +170,7 @@ class FoodSpec:
 
         sizes = {"length": length, "width": width, "height": height}
         size = {n: self.dims[n].value if given is None else given for n, given in sizes.items()}
-        values = {n: p.value for n, p in self.properties.items()}
+        values: dict[str, Any] = {n: p.value for n, p in self.properties.items()}
         if not all(n in values for n in _DAMAGE):
             values = {n: v for n, v in values.items() if n not in _DAMAGE}
         return Food(Shape(shape or self.shape_kind, **size), Material(**values))

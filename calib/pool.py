@@ -27,7 +27,7 @@ def _ignore_interrupt() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _run(scene: Scene, values: dict[str, float], arch: str, threads: int) -> dict[str, Any]:
+def _run(scene: Scene, values: dict[str, Any], arch: str, threads: int) -> dict[str, Any]:
     """One simulation in a worker; everything that is sent back is plain data."""
     from mpm.runtime import Runtime
     from mpm.solver import Simulation

@@ -4,25 +4,42 @@ import taichi as ti
 
 
 @ti.func
-def blade_distance(y, above, spine, cos_h, sin_h):
-    """Signed distance to the right half of the blade's wedge and its outward normal, in the plane across the blade.
+def blade_distance(y, above, spine, cos_h, sin_h, radius):
+    """Signed distance to the right half of the blade and its outward normal, in the plane across the edge.
+
+    The blade is a wedge with a rounded tip up to the spine's thickness and parallel above it.
 
     Args:
         y: Distance from the blade plane towards the particle's own side [m]; negative beyond the plane.
-        above: Height above the cutting edge [m], positive.
+        above: Height above the lowest point of the edge [m], positive.
         spine: Thickness of the spine [m].
         cos_h: Cosine of half the included angle.
         sin_h: Sine of half the included angle.
+        radius: Radius of the tip [m].
 
     Returns:
-        Distance [m], negative inside, and the unit normal (0, n_y, n_z) of the face, n_y > 0.
+        Distance [m], negative inside, and the unit normal (0, n_y, n_z).
     """
-    d = y * cos_h - above * sin_h
+    d = y * cos_h - (above - radius) * sin_h - radius
     n = ti.Vector([0.0, cos_h, -sin_h])
+    if y * sin_h + (above - radius) * cos_h < 0:
+        size = ti.sqrt(y * y + (above - radius) ** 2)
+        d = size - radius
+        n = ti.Vector([0.0, y, above - radius]) / ti.max(size, 1e-12)
     if y - 0.5 * spine > d:
         d = y - 0.5 * spine
         n = ti.Vector([0.0, 1.0, 0.0])
     return d, n
+
+
+@ti.func
+def tack(opening, gap):
+    """Traction of a sticky face over its strength when it has opened by ``opening`` [-]; ``gap`` [m] ends it.
+
+    Triangular law: full strength at a tenth of the gap, work of adhesion = strength times gap / 2.
+    """
+    r = opening / gap
+    return ti.math.clamp(ti.min(10 * r, (1 - r) / 0.9), 0.0, 1.0)
 
 
 @ti.func
@@ -33,7 +50,7 @@ def coulomb(jn, tangent, mu):
 
 
 @ti.func
-def stick_slip(stick, slide, depth, mu):
+def stick_slip(stick, slide, press, mu):
     """Elastic-sticking Coulomb friction: tangential spring as stiff as the normal one, capped at mu times its force.
 
     Capping each step's impulse at the one that stops the particle would make friction viscous, because the grid takes
@@ -42,14 +59,14 @@ def stick_slip(stick, slide, depth, mu):
     Args:
         stick: Tangential stretch of the spring so far [m], 3-vector.
         slide: Sliding of the particle along the tool in this step [m], 3-vector, tangential.
-        depth: Penetration [m].
+        press: Normal force over the normal spring's stiffness [m]: the penetration.
         mu: Friction coefficient [-].
 
     Returns:
         New stretch [m].
     """
     out = stick + slide
-    size, cap = out.norm(), mu * depth
+    size, cap = out.norm(), mu * press
     if size > cap:
         out *= cap / size
     return out

@@ -30,6 +30,10 @@ class Material:
         fracture_energy: Energy per crack area of bulk damage [J/m^2], or None. Both or none.
         loss_factor: Mechanical loss factor tan(delta) [-] at the first axial mode of the specimen, Kelvin-Voigt. Apple
             tissue loses 0.13-0.4 of the energy of a cycle (J. Texture Stud. 14:155, 1983), i.e. about 0.04-0.13.
+        prony: Relaxation of the shear stiffness as pairs (share [-], time [s]); E is then the instantaneous modulus and
+            the shares add up to less than 1 (Simo 1987). Empty = rate-independent, the default.
+        adhesion: Largest normal traction of the food on the blade's faces [Pa]; 0 = none, the default.
+        adhesion_energy: Work of adhesion [J/m^2], needed with ``adhesion``.
     """
 
     E: float
@@ -45,6 +49,9 @@ class Material:
     tensile_strength: float | None = None
     fracture_energy: float | None = None
     loss_factor: float = 0.0
+    prony: tuple[tuple[float, float], ...] = ()
+    adhesion: float = 0.0
+    adhesion_energy: float = 0.0
 
     def __post_init__(self) -> None:
         w = "material"
@@ -57,7 +64,14 @@ class Material:
         check_number(w, "rho", self.rho, 0.0, 1e5, "kg/m^3")
         if self.yield_stress != math.inf:
             check_number(w, "yield_stress", self.yield_stress, 0.0, 1e12, "Pa")
-        for name, unit in (("R", "J/m^2"), ("skin_thickness", "m"), ("mu", ""), ("loss_factor", "")):
+        for name, unit in (
+            ("R", "J/m^2"),
+            ("skin_thickness", "m"),
+            ("mu", ""),
+            ("loss_factor", ""),
+            ("adhesion", "Pa"),
+            ("adhesion_energy", "J/m^2"),
+        ):
             check_number(w, name, getattr(self, name), -1e-300, 1e6, unit)
         check_number(w, "initiation_depth", self.initiation_depth, 1e-5, 0.1, "m")
         for name in ("R_initiation", "R_skin"):
@@ -74,6 +88,15 @@ class Material:
             raise SceneError(
                 "material: skin_thickness > 0 needs R_skin, the force per width that goes through the skin"
             )
+        if (self.adhesion > 0) != (self.adhesion_energy > 0):
+            raise SceneError(
+                "material: adhesion [Pa] and adhesion_energy [J/m^2] make sticky faces together; give both"
+            )
+        for share, time in self.prony:
+            check_number(w, "share of a prony branch", share, 0.0, 1.0, "")
+            check_number(w, "time of a prony branch", time, 0.0, 1e9, "s")
+        if sum(share for share, _ in self.prony) >= 1.0:
+            raise SceneError("material: the shares of the prony branches must add up to less than 1, or a solid flows")
 
     @property
     def shear(self) -> float:
@@ -90,6 +113,11 @@ class Material:
         """Force per width at which a cut starts: that of the skin where there is one, never below R [N/m]."""
         threshold = self.R_skin if self.skin_thickness > 0 else self.R_initiation
         return max(self.R, threshold or 0.0)
+
+    @property
+    def rate_dependent(self) -> bool:
+        """Whether the force depends on the real speed of the knife."""
+        return bool(self.prony)
 
     @property
     def p_wave(self) -> float:

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from mpm.topology import Topology
+
 
 @dataclass(frozen=True)
 class ForceRecord:
@@ -15,7 +17,9 @@ class ForceRecord:
     Every force is an impulse accumulated over the interval and divided by its length.
 
     Attributes:
-        stroke: Stroke at the end of each interval [m], shape (n,).
+        stroke: Way of the edge below the food's top at the end of each interval [m], shape (n,).
+        command: Stroke that was commanded; differs from ``stroke`` when the arm is not rigid [m], shape (n,).
+        slide: Way of the blade along its edge [m], shape (n,).
         time: Simulated time at the end of each interval [s], shape (n,).
         edge: Force of the food on the cutting edge [N], shape (n, 3).
         face: Force of the food on the blade's faces [N], shape (n, 3).
@@ -36,7 +40,7 @@ class ForceRecord:
         images: Mirror images that each particle stands for (1, 2 or 4).
         cells: Number of grid nodes.
         severed_area: Area of the section that the edge has passed [m^2].
-        whole: Part of the food's particles that the edge has not passed [-].
+        pieces: Connected pieces that are left, None when the run broke down.
         counters: How often each exceptional branch was taken, e.g. ``inverted``; all zero in a sound run.
         wall: Run time of the time loop [s].
         status: ``done``, or the reason why the run stopped early.
@@ -44,6 +48,8 @@ class ForceRecord:
     """
 
     stroke: np.ndarray
+    command: np.ndarray
+    slide: np.ndarray
     time: np.ndarray
     edge: np.ndarray
     face: np.ndarray
@@ -64,7 +70,7 @@ class ForceRecord:
     images: int
     cells: int
     severed_area: float
-    whole: float
+    pieces: Topology | None
     counters: dict[str, int]
     wall: float
     status: str = "done"
@@ -82,7 +88,7 @@ class ForceRecord:
         The crack front behind the edge advances by whole node layers, so the force on the faces carries a ripple with
         the period of one cell. A moving mean over exactly one cell removes it and nothing longer.
         """
-        return _moving_mean(self.stroke, self.face[:, 2], self.cell)
+        return _moving_mean(self.time * self.speed, self.face[:, 2], self.cell)
 
     @property
     def resolved(self) -> np.ndarray:
@@ -101,13 +107,19 @@ class ForceRecord:
 
     @property
     def severed(self) -> bool:
-        """Whether the edge has passed all of the food, so that it is in two pieces."""
-        return self.whole == 0.0
+        """Whether the food is in two or more pieces."""
+        return self.pieces is not None and self.pieces.complete
 
     @property
     def work(self) -> float:
-        """Work of the knife on the food [J]: vertical force times stroke, summed over the intervals."""
-        return float(np.sum(self.knife[:, 2] * np.diff(self.stroke, prepend=0.0)))
+        """Work of the knife on the food [J], vertical and along the blade."""
+        return float(self.work_done[-1]) if len(self.stroke) else 0.0
+
+    @property
+    def work_done(self) -> np.ndarray:
+        """Work of the knife on the food so far [J], shape (n,)."""
+        down = self.knife[:, 2] * np.diff(self.stroke, prepend=0.0)
+        return np.cumsum(down - self.knife[:, 0] * np.diff(self.slide, prepend=0.0))
 
     @property
     def momentum_residual(self) -> float:
@@ -119,13 +131,13 @@ class ForceRecord:
         """Kinetic energy over the work done on the food so far less that energy [-], the worst once a quarter of the
         work is done; an explicit run counts as quasi-static below 0.05 to 0.1.
         """
-        done = np.cumsum(self.knife[:, 2] * np.diff(self.stroke, prepend=0.0)) - self.kinetic
+        done = self.work_done - self.kinetic
         ok = done > 0.25 * done[-1] if len(done) and done[-1] > 0 else np.zeros(0, bool)
         return float((self.kinetic[ok] / done[ok]).max()) if ok.any() else 0.0
 
     def columns(self) -> dict[str, np.ndarray]:
         """The record as named columns with units, ready for a CSV file."""
-        out = {"stroke_m": self.stroke, "time_s": self.time}
+        out = {"stroke_m": self.stroke, "time_s": self.time, "command_m": self.command, "slide_m": self.slide}
         for name in ("knife", "edge", "face", "board"):
             values = getattr(self, name)
             out |= {f"{name}_f{axis}_N": values[:, k] for k, axis in enumerate("xyz")}
@@ -150,7 +162,9 @@ class ForceRecord:
             "speed_m_s": self.speed,
             "wall_s": self.wall,
             "severed": self.severed,
-            "components": 2 if self.severed else 1,
+            "components": len(self.pieces.volumes) if self.pieces is not None else None,
+            "volumes_m3": list(self.pieces.volumes) if self.pieces is not None else None,
+            "cut": self.pieces.words() if self.pieces is not None else None,
             "momentum_residual": self.momentum_residual,
             "ke_over_ie": self.ke_over_ie,
             "counters": dict(self.counters),
@@ -159,11 +173,11 @@ class ForceRecord:
         }
 
 
-def _moving_mean(stroke: np.ndarray, values: np.ndarray, width: float) -> np.ndarray:
-    """Mean of interval values over a centred window of the stroke, exact for piecewise constant values."""
-    if len(stroke) == 0:
+def _moving_mean(way: np.ndarray, values: np.ndarray, width: float) -> np.ndarray:
+    """Mean of interval values over a centred window of the way, exact for piecewise constant values."""
+    if len(way) == 0:
         return values
-    edges = np.concatenate([[stroke[0] - (stroke[1] - stroke[0] if len(stroke) > 1 else stroke[0])], stroke])
+    edges = np.concatenate([[0.0], way])
     integral = np.concatenate([[0.0], np.cumsum(values * np.diff(edges))])
     centre = (edges[1:] + edges[:-1]) / 2
     half = np.minimum(width / 2, np.minimum(centre - edges[0], edges[-1] - centre))

@@ -30,7 +30,8 @@ class Food:
 class Knife:
     """A straight blade: a wedge of the included angle up to the spine's thickness, parallel above it.
 
-    Attributes: name; spine thickness [m]; included angle of the wedge [rad]; blade height [m]; length along x [m].
+    Attributes: name; spine thickness [m]; included angle of the wedge [rad]; blade height [m]; length along x [m];
+    radius of the tip [m], 0 = sharp. A wire is a blade as thick and half as high as its diameter.
     """
 
     name: str
@@ -38,13 +39,19 @@ class Knife:
     angle: float
     height: float
     length: float
+    radius: float = 0.0
 
     def __post_init__(self) -> None:
         w = f"knife {self.name}"
         check_number(w, "spine", self.spine, 1e-5, 0.1, "m")
         check_number(w, "angle", self.angle, 1e-3, math.pi / 2, "rad")
-        check_number(w, "height", self.height, 1e-3, 1.0, "m")
+        check_number(w, "height", self.height, 1e-4, 1.0, "m")
         check_number(w, "length", self.length, 1e-3, 1.0, "m")
+        check_number(w, "radius", self.radius, -1e-300, 0.05, "m")
+        if 2 * self.radius > self.spine * (1 + 1e-9):
+            raise SceneError(
+                f"{w}: a tip of radius {self.radius * 1e3:g} mm is wider than the spine of {self.spine * 1e3:g} mm"
+            )
 
 
 @dataclass(frozen=True)
@@ -59,20 +66,64 @@ class Board:
 
 @dataclass(frozen=True)
 class Motion:
-    """A vertical press at constant speed.
+    """The commanded motion of the blade: a stroke at constant speed, a pause, a retraction.
 
     Attributes:
-        stroke: Way of the edge below the food's top [m].
-        mach: Blade speed over the P-wave speed [-]. All laws here are rate-independent, so the real speed is replaced
-            by this one; the force changes by less than 1 % up to 0.01 and by 9 % at 0.035.
+        stroke: Way of the edge's middle below the food's top [m].
+        mach: Blade speed over the P-wave speed [-]. All laws are rate-independent by default, so the real speed is
+            replaced by this one; the force changes by less than 1 % up to 0.01 and by 9 % at 0.035.
+        slice_ratio: Speed along the edge over the speed down (slice/push ratio xi) [-].
+        tilt: Angle of the edge to the board, positive when the end at +x is higher [rad].
+        dwell: Pause at the end of the stroke [s], in real time; needs ``speed``.
+        retract: Way back up after it [m].
+        speed: Real speed of the stroke [m/s]; needed by rate-dependent laws and by ``dwell``. Times of the material are
+            then shortened by simulated over real speed, so that the laws see the real duration.
     """
 
     stroke: float
     mach: float = 0.01
+    slice_ratio: float = 0.0
+    tilt: float = 0.0
+    dwell: float = 0.0
+    retract: float = 0.0
+    speed: float | None = None
 
     def __post_init__(self) -> None:
         check_number("motion", "stroke", self.stroke, 1e-4, 1.0, "m")
         check_number("motion", "mach", self.mach, 1e-5, 0.1, "")
+        check_number("motion", "slice_ratio", self.slice_ratio, -20.0, 20.0, "")
+        check_number("motion", "tilt", self.tilt, -1.2, 1.2, "rad")
+        check_number("motion", "dwell", self.dwell, -1e-300, 1e5, "s")
+        check_number("motion", "retract", self.retract, -1e-300, 2.0, "m")
+        if self.speed is not None:
+            check_number("motion", "speed", self.speed, 0.0, 100.0, "m/s")
+        elif self.dwell > 0:
+            raise SceneError("motion: a dwell in seconds needs the real speed of the stroke; give motion.speed")
+
+
+@dataclass(frozen=True)
+class Arm:
+    """What holds the knife: a spring between its commanded and its actual height, and the most force it can give.
+
+    Attributes: stiffness [N/m], None = rigid; force_limit [N], None = none. A limit needs a stiffness, as robots have
+    (a Franka arm in impedance control: up to 3000 N/m).
+    """
+
+    stiffness: float | None = None
+    force_limit: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.stiffness is not None:
+            check_number("arm", "stiffness", self.stiffness, 1.0, 1e9, "N/m")
+        if self.force_limit is not None:
+            check_number("arm", "force_limit", self.force_limit, 0.0, 1e6, "N")
+            if self.rigid:
+                raise SceneError("arm: a rigid arm has no force limit; give arm.stiffness, e.g. 3000 N/m")
+
+    @property
+    def rigid(self) -> bool:
+        """Whether the knife is where it is commanded to be."""
+        return self.stiffness is None
 
 
 @dataclass(frozen=True)
@@ -101,6 +152,7 @@ class Numerics:
         ppc: Particles per cell and direction.
         contact: ``cohesive`` (edge law and particle contact) or ``nodal`` (the plain projection of grid velocities).
         grid_shift: Position of the grid against the scene along x, y, z [cells].
+        grid_turn: Angle of food and blade against the grid [rad].
         mirror: Use the mirror planes x = 0 and y = 0 where the grid lies on them.
         seed: Seed of the particle positions.
         safety: dt over the stability limit of a lone particle [-].
@@ -113,9 +165,10 @@ class Numerics:
     ppc: int = 2
     contact: str = "cohesive"
     grid_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    grid_turn: float = 0.0
     mirror: bool = True
     seed: int = 0
-    safety: float = 0.5
+    safety: float = 0.7
     gravity: float = 9.81
     output: float = 0.25e-3
     precision: str = "f64"
@@ -142,6 +195,7 @@ class Scene:
     board: Board = field(default_factory=Board)
     edge: EdgeLaw = field(default_factory=EdgeLaw)
     numerics: Numerics = field(default_factory=Numerics)
+    arm: Arm = field(default_factory=Arm)
 
     def __post_init__(self) -> None:
         dx, shape = self.numerics.dx, self.food.shape
@@ -153,12 +207,33 @@ class Scene:
         thin = min(shape.length, shape.width, shape.height)
         if thin < 4 * dx:
             raise SceneError(f"shape: {thin * 1e3:g} mm is under 4 cells of {dx * 1e3:g} mm; use a smaller dx")
-        if self.motion.stroke > shape.height * (1 + 1e-9):
-            raise SceneError(
-                f"motion: stroke {self.motion.stroke * 1e3:g} mm goes below the board; the food is "
-                f"{shape.height * 1e3:g} mm high"
-            )
+        self._check_motion()
         self._check_band()
+
+    @property
+    def drop(self) -> float:
+        """How much lower than its middle the tilted edge gets over the food [m]."""
+        reach = min(self.food.shape.width, self.knife.length * math.cos(self.motion.tilt)) / 2
+        return reach * math.tan(abs(self.motion.tilt))
+
+    @property
+    def time_scale(self) -> float:
+        """Simulated over real speed of the knife [-]; 1 when the real speed does not matter."""
+        speed = self.motion.speed
+        return 1.0 if speed is None else self.motion.mach * self.food.material.p_wave / speed
+
+    def _check_motion(self) -> None:
+        m, height = self.motion, self.food.shape.height
+        if m.stroke + self.drop > height * (1 + 1e-9) and (self.arm.rigid or m.tilt != 0):
+            raise SceneError(
+                f"motion: stroke {m.stroke * 1e3:g} mm goes below the board; the food is {height * 1e3:g} mm high"
+                + (f" and the tilted edge reaches {self.drop * 1e3:.1f} mm lower than its middle" if m.tilt else "")
+            )
+        if self.food.material.rate_dependent and m.speed is None:
+            raise SceneError(
+                "material: prony makes the force depend on the real speed of the knife, and speeding the simulation up "
+                "would change it; give motion.speed [m/s]"
+            )
 
     def _check_band(self) -> None:
         m = self.food.material
@@ -174,13 +249,14 @@ class Scene:
 
     @property
     def mirrors(self) -> tuple[bool, bool]:
-        """Whether the planes x = 0 and y = 0 are used as mirrors: only when nodes lie on them."""
+        """Whether the planes x = 0 and y = 0 are used as mirrors: only when nodes lie on them and the motion allows."""
         sx, sy, _ = self.numerics.grid_shift
         cohesive = self.numerics.contact == "cohesive"
-        on = self.numerics.mirror
-        return on and float(sx).is_integer(), on and cohesive and float(sy).is_integer()
+        on = self.numerics.mirror and self.numerics.grid_turn == 0
+        straight = self.motion.slice_ratio == 0 and self.motion.tilt == 0
+        return on and straight and float(sx).is_integer(), on and cohesive and float(sy).is_integer()
 
-    def with_material(self, **values: float) -> Scene:
+    def with_material(self, **values: Any) -> Scene:
         """The same scene with other material constants."""
         return replace(self, food=replace(self.food, material=replace(self.food.material, **values)))
 

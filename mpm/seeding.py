@@ -22,12 +22,25 @@ class Seeds:
         volume: Volume of one particle [m^3]; the particles of all mirror images add up to the shape's volume.
         spacing: Lattice spacing [m].
         foot: Distance of each particle from the lower surface, at most half a spacing [m], shape (n,).
+        cells: Lattice cell of each particle, counted from the cut plane along y (-1, 0 on either side of it), shape
+            (n, 3).
     """
 
     x: np.ndarray
     volume: float
     spacing: float
     foot: np.ndarray
+    cells: np.ndarray
+
+    @property
+    def gap(self) -> np.ndarray:
+        """Distance of each particle from the cut plane, at most half a spacing [m], shape (n,)."""
+        return np.minimum(np.abs(self.x[:, 1]), self.spacing / 2)
+
+    @property
+    def beside(self) -> np.ndarray:
+        """Whether a particle is in the first layer beside the cut plane, shape (n,)."""
+        return np.isin(self.cells[:, 1], (-1, 0))
 
 
 def seed(scene: Scene) -> Seeds:
@@ -44,14 +57,18 @@ def seed(scene: Scene) -> Seeds:
     low = np.array([0.0 if mirror_x else -shape.width / 2, -shape.length / 2, 0.0])
     high = np.array([shape.width / 2, 0.0 if mirror_y else shape.length / 2, shape.height])
     counts = np.ceil((high - low) / h - 1e-9).astype(int)
+    if not mirror_y:
+        counts[1] += counts[1] % 2  # the cut plane lies between two layers
     if counts.prod() > MAX_PARTICLES:
         raise SceneError(f"numerics: dx = {num.dx * 1e3:g} mm makes {counts.prod():,} particles; use a larger dx")
     # the lattice starts on the mirror planes (x = 0 below, y = 0 above) and on the board
-    origin = np.array([low[0], high[1] - counts[1] * h, 0.0])
+    right = 0 if mirror_y else counts[1] // 2
+    origin = np.array([low[0], (right - counts[1]) * h, 0.0])
     cells = np.stack(np.meshgrid(*[np.arange(n) for n in counts], indexing="ij"), -1).reshape(-1, 3)
     rng = np.random.default_rng(num.seed)
     points = origin + (cells + rng.uniform(0.0, 1.0, cells.shape)) * h
-    points = points[inside(shape, points)]
+    there = inside(shape, points)
+    points, cells = points[there], cells[there] - [0, counts[1] - right, 0]
     bottom, _ = surface(shape, points[:, 0], points[:, 1])
     images = (2 if mirror_x else 1) * (2 if mirror_y else 1)
-    return Seeds(points, volume(shape) / images / len(points), h, np.minimum(points[:, 2] - bottom, h / 2))
+    return Seeds(points, volume(shape) / images / len(points), h, np.minimum(points[:, 2] - bottom, h / 2), cells)

@@ -18,12 +18,14 @@ from mpm.runtime import Runtime, start
 from mpm.scene import BAND_CELLS, Scene
 from mpm.seeding import seed
 from mpm.shapes import section_area, skin_path, slices
+from mpm.topology import topology
 
 PAD = 3  # empty cells around the food: a quadratic kernel reaches 1.5 cells, the rest is room to move
 MARGIN = 3  # cells by which the active window exceeds the particles; renewed at every output interval
 SPREAD = 0.5  # room for the food to widen while it is pressed, part of its size
 APPROACH = 0.1  # way of the blade above the food before contact, in cells
 EDGE_STEP = 0.5  # dt times the frequency of the edge's cohesive spring, 2 is unstable
+TACK_STEP = 0.5  # the same for the rising part of the adhesive traction
 
 Progress = Callable[[float, float], None]
 
@@ -47,18 +49,29 @@ class Simulation:
         self._layout()
         threads = self.runtime.cpu_threads if self.runtime.arch == "cpu" else 0
         damage = scene.food.material.tensile_strength is not None
-        nodal = scene.numerics.contact == "nodal"
         self.k: Any = Kernels(
-            len(self.seeds.x), self.nodes, scene.numerics.dx, self.origin, self.planes, threads, nodal, damage
+            len(self.seeds.x),
+            self.nodes,
+            scene.numerics.dx,
+            self.origin,
+            self.planes,
+            len(self.stations),
+            self.stations[0],
+            threads,
+            scene.numerics.contact == "nodal",
+            damage,
+            scene.numerics.grid_turn != 0,
+            len(scene.food.material.prony),
         )
 
     def _layout(self) -> None:
         """Place the grid: around the food with room to widen, nodes on the mirror planes."""
         shape, num = self.scene.food.shape, self.scene.numerics
-        dx = num.dx
-        mirror = (*self.scene.mirrors, False)
+        dx, mirror = num.dx, (*self.scene.mirrors, False)
+        c, s = abs(math.cos(num.grid_turn)), abs(math.sin(num.grid_turn))
+        wide, deep = c * shape.width + s * shape.length, s * shape.width + c * shape.length
         low, high, zero = [], [], []
-        for axis, size in enumerate((shape.width, shape.length, shape.height)):
+        for axis, size in enumerate((wide, deep, shape.height)):
             shift = num.grid_shift[axis] % 1.0
             room = PAD + math.ceil(SPREAD * size / 2 / dx)
             bottom = -PAD if axis == 2 else -math.ceil(size / 2 / dx) - room
@@ -74,6 +87,17 @@ class Simulation:
         self.origin = np.array([(b - z) * dx for b, z in zip(low, zero, strict=True)])
         self.planes = (-low[0] if mirror[0] else -1, -low[1] if mirror[1] else -1)
         self.images = (2 if mirror[0] else 1) * (2 if mirror[1] else 1)
+        if num.grid_turn:
+            half = math.ceil(shape.width / 2 / dx) + PAD
+            self.stations = dx * np.arange(-half, half + 1)
+        else:
+            self.stations = self.origin[0] + dx * np.arange(self.nodes[0])
+
+    def _turn(self, vectors: np.ndarray, sign: float = 1.0) -> np.ndarray:
+        """Vectors (n, 3) of the scene's axes in the grid's, or back with ``sign`` -1."""
+        angle = sign * self.scene.numerics.grid_turn
+        c, s = math.cos(angle), math.sin(angle)
+        return vectors @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
     def _retardation(self, material: Material) -> float:
         """Kelvin-Voigt retardation time that gives the loss factor at the first axial mode c/(4 height) [s]."""
@@ -89,15 +113,21 @@ class Simulation:
         if num.contact == "cohesive":
             spring = math.sqrt(max(material.start, 1e-12) / (edge.slip * material.rho * edge.zone**2))
             dt = min(dt, EDGE_STEP / spring)
+            if material.adhesion > 0:
+                pull = material.adhesion / (material.rho * self.seeds.spacing)  # acceleration at full strength
+                dt = min(dt, TACK_STEP * math.sqrt(0.1 * 2 * material.adhesion_energy / material.adhesion / pull))
         return dt
 
     def _load(self, material: Material) -> None:
         """Write seeds and constants into the fields."""
         k, scene, num, edge = self.k, self.scene, self.scene.numerics, self.scene.edge
         real = np.float64 if num.precision == "f64" else np.float32
-        k.x.from_numpy(self.seeds.x.astype(real))
+        k.x.from_numpy(self._turn(self.seeds.x).astype(real))
         k.foot.from_numpy(self.seeds.foot.astype(real))
+        k.gap.from_numpy(self.seeds.gap.astype(real))
         k.reset()
+        sticky = self.seeds.beside & (material.adhesion > 0)
+        k.tacky.from_numpy(np.where(sticky, 0, -1).astype(np.int32))
         knife = scene.knife
         table = np.zeros(kn.N_PARAMETERS)
         table[kn.MU], table[kn.LAM] = material.shear, material.lame
@@ -113,18 +143,52 @@ class Simulation:
             table[kn.EPS0] = eps0
             table[kn.EPSF] = eps0 / 2 + material.fracture_energy / (material.tensile_strength * band)
         table[kn.SPINE], table[kn.BLADE], table[kn.HALF_LENGTH] = knife.spine, knife.height, knife.length / 2
-        table[kn.COS], table[kn.SIN] = math.cos(knife.angle / 2), math.sin(knife.angle / 2)
-        table[kn.GRAVITY], table[kn.REACH] = num.gravity, self.seeds.spacing / 2
+        table[kn.COS], table[kn.SIN], table[kn.RADIUS] = (
+            math.cos(knife.angle / 2),
+            math.sin(knife.angle / 2),
+            knife.radius,
+        )
+        table[kn.TILT_COS], table[kn.TILT_SIN] = math.cos(scene.motion.tilt), math.sin(scene.motion.tilt)
+        table[kn.YAW_COS], table[kn.YAW_SIN] = math.cos(num.grid_turn), math.sin(num.grid_turn)
+        table[kn.GRAVITY] = num.gravity
         beta = self._retardation(material)
         table[kn.ETA_S], table[kn.ETA_B] = beta * material.shear, beta * (material.lame + 2 / 3 * material.shear)
+        table[kn.TACK], table[kn.TACK_GAP] = material.adhesion / (material.rho * self.seeds.spacing), 1.0
+        if material.adhesion > 0:
+            table[kn.TACK_GAP] = 2 * material.adhesion_energy / material.adhesion
+        if scene.arm.stiffness is not None:
+            table[kn.ARM_K], table[kn.ARM_LIMIT] = scene.arm.stiffness, scene.arm.force_limit or 1e30
+            table[kn.ARM_MASS] = self._arm_mass(material, scene.arm.stiffness)
+            table[kn.ARM_C] = 2 * math.sqrt(scene.arm.stiffness * table[kn.ARM_MASS])
         k.par.from_numpy(table.astype(real))
-        xs = self.origin[0] + num.dx * np.arange(self.nodes[0])
-        over = np.clip((knife.length / 2 - np.abs(xs)) / num.dx + 0.5, 0.0, 1.0)
-        k.cover.from_numpy(over.astype(real))
+        for b, (share, time) in enumerate(material.prony):
+            k.share[b], k.relax[b] = share, self._time_step(material) * scene.time_scale / time
+        xs = self.stations
         path = skin_path(scene.food.shape, xs, material.skin_thickness) if material.skin_thickness > 0 else 0 * xs
         for field, values in zip((k.top, k.low, k.width), slices(scene.food.shape, xs, num.dx), strict=True):
             field.from_numpy(values.astype(real))
         k.soften.from_numpy((edge.slip + path).astype(real))
+        self._set_pose(scene.food.shape.height + self._gap())
+
+    def _set_pose(self, z: float) -> None:
+        """Put the middle of the edge at a height, at rest [m]."""
+        pose = np.zeros(kn.N_POSE)
+        pose[kn.Z] = pose[kn.COMMAND] = z
+        self.k.pose.from_numpy(pose)
+
+    def _gap(self) -> float:
+        """Way of the edge's middle above the food before contact [m]."""
+        return APPROACH * self.scene.numerics.dx + self.scene.drop
+
+    def _arm_mass(self, material: Material, stiffness: float) -> float:
+        """Mass of the arm [kg]: as slow as the food's first axial mode, not lighter than the food beside the blade.
+
+        The real mass is immaterial: in a quasi-static cut the arm's inertia has no part in the force.
+        """
+        shape = self.scene.food.shape
+        period = 4 * shape.height / material.p_wave
+        layer = material.rho * 2 * self.scene.numerics.dx * section_area(shape)
+        return max(stiffness * (period / (2 * math.pi)) ** 2, layer)
 
     def run(self, material: Material | None = None, progress: Progress | None = None) -> ForceRecord:
         """Simulate the cut.
@@ -139,33 +203,45 @@ class Simulation:
         scene = self.scene.with_material(**vars(material)) if material is not None else self.scene
         material = scene.food.material
         self._load(material)
-        num, height = scene.numerics, scene.food.shape.height
+        num, motion = scene.numerics, scene.motion
         dt = self._time_step(material)
-        speed = scene.motion.mach * material.p_wave
+        speed = motion.mach * material.p_wave
         every = max(1, round(num.output / (speed * dt)))
-        gap = APPROACH * num.dx
-        total = math.ceil((scene.motion.stroke + gap) / (speed * dt))
+        gap = self._gap()
+        # steps, velocity down and along the blade of each phase
+        phases = [
+            (math.ceil((motion.stroke + gap) / (speed * dt)), -speed, speed * motion.slice_ratio),
+            (math.ceil(motion.dwell / scene.time_scale / dt), 0.0, 0.0),
+            (math.ceil(motion.retract / (speed * dt)), speed, 0.0),
+        ]
+        total = sum(steps for steps, _, _ in phases)
         rows: list[list[float]] = []
         began = clock.perf_counter()
         status, done, last = "done", 0, np.zeros(3)
         self.counters = {"inverted": 0, "outside": 0}
-        while done < total:
-            count = min(every, total - done)
-            self._advance(count, dt, height + gap - speed * dt * done, speed)
-            done += count
-            sums, state = self.k.sums.to_numpy(), self._state()
-            self.k.sums.fill(0.0)
-            self.counters["inverted"] += int(sums[kn.INVERTED])
-            self.counters["outside"] += int(sums[kn.OUTSIDE])
-            row = self._row(sums, state, last, count * dt, material, num.gravity)
-            last = np.array(row[0])
-            rows.append([speed * dt * done - gap, dt * done, *(v for part in row for v in part)])
-            status = _health(sums, state)
-            if status != "done":
-                break
-            if progress is not None:
-                progress(done / total, row[1][2] + row[2][2])
-        return self._record(rows, status, done / total, dt, done, speed, clock.perf_counter() - began)
+        for steps, down, along in phases:
+            left = steps
+            while left > 0 and status == "done":
+                count = min(every, left)
+                self._advance(count, dt, down, along)
+                left, done = left - count, done + count
+                sums, state = self.k.sums.to_numpy(), self._state()
+                self.k.sums.fill(0.0)
+                self.k.pose[kn.BOOKED] = 0.0
+                self.counters["inverted"] += int(sums[kn.INVERTED])
+                self.counters["outside"] += int(sums[kn.OUTSIDE])
+                row = self._row(sums, state, last, count * dt, material, num.gravity)
+                last = np.array(row[0])
+                rows.append([*self._place(), dt * done, *(v for part in row for v in part)])
+                status = _health(sums, state)
+                if progress is not None and status == "done":
+                    progress(done / total, row[1][2] + row[2][2])
+        return self._record(rows, material, status, done / total, dt, done, speed, clock.perf_counter() - began)
+
+    def _place(self) -> list[float]:
+        """Stroke, commanded stroke and way along the blade now [m]."""
+        pose, height = self.k.pose.to_numpy(), self.scene.food.shape.height
+        return [height - pose[kn.Z], height - pose[kn.COMMAND], pose[kn.S]]
 
     def _window(self) -> Any:
         """Nodes that the particles can reach before the next output interval; planes keep their ghosts."""
@@ -176,14 +252,14 @@ class Simulation:
                 low[axis], high[axis] = min(low[axis], plane - 2), max(high[axis], plane + 3)
         return IVEC6([*np.maximum(low, 0), *np.minimum(high, self.nodes)])
 
-    def _advance(self, count: int, dt: float, tip: float, speed: float) -> None:
-        """Some time steps with the edge at ``tip`` in the first one [m]."""
+    def _advance(self, count: int, dt: float, down: float, along: float) -> None:
+        """Some time steps with the tool commanded at these velocities [m/s]."""
         window = self._window()
         if self.k.threads == 1 and not self.k.atomic:
-            self.k.steps(count, dt, tip, speed, window)
+            self.k.steps(count, dt, down, along, window)
             return
-        for n in range(count):
-            self.k.step(dt, tip - speed * dt * n, speed, window)
+        for _ in range(count):
+            self.k.step(dt, down, along, window)
 
     def _state(self) -> np.ndarray:
         self.k.measure()
@@ -194,7 +270,7 @@ class Simulation:
     ) -> list[list[float]]:
         """Momentum, edge, face, board, gravity, residual, energies of one interval."""
         mirror = np.array([0.0 if m else 1.0 for m in (*self.scene.mirrors, False)])
-        momentum = state[:3] * self.images * mirror
+        momentum = self._turn(state[None, :3], -1.0)[0] * self.images * mirror
         edge, face, board = (sums[r : r + 3] / span for r in (kn.EDGE, kn.FACE, kn.BOARD))
         weight = np.array([0.0, 0.0, -material.rho * self.seeds.volume * len(self.seeds.x) * self.images * gravity])
         residual = (momentum - last) / span - weight + edge + face + board
@@ -202,9 +278,23 @@ class Simulation:
         energy = [state[3] * self.images, state[4] * self.images, *lost]
         return [list(momentum), list(edge), list(face), list(board), list(weight), list(residual), energy]
 
+    def _topology(self) -> Any:
+        """Pieces of the food now."""
+        k, mirrors = self.k, self.scene.mirrors
+        side, f = k.side.to_numpy(), k.F.to_numpy()
+        across = self._turn(k.x.to_numpy(), -1.0)[:, 1]
+        half = np.where(side > 0, side - 1, 0 if mirrors[1] else across >= 0)
+        damage = np.zeros(len(side))
+        if k.damage:
+            table = k.par.to_numpy()
+            kappa = np.maximum(k.kappa.to_numpy(), table[kn.EPS0])
+            damage = 1 - table[kn.EPS0] / kappa * np.exp(-(kappa - table[kn.EPS0]) / (table[kn.EPSF] - table[kn.EPS0]))
+        return topology(self.seeds, mirrors, half.astype(int), side > 0, np.linalg.det(f), damage)
+
     def _record(
         self,
         rows: list[list[float]],
+        material: Material,
         status: str,
         fraction: float,
         dt: float,
@@ -214,13 +304,16 @@ class Simulation:
     ) -> ForceRecord:
         """Columns of the rows as a record."""
         a = np.array(rows)
-        parts = {n: a[:, 2 + 3 * k : 5 + 3 * k] for k, n in enumerate(("p", "edge", "face", "board", "g", "res"))}
-        kinetic, elastic = a[:, 20], a[:, 21]
-        plastic, damage, viscous = np.cumsum(a[:, 22:25], axis=0).T
-        shape = self.scene.food.shape
+        parts = {n: a[:, 4 + 3 * k : 7 + 3 * k] for k, n in enumerate(("p", "edge", "face", "board", "g", "res"))}
+        kinetic, elastic = a[:, 22], a[:, 23]
+        plastic, damage, viscous = np.cumsum(a[:, 24:27], axis=0).T
+        pieces = self._topology() if status == "done" else None
+        area = section_area(self.scene.food.shape)
         return ForceRecord(
             stroke=a[:, 0],
-            time=a[:, 1],
+            command=a[:, 1],
+            slide=a[:, 2],
+            time=a[:, 3],
             edge=parts["edge"],
             face=parts["face"],
             board=parts["board"],
@@ -239,8 +332,8 @@ class Simulation:
             particles=len(self.seeds.x),
             images=self.images,
             cells=int(np.prod(self.nodes)),
-            severed_area=section_area(shape),
-            whole=float(np.mean(self.k.side.to_numpy() == 0)),
+            severed_area=area - pieces.uncut_area if pieces is not None else 0.0,
+            pieces=pieces,
             counters=self.counters,
             wall=wall,
             status=status,

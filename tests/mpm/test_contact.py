@@ -19,7 +19,7 @@ def evaluate():
 
     @ti.kernel
     def blade():
-        d, n = contact.blade_distance(inp[0], inp[1], inp[2], ti.cos(inp[3] / 2), ti.sin(inp[3] / 2))
+        d, n = contact.blade_distance(inp[0], inp[1], inp[2], ti.cos(inp[3] / 2), ti.sin(inp[3] / 2), inp[4])
         out[0], out[1], out[2], out[3] = d, n[0], n[1], n[2]
 
     @ti.kernel
@@ -43,6 +43,22 @@ def evaluate():
         return out.to_numpy()
 
     return run
+
+
+@pytest.mark.parametrize(("y", "z"), [(0.1e-3, 0.1e-3), (0.4e-3, 0.2e-3), (0.6e-3, 0.5e-3), (0.8e-3, 4e-3)])
+def test_rounded_tip_is_a_circle_that_touches_the_faces(evaluate, y, z):
+    """With a tip radius the distance is that to a circle at the edge and to the wedge's faces tangent to it."""
+    r, half = 0.5e-3, ANGLE / 2
+    tangent = np.array([r * np.cos(half), r - r * np.sin(half)])
+    along = np.array([np.sin(half), np.cos(half)])
+    face = tangent + np.linspace(0, 20e-3, 40001)[:, None] * along
+    angle = np.linspace(-np.pi / 2, -half, 4001)
+    arc = np.stack([r * np.cos(angle), r + r * np.sin(angle)], -1)
+    outline = np.concatenate([arc, face])
+    expected = np.sqrt(((outline - [y, z]) ** 2).sum(1)).min()
+    got = evaluate("blade", y, z, 1.0, ANGLE, r)
+    assert abs(got[0]) == pytest.approx(expected, abs=2e-6)
+    assert np.linalg.norm(got[1:]) == pytest.approx(1.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("y", [0.05e-3, 0.3e-3, 0.9e-3, 1.5e-3, 4e-3])

@@ -32,6 +32,7 @@ class Free:
         self.sim = Simulation(scene(shape, gravity=gravity), Runtime(threads=1))
         self.k, self.dt, self.x0 = self.sim.k, self.sim._time_step(MATERIAL), self.sim.seeds.x
         self.sim._load(MATERIAL)
+        self.sim._set_pose(1.0)
         self.k.foot.fill(-1.0)  # nothing touches the board
 
     def start(self, velocity: np.ndarray, gradient: np.ndarray) -> None:
@@ -44,7 +45,7 @@ class Free:
         done = 0
         while done < steps:
             n = min(20, steps - done)
-            self.sim._advance(n, self.dt, 1.0, 0.0)
+            self.sim._advance(n, self.dt, 0.0, 0.0)
             done += n
 
     def momenta(self) -> tuple[np.ndarray, np.ndarray, float]:
@@ -145,9 +146,10 @@ def test_block_at_rest_weighs_its_weight():
     sc = replace(sc, knife=replace(KNIFE, name="away"), motion=Motion(2e-3, 1e-3))
     sim = Simulation(sc, Runtime(threads=1))
     sim._load(sc.food.material)
+    sim._set_pose(1.0)
     dt, total, n = sim._time_step(sc.food.material), 0.0, 0
     for block_of_steps in range(60):
-        sim._advance(20, dt, 1.0, 0.0)
+        sim._advance(20, dt, 0.0, 0.0)
         sums = sim.k.sums.to_numpy()
         sim.k.sums.fill(0.0)
         if block_of_steps >= 30:

@@ -1,0 +1,166 @@
+"""The cutting edge as a line that moves through the grid with a cohesive law, slice by slice along the blade."""
+
+import taichi as ti
+
+from mpm.contact import bspline, edge_level
+from mpm.fields import DEPTH, EDGE, FULL, HALF_LENGTH, R_FLESH, R_START, SLIP, TILT_COS, TILT_SIN, VS, VZ, ZONE, S
+from mpm.nodes import Nodes
+
+# Kernel mass of the process zone of an edge that touches a flat surface, over rho dx zone^2 (exact: the zone is centred
+# half a zone below the edge).
+SURFACE_FILL = 5 / 6
+EMPTY_ZONE = 0.15  # filled less than this the zone carries no edge; at the board it is still filled to 0.2
+
+
+@ti.data_oriented
+class Edge(Nodes):
+    """The edge's law and its reaction on the grid."""
+
+    @ti.func
+    def slice_nodes(self, i):
+        """Nodes whose velocity slice i feels, as the corners (low 3, high 3) of a box."""
+        reach = 1.5 * self.par[ZONE]
+        s = self.first + i * self.dx
+        mid = self.grid_axes(ti.Vector([s, 0.0, self.front[i] - 0.5 * self.par[ZONE]]))
+        wide, deep = 0.0, reach
+        if ti.static(self.turned):
+            e = ti.abs(self.grid_axes(ti.Vector([self.dx, 0.0, 0.0])))
+            f = ti.abs(self.grid_axes(ti.Vector([0.0, reach, 0.0])))
+            wide, deep = e[0] + f[0], e[1] + f[1]
+        r = (mid - ti.Vector([self.ox, self.oy, self.oz])) * self.inv
+        h = ti.Vector([wide + 1e-6 * self.dx, deep, reach]) * self.inv
+        out = ti.Vector([0, 0, 0, 0, 0, 0])
+        for d in ti.static(range(3)):
+            out[d] = ti.max(0, ti.ceil(r[d] - h[d], ti.i32))
+            out[d + 3] = ti.min(ti.static(self.nodes[d]), ti.floor(r[d] + h[d], ti.i32) + 1)
+        return out
+
+    @ti.func
+    def zone_weight(self, i, a, j, k):
+        """Weight of node (a, j, k) in the process zone of slice i, which is centred half a zone below the edge."""
+        z = self.par[ZONE]
+        at = self.blade_axes(self.node(a, j, k))
+        w = bspline(at[1] / z) * bspline((at[2] - self.front[i]) / z + 0.5)
+        if ti.static(self.turned):
+            w *= ti.max(0.0, 1.0 - ti.abs(at[0] - self.first - i * self.dx) * self.inv)
+        return w
+
+    @ti.func
+    def line_force(self, i, tangential, forward):
+        """Force per length of the edge in one slice after it moved against the material [N/m]: along the edge, forward.
+
+        The slip is elastic up to a limit and points where the edge goes. A cut starts where the force reaches the
+        threshold, at the indentation that belongs to it, and from there runs along the blade to every slice that
+        already carries the propagation resistance: growing a crack takes less than starting one. Then the force falls
+        to that resistance. It acts against the motion and only the way forward makes new surface, so that with a
+        slice/push ratio xi the forward force is R / (1 + xi^2) (Atkins, Xu and Jeronimidis 2004).
+        """
+        limit, flesh = self.par[SLIP], self.par[R_FLESH]
+        e = self.slip[i] + ti.Vector([tangential, forward])
+        e[1] = ti.max(e[1], 0.0)
+        size = e.norm()
+        steep = e[1] / size if size > 0 else 0.0
+        level = 0.0
+        if self.start[i] <= 0:
+            level = self.par[R_START] * size / self.par[DEPTH]
+            if level >= self.par[R_START] or (self.near[i] > 0 and level >= flesh):
+                self.start[i] = ti.max(level, 1e-9)
+                e *= limit / size
+        else:
+            if size > limit:
+                self.cut[i] += (size - limit) * steep
+                e *= limit / size
+                size = limit
+            level = edge_level(self.cut[i], self.soften[i], self.start[i], flesh) * size / limit
+        self.slip[i] = e
+        return level * steep * e / ti.max(e.norm(), 1e-30)
+
+    @ti.func
+    def over(self, s):
+        """Part of a slice that is under the blade [-]."""
+        reach = self.par[HALF_LENGTH] * self.par[TILT_COS] - ti.abs(s - ti.cast(self.pose[S], float))
+        return ti.math.clamp(reach * self.inv + 0.5, 0.0, 1.0)
+
+    @ti.func
+    def lead(self, i):
+        """Move the crack front of slice i: down with the edge, and with the food where the blade has gone."""
+        s = self.first + i * self.dx
+        tip = self.edge_height(s)
+        self.front[i] += self.drift[i]
+        if self.over(s) > 0 and tip < self.front[i]:
+            self.front[i] = tip
+
+    @ti.func
+    def feel(self, i, dt):
+        """Find the edge's reaction on slice i in this step, as a change of velocity."""
+        self.push[i], self.drift[i] = ti.Vector.zero(float, 2), 0.0
+        s = self.first + i * self.dx
+        tip = self.edge_height(s)
+        over = self.over(s)
+        box = self.slice_nodes(i)
+        mass, mom = 0.0, ti.Vector.zero(float, 3)
+        images = ti.static(2.0 if self.my else 1.0)
+        for a in range(box[0], box[3]):
+            for j in range(box[1], box[4]):
+                for k in range(box[2], box[5]):
+                    q = images * self.zone_weight(i, a, j, k) * self.moving(a, j, k)
+                    mass += q[3]
+                    mom += ti.Vector([q[0], q[1], q[2]])
+        # the zone reaches below the edge and beside the food, so the width that is cut is that of the outline
+        width = self.dx * self.width[i] * ti.math.clamp((self.top[i] - tip) / (self.top[i] - self.low[i]), 0.0, 1.0)
+        full = SURFACE_FILL * self.par[FULL] * width * self.inv
+        if width > 0 and mass > EMPTY_ZONE * full:
+            c, t = self.par[TILT_COS], self.par[TILT_SIN]
+            mean = self.blade_axes(mom / mass)
+            if over > 0 and tip <= self.front[i] + self.par[SLIP]:
+                slide = (ti.cast(self.pose[VS], float) - mean[0]) * dt
+                fall = (mean[2] - ti.cast(self.pose[VZ], float)) * dt
+                line = self.line_force(i, c * slide - t * fall, c * fall + t * slide)
+                along, down = c * line[0] + t * line[1], c * line[1] - t * line[0]
+                impulse = ti.Vector([along, -down]) * width / c * over * dt
+                self.push[i] = impulse / mass
+                self.tool(EDGE, -self.images_x(i) * ti.Vector([impulse[0], 0.0, impulse[1]]))
+            else:
+                self.slip[i] = ti.Vector.zero(float, 2)
+                if self.front[i] < 1e2:  # the blade has gone: the front stays in the material
+                    self.drift[i] = mean[2] * dt
+        else:
+            self.slip[i] = ti.Vector.zero(float, 2)
+
+    @ti.func
+    def moving(self, a, j, k):
+        """Momentum and mass of both fields of a node."""
+        q = self.u[a, j, k]
+        out = q[3] * ti.Vector([q[0], q[1], q[2], 1.0])
+        if ti.static(self.b1 > self.b0):
+            if self.b0 <= j < self.b1:
+                other = self.u[a, self.second + j, k]
+                out += other[3] * ti.Vector([other[0], other[1], other[2], 1.0])
+        return out
+
+    @ti.func
+    def react(self, i):
+        """Give the grid the reaction of slice i."""
+        if self.push[i].norm_sqr() > 0:
+            box = self.slice_nodes(i)
+            dv = self.grid_axes(ti.Vector([self.push[i][0], 0.0, self.push[i][1]]))
+            for a in range(box[0], box[3]):
+                for j in range(box[1], box[4]):
+                    for k in range(box[2], box[5]):
+                        w = self.zone_weight(i, a, j, k)
+                        if w > 0:
+                            self.give(a, j, k, w * dv)
+                            if ti.static(self.mx):
+                                image = 2 * self.i0 - a
+                                if a > self.i0 and image >= 0:
+                                    self.give(image, j, k, w * ti.Vector([-dv[0], dv[1], dv[2]]))
+
+    @ti.func
+    def give(self, a, j, k, dv):
+        """Change the velocity of both fields of a node."""
+        for d in ti.static(range(3)):
+            self.u[a, j, k][d] += dv[d]
+        if ti.static(self.b1 > self.b0):
+            if self.b0 <= j < self.b1:
+                for d in ti.static(range(3)):
+                    self.u[a, self.second + j, k][d] += dv[d]
