@@ -256,8 +256,10 @@ class Kernels(Edge):
         if self.par[ARM_MASS] > 0:
             booked = self.sums[EDGE + 2] + self.sums[FACE + 2]
             limit = ti.cast(self.par[ARM_LIMIT], ti.f64)
-            pull = self.par[ARM_K] * (self.pose[COMMAND] - self.pose[Z]) + self.par[ARM_C] * (vz - self.pose[VZ])
-            pull = ti.math.clamp(pull, -limit, limit)
+            spring = self.par[ARM_K] * (self.pose[COMMAND] - self.pose[Z])
+            pull = ti.math.clamp(spring + self.par[ARM_C] * (vz - self.pose[VZ]), -limit, limit)
+            if ti.abs(spring) > 2 * limit:  # stalled: it pulls as hard as it can and only stops rattling
+                pull = ti.math.clamp(spring, -limit, limit) - self.par[ARM_C] * self.pose[VZ]
             self.pose[VZ] += (pull * dt + booked - self.pose[BOOKED]) / self.par[ARM_MASS]
             self.pose[BOOKED] = booked
         else:

@@ -55,6 +55,8 @@ def start(runtime: Runtime, precision: str) -> int:
             default_fp=real,
             cpu_max_num_threads=runtime.cpu_threads,
             offline_cache=True,
+            # LLVM does the same work again: a cut's kernel compiles in 5 instead of 38 s and runs as fast
+            advanced_optimization=runtime.arch != "cpu",
             log_level=ti.ERROR,
             random_seed=0,
             enable_fallback=False,

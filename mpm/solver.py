@@ -227,7 +227,7 @@ class Simulation:
                 left, done = left - count, done + count
                 sums, state = self.k.sums.to_numpy(), self._state()
                 self.k.sums.fill(0.0)
-                self.k.pose[kn.BOOKED] = 0.0
+                self.k.pose[kn.BOOKED] -= sums[kn.EDGE + 2] + sums[kn.FACE + 2]  # what the arm has not felt yet
                 self.counters["inverted"] += int(sums[kn.INVERTED])
                 self.counters["outside"] += int(sums[kn.OUTSIDE])
                 row = self._row(sums, state, last, count * dt, material, num.gravity)

@@ -69,7 +69,9 @@ def test_force_scales_with_all_stresses(prism):
 def test_initiation_needs_more_than_propagation():
     """A threshold of 3 R at 2 mm of indentation shows as a peak of 3 R w (7 %) that falls back to R w (3 %)."""
     stiff = replace(FLESH, E=5e6, yield_stress=1e6, R_initiation=900.0, initiation_depth=2e-3)
-    fine = replace(PRISM, numerics=replace(PRISM.numerics, output=0.1e-3))  # the peak is narrower than the usual 0.25 mm
+    fine = replace(
+        PRISM, numerics=replace(PRISM.numerics, output=0.1e-3)
+    )  # the peak is narrower than the usual 0.25 mm
     record = cut(replace(fine, food=replace(PRISM.food, material=stiff)))
     assert record.peak == pytest.approx(3 * 7.2, rel=0.07)
     assert plateau(record) == pytest.approx(7.2, rel=0.03)

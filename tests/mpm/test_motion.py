@@ -1,0 +1,177 @@
+"""Blade motion: slicing, tilt, retraction, arm, rate, adhesion, and what is left of the food."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpm.errors import SceneError
+from mpm.material import Material
+from mpm.record import ForceRecord
+from mpm.runtime import Runtime
+from mpm.scene import Arm, Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
+from mpm.shapes import Shape
+from mpm.solver import Simulation
+
+THIN = Knife("thin", 0.2e-3, np.deg2rad(1.0), 0.05, 0.4)
+WEDGE = Knife("wedge", 2e-3, np.deg2rad(11.0), 0.0104, 0.2)
+FLESH = Material(E=1e6, nu=0.35, rho=1000, yield_stress=2e5, R=300.0, R_initiation=300.0, loss_factor=0.1)
+PRISM = Scene(
+    Food(Shape("block", 0.03, 0.024, 0.024), FLESH),
+    THIN,
+    Motion(0.018, 0.01),
+    edge=EdgeLaw(zone=3e-3),
+    numerics=Numerics(dx=3e-3),
+)
+
+# rough board, wide and low: or the food slides along with the blade, or tips over
+HELD = replace(PRISM, food=Food(Shape("block", 0.03, 0.072, 0.024), FLESH), board=Board(mu=9.0))
+R_W = 300 * 0.072
+
+
+def cut(scene: Scene) -> ForceRecord:
+    """Run a scene on one thread and insist on a sound end."""
+    record = Simulation(scene, Runtime(threads=1)).run()
+    assert record.status == "done"
+    assert record.counters == {"inverted": 0, "outside": 0}
+    assert record.momentum_residual < 1e-10
+    return record
+
+
+def between(record: ForceRecord, values: np.ndarray, low: float = 8e-3, high: float = 15e-3) -> float:
+    """Mean of a column over a part of the stroke on the way down."""
+    n = int(record.stroke.argmax()) + 1
+    inside = (record.stroke[:n] > low) & (record.stroke[:n] < high)
+    return float(values[:n][inside].mean())
+
+
+@pytest.fixture(scope="module")
+def sliding() -> Simulation:
+    """A prism held on a rough board, whose blade may also move along its edge; the ratio is changed run by run."""
+    return Simulation(replace(HELD, motion=replace(PRISM.motion, slice_ratio=1.0)), Runtime(threads=1))
+
+
+@pytest.mark.parametrize("xi", [0.0, 0.5, 1.0, 2.0])
+def test_slicing_lowers_the_push_as_atkins_says(sliding, xi):
+    """Frictionless: V/(R w) = 1/(1 + xi^2) and H/(R w) = xi/(1 + xi^2) (Atkins, Xu and Jeronimidis 2004), within 5 %."""
+    sliding.scene = replace(HELD, motion=replace(PRISM.motion, slice_ratio=max(xi, 1e-9)))  # 0 would be mirrored
+    record = sliding.run()
+    push, pull = (between(record, record.edge[:, axis], 11e-3, 16e-3) for axis in (2, 0))
+    assert push == pytest.approx(R_W / (1 + xi**2), rel=0.05)
+    assert -pull == pytest.approx(R_W * xi / (1 + xi**2), abs=0.05 * R_W)
+    assert record.momentum_residual < 1e-10
+
+
+def test_tilted_edge_needs_the_same_work_per_area():
+    """A thin edge tilted by 20 degrees and pressed straight down cuts R w per way once all of it is in the food."""
+    motion = Motion(0.017, 0.01, tilt=np.deg2rad(20.0))
+    record = cut(replace(PRISM, motion=motion))
+    assert between(record, record.knife[:, 2], 10e-3, 16e-3) == pytest.approx(7.2, rel=0.05)
+    assert record.pieces is not None and not record.severed
+
+
+@pytest.mark.parametrize("turn", [15.0, 45.0])
+def test_grid_may_lie_at_any_angle(turn):
+    """Food and blade turned against the grid: peak and work as on it, within 2 %."""
+    straight = cut(PRISM)
+    turned = cut(replace(PRISM, numerics=replace(PRISM.numerics, grid_turn=np.deg2rad(turn))))
+    assert turned.peak == pytest.approx(straight.peak, rel=0.02)
+    assert turned.work == pytest.approx(straight.work, rel=0.02)
+
+
+def test_retracting_blade_is_dragged_by_friction_and_leaves_the_slit_open():
+    """On the way up friction pulls the knife down, nothing is cut, and the uncut area stays what it was."""
+    flesh = replace(FLESH, mu=0.4)
+    scene = replace(PRISM, food=replace(PRISM.food, material=flesh), knife=WEDGE, motion=Motion(0.015, 0.01))
+    down = cut(scene)
+    both = cut(replace(scene, motion=replace(scene.motion, retract=0.03)))
+    n = len(down.stroke)
+    np.testing.assert_allclose(both.knife[:n, 2], down.knife[:n, 2], rtol=1e-9, atol=1e-9)
+    assert both.stroke[-1] == pytest.approx(-0.015, abs=1e-3)
+    late = both.knife[n + 8 :, 2]
+    assert late.min() < -0.02 * both.peak
+    assert np.abs(late[-8:]).max() < 0.02 * both.peak
+    assert both.edge[n + 8 :, 2].max() < 0.01 * both.peak
+    assert both.pieces.uncut_area == pytest.approx(down.pieces.uncut_area, rel=0.1)
+
+
+def test_cut_leaves_two_pieces_of_the_whole_volume():
+    """A stroke to the board leaves two halves whose volumes add up to the food's within 1 %."""
+    record = cut(replace(PRISM, knife=WEDGE, motion=Motion(0.024, 0.01)))
+    assert record.severed and len(record.pieces.volumes) == 2
+    assert sum(record.pieces.volumes) == pytest.approx(0.03 * 0.024 * 0.024, rel=0.01)
+    assert record.pieces.volumes[0] == pytest.approx(record.pieces.volumes[1], rel=0.02)
+    assert record.severed_area == pytest.approx(0.024 * 0.024, rel=0.01)
+
+
+def test_arm_that_is_too_weak_does_not_sever_and_says_so():
+    """With the arm's force limited to half the peak the blade stops in the food; with enough force it goes through."""
+    rigid = cut(replace(PRISM, motion=Motion(0.024, 0.01)))
+    arm = Arm(stiffness=3000.0, force_limit=0.5 * rigid.peak)
+    weak = cut(replace(PRISM, motion=Motion(0.024, 0.01), arm=arm))
+    assert not weak.severed
+    assert weak.stroke.max() < 0.5 * weak.command.max()
+    stalled = weak.knife[len(weak.stroke) // 2 :, 2]  # it rattles on the food, about the limit
+    assert stalled.mean() == pytest.approx(arm.force_limit, rel=0.1)
+    assert "not severed" in weak.summary()["cut"] and "mm^2" in weak.summary()["cut"]
+    strong = cut(replace(PRISM, motion=Motion(0.024 + rigid.peak / 3000, 0.01), arm=Arm(3000.0, 2 * rigid.peak)))
+    assert strong.severed
+    middle = (strong.stroke > 8e-3) & (strong.stroke < 15e-3)
+    lag = (strong.command - strong.stroke)[middle].mean()
+    assert lag == pytest.approx(7.2 / 3000, rel=0.05)
+
+
+def test_prony_series_needs_the_real_speed_and_softens_a_slow_cut():
+    """Without a real speed the scene is refused; a cut slow against the relaxation time opens at the relaxed modulus,
+    a fast one at the instantaneous one."""
+    relaxing = replace(FLESH, prony=((0.6, 1.0),))
+    with pytest.raises(SceneError, match=r"motion\.speed"):
+        replace(PRISM, food=replace(PRISM.food, material=relaxing))
+    elastic = replace(FLESH, yield_stress=np.inf)
+    work = {}
+    for name, prony, speed in (
+        ("fast", ((0.6, 1.0),), 100.0 * 0.99),
+        ("slow", ((0.6, 1.0),), 1e-5),
+        ("none", (), 0.02),
+    ):
+        food = replace(PRISM.food, material=replace(elastic, prony=prony))
+        record = cut(replace(PRISM, food=food, knife=WEDGE, motion=Motion(0.015, 0.01, speed=speed)))
+        work[name] = float(record.face[:, 2] @ np.diff(record.stroke, prepend=0.0))
+    assert work["fast"] == pytest.approx(work["none"], rel=0.02)
+    assert work["slow"] < 0.75 * work["fast"]
+
+
+def test_dwell_relaxes_the_force_and_needs_a_speed():
+    """Holding the blade still lets a viscoelastic food relax; a pause without a real speed is refused."""
+    with pytest.raises(SceneError, match="real speed"):
+        Motion(0.015, dwell=1.0)
+    food = replace(PRISM.food, material=replace(FLESH, yield_stress=np.inf, prony=((0.6, 0.1),)))
+    record = cut(replace(PRISM, food=food, knife=WEDGE, motion=Motion(0.015, 0.01, speed=0.05, dwell=0.4)))
+    end = int(np.argmax(record.stroke >= record.stroke.max() - 1e-9))
+    assert record.face[-3:, 2].mean() < 0.9 * record.face[end - 2 : end + 1, 2].mean()
+
+
+def test_sticky_faces_hold_the_knife_back():
+    """Adhesion adds to the pull on a retracting blade, at most its strength times friction on both faces."""
+    pull = {}
+    for name, extra in (("dry", {}), ("sticky", {"adhesion": 5e3, "adhesion_energy": 0.5})):
+        food = replace(PRISM.food, material=replace(FLESH, mu=0.4, **extra))
+        record = cut(replace(PRISM, food=food, knife=WEDGE, motion=Motion(0.015, 0.01, retract=0.006)))
+        pull[name] = -record.knife[:, 2].min()
+    assert pull["sticky"] > 1.1 * pull["dry"]
+    assert pull["sticky"] - pull["dry"] < 0.4 * 5e3 * 2 * 0.015 * 0.024 * 1.5
+
+
+def test_half_adhesion_is_refused():
+    """Adhesion without its energy is a typo, not a choice."""
+    with pytest.raises(SceneError, match="adhesion"):
+        replace(FLESH, adhesion=1e4)
+
+
+def test_blunt_edge_needs_more_force():
+    """A tip of 0.8 mm radius needs more force than a sharp one of the same blade."""
+    sharp = cut(replace(PRISM, knife=WEDGE))
+    blunt = cut(replace(PRISM, knife=replace(WEDGE, radius=0.8e-3)))
+    assert blunt.work > 1.1 * sharp.work
