@@ -60,9 +60,13 @@ class Kernels(Edge):
 
     @ti.func
     def sever(self, p, q):
-        """Material that the edge has passed belongs to the left (1) or right (2) half for good."""
+        """Material that the edge has passed belongs to the left (1) or right (2) half for good.
+
+        At the board that is all of it, also what is pressed a little into the board.
+        """
         if ti.static(not self.nodal):
-            if self.side[p] == 0 and q[2] > self.edge_height(q[0]) and self.under_blade(q[0]):
+            tip = self.edge_height(q[0])
+            if self.side[p] == 0 and (q[2] > tip or tip <= 0) and self.under_blade(q[0]):
                 self.side[p] = 1 + self.half(p, q[1])
 
     @ti.func

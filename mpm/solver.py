@@ -208,9 +208,9 @@ class Simulation:
         speed = motion.mach * material.p_wave
         every = max(1, round(num.output / (speed * dt)))
         gap = self._gap()
-        # steps, velocity down and along the blade of each phase
+        # steps, velocity down and along the blade of each phase; one step more lets the food see where the edge ends
         phases = [
-            (math.ceil((motion.stroke + gap) / (speed * dt)), -speed, speed * motion.slice_ratio),
+            (math.ceil((motion.stroke + gap) / (speed * dt)) + 1, -speed, speed * motion.slice_ratio),
             (math.ceil(motion.dwell / scene.time_scale / dt), 0.0, 0.0),
             (math.ceil(motion.retract / (speed * dt)), speed, 0.0),
         ]

@@ -79,4 +79,4 @@ def test_crack_is_as_long_as_its_front_with_a_lead_of_half_a_cell(length, dx, of
         float(length(compliance(dx, CRACK, (offset, z), s, lead=0.5))) for s in (0, 1) for z in (0, 0.25, 0.5, 0.75)
     ]
     assert np.mean(found) - CRACK == pytest.approx(0.0, abs=0.2 * dx)
-    assert np.std(found) < 0.3 * dx
+    assert np.std(found) < 0.5 * dx
