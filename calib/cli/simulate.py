@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from calib.cli.options import add_food, add_run, food_of, number, sizing_of
@@ -12,7 +14,7 @@ from calib.outputs import prepare, write_csv, write_json
 from calib.progress import clock
 from calib.provenance import git_commit, versions
 from calib.scenes import cut_scene, specimen
-from mpm.scene import CONTACTS
+from mpm.scene import CONTACTS, Arm
 
 HELP = "simulate one cut"
 DESCRIPTION = "Simulate one cut and write force.csv and summary.json."
@@ -31,6 +33,17 @@ def add_args(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("--contact", choices=CONTACTS, default="cohesive", help="nodal: plain projection, for comparison")
     p.add_argument("--mach", type=number(0, 0.05, ""), default=0.01, help="blade speed over the P-wave speed")
+    p.add_argument("--slice-ratio", type=number(-20, 20, ""), default=0.0, help="speed along the edge over speed down")
+    p.add_argument("--tilt", type=number(-60, 60, "degrees"), default=0.0, metavar="DEG", help="edge against the board")
+    p.add_argument("--retract", type=number(0, 1, "m"), default=0.0, metavar="M", help="way back up after the stroke")
+    p.add_argument("--turn", type=number(-90, 90, "degrees"), default=0.0, metavar="DEG", help="scene against the grid")
+    p.add_argument(
+        "--arm-stiffness",
+        type=number(1, 1e9, "N/m"),
+        metavar="N/M",
+        help="of the robot that holds the knife; rigid if not given",
+    )
+    p.add_argument("--force-limit", type=number(0, 1e6, "N"), metavar="N", help="most force the arm can give")
     p.add_argument("--threads", type=int, default=0, help="CPU threads, 0 = all cores")
     add_run(p)
 
@@ -50,6 +63,18 @@ def run(args: argparse.Namespace) -> int:
         contact=args.contact,
         grid_shift=(0.0, args.offset, 0.0),
         seed=args.seed,
+    )
+    scene = replace(
+        scene,
+        motion=replace(
+            scene.motion,
+            slice_ratio=args.slice_ratio,
+            tilt=math.radians(args.tilt),
+            retract=args.retract,
+            speed=args.speed,
+        ),
+        numerics=replace(scene.numerics, grid_turn=math.radians(args.turn)),
+        arm=Arm(args.arm_stiffness, args.force_limit),
     )
     prepare(out, resume=False)
     import time
@@ -90,4 +115,6 @@ def run(args: argparse.Namespace) -> int:
             f"{food.name}: peak {record.peak:.2f} N, work {record.work:.3f} J, {record.status}; "
             f"momentum balance closes to {record.momentum_residual:.1e} of the peak; wrote {out}"
         )
+        if record.pieces is not None:
+            print(record.pieces.words())
     return 0 if record.status == "done" else 1
