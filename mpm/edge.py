@@ -107,7 +107,9 @@ class Edge(Nodes):
                     mass += q[3]
                     mom += ti.Vector([q[0], q[1], q[2]])
         # the zone reaches below the edge and beside the food, so the width that is cut is that of the outline
-        width = self.dx * self.width[i] * ti.math.clamp((self.top[i] - tip) / (self.top[i] - self.low[i]), 0.0, 1.0)
+        begun = ti.math.clamp((self.top[i] - tip) / (self.top[i] - self.low[i]), 0.0, 1.0)
+        ended = ti.math.clamp((self.floor_top[i] - tip) / (self.floor_top[i] - self.floor_low[i]), 0.0, 1.0)
+        width = self.dx * self.width[i] * (begun - ended)
         full = SURFACE_FILL * self.par[FULL] * width * self.inv
         if width > 0 and mass > EMPTY_ZONE * full:
             c, t = self.par[TILT_COS], self.par[TILT_SIN]

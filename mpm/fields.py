@@ -79,6 +79,7 @@ class Fields:
         self.soften, self.start = ti.field(real, stations), ti.field(real, stations)
         self.near = ti.field(ti.i32, stations)
         self.top, self.low, self.width = (ti.field(real, stations) for _ in range(3))
+        self.floor_top, self.floor_low = ti.field(real, stations), ti.field(real, stations)
         self.par = ti.field(real, N_PARAMETERS)
         self.pose = ti.field(ti.f64, N_POSE)
         self.sums = ti.field(ti.f64, N_SUMS)

@@ -121,8 +121,8 @@ def skin_path(shape: Shape, x: np.ndarray, thickness: float) -> np.ndarray:
 SLICE_SAMPLES = 65  # points at which a slice's outline is looked up
 
 
-def slices(shape: Shape, x: np.ndarray, dx: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Upper outline in the blade plane, slice by slice.
+def slices(shape: Shape, x: np.ndarray, dx: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Outline in the blade plane, slice by slice.
 
     Args:
         shape: The outline.
@@ -130,14 +130,18 @@ def slices(shape: Shape, x: np.ndarray, dx: float) -> tuple[np.ndarray, np.ndarr
         dx: Width of a slice [m].
 
     Returns:
-        Highest and lowest height of the upper surface over each slice [m] and the part of the slice that has food [-],
-        each of shape (n,); a slice without food is 0 high and has the part 0. The highest is above the lowest.
+        Highest and lowest height of the upper surface over each slice [m], the part of the slice that has food [-], and
+        the highest and lowest height of the lower surface [m], each of shape (n,); a slice without food is 0 high and
+        has the part 0. The highest is above the lowest.
     """
     offsets = (np.arange(SLICE_SAMPLES) + 0.5) / SLICE_SAMPLES - 0.5
     points = x[:, None] + dx * offsets
-    _, top = surface(shape, points, np.zeros_like(points))
+    bottom, top = surface(shape, points, np.zeros_like(points))
     there = np.isfinite(top)
-    high = np.where(there, top, 0.0).max(axis=1)
-    low = np.where(there, top, np.inf).min(axis=1)
-    low = np.where(there.any(axis=1), low, 0.0)
-    return high, np.minimum(low, high - 1e-6 * dx), there.mean(axis=1)
+    some = there.any(axis=1)
+    out = []
+    for heights in (top, bottom):
+        high = np.where(some, np.where(there, heights, -np.inf).max(axis=1), 0.0)
+        low = np.where(some, np.where(there, heights, np.inf).min(axis=1), 0.0)
+        out += [high, np.minimum(low, high - 1e-6 * dx)]
+    return out[0], out[1], there.mean(axis=1), out[2], out[3]

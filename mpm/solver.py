@@ -165,7 +165,9 @@ class Simulation:
             k.share[b], k.relax[b] = share, self._time_step(material) * scene.time_scale / time
         xs = self.stations
         path = skin_path(scene.food.shape, xs, material.skin_thickness) if material.skin_thickness > 0 else 0 * xs
-        for field, values in zip((k.top, k.low, k.width), slices(scene.food.shape, xs, num.dx), strict=True):
+        for field, values in zip(
+            (k.top, k.low, k.width, k.floor_top, k.floor_low), slices(scene.food.shape, xs, num.dx), strict=True
+        ):
             field.from_numpy(values.astype(real))
         k.soften.from_numpy((edge.slip + path).astype(real))
         self._set_pose(scene.food.shape.height + self._gap())
