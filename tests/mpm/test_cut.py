@@ -188,3 +188,14 @@ def test_edge_waits_for_the_food_on_a_round_top():
     late = (record.stroke > 4e-3) & (record.stroke < 11e-3)
     assert record.edge[record.stroke < 0, 2].max() == 0.0
     np.testing.assert_allclose(record.edge[late, 2], 300 * chord[late], rtol=0.05)
+
+
+def test_edge_leaves_the_food_at_its_lower_outline():
+    """Below the middle of a lying cylinder the edge carries R times the chord that is left, not the chord it began with."""
+    round_food = Food(Shape("cylinder", 0.03, 0.03, 0.03), replace(FLESH, E=5e6, yield_stress=1e6))
+    record = cut(replace(PRISM, food=round_food, motion=Motion(0.03, 0.01)))
+    chord = 2 * np.sqrt(np.maximum(0.015**2 - (0.015 - record.stroke) ** 2, 0))
+    late = (record.stroke > 19e-3) & (record.stroke < 27e-3)
+    np.testing.assert_allclose(record.edge[late, 2], 300 * chord[late], rtol=0.08)
+    area = np.pi / 4 * 0.03**2
+    assert record.edge[:, 2] @ np.diff(record.stroke, prepend=0.0) == pytest.approx(300 * area, rel=0.05)
