@@ -16,6 +16,7 @@ MARKS = (
     "summary.json",
     "material.yaml",
     "curves.csv",
+    "converge.json",
     "report.pdf",
     "force.csv",
     "evaluations.h5",

@@ -96,6 +96,25 @@ class Pool:
         """Evaluator of material candidates of one scene."""
         return SceneEvaluator(self, scene)
 
+    def run(self, jobs: Sequence[tuple[Scene, Mapping[str, float]]]) -> Iterator[Evaluation]:
+        """Run each scene with its material values; yields in order of completion, ``index`` is the place among the jobs.
+
+        A run whose process was killed is made once more before it counts as failed: the killed one may have been its
+        neighbour's.
+        """
+        waiting = {self.submit(*job): (k, False) for k, job in enumerate(jobs)}
+        while waiting:
+            done, _ = wait(waiting, return_when=FIRST_COMPLETED)
+            for future in done:
+                index, again = waiting.pop(future)
+                scene, values = jobs[index][0], dict(jobs[index][1])
+                if not isinstance(future.exception(), BrokenProcessPool):
+                    yield Evaluation(index=index, parameters=values, **future.result())
+                elif not again:
+                    waiting[self.submit(scene, values)] = (index, True)
+                else:
+                    yield Evaluation(index, values, "failed", DIED, 0.0, np.empty(0), np.empty(0))
+
     def submit(self, scene: Scene, values: Mapping[str, float]) -> Future[dict[str, Any]]:
         """Queue one run; a broken pool is started anew first."""
         args = (scene, dict(values), self.arch, self.threads)
@@ -113,20 +132,5 @@ class SceneEvaluator:
         self.pool, self.scene = pool, scene
 
     def evaluate(self, batch: Sequence[Mapping[str, float]]) -> Iterator[Evaluation]:
-        """Run each candidate; yields in order of completion, ``index`` is the place in the batch.
-
-        A run whose process was killed is made once more before it counts as failed: the killed one may have been its
-        neighbour's.
-        """
-        waiting = {self.pool.submit(self.scene, values): (k, False) for k, values in enumerate(batch)}
-        while waiting:
-            done, _ = wait(waiting, return_when=FIRST_COMPLETED)
-            for future in done:
-                index, again = waiting.pop(future)
-                values = dict(batch[index])
-                if not isinstance(future.exception(), BrokenProcessPool):
-                    yield Evaluation(index=index, parameters=values, **future.result())
-                elif not again:
-                    waiting[self.pool.submit(self.scene, values)] = (index, True)
-                else:
-                    yield Evaluation(index, values, "failed", DIED, 0.0, np.empty(0), np.empty(0))
+        """Run each candidate; yields in order of completion, ``index`` is the place in the batch."""
+        yield from self.pool.run([(self.scene, values) for values in batch])

@@ -146,13 +146,13 @@ def forces(curves: Curves, measured: str, simulated: str, height: float) -> byte
         axes.plot(x, curves["face_N"], label="face part of the simulation", **FACE)
         axes.plot(x, curves["real_N"], label=measured, **MEASURED)
         axes.plot(x, curves["sim_N"], label=simulated, **SIMULATED)
-        _stroke_axis(axes, x)
+        stroke_axis(axes, x)
         axes.set_ylabel("force on the knife [N]")
         handles, labels = axes.get_legend_handles_labels()
         handles, labels = ([items[i] for i in (2, 3, 0, 1)] for items in (handles, labels))
         figure.legend(handles, labels, loc="outside upper left", ncols=2)
 
-    return _svg(draw, height)
+    return svg(draw, height)
 
 
 def conditioning(record: Record, curves: Curves) -> bytes:
@@ -166,7 +166,7 @@ def conditioning(record: Record, curves: Curves) -> bytes:
         handles, labels = panels["raw"].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper left", ncols=4 if len(labels) < 5 else 3)
 
-    return _svg(draw, 138.0)
+    return svg(draw, 138.0)
 
 
 def fit(curves: Curves, noise_sd: float, trace: str) -> bytes:
@@ -190,12 +190,12 @@ def fit(curves: Curves, noise_sd: float, trace: str) -> bytes:
         residual.plot(x, sim - real, color=BLUE, lw=1.3, label=f"simulated − {trace}")
         residual.set_ylabel("residual [N]")
         residual.yaxis.set_major_locator(MaxNLocator(4))
-        _stroke_axis(residual, x)
+        stroke_axis(residual, x)
         handles, labels = zip(*(a.get_legend_handles_labels() for a in (shape, residual)), strict=True)
         figure.legend(sum(handles, []), sum(labels, []), loc="outside upper left", ncols=2)
         figure.align_ylabels()
 
-    return _svg(draw, 76.0)
+    return svg(draw, 76.0)
 
 
 def nulls(curves: Curves, trace: str) -> bytes:
@@ -220,10 +220,10 @@ def nulls(curves: Curves, trace: str) -> bytes:
         highest = max(highest, top / 1.5)
         axes.set_ylim(bottom - 0.04 * highest, 1.05 * highest)
         axes.set_ylabel("force on the knife [N]")
-        _stroke_axis(axes, x)
+        stroke_axis(axes, x)
         figure.legend(loc="outside upper left", ncols=3)
 
-    return _svg(draw, 57.0)
+    return svg(draw, 57.0)
 
 
 def parameters(rows: Sequence[Row]) -> bytes:
@@ -254,7 +254,7 @@ def parameters(rows: Sequence[Row]) -> bytes:
         axes.spines["left"].set_visible(False)
         axes.set_xlabel("value / middle of the literature's range")
 
-    return _svg(draw, 20.0 + 8.5 * max(len(rows), 2))
+    return svg(draw, 20.0 + 8.5 * max(len(rows), 2))
 
 
 def misfit(history: Sequence[tuple[float, float]]) -> bytes:
@@ -277,7 +277,7 @@ def misfit(history: Sequence[tuple[float, float]]) -> bytes:
         axes.set_xlabel("simulation number")
         axes.set_ylabel("best chi-square so far")
 
-    return _svg(draw, 48.0)
+    return svg(draw, 48.0)
 
 
 def envelope(x: np.ndarray, y: np.ndarray, columns: int = COLUMNS) -> tuple[np.ndarray, np.ndarray]:
@@ -298,8 +298,8 @@ def envelope(x: np.ndarray, y: np.ndarray, columns: int = COLUMNS) -> tuple[np.n
     return x[kept], y[kept]
 
 
-def _svg(draw: Any, height: float) -> bytes:
-    """SVG of a figure of the report's width and ``height`` [mm]."""
+def svg(draw: Any, height: float) -> bytes:
+    """SVG of a figure of the report's width and ``height`` [mm] that ``draw`` fills."""
     with style.context(["default", STYLE]):
         figure = Figure(figsize=(WIDTH * MM, height * MM), layout="constrained")
         FigureCanvasSVG(figure)
@@ -309,7 +309,8 @@ def _svg(draw: Any, height: float) -> bytes:
     return out.getvalue()
 
 
-def _stroke_axis(axes: Axes, x: np.ndarray) -> None:
+def stroke_axis(axes: Axes, x: np.ndarray) -> None:
+    """Name and limits of the axis of the stroke ``x`` [mm]."""
     axes.set_xlim(float(x[0]), float(x[-1]))
     axes.set_xlabel("stroke from contact [mm]")
 
@@ -386,7 +387,7 @@ def _filtered(axes: Axes, r: Record, curves: Curves) -> None:
     if r.peak is not None:
         axes.errorbar(x[np.argmax(y)], r.peak, yerr=r.peak_sd, color=RED, marker="o", ms=3.5, mfc="white",
                       capsize=2.5, lw=1.0, zorder=4)  # fmt: skip
-    _stroke_axis(axes, x)
+    stroke_axis(axes, x)
     axes.set_title("c  filtered, over stroke (circle: peak ± 1 sd)")
     axes.set_ylabel("force [N]")
 

@@ -7,10 +7,10 @@ import sys
 from collections.abc import Sequence
 
 import calib
-from calib.cli import calibrate, foods, report, simulate
+from calib.cli import calibrate, converge, foods, report, simulate
 from mpm.errors import CutcalError
 
-COMMANDS = {"calibrate": calibrate, "simulate": simulate, "report": report, "foods": foods}
+COMMANDS = {"calibrate": calibrate, "converge": converge, "simulate": simulate, "report": report, "foods": foods}
 INTERRUPTED = 130  # what a shell reports for a program ended by Ctrl-C
 
 

@@ -28,7 +28,20 @@ def number(low: float, high: float, unit: str) -> Callable[[str], float]:
     return convert
 
 
-def add_food(p: argparse.ArgumentParser) -> None:
+def numbers(low: float, high: float, unit: str) -> Callable[[str], tuple[float, ...]]:
+    """Type of an option that takes several numbers with commas between them, each within limits and none twice."""
+    one = number(low, high, unit)
+
+    def convert(text: str) -> tuple[float, ...]:
+        values = tuple(one(part) for part in text.split(",") if part.strip())
+        if not values or len(set(values)) < len(values):
+            raise argparse.ArgumentTypeError(f"{text!r}: write different numbers with commas between them")
+        return values
+
+    return convert
+
+
+def add_food(p: argparse.ArgumentParser, *, cell: bool = True) -> None:
     """Options that say what is cut with what."""
     p.add_argument("--food", required=True, metavar="NAME", help="food of materials.yaml (cutcal foods lists them)")
     p.add_argument(
@@ -41,7 +54,8 @@ def add_food(p: argparse.ArgumentParser) -> None:
     p.add_argument("--shape", choices=SHAPE_KINDS, help="outline of the specimen")
     for name, what in (("height", "height"), ("width", "width along the blade"), ("length", "length across the blade")):
         p.add_argument(f"--{name}", type=number(1e-3, 1.0, "m"), metavar="M", help=f"{what} of the specimen [m]")
-    p.add_argument("--dx", type=number(1e-4, 0.02, "m"), metavar="M", help="cell size [m]")
+    if cell:
+        p.add_argument("--dx", type=number(1e-4, 0.02, "m"), metavar="M", help="cell size [m]")
 
 
 def add_run(p: argparse.ArgumentParser) -> None:

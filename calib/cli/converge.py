@@ -1,0 +1,123 @@
+"""``cutcal converge``: one cut over grid, time step, speed and particles."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from calib.cli.options import add_food, add_run, food_of, number, numbers, sizing_of
+from calib.errors import CurveError
+from calib.knives import load_knife
+from calib.scenes import cut_scene, specimen
+
+HELP = "repeat one cut on finer grids: order, grid convergence index, numerical uncertainty"
+DESCRIPTION = """Repeat one cut on finer grids, and apart from that with other time steps,
+speeds and particles. Writes converge.json, curves.csv (with the standard
+numerical uncertainty u_num_N over the stroke) and converge.svg to --out."""
+EPILOG = """examples:
+  cutcal converge --food banana
+  cutcal converge --food potato --material runs/potato/material.yaml --knife edc \\
+      --dx 3e-3,2e-3,1.5e-3,1e-3 --mach 0.005 --safety 0.35 --ppc 3
+
+Ctrl-C keeps what was computed; the same command with --resume goes on.
+Exit codes: 0 converged (work within 2 %, peak within 3 % between the two finest
+grids), 1 error in input or run, 2 ran but did not converge."""
+REFINED = (1.0, 2 / 3, 0.5)  # default cells over the scene's own one
+
+
+def add_args(p: argparse.ArgumentParser) -> None:
+    """Options of this command."""
+    add_food(p, cell=False)
+    p.add_argument(
+        "--dx",
+        type=numbers(1e-4, 0.02, "m"),
+        metavar="M,M,...",
+        help="cell sizes [m]; the food's own one, two thirds and half of it by default",
+    )
+    p.add_argument(
+        "--safety", type=numbers(0, 0.9, "of the stability limit"), metavar="F,...", help="time steps to try"
+    )
+    p.add_argument("--mach", type=numbers(0, 0.05, ""), metavar="F,...", help="blade speeds to try, over the P-wave's")
+    p.add_argument("--ppc", type=numbers(0.5, 8.5, ""), metavar="N,...", help="particles per cell and direction to try")
+    p.add_argument("--seeds", type=int, default=2, help="other particle positions on the coarsest grid (default 2)")
+    p.add_argument(
+        "--stroke", type=number(1e-4, 1, "m"), metavar="M", help="way of the edge; the whole height by default"
+    )
+    p.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
+    p.add_argument("--resume", action="store_true", help="go on with the study in --out; nothing is simulated twice")
+    add_run(p)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the study; prints its table, or converge.json."""
+    from calib.refinement import run as study
+
+    if args.workers < 1 or args.seeds < 0:
+        raise CurveError("--workers must be at least 1 and --seeds at least 0")
+    food, knife = food_of(args), load_knife(args.knife)
+    shape, assumed = specimen(food, None, sizing_of(args))
+    scene = cut_scene(food, shape, knife, stroke=args.stroke, dx=max(args.dx) if args.dx else None, seed=args.seed)
+    axes = {"dx": args.dx or tuple(round(scene.numerics.dx * part, 7) for part in REFINED)}
+    axes |= {name: getattr(args, name) for name in ("safety", "mach", "ppc") if getattr(args, name)}
+    out = Path(args.out or f"cutcal-converge-{food.name}")
+    about = {
+        "food": food.name,
+        "knife": knife.name,
+        "shape": vars(shape),
+        "command": ["converge", *(a for a in sys.argv[1:] if a != "converge")],
+        "warnings": [*food.warnings(), *assumed],
+    }
+
+    def say(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
+    document = study(
+        scene,
+        axes,
+        out,
+        about=about,
+        seeds=args.seeds,
+        workers=args.workers,
+        arch=args.arch,
+        resume=args.resume,
+        say=say,
+    )
+    if args.json:
+        print((out / "converge.json").read_text(encoding="utf-8"), end="")
+    else:
+        print(table(document))
+        print(f"  wrote {out}")
+    return 0 if document["converged"] else 2
+
+
+def table(document: dict[str, Any]) -> str:
+    """What the terminal shows at the end."""
+    lines = [f"  {'dx [mm]':>8s}{'peak [N]':>10s}{'work [J]':>10s}{'particles':>11s}{'steps':>8s}{'time [s]':>10s}"]
+    for g in document["grids"]:
+        if g["status"] == "ok":
+            numbers = f"{g['peak_N']:10.3f}{g['work_J']:10.4f}{g['particles']:11.0f}{g['steps']:8.0f}"
+            lines.append(f"  {g['dx_m'] * 1e3:8.3g}{numbers}{g['wall_s']:10.1f}")
+        else:
+            lines.append(f"  {g['dx_m'] * 1e3:8.3g}  broke down: {g['reason']}")
+    for name in ("work", "peak"):
+        e = document[name]
+        order = "-" if e["order"] is None else f"{e['order']:.2f}"
+        lines.append(
+            f"  {name}: {e['verdict']}, order {order}, {e['change']:+.2%} between the two finest, GCI {e['gci']:.2%}, "
+            f"uncertainty {e['uncertainty']:.2%}"
+        )
+    lines.append(
+        f"  curve: GCI {document['gci_curve_median']:.2%} of the peak (median), {document['gci_curve_max']:.2%} (largest)"
+    )
+    for axis, words in (("safety", "time step"), ("mach", "speed"), ("ppc", "particles"), ("seed", "seeds")):
+        if document[axis] is not None and "spread_work" in document[axis]:
+            spread = document[axis]
+            slope = f", log-log slope of the peak {spread['slope_peak']:+.3f}" if axis == "mach" else ""
+            lines.append(
+                f"  {words}: work within {spread['spread_work']:.2%}, peak within {spread['spread_peak']:.2%} of the mean"
+                + slope
+            )
+    head = f"{document['food']}: {'converged' if document['converged'] else 'not converged'}"
+    return "\n".join([head, *lines])

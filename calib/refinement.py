@@ -1,0 +1,230 @@
+"""One cut on several grids, and apart from that with other time steps, speeds, particles: how much is numerical."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calib.convergence import CurveEstimate, Estimate, curve_estimate, estimate
+from calib.errors import CurveError
+from calib.filters import filter_simulated
+from calib.objective import Evaluation
+from calib.outputs import prepare, write_csv, write_json
+from calib.pool import Pool
+from calib.progress import clock
+from calib.provenance import code_key, git_commit, key_of, versions
+from calib.store import TRANSIENT_REASONS, EvaluationStore, Header, content_key
+from mpm.scene import Scene
+
+AXES = {"dx": "cell size [m]", "safety": "dt over its limit", "mach": "speed over P-wave speed", "ppc": "particles"}
+"""What can be varied, each apart from the others."""
+POINTS = 240
+"""Points of the common stroke grid, as of a calibration."""
+WORK_LIMIT, PEAK_LIMIT = 0.02, 0.03
+"""Largest change between the two finest grids that counts as converged [-]."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One run. Attributes: axis that is varied (``seed``: only the particles), its value, the scene."""
+
+    axis: str
+    value: float
+    scene: Scene
+
+    @property
+    def cost(self) -> float:
+        """Particle steps of the run up to a constant."""
+        n = self.scene.numerics
+        return n.ppc**3 / n.dx**4 / (n.safety * self.scene.motion.mach)
+
+    @property
+    def words(self) -> str:
+        """The case in words."""
+        return f"dx {self.value * 1e3:g} mm" if self.axis == "dx" else f"{self.axis} {self.value:g}"
+
+
+def cases(scene: Scene, axes: Mapping[str, Sequence[float]], seeds: int) -> list[Case]:
+    """Runs of a study; the other axes and the seeds are varied on the coarsest grid.
+
+    Args:
+        scene: The cut.
+        axes: Values of each axis to vary, ``dx`` at least two.
+        seeds: Other particle positions that are tried, to tell noise from trend.
+
+    Raises:
+        CurveError: Fewer than two cell sizes.
+        SceneError: A value that cannot be simulated.
+    """
+    cells = sorted(axes["dx"], reverse=True)
+    if len(cells) < 2:
+        raise CurveError(f"--dx {cells[0]:g}: give at least two cell sizes, for instance 3e-3,2e-3,1.5e-3")
+    out = [Case("dx", dx, replace(scene, numerics=replace(scene.numerics, dx=dx))) for dx in cells]
+    base = out[0].scene
+    for value in axes.get("safety", ()):
+        out.append(Case("safety", value, replace(base, numerics=replace(base.numerics, safety=value))))
+    for value in axes.get("mach", ()):
+        out.append(Case("mach", value, replace(base, motion=replace(base.motion, mach=value))))
+    for value in axes.get("ppc", ()):
+        out.append(Case("ppc", value, replace(base, numerics=replace(base.numerics, ppc=round(value)))))
+    for seed in range(1, seeds + 1):
+        numerics = replace(base.numerics, seed=base.numerics.seed + seed)
+        out.append(Case("seed", seed, replace(base, numerics=numerics)))
+    return out
+
+
+def run(
+    scene: Scene,
+    axes: Mapping[str, Sequence[float]],
+    out: Path,
+    *,
+    about: Mapping[str, Any],
+    seeds: int = 2,
+    workers: int = 2,
+    arch: str = "cpu",
+    resume: bool = False,
+    say: Callable[[str], None],
+) -> dict[str, Any]:
+    """Run a study and write converge.json, curves.csv and converge.svg.
+
+    Args:
+        scene: The cut; its cell size is not used.
+        axes: Values to try by axis.
+        out: Output folder.
+        about: What converge.json says of food, knife and command.
+        seeds: Other particle positions on the coarsest grid.
+        workers: Simulations at a time.
+        arch: Device.
+        resume: Go on with the study in ``out``.
+        say: Called with a line after each run.
+
+    Returns:
+        The content of converge.json.
+
+    Raises:
+        CutcalError: Impossible values, or results of something else in ``out``; nothing that was computed is lost.
+    """
+    todo = cases(scene, axes, seeds)
+    prepare(out, resume=resume)
+    with EvaluationStore(out / "evaluations.h5", Header("", key_of(scene.as_dict())), resume=resume) as store:
+        results = _evaluate(todo, store, workers, arch, say)
+    document = {**about, **_conclude(todo, results, out)}
+    document |= {"device": arch, "versions": versions(), "git": git_commit()}
+    write_json(out / "converge.json", document)
+    from reports.convergence import write_figure
+
+    write_figure(out)
+    return document
+
+
+def _evaluate(
+    todo: Sequence[Case], store: EvaluationStore, workers: int, arch: str, say: Callable[[str], None]
+) -> list[Evaluation]:
+    """Results of all cases in their order; what the store knows is not run again, and the longest runs start first."""
+    keys = [content_key(case.scene.as_dict(), {}, code_key()) for case in todo]
+    found = {k: known for k, key in enumerate(keys) if (known := store.get(key)) and _final(known)}
+    new = sorted((k for k in range(len(todo)) if k not in found), key=lambda k: -todo[k].cost)
+    if found:
+        say(f"{len(found)} of {len(todo)} runs are known already")
+    began, total, spent = time.monotonic(), sum(todo[k].cost for k in new), 0.0
+    if new:
+        say(f"{len(new)} runs; the finest grid costs {max(todo[k].cost for k in new) / total:.0%} of them")
+        with Pool(workers, arch) as pool:
+            for result in pool.run([(todo[k].scene, {}) for k in new]):
+                k = new[result.index]
+                store.append(keys[k], result, todo[k].words)
+                found[k] = result
+                spent += todo[k].cost
+                left = (time.monotonic() - began) * (total - spent) / spent
+                peak, work = (result.scalars.get(name, math.nan) for name in ("peak_N", "work_J"))
+                state = f"peak {peak:.2f} N, work {work:.4f} J" if result.ok else f"broke down ({result.reason})"
+                say(f"{todo[k].words}: {state}; {len(found)} of {len(todo)} runs, about {clock(left)} left")
+    return [found[k] for k in range(len(todo))]
+
+
+def _final(result: Evaluation) -> bool:
+    return result.reason not in TRANSIENT_REASONS
+
+
+def _conclude(todo: Sequence[Case], results: Sequence[Evaluation], out: Path) -> dict[str, Any]:
+    """The document; writes curves.csv."""
+    grids = [(c, r) for c, r in zip(todo, results, strict=True) if c.axis == "dx"]
+    sound = [(c.value, r) for c, r in grids if r.ok]
+    if len(sound) < 2:
+        reasons = ", ".join(f"{c.words}: {r.reason}" for c, r in grids if not r.ok)
+        raise CurveError(
+            f"fewer than two grids reached the end of the stroke ({reasons}); try other --dx or --set values"
+        )
+    h = [dx for dx, _ in sound]
+    noise = {name: _spread(todo, results, name) for name in ("peak_N", "work_J")}
+    by_name = {name: estimate(h, [r.scalars[name] for _, r in sound], noise[name]) for name in ("peak_N", "work_J")}
+    stroke = np.linspace(0.0, min(r.stroke[-1] for _, r in sound), POINTS)
+    curves = [filter_simulated(stroke, r.stroke, r.force) for _, r in sound]
+    curve = curve_estimate(h, curves)
+    columns = {f"force_dx_{dx:g}_N": values for dx, values in zip(h, curves, strict=True)}
+    write_csv(out / "curves.csv", {"stroke_m": stroke, **columns, "u_num_N": curve.u_num})
+    peak, work = by_name["peak_N"], by_name["work_J"]
+    return {
+        "grids": [{"dx_m": c.value, **_row(r)} for c, r in grids],
+        **_agreement(peak, work, curve),
+        "repeat_sd_peak_N": noise["peak_N"],
+        "repeat_sd_work_J": noise["work_J"],
+        **{axis: _axis(todo, results, axis) for axis in ("safety", "mach", "ppc", "seed")},
+    }
+
+
+def _agreement(peak: Estimate, work: Estimate, curve: CurveEstimate) -> dict[str, Any]:
+    return {
+        "order": work.order,
+        "gci_peak": peak.gci,
+        "gci_work": work.gci,
+        "verdict": work.verdict,
+        "converged": abs(work.change) <= WORK_LIMIT and abs(peak.change) <= PEAK_LIMIT,
+        "limits": {"work": WORK_LIMIT, "peak": PEAK_LIMIT},
+        "peak": vars(peak),
+        "work": vars(work),
+        "order_curve": curve.order,
+        "gci_curve_median": float(np.median(curve.gci)),
+        "gci_curve_max": float(curve.gci.max()),
+    }
+
+
+def _row(r: Evaluation) -> dict[str, Any]:
+    names = ("peak_N", "work_J", "particles", "steps", "momentum_residual", "ke_over_ie", "ripple_N")
+    numbers = {name: r.scalars.get(name) for name in names}
+    return {**numbers, "wall_s": r.seconds, "status": r.status, "reason": r.reason, "fraction": r.fraction}
+
+
+def _axis(todo: Sequence[Case], results: Sequence[Evaluation], axis: str) -> dict[str, Any] | None:
+    """Rows of one axis with the coarsest grid's own value among them, and the spread of what they give."""
+    base = next(c for c in todo if c.axis == "dx")
+    own = {"safety": base.scene.numerics.safety, "mach": base.scene.motion.mach, "ppc": base.scene.numerics.ppc}
+    rows = [(c.value, r) for c, r in zip(todo, results, strict=True) if c.axis == axis]
+    if not rows:
+        return None
+    rows = sorted([(float(own.get(axis, 0)), results[todo.index(base)]), *rows], key=lambda row: row[0])
+    rows = [row for k, row in enumerate(rows) if k == 0 or row[0] != rows[k - 1][0]]
+    good = [(v, r) for v, r in rows if r.ok]
+    out: dict[str, Any] = {"rows": [{axis: v, **_row(r)} for v, r in rows]}
+    for name in ("peak_N", "work_J"):
+        values = np.array([r.scalars[name] for _, r in good])
+        if len(values) > 1:
+            out[f"spread_{name[:4]}"] = float(np.abs(values / values.mean() - 1).max())
+            if axis == "mach":
+                speeds = np.log([v for v, _ in good])
+                out[f"slope_{name[:4]}"] = float(np.polyfit(speeds, np.log(values), 1)[0])
+    return out
+
+
+def _spread(todo: Sequence[Case], results: Sequence[Evaluation], name: str) -> float:
+    """Standard deviation between runs that differ only in their particles; 0 where none was asked for."""
+    base = results[next(k for k, c in enumerate(todo) if c.axis == "dx")]
+    same = [base, *(r for c, r in zip(todo, results, strict=True) if c.axis == "seed")]
+    values = [r.scalars[name] for r in same if r.ok]
+    return float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
