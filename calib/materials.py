@@ -107,6 +107,17 @@ class FoodSpec:
             raise MaterialError(f"{self.name}: no literature range for {name}; give a value for it first")
         return self.properties[name].low, self.properties[name].high
 
+    def with_sizes(self, sizes: Mapping[str, float], *, status: str, source: str) -> FoodSpec:
+        """The same food with other dimensions [m], by name; ranges stay.
+
+        Raises:
+            MaterialError: An impossible size.
+        """
+        new = dict(self.dims)
+        for name, x in sizes.items():
+            new[name] = replace(new[name], value=x, status=status, source=source)
+        return replace(self, dims=new)
+
     def with_values(
         self, values: Mapping[str, float], *, status: str = "given", source: str = "given by the user"
     ) -> FoodSpec:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
@@ -14,10 +14,13 @@ from typing import Any
 import numpy as np
 
 from calib.objective import Evaluation
+from calib.scenes import place
 from mpm.material import Material
 from mpm.scene import Scene
 
 DIED = "worker_died"  # reason of a run whose process was killed, for instance for lack of memory
+
+KEPT_SCENES = 3  # scenes whose kernels a worker keeps: fine, coarse and one of another height
 
 _simulations: dict[Scene, Any] = {}
 
@@ -32,9 +35,10 @@ def _run(scene: Scene, values: dict[str, Any], arch: str, threads: int) -> dict[
     from mpm.runtime import Runtime
     from mpm.solver import Simulation
 
-    simulation = _simulations.get(scene)
-    if simulation is None:
-        simulation = _simulations[scene] = Simulation(scene, Runtime(arch, threads))
+    simulation = _simulations.pop(scene, None) or Simulation(scene, Runtime(arch, threads))
+    _simulations[scene] = simulation  # the latest is the last
+    while len(_simulations) > KEPT_SCENES:
+        del _simulations[next(iter(_simulations))]
     material: Material = replace(scene.food.material, **values)
     parent = os.getppid()
 
@@ -92,9 +96,9 @@ class Pool:
         for process in processes:
             process.terminate()
 
-    def evaluator(self, scene: Scene) -> SceneEvaluator:
-        """Evaluator of material candidates of one scene."""
-        return SceneEvaluator(self, scene)
+    def evaluator(self, scene: Scene, kept: Collection[str] = ()) -> SceneEvaluator:
+        """Evaluator of candidates of one scene; ``kept`` sizes do not follow a fitted height."""
+        return SceneEvaluator(self, scene, kept)
 
     def run(self, jobs: Sequence[tuple[Scene, Mapping[str, float]]]) -> Iterator[Evaluation]:
         """Run each scene with its material values; yields in order of completion, ``index`` is the place among the jobs.
@@ -126,11 +130,18 @@ class Pool:
 
 
 class SceneEvaluator:
-    """Runs material candidates of one scene in a pool."""
+    """Runs candidates of one scene in a pool: material values, and the specimen's height where that is fitted.
 
-    def __init__(self, pool: Pool, scene: Scene) -> None:
-        self.pool, self.scene = pool, scene
+    Args:
+        pool: Where they run.
+        scene: The scene.
+        kept: Sizes of the specimen that do not follow a fitted height.
+    """
+
+    def __init__(self, pool: Pool, scene: Scene, kept: Collection[str] = ()) -> None:
+        self.pool, self.scene, self.kept = pool, scene, kept
 
     def evaluate(self, batch: Sequence[Mapping[str, float]]) -> Iterator[Evaluation]:
         """Run each candidate; yields in order of completion, ``index`` is the place in the batch."""
-        yield from self.pool.run([(self.scene, values) for values in batch])
+        for evaluation in self.pool.run([place(self.scene, values, self.kept) for values in batch]):
+            yield replace(evaluation, parameters=dict(batch[evaluation.index]))

@@ -62,4 +62,5 @@ class Setup:
     coarse: Scene
     objective: Objective
     assumed: list[str]
+    kept: tuple[str, ...] = ()
     air_sha256: str | None = None

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 
 from calib.conditioning import Conditioned
 from calib.materials import FoodSpec
@@ -12,7 +13,8 @@ from mpm.shapes import Shape
 ZONE_M = 4e-3  # process zone of the edge; small foods get an eighth of their height
 ZONE_PARTS = 8
 CELL_PER_ZONE = 0.75  # default cell, so that the zone spans 1.3 cells; the coarse grid has one cell to the zone
-CLEARANCE_ZONES = 2.0  # food left below the edge where a trace ends under load
+CLEARANCE_ZONES = 1.0  # least food left below the edge where a trace ends under load
+HEIGHT_SPAN = 1.25  # a specimen of unknown height may be at least this many times higher than the lowest it can be
 UNDER_LOAD = 0.5  # the trace ends under load when its last force exceeds this part of its median after the peak
 LENGTH_PER_HEIGHT = 1.0  # simulated length across the blade; the rest of a long food carries no load
 
@@ -26,13 +28,19 @@ class Sizing:
     width: float | None = None
     length: float | None = None
 
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """Which of width and length were measured, and so do not follow a fitted height."""
+        return tuple(name for name in ("width", "length") if getattr(self, name) is not None)
+
 
 def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple[Shape, list[str]]:
     """Shape of the specimen, and what had to be assumed about it.
 
-    Real traces rarely come with the specimen's size. The height follows from the stroke where the trace has a
-    position; a width that is not given keeps the food's proportions. The force is proportional to the width, so only
-    the product of resistance and width is seen by one trace.
+    Real traces rarely come with the specimen's size. Where the trace has a position and ends released, the height is
+    the stroke; where it ends under load it lies in :func:`height_range`. A width that is not given keeps the food's
+    proportions. The force is proportional to the width, so only the product of resistance and width is seen by one
+    trace.
 
     Raises:
         SceneError: A shape or size that cannot be simulated.
@@ -41,27 +49,65 @@ def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple
     default = food.to_scene_food(shape=sizing.shape).shape
     height = sizing.height
     if height is None and trace is not None and trace.stroke_source != "height":
-        late = trace.curve[int(trace.curve.argmax()) :]
-        loaded = trace.curve[-1] > UNDER_LOAD * float(sorted(late)[len(late) // 2])
-        zone = min(ZONE_M, trace.stroke_length_m / ZONE_PARTS)
-        height = trace.stroke_length_m + (CLEARANCE_ZONES * zone if loaded else 0.0)
-        why = "it ends under load, so the edge did not reach the board" if loaded else "it ends released"
-        said.append(
-            f"the specimen's height is not known: {height * 1e3:.1f} mm is taken from the stroke of "
-            f"{trace.stroke_length_m * 1e3:.1f} mm, because {why}; give --height if you measured it"
-        )
+        free = height_range(food, trace, sizing)
+        if free is None:
+            height = trace.stroke_length_m
+            said.append(
+                f"the specimen's height is not known: {height * 1e3:.1f} mm is the stroke, because the trace ends "
+                "released; give --height if you measured it"
+            )
+        else:
+            low, height, high = free
+            said.append(
+                f"the specimen's height is not known: the trace ends under load, so the edge stopped above the board, and "
+                f"{low * 1e3:.0f} to {high * 1e3:.0f} mm are possible; give --height if you measured it"
+            )
     height = default.height if height is None else height
     width = sizing.width
     if width is None:
         width = default.width * height / default.height
         said.append(
-            f"the specimen's width is not known: {width * 1e3:.1f} mm keeps the proportions of the food; resistances are "
-            "only identified as their product with it; give --width if you measured it"
+            "the specimen's width is not known: it keeps the proportions of the food; resistances are only identified as "
+            "their product with it; give --width if you measured it"
         )
     length = sizing.length
     if length is None:
         length = min(default.length * height / default.height, LENGTH_PER_HEIGHT * height)
     return Shape(default.kind, length, width, height), said
+
+
+def height_range(food: FoodSpec, trace: Conditioned, sizing: Sizing) -> tuple[float, float, float] | None:
+    """Lowest, likely and largest height of a specimen whose trace ends under load [m]; None where it is known.
+
+    The edge then stopped above the board: the food is higher than the stroke by a process zone at least, and where the
+    literature's range allows, within it.
+    """
+    late = trace.curve[int(trace.curve.argmax()) :]
+    loaded = trace.curve[-1] > UNDER_LOAD * float(sorted(late)[len(late) // 2])
+    if sizing.height is not None or trace.stroke_source == "height" or not loaded:
+        return None
+    known = food.dims["height"]
+    low = trace.stroke_length_m + CLEARANCE_ZONES * min(ZONE_M, trace.stroke_length_m / ZONE_PARTS)
+    high = max(known.high, HEIGHT_SPAN * low)
+    return low, known.value if low < known.value < high else (low * high) ** 0.5, high
+
+
+def place(scene: Scene, values: Mapping[str, float], kept: Collection[str] = ()) -> tuple[Scene, dict[str, float]]:
+    """The scene at a fitted height, and the values that are left: those of the material.
+
+    Args:
+        scene: The scene with any height.
+        values: Fitted values by name, ``height`` [m] among them or not.
+        kept: Which of ``width`` and ``length`` do not grow with the height, because they were measured.
+    """
+    rest = dict(values)
+    height = rest.pop("height", None)
+    if height is None:
+        return scene, rest
+    shape = scene.food.shape
+    k = height / shape.height
+    sizes = {name: getattr(shape, name) * (1.0 if name in kept else k) for name in ("width", "length")}
+    return replace(scene, food=replace(scene.food, shape=replace(shape, height=height, **sizes))), rest
 
 
 def cut_scene(

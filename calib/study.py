@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from calib.progress import Progress
 from calib.properties import rule_of
 from calib.provenance import code_key, key_of
 from calib.request import Request, Setup
-from calib.scenes import cut_scene, specimen
+from calib.scenes import cut_scene, height_range, place, specimen
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.summary import add_conditioning, summarise
 from calib.trace import read_trace
@@ -38,14 +39,29 @@ BOUND_FACTOR = 5.0
 LINEAR = {"nu": (0.0, 0.49), "mu": (0.0, 1.2)}  # fitted on a linear scale, with their hard bounds
 
 
-def fit_parameters(food: FoodSpec, names: tuple[str, ...]) -> ParameterSet:
+def fit_parameters(
+    food: FoodSpec, names: tuple[str, ...], heights: tuple[float, float, float] | None = None
+) -> ParameterSet:
     """The fitted properties with start value, hard bounds and literature prior.
 
+    Args:
+        food: The food.
+        names: Properties, and ``height`` for the specimen's.
+        heights: Lowest, likely and largest height of the specimen [m]; None where it is known.
+
     Raises:
-        MaterialError: An unknown or repeated name, or a property without a literature range.
+        MaterialError: An unknown or repeated name, a property without a literature range, or a height that is known.
     """
     chosen = []
     for name in names:
+        if name == "height":
+            if heights is None:
+                raise MaterialError(
+                    "--fit height: the height is known (given, or the trace ends released); leave one of both out"
+                )
+            low, likely, high = heights
+            chosen.append(Parameter(name, likely, low, high, "m", low, high))
+            continue
         rule, (low, high) = rule_of(name), food.prior(name)
         value = food.value(name)
         assert value is not None  # prior() has a range only where there is a value
@@ -60,7 +76,12 @@ def fit_parameters(food: FoodSpec, names: tuple[str, ...]) -> ParameterSet:
     return ParameterSet(tuple(chosen))
 
 
-def _set_up(request: Request) -> Setup:
+def set_up(request: Request) -> Setup:
+    """Condition the trace, and make the scenes and the objective of a calibration.
+
+    Raises:
+        CutcalError: Anything wrong with the input.
+    """
     food = request.food
     trace = read_trace(request.trace, **request.columns)
     air = read_trace(request.air, **request.columns) if request.air is not None else None
@@ -73,8 +94,10 @@ def _set_up(request: Request) -> Setup:
         for screening in (False, True)
     )
     target = Target(curve.stroke, curve.curve, curve.noise_sd_N, curve.peak_sd_N, filter_simulated)
-    objective = Objective(target, fit_parameters(food, request.fit or food.default_fit))
-    return Setup(curve, fine, coarse, objective, assumed, None if air is None else air.sha256)
+    heights = height_range(food, curve, request.sizing)
+    names = request.fit or (food.default_fit if heights is None else (*food.default_fit, "height"))
+    objective = Objective(target, fit_parameters(food, names, heights))
+    return Setup(curve, fine, coarse, objective, assumed, request.sizing.kept, None if air is None else air.sha256)
 
 
 def run(
@@ -102,7 +125,7 @@ def run(
     """
     say = say or (lambda text: None)
     began = time.monotonic()
-    setup = _set_up(request)
+    setup = set_up(request)
     for text in [*request.food.warnings(), *setup.curve.warnings, *setup.assumed]:
         say(text)
     options = FitOptions(budget=request.budget, batch=request.workers, seed=request.seed)
@@ -114,13 +137,21 @@ def run(
         Pool(request.workers, request.arch) as pool,
     ):
         fine, coarse = (
-            CachedEvaluator(pool.evaluator(scene), store, scene=scene.as_dict(), code=code_key(), fidelity=name)
+            CachedEvaluator(
+                pool.evaluator(scene, setup.kept),
+                store,
+                scene=scene.as_dict() | {"kept": setup.kept},
+                code=code_key(),
+                fidelity=name,
+            )
             for name, scene in (("fine", setup.fine), ("coarse", setup.coarse))
         )
         result = calibrate(setup.objective, fine, coarse=coarse, options=options, progress=progress)
         start = _start_curve(setup, result, fine)
     say("simulating the best values once more for their full record")
-    record = _record(setup.fine, result.best.evaluation.parameters, request.arch)
+    scene, values = place(setup.fine, result.best.evaluation.parameters, setup.kept)
+    setup = replace(setup, fine=scene)
+    record = _record(scene, values, request.arch)
     add_conditioning(out / "evaluations.h5", setup.curve)
     return _write(request, setup, result, record, start, out, time.monotonic() - began)
 
@@ -165,14 +196,23 @@ def _write(
     summary = summarise(request, setup, result, record, metrics, nulls, doubt)
     summary["wall_s"] = wall
     write_csv(out / "curves.csv", _curves(curve, best.curve, record, start, nulls))
-    fitted = request.food.with_values(
-        best.evaluation.parameters, status="fitted", source=f"fitted to {curve.trace.source}"
-    )
+    fitted = _fitted_food(request, setup, best.evaluation.parameters)
     keep = ("created", "trace_sha256", "passed", "peak_error", "nrmse", "shape_error", "git", "versions")
     dump_material(fitted, out / "material.yaml", {k: summary[k] for k in keep} | {"trace": curve.trace.label})
     write_json(out / "summary.json", summary)
     write_report(out)
     return summary
+
+
+def _fitted_food(request: Request, setup: Setup, parameters: Mapping[str, float]) -> FoodSpec:
+    """The food with the fitted values, and with the specimen's height and width where the height was fitted."""
+    _, values = place(setup.fine, parameters)
+    how = {"status": "fitted", "source": f"fitted to {setup.curve.trace.source}"}
+    food = request.food.with_values(values, **how)
+    if len(values) == len(parameters):
+        return food
+    shape = setup.fine.food.shape
+    return food.with_sizes({"height": shape.height, "width": shape.width}, **how)
 
 
 def _curves(

@@ -131,7 +131,7 @@ def _parameters(request: Request, result: FitResult, doubt: Uncertainty | None) 
         else:
             entry = {"value": p.value, "unit": p.unit, "low95": None, "high95": None}
             entry |= {"prior_low": p.prior_low, "prior_high": p.prior_high, "verdict": UNKNOWN}
-        known = request.food.properties[p.name]
+        known = (request.food.dims if p.name == "height" else request.food.properties)[p.name]
         out[p.name] = entry | {"status": known.status, "source": known.source}
     if doubt is not None:
         names = result.parameters.names

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,18 @@ Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass."
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
     add_food(p)
+    add_trace(p)
+    p.add_argument(
+        "--fit", metavar="NAMES", help="properties to fit, e.g. E,nu,R,mu (default: those that cutting sees)"
+    )
+    p.add_argument("--budget", type=number(0, 1e6, ""), default=40, help="largest number of simulations (default 40)")
+    p.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
+    p.add_argument("--resume", action="store_true", help="go on with the run in --out; nothing is simulated twice")
+    add_run(p)
+
+
+def add_trace(p: argparse.ArgumentParser) -> None:
+    """Options that say what was measured."""
     p.add_argument("--trace", required=True, metavar="CSV", help="record of the cut")
     p.add_argument("--air", metavar="CSV", help="the same motion without food, subtracted at equal time")
     p.add_argument("--time-col", metavar="NAME", help="column of the time")
@@ -40,13 +53,6 @@ def add_args(p: argparse.ArgumentParser) -> None:
         "--speed", type=number(0, 10, "m/s"), metavar="M/S", help="knife speed, where the trace has no position"
     )
     p.add_argument("--t-end", type=float, metavar="S", help="ignore the record after this time (board contact)")
-    p.add_argument(
-        "--fit", metavar="NAMES", help="properties to fit, e.g. E,nu,R,mu (default: those that cutting sees)"
-    )
-    p.add_argument("--budget", type=number(0, 1e6, ""), default=40, help="largest number of simulations (default 40)")
-    p.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
-    p.add_argument("--resume", action="store_true", help="go on with the run in --out; nothing is simulated twice")
-    add_run(p)
 
 
 def request_of(args: argparse.Namespace, command: Sequence[str]) -> Request:
@@ -57,6 +63,16 @@ def request_of(args: argparse.Namespace, command: Sequence[str]) -> Request:
     """
     if args.workers < 1:
         raise CutcalError(f"--workers {args.workers}: at least 1")
+    named = None if args.fit is None else tuple(n.strip() for n in args.fit.split(",") if n.strip())
+    return replace(measured(args, command), fit=named, budget=args.budget, workers=args.workers)
+
+
+def measured(args: argparse.Namespace, command: Sequence[str]) -> Request:
+    """The part of a request that says what was cut and measured.
+
+    Raises:
+        CutcalError: An impossible value, an unknown name, a missing file.
+    """
     columns: dict[str, Any] = {
         "time_col": args.time_col,
         "force_col": args.force_col,
@@ -72,10 +88,7 @@ def request_of(args: argparse.Namespace, command: Sequence[str]) -> Request:
         speed=args.speed,
         t_end=args.t_end,
         sizing=sizing_of(args),
-        fit=None if args.fit is None else tuple(n.strip() for n in args.fit.split(",") if n.strip()),
         dx=args.dx,
-        budget=args.budget,
-        workers=args.workers,
         seed=args.seed,
         arch=args.arch,
         command=tuple(command),

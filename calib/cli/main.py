@@ -7,10 +7,17 @@ import sys
 from collections.abc import Sequence
 
 import calib
-from calib.cli import calibrate, converge, foods, report, simulate
+from calib.cli import calibrate, converge, foods, predict, report, simulate
 from mpm.errors import CutcalError
 
-COMMANDS = {"calibrate": calibrate, "converge": converge, "simulate": simulate, "report": report, "foods": foods}
+COMMANDS = {
+    "calibrate": calibrate,
+    "converge": converge,
+    "predict": predict,
+    "simulate": simulate,
+    "report": report,
+    "foods": foods,
+}
 INTERRUPTED = 130  # what a shell reports for a program ended by Ctrl-C
 
 

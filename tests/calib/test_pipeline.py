@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Mapping
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
@@ -19,9 +20,9 @@ from calib.materials import load_food, load_foods
 from calib.metrics import compare
 from calib.nulls import null_models
 from calib.outputs import prepare, write_json
-from calib.pool import DIED, SceneEvaluator
+from calib.pool import DIED, Pool, SceneEvaluator
 from calib.provenance import code_key, key_of, versions
-from calib.scenes import Sizing, cut_scene, specimen
+from calib.scenes import Sizing, cut_scene, height_range, place, specimen
 from calib.study import fit_parameters
 from calib.trace import Trace
 from calib.verdicts import judge, limits
@@ -42,12 +43,16 @@ def trace(loaded: bool) -> Any:
 
 
 def test_height_follows_the_stroke():
-    """A trace that ends released cut through: height = stroke; one that ends under load leaves food below, and says so."""
+    """A trace that ends released cut through: height = stroke; one that ends under load leaves a range, and says so."""
     food = load_food("cucumber")
     through, said = specimen(food, trace(loaded=False), Sizing())
     assert through.height == pytest.approx(0.04, rel=0.03)
     short, words = specimen(food, trace(loaded=True), Sizing())
-    assert short.height == pytest.approx(0.048, rel=0.03)
+    low, likely, high = height_range(food, trace(loaded=True), Sizing())
+    assert low == pytest.approx(0.044, rel=0.03) and high == pytest.approx(0.055, rel=0.03)
+    assert low < short.height == likely < high
+    assert height_range(food, trace(loaded=False), Sizing()) is None
+    assert height_range(food, trace(loaded=True), Sizing(height=0.05)) is None
     assert "under load" in words[0] and "released" in said[0]
     assert any("width" in w for w in words)
 
@@ -57,6 +62,30 @@ def test_given_sizes_are_taken_and_not_assumed():
     shape, said = specimen(load_food("apple"), None, Sizing("block", 0.03, 0.04, 0.05))
     assert (shape.kind, shape.height, shape.width, shape.length) == ("block", 0.03, 0.04, 0.05)
     assert said == []
+
+
+def test_fitted_height_takes_the_other_sizes_along():
+    """A candidate's height scales width and length with it, except what was measured; the rest is the material's."""
+    food = load_food("cucumber")
+    shape, _ = specimen(food, None, Sizing())
+    scene = cut_scene(food, shape, load_knife("kitchen"), stroke=0.02)
+    higher, values = place(scene, {"E": 1e6, "height": 1.2 * shape.height}, kept=("width",))
+    grown = higher.food.shape
+    assert values == {"E": 1e6}
+    assert (grown.height, grown.length) == pytest.approx((1.2 * shape.height, 1.2 * shape.length))
+    assert grown.width == shape.width
+    assert (higher.motion, higher.edge, higher.numerics) == (scene.motion, scene.edge, scene.numerics)
+    assert place(scene, {"E": 1e6}) == (scene, {"E": 1e6})
+
+
+def test_height_is_fitted_only_where_it_is_free():
+    """Its bounds are what is possible; a height that is known cannot be fitted as well."""
+    food = load_food("cucumber")
+    heights = height_range(food, trace(loaded=True), Sizing())
+    item = fit_parameters(food, ("E", "height"), heights)["height"]
+    assert (item.low, item.value, item.high, item.unit) == (*heights, "m")
+    with pytest.raises(MaterialError, match="height is known"):
+        fit_parameters(food, ("E", "height"))
 
 
 @pytest.mark.parametrize("name", list(load_foods()))
@@ -130,13 +159,13 @@ def test_prepare_makes_folders_once(tmp_path):
     assert list((tmp_path / "a" / "b").iterdir()) == []
 
 
-class FlakyPool:
+class FlakyPool(Pool):
     """A pool whose first ``deaths`` runs lose their process."""
 
     def __init__(self, deaths: int) -> None:
         self.deaths, self.runs = deaths, 0
 
-    def submit(self, scene: object, values: dict[str, float]) -> Future[dict[str, Any]]:
+    def submit(self, scene: object, values: Mapping[str, float]) -> Future[dict[str, Any]]:
         self.runs += 1
         future: Future[dict[str, Any]] = Future()
         if self.runs <= self.deaths:

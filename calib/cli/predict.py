@@ -1,0 +1,62 @@
+"""``cutcal predict``: a measured cut against a food that was calibrated on another one."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from calib.cli.calibrate import add_trace, measured
+from calib.cli.options import add_food, add_run
+from calib.errors import MaterialError
+
+HELP = "predict a measured cut with a food that was calibrated on another one"
+DESCRIPTION = """Simulate the cut of a trace with the values of --material, without fitting
+any of them, and compare. Writes summary.json and curves.csv to --out."""
+EPILOG = """example:
+  cutcal predict --food potato --material runs/cut1/material.yaml --scale-width \\
+      --trace cut2.csv --air air.csv --knife edc --out runs/cut2
+
+Exit codes: 0 NRMSE at most 0.10 and rating R at least 0.80, 1 error, 2 worse."""
+
+
+def add_args(p: argparse.ArgumentParser) -> None:
+    """Options of this command."""
+    add_food(p)
+    add_trace(p)
+    p.add_argument(
+        "--scale-width",
+        action="store_true",
+        help="take the specimen's width from this trace: one factor on the force, the only number that is fitted",
+    )
+    add_run(p)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Predict; prints the agreement, or the summary as JSON."""
+    from calib.prediction import run as predict
+
+    if args.material is None:
+        raise MaterialError("predict needs the calibrated food: add --material with the material.yaml of a calibration")
+    request = measured(args, ["predict", *(a for a in sys.argv[1:] if a != "predict")])
+    out = Path(args.out or f"cutcal-predict-{request.food.name}-{request.trace.stem}")
+
+    def say(text: str) -> None:
+        print(f"note: {text}", file=sys.stderr, flush=True)
+
+    summary = predict(request, out, scale_width=args.scale_width, say=say)
+    if args.json:
+        print((out / "summary.json").read_text(encoding="utf-8"), end="")
+    else:
+        m, scale = summary["metrics"], summary["width_scale"]
+        print(
+            f"{summary['food']}: {'passed' if summary['passed'] else 'not passed'}, predicted without fitting"
+            + ("" if scale is None else f" but one factor {scale:.3g} for the width")
+        )
+        print(
+            f"  peak {m['peak_sim_N']:.2f} N against {m['peak_real_N']:.2f} N ({m['peak_error']:+.1%}), "
+            f"NRMSE {m['nrmse']:.3f} (limit 0.10), R {m['iso18571']['R']:.3f} (limit 0.80), "
+            f"shape {m['shape_error']:.3f}, work {m['work_error']:+.1%}"
+        )
+        print(f"  wrote {out}")
+    return 0 if summary["passed"] else 2
