@@ -1,0 +1,49 @@
+"""``cutcal predict``: a cut that was not fitted, with and without the one factor for its width."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from calib.cli.main import main
+from calib.materials import dump_material, load_food
+
+TRACE = ["--trace", "force_data/banana_reconstructed.csv", "--dx", "6e-3"]
+
+
+@pytest.fixture(scope="module")
+def material(tmp_path_factory):
+    """The banana of the literature as if it had been calibrated."""
+    path = tmp_path_factory.mktemp("material") / "material.yaml"
+    dump_material(load_food("banana"), path, {"trace": "another"})
+    return str(path)
+
+
+def test_prediction_takes_one_number_from_the_trace(material, tmp_path, capsys):
+    """The width scales the curve by the factor that brings it closest; without it nothing is taken from the trace."""
+    code = {}
+    for name, extra in (("bare", []), ("scaled", ["--scale-width"])):
+        command = ["predict", "--food", "banana", "--material", material, *TRACE, *extra, "--out", str(tmp_path / name)]
+        code[name] = main(command)
+    bare, scaled = (json.loads((tmp_path / n / "summary.json").read_text()) for n in ("bare", "scaled"))
+    a, b = (pd.read_csv(tmp_path / n / "curves.csv") for n in ("bare", "scaled"))
+    k = scaled["width_scale"]
+    assert bare["width_scale"] is None and bare["metrics"] == bare["unscaled"] == scaled["unscaled"]
+    np.testing.assert_allclose(b["sim_N"], k * a["sim_N"], rtol=1e-6, atol=1e-9)
+    assert scaled["width_m"] == pytest.approx(k * bare["width_m"])
+    assert scaled["metrics"]["best_scale"] == pytest.approx(1.0)
+    assert scaled["metrics"]["nrmse"] <= bare["metrics"]["nrmse"]
+    for name, s in (("bare", bare), ("scaled", scaled)):
+        assert s["passed"] == (s["metrics"]["nrmse"] <= 0.10 and s["metrics"]["iso18571"]["R"] >= 0.80)
+        assert code[name] == (0 if s["passed"] else 2)
+    assert "one factor" in capsys.readouterr().out
+
+
+def test_prediction_needs_a_calibrated_food(capsys, tmp_path):
+    """Without --material there is nothing that was calibrated: one error, nothing written."""
+    assert main(["predict", "--food", "banana", *TRACE, "--out", str(tmp_path / "x")]) == 1
+    assert "--material" in capsys.readouterr().err
+    assert not (tmp_path / "x").exists()
