@@ -22,8 +22,9 @@ from calib.provenance import code_key, git_commit, key_of, versions
 from calib.store import TRANSIENT_REASONS, EvaluationStore, Header, content_key
 from mpm.scene import Scene
 
-AXES = {"dx": "cell size [m]", "safety": "dt over its limit", "mach": "speed over P-wave speed", "ppc": "particles"}
-"""What can be varied, each apart from the others."""
+AXES = ("safety", "mach", "ppc", "offset", "seed")
+"""What can be varied beside the cell size, each apart from the others: dt over its limit, speed over the P-wave's,
+particles per cell and direction, blade against the grid [cells], particle positions."""
 POINTS = 240
 """Points of the common stroke grid, as of a calibration."""
 WORK_LIMIT, PEAK_LIMIT = 0.02, 0.03
@@ -73,6 +74,9 @@ def cases(scene: Scene, axes: Mapping[str, Sequence[float]], seeds: int) -> list
         out.append(Case("mach", value, replace(base, motion=replace(base.motion, mach=value))))
     for value in axes.get("ppc", ()):
         out.append(Case("ppc", value, replace(base, numerics=replace(base.numerics, ppc=round(value)))))
+    for value in axes.get("offset", ()):
+        shifted = replace(base.numerics, grid_shift=(0.0, value, 0.0))
+        out.append(Case("offset", value, replace(base, numerics=shifted)))
     for seed in range(1, seeds + 1):
         numerics = replace(base.numerics, seed=base.numerics.seed + seed)
         out.append(Case("seed", seed, replace(base, numerics=numerics)))
@@ -175,7 +179,7 @@ def _conclude(todo: Sequence[Case], results: Sequence[Evaluation], out: Path) ->
         **_agreement(peak, work, curve),
         "repeat_sd_peak_N": noise["peak_N"],
         "repeat_sd_work_J": noise["work_J"],
-        **{axis: _axis(todo, results, axis) for axis in ("safety", "mach", "ppc", "seed")},
+        **{axis: _axis(todo, results, axis) for axis in AXES},
     }
 
 

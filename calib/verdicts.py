@@ -119,8 +119,11 @@ def limits(
     said += [a[0].upper() + a[1:] + "." for a in assumptions]
     said.append("One cut of one specimen says nothing about the scatter between specimens.")
     said.append(
-        "The laws are independent of rate; relaxation, adhesion and moisture are not modelled, and the lower skin of a "
+        "The laws are independent of rate; relaxation, adhesion and moisture were not simulated, and the lower skin of a "
         "whole fruit is not cut."
     )
-    said.append("One grid was used; the discretisation error of the calibrated force was not measured in this run.")
+    said.append(
+        "One grid was used; the discretisation error of the calibrated force was not measured in this run "
+        "(cutcal converge --material measures it)."
+    )
     return said

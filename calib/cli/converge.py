@@ -19,11 +19,12 @@ numerical uncertainty u_num_N over the stroke) and converge.svg to --out."""
 EPILOG = """examples:
   cutcal converge --food banana
   cutcal converge --food potato --material runs/potato/material.yaml --knife edc \\
-      --dx 3e-3,2e-3,1.5e-3,1e-3 --mach 0.005 --safety 0.35 --ppc 3
+      --dx 3e-3,2e-3,1.5e-3,1e-3 --mach 0.005 --safety 0.35 --ppc 3 --offset 0.25,0.5
 
 Ctrl-C keeps what was computed; the same command with --resume goes on.
 Exit codes: 0 converged (work within 2 %, peak within 3 % between the two finest
 grids), 1 error in input or run, 2 ran but did not converge."""
+WORDS = {"safety": "time step", "mach": "speed", "ppc": "particles", "offset": "offset", "seed": "seeds"}
 REFINED = (1.0, 2 / 3, 0.5)  # default cells over the scene's own one
 
 
@@ -41,6 +42,12 @@ def add_args(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("--mach", type=numbers(0, 0.05, ""), metavar="F,...", help="blade speeds to try, over the P-wave's")
     p.add_argument("--ppc", type=numbers(0.5, 8.5, ""), metavar="N,...", help="particles per cell and direction to try")
+    p.add_argument(
+        "--offset",
+        type=numbers(-1, 1, "cells"),
+        metavar="CELLS,...",
+        help="places of the blade against the grid to try",
+    )
     p.add_argument("--seeds", type=int, default=2, help="other particle positions on the coarsest grid (default 2)")
     p.add_argument(
         "--stroke", type=number(1e-4, 1, "m"), metavar="M", help="way of the edge; the whole height by default"
@@ -59,8 +66,14 @@ def run(args: argparse.Namespace) -> int:
     food, knife = food_of(args), load_knife(args.knife)
     shape, assumed = specimen(food, None, sizing_of(args))
     scene = cut_scene(food, shape, knife, stroke=args.stroke, dx=max(args.dx) if args.dx else None, seed=args.seed)
+    zone = cut_scene(food, shape, knife).edge.zone
+    if scene.edge.zone > zone:
+        assumed.append(
+            f"the coarsest cell is larger than the process zone of {zone * 1e3:g} mm, so all grids have one of "
+            f"{scene.edge.zone * 1e3:g} mm: this is not the cut of the other commands; start from {zone * 1e3:g} mm or less"
+        )
     axes = {"dx": args.dx or tuple(round(scene.numerics.dx * part, 7) for part in REFINED)}
-    axes |= {name: getattr(args, name) for name in ("safety", "mach", "ppc") if getattr(args, name)}
+    axes |= {name: getattr(args, name) for name in ("safety", "mach", "ppc", "offset") if getattr(args, name)}
     out = Path(args.out or f"cutcal-converge-{food.name}")
     about = {
         "food": food.name,
@@ -73,6 +86,8 @@ def run(args: argparse.Namespace) -> int:
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
+    for text in about["warnings"]:
+        say(f"note: {text}")
     document = study(
         scene,
         axes,
@@ -111,7 +126,7 @@ def table(document: dict[str, Any]) -> str:
     lines.append(
         f"  curve: GCI {document['gci_curve_median']:.2%} of the peak (median), {document['gci_curve_max']:.2%} (largest)"
     )
-    for axis, words in (("safety", "time step"), ("mach", "speed"), ("ppc", "particles"), ("seed", "seeds")):
+    for axis, words in WORDS.items():
         if document[axis] is not None and "spread_work" in document[axis]:
             spread = document[axis]
             slope = f", log-log slope of the peak {spread['slope_peak']:+.3f}" if axis == "mach" else ""
