@@ -46,7 +46,7 @@ class Request:
     sizing: Sizing = field(default_factory=Sizing)
     fit: tuple[str, ...] | None = None
     dx: float | None = None
-    budget: float = 40
+    budget: float = 60
     workers: int = 2
     seed: int = 0
     arch: str = "cpu"
