@@ -95,6 +95,9 @@ def height_range(food: FoodSpec, trace: Conditioned, sizing: Sizing) -> tuple[fl
 def place(scene: Scene, values: Mapping[str, float], kept: Collection[str] = ()) -> tuple[Scene, dict[str, float]]:
     """The scene at a fitted height, and the values that are left: those of the material.
 
+    The cell grows with the height, so that every height has the same particles and nodes: on a fixed cell each height
+    would draw other particles, and the force would jump by several per cent from one to the next.
+
     Args:
         scene: The scene with any height.
         values: Fitted values by name, ``height`` [m] among them or not.
@@ -107,7 +110,17 @@ def place(scene: Scene, values: Mapping[str, float], kept: Collection[str] = ())
     shape = scene.food.shape
     k = height / shape.height
     sizes = {name: getattr(shape, name) * (1.0 if name in kept else k) for name in ("width", "length")}
-    return replace(scene, food=replace(scene.food, shape=replace(shape, height=height, **sizes))), rest
+    food = replace(scene.food, shape=replace(shape, height=height, **sizes))
+    cell = k * scene.numerics.dx
+    return (
+        replace(
+            scene,
+            food=food,
+            numerics=replace(scene.numerics, dx=cell),
+            edge=replace(scene.edge, zone=max(scene.edge.zone, cell)),
+        ),
+        rest,
+    )
 
 
 def cut_scene(

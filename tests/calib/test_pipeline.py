@@ -7,6 +7,7 @@ import sys
 from collections.abc import Mapping
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from calib.scenes import Sizing, cut_scene, height_range, place, specimen
 from calib.study import fit_parameters
 from calib.trace import Trace
 from calib.verdicts import judge, limits
+from mpm.seeding import seed
 from mpm.shapes import SHAPE_KINDS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -74,7 +76,10 @@ def test_fitted_height_takes_the_other_sizes_along():
     assert values == {"E": 1e6}
     assert (grown.height, grown.length) == pytest.approx((1.2 * shape.height, 1.2 * shape.length))
     assert grown.width == shape.width
-    assert (higher.motion, higher.edge, higher.numerics) == (scene.motion, scene.edge, scene.numerics)
+    assert higher.numerics == replace(scene.numerics, dx=1.2 * scene.numerics.dx)
+    assert (higher.motion, higher.edge) == (scene.motion, scene.edge)
+    free, _ = place(scene, {"height": 1.2 * shape.height})
+    assert len(seed(free).x) == len(seed(scene).x)
     assert place(scene, {"E": 1e6}) == (scene, {"E": 1e6})
 
 
