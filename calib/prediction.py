@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from calib.conditioning import condition
 from calib.filters import filter_simulated
 from calib.knives import load_knife
 from calib.metrics import Metrics, compare
@@ -15,7 +14,8 @@ from calib.outputs import prepare, write_csv, write_json
 from calib.provenance import git_commit, versions
 from calib.request import Request
 from calib.scenes import cut_scene, specimen
-from calib.trace import read_trace
+from calib.study import conditioned
+from mpm.errors import SimulationError
 
 NRMSE_LIMIT, RATING_LIMIT = 0.10, 0.80
 """Largest curve error and smallest ISO-18571-style rating of a prediction that passes [-]."""
@@ -30,10 +30,7 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
     Raises:
         CutcalError: Anything wrong with the input, or a run that breaks down.
     """
-    trace = read_trace(request.trace, **request.columns)
-    air = read_trace(request.air, **request.columns) if request.air is not None else None
-    known = request.sizing.height or request.food.dims["height"].value
-    curve = condition(trace, air=air, speed=request.speed, height=known, t_end=request.t_end)
+    curve, _ = conditioned(request)
     shape, assumed = specimen(request.food, curve, request.sizing)
     knife = load_knife(request.knife)
     scene = cut_scene(request.food, shape, knife, stroke=curve.stroke_length_m, dx=request.dx, seed=request.seed)
@@ -45,6 +42,13 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
     from mpm.solver import Simulation
 
     record = Simulation(scene, Runtime(request.arch)).run()
+    if record.status != "done":
+        raise SimulationError(
+            f"the predicted cut broke down at {record.fraction:.0%} of its stroke ({record.status}); nothing was compared; "
+            "try another --dx",
+            reason=record.status,
+            fraction=record.fraction,
+        )
     whole = filter_simulated(curve.stroke, record.stroke, record.resolved)
     bare = compare(curve.stroke, curve.curve, whole)
     factor = bare.best_scale if scale_width else 1.0

@@ -76,17 +76,27 @@ def fit_parameters(
     return ParameterSet(tuple(chosen))
 
 
-def set_up(request: Request) -> Setup:
+def conditioned(request: Request) -> tuple[Conditioned, str | None]:
+    """The trace of a request, conditioned, and the SHA-256 of its air run (None without one).
+
+    Raises:
+        CutcalError: Anything wrong with the records.
+    """
+    trace = read_trace(request.trace, **request.columns)
+    air = read_trace(request.air, **request.columns) if request.air is not None else None
+    known = request.sizing.height or request.food.dims["height"].value
+    curve = condition(trace, air=air, speed=request.speed, height=known, t_end=request.t_end)
+    return curve, None if air is None else air.sha256
+
+
+def _set_up(request: Request) -> Setup:
     """Condition the trace, and make the scenes and the objective of a calibration.
 
     Raises:
         CutcalError: Anything wrong with the input.
     """
     food = request.food
-    trace = read_trace(request.trace, **request.columns)
-    air = read_trace(request.air, **request.columns) if request.air is not None else None
-    known = request.sizing.height or food.dims["height"].value
-    curve = condition(trace, air=air, speed=request.speed, height=known, t_end=request.t_end)
+    curve, air_sha256 = conditioned(request)
     shape, assumed = specimen(food, curve, request.sizing)
     knife = load_knife(request.knife)
     fine, coarse = (
@@ -97,7 +107,7 @@ def set_up(request: Request) -> Setup:
     heights = height_range(food, curve, request.sizing)
     names = request.fit or (food.default_fit if heights is None else (*food.default_fit, "height"))
     objective = Objective(target, fit_parameters(food, names, heights))
-    return Setup(curve, fine, coarse, objective, assumed, request.sizing.kept, None if air is None else air.sha256)
+    return Setup(curve, fine, coarse, objective, assumed, request.sizing.kept, air_sha256)
 
 
 def run(
@@ -125,7 +135,7 @@ def run(
     """
     say = say or (lambda text: None)
     began = time.monotonic()
-    setup = set_up(request)
+    setup = _set_up(request)
     for text in [*request.food.warnings(), *setup.curve.warnings, *setup.assumed]:
         say(text)
     options = FitOptions(budget=request.budget, batch=request.workers, seed=request.seed)
@@ -205,14 +215,15 @@ def _write(
 
 
 def _fitted_food(request: Request, setup: Setup, parameters: Mapping[str, float]) -> FoodSpec:
-    """The food with the fitted values, and with the specimen's height and width where the height was fitted."""
+    """The food with the fitted values, and the specimen's height (and width, unless measured) where it was fitted."""
     _, values = place(setup.fine, parameters)
     how = {"status": "fitted", "source": f"fitted to {setup.curve.trace.source}"}
     food = request.food.with_values(values, **how)
     if len(values) == len(parameters):
         return food
     shape = setup.fine.food.shape
-    return food.with_sizes({"height": shape.height, "width": shape.width}, **how)
+    names = [name for name in ("height", "width") if name not in setup.kept]
+    return food.with_sizes({name: getattr(shape, name) for name in names}, **how)
 
 
 def _curves(

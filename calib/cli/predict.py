@@ -48,14 +48,14 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print((out / "summary.json").read_text(encoding="utf-8"), end="")
     else:
-        m, scale = summary["metrics"], summary["width_scale"]
+        m, scale, limits = summary["metrics"], summary["width_scale"], summary["limits"]
         print(
             f"{summary['food']}: {'passed' if summary['passed'] else 'not passed'}, predicted without fitting"
             + ("" if scale is None else f" but one factor {scale:.3g} for the width")
         )
         print(
             f"  peak {m['peak_sim_N']:.2f} N against {m['peak_real_N']:.2f} N ({m['peak_error']:+.1%}), "
-            f"NRMSE {m['nrmse']:.3f} (limit 0.10), R {m['iso18571']['R']:.3f} (limit 0.80), "
+            f"NRMSE {m['nrmse']:.3f} (limit {limits['nrmse']:.2f}), R {m['iso18571']['R']:.3f} (limit {limits['rating']:.2f}), "
             f"shape {m['shape_error']:.3f}, work {m['work_error']:+.1%}"
         )
         print(f"  wrote {out}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -10,6 +11,7 @@ import pytest
 
 from calib.cli.main import main
 from calib.materials import dump_material, load_food
+from mpm.solver import Simulation
 
 TRACE = ["--trace", "force_data/banana_reconstructed.csv", "--dx", "6e-3"]
 
@@ -47,3 +49,13 @@ def test_prediction_needs_a_calibrated_food(capsys, tmp_path):
     assert main(["predict", "--food", "banana", *TRACE, "--out", str(tmp_path / "x")]) == 1
     assert "--material" in capsys.readouterr().err
     assert not (tmp_path / "x").exists()
+
+
+def test_run_that_breaks_down_is_an_error_and_not_a_prediction(material, tmp_path, capsys, monkeypatch):
+    """A run that ends early is one error with its reason and the part that was done; nothing is compared."""
+    whole = Simulation.run
+    monkeypatch.setattr(Simulation, "run", lambda s: replace(whole(s), status="not_finite", fraction=0.4))
+    command = ["predict", "--food", "banana", "--material", material, *TRACE, "--out", str(tmp_path / "x")]
+    assert main(command) == 1
+    assert "broke down at 40% of its stroke (not_finite)" in capsys.readouterr().err
+    assert not (tmp_path / "x" / "summary.json").exists()
