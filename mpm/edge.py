@@ -46,17 +46,23 @@ class Edge(Nodes):
         return w
 
     @ti.func
-    def line_force(self, i, tangential, forward):
+    def line_force(self, i, tangential, forward, part):
         """Force per length of the edge in one slice after it moved against the material [N/m]: along the edge, forward.
 
         The slip is elastic up to a limit and points where the edge goes. A cut starts where the force reaches the
         threshold, at the indentation that belongs to it, and from there runs along the blade to every slice that
         already carries the propagation resistance: growing a crack takes less than starting one. Then the force falls
-        to that resistance. It acts against the motion and only the way forward makes new surface, so that with a
-        slice/push ratio xi the forward force is R / (1 + xi^2) (Atkins, Xu and Jeronimidis 2004).
+        to that resistance. Until the start the slip is the mean over the part of the slice that the edge has reached: on
+        a round top more of it comes into contact, unslipped, as the edge goes down. The force acts against the motion
+        and only the way forward makes new surface, so that with a slice/push ratio xi the forward force is
+        R / (1 + xi^2) (Atkins, Xu and Jeronimidis 2004).
         """
         limit, flesh = self.par[SLIP], self.par[R_FLESH]
-        e = self.slip[i] + ti.Vector([tangential, forward])
+        held = 1.0
+        if self.start[i] <= 0:  # what has come into contact since has not slipped yet
+            held = ti.min(1.0, self.touched[i] / part)
+        self.touched[i] = part
+        e = held * self.slip[i] + ti.Vector([tangential, forward])
         e[1] = ti.max(e[1], 0.0)
         size = e.norm()
         steep = e[1] / size if size > 0 else 0.0
@@ -117,7 +123,7 @@ class Edge(Nodes):
             if over > 0 and tip <= self.front[i] + self.par[SLIP]:
                 slide = (ti.cast(self.pose[VS], float) - mean[0]) * dt
                 fall = (mean[2] - ti.cast(self.pose[VZ], float)) * dt
-                line = self.line_force(i, c * slide - t * fall, c * fall + t * slide)
+                line = self.line_force(i, c * slide - t * fall, c * fall + t * slide, begun - ended)
                 along, down = c * line[0] + t * line[1], c * line[1] - t * line[0]
                 impulse = ti.Vector([along, -down]) * width / c * over * dt
                 self.push[i] = impulse / mass

@@ -7,12 +7,13 @@ import sys
 from collections.abc import Sequence
 
 import calib
-from calib.cli import calibrate, converge, foods, predict, report, simulate
+from calib.cli import bench, calibrate, converge, foods, predict, report, simulate
 from mpm.errors import CutcalError
 
 COMMANDS = {
     "calibrate": calibrate,
     "converge": converge,
+    "bench": bench,
     "predict": predict,
     "simulate": simulate,
     "report": report,

@@ -8,36 +8,19 @@ import numpy as np
 import pytest
 
 from mpm.errors import SceneError
-from mpm.material import Material
 from mpm.record import ForceRecord
 from mpm.runtime import Runtime
-from mpm.scene import Arm, Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
+from mpm.scene import Arm, Board, Food, Motion
 from mpm.shapes import Shape
 from mpm.solver import Simulation
+from tests.mpm import scenes
+from tests.mpm.scenes import WEDGE, cut
 
-THIN = Knife("thin", 0.2e-3, np.deg2rad(1.0), 0.05, 0.4)
-WEDGE = Knife("wedge", 2e-3, np.deg2rad(11.0), 0.0104, 0.2)
-FLESH = Material(E=1e6, nu=0.35, rho=1000, yield_stress=2e5, R=300.0, R_initiation=300.0, loss_factor=0.1)
-PRISM = Scene(
-    Food(Shape("block", 0.03, 0.024, 0.024), FLESH),
-    THIN,
-    Motion(0.018, 0.01),
-    edge=EdgeLaw(zone=3e-3),
-    numerics=Numerics(dx=3e-3),
-)
-
+FLESH = replace(scenes.FLESH, loss_factor=0.1)
+PRISM = replace(scenes.PRISM, food=replace(scenes.PRISM.food, material=FLESH))
 # rough board, wide and low: or the food slides along with the blade, or tips over
 HELD = replace(PRISM, food=Food(Shape("block", 0.03, 0.072, 0.024), FLESH), board=Board(mu=9.0))
 R_W = 300 * 0.072
-
-
-def cut(scene: Scene) -> ForceRecord:
-    """Run a scene on one thread and insist on a sound end."""
-    record = Simulation(scene, Runtime(threads=1)).run()
-    assert record.status == "done"
-    assert record.counters == {"inverted": 0, "outside": 0}
-    assert record.momentum_residual < 1e-10
-    return record
 
 
 def between(record: ForceRecord, values: np.ndarray, low: float = 8e-3, high: float = 15e-3) -> float:

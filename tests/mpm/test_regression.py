@@ -9,9 +9,10 @@ import pytest
 
 from mpm.material import Material
 from mpm.runtime import Runtime
-from mpm.scene import EdgeLaw, Food, Knife, Motion, Numerics, Scene
+from mpm.scene import EdgeLaw, Food, Motion, Numerics, Scene
 from mpm.shapes import Shape
 from mpm.solver import Simulation
+from tests.mpm.scenes import WEDGE
 
 SCENE = Scene(
     Food(
@@ -28,7 +29,7 @@ SCENE = Scene(
             mu=0.3,
         ),
     ),
-    Knife("wedge", 2e-3, np.deg2rad(11.0), 0.0104, 0.2),
+    WEDGE,
     Motion(0.024, 0.01),
     edge=EdgeLaw(zone=3e-3),
     numerics=Numerics(dx=3e-3),

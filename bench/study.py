@@ -1,0 +1,298 @@
+"""Run time against error of one cut, what each economy brings, and the rate of the kernels beside the textbook's.
+
+All ratios are of runs that take turns in one process, the least time of each: a machine that is slow for a while is slow
+for both. Compilation is not counted; the time of the first run, with it, is given apart.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calib.filters import filter_simulated
+from calib.knives import load_knife
+from calib.materials import FoodSpec
+from calib.metrics import compare
+from calib.outputs import prepare, write_json
+from calib.progress import clock
+from calib.provenance import git_commit, versions
+from calib.scenes import Sizing, cut_scene, specimen
+from mpm.material import Material
+from mpm.record import ForceRecord
+from mpm.runtime import Runtime
+from mpm.scene import EdgeLaw, Food, Knife, Motion, Numerics, Scene
+from mpm.shapes import Shape
+from mpm.solver import Simulation
+
+POINTS = 240  # of a curve that is compared
+# The published configuration: nodes along each axis, time step [s] (CulinaryCut, section 4.1). Its cell is the one with
+# which the cube holds a whole banana, its speed that of the robot whose cuts are published with their forces (50 mm/s).
+PAPER_NODES, PAPER_DT, PAPER_DX, PAPER_SPEED = 120, 2e-5, 2e-3, 0.05
+BLOCK = Scene(
+    Food(
+        Shape("block", 0.04, 0.08, 0.04),
+        Material(E=1e6, nu=0.35, rho=1000, yield_stress=1e5, R=200, mu=0.3, tensile_strength=2e5, fracture_energy=200),
+    ),
+    Knife("wedge", 2e-3, 0.19, 0.0104, 0.2),
+    Motion(2e-3, 0.01),
+    edge=EdgeLaw(zone=3e-3),
+    numerics=Numerics(dx=2e-3, mirror=False),
+)
+TEXTBOOK_STEPS = 10
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A way of simulating the same cut. Attributes: name; scene; runtime; physics: whether it is another food."""
+
+    name: str
+    scene: Scene
+    runtime: Runtime
+    physics: bool = False
+
+
+class Bench:
+    """Measures, and writes bench.json after each measurement.
+
+    Args:
+        food: What is cut.
+        knife: Name of the knife.
+        out: Folder of bench.json and bench.svg.
+        runtime: Device and threads of the default cut.
+        repeats: Turns that each of two runs takes.
+        finest: Cell of the reference [m].
+        seed: Seed of the particles.
+        say: Called with a line after each measurement.
+    """
+
+    def __init__(
+        self,
+        food: FoodSpec,
+        knife: str,
+        out: Path,
+        *,
+        runtime: Runtime,
+        repeats: int,
+        finest: float,
+        seed: int,
+        say: Say,
+    ) -> None:
+        shape, _ = specimen(food, None, Sizing())
+        self.scene = cut_scene(food, shape, load_knife(knife), seed=seed)
+        self.screening = cut_scene(food, shape, load_knife(knife), seed=seed, coarse=True)
+        self.whole = cut_scene(
+            food, replace(shape, length=food.dims["length"].value or shape.length), load_knife(knife)
+        )
+        self.out, self.runtime, self.repeats, self.finest, self.say = out, runtime, repeats, finest, say
+        self.document: dict[str, Any] = {
+            "food": food.name,
+            "knife": knife,
+            "complete": False,
+            "device": runtime.arch,
+            "threads": runtime.cpu_threads,
+            "versions": versions(),
+            "git": git_commit(),
+            "peers": [],
+        }
+        self._kept: dict[tuple[Scene, Runtime], Simulation] = {}
+
+    def run(self) -> dict[str, Any]:
+        """Measure everything; returns the content of bench.json."""
+        prepare(self.out, resume=False)
+        for name, measure in (
+            ("throughput", self.throughput),
+            ("paper_config", self.paper),
+            ("default_cut", self.default_cut),
+        ):
+            self._keep(**{name: measure()})
+        slow, fast = self.document["paper_config"]["wall_s_extrapolated"], self.document["default_cut"]["wall_s"]
+        self._keep(ratio_to_paper=slow / fast, ablations=[])
+        todo = self.variants()
+        began = time.monotonic()
+        for done, variant in enumerate(todo, 1):
+            row = self.compare(variant)
+            self._keep(ablations=[*self.document["ablations"], row])
+            left = (time.monotonic() - began) / done * (len(todo) - done)
+            self.say(f"{variant.name}: {row['time_ratio']:.2f} times the time; about {clock(left)} left")
+        self._keep(exponent=self._exponent(), complete=True)
+        return self.document
+
+    def throughput(self) -> dict[str, Any]:
+        """Particle steps a second of the block, ours and the textbook's in turns, and inside the default cut [1e6/s]."""
+        from bench.textbook import Textbook
+
+        ours, scene = self._simulation(BLOCK, self.runtime), BLOCK
+        dt = ours.run().dt
+        text = Textbook(scene, dx=2e-3, dt=dt, speed=PAPER_SPEED, nodes=PAPER_NODES, runtime=self.runtime)
+        text.run(1)
+        best = [0.0, 0.0]
+        for _ in range(self.repeats):
+            best = [max(best[0], _rate(ours.run())), max(best[1], text.run(TEXTBOOK_STEPS).rate)]
+        cut = self._simulation(self.scene, self.runtime)
+        cut.run()
+        inside = max(_rate(cut.run()) for _ in range(self.repeats))
+        row = {
+            "particles": text.n,
+            "full_physics_Mps": best[0] / 1e6,
+            "textbook_Mps": best[1] / 1e6,
+            "ratio": best[0] / best[1],
+            "cut_Mps": inside / 1e6,
+        }
+        self.say(
+            f"{text.n} particles: {row['full_physics_Mps']:.2f} million particle steps a second, textbook "
+            f"{row['textbook_Mps']:.2f} ({row['ratio']:.1f} times); inside the cut {row['cut_Mps']:.2f}"
+        )
+        return row
+
+    def paper(self) -> dict[str, Any]:
+        """Time that the published configuration needs for the same stroke, from a few of its steps [s]."""
+        from bench.textbook import Textbook
+
+        text = Textbook(
+            self.whole, dx=PAPER_DX, dt=PAPER_DT, speed=PAPER_SPEED, nodes=PAPER_NODES, runtime=self.runtime
+        )
+        text.run(1)
+        step = min(text.run(TEXTBOOK_STEPS).seconds for _ in range(self.repeats))
+        steps = self.scene.motion.stroke / (PAPER_SPEED * PAPER_DT)
+        row = {
+            "nodes": PAPER_NODES,
+            "dx_m": PAPER_DX,
+            "dt_s": PAPER_DT,
+            "particles": text.n,
+            "steps": round(steps),
+            "step_s": step,
+            "wall_s_extrapolated": step * steps,
+        }
+        self.say(
+            f"published configuration: {step * 1e3:.1f} ms a step, {clock(row['wall_s_extrapolated'])} for the cut"
+        )
+        return row
+
+    def default_cut(self) -> dict[str, Any]:
+        """Least run time of the default cut, and its errors against the finest cells."""
+        self.say(f"reference with cells of {self.finest * 1e3:g} mm")
+        fine = replace(self.scene, numerics=replace(self.scene.numerics, dx=self.finest))
+        self.reference = Simulation(fine, self.runtime).run()
+        self._kept.clear()
+        began = time.monotonic()
+        cut = self._simulation(self.scene, self.runtime)
+        cut.run()
+        first = time.monotonic() - began
+        records = [cut.run() for _ in range(self.repeats)]
+        self.record = min(records, key=lambda r: r.wall)
+        row = {
+            "wall_s": self.record.wall,
+            "first_run_s": first,
+            "particles": self.record.particles,
+            "steps": self.record.steps,
+            "reference_dx_m": self.finest,
+            "reference_wall_s": self.reference.wall,
+            **self._errors(self.record),
+        }
+        self.say(f"default cut: {row['wall_s']:.2f} s, work {row['work_error']:+.1%}, NRMSE {row['nrmse']:.3f}")
+        return row
+
+    def variants(self) -> list[Variant]:
+        """The default cut with one thing changed."""
+        scene, run, num = self.scene, self.runtime, self.scene.numerics
+        motion, food = scene.motion, scene.food.material
+
+        def numerics(name: str, **change: Any) -> Variant:
+            return Variant(name, replace(scene, numerics=replace(num, **change)), run)
+
+        def stiffness(name: str, k: float) -> Variant:
+            names = ("E", "yield_stress", "R", "R_initiation", "R_skin")
+            values = {n: k * v for n in names if (v := getattr(food, n)) is not None}
+            return Variant(name, scene.with_material(**values), run, physics=True)
+
+        return [
+            Variant("screening: one cell to the zone, twice the speed", self.screening, run),
+            numerics("cells of two thirds", dx=num.dx * 2 / 3),
+            numerics("single precision", precision="f32"),
+            numerics("whole instead of a quarter", mirror=False),
+            numerics("27 particles a cell", ppc=3),
+            numerics("half the time step", safety=num.safety / 2),
+            Variant("half the speed", replace(scene, motion=replace(motion, mach=motion.mach / 2)), run),
+            Variant("twice the speed", replace(scene, motion=replace(motion, mach=motion.mach * 2)), run),
+            stiffness("ten times as stiff", 10.0),
+            stiffness("a tenth as stiff", 0.1),
+            Variant("one thread", scene, replace(run, threads=1)),
+        ]
+
+    def compare(self, variant: Variant) -> dict[str, Any]:
+        """A variant and the default cut in turns."""
+        began = time.monotonic()
+        self._simulation(variant.scene, variant.runtime).run()
+        first = time.monotonic() - began
+        same = variant.runtime == self.runtime and variant.scene.numerics.precision == self.scene.numerics.precision
+        ours, other = [], []
+        for _ in range(self.repeats):
+            other.append(self._simulation(variant.scene, variant.runtime).run())
+            if not same:
+                self._kept.clear()
+            ours.append(self._simulation(self.scene, self.runtime).run())
+            if not same:
+                self._kept.clear()
+        record = min(other, key=lambda r: r.wall)
+        row = {
+            "name": variant.name,
+            "status": record.status,
+            "wall_s": record.wall,
+            "first_run_s": first,
+            "time_ratio": record.wall / min(r.wall for r in ours),
+            "particles": record.particles,
+            "steps": record.steps,
+        }
+        return row if variant.physics else row | self._errors(record)
+
+    def _simulation(self, scene: Scene, runtime: Runtime) -> Simulation:
+        """A simulation that is kept, with its kernels, until the runtime changes."""
+        key = (scene, runtime)
+        if key not in self._kept:
+            self._kept[key] = Simulation(scene, runtime)
+        return self._kept[key]
+
+    def _errors(self, record: ForceRecord) -> dict[str, float]:
+        """Errors of peak, work and curve against the reference, fractions."""
+        end = min(record.stroke[-1], self.reference.stroke[-1])
+        grid = np.linspace(0.0, end, POINTS)
+        fine, ours = (filter_simulated(grid, r.stroke, r.resolved) for r in (self.reference, record))
+        return {
+            "peak_error": float(ours.max() / fine.max() - 1),
+            "work_error": record.work / self.reference.work - 1,
+            "nrmse": compare(grid, fine, ours).nrmse,
+        }
+
+    def _exponent(self) -> float:
+        """Exponent with which the time grows with particles times steps, over cells and particles a cell."""
+        names = ("cells of two thirds", "27 particles a cell", "whole instead of a quarter")
+        rows = [self.document["default_cut"], *(r for r in self.document["ablations"] if r["name"] in names)]
+        size = np.log([r["particles"] * r["steps"] for r in rows])
+        spent = np.log([1.0, *(r["time_ratio"] for r in rows[1:])])
+        return float(np.polyfit(size, spent, 1)[0])
+
+    def _keep(self, **parts: Any) -> None:
+        self.document |= parts
+        write_json(self.out / "bench.json", self.document)
+
+
+def _rate(record: ForceRecord) -> float:
+    return record.particles * record.steps / record.wall
+
+
+def run(
+    food: FoodSpec, knife: str, out: Path, *, runtime: Runtime, repeats: int, finest: float, seed: int, say: Say
+) -> dict[str, Any]:
+    """Measure, and write bench.json and bench.svg; see :class:`Bench`."""
+    document = Bench(food, knife, out, runtime=runtime, repeats=repeats, finest=finest, seed=seed, say=say).run()
+    from reports.bench import write_figure
+
+    write_figure(out)
+    return document

@@ -1,0 +1,88 @@
+"""``cutcal bench``: run time against error, what each economy brings, the rate of the kernels."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from calib.cli.options import add_run, number
+from calib.errors import CurveError
+from calib.materials import load_food
+
+HELP = "run time against error on this machine"
+DESCRIPTION = """Measure on this machine: the rate of the kernels beside that of a textbook
+solver with the same physics, the time of the default cut beside that of the
+published configuration (120^3 nodes, dt 2e-5 s), and time and error of the
+cut with one thing changed. Writes bench.json and bench.svg to --out.
+
+Only the ratios mean something elsewhere: each is of runs that took turns."""
+EPILOG = """example:
+  cutcal bench --food banana --out runs/bench
+
+Ctrl-C keeps what was measured. Times of two sessions are not comparable, so
+there is no --resume. Nothing else should run meanwhile; about ten minutes."""
+
+
+def add_args(p: argparse.ArgumentParser) -> None:
+    """Options of this command."""
+    p.add_argument("--food", default="banana", metavar="NAME", help="food of materials.yaml (default banana)")
+    p.add_argument("--knife", default="kitchen", metavar="NAME", help="knife of knives.yaml, or a YAML file")
+    p.add_argument("--repeats", type=int, default=3, help="turns that each of two runs takes (default 3)")
+    p.add_argument("--threads", type=int, default=0, help="CPU threads, 0 = all cores")
+    p.add_argument(
+        "--reference-dx",
+        type=number(1e-4, 0.02, "m"),
+        default=1.5e-3,
+        metavar="M",
+        help="cells of the reference [m] (default 1.5e-3)",
+    )
+    add_run(p)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure; prints a table, or bench.json."""
+    from bench.study import run as study
+    from mpm.runtime import Runtime
+
+    if args.repeats < 1 or args.threads < 0:
+        raise CurveError("--repeats must be at least 1 and --threads at least 0")
+    out = Path(args.out or f"cutcal-bench-{args.food}")
+    document = study(
+        load_food(args.food),
+        args.knife,
+        out,
+        runtime=Runtime(args.arch, args.threads),
+        repeats=args.repeats,
+        finest=args.reference_dx,
+        seed=args.seed,
+        say=lambda text: print(text, file=sys.stderr, flush=True),
+    )
+    if args.json:
+        print((out / "bench.json").read_text(encoding="utf-8"), end="")
+    else:
+        print(table(document))
+        print(f"  wrote {out}")
+    return 0
+
+
+def table(document: dict[str, Any]) -> str:
+    """What the terminal shows at the end."""
+    t, d = document["throughput"], document["default_cut"]
+    lines = [
+        f"{document['food']} on {document['device']}, {document['threads']} threads",
+        f"  {t['full_physics_Mps']:.2f} million particle steps a second, {t['ratio']:.1f} times the textbook kernel; "
+        f"{t['cut_Mps']:.2f} inside the cut",
+        f"  default cut {d['wall_s']:.2f} s, 1/{document['ratio_to_paper']:.0f} of the published configuration",
+        f"  {'':50s}{'time':>7s}{'peak':>8s}{'work':>8s}{'NRMSE':>8s}",
+        _line("default", {"time_ratio": 1.0, **d}),
+    ]
+    lines += [_line(row["name"], row) for row in document["ablations"]]
+    return "\n".join([*lines, f"  time grows with particles times steps to the power {document['exponent']:.2f}"])
+
+
+def _line(name: str, row: dict[str, Any]) -> str:
+    if "nrmse" not in row:
+        return f"  {name:50s}{row['time_ratio']:7.2f}   (another food)"
+    return f"  {name:50s}{row['time_ratio']:7.2f}{row['peak_error']:+8.1%}{row['work_error']:+8.1%}{row['nrmse']:8.3f}"

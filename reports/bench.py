@@ -1,0 +1,42 @@
+"""The figure of a benchmark: error over run time, one mark for each way of simulating the same cut."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
+
+from reports.figures import BLACK, BLUE, GREY, svg
+
+FLOOR = 1e-4  # smaller errors are drawn here
+
+
+def write_figure(out: Path) -> None:
+    """Draw bench.svg from bench.json in ``out``."""
+    document = json.loads((out / "bench.json").read_text(encoding="utf-8"))
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        rows: list[dict[str, Any]] = [{"name": "default", "time_ratio": 1.0, **document["default_cut"]}]
+        rows += [row for row in document["ablations"] if "nrmse" in row]
+        for k, row in enumerate(rows):
+            x = row["time_ratio"]
+            for name, marker, color in (("nrmse", "o", BLACK), ("work_error", "^", BLUE)):
+                label = {"nrmse": "NRMSE", "work_error": "|work error|"}[name] if k == 0 else None
+                axes.plot(x, 100 * max(abs(row[name]), FLOOR), marker, ms=4, color=color, label=label)
+            top = 100 * max(row["nrmse"], abs(row["work_error"]), FLOOR)
+            axes.annotate(
+                row["name"], (x, top), (2, 4), textcoords="offset points", fontsize=6, color=GREY, rotation=20
+            )
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_xlabel("run time over that of the default cut")
+        axes.set_ylabel("error against the reference [%]")
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.margins(x=0.15, y=0.25)
+        axes.legend(loc="upper right")
+
+    (out / "bench.svg").write_bytes(svg(draw, 90.0))
