@@ -1,8 +1,10 @@
 """The search for the material: few, noisy, expensive simulations, run two or more at a time.
 
-1. Design: the given values, the centre of the prior and a scrambled Sobol sample of its 95 % box, on the
-   coarse evaluator if there is one.  Quasi-static forces scale with the stress-like parameters, so every run
-   of the design stands for a whole line of materials; the best points of the best lines are run next.
+0. Screening, where there is a coarse evaluator: steps 1 to 3 with it alone, within a part of the budget.  Its
+   curves stay in the process, with an offset of their own, and the fine search starts at its best points.
+1. Design: the given values, the centre of the prior and a scrambled Sobol sample of its 95 % box.
+   Quasi-static forces scale with the stress-like parameters, so every run of the design stands for a whole
+   line of materials; the best points of the best lines are run next.
 2. Differences: one wide step along each parameter from the best point.
 3. Rounds: a Gaussian process through all smoothed curves so far (not through the misfit, which hides which
    part of a curve is wrong) proposes one batch: the point of least *expected* chi-square near the best one,
@@ -22,7 +24,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -60,6 +62,8 @@ CALM_ROUNDS, STALLED_ROUNDS = 2, 4
 #: above the number of independent data.  Of 96 synthetic cuts one stayed in a side minimum (excess
 #: chi-square 100) with a single design, none (excess at most 2.1) with three.
 DESIGNS = 3
+#: Part of the budget that the coarse evaluator may spend on the screening.
+SCREENING = 0.25
 #: Largest joint scaling of the design's materials, as a logarithm: a factor 20 either way.
 LARGEST_SCALE = 3.0
 
@@ -199,6 +203,7 @@ class _Search:
         self.unit = coordinate_unit(self.parameters)
         self.hyper: FloatArray | None = None
         self.centre: FloatArray | None = None
+        self.screening = False
         low, high = self.parameters.box
         sobol = qmc.Sobol(len(low), scramble=True, seed=options.seed)
         count = DESIGNS * options.design
@@ -207,12 +212,12 @@ class _Search:
 
     @property
     def finished(self) -> list[Trial]:
-        """Finished runs on the fine evaluator."""
-        return [t for t in self.trials if t.ok and not t.coarse]
+        """Finished runs on the fine evaluator, while screening those on the coarse one."""
+        return [t for t in self.trials if t.ok and t.coarse == self.screening]
 
     @property
     def best(self) -> Trial:
-        """Best finished run on the fine evaluator; there is one after the design."""
+        """Best of ``finished``; there is one after the design."""
         return min(self.finished, key=lambda t: t.misfit)
 
     @property
@@ -227,12 +232,18 @@ class _Search:
 
     def run(self) -> str:
         """Search until there is nothing to gain or to spend; return the status."""
-        self._design([self.parameters.start, self.parameters.prior_mean])
+        first = [self.parameters.start, self.parameters.prior_mean]
+        if self.coarse is not None:
+            self._screen(first)
+            first = []
+        if not self.finished:
+            self._design(first)
         while not self.finished and self._unseen():
             self._design([])
         if not self.finished:
             raise self._nothing()
-        self._differences()
+        if self.coarse is None:
+            self._differences()
         while True:
             status, best = self._rounds(), self.best
             if status == "budget":
@@ -246,6 +257,20 @@ class _Search:
             else:
                 return status
 
+    def _screen(self, first: list[FloatArray]) -> None:
+        """Search on the coarse evaluator, and run its best point and where its process expects the best one."""
+        self.screening = True
+        points: list[FloatArray] = []
+        try:
+            self._design(first)
+            if self.finished:
+                self._differences()
+                self._rounds()
+                points = [_near(self._process()), *(t.z for t in sorted(self.finished, key=lambda t: t.misfit))]
+        finally:
+            self.screening, self.centre, self.hyper = False, None, None
+        self._evaluate(points[: max(2, self.options.batch)], "screened")
+
     def result(self, status: str) -> FitResult:
         """What was found, with a Jacobian if there are runs enough for one."""
         best, jacobian, repeatability = self.best, None, math.nan
@@ -258,12 +283,15 @@ class _Search:
     def _unseen(self) -> bool:
         """Whether there is another design that can be paid together with the rounds it may call for."""
         cost = self.options.coarse_cost if self.coarse is not None else 1.0
-        return len(self.designs) > 0 and self._room() > cost * self.options.design + 2 * self.options.batch
+        return (
+            len(self.designs) > 0
+            and self.options.budget - self.spent > cost * self.options.design + 2 * self.options.batch
+        )
 
     def _design(self, points: list[FloatArray]) -> None:
         """Run ``points`` and the next part of the sample, then the best of the lines they stand for."""
         first = len(self.trials)
-        self._evaluate(points + list(self.designs.pop(0)), "design", coarse=True)
+        self._evaluate(points + list(self.designs.pop(0)), "design", coarse=self.coarse is not None)
         lines = sorted((self._scaled(t) for t in self.trials[first:] if t.ok), key=lambda line: line[0])
         self._evaluate([z for _, z in lines[: self.options.batch]], "scaled")
 
@@ -341,17 +369,22 @@ class _Search:
         return [points[i] for i in np.argsort(np.where(good, -doubt, 0.0))[:count]]
 
     def _process(self) -> CurveProcess:
-        process = CurveProcess(self.objective, self.trials, self.best, self.hyper)
+        trials: Sequence[Trial] = self.trials
+        if self.screening:  # one evaluator: no offset
+            trials = [replace(t, coarse=False) for t in trials]
+        process = CurveProcess(self.objective, trials, self.best, self.hyper)
         self.hyper = process.hyper
         return process
 
     def _room(self) -> int:
-        """Fine simulations that the budget still holds."""
+        """Simulations that the budget, while screening its part of it, still holds."""
+        if self.screening:
+            return int((SCREENING * self.options.budget - self.spent) / self.options.coarse_cost + 1e-9)
         return int(self.options.budget - self.spent + 1e-9)
 
     def _evaluate(self, points: Sequence[FloatArray], stage: str, *, coarse: bool = False) -> None:
         """Run those points that are new and can be paid; the history keeps the order of the points."""
-        coarse = coarse and self.coarse is not None
+        coarse = coarse or self.screening
         cost = self.options.coarse_cost if coarse else 1.0
         grid = LATTICE * self.unit
         known = [t.z for t in self.trials if t.coarse == coarse]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from calib.errors import MaterialError
-from calib.fit import FitOptions, FitResult, calibrate
+from calib.fit import SCREENING, FitOptions, FitResult, calibrate
 from calib.objective import Evaluation, Evaluator, Objective, Target
 from calib.parameters import Parameter, ParameterSet
 from calib.progress import Progress
@@ -233,14 +233,16 @@ def test_scaling_the_start_finds_a_material_of_equal_proportions_at_once() -> No
     assert scaled < 20.0 < 100.0 < design
 
 
-def test_design_on_the_coarse_grid_saves_fine_runs() -> None:
-    """A coarse evaluator 6 % too strong serves the design only; the answer is the fine one."""
-    objective, fine = goal(TRUTHS[0]), Fake()
+def test_screening_on_the_coarse_grid_saves_fine_runs() -> None:
+    """A coarse evaluator 6 % too strong finds the region, within its part of the budget; the answer is the fine one."""
+    objective, fine, alone = goal(TRUTHS[0]), Fake(), Fake()
     coarse = Fake(lambda p: 1.06 * three_terms(p))
     result = calibrate(objective, fine, coarse=coarse, options=FitOptions(budget=60))
-    assert result.coarse_simulations == coarse.runs >= 9 and result.simulations == fine.runs
+    calibrate(objective, alone, options=FitOptions(budget=60))
+    assert result.coarse_simulations == coarse.runs <= SCREENING * 60 / 0.25
+    assert result.simulations == fine.runs < alone.runs
     assert fine.runs + 0.25 * coarse.runs <= 60.0
-    assert not result.best.coarse and all(t.coarse == (t.stage == "design") for t in result.history)
+    assert not result.best.coarse and result.history[0].coarse
     assert noise_free(objective, values(result)) < noise_free(objective, TRUTHS[0]) + CLOSE
 
 
