@@ -420,7 +420,7 @@ class _Search:
                 failed=sum(not t.ok for t in self.trials),
                 misfit=misfit,
                 eta_s=float(np.mean(seconds)) * rest / self.options.batch,
-                stage=stage,
+                stage=f"{stage} on coarse cells" if self.trials[-1].coarse else stage,
             )
         )
 

@@ -190,7 +190,7 @@ class Trial:
         curve: Its smoothed force on the target's grid [N] (n,).
         residual: Its residual vector (n + 2 + p,).
         coarse: Whether it was run at the coarse resolution.
-        stage: Why it was run: design, scaled, difference or round.
+        stage: Why it was run: design, scaled, difference, round or screened.
     """
 
     z: FloatArray
