@@ -14,6 +14,7 @@ import numpy as np
 import taichi as ti
 
 from mpm.contact import blade_distance, coulomb
+from mpm.errors import SceneError
 from mpm.runtime import Runtime, start
 from mpm.scene import Scene
 from mpm.seeding import seed
@@ -60,6 +61,9 @@ class Textbook:
         speed: Speed of the blade [m/s].
         nodes: Nodes along each axis.
         runtime: Device.
+
+    Raises:
+        SceneError: The food is larger than the cube.
     """
 
     def __init__(self, scene: Scene, *, dx: float, dt: float, speed: float, nodes: int, runtime: Runtime) -> None:
@@ -67,6 +71,8 @@ class Textbook:
         real = ti.f64 if scene.numerics.precision == "f64" else ti.f32
         whole = replace(scene, numerics=replace(scene.numerics, dx=dx, mirror=False))
         seeds = seed(whole)
+        if max(vars(scene.food.shape)[side] for side in ("length", "width", "height")) > (nodes - 2 * BOTTOM) * dx:
+            raise SceneError(f"the food does not fit into {nodes} nodes of {dx * 1e3:g} mm; take a larger cell")
         shape, m, knife = scene.food.shape, scene.food.material, scene.knife
         x = seeds.x + [nodes * dx / 2, nodes * dx / 2, BOTTOM * dx]
         x = x[np.random.default_rng(0).permutation(len(x))]

@@ -1,0 +1,94 @@
+"""The benchmark's bookkeeping with a solver and a yardstick whose times are known."""
+
+from __future__ import annotations
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import bench.study
+import bench.textbook
+from calib.cli.bench import table
+from calib.materials import load_food
+from mpm.runtime import Runtime
+from mpm.scene import Scene
+
+
+class Solver:
+    """Takes 1 us a particle step and finds a force that is too high in proportion to the cell."""
+
+    def __init__(self, scene: Scene, runtime: Runtime) -> None:
+        self.scene, self.runtime = scene, runtime
+
+    def run(self) -> SimpleNamespace:
+        """A record with the columns that are looked at."""
+        num, motion = self.scene.numerics, self.scene.motion
+        particles = round(1e-5 / num.dx**3) * num.ppc**3 * (1 if num.mirror else 4)
+        steps = round(1e-2 / (motion.mach * num.safety * num.dx))
+        stroke = np.linspace(0.0, 0.03, 200)
+        force = 10.0 * (1.0 + 10.0 * num.dx) * np.sin(np.pi * stroke / 0.03)
+        return SimpleNamespace(
+            status="done",
+            particles=particles,
+            steps=steps,
+            wall=1e-6 * particles * steps,
+            dt=1e-5,
+            stroke=stroke,
+            resolved=force,
+            work=float(np.trapezoid(force, stroke)),
+        )
+
+
+class Yardstick:
+    """Takes 10 us a particle step."""
+
+    def __init__(self, scene: Scene, **_: object) -> None:
+        self.n = 1000
+
+    def run(self, steps: int) -> SimpleNamespace:
+        """The time of these steps."""
+        return SimpleNamespace(seconds=0.01, particles=self.n, rate=1e5)
+
+
+@pytest.fixture
+def document(monkeypatch, tmp_path) -> dict:
+    """What the benchmark writes."""
+    monkeypatch.setattr(bench.study, "Simulation", Solver)
+    monkeypatch.setattr(bench.textbook, "Textbook", Yardstick)
+    said: list[str] = []
+    bench.study.run(
+        load_food("banana"),
+        "kitchen",
+        tmp_path,
+        runtime=Runtime(threads=2),
+        repeats=2,
+        finest=1.5e-3,
+        seed=0,
+        say=said.append,
+    )
+    assert "published configuration" in "\n".join(said) and (tmp_path / "bench.svg").stat().st_size > 2000
+    return json.loads((tmp_path / "bench.json").read_text())
+
+
+def test_ratios_are_those_of_the_times(document):
+    """Rates, the ratio to the published configuration, errors and the exponent follow from the known times."""
+    d = document
+    assert d["complete"]
+    assert d["throughput"]["full_physics_Mps"] == pytest.approx(1.0)
+    assert d["throughput"]["ratio"] == pytest.approx(10.0)
+    assert d["paper_config"]["wall_s_extrapolated"] == pytest.approx(0.01 * d["paper_config"]["steps"], rel=1e-3)
+    assert d["ratio_to_paper"] == pytest.approx(d["paper_config"]["wall_s_extrapolated"] / d["default_cut"]["wall_s"])
+    assert d["default_cut"]["work_error"] == pytest.approx(1.03 / 1.015 - 1, rel=1e-6)
+    rows = {row["name"]: row for row in d["ablations"]}
+    assert rows["whole instead of a quarter"]["time_ratio"] == pytest.approx(4.0)
+    assert rows["half the time step"]["time_ratio"] == pytest.approx(2.0, rel=0.01)
+    assert "nrmse" not in rows["ten times as stiff"]
+    assert d["exponent"] == pytest.approx(1.0, abs=0.01)
+
+
+def test_table_names_every_row(document):
+    """The terminal shows each variant with its time and errors."""
+    text = table(document)
+    assert all(row["name"] in text for row in document["ablations"]) and "to the power 1.00" in text
