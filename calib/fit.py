@@ -257,19 +257,21 @@ class _Search:
             else:
                 return status
 
-    def _screen(self, first: list[FloatArray]) -> None:
+    def _screen(self, given: list[FloatArray]) -> None:
         """Search on the coarse evaluator, and run its best point and where its process expects the best one."""
         self.screening = True
         points: list[FloatArray] = []
         try:
-            self._design(first)
+            self._design(given)
             if self.finished:
                 self._differences()
                 self._rounds()
                 points = [_near(self._process()), *(t.z for t in sorted(self.finished, key=lambda t: t.misfit))]
         finally:
             self.screening, self.centre, self.hyper = False, None, None
+        first = len(self.trials)
         self._evaluate(points[: max(2, self.options.batch)], "screened")
+        self._follow_lines(first)
 
     def result(self, status: str) -> FitResult:
         """What was found, with a Jacobian if there are runs enough for one."""
@@ -292,6 +294,10 @@ class _Search:
         """Run ``points`` and the next part of the sample, then the best of the lines they stand for."""
         first = len(self.trials)
         self._evaluate(points + list(self.designs.pop(0)), "design", coarse=self.coarse is not None)
+        self._follow_lines(first)
+
+    def _follow_lines(self, first: int) -> None:
+        """Run the best points of the best lines through the trials from ``first`` on."""
         lines = sorted((self._scaled(t) for t in self.trials[first:] if t.ok), key=lambda line: line[0])
         self._evaluate([z for _, z in lines[: self.options.batch]], "scaled")
 

@@ -246,6 +246,16 @@ def test_screening_on_the_coarse_grid_saves_fine_runs() -> None:
     assert noise_free(objective, values(result)) < noise_free(objective, TRUTHS[0]) + CLOSE
 
 
+def test_a_strong_coarse_grid_is_corrected_by_one_scaled_run() -> None:
+    """Where the coarse force is 30 % too high all over, the fine search starts from its best point, scaled."""
+    result = calibrate(
+        goal(TRUTHS[0]), Fake(), coarse=Fake(lambda p: 1.3 * three_terms(p)), options=FitOptions(budget=40)
+    )
+    fine = [t for t in result.history if not t.coarse]
+    screened, scaled = (min(t.misfit for t in fine if t.stage == stage) for stage in ("screened", "scaled"))
+    assert scaled < 0.2 * screened
+
+
 def test_a_coarse_run_is_never_the_answer() -> None:
     """Even where only the coarse grid can draw the real curve the best run on the fine one is returned."""
     start = ParameterSet(tuple(p for p in TWO)).with_values(TWO_TRUTH)
