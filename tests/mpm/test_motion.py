@@ -65,7 +65,10 @@ def test_grid_may_lie_at_any_angle(turn):
 
 
 def test_retracting_blade_is_dragged_by_friction_and_leaves_the_slit_open():
-    """On the way up friction pulls the knife down, nothing is cut, and the uncut area stays what it was."""
+    """On the way up friction drags the faces down, nothing is cut, and the uncut area stays what it was.
+
+    The faces come free within 2 mm, in which the edge gives back its elastic slip.
+    """
     flesh = replace(FLESH, mu=0.4)
     scene = replace(PRISM, food=replace(PRISM.food, material=flesh), knife=WEDGE, motion=Motion(0.015, 0.01))
     down = cut(scene)
@@ -73,8 +76,8 @@ def test_retracting_blade_is_dragged_by_friction_and_leaves_the_slit_open():
     n = len(down.stroke)
     np.testing.assert_allclose(both.knife[:n, 2], down.knife[:n, 2], rtol=1e-9, atol=1e-9)
     assert both.stroke[-1] == pytest.approx(-0.015, abs=1e-3)
-    late = both.knife[n + 8 :, 2]
-    assert late.min() < -0.02 * both.peak
+    drag, late = both.face[n + 1 :, 2], both.knife[n + 8 :, 2]
+    assert drag.min() < -0.05 * both.peak and drag.max() < 0.01 * both.peak
     assert np.abs(late[-8:]).max() < 0.02 * both.peak
     assert both.edge[n + 8 :, 2].max() < 0.01 * both.peak
     assert both.pieces.uncut_area == pytest.approx(down.pieces.uncut_area, rel=0.1)
