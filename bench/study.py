@@ -128,9 +128,9 @@ class Bench:
         """Particle steps a second of the block, ours and the textbook's in turns, and inside the default cut [1e6/s]."""
         from bench.textbook import Textbook
 
-        ours, scene = self._simulation(BLOCK, self.runtime), BLOCK
-        dt = ours.run().dt
-        text = Textbook(scene, dx=2e-3, dt=dt, speed=PAPER_SPEED, nodes=PAPER_NODES, runtime=self.runtime)
+        ours = self._simulation(BLOCK, self.runtime)
+        dt, dx = ours.run().dt, BLOCK.numerics.dx
+        text = Textbook(BLOCK, dx=dx, dt=dt, speed=PAPER_SPEED, nodes=PAPER_NODES, runtime=self.runtime)
         text.run(1)
         best = [0.0, 0.0]
         for _ in range(self.repeats):

@@ -194,12 +194,13 @@ class Fields:
           shrink (0.31, 0.35, 0.37 J for dx = 3, 2, 1.5 mm against 0.321, 0.320, 0.315 J so).
         - The nodes part early, so the front is held a quarter of a cell higher. A crack that is loaded far away wants
           half a cell (0.2 either way over offsets and cell sizes, tests/mpm/test_split.py); the force of a wedge close
-          behind its front varies least with a quarter (2 % over dx = 3, 2, 1.5 mm in a stiff block; with a half, 9 %).
+          behind its front varies less with a quarter (stiff food without friction, dx = 4, 3, 2, 1.5 mm: 4.4, 4.3, 4.2, 4.3 N)
+          than with a half (4.9, 4.6, 4.5, 4.5 N).
 
         All particles have the same front, so the nodes part row by row. That is a ripple with the period of a cell,
         which the moving mean over one cell takes out (ForceRecord.resolved_face). Spreading the fronts of the particles
-        over a cell would hide it and cost more: those that are held longest carry the force, which is then 25 % too high
-        at 4 mm and depends on the seed.
+        over a cell would hide it and cost more: those that are held longest carry the force. It was 6.8 N at 4 and 5.1 N
+        at 2 mm then, and its work followed the seed by 2 to 4 %.
 
         Args:
             p: The particle.

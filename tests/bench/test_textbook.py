@@ -37,7 +37,7 @@ def textbook_force(scene: Scene, dt: float, speed: float, gap: float, times: np.
 
 @pytest.mark.parametrize("yield_stress", [1e11, 5e4])
 def test_fast_kernels_repeat_the_textbook(yield_stress):
-    """Windowed, sorted, without SVD and atomics the elastic force is the textbook's to 1e-6; J2 returns differ by 5 %."""
+    """Windowed, without SVD and atomics the elastic force is the textbook's to 1e-6; J2 returns differ by 5 %."""
     scene = SCENE.with_material(yield_stress=yield_stress)
     record = Simulation(scene, Runtime(threads=1)).run()
     gap = float(record.speed * record.time[0] - record.stroke[0])
