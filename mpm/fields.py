@@ -1,5 +1,6 @@
 """Fields of one discretised scene, the tables that kernels read and write, and what every kernel needs of them."""
 
+import numpy as np
 import taichi as ti
 
 # Rows of the parameter table that kernels read at run time.
@@ -17,14 +18,22 @@ N_SUMS = 14
 # the height that is commanded, the vertical impulse booked before this step.
 Z, S, VZ, VS, COMMAND, BOOKED = range(6)
 N_POSE = 6
+# State at an output: momentum of the particles, kinetic and elastic energy.
+N_STATE = 5
+N_REPORT = N_SUMS + N_STATE + N_POSE
 
 BESIDE = 3  # cells on either side of the cut plane whose nodes may carry both halves
+LANES = 4  # particles whose elastic stress is found at once on a CPU: four double-precision numbers fill a register
+CPU_BLOCK = 512  # Taichi runs CPU loops shorter than this on one thread, so one iteration in 512 works for a thread
 CRACK_LEAD = 0.25  # cells by which the split of the nodes lags the crack it makes; see Fields.split
 
 
 @ti.data_oriented
 class Fields:
     """Particles, grid, edge and tables.
+
+    Deformation gradients are stored entry by entry for ``lanes`` particles, [block, 3 row + column, lane], so that the
+    same operation on all of them is one instruction; velocity gradients column by column, each filled up to four.
 
     The grid stores two velocity fields: the first at ``[i, j, k]``, the second, which only nodes beside the cut plane
     have, at ``[i, second + j, k]``.
@@ -51,6 +60,7 @@ class Fields:
         self.mx, self.my = self.i0 >= 0, self.j0 >= 0
         self.threads, self.nodal, self.damage, self.turned = max(threads, 1), nodal, damage, turned
         self.atomic = threads == 0
+        self.parts = n if self.atomic else 1 if self.threads == 1 else self.threads * CPU_BLOCK
         self.stations, self.first, self.branches = stations, float(first), branches
         middle = round(-self.oy / self.dx)
         self.b0 = 0 if turned else max(middle - BESIDE, 0)
@@ -61,18 +71,24 @@ class Fields:
         vec3, vec4 = ti.types.vector(3, real), ti.types.vector(4, real)
         mat3 = ti.types.matrix(3, 3, real)
         self.x, self.v = vec3.field(shape=n), vec3.field(shape=n)
-        self.C, self.F = mat3.field(shape=n), mat3.field(shape=n)
+        self.lanes = 1 if self.atomic else LANES
+        self.blocks = -(-n // self.lanes)
+        room = self.blocks * self.lanes
+        self.C, self.F = vec4.field(shape=(room, 3)), ti.Vector.field(self.lanes, real, (self.blocks, 9))
+        self.tau = ti.Vector.field(
+            self.lanes, real, (self.blocks, 8)
+        )  # elastic stress, viscous loss, whether it is not so
         self.side, self.gap = ti.field(ti.i32, n), ti.field(real, n)
-        self.foot, self.kappa = ti.field(real, n), ti.field(real, n)
-        self.strain = ti.field(real, n if damage else 1)
+        self.foot = ti.field(real, n)
+        self.kappa, self.strain = (ti.field(real, room if damage else 1) for _ in range(2))
         self.stick = vec3.field(shape=(2, n))  # board, blade
         self.tacky, self.layers = ti.field(ti.i32, n), ti.field(ti.i32, n)
         self.memory = mat3.field(shape=(max(branches, 1), n if branches else 1))
         self.before = mat3.field(shape=n if branches else 1)
-        self.share, self.relax = ti.field(real, max(branches, 1)), ti.field(real, max(branches, 1))
+        self.share_of, self.relax = ti.field(real, max(branches, 1)), ti.field(real, max(branches, 1))
         self.g = vec4.field(shape=(self.threads, nodes[0], deep, nodes[2]))
         self.u = vec4.field(shape=(nodes[0], deep, nodes[2]))
-        self.smooth = ti.Vector.field(2, real, nodes if damage else (1, 1, 1))
+        self.hot = ti.field(ti.i32, 6)  # box of the lowest nodes of particles whose strain could damage something
         self.slip, self.push = ti.Vector.field(2, real, stations), ti.Vector.field(2, real, stations)
         self.front, self.drift, self.cut = (ti.field(real, stations) for _ in range(3))
         self.soften, self.start = ti.field(real, stations), ti.field(real, stations)
@@ -83,17 +99,15 @@ class Fields:
         self.par = ti.field(real, N_PARAMETERS)
         self.pose = ti.field(ti.f64, N_POSE)
         self.sums = ti.field(ti.f64, N_SUMS)
-        self.state = ti.field(ti.f64, 8)
+        self.state = ti.field(ti.f64, N_STATE)
+        self.window = ti.field(ti.i32, 6)  # nodes that particles can reach before it is renewed: first, last + 1
 
     @ti.kernel
     def reset(self):
         """Particles at rest and unstrained, nothing cut, nothing booked."""
         for p in self.x:
             self.v[p] = ti.Vector.zero(float, 3)
-            self.C[p] = ti.Matrix.zero(float, 3, 3)
-            self.F[p] = ti.Matrix.identity(float, 3)
             self.side[p] = 0
-            self.kappa[p] = 0.0
             self.tacky[p] = 0
             for b in ti.static(range(2)):
                 self.stick[b, p] = ti.Vector.zero(float, 3)
@@ -101,6 +115,14 @@ class Fields:
                 self.before[p] = ti.Matrix.zero(float, 3, 3)
                 for b in ti.static(range(self.branches)):
                     self.memory[b, p] = ti.Matrix.zero(float, 3, 3)
+        for p, d in self.C:
+            self.C[p, d] = ti.Vector.zero(float, 4)
+        for b, r in self.F:
+            for lane in ti.static(range(self.lanes)):
+                self.F[b, r][lane] = 1.0 if r % 4 == 0 else 0.0
+        for p in self.kappa:
+            self.kappa[p] = 0.0
+            self.strain[p] = 0.0
         for i in self.cut:
             self.slip[i] = ti.Vector.zero(float, 2)
             self.push[i] = ti.Vector.zero(float, 2)
@@ -111,6 +133,48 @@ class Fields:
             self.front[i] = 1e3
         for k in self.sums:
             self.sums[k] = 0.0
+
+    def deformation(self):
+        """Deformation gradients (n, 3, 3) as NumPy."""
+        return self.F.to_numpy().transpose(0, 2, 1).reshape(-1, 3, 3)[: self.n]
+
+    def gradient(self):
+        """Velocity gradients (n, 3, 3) [1/s] as NumPy."""
+        return self.C.to_numpy()[: self.n, :, :3].transpose(0, 2, 1)
+
+    def set_gradient(self, values):
+        """Set the velocity gradients from (n, 3, 3) [1/s]."""
+        c = self.C.to_numpy()
+        c[: self.n, :, :3] = np.transpose(values, (0, 2, 1))
+        self.C.from_numpy(c)
+
+    @ti.func
+    def deformation_of(self, p):
+        """Deformation gradient of one particle."""
+        b, lane = p // self.lanes, p % self.lanes
+        f = ti.Matrix.zero(float, 3, 3)
+        for r, c in ti.static(ti.ndrange(3, 3)):
+            f[r, c] = self.F[b, 3 * r + c][lane]
+        return f
+
+    @ti.func
+    def gradient_of(self, p):
+        """Velocity gradient of one particle [1/s]."""
+        x, y, z = self.C[p, 0], self.C[p, 1], self.C[p, 2]
+        return ti.Matrix([[x[0], y[0], z[0]], [x[1], y[1], z[1]], [x[2], y[2], z[2]]])
+
+    @ti.func
+    def share(self, part):
+        """Blocks of particles, first and last + 1, of one part of a parallel loop over ``parts``, and its thread."""
+        thread, first, last = 0, 0, 0
+        if ti.static(self.atomic):
+            first, last = part, part + 1
+        elif ti.static(self.threads == 1):
+            last = self.blocks
+        elif part % CPU_BLOCK == 0:
+            thread = part // CPU_BLOCK
+            first, last = self.blocks * thread // self.threads, self.blocks * (thread + 1) // self.threads
+        return first, last, thread
 
     @ti.func
     def local(self, q):

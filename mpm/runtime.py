@@ -33,6 +33,32 @@ class Runtime:
 _state: dict[str, Any] = {"key": None, "serial": 0}
 
 
+def remember_places() -> None:
+    """Let Taichi remember where in the source a statement is, which it asks anew for each copy of an unrolled loop.
+
+    Writing these places out for its messages takes half of the time in which a cached kernel is made ready (40,000 places
+    of which 3,000 are different). Without effect where Taichi is not as it was in 1.7.
+    """
+    try:
+        from taichi.lang.ast.ast_transformer_utils import ASTTransformerContext as Context
+    except ImportError:
+        return
+    write = getattr(Context, "get_pos_info", None)
+    if write is None or hasattr(write, "places"):
+        return
+    places: dict[Any, str] = {}
+
+    def get_pos_info(self: Any, node: Any) -> str:
+        spot = (node.lineno, node.col_offset, node.end_lineno, node.end_col_offset, type(node))
+        key = (self.file, self.lineno_offset, self.func.func.__name__, spot)
+        if key not in places:
+            places[key] = write(self, node)
+        return places[key]
+
+    get_pos_info.places = places  # type: ignore[attr-defined]
+    Context.get_pos_info = get_pos_info
+
+
 def start(runtime: Runtime, precision: str) -> int:
     """Start Taichi for this device and precision, or keep the one that runs.
 
@@ -44,6 +70,7 @@ def start(runtime: Runtime, precision: str) -> int:
     """
     import taichi as ti
 
+    remember_places()
     key = (runtime, precision)
     if _state["key"] == key:
         return _state["serial"]

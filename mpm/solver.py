@@ -11,7 +11,7 @@ import numpy as np
 
 from mpm import fields as kn
 from mpm.errors import SimulationError
-from mpm.kernels import IVEC6, Kernels
+from mpm.kernels import Kernels
 from mpm.material import Material
 from mpm.record import ForceRecord
 from mpm.runtime import Runtime, start
@@ -21,8 +21,8 @@ from mpm.shapes import section_area, skin_path, slices
 from mpm.topology import topology
 
 PAD = 3  # empty cells around the food: a quadratic kernel reaches 1.5 cells, the rest is room to move
-MARGIN = 3  # cells by which the active window exceeds the particles; renewed at every output interval
 SPREAD = 0.5  # room for the food to widen while it is pressed, part of its size
+PATIENCE = 0.1  # time after which a run comes back from the device to say how far it is and to be stopped [s]
 APPROACH = 0.1  # way of the blade above the food before contact, in cells
 EDGE_STEP = 0.5  # dt times the frequency of the edge's cohesive spring, 2 is unstable
 TACK_STEP = 0.5  # the same for the rising part of the adhesive traction
@@ -162,7 +162,7 @@ class Simulation:
             table[kn.ARM_C] = 2 * math.sqrt(scene.arm.stiffness * table[kn.ARM_MASS])
         k.par.from_numpy(table.astype(real))
         for b, (share, time) in enumerate(material.prony):
-            k.share[b], k.relax[b] = share, self._time_step(material) * scene.time_scale / time
+            k.share_of[b], k.relax[b] = share, self._time_step(material) * scene.time_scale / time
         xs = self.stations
         path = skin_path(scene.food.shape, xs, material.skin_thickness) if material.skin_thickness > 0 else 0 * xs
         for field, values in zip(
@@ -219,53 +219,49 @@ class Simulation:
         total = sum(steps for steps, _, _ in phases)
         rows: list[list[float]] = []
         began = clock.perf_counter()
-        status, done, last = "done", 0, np.zeros(3)
+        status, done, last, batch = "done", 0, np.zeros(3), 1
         self.counters = {"inverted": 0, "outside": 0}
         for steps, down, along in phases:
             left = steps
             while left > 0 and status == "done":
-                count = min(every, left)
-                self._advance(count, dt, down, along)
-                left, done = left - count, done + count
-                sums, state = self.k.sums.to_numpy(), self._state()
-                self.k.sums.fill(0.0)
-                self.k.pose[kn.BOOKED] -= sums[kn.EDGE + 2] + sums[kn.FACE + 2]  # what the arm has not felt yet
-                self.counters["inverted"] += int(sums[kn.INVERTED])
-                self.counters["outside"] += int(sums[kn.OUTSIDE])
-                row = self._row(sums, state, last, count * dt, material, num.gravity)
-                last = np.array(row[0])
-                rows.append([*self._place(), dt * done, *(v for part in row for v in part)])
-                status = _health(sums, state)
+                count = min(every * batch, left)
+                asked = clock.perf_counter()
+                for row in self._advance(count, every, dt, down, along):
+                    sums, state, pose = np.split(row, (kn.N_SUMS, kn.N_SUMS + kn.N_STATE))
+                    n = min(every, left)
+                    left, done = left - n, done + n
+                    self.counters["inverted"] += int(sums[kn.INVERTED])
+                    self.counters["outside"] += int(sums[kn.OUTSIDE])
+                    parts = self._row(sums, state, last, n * dt, material, num.gravity)
+                    last = np.array(parts[0])
+                    rows.append([*self._place(pose), dt * done, *(v for part in parts for v in part)])
+                    status = _health(sums, state)
+                    if status != "done":
+                        break
+                if clock.perf_counter() - asked < PATIENCE / 2:
+                    batch *= 2
                 if progress is not None and status == "done":
-                    progress(done / total, row[1][2] + row[2][2])
+                    progress(done / total, parts[1][2] + parts[2][2])
         return self._record(rows, material, status, done / total, dt, done, speed, clock.perf_counter() - began)
 
-    def _place(self) -> list[float]:
-        """Stroke, commanded stroke and way along the blade now [m]."""
-        pose, height = self.k.pose.to_numpy(), self.scene.food.shape.height
+    def _place(self, pose: np.ndarray) -> list[float]:
+        """Stroke, commanded stroke and way along the blade [m]."""
+        height = self.scene.food.shape.height
         return [height - pose[kn.Z], height - pose[kn.COMMAND], pose[kn.S]]
 
-    def _window(self) -> Any:
-        """Nodes that the particles can reach before the next output interval; planes keep their ghosts."""
-        e = np.array(self.k.extent())
-        low, high = np.maximum(e[:3] - MARGIN, 0), np.minimum(e[3:] + MARGIN + 1, self.nodes)
-        for axis, plane in enumerate(self.planes):
-            if plane >= 0:
-                low[axis], high[axis] = min(low[axis], plane - 2), max(high[axis], plane + 3)
-        return IVEC6([*np.maximum(low, 0), *np.minimum(high, self.nodes)])
-
-    def _advance(self, count: int, dt: float, down: float, along: float) -> None:
-        """Some time steps with the tool commanded at these velocities [m/s]."""
-        window = self._window()
-        if self.k.threads == 1 and not self.k.atomic:
-            self.k.steps(count, dt, down, along, window)
-            return
-        for _ in range(count):
-            self.k.step(dt, down, along, window)
-
-    def _state(self) -> np.ndarray:
-        self.k.measure()
-        return self.k.state.to_numpy()
+    def _advance(self, count: int, every: int, dt: float, down: float, along: float) -> np.ndarray:
+        """Some time steps with the tool commanded at these velocities [m/s]; one row of the report after ``every``."""
+        k, rows = self.k, math.ceil(count / every)
+        out = np.zeros((rows, kn.N_REPORT))
+        if k.threads == 1 and not k.atomic:
+            k.steps(rows, every, count, dt, down, along, out)
+            return out
+        for r in range(rows):
+            k.surround()
+            for _ in range(min(every, count - r * every)):
+                k.step(dt, down, along)
+            k.write(out[r : r + 1])
+        return out
 
     def _row(
         self, sums: np.ndarray, state: np.ndarray, last: np.ndarray, span: float, material: Material, gravity: float
@@ -283,13 +279,13 @@ class Simulation:
     def _topology(self) -> Any:
         """Pieces of the food now."""
         k, mirrors = self.k, self.scene.mirrors
-        side, f = k.side.to_numpy(), k.F.to_numpy()
+        side, f = k.side.to_numpy(), k.deformation()
         across = self._turn(k.x.to_numpy(), -1.0)[:, 1]
         half = np.where(side > 0, side - 1, 0 if mirrors[1] else across >= 0)
         damage = np.zeros(len(side))
         if k.damage:
             table = k.par.to_numpy()
-            kappa = np.maximum(k.kappa.to_numpy(), table[kn.EPS0])
+            kappa = np.maximum(k.kappa.to_numpy()[: k.n], table[kn.EPS0])
             damage = 1 - table[kn.EPS0] / kappa * np.exp(-(kappa - table[kn.EPS0]) / (table[kn.EPSF] - table[kn.EPS0]))
         return topology(self.seeds, mirrors, half.astype(int), side > 0, np.linalg.det(f), damage)
 

@@ -23,28 +23,34 @@ def evaluate():
     par = ti.field(ti.f64, 4)
 
     @ti.kernel
-    def rotation():
+    def stretch():
         for _ in range(1):  # Taichi cannot break out of an outermost loop
-            out[None] = law.polar_rotation(inp[None])
+            f = inp[None]
+            out[None] = law.full(law.left_stretch(law.left_cauchy_green(f), f.determinant()))
 
     @ti.kernel
     def returned():
-        s = inp[None]
-        out[None] = law.j2_return(s, s.determinant(), par[0], par[1])
+        v = law.upper(inp[None])
+        out[None] = law.full(law.j2_return(law.square(v), v, law.determinant(v), par[0], par[1]))
 
     @ti.kernel
     def eigen():
-        out[None][0, 0] = law.largest_eigenvalue(inp[None])
+        out[None][0, 0] = law.largest_eigenvalue(law.upper(inp[None]))
 
     @ti.kernel
     def damaged():
-        out[None] = law.degrade(inp[None], par[0])
+        out[None] = law.full(law.degrade(law.upper(inp[None]), par[0]))
+
+    @ti.kernel
+    def inverse():
+        a = law.upper(inp[None])
+        out[None] = law.full(law.cofactor(a) / law.determinant(a))
 
     @ti.kernel
     def softening():
         out[None][0, 0] = law.damage_of(par[0], par[1], par[2])
 
-    kernels = {f.__name__: f for f in (rotation, returned, eigen, damaged, softening)}
+    kernels = {f.__name__: f for f in (stretch, returned, eigen, damaged, inverse, softening)}
 
     def run(name: str, matrix: np.ndarray | None = None, *values: float) -> np.ndarray:
         inp[None] = np.eye(3) if matrix is None else matrix
@@ -62,13 +68,29 @@ def random_f(rng: np.random.Generator, size: float) -> np.ndarray:
     )
 
 
-def test_polar_rotation_agrees_with_scipy(evaluate):
-    """Newton's rotation is the polar factor, to 1e-10 at 15 % strain and at stretches of 0.2 to 3."""
+def test_left_stretch_agrees_with_scipy(evaluate):
+    """V is the left polar factor: 1e-12 unstrained and at 15 % strain, 1e-10 at stretches of 0.2 to 3."""
     rng = np.random.default_rng(0)
-    samples = [random_f(rng, 0.15) for _ in range(50)]
-    samples += [Rotation.random(random_state=k).as_matrix() @ np.diag([0.2, 1.3, 3.0]) for k in range(10)]
-    for f in samples:
-        np.testing.assert_allclose(evaluate("rotation", f), polar(f)[0], atol=1e-10)
+    for f in [np.eye(3), *(random_f(rng, size) for size in (1e-6, 1e-2, 0.15) for _ in range(20))]:
+        np.testing.assert_allclose(evaluate("stretch", f), polar(f, side="left")[1], atol=1e-12)
+    for k in range(10):
+        turn = Rotation.random(random_state=k).as_matrix()
+        f = turn.T @ np.diag([0.2, 1.3, 3.0]) @ turn @ Rotation.random(random_state=k + 50).as_matrix()
+        np.testing.assert_allclose(evaluate("stretch", f), polar(f, side="left")[1], atol=1e-10)
+
+
+@pytest.mark.parametrize("stretches", [(50.0, 0.02, 0.02), (50.0, 50.0, 0.02), (0.02, 0.02, 0.02)])
+def test_left_stretch_of_a_crushed_element(evaluate, stretches):
+    """Stretches as no food survives still give V, to 1e-6 of the largest: the run ends by its audit, not by a NaN."""
+    turn = Rotation.random(random_state=1).as_matrix()
+    f = turn.T @ np.diag(stretches) @ turn
+    np.testing.assert_allclose(evaluate("stretch", f), f, atol=1e-6 * max(stretches))
+
+
+def test_symmetric_inverse(evaluate):
+    """Cofactor over determinant is the inverse."""
+    a = np.array([[2.0, 0.3, -0.2], [0.3, 1.5, 0.4], [-0.2, 0.4, 0.9]])
+    np.testing.assert_allclose(evaluate("inverse", a) @ a, np.eye(3), atol=1e-14)
 
 
 @pytest.mark.parametrize(("stretch", "lateral", "nominal"), [(0.95, 1.01784, -0.05119), (0.7, 1.11636, -0.35968)])
