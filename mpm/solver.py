@@ -22,6 +22,7 @@ from mpm.topology import topology
 
 PAD = 3  # empty cells around the food: a quadratic kernel reaches 1.5 cells, the rest is room to move
 SPREAD = 0.5  # room for the food to widen while it is pressed, part of its size
+WORTH_A_THREAD = 4000  # particles for which another thread pays: steps of few last as long as it takes to share them
 PATIENCE = 0.1  # time after which a run comes back from the device to say how far it is and to be stopped [s]
 APPROACH = 0.1  # way of the blade above the food before contact, in cells
 EDGE_STEP = 0.5  # dt times the frequency of the edge's cohesive spring, 2 is unstable
@@ -47,9 +48,18 @@ class Simulation:
         self.serial = start(self.runtime, scene.numerics.precision)
         self.seeds = seed(scene)
         self._layout()
-        threads = self.runtime.cpu_threads if self.runtime.arch == "cpu" else 0
-        damage = scene.food.material.tensile_strength is not None
-        self.k: Any = Kernels(
+        self.k: Any = self._kernels(self._threads())
+
+    def _threads(self) -> int:
+        """CPU threads that pay for a scene of this size, 0 on a GPU."""
+        if self.runtime.arch != "cpu":
+            return 0
+        return min(self.runtime.cpu_threads, 1 + len(self.seeds.x) // WORTH_A_THREAD)
+
+    def _kernels(self, threads: int) -> Kernels:
+        """Fields and kernels of the scene for so many CPU threads, 0 for a GPU."""
+        scene = self.scene
+        return Kernels(
             len(self.seeds.x),
             self.nodes,
             scene.numerics.dx,
@@ -59,7 +69,7 @@ class Simulation:
             self.stations[0],
             threads,
             scene.numerics.contact == "nodal",
-            damage,
+            scene.food.material.tensile_strength is not None,
             scene.numerics.grid_turn != 0,
             len(scene.food.material.prony),
         )

@@ -1,0 +1,145 @@
+"""What the kernels skip or do at once changes no result: against NumPy, and one thread against two."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import taichi as ti
+from scipy.linalg import polar
+
+from mpm import fields as kn
+from mpm.material import Material
+from mpm.runtime import Runtime
+from mpm.scene import EdgeLaw, Food, Motion, Numerics, Scene
+from mpm.shapes import Shape
+from mpm.solver import Simulation
+from tests.mpm import twins
+from tests.mpm.scenes import PRISM, WEDGE
+
+BRITTLE = Scene(
+    Food(
+        Shape("block", 0.05, 0.02, 0.016),
+        Material(
+            E=1e6,
+            nu=0.35,
+            rho=1000,
+            yield_stress=5e4,
+            R=200,
+            mu=0.3,
+            tensile_strength=1.2e4,
+            fracture_energy=20,
+            loss_factor=0.02,
+        ),
+    ),
+    WEDGE,
+    Motion(3e-3, 0.01),
+    edge=EdgeLaw(zone=3e-3),
+    numerics=Numerics(dx=2e-3, mirror=False),
+)
+
+
+@ti.kernel
+def elastic(k: ti.template(), dt: float):
+    for block in range(k.blocks):
+        k.elastic(block, dt)
+
+
+@pytest.fixture(scope="module")
+def strained():
+    """A prism whose particles have random strains up to 20 %, a few of them inverted; its tables before and after."""
+    viscous = replace(PRISM.food.material, loss_factor=0.1)
+    scene = replace(PRISM, food=Food(PRISM.food.shape, viscous))
+    sim = Simulation(scene, Runtime(threads=1))
+    sim._load(viscous)
+    k, rng = sim.k, np.random.default_rng(0)
+    f = np.eye(3) + rng.uniform(-0.2, 0.2, (k.n, 3, 3)) * rng.uniform(0, 1, (k.n, 1, 1))
+    f[:5] = np.diag([-0.5, 1.0, 1.0])
+    slope = rng.uniform(-1, 1, (k.n, 3, 3))
+    k.F.from_numpy(np.pad(f, ((0, k.blocks * k.lanes - k.n), (0, 0), (0, 0))).reshape(-1, k.lanes, 9).swapaxes(1, 2))
+    k.set_gradient(slope)
+    np.testing.assert_array_equal(k.deformation(), f)
+    np.testing.assert_array_equal(k.gradient(), slope)
+    dt = 1e-5
+    elastic(k, dt)
+    tau = k.tau.to_numpy().transpose(0, 2, 1).reshape(-1, 8)[: k.n]
+    return sim, dt, f, slope, tau, k.deformation()
+
+
+def test_elastic_stress_of_four_particles_at_once(strained):
+    """Deformation gradient, Kirchhoff stress with the viscous part, and its loss are those of the formulas, to 1e-9."""
+    sim, dt, f, slope, tau, new = strained
+    par, m = sim.k.par.to_numpy(), sim.scene.food.material
+    done = np.flatnonzero(tau[:, 7] == 0)
+    assert len(done) > 500
+    for p in done[::7]:
+        want = f[p] + dt * slope[p] @ f[p]
+        rate = (slope[p] + slope[p].T) / 2
+        swell, j = np.trace(rate) * np.eye(3), np.linalg.det(want)
+        drag = j * (2 * par[kn.ETA_S] * (rate - swell / 3) + par[kn.ETA_B] * swell)
+        stress = twins.kirchhoff(want, m.shear, m.lame) + drag
+        np.testing.assert_allclose(new[p], want, rtol=1e-13)
+        np.testing.assert_allclose(tau[p, :6], stress[[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]], atol=1e-9 * m.E)
+        assert tau[p, 6] == pytest.approx(dt * np.sum(drag * rate), rel=1e-9)
+
+
+def test_particles_that_flow_or_are_inverted_are_left_to_be_done_one_by_one(strained):
+    """Marked are exactly those above the yield stress or turned inside out, and they are not advanced."""
+    sim, dt, f, slope, tau, new = strained
+    m, want = sim.scene.food.material, f + dt * slope @ f
+    beyond = np.array([twins.mises(twins.kirchhoff(g, m.shear, m.lame)) > m.yield_stress for g in want])
+    beyond[np.linalg.det(want) <= 0] = True
+    assert 50 < beyond.sum() < len(f) - 50
+    np.testing.assert_array_equal(tau[:, 7] > 0, beyond)
+    np.testing.assert_array_equal(new[beyond], f[beyond])
+
+
+def test_strain_is_smoothed_wherever_it_can_matter():
+    """About a few strongly strained particles the smoothed strain is the one over all particles, and most are spared."""
+    tough = replace(BRITTLE.food.material, yield_stress=np.inf)
+    sim = Simulation(replace(BRITTLE, food=Food(BRITTLE.food.shape, tough)), Runtime(threads=1))
+    sim._load(tough)
+    k, par = sim.k, sim.k.par.to_numpy()
+    calm = np.random.default_rng(0).uniform(0, 0.9 * par[kn.EPS0], (k.n, 1, 1))
+    f = (1 + calm) * np.eye(3)
+    f[np.linalg.norm(k.x.to_numpy() - [0.002, 0.004, 0.008], axis=1) < 1.5e-3] += 9.0 * np.eye(
+        3
+    )  # far beyond what food bears, so that it is felt two cells away
+    k.F.from_numpy(f.reshape(-1, k.lanes, 9).swapaxes(1, 2))
+    k.v.fill(1.0)  # what the grid carried before must be gone
+    k.steps(1, 1, 1, 1e-12, 0.0, 0.0, np.zeros((1, kn.N_REPORT)))
+    x = (k.x.to_numpy() - [k.ox, k.oy, k.oz]) * k.inv
+    base = np.floor(x - 0.5).astype(int)
+    strain = np.array([np.linalg.eigvalsh(polar(f, side="left")[1])[-1] - 1 for f in k.deformation()])
+    weight, total = np.zeros(k.nodes), np.zeros(k.nodes)
+    near = [(i, j, m) for i in range(3) for j in range(3) for m in range(3)]
+    shape = [np.prod(twins.bspline(base + d - x), axis=1) for d in near]
+    for d, w in zip(near, shape, strict=True):
+        np.add.at(weight, tuple((base + d).T), w)
+        np.add.at(total, tuple((base + d).T), w * strain)
+    mean = total / np.maximum(weight, 1e-30)
+    smooth = sum(w * mean[tuple((base + d).T)] for d, w in zip(near, shape, strict=True))
+    hit = smooth > par[kn.EPS0]
+    assert 100 < hit.sum() < 0.2 * k.n
+    ours = k.strain.to_numpy()[: k.n]
+    np.testing.assert_allclose(ours[hit], smooth[hit], rtol=1e-9)
+    assert (ours[~hit] <= par[kn.EPS0]).all()
+    assert (ours == 0).sum() > 0.5 * k.n
+
+
+@pytest.fixture(scope="module")
+def alone():
+    """The brittle cut on one thread."""
+    return Simulation(BRITTLE, Runtime(threads=1)).run()
+
+
+@pytest.mark.parametrize("threads", [2, 0])
+def test_many_threads_repeat_one(alone, threads):
+    """Split among two threads, or as on a GPU (here on the CPU), a cut with flow, friction, damage and both halves gives
+    the same force to 1e-9."""
+    sim = Simulation(BRITTLE, Runtime(threads=2))
+    sim.k = sim._kernels(threads)
+    record = sim.run()
+    assert alone.damage[-1] > 0
+    assert alone.plastic[-1] > 0
+    np.testing.assert_allclose(record.edge + record.face, alone.edge + alone.face, atol=1e-9 * alone.resolved.max())
+    np.testing.assert_allclose(record.damage[-1], alone.damage[-1], rtol=1e-9)
