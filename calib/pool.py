@@ -20,10 +20,6 @@ from mpm.scene import Scene
 
 DIED = "worker_died"  # reason of a run whose process was killed, for instance for lack of memory
 
-KEPT_SCENES = 3  # scenes whose kernels a worker keeps: fine, coarse and one of another height
-
-_simulations: dict[Scene, Any] = {}
-
 
 def _ignore_interrupt() -> None:
     """Ctrl-C is handled by the main process, which then ends the workers."""
@@ -35,10 +31,7 @@ def _run(scene: Scene, values: dict[str, Any], arch: str, threads: int) -> dict[
     from mpm.runtime import Runtime
     from mpm.solver import Simulation
 
-    simulation = _simulations.pop(scene, None) or Simulation(scene, Runtime(arch, threads))
-    _simulations[scene] = simulation  # the latest is the last
-    while len(_simulations) > KEPT_SCENES:
-        del _simulations[next(iter(_simulations))]
+    simulation = Simulation(scene, Runtime(arch, threads))
     material: Material = replace(scene.food.material, **values)
     parent = os.getppid()
 

@@ -3,7 +3,27 @@
 import taichi as ti
 
 from mpm.contact import bspline, edge_level
-from mpm.fields import DEPTH, EDGE, FULL, HALF_LENGTH, R_FLESH, R_START, SLIP, TILT_COS, TILT_SIN, VS, VZ, ZONE, S
+from mpm.fields import (
+    DEPTH,
+    DX,
+    EDGE,
+    FIRST,
+    FULL,
+    HALF_LENGTH,
+    INV,
+    OX,
+    OY,
+    OZ,
+    R_FLESH,
+    R_START,
+    SLIP,
+    TILT_COS,
+    TILT_SIN,
+    VS,
+    VZ,
+    ZONE,
+    S,
+)
 from mpm.nodes import Nodes
 
 # Kernel mass of the process zone of an edge that touches a flat surface, over rho dx zone^2 (exact: the zone is centred
@@ -20,15 +40,15 @@ class Edge(Nodes):
     def slice_nodes(self, i):
         """Nodes whose velocity slice i feels, as the corners (low 3, high 3) of a box."""
         reach = 1.5 * self.par[ZONE]
-        s = self.first + i * self.dx
+        s = self.par[FIRST] + i * self.par[DX]
         mid = self.grid_axes(ti.Vector([s, 0.0, self.front[i] - 0.5 * self.par[ZONE]]))
         wide, deep = 0.0, reach
         if ti.static(self.turned):
-            e = ti.abs(self.grid_axes(ti.Vector([self.dx, 0.0, 0.0])))
+            e = ti.abs(self.grid_axes(ti.Vector([self.par[DX], 0.0, 0.0])))
             f = ti.abs(self.grid_axes(ti.Vector([0.0, reach, 0.0])))
             wide, deep = e[0] + f[0], e[1] + f[1]
-        r = (mid - ti.Vector([self.ox, self.oy, self.oz])) * self.inv
-        h = ti.Vector([wide + 1e-6 * self.dx, deep, reach]) * self.inv
+        r = (mid - ti.Vector([self.par[OX], self.par[OY], self.par[OZ]])) * self.par[INV]
+        h = ti.Vector([wide + 1e-6 * self.par[DX], deep, reach]) * self.par[INV]
         out = ti.Vector([0, 0, 0, 0, 0, 0])
         for d in ti.static(range(3)):
             out[d] = ti.max(0, ti.ceil(r[d] - h[d], ti.i32))
@@ -42,7 +62,7 @@ class Edge(Nodes):
         at = self.blade_axes(self.node(a, j, k))
         w = bspline(at[1] / z) * bspline((at[2] - self.front[i]) / z + 0.5)
         if ti.static(self.turned):
-            w *= ti.max(0.0, 1.0 - ti.abs(at[0] - self.first - i * self.dx) * self.inv)
+            w *= ti.max(0.0, 1.0 - ti.abs(at[0] - self.par[FIRST] - i * self.par[DX]) * self.par[INV])
         return w
 
     @ti.func
@@ -85,12 +105,12 @@ class Edge(Nodes):
     def over(self, s):
         """Part of a slice that is under the blade [-]."""
         reach = self.par[HALF_LENGTH] * self.par[TILT_COS] - ti.abs(s - ti.cast(self.pose[S], float))
-        return ti.math.clamp(reach * self.inv + 0.5, 0.0, 1.0)
+        return ti.math.clamp(reach * self.par[INV] + 0.5, 0.0, 1.0)
 
     @ti.func
     def lead(self, i):
         """Move the crack front of slice i: down with the edge, and with the food where the blade has gone."""
-        s = self.first + i * self.dx
+        s = self.par[FIRST] + i * self.par[DX]
         tip = self.edge_height(s)
         self.front[i] += self.drift[i]
         if self.over(s) > 0 and tip < self.front[i]:
@@ -100,7 +120,7 @@ class Edge(Nodes):
     def feel(self, i, dt):
         """Find the edge's reaction on slice i in this step, as a change of velocity."""
         self.push[i], self.drift[i] = ti.Vector.zero(float, 2), 0.0
-        s = self.first + i * self.dx
+        s = self.par[FIRST] + i * self.par[DX]
         tip = self.edge_height(s)
         over = self.over(s)
         box = self.slice_nodes(i)
@@ -115,8 +135,8 @@ class Edge(Nodes):
         # the zone reaches below the edge and beside the food, so the width that is cut is that of the outline
         begun = ti.math.clamp((self.top[i] - tip) / (self.top[i] - self.low[i]), 0.0, 1.0)
         ended = ti.math.clamp((self.floor_top[i] - tip) / (self.floor_top[i] - self.floor_low[i]), 0.0, 1.0)
-        width = self.dx * self.width[i] * (begun - ended)
-        full = SURFACE_FILL * self.par[FULL] * width * self.inv
+        width = self.par[DX] * self.width[i] * (begun - ended)
+        full = SURFACE_FILL * self.par[FULL] * width * self.par[INV]
         if width > 0 and mass > EMPTY_ZONE * full:
             c, t = self.par[TILT_COS], self.par[TILT_SIN]
             mean = self.blade_axes(mom / mass)

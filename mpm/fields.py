@@ -9,7 +9,8 @@ R_FLESH, R_START, DEPTH, SLIP, ZONE, FULL, EPS0, EPSF = range(7, 15)
 SPINE, COS, SIN, HALF_LENGTH, BLADE, GRAVITY, RADIUS, ETA_S, ETA_B = range(15, 24)
 TILT_COS, TILT_SIN, YAW_COS, YAW_SIN, TACK, TACK_GAP = range(24, 30)
 ARM_K, ARM_C, ARM_MASS, ARM_LIMIT = range(30, 34)
-N_PARAMETERS = 34
+DX, INV, OX, OY, OZ, FIRST = range(34, 40)
+N_PARAMETERS = 40
 # Rows of the accumulator table, cleared by the host at each output interval.
 EDGE, FACE, BOARD = 0, 3, 6
 PLASTIC, DAMAGE, VISCOUS, INVERTED, OUTSIDE = 9, 10, 11, 12, 13
@@ -41,11 +42,9 @@ class Fields:
     Args:
         n: Number of particles.
         nodes: Grid nodes along x, y, z.
-        dx: Cell size [m].
-        origin: Position of node (0, 0, 0) [m], in the grid's own axes.
+        middle: Index of the node plane along y that is nearest to y = 0.
         planes: Node index of the mirror planes (x, y), -1 where there is none.
         stations: Number of slices along the edge.
-        first: Position of the first slice along the blade [m].
         threads: CPU threads, 0 on a GPU.
         nodal: Plain nodal projection instead of the cohesive edge and particle contact.
         damage: Bulk damage on.
@@ -53,16 +52,14 @@ class Fields:
         branches: Number of Prony branches.
     """
 
-    def __init__(self, n, nodes, dx, origin, planes, stations, first, threads, nodal, damage, turned=False, branches=0):
-        self.n, self.nodes, self.dx, self.inv = n, nodes, float(dx), 1.0 / float(dx)
-        self.ox, self.oy, self.oz = (float(o) for o in origin)
+    def __init__(self, n, nodes, middle, planes, stations, threads, nodal, damage, turned=False, branches=0):
+        self.n, self.nodes = n, nodes
         self.i0, self.j0 = planes
         self.mx, self.my = self.i0 >= 0, self.j0 >= 0
         self.threads, self.nodal, self.damage, self.turned = max(threads, 1), nodal, damage, turned
         self.atomic = threads == 0
         self.parts = n if self.atomic else 1 if self.threads == 1 else self.threads * CPU_BLOCK
-        self.stations, self.first, self.branches = stations, float(first), branches
-        middle = round(-self.oy / self.dx)
+        self.stations, self.branches = stations, branches
         self.b0 = 0 if turned else max(middle - BESIDE, 0)
         self.b1 = 0 if nodal else nodes[1] if turned else min(middle + BESIDE + 1, nodes[1])
         self.second = nodes[1] - self.b0
@@ -179,7 +176,7 @@ class Fields:
     @ti.func
     def local(self, q):
         """Lowest node of the 27 that a point reaches, and its offset in cells."""
-        u = (q - ti.Vector([self.ox, self.oy, self.oz])) * self.inv
+        u = (q - ti.Vector([self.par[OX], self.par[OY], self.par[OZ]])) * self.par[INV]
         base = ti.floor(u - 0.5).cast(ti.i32)
         return base, u - base.cast(float)
 
@@ -200,7 +197,9 @@ class Fields:
     @ti.func
     def node(self, i, j, k):
         """Position of a node [m]."""
-        return ti.Vector([self.ox + i * self.dx, self.oy + j * self.dx, self.oz + k * self.dx])
+        return ti.Vector(
+            [self.par[OX] + i * self.par[DX], self.par[OY] + j * self.par[DX], self.par[OZ] + k * self.par[DX]]
+        )
 
     @ti.func
     def blade_axes(self, q):
@@ -234,7 +233,7 @@ class Fields:
     @ti.func
     def front_at(self, s):
         """Height of the crack front at a place along the cut [m], between the slices; far up where nothing is cut."""
-        r = (s - self.first) * self.inv
+        r = (s - self.par[FIRST]) * self.par[INV]
         i = ti.math.clamp(ti.floor(r, ti.i32), 0, self.stations - 2)
         t = ti.math.clamp(r - i, 0.0, 1.0)
         out = 1e3
@@ -277,20 +276,20 @@ class Fields:
         """
         code = 0x3FFFF
         if ti.static(not self.nodal):
-            reach = ti.static(2.2 if self.turned else 1.6) * self.dx
+            reach = ti.static(2.2 if self.turned else 1.6) * self.par[DX]
             if ti.abs(q[1]) < reach:
                 front = self.front_at(q[0]) - 0.5 * self.par[ZONE]
-                front += CRACK_LEAD * self.dx
+                front += CRACK_LEAD * self.par[DX]
                 if front < 1e2:
                     code = 0
                     for column in range(ti.static(9 if self.turned else 3)):
                         n = self.blade_axes(self.node(base[0] + column // 3, base[1] + column % 3, base[2]))[1]
                         layer = 3
                         if self.half_of_node(n) != mine:
-                            t = q[1] / (q[1] - n) if ti.abs(q[1] - n) > 1e-9 * self.dx else 1.0
+                            t = q[1] / (q[1] - n) if ti.abs(q[1] - n) > 1e-9 * self.par[DX] else 1.0
                             t = ti.math.clamp(t, 1e-6, 1.0)
                             # the line passes the plane at z_p + t (z_node - z_p); above the front it is cut
-                            level = (q[2] + (front - q[2]) / t - self.oz) * self.inv
+                            level = (q[2] + (front - q[2]) / t - self.par[OZ]) * self.par[INV]
                             layer = ti.math.clamp(ti.floor(level - base[2], ti.i32) + 1, 0, 3)
                         code |= layer << (2 * column)
         return code
@@ -312,7 +311,7 @@ class Fields:
     @ti.func
     def half_of_node(self, n):
         """Half that a node belongs to; a node on the plane belongs to the right."""
-        return ti.cast(n > -1e-6 * self.dx, ti.i32)
+        return ti.cast(n > -1e-6 * self.par[DX], ti.i32)
 
     @ti.func
     def images_x(self, i):

@@ -37,6 +37,7 @@ from mpm.fields import (
     BOOKED,
     COMMAND,
     COS,
+    DX,
     EDGE,
     EPS0,
     EPSF,
@@ -44,6 +45,7 @@ from mpm.fields import (
     ETA_S,
     FACE,
     FRICTION,
+    INV,
     LAM,
     MASS,
     MU,
@@ -299,7 +301,7 @@ class Kernels(Edge):
         if outside == 0.0:
             w = self.weights(fx)
             m = self.par[MASS]
-            k, h = -dt * self.par[VOL] * 4 * self.inv, m * self.dx * ti.Vector([1.0, 1.0, 1.0, 0.0])
+            k, h = -dt * self.par[VOL] * 4 * self.par[INV], m * self.par[DX] * ti.Vector([1.0, 1.0, 1.0, 0.0])
             ax = k * ti.Vector([tau[0], tau[5], tau[4], 0.0]) + h * self.C[p, 0]
             ay = k * ti.Vector([tau[5], tau[1], tau[3], 0.0]) + h * self.C[p, 1]
             az = k * ti.Vector([tau[4], tau[3], tau[2], 0.0]) + h * self.C[p, 2]
@@ -419,9 +421,9 @@ class Kernels(Edge):
             if ti.static(i > 0):
                 mx += i * w[i][0] * plane
         u = ti.Vector([whole[0], whole[1], whole[2]])
-        self.C[p, 0] = (4 * self.inv) * (mx - fx[0] * whole)
-        self.C[p, 1] = (4 * self.inv) * (my - fx[1] * whole)
-        self.C[p, 2] = (4 * self.inv) * (mz - fx[2] * whole)
+        self.C[p, 0] = (4 * self.par[INV]) * (mx - fx[0] * whole)
+        self.C[p, 1] = (4 * self.par[INV]) * (my - fx[1] * whole)
+        self.C[p, 2] = (4 * self.par[INV]) * (mz - fx[2] * whole)
         at = self.x[p] + dt * u
         if ti.static(not self.nodal):
             m = self.par[MASS] * ti.static((2 if self.mx else 1) * (2 if self.my else 1))
@@ -649,7 +651,7 @@ class Kernels(Edge):
                 stored += self.memory[b, p].norm_sqr() / (4 * self.par[MU] * self.share_of[b])
             dev = held * dev + stored
         keep = 1.0 - d
-        kinetic = 0.5 * m * (u.norm_sqr() + 0.25 * self.dx * self.dx * spin)
+        kinetic = 0.5 * m * (u.norm_sqr() + 0.25 * self.par[DX] * self.par[DX] * spin)
         energy = self.par[VOL] * (keep * dev + (keep if j > 1 else 1.0) * vol)
         return ti.Vector([m * u[0], m * u[1], m * u[2], kinetic, energy])
 

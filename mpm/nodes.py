@@ -3,7 +3,7 @@
 import taichi as ti
 
 from mpm.contact import blade_distance, coulomb
-from mpm.fields import BLADE, BOARD, BOARD_MU, COS, FACE, FRICTION, GRAVITY, RADIUS, SIN, SPINE, VS, VZ, Fields
+from mpm.fields import BLADE, BOARD, BOARD_MU, COS, DX, FACE, FRICTION, GRAVITY, RADIUS, SIN, SPINE, VS, VZ, Fields
 
 
 @ti.data_oriented
@@ -43,7 +43,7 @@ class Nodes(Fields):
                 d, nrm = blade_distance(
                     ti.abs(at[1]), above, self.par[SPINE], self.par[COS], self.par[SIN], self.par[RADIUS]
                 )
-                if ti.abs(at[1]) < 1e-6 * self.dx:  # both faces are equally near: their mean normal is downwards
+                if ti.abs(at[1]) < 1e-6 * self.par[DX]:  # both faces are equally near: their mean normal is downwards
                     nrm = ti.Vector([0.0, 0.0, -1.0])
                 elif at[1] < 0:
                     nrm[1] = -nrm[1]
@@ -100,7 +100,7 @@ class Nodes(Fields):
         """Where no blade is between them, the severed halves may close on each other but not pass through."""
         at = self.blade_axes(self.node(i, j, k))
         above = at[2] - self.edge_height(at[0])
-        if not (-0.5 * self.dx < above < self.par[BLADE] and self.under_blade(at[0])):
+        if not (-0.5 * self.par[DX] < above < self.par[BLADE] and self.under_blade(at[0])):
             n = self.grid_axes(ti.Vector([0.0, 1.0, 0.0]))
             sign = 1.0 if self.half_of_node(at[1]) == 1 else -1.0
             na, nb = va.dot(n), vb.dot(n)

@@ -28,6 +28,10 @@ APPROACH = 0.1  # way of the blade above the food before contact, in cells
 EDGE_STEP = 0.5  # dt times the frequency of the edge's cohesive spring, 2 is unstable
 TACK_STEP = 0.5  # the same for the rising part of the adhesive traction
 
+KEPT = 3  # kernels that a process keeps: of the default cells, of coarse ones and of one scene more
+
+_kept: dict[tuple[int, tuple[Any, ...]], Kernels] = {}
+
 Progress = Callable[[float, float], None]
 
 
@@ -57,22 +61,26 @@ class Simulation:
         return min(self.runtime.cpu_threads, 1 + len(self.seeds.x) // WORTH_A_THREAD)
 
     def _kernels(self, threads: int) -> Kernels:
-        """Fields and kernels of the scene for so many CPU threads, 0 for a GPU."""
+        """Fields and kernels of the scene for so many CPU threads, 0 for a GPU; those of a scene with as many nodes and
+        particles are used again."""
         scene = self.scene
-        return Kernels(
+        key = (
             len(self.seeds.x),
             self.nodes,
-            scene.numerics.dx,
-            self.origin,
+            round(-self.origin[1] / scene.numerics.dx),
             self.planes,
             len(self.stations),
-            self.stations[0],
             threads,
             scene.numerics.contact == "nodal",
             scene.food.material.tensile_strength is not None,
             scene.numerics.grid_turn != 0,
             len(scene.food.material.prony),
         )
+        kept = _kept.pop((self.serial, key), None) or Kernels(*key)
+        _kept[self.serial, key] = kept  # the latest is the last
+        while len(_kept) > KEPT:
+            del _kept[next(iter(_kept))]
+        return kept
 
     def _layout(self) -> None:
         """Place the grid: around the food with room to widen, nodes on the mirror planes."""
@@ -140,6 +148,8 @@ class Simulation:
         k.tacky.from_numpy(np.where(sticky, 0, -1).astype(np.int32))
         knife = scene.knife
         table = np.zeros(kn.N_PARAMETERS)
+        table[kn.DX], table[kn.INV], table[kn.FIRST] = num.dx, 1 / num.dx, self.stations[0]
+        table[kn.OX], table[kn.OY], table[kn.OZ] = self.origin
         table[kn.MU], table[kn.LAM] = material.shear, material.lame
         table[kn.YIELD] = min(material.yield_stress, 1e30)
         table[kn.MASS], table[kn.VOL] = material.rho * self.seeds.volume, self.seeds.volume

@@ -40,6 +40,7 @@ BRITTLE = Scene(
 
 @ti.kernel
 def elastic(k: ti.template(), dt: float):
+    """The elastic pass alone."""
     for block in range(k.blocks):
         k.elastic(block, dt)
 
@@ -107,7 +108,7 @@ def test_strain_is_smoothed_wherever_it_can_matter():
     k.F.from_numpy(f.reshape(-1, k.lanes, 9).swapaxes(1, 2))
     k.v.fill(1.0)  # what the grid carried before must be gone
     k.steps(1, 1, 1, 1e-12, 0.0, 0.0, np.zeros((1, kn.N_REPORT)))
-    x = (k.x.to_numpy() - [k.ox, k.oy, k.oz]) * k.inv
+    x = (k.x.to_numpy() - sim.origin) / sim.scene.numerics.dx
     base = np.floor(x - 0.5).astype(int)
     strain = np.array([np.linalg.eigvalsh(polar(f, side="left")[1])[-1] - 1 for f in k.deformation()])
     weight, total = np.zeros(k.nodes), np.zeros(k.nodes)
