@@ -64,7 +64,7 @@ CALM_ROUNDS, STALLED_ROUNDS = 2, 4
 DESIGNS = 3
 #: Part of the budget that the coarse evaluator may spend on the screening: 60 runs of the default budget.  On
 #: two synthetic and two real cuts it ended by itself after 32 to 50.
-SCREENING = 0.25
+SCREENING = 0.15
 #: Largest joint scaling of the design's materials, as a logarithm: a factor 20 either way.
 LARGEST_SCALE = 3.0
 
@@ -87,7 +87,7 @@ class FitOptions:
         ValueError: A number that is not positive.
     """
 
-    budget: float = 80.0
+    budget: float = 100.0
     batch: int = 2
     design: int = 7
     coarse_cost: float = 0.25

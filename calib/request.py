@@ -46,7 +46,7 @@ class Request:
     sizing: Sizing = field(default_factory=Sizing)
     fit: tuple[str, ...] | None = None
     dx: float | None = None
-    budget: float = 60
+    budget: float = 100
     workers: int = 2
     seed: int = 0
     arch: str = "cpu"

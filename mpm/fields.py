@@ -23,6 +23,7 @@ N_POSE = 6
 N_STATE = 5
 N_REPORT = N_SUMS + N_STATE + N_POSE
 
+FAR = 1 << 20  # a node that no grid has
 BESIDE = 3  # cells on either side of the cut plane whose nodes may carry both halves
 LANES = 4  # particles whose elastic stress is found at once on a CPU: four double-precision numbers fill a register
 CPU_BLOCK = 512  # Taichi runs CPU loops shorter than this on one thread, so one iteration in 512 works for a thread
@@ -172,6 +173,33 @@ class Fields:
             thread = part // CPU_BLOCK
             first, last = self.blocks * thread // self.threads, self.blocks * (thread + 1) // self.threads
         return first, last, thread
+
+    @ti.func
+    def rows(self, w):
+        """Number of rows of nodes along z in the box ``w``; on a GPU each node is a row."""
+        return (w[3] - w[0]) * (w[4] - w[1]) * ((w[5] - w[2]) if ti.static(self.atomic) else 1)
+
+    @ti.func
+    def row(self, c, w):
+        """Place i, j of a row and its first and last node (excluded)."""
+        low, high = w[2], w[5]
+        r = c
+        if ti.static(self.atomic):
+            deep = w[5] - w[2]
+            r = c // deep
+            low += c - r * deep
+            high = low + 1
+        wide = w[4] - w[1]
+        i = r // wide
+        return w[0] + i, w[1] + r - i * wide, low, high
+
+    @ti.func
+    def add(self, thread, i, j, k, value):
+        """Add to a node of a thread's own grid; atomically where all threads share one."""
+        if ti.static(self.atomic):
+            self.g[thread, i, j, k] += value
+        else:
+            self.g[thread, i, j, k] = self.g[thread, i, j, k] + value
 
     @ti.func
     def local(self, q):

@@ -35,7 +35,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--fit", metavar="NAMES", help="properties to fit, e.g. E,nu,R,mu (default: those that cutting sees)"
     )
-    p.add_argument("--budget", type=number(0, 1e6, ""), default=60, help="largest number of simulations (default 60)")
+    p.add_argument("--budget", type=number(0, 1e6, ""), default=100, help="largest number of simulations (default 100)")
     p.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
     p.add_argument("--resume", action="store_true", help="go on with the run in --out; nothing is simulated twice")
     add_run(p)

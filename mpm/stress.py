@@ -1,0 +1,256 @@
+"""Stress of the particles: many elastic ones at once, the others one by one; the smoothed strain that damages them."""
+
+import taichi as ti
+
+from mpm.constitutive import (
+    STRETCH_TOLERANCE,
+    cofactor,
+    cofactors,
+    damage_of,
+    degrade,
+    deviatoric_energy,
+    double,
+    full,
+    halley,
+    j2_return,
+    largest_eigenvalue,
+    left_cauchy_green,
+    left_stretch,
+    mises_squared,
+    product_with_transpose,
+    square,
+    stretch_of,
+    trace,
+    unit,
+    upper,
+)
+from mpm.edge import Edge
+from mpm.fields import EPS0, EPSF, ETA_B, ETA_S, LAM, MU, YIELD
+
+
+@ti.data_oriented
+class Stress(Edge):
+    """Deformation gradient and Kirchhoff stress of the particles in a time step."""
+
+    @ti.func
+    def relaxed(self, p, f, v, j, mu):
+        """Prony series on the deviator in the unrotated frame (Simo 1987): stress to add, and loss per volume."""
+        r = full(cofactor(v)) @ f / j
+        s = r.transpose() @ f
+        now = 2 * mu * (s @ s - s)
+        now -= now.trace() / 3 * ti.Matrix.identity(float, 3)
+        add, lost = ti.Matrix.zero(float, 3, 3), 0.0
+        for b in ti.static(range(self.branches)):
+            share, rate = self.share_of[b], self.relax[b]
+            decay = ti.exp(-rate)
+            h = decay * self.memory[b, p] + share * (1 - decay) / rate * (now - self.before[p])
+            self.memory[b, p] = h
+            add += h - share * now
+            lost += h.norm_sqr() * rate / (2 * mu * share)
+        self.before[p] = now
+        return upper(r @ add @ r.transpose()), lost
+
+    @ti.func
+    def damaged(self, p, v, j, mu, lam):
+        """Damage of a particle from the smoothed strain of the last step; returns it and the energy that is lost.
+
+        Also finds the box of the particles whose strain could damage something. No principal strain exceeds the norm
+        of the strain, so the others never pay for an eigenvalue.
+        """
+        d, lost = 0.0, 0.0
+        eps0, eps_f = self.par[EPS0], self.par[EPSF]
+        if eps0 > 0:
+            before = damage_of(self.kappa[p], eps0, eps_f)
+            self.kappa[p] = ti.max(self.kappa[p], self.strain[p])
+            self.strain[p] = 0.0
+            d = damage_of(self.kappa[p], eps0, eps_f)
+            if d > before and j > 1:
+                lost = (d - before) * (deviatoric_energy(v, mu) + 0.5 * lam * (j - 1) ** 2)
+            e = v - unit()
+            if double(e, e) > eps0 * eps0:
+                if largest_eigenvalue(e) > eps0:
+                    base, fx = self.local(self.x[p])
+                    for axis in ti.static(range(3)):
+                        ti.atomic_min(self.hot[axis], base[axis])
+                        ti.atomic_max(self.hot[axis + 3], base[axis])
+        return d, lost
+
+    @ti.func
+    def slope(self, block, row, column):
+        """One entry of the velocity gradient for all particles of a block [1/s]."""
+        return ti.Vector([self.C[block * self.lanes + lane, column][row] for lane in range(self.lanes)])
+
+    @ti.func
+    def elastic(self, block, dt):
+        """Advance F of a block of particles and find their Kirchhoff stress and viscous loss, all at once.
+
+        Those that flow, are damaged or inverted, or whose stretch has not converged, are left as they are and marked;
+        :meth:`stress` does them one by one.
+        """
+        a0, a1, a2 = self.F[block, 0], self.F[block, 1], self.F[block, 2]
+        b0, b1, b2 = self.F[block, 3], self.F[block, 4], self.F[block, 5]
+        c0, c1, c2 = self.F[block, 6], self.F[block, 7], self.F[block, 8]
+        lxx, lxy, lxz = self.slope(block, 0, 0), self.slope(block, 0, 1), self.slope(block, 0, 2)
+        lyx, lyy, lyz = self.slope(block, 1, 0), self.slope(block, 1, 1), self.slope(block, 1, 2)
+        lzx, lzy, lzz = self.slope(block, 2, 0), self.slope(block, 2, 1), self.slope(block, 2, 2)
+        d0 = a0 + dt * (lxx * a0 + lxy * b0 + lxz * c0)
+        d1 = a1 + dt * (lxx * a1 + lxy * b1 + lxz * c1)
+        d2 = a2 + dt * (lxx * a2 + lxy * b2 + lxz * c2)
+        e0 = b0 + dt * (lyx * a0 + lyy * b0 + lyz * c0)
+        e1 = b1 + dt * (lyx * a1 + lyy * b1 + lyz * c1)
+        e2 = b2 + dt * (lyx * a2 + lyy * b2 + lyz * c2)
+        f0 = c0 + dt * (lzx * a0 + lzy * b0 + lzz * c0)
+        f1 = c1 + dt * (lzx * a1 + lzy * b1 + lzz * c1)
+        f2 = c2 + dt * (lzx * a2 + lzy * b2 + lzz * c2)
+        j = d0 * (e1 * f2 - e2 * f1) + d1 * (e2 * f0 - e0 * f2) + d2 * (e0 * f1 - e1 * f0)
+        xx, yy, zz, yz, xz, xy = product_with_transpose(d0, d1, d2, e0, e1, e2, f0, f1, f2)
+        ca, cb, cc, _, _, _ = cofactors(xx, yy, zz, yz, xz, xy)
+        first, second = xx + yy + zz, ca + cb + cc
+        x = ti.sqrt(3 * first)
+        x -= halley(x, first, second, j)
+        x -= halley(x, first, second, j)
+        change = halley(x, first, second, j)
+        x -= change
+        vxx, vyy, vzz, vyz, vxz, vxy = stretch_of(x, first, j, xx, yy, zz, yz, xz, xy)
+        mu, lam = self.par[MU], self.par[LAM]
+        txx, tyy, tzz = 2 * mu * (xx - vxx), 2 * mu * (yy - vyy), 2 * mu * (zz - vzz)
+        tyz, txz, txy = 2 * mu * (yz - vyz), 2 * mu * (xz - vxz), 2 * mu * (xy - vxy)
+        mean = (txx + tyy + tzz) / 3
+        mises2 = 1.5 * (txx * txx + tyy * tyy + tzz * tzz - 3 * mean * mean) + 3 * (tyz * tyz + txz * txz + txy * txy)
+        strain2 = 0.0 * j
+        if ti.static(self.damage):
+            strain2 = (vxx - 1) ** 2 + (vyy - 1) ** 2 + (vzz - 1) ** 2 + 2 * (vyz * vyz + vxz * vxz + vxy * vxy)
+        swell = lxx + lyy + lzz
+        shear, bulk = 2 * self.par[ETA_S] * j, self.par[ETA_B] * j * swell
+        syz, sxz, sxy = 0.5 * (lyz + lzy), 0.5 * (lxz + lzx), 0.5 * (lxy + lyx)
+        dxx, dyy, dzz = lxx - swell / 3, lyy - swell / 3, lzz - swell / 3
+        press = lam * j * (j - 1) + bulk
+        heat = shear * (dxx * dxx + dyy * dyy + dzz * dzz + 2 * (syz * syz + sxz * sxz + sxy * sxy)) + bulk * swell
+        flow2, eps0 = self.par[YIELD] ** 2, self.par[EPS0]
+        odd = (j <= 0) | (change > STRETCH_TOLERANCE * x) | (mises2 > flow2)
+        if ti.static(self.damage):
+            odd |= (strain2 > eps0 * eps0) & (eps0 > 0)
+            for lane in ti.static(range(self.lanes)):
+                p = block * self.lanes + lane
+                odd[lane] |= (ti.max(self.kappa[p], self.strain[p]) > eps0) & (eps0 > 0)
+        self.tau[block, 7] = ti.cast(odd, float)
+        for r, new, old in ti.static(
+            (
+                (0, d0, a0),
+                (1, d1, a1),
+                (2, d2, a2),
+                (3, e0, b0),
+                (4, e1, b1),
+                (5, e2, b2),
+                (6, f0, c0),
+                (7, f1, c1),
+                (8, f2, c2),
+            )
+        ):
+            self.F[block, r] = ti.select(odd, old, new)
+        for r, value in ti.static(
+            (
+                (0, txx + press + shear * dxx),
+                (1, tyy + press + shear * dyy),
+                (2, tzz + press + shear * dzz),
+                (3, tyz + shear * syz),
+                (4, txz + shear * sxz),
+                (5, txy + shear * sxy),
+                (6, heat * dt),
+            )
+        ):
+            self.tau[block, r] = value
+
+    @ti.func
+    def stress(self, p, block, lane, dt):
+        """Advance F of one particle; returns its (plastic, damage, viscous loss, inverted) and Kirchhoff stress."""
+        c, old = self.gradient_of(p), self.deformation_of(p)
+        f = old + dt * (c @ old)
+        j = f.determinant()
+        tau = 0.0 * unit()
+        plastic, lost, heat, bad = 0.0, 0.0, 0.0, 0.0
+        if j > 0:
+            mu, lam = self.par[MU], self.par[LAM]
+            b = left_cauchy_green(f)
+            v = left_stretch(b, j)
+            if mises_squared(b, v, mu) > self.par[YIELD] ** 2:
+                back = j2_return(b, v, j, mu, self.par[YIELD])
+                plastic = deviatoric_energy(v, mu) - deviatoric_energy(back, mu)
+                f = full(back) @ (full(cofactor(v)) @ f) / j
+                v, b = back, square(back)
+            tau = 2 * mu * (b - v) + lam * j * (j - 1) * unit()
+            if ti.static(self.branches > 0):
+                add, loss = self.relaxed(p, f, v, j, mu)
+                tau += add
+                heat += loss
+            if ti.static(self.damage):
+                d, loss = self.damaged(p, v, j, mu, lam)
+                lost += loss
+                tau = degrade(tau, d)
+            rate = upper(c)
+            swell = trace(rate)
+            drag = j * (2 * self.par[ETA_S] * (rate - swell / 3 * unit()) + self.par[ETA_B] * swell * unit())
+            heat += double(drag, rate) * dt
+            tau += drag
+            for r, k in ti.static(ti.ndrange(3, 3)):
+                self.F[block, 3 * r + k][lane] = f[r, k]
+        else:
+            bad = 1.0
+        return ti.Vector([plastic, lost, heat, bad]), tau
+
+    @ti.func
+    def near_hot(self, base, cells):
+        """Whether a particle is at most so many cells from the box of those whose strain could damage something."""
+        out = True
+        for d in ti.static(range(3)):
+            if base[d] < self.hot[d] - cells or base[d] > self.hot[d + 3] + cells:
+                out = False
+        return out
+
+    @ti.func
+    def spread_strain(self, p, thread, window):
+        """Largest principal strain of a particle to the grid, times its weights."""
+        base, fx = self.local(self.x[p])
+        if self.near_hot(base, 4) and self.inside(base, window) > 0:
+            f = self.deformation_of(p)
+            strain = largest_eigenvalue(left_stretch(left_cauchy_green(f), f.determinant()) - unit())
+            w = self.weights(fx)
+            for i, j, k in ti.static(ti.ndrange(3, 3, 3)):
+                wt = w[i][0] * w[j][1] * w[k][2]
+                self.add(thread, base[0] + i, base[1] + j, base[2] + k, ti.Vector([wt * strain, wt, 0.0, 0.0]))
+
+    @ti.func
+    def smooth_strain(self, window):
+        """Replace each particle's driving strain by its mean over the grid's weights (one pass).
+
+        Only where it can matter: two particles meet at a node when they are at most two cells apart, so that those
+        within two cells of a strain above the threshold may be damaged, and those within four contribute to that. It
+        uses the grids of the threads, which are cleared at the start of a step.
+        """
+        box = window
+        for d in ti.static(range(3)):
+            box[d] = ti.max(window[d], self.hot[d] - 4)
+            box[d + 3] = ti.min(window[d + 3], self.hot[d + 3] + 7)
+            box[d + 3] = ti.max(box[d + 3], box[d])
+        on = 1 if self.hot[3] >= 0 else 0
+        for c in range(self.rows(box)):
+            i, j, low, high = self.row(c, box)
+            for k in range(low, high):
+                for s in ti.static(range(self.threads)):
+                    self.g[s, i, j, k] = ti.Vector.zero(float, 4)
+        for part in range(self.parts * on):
+            first, last, thread = self.share(part)
+            for p in range(first * self.lanes, ti.min(last * self.lanes, self.n)):
+                self.spread_strain(p, thread, window)
+        for p in range(self.n * on):
+            base, fx = self.local(self.x[p])
+            if self.near_hot(base, 2) and self.inside(base, window) > 0:
+                w = self.weights(fx)
+                e = 0.0
+                for i, j, k in ti.static(ti.ndrange(3, 3, 3)):
+                    total = ti.Vector.zero(float, 2)
+                    for s in ti.static(range(self.threads)):
+                        q = self.g[s, base[0] + i, base[1] + j, base[2] + k]
+                        total += ti.Vector([q[0], q[1]])
+                    e += w[i][0] * w[j][1] * w[k][2] * total[0] / ti.max(total[1], 1e-30)
+                self.strain[p] = e
