@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,11 @@ BLOCK = Scene(
     numerics=Numerics(dx=2e-3, mirror=False),
 )
 TEXTBOOK_STEPS = 10
+# What a particle step has to move to and from memory in a scene that no cache holds, in numbers of eight bytes: to the
+# grid F twice, C, stress, x, v, two indices (45); back x twice, v, C, two indices, height of contact, two stretches (29);
+# the nodes, each for eight particles, cleared, added to, turned to velocities and read (3).
+WORDS = 45 + 29 + 3
+COPY_WORDS = 1 << 23  # numbers that a thread copies to measure the bandwidth: 64 MiB
 
 Say = Callable[[str], None]
 
@@ -138,8 +144,12 @@ class Bench:
         cut = self._simulation(self.scene, self.runtime)
         cut.run()
         inside = max(_rate(cut.run()) for _ in range(self.repeats))
+        speed = bandwidth(self.runtime.cpu_threads)
         row = {
             "particles": text.n,
+            "bandwidth_GBps": speed / 1e9,
+            "bytes_per_particle_step": 8 * WORDS,
+            "memory_bound_Mps": speed / (8 * WORDS) / 1e6,
             "full_physics_Mps": best[0] / 1e6,
             "textbook_Mps": best[1] / 1e6,
             "ratio": best[0] / best[1],
@@ -147,7 +157,8 @@ class Bench:
         }
         self.say(
             f"{text.n} particles: {row['full_physics_Mps']:.2f} million particle steps a second, textbook "
-            f"{row['textbook_Mps']:.2f} ({row['ratio']:.1f} times); inside the cut {row['cut_Mps']:.2f}"
+            f"{row['textbook_Mps']:.2f} ({row['ratio']:.1f} times); inside the cut {row['cut_Mps']:.2f}; the memory would "
+            f"bear {row['memory_bound_Mps']:.0f}"
         )
         return row
 
@@ -223,7 +234,6 @@ class Bench:
             Variant("twice the speed", replace(scene, motion=replace(motion, mach=motion.mach * 2)), run),
             stiffness("ten times as stiff", 10.0),
             stiffness("a tenth as stiff", 0.1),
-            Variant("one thread", scene, replace(run, threads=1)),
         ]
 
     def compare(self, variant: Variant) -> dict[str, Any]:
@@ -281,6 +291,22 @@ class Bench:
     def _keep(self, **parts: Any) -> None:
         self.document |= parts
         write_json(self.out / "bench.json", self.document)
+
+
+def bandwidth(threads: int) -> float:
+    """Bytes a second that so many threads read and write together when each copies an array that no cache holds."""
+    arrays = [(np.ones(COPY_WORDS), np.empty(COPY_WORDS)) for _ in range(threads)]
+
+    def copy(pair: tuple[np.ndarray, np.ndarray]) -> None:
+        np.copyto(pair[1], pair[0])  # lets other threads run meanwhile
+
+    best = np.inf
+    with ThreadPoolExecutor(threads) as pool:
+        for _ in range(5):
+            began = time.perf_counter()
+            list(pool.map(copy, arrays))
+            best = min(best, time.perf_counter() - began)
+    return 2 * 8 * COPY_WORDS * threads / best
 
 
 def _rate(record: ForceRecord) -> float:

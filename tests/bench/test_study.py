@@ -77,6 +77,8 @@ def test_ratios_are_those_of_the_times(document):
     d = document
     assert d["complete"]
     assert d["throughput"]["full_physics_Mps"] == pytest.approx(1.0)
+    t = d["throughput"]
+    assert t["memory_bound_Mps"] == pytest.approx(1e3 * t["bandwidth_GBps"] / t["bytes_per_particle_step"])
     assert d["throughput"]["ratio"] == pytest.approx(10.0)
     assert d["paper_config"]["wall_s_extrapolated"] == pytest.approx(0.01 * d["paper_config"]["steps"], rel=1e-3)
     assert d["ratio_to_paper"] == pytest.approx(d["paper_config"]["wall_s_extrapolated"] / d["default_cut"]["wall_s"])
