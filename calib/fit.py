@@ -9,8 +9,10 @@
 3. Rounds: a Gaussian process through all smoothed curves so far (not through the misfit, which hides which
    part of a curve is wrong) proposes one batch: the point of least *expected* chi-square near the best one,
    the most promising point elsewhere if that is another one, and probes inside the present 95 % region.
-4. When neither the process nor the runs give a gain worth its noise: another design if the curve is still not
-   explained, else differences about the best point; and again 3 if that brings or promises a gain.  The
+4. When neither the process nor the runs give a gain worth its noise: if the curve is still not explained,
+   strides along each parameter to both ends of its prior range (one that is not felt here, such as a yield
+   stress that nothing reaches, may be felt there), after those another design; else differences about the
+   best point; and again 3 if that brings or promises a gain.  The
    Jacobian there is that of the process, in which the noise of single runs is averaged out; plain differences
    of noisy curves would make every parameter look well identified.
 
@@ -204,6 +206,7 @@ class _Search:
         self.unit = coordinate_unit(self.parameters)
         self.hyper: FloatArray | None = None
         self.centre: FloatArray | None = None
+        self.strode: list[FloatArray] = []
         self.screening = False
         low, high = self.parameters.box
         sobol = qmc.Sobol(len(low), scramble=True, seed=options.seed)
@@ -249,7 +252,10 @@ class _Search:
             status, best = self._rounds(), self.best
             if status == "budget":
                 return status
-            if best.misfit > self.objective.effective_rows and self._unseen():
+            unexplained = best.misfit > self.objective.effective_rows
+            if unexplained and self._strides():
+                continue
+            if unexplained and self._unseen():
                 self._design([])
             elif self._differences():
                 process = self._process()
@@ -321,6 +327,21 @@ class _Search:
 
         found = minimize_scalar(cost, bounds=(-LARGEST_SCALE, LARGEST_SCALE), method="bounded")
         return float(found.fun), trial.z + float(found.x) * along
+
+    def _strides(self) -> bool:
+        """Along each parameter from the best point as far as its prior range goes; False where that was done or cannot
+        be paid."""
+        z, sd, ends = self.best.z, self.parameters.prior_sd, self.parameters.box
+        cost = self.options.coarse_cost if self.coarse is not None else 1.0
+        done = any(np.all(np.abs(z - other) < 0.5 * sd) for other in self.strode)
+        if done or self._room() < 2 * len(z) * cost + 2 * self.options.batch:
+            return False
+        self.strode.append(z)
+        first = len(self.trials)
+        star = [np.where(np.arange(len(z)) == i, end, z) for i in range(len(z)) for end in ends]
+        self._evaluate(star, "stride", coarse=self.coarse is not None)
+        self._follow_lines(first)
+        return True
 
     def _differences(self) -> bool:
         """Step along each parameter from the best point; False where that was done or cannot be paid."""

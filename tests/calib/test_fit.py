@@ -265,6 +265,21 @@ def test_a_coarse_run_is_never_the_answer() -> None:
     assert min(t.misfit for t in result.history if t.coarse) < result.best.misfit
 
 
+def test_strides_find_what_is_not_felt_at_the_best_point() -> None:
+    """Stuck where a yield stress is never reached, the search strides down to where it is; on the coarse grid."""
+
+    def capped(p: Mapping[str, float]) -> np.ndarray:
+        return two_terms(p) * (1.0 if p["yield_stress"] > 3.3e4 else 1.0 + 0.3 * np.sin(6.0 * STROKE / LENGTH))
+
+    hidden = Parameter("yield_stress", 2e5, 2e3, 2e6, "Pa", 3e4, 3e5)
+    truth = {"R": 600.0, "mu": 0.15, "yield_stress": 2e4}
+    fixed = ParameterSet((FIVE["R"], FIVE["mu"], hidden))
+    result = calibrate(goal(truth, fixed, capped), Fake(capped), coarse=Fake(capped), options=FitOptions(budget=60))
+    strides = [t for t in result.history if t.stage == "stride"]
+    assert 0 < len(strides) <= 2 * len(fixed) and all(t.coarse for t in strides)
+    assert values(result)["yield_stress"] < 3.3e4
+
+
 def test_single_linear_parameter() -> None:
     """One parameter that is no stress (no scaling, one dimension) is found to the lattice without noise."""
     alone = ParameterSet((FIVE["mu"],))
