@@ -27,9 +27,8 @@ def write_figure(out: Path) -> None:
             for name, marker, color in (("nrmse", "o", BLACK), ("work_error", "^", BLUE)):
                 label = {"nrmse": "NRMSE", "work_error": "|work error|"}[name] if k == 0 else None
                 axes.plot(x, 100 * max(abs(row[name]), FLOOR), marker, ms=4, color=color, label=label)
-            top = 100 * max(row["nrmse"], abs(row["work_error"]), FLOOR)
             axes.annotate(
-                row["name"], (x, top), (2, 4), textcoords="offset points", fontsize=6, color=GREY, rotation=20
+                str(k + 1), (x, 100 * max(row["nrmse"], FLOOR)), (0, 5), textcoords="offset points", fontsize=7
             )
         axes.set_xscale("log")
         axes.set_yscale("log")
@@ -37,6 +36,8 @@ def write_figure(out: Path) -> None:
         axes.set_ylabel("error against the reference [%]")
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.margins(x=0.15, y=0.25)
-        axes.legend(loc="upper right")
+        names = "\n".join(f"{k} {row['name']}" for k, row in enumerate(rows, 1))
+        axes.text(1.02, 1.0, names, transform=axes.transAxes, va="top", fontsize=7, color=GREY)
+        axes.legend(loc="lower left", bbox_to_anchor=(1.0, 0.0))
 
     (out / "bench.svg").write_bytes(svg(draw, 90.0))
