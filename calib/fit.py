@@ -230,6 +230,11 @@ class _Search:
         return sum(self.options.coarse_cost if t.coarse else 1.0 for t in self.trials)
 
     @property
+    def scouting(self) -> float:
+        """Cost of a run far from the best point [fine simulations]: those are coarse where they can be."""
+        return self.options.coarse_cost if self.coarse is not None else 1.0
+
+    @property
     def worth(self) -> float:
         """Gain in chi-square that is worth a round [-]."""
         return self.options.tolerance * max(1.0, self.best.misfit / self.objective.effective_rows)
@@ -291,8 +296,7 @@ class _Search:
 
     def _unseen(self) -> bool:
         """Whether there is another design that can be paid together with the rounds it may call for."""
-        cost = self.options.coarse_cost if self.coarse is not None else 1.0
-        return len(self.designs) > 0 and self._room() > cost * self.options.design + 2 * self.options.batch
+        return len(self.designs) > 0 and self._room() > self.scouting * self.options.design + 2 * self.options.batch
 
     def _design(self, points: list[FloatArray]) -> None:
         """Run ``points`` and the next part of the sample, then the best of the lines they stand for."""
@@ -332,9 +336,8 @@ class _Search:
         """Along each parameter from the best point as far as its prior range goes; False where that was done or cannot
         be paid."""
         z, sd, ends = self.best.z, self.parameters.prior_sd, self.parameters.box
-        cost = self.options.coarse_cost if self.coarse is not None else 1.0
         done = any(np.all(np.abs(z - other) < 0.5 * sd) for other in self.strode)
-        if done or self._room() < 2 * len(z) * cost + 2 * self.options.batch:
+        if done or self._room() < 2 * len(z) * self.scouting + 2 * self.options.batch:
             return False
         self.strode.append(z)
         first = len(self.trials)

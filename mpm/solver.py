@@ -63,8 +63,11 @@ class Simulation:
         return min(self.runtime.cpu_threads, 1 + len(self.seeds.x) // WORTH_A_THREAD)
 
     def _kernels(self, threads: int) -> Kernels:
-        """Fields and kernels of the scene for so many CPU threads, 0 for a GPU; those of a scene with as many nodes and
-        particles are used again."""
+        """Fields and kernels of the scene for so many CPU threads, 0 for a GPU.
+
+        Those of a scene with as many nodes and particles are used again, so the fields are those of the simulation that
+        ran last; every run loads them anew.
+        """
         scene = self.scene
         key = (
             len(self.seeds.x),

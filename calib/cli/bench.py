@@ -71,7 +71,7 @@ def table(document: dict[str, Any]) -> str:
     """What the terminal shows at the end."""
     t, d = document["throughput"], document["default_cut"]
     lines = [
-        f"{document['food']} on {document['device']}, {document['threads']} threads",
+        f"{document['food']} on {document['device']}, up to {document['threads']} threads",
         f"  {t['full_physics_Mps']:.2f} million particle steps a second, {t['ratio']:.1f} times the textbook kernel; "
         f"{t['cut_Mps']:.2f} inside the cut",
         f"  default cut {d['wall_s']:.2f} s, 1/{document['ratio_to_paper']:.0f} of the published configuration",
