@@ -9,8 +9,8 @@
 3. Rounds: a Gaussian process through all smoothed curves so far (not through the misfit, which hides which
    part of a curve is wrong) proposes one batch: the point of least *expected* chi-square near the best one,
    the most promising point elsewhere if that is another one, and probes inside the present 95 % region.
-4. When neither the process nor the runs give a gain worth its noise: if the curve is still not explained,
-   strides along each parameter to both ends of its prior range (one that is not felt here, such as a yield
+4. When neither the process nor the runs give a gain worth its noise: if the curve is still not explained
+   (chi-square above its 95 % quantile), strides along each parameter to both ends of its prior range (one that is not felt here, such as a yield
    stress that nothing reaches, may be felt there), after those another design; else differences about the
    best point; and again 3 if that brings or promises a gain.  The
    Jacobian there is that of the process, in which the noise of single runs is averaged out; plain differences
@@ -31,7 +31,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize_scalar
-from scipy.stats import qmc
+from scipy.stats import chi2, qmc
 
 from calib.errors import MaterialError
 from calib.objective import Evaluation, Evaluator, Objective, Trial
@@ -58,6 +58,8 @@ STARTS, FOLLOWED = 16, 3
 #: left a quarter of the excess chi-square that isotropic probes left), and may cost this much more than the
 #: best run: about a 90 % region of one parameter, where curvature matters for the intervals.
 PROBE_SPREAD, PROBE_COST, PROBES = 1.5, 3.0, 200
+#: A curve counts as explained when the right material would leave a larger chi-square than its in one of twenty cuts.
+EXPLAINED = 0.95
 #: Rounds without promise and gain after which the search has converged; rounds without gain: stalled.
 CALM_ROUNDS, STALLED_ROUNDS = 2, 4
 #: Designs at most: further ones while every run breaks down, and where the search ends with a chi-square
@@ -257,7 +259,7 @@ class _Search:
             status, best = self._rounds(), self.best
             if status == "budget":
                 return status
-            unexplained = best.misfit > self.objective.effective_rows
+            unexplained = best.misfit > chi2.ppf(EXPLAINED, self.objective.effective_rows)
             if unexplained and self._strides():
                 continue
             if unexplained and self._unseen():
