@@ -280,6 +280,21 @@ def test_strides_find_what_is_not_felt_at_the_best_point() -> None:
     assert values(result)["yield_stress"] < 3.3e4
 
 
+@pytest.mark.parametrize(("size", "strode"), [(0.045, False), (0.075, True)])
+def test_only_a_curve_beyond_chance_is_strode_for(size: float, strode: bool) -> None:
+    """A wiggle that nothing explains calls for strides where one cut in twenty would not show it, not before."""
+
+    def with_wiggle(p: Mapping[str, float]) -> np.ndarray:
+        force = two_terms(p)
+        return force + size * force.max() * np.sin(16.0 * np.pi * STROKE / LENGTH)
+
+    objective = goal(TWO_TRUTH, TWO, with_wiggle)
+    result = calibrate(objective, Fake(two_terms), options=FitOptions(budget=60))
+    excess = result.best.misfit / objective.effective_rows
+    assert 1.0 < excess and (excess > 1.56) is strode  # chi-square over 21 rows: 95 % quantile 32.7
+    assert any(t.stage == "stride" for t in result.history) is strode
+
+
 def test_single_linear_parameter() -> None:
     """One parameter that is no stress (no scaling, one dimension) is found to the lattice without noise."""
     alone = ParameterSet((FIVE["mu"],))
