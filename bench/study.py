@@ -6,20 +6,24 @@ for both. Compilation is not counted; the time of the first run, with it, is giv
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from bench.peers import PEERS, measure
 from calib.filters import filter_simulated
 from calib.knives import load_knife
 from calib.materials import FoodSpec
 from calib.metrics import compare
 from calib.outputs import prepare, write_json
+from calib.pool import Pool
 from calib.progress import clock
 from calib.provenance import git_commit, versions
 from calib.scenes import Sizing, cut_scene, specimen
@@ -45,6 +49,7 @@ BLOCK = Scene(
     numerics=Numerics(dx=2e-3, mirror=False),
 )
 TEXTBOOK_STEPS = 10
+PEER_FLOOR = 4  # node that holds the block in a peer
 # What a particle step has to move to and from memory in a scene that no cache holds, in numbers of eight bytes: to the
 # grid F twice, C, stress, x, v, two indices (45); back x twice, v, C, two indices, height of contact, two stretches (29);
 # the nodes, each for eight particles, cleared, added to, turned to velocities and read (3).
@@ -76,6 +81,7 @@ class Bench:
         finest: Cell of the reference [m].
         seed: Seed of the particles.
         say: Called with a line after each measurement.
+        peers: Interpreter that has the packages of the peers, if they are to be measured.
     """
 
     def __init__(
@@ -89,6 +95,7 @@ class Bench:
         finest: float,
         seed: int,
         say: Say,
+        peers: str | None = None,
     ) -> None:
         shape, _ = specimen(food, None, Sizing())
         self.scene = cut_scene(food, shape, load_knife(knife), seed=seed)
@@ -97,6 +104,7 @@ class Bench:
             food, replace(shape, length=food.dims["length"].value or shape.length), load_knife(knife)
         )
         self.out, self.runtime, self.repeats, self.finest, self.say = out, runtime, repeats, finest, say
+        self.peers = peers
         self.document: dict[str, Any] = {
             "food": food.name,
             "knife": knife,
@@ -112,12 +120,15 @@ class Bench:
     def run(self) -> dict[str, Any]:
         """Measure everything; returns the content of bench.json."""
         prepare(self.out, resume=False)
-        for name, measure in (
+        for name, part in (
             ("throughput", self.throughput),
             ("paper_config", self.paper),
             ("default_cut", self.default_cut),
+            ("processes", self.processes),
         ):
-            self._keep(**{name: measure()})
+            self._keep(**{name: part()})
+        if self.peers:
+            self._keep(peers=self.others())
         slow, fast = self.document["paper_config"]["wall_s_extrapolated"], self.document["default_cut"]["wall_s"]
         self._keep(ratio_to_paper=slow / fast, ablations=[])
         todo = self.variants()
@@ -203,12 +214,66 @@ class Bench:
             "first_run_s": first,
             "particles": self.record.particles,
             "steps": self.record.steps,
+            "nodes": math.prod(cut.nodes),
             "reference_dx_m": self.finest,
             "reference_wall_s": self.reference.wall,
             **self._errors(self.record),
         }
         self.say(f"default cut: {row['wall_s']:.2f} s, work {row['work_error']:+.1%}, NRMSE {row['nrmse']:.3f}")
         return row
+
+    def processes(self) -> dict[str, Any]:
+        """What a calibration gains from a process for each core: the same cuts in one process and in several, in turns."""
+        count = self.runtime.cpu_threads
+        spent: dict[int, list[float]] = {1: [], count: []}
+        with ExitStack() as stack:
+            pools = {n: stack.enter_context(Pool(n, self.runtime.arch)) for n in spent}
+            for turn in range(self.repeats + 1):  # every process compiles in the first turn, which does not count
+                for n, pool in pools.items():
+                    began = time.perf_counter()
+                    list(pool.run([(self.scene, {})] * (2 * count)))
+                    if turn > 0:
+                        spent[n].append(time.perf_counter() - began)
+        row = {"processes": count, "speed_up": min(spent[1]) / min(spent[count])}
+        self.say(f"{count} processes: {row['speed_up']:.2f} times as many cuts as one")
+        return row
+
+    def others(self) -> list[dict[str, Any]]:
+        """Particle steps a second of the elastic block, ours and each peer's [1e6/s]; ours before and after it."""
+        scene = BLOCK.with_material(yield_stress=math.inf, tensile_strength=None, fracture_energy=None)
+        food = scene.food
+        ours = self._simulation(scene, self.runtime)
+        shape, dx, law = food.shape, BLOCK.numerics.dx, food.material
+        size = np.array([shape.width, shape.length, shape.height])
+        room = np.array(ours.nodes) * dx - size
+        block = {
+            "dx": dx,
+            "nodes": [int(n) for n in ours.nodes],
+            "low": [float(room[0]) / 2, float(room[1]) / 2, PEER_FLOOR * dx],
+            "counts": [round(s / dx * BLOCK.numerics.ppc) for s in size],
+            "dt": ours.run().dt,
+            "rho": law.rho,
+            "mu": law.shear,
+            "lam": law.lame,
+            "floor": PEER_FLOOR,
+            "steps": TEXTBOOK_STEPS,
+            "repeats": self.repeats,
+        }
+        rows = []
+        for name in PEERS:
+            best = max(_rate(ours.run()) for _ in range(self.repeats))
+            row = measure(self.peers, name, block, self.runtime.cpu_threads) if self.peers else {}
+            best = max(best, *(_rate(ours.run()) for _ in range(self.repeats)))
+            if "seconds" in row:
+                theirs = row["particles"] / row["seconds"]
+                row |= {"Mps": theirs / 1e6, "ours_Mps": best / 1e6, "ratio": best / theirs}
+                self.say(
+                    f"{name} {row['version']}: {row['Mps']:.2f} million particle steps a second, {row['ratio']:.1f}"
+                )
+            else:
+                self.say(f"{name}: not measured, {row['error']}")
+            rows.append(row)
+        return rows
 
     def variants(self) -> list[Variant]:
         """The default cut with one thing changed."""
@@ -229,6 +294,7 @@ class Bench:
             numerics("single precision", precision="f32"),
             numerics("whole instead of a quarter", mirror=False),
             numerics("27 particles a cell", ppc=3),
+            numerics("two to three times the grid, all of it empty", room=num.room + 1.0),
             numerics("half the time step", safety=num.safety / 2),
             Variant("half the speed", replace(scene, motion=replace(motion, mach=motion.mach / 2)), run),
             Variant("twice the speed", replace(scene, motion=replace(motion, mach=motion.mach * 2)), run),
@@ -242,7 +308,8 @@ class Bench:
         self._simulation(variant.scene, variant.runtime).run()
         first = time.monotonic() - began
         same = variant.runtime == self.runtime and variant.scene.numerics.precision == self.scene.numerics.precision
-        ours, other = [], []
+        ours: list[ForceRecord] = []
+        other: list[ForceRecord] = []
         for _ in range(self.repeats):
             for records, scene, runtime in (
                 (other, variant.scene, variant.runtime),
@@ -261,6 +328,7 @@ class Bench:
             "time_ratio": record.wall / min(r.wall for r in ours),
             "particles": record.particles,
             "steps": record.steps,
+            "nodes": math.prod(self._simulation(variant.scene, variant.runtime).nodes),
         }
         return row if variant.physics else row | self._errors(record)
 
@@ -315,11 +383,9 @@ def _rate(record: ForceRecord) -> float:
     return record.particles * record.steps / record.wall
 
 
-def run(
-    food: FoodSpec, knife: str, out: Path, *, runtime: Runtime, repeats: int, finest: float, seed: int, say: Say
-) -> dict[str, Any]:
-    """Measure, and write bench.json and bench.svg; see :class:`Bench`."""
-    document = Bench(food, knife, out, runtime=runtime, repeats=repeats, finest=finest, seed=seed, say=say).run()
+def run(food: FoodSpec, knife: str, out: Path, **options: Any) -> dict[str, Any]:
+    """Measure, and write bench.json and bench.svg; the options are those of :class:`Bench`."""
+    document = Bench(food, knife, out, **options).run()
     from reports.bench import write_figure
 
     write_figure(out)

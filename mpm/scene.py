@@ -154,6 +154,7 @@ class Numerics:
         grid_shift: Position of the grid against the scene along x, y, z [cells].
         grid_turn: Angle of food and blade against the grid [rad].
         mirror: Use the mirror planes x = 0 and y = 0 where the grid lies on them.
+        room: Empty grid on either side of the food, for it to widen in while it is pressed, part of half its size.
         seed: Seed of the particle positions.
         safety: dt over the stability limit of a lone particle [-].
         gravity: Acceleration of gravity [m/s^2].
@@ -167,6 +168,7 @@ class Numerics:
     grid_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
     grid_turn: float = 0.0
     mirror: bool = True
+    room: float = 0.5
     seed: int = 0
     safety: float = 0.7
     gravity: float = 9.81
@@ -177,6 +179,7 @@ class Numerics:
         w = "numerics"
         check_number(w, "dx", self.dx, 1e-5, 0.05, "m")
         check_number(w, "ppc", self.ppc, 0.5, 8.5, "")
+        check_number(w, "room", self.room, 0.0, 100.0, "of half the food's size")
         check_number(w, "safety", self.safety, 0.0, 0.9001, "of the stability limit")
         check_number(w, "output", self.output, 0.0, 0.1, "m")
         if self.contact not in CONTACTS:

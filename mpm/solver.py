@@ -21,7 +21,6 @@ from mpm.shapes import section_area, skin_path, slices
 from mpm.topology import topology
 
 PAD = 3  # empty cells around the food: a quadratic kernel reaches 1.5 cells, the rest is room to move
-SPREAD = 0.5  # room for the food to widen while it is pressed, part of its size
 # Particles for which another thread pays.  On two cores two threads need 20 % more time than one for 8,000 particles and
 # 15 % less for 128,000; processes share the cores better, which is how a calibration uses them.
 WORTH_A_THREAD = 50_000
@@ -96,7 +95,7 @@ class Simulation:
         low, high, zero = [], [], []
         for axis, size in enumerate((wide, deep, shape.height)):
             shift = num.grid_shift[axis] % 1.0
-            room = PAD + math.ceil(SPREAD * size / 2 / dx)
+            room = PAD + math.ceil(num.room * size / 2 / dx)
             bottom = -PAD if axis == 2 else -math.ceil(size / 2 / dx) - room
             top = math.ceil(size / dx) + PAD if axis == 2 else math.ceil(size / 2 / dx) + room
             if mirror[axis] and axis == 0:

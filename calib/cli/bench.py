@@ -38,6 +38,11 @@ def add_args(p: argparse.ArgumentParser) -> None:
         metavar="M",
         help="cells of the reference [m] (default 1.5e-3)",
     )
+    p.add_argument(
+        "--peers",
+        metavar="PYTHON",
+        help="interpreter with warp-lang or genesis-world: measure the elastic block in them too",
+    )
     add_run(p)
 
 
@@ -58,6 +63,7 @@ def run(args: argparse.Namespace) -> int:
         finest=args.reference_dx,
         seed=args.seed,
         say=lambda text: print(text, file=sys.stderr, flush=True),
+        peers=args.peers,
     )
     if args.json:
         print((out / "bench.json").read_text(encoding="utf-8"), end="")
@@ -79,6 +85,13 @@ def table(document: dict[str, Any]) -> str:
         _line("default", {"time_ratio": 1.0, **d}),
     ]
     lines += [_line(row["name"], row) for row in document["ablations"]]
+    p = document["processes"]
+    lines.append(f"  {p['processes']} processes do {p['speed_up']:.2f} times the cuts of one")
+    lines += [
+        f"  elastic block: {row['ratio']:.1f} times {row['name']} {row['version']} ({row['Mps']:.2f} million a second)"
+        for row in document["peers"]
+        if "ratio" in row
+    ]
     return "\n".join([*lines, f"  time grows with particles times steps to the power {document['exponent']:.2f}"])
 
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import sys
+import time
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import bench.peers
 import bench.study
 import bench.textbook
 from calib.cli.bench import table
@@ -22,6 +25,7 @@ class Solver:
     def __init__(self, scene: Scene, runtime: Runtime) -> None:
         self.scene, self.runtime = scene, runtime
         self.compile = 100.0
+        self.nodes = (round(0.08 * (1 + scene.numerics.room) / scene.numerics.dx),) * 3
 
     def run(self) -> SimpleNamespace:
         """A record with the columns that are looked at."""
@@ -54,9 +58,43 @@ class Yardstick:
         return SimpleNamespace(seconds=0.01, particles=self.n, rate=1e5)
 
 
+class Workers:
+    """Processes that divide eight seconds' work among them, after a minute for the first."""
+
+    now = 0.0
+
+    def __init__(self, workers: int, arch: str) -> None:
+        self.workers, self.start = workers, 60.0
+
+    def __enter__(self) -> Workers:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def run(self, jobs: list[object]) -> list[object]:
+        """All done at once, but later."""
+        Workers.now += self.start + 2.0 * len(jobs) / self.workers
+        self.start = 0.0
+        return jobs
+
+
+def peer(python: str, name: str, block: dict, threads: int) -> dict:
+    """One peer that takes 0.5 s a step, one that is not there."""
+    assert np.prod(block["counts"]) == 128000 and np.all(np.array(block["low"]) > 0) and threads == 2
+    if name == "Genesis":
+        return {"name": name, "error": "No module named 'genesis'"}
+    return {"name": name, "seconds": 0.5, "particles": 128000, "version": "1"}
+
+
 @pytest.fixture
 def document(monkeypatch, tmp_path) -> dict:
     """What the benchmark writes."""
+    monkeypatch.setattr(bench.study, "Pool", Workers)
+    monkeypatch.setattr(bench.study, "measure", peer)
+    clock = SimpleNamespace(perf_counter=lambda: Workers.now, monotonic=time.monotonic)
+    monkeypatch.setattr(bench.study, "time", clock)
+    monkeypatch.setattr(bench.study, "bandwidth", lambda threads: 2e10)
     monkeypatch.setattr(bench.study, "Simulation", Solver)
     monkeypatch.setattr(bench.textbook, "Textbook", Yardstick)
     said: list[str] = []
@@ -69,6 +107,7 @@ def document(monkeypatch, tmp_path) -> dict:
         finest=1.5e-3,
         seed=0,
         say=said.append,
+        peers="python",
     )
     assert "published configuration" in "\n".join(said) and (tmp_path / "bench.svg").stat().st_size > 2000
     return json.loads((tmp_path / "bench.json").read_text())
@@ -90,10 +129,29 @@ def test_ratios_are_those_of_the_times(document):
     assert rows["half the time step"]["time_ratio"] == pytest.approx(2.0, rel=0.01)
     assert rows["single precision"]["time_ratio"] == pytest.approx(1.0)  # neither compiles while it is timed
     assert "nrmse" not in rows["ten times as stiff"]
+    assert d["processes"] == {"processes": 2, "speed_up": pytest.approx(2.0)}
+    empty = next(row for name, row in rows.items() if "all of it empty" in name)
+    assert empty["time_ratio"] == pytest.approx(1.0) and empty["nodes"] > 2 * d["default_cut"]["nodes"]
     assert d["exponent"] == pytest.approx(1.0, abs=0.01)
+
+
+def test_peers_are_compared_or_said_to_be_absent(document):
+    """The ratio is that of particle steps a second; a peer that is not installed says so."""
+    warp, genesis = document["peers"]
+    assert warp["ours_Mps"] == pytest.approx(1.0) and warp["ratio"] == pytest.approx(1.0 / 0.256)
+    assert "ratio" not in genesis and "genesis" in genesis["error"]
+
+
+@pytest.mark.parametrize("name", list(bench.peers.PEERS))
+def test_peer_that_is_not_installed(name):
+    """An interpreter without the package, or no interpreter at all, gives its last line and no traceback."""
+    row = bench.peers.measure(sys.executable, name, {}, 1)
+    assert set(row) == {"name", "error"} and "No module named" in row["error"]
+    assert "no-such-python" in bench.peers.measure("no-such-python", name, {}, 1)["error"]
 
 
 def test_table_names_every_row(document):
     """The terminal shows each variant with its time and errors."""
     text = table(document)
     assert all(row["name"] in text for row in document["ablations"]) and "to the power 1.00" in text
+    assert "3.9 times Warp" in text and "2 processes do 2.00 times" in text
