@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from multiprocessing import get_context
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from calib.objective import Evaluation
 from calib.scenes import place
+from mpm.errors import SimulationError
 from mpm.material import Material
+from mpm.record import ForceRecord
 from mpm.scene import Scene
+
+Result = TypeVar("Result")
 
 DIED = "worker_died"  # reason of a run whose process was killed, for instance for lack of memory
 
@@ -58,6 +62,14 @@ def _run(scene: Scene, values: dict[str, Any], arch: str, threads: int) -> dict[
         "scalars": scalars,
         "seconds": record.wall,
     }
+
+
+def _whole(scene: Scene, arch: str, threads: int) -> ForceRecord:
+    """One simulation in a worker, its whole record."""
+    from mpm.runtime import Runtime
+    from mpm.solver import Simulation
+
+    return Simulation(scene, Runtime(arch, threads)).run()
 
 
 class Pool:
@@ -114,12 +126,32 @@ class Pool:
 
     def submit(self, scene: Scene, values: Mapping[str, float]) -> Future[dict[str, Any]]:
         """Queue one run; a broken pool is started anew first."""
-        args = (scene, dict(values), self.arch, self.threads)
+        return self._submit(_run, scene, dict(values), self.arch, self.threads)
+
+    def record(self, scene: Scene) -> ForceRecord:
+        """The whole record of one scene, from a process that has its kernels.
+
+        Raises:
+            SimulationError: Its process was killed twice.
+        """
+        for _ in range(2):
+            try:
+                return self._submit(_whole, scene, self.arch, self.threads).result()
+            except BrokenProcessPool:
+                continue
+        raise SimulationError(
+            "the process of the last simulation was killed twice, perhaps for lack of memory; every run before it is "
+            "stored: free some memory and add --resume",
+            reason=DIED,
+            fraction=0.0,
+        )
+
+    def _submit(self, work: Callable[..., Result], *args: Any) -> Future[Result]:
         try:
-            return self._executor.submit(_run, *args)
+            return self._executor.submit(work, *args)
         except BrokenProcessPool:
             self._executor = self._start()
-            return self._executor.submit(_run, *args)
+            return self._executor.submit(work, *args)
 
 
 class SceneEvaluator:

@@ -32,7 +32,6 @@ from calib.summary import add_conditioning, summarise
 from calib.trace import read_trace
 from calib.uncertainty import uncertainty
 from mpm.record import ForceRecord
-from mpm.scene import Scene
 
 # Hard bounds reach this factor beyond the literature's range, so that a trace may contradict the literature.
 BOUND_FACTOR = 5.0
@@ -158,19 +157,12 @@ def run(
         )
         result = calibrate(setup.objective, fine, coarse=coarse, options=options, progress=progress)
         start = _start_curve(setup, result, fine)
-    say("simulating the best values once more for their full record")
-    scene, values = place(setup.fine, result.best.evaluation.parameters, setup.kept)
-    setup = replace(setup, fine=scene)
-    record = _record(scene, values, request.arch)
+        say("simulating the best values once more for their full record")
+        scene, values = place(setup.fine, result.best.evaluation.parameters, setup.kept)
+        setup = replace(setup, fine=scene)
+        record = pool.record(scene.with_material(**values))
     add_conditioning(out / "evaluations.h5", setup.curve)
     return _write(request, setup, result, record, start, out, time.monotonic() - began)
-
-
-def _record(scene: Scene, values: Mapping[str, float], arch: str) -> ForceRecord:
-    from mpm.runtime import Runtime
-    from mpm.solver import Simulation
-
-    return Simulation(scene.with_material(**values), Runtime(arch)).run()
 
 
 def _start_curve(setup: Setup, result: FitResult, fine: CachedEvaluator) -> np.ndarray:

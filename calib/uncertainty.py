@@ -96,9 +96,9 @@ class CurveProcess:
         missing = np.array([0.0 if t.ok else 1.0 - t.evaluation.fraction for t in used])
         y = np.clip((curves - best.curve) / self._peak, -LARGEST_DIFFERENCE, LARGEST_DIFFERENCE)
         self.hyper = self._learn(y, guess)
-        self._factor = cho_factor(self._covariance(self.hyper))
+        self._inverse = cho_solve(cho_factor(self._covariance(self.hyper)), np.eye(len(used)))
         exact = self._kernel(self._x, self._x, self.hyper) + self.noise**2 * np.eye(len(used))
-        self._weights = np.column_stack([cho_solve(self._factor, y), np.linalg.solve(exact, missing)])
+        self._weights = np.column_stack([self._inverse @ y, np.linalg.solve(exact, missing)])
 
     @property
     def noise(self) -> float:
@@ -154,7 +154,8 @@ class CurveProcess:
         """Expected curve [N] (n,), its standard deviation [N] and the completed part of the stroke at z."""
         x = ((z - self.best.z) / self.unit)[None]
         k = self._kernel(x, self._x, self.hyper)
-        variance = float((self._kernel(x, x, self.hyper) - k @ cho_solve(self._factor, k.T))[0, 0])
+        own = OFFSET**2 + math.exp(2.0 * self.hyper[1]) * float(x[0] @ x[0]) + math.exp(2.0 * self.hyper[0])
+        variance = own - float(k[0] @ self._inverse @ k[0])
         out = (k @ self._weights)[0]
         size = math.exp(self._scale(z))
         curve = size * (self.best.curve + self._peak * out[:-1])
@@ -206,7 +207,7 @@ class CurveProcess:
         rows = np.array([self.residual(z + d) - self.residual(z - d) for d in moves]).T / (2.0 * steps)
         x = np.array([z + d for d in moves] + [z - d for d in moves])
         k = self._kernel((x - self.best.z) / self.unit, self._x, self.hyper)
-        weights = cho_solve(self._factor, ((k[:p] - k[p:]) / (2.0 * steps[:, None])).T)
+        weights = self._inverse @ ((k[:p] - k[p:]) / (2.0 * steps[:, None])).T
         noise = (weights.T * (self._extra + self.noise**2)) @ weights
         per_row = objective.effective_points / objective.sigma**2 + 1.0 / objective.sigma_peak**2
         noise *= self._peak**2 * per_row

@@ -17,7 +17,8 @@ class SimulationError(CutcalError):
     """A run that broke down after it had started.
 
     Attributes:
-        reason: Typed reason, one of ``not_finite``, ``inverted``, ``left_grid``, ``stopped``.
+        reason: Typed reason, one of ``not_finite``, ``inverted``, ``left_grid``, ``stopped``,
+            ``worker_died``.
         fraction: Part of the stroke that was completed [-], 0 to 1.
     """
 

@@ -27,6 +27,7 @@ from calib.scenes import Sizing, cut_scene, height_range, place, specimen
 from calib.study import fit_parameters
 from calib.trace import Trace
 from calib.verdicts import judge, limits
+from mpm.errors import SimulationError
 from mpm.seeding import seed
 from mpm.shapes import SHAPE_KINDS
 
@@ -198,6 +199,30 @@ def test_killed_worker_is_tried_once_more():
     assert one.ok and pool.runs == 2
     (two,) = SceneEvaluator(FlakyPool(deaths=2), None).evaluate([{"E": 1.0}])  # type: ignore[arg-type]
     assert (two.status, two.reason, two.fraction) == ("failed", DIED, 0.0)
+
+
+class LastRun(Pool):
+    """A pool whose last run loses its process ``deaths`` times."""
+
+    def __init__(self, deaths: int) -> None:
+        self.deaths, self.arch, self.threads = deaths, "cpu", 1
+
+    def _submit(self, work: object, *args: object) -> Future[Any]:
+        future: Future[Any] = Future()
+        if self.deaths > 0:
+            future.set_exception(BrokenProcessPool("killed"))
+        else:
+            future.set_result("the record")
+        self.deaths -= 1
+        return future
+
+
+def test_killed_last_run_is_made_once_more():
+    """The full record of the best values survives one death; after two the message says what is kept and what to do."""
+    assert LastRun(1).record(None) == "the record"  # type: ignore[arg-type]
+    with pytest.raises(SimulationError, match="--resume") as error:
+        LastRun(2).record(None)  # type: ignore[arg-type]
+    assert error.value.reason == DIED
 
 
 def test_imports_stay_light():
