@@ -59,6 +59,7 @@ class Fields:
         self.mx, self.my = self.i0 >= 0, self.j0 >= 0
         self.threads, self.nodal, self.damage, self.turned = max(threads, 1), nodal, damage, turned
         self.atomic = threads == 0
+        self.alone = not self.atomic  # short loops run where the kernel was launched
         self.parts = n if self.atomic else 1 if self.threads == 1 else self.threads * CPU_BLOCK
         self.stations, self.branches = stations, branches
         self.b0 = 0 if turned else max(middle - BESIDE, 0)

@@ -244,14 +244,19 @@ class Kernels(Survey):
 
     @ti.func
     def advance(self, dt, vz, vs):
-        """One time step with the tool commanded at (vs, vz) [m/s]."""
+        """One time step with the tool commanded at (vs, vz) [m/s].
+
+        On a CPU the short loops do not go to the threads: to wake them takes 0.1 ms, a tenth of a step of 8,000 particles.
+        """
         w = ti.Vector([self.window[d] for d in range(6)])
+        ti.loop_config(serialize=self.alone)
         for _ in range(1):
             self.drive(dt, vz, vs)
             if ti.static(self.damage):
                 for d in ti.static(range(3)):
                     self.hot[d], self.hot[d + 3] = FAR, -FAR
         if ti.static(not self.nodal):
+            ti.loop_config(serialize=self.alone)
             for i in range(self.stations):
                 self.lead(i)
         for c in range(self.rows(w)):
@@ -292,17 +297,21 @@ class Kernels(Survey):
             for k in range(low, high):
                 self.update_node(i, j, k, dt)
         if ti.static(not self.nodal):
+            ti.loop_config(serialize=self.alone)
             for i in range(self.stations):
                 self.near[i] = 0
                 for d in ti.static((-1, 1)):
                     if 0 <= i + d < self.stations:
                         self.near[i] += ti.cast(self.start[i + d] > 0, ti.i32)
+            ti.loop_config(serialize=self.alone)
             for i in range(self.stations):
                 if i >= self.i0:
                     self.feel(i, dt)
+            ti.loop_config(serialize=self.alone)
             for i in range(self.stations):
                 if i >= self.i0:
                     self.react(i)
+        ti.loop_config(serialize=self.alone)
         for _ in range(1):
             self.pose[Z] += self.pose[VZ] * dt
             self.pose[S] += self.pose[VS] * dt

@@ -21,9 +21,9 @@ from mpm.shapes import section_area, skin_path, slices
 from mpm.topology import topology
 
 PAD = 3  # empty cells around the food: a quadratic kernel reaches 1.5 cells, the rest is room to move
-# Particles for which another thread pays.  On two cores two threads need 20 % more time than one for 8,000 particles and
-# 15 % less for 128,000; processes share the cores better, which is how a calibration uses them.
-WORTH_A_THREAD = 50_000
+# Particles for which another thread pays.  On two cores the second thread gains nothing for 8,000 particles, 10 to 25 % for
+# 38,000 and 20 to 40 % for 128,000; processes share the cores better, which is how a calibration uses them.
+WORTH_A_THREAD = 20_000
 PATIENCE = 0.1  # time after which a run comes back from the device to say how far it is and to be stopped [s]
 APPROACH = 0.1  # way of the blade above the food before contact, in cells
 EDGE_STEP = 0.5  # dt times the frequency of the edge's cohesive spring, 2 is unstable
