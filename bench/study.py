@@ -305,7 +305,8 @@ class Bench:
     def compare(self, variant: Variant) -> dict[str, Any]:
         """A variant and the default cut in turns."""
         began = time.monotonic()
-        self._simulation(variant.scene, variant.runtime).run()
+        simulation = self._simulation(variant.scene, variant.runtime)
+        simulation.run()
         first = time.monotonic() - began
         same = variant.runtime == self.runtime and variant.scene.numerics.precision == self.scene.numerics.precision
         ours: list[ForceRecord] = []
@@ -328,7 +329,7 @@ class Bench:
             "time_ratio": record.wall / min(r.wall for r in ours),
             "particles": record.particles,
             "steps": record.steps,
-            "nodes": math.prod(self._simulation(variant.scene, variant.runtime).nodes),
+            "nodes": math.prod(simulation.nodes),
         }
         return row if variant.physics else row | self._errors(record)
 

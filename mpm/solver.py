@@ -50,9 +50,9 @@ class Simulation:
     def __init__(self, scene: Scene, runtime: Runtime | None = None) -> None:
         self.scene = scene
         self.runtime = runtime or Runtime()
-        self.serial = start(self.runtime, scene.numerics.precision)
         self.seeds = seed(scene)
         self._layout()
+        self.serial = start(self.runtime, scene.numerics.precision)
         self.k: Any = self._kernels(self._threads())
 
     def _threads(self) -> int:
@@ -62,7 +62,7 @@ class Simulation:
         return min(self.runtime.cpu_threads, 1 + len(self.seeds.x) // WORTH_A_THREAD)
 
     def _kernels(self, threads: int) -> Kernels:
-        """Fields and kernels of the scene for so many CPU threads, 0 for a GPU.
+        """Fields and kernels of the scene for so many CPU threads, 0 for a GPU, in the runtime of ``serial``.
 
         Those of a scene with as many nodes and particles are used again, so the fields are those of the simulation that
         ran last; every run loads them anew.
@@ -226,6 +226,9 @@ class Simulation:
         Returns:
             The record. A run that breaks down returns what it had, with its reason in ``status``.
         """
+        serial = start(self.runtime, self.scene.numerics.precision)
+        if serial != self.serial:  # another simulation has started Taichi anew: the fields are gone
+            self.serial, self.k = serial, self._kernels(self._threads())
         scene = self.scene.with_material(**vars(material)) if material is not None else self.scene
         material = scene.food.material
         self._load(material)

@@ -144,3 +144,16 @@ def test_many_threads_repeat_one(alone, threads):
     assert alone.plastic[-1] > 0
     np.testing.assert_allclose(record.edge + record.face, alone.edge + alone.face, atol=1e-9 * alone.resolved.max())
     np.testing.assert_allclose(record.damage[-1], alone.damage[-1], rtol=1e-9)
+
+
+def test_a_simulation_outlives_a_restart_of_taichi():
+    """Another precision starts Taichi anew, and every field is gone; a simulation made before runs again, and alike."""
+    scene = replace(BRITTLE, motion=replace(BRITTLE.motion, stroke=2e-3))
+    double = Simulation(scene, Runtime(threads=1))
+    first = double.run().resolved
+    single = (
+        Simulation(replace(scene, numerics=replace(scene.numerics, precision="f32")), Runtime(threads=1)).run().resolved
+    )
+    np.testing.assert_array_equal(double.run().resolved, first)
+    np.testing.assert_allclose(single, first, atol=1e-3 * first.max())
+    assert (single != first).any()
