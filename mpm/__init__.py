@@ -11,6 +11,7 @@ from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
 from mpm.shapes import Shape
 
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")  # stdout belongs to the caller
+os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")  # Taichi would tell its makers once a day that it was started
 
 __all__ = [
     "Board",

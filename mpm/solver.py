@@ -228,7 +228,8 @@ class Simulation:
         """
         serial = start(self.runtime, self.scene.numerics.precision)
         if serial != self.serial:  # another simulation has started Taichi anew: the fields are gone
-            self.serial, self.k = serial, self._kernels(self._threads())
+            self.serial = serial
+            self.k = self._kernels(self._threads())
         scene = self.scene.with_material(**vars(material)) if material is not None else self.scene
         material = scene.food.material
         self._load(material)

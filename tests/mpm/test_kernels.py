@@ -155,5 +155,5 @@ def test_a_simulation_outlives_a_restart_of_taichi():
         Simulation(replace(scene, numerics=replace(scene.numerics, precision="f32")), Runtime(threads=1)).run().resolved
     )
     np.testing.assert_array_equal(double.run().resolved, first)
-    np.testing.assert_allclose(single, first, atol=1e-3 * first.max())
+    np.testing.assert_allclose(single, first, atol=0.01 * first.max())
     assert (single != first).any()
