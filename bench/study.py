@@ -239,8 +239,12 @@ class Bench:
         return row
 
     def others(self) -> list[dict[str, Any]]:
-        """Particle steps a second of the elastic block, ours and each peer's [1e6/s]; ours before and after it."""
+        """Particle steps a second of the elastic block, ours and each peer's [1e6/s]; ours before and after it.
+
+        All in single precision, which is the peers' default.
+        """
         scene = BLOCK.with_material(yield_stress=math.inf, tensile_strength=None, fracture_energy=None)
+        scene = replace(scene, numerics=replace(scene.numerics, precision="f32"))
         food = scene.food
         ours = self._simulation(scene, self.runtime)
         shape, dx, law = food.shape, BLOCK.numerics.dx, food.material

@@ -25,7 +25,7 @@ N_REPORT = N_SUMS + N_STATE + N_POSE
 
 FAR = 1 << 20  # a node that no grid has
 BESIDE = 3  # cells on either side of the cut plane whose nodes may carry both halves
-LANES = 4  # particles whose elastic stress is found at once on a CPU: four double-precision numbers fill a register
+REGISTER = 32  # bytes of a register of a CPU: as many particles as fill it have their elastic stress found at once
 CPU_BLOCK = 512  # Taichi runs CPU loops shorter than this on one thread, so one iteration in 512 works for a thread
 CRACK_LEAD = 0.25  # cells by which the split of the nodes lags the crack it makes; see Fields.split
 
@@ -70,7 +70,7 @@ class Fields:
         vec3, vec4 = ti.types.vector(3, real), ti.types.vector(4, real)
         mat3 = ti.types.matrix(3, 3, real)
         self.x, self.v = vec3.field(shape=n), vec3.field(shape=n)
-        self.lanes = 1 if self.atomic else LANES
+        self.lanes = 1 if self.atomic else REGISTER // (8 if real == ti.f64 else 4)
         self.blocks = -(-n // self.lanes)
         room = self.blocks * self.lanes
         self.C, self.F = vec4.field(shape=(room, 3)), ti.Vector.field(self.lanes, real, (self.blocks, 9))
