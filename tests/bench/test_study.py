@@ -110,6 +110,7 @@ def document(monkeypatch, tmp_path) -> dict:
         peers="python",
     )
     assert "published configuration" in "\n".join(said) and (tmp_path / "bench.svg").stat().st_size > 2000
+    assert "mathdefault" not in (tmp_path / "bench.svg").read_text()  # powers of ten would be shown as source text
     return json.loads((tmp_path / "bench.json").read_text())
 
 
