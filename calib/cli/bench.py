@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -53,6 +54,8 @@ def run(args: argparse.Namespace) -> int:
 
     if args.repeats < 1 or args.threads < 0:
         raise CurveError("--repeats must be at least 1 and --threads at least 0")
+    if args.peers is not None and shutil.which(args.peers) is None:
+        raise CurveError(f"--peers {args.peers}: no such program; give the Python of an environment with the peers")
     out = Path(args.out or f"cutcal-bench-{args.food}")
     document = study(
         load_food(args.food),

@@ -14,6 +14,7 @@ import bench.peers
 import bench.study
 import bench.textbook
 from calib.cli.bench import table
+from calib.cli.main import main
 from calib.materials import load_food
 from mpm.runtime import Runtime
 from mpm.scene import Scene
@@ -149,6 +150,12 @@ def test_peer_that_is_not_installed(name):
     row = bench.peers.measure(sys.executable, name, {}, 1)
     assert set(row) == {"name", "error"} and "No module named" in row["error"]
     assert "no-such-python" in bench.peers.measure("no-such-python", name, {}, 1)["error"]
+
+
+def test_missing_interpreter_is_said_before_anything_is_measured(capsys, tmp_path):
+    """A mistyped path costs no minutes of measuring."""
+    assert main(["bench", "--peers", "no-such-python", "--out", str(tmp_path / "out")]) == 1
+    assert "--peers no-such-python" in capsys.readouterr().err and not (tmp_path / "out").exists()
 
 
 def test_table_names_every_row(document):
