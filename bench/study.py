@@ -298,7 +298,7 @@ class Bench:
             numerics("single precision", precision="f32"),
             numerics("whole instead of a quarter", mirror=False),
             numerics("27 particles a cell", ppc=3),
-            numerics("two to three times the grid, all of it empty", room=num.room + 1.0),
+            numerics("its own size of empty grid on either side", room=2.0),
             numerics("half the time step", safety=num.safety / 2),
             Variant("half the speed", replace(scene, motion=replace(motion, mach=motion.mach / 2)), run),
             Variant("twice the speed", replace(scene, motion=replace(motion, mach=motion.mach * 2)), run),

@@ -99,6 +99,7 @@ class Fields:
         self.sums = ti.field(ti.f64, N_SUMS)
         self.state = ti.field(ti.f64, N_STATE)
         self.window = ti.field(ti.i32, 6)  # nodes that particles can reach before it is renewed: first, last + 1
+        ti.sync()  # lays these fields out by themselves; Taichi does not manage those of eight scenes at once
 
     @ti.kernel
     def reset(self):

@@ -157,3 +157,12 @@ def test_a_simulation_outlives_a_restart_of_taichi():
     np.testing.assert_array_equal(double.run().resolved, first)
     np.testing.assert_allclose(single, first, atol=0.01 * first.max())
     assert (single != first).any()
+
+
+def test_many_simulations_wait_side_by_side():
+    """A dozen scenes of different sizes are made before the first one runs."""
+    lengths = np.linspace(0.03, 0.06, 12)
+    food = BRITTLE.food
+    scenes = [replace(BRITTLE, food=replace(food, shape=replace(food.shape, length=x))) for x in lengths]
+    made = [Simulation(replace(s, motion=replace(s.motion, stroke=3e-4)), Runtime(threads=1)) for s in scenes]
+    assert made[0].run().status == "done"
