@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
-from multiprocessing import get_context
+from multiprocessing import connection, get_context, parent_process
 from typing import Any, TypeVar
 
 import numpy as np
@@ -25,9 +26,18 @@ Result = TypeVar("Result")
 DIED = "worker_died"  # reason of a run whose process was killed, for instance for lack of memory
 
 
-def _ignore_interrupt() -> None:
-    """Ctrl-C is handled by the main process, which then ends the workers."""
+def _begin() -> None:
+    """Start of a worker: Ctrl-C is handled by the main process, which then ends the workers; they end with it anyway."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = parent_process()
+    if parent is not None:
+        threading.Thread(target=_follow, args=(parent.sentinel,), daemon=True).start()
+
+
+def _follow(parent: int) -> None:
+    """End this process as soon as the main one has ended, were it killed: nobody waits for results any more."""
+    connection.wait([parent])
+    os._exit(1)
 
 
 def _run(scene: Scene, values: dict[str, Any], arch: str, threads: int) -> dict[str, Any]:
@@ -37,13 +47,7 @@ def _run(scene: Scene, values: dict[str, Any], arch: str, threads: int) -> dict[
 
     simulation = Simulation(scene, Runtime(arch, threads))
     material: Material = replace(scene.food.material, **values)
-    parent = os.getppid()
-
-    def watch(done: float, force: float) -> None:
-        if os.getppid() != parent:  # the main process was killed: nobody waits for this result
-            os._exit(1)
-
-    record = simulation.run(material, progress=watch)
+    record = simulation.run(material)
     scalars = {
         "peak_N": record.peak,
         "work_J": record.work,
@@ -86,7 +90,7 @@ class Pool:
         self._executor = self._start()
 
     def _start(self) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(self.workers, mp_context=get_context("spawn"), initializer=_ignore_interrupt)
+        return ProcessPoolExecutor(self.workers, mp_context=get_context("spawn"), initializer=_begin)
 
     def __enter__(self) -> Pool:
         return self

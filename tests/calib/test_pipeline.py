@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
+import time
 from collections.abc import Mapping
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
@@ -223,6 +226,44 @@ def test_killed_last_run_is_made_once_more():
     with pytest.raises(SimulationError, match="--resume") as error:
         LastRun(2).record(None)  # type: ignore[arg-type]
     assert error.value.reason == DIED
+
+
+IDLE = """
+import os, sys, time
+from calib.pool import Pool
+if __name__ == "__main__":
+    pool = Pool(1)
+    print(pool._submit(os.getpid).result(), flush=True)
+    time.sleep(600)
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="processes cannot be killed without notice here")
+def test_idle_workers_end_with_a_killed_main_process(tmp_path):
+    """kill -9 of the main process leaves no worker behind, also none that has nothing to do."""
+    script = tmp_path / "idle.py"
+    script.write_text(IDLE)
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    with subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True, env=environment) as main:
+        assert main.stdout is not None
+        worker = int(main.stdout.readline())
+        main.kill()
+    for _ in range(600):  # as long as it takes a loaded machine, up to a minute
+        if not _alive(worker):
+            return
+        time.sleep(0.1)
+    os.kill(worker, signal.SIGKILL)
+    pytest.fail("the worker still waits for work")
+
+
+def _alive(process: int) -> bool:
+    """Whether a process runs; one that has ended and was not waited for does not."""
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    state = Path(f"/proc/{process}/stat")
+    return not state.exists() or state.read_text().rsplit(")", 1)[1].split()[0] != "Z"
 
 
 def test_imports_stay_light():
