@@ -128,7 +128,7 @@ class Bench:
         ):
             self._keep(**{name: part()})
         if self.peers:
-            self._keep(peers=self.others())
+            self._keep(peers=self.others(self.peers))
         slow, fast = self.document["paper_config"]["wall_s_extrapolated"], self.document["default_cut"]["wall_s"]
         self._keep(ratio_to_paper=slow / fast, ablations=[])
         todo = self.variants()
@@ -238,16 +238,15 @@ class Bench:
         self.say(f"{count} processes: {row['speed_up']:.2f} times as many cuts as one")
         return row
 
-    def others(self) -> list[dict[str, Any]]:
+    def others(self, python: str) -> list[dict[str, Any]]:
         """Particle steps a second of the elastic block, ours and each peer's [1e6/s]; ours before and after it.
 
         All in single precision, which is the peers' default.
         """
         scene = BLOCK.with_material(yield_stress=math.inf, tensile_strength=None, fracture_energy=None)
         scene = replace(scene, numerics=replace(scene.numerics, precision="f32"))
-        food = scene.food
         ours = self._simulation(scene, self.runtime)
-        shape, dx, law = food.shape, BLOCK.numerics.dx, food.material
+        shape, dx, law = scene.food.shape, BLOCK.numerics.dx, scene.food.material
         size = np.array([shape.width, shape.length, shape.height])
         room = np.array(ours.nodes) * dx - size
         block = {
@@ -266,7 +265,7 @@ class Bench:
         rows = []
         for name in PEERS:
             best = max(_rate(ours.run()) for _ in range(self.repeats))
-            row = measure(self.peers, name, block, self.runtime.cpu_threads) if self.peers else {}
+            row = measure(python, name, block, self.runtime.cpu_threads)
             best = max(best, *(_rate(ours.run()) for _ in range(self.repeats)))
             if "seconds" in row:
                 theirs = row["particles"] / row["seconds"]

@@ -10,8 +10,9 @@
    part of a curve is wrong) proposes one batch: the point of least *expected* chi-square near the best one,
    the most promising point elsewhere if that is another one, and probes inside the present 95 % region.
 4. When neither the process nor the runs give a gain worth its noise: if the curve is still not explained
-   (chi-square above its 95 % quantile), strides along each parameter to both ends of its prior range (one that is not felt here, such as a yield
-   stress that nothing reaches, may be felt there), after those another design; else differences about the
+   (chi-square above its 95 % quantile), strides along each parameter to both ends of its prior range (one
+   that is not felt here, such as a yield stress that nothing reaches, may be felt there), after those
+   another design; else differences about the
    best point; and again 3 if that brings or promises a gain.  The
    Jacobian there is that of the process, in which the noise of single runs is averaged out; plain differences
    of noisy curves would make every parameter look well identified.

@@ -12,7 +12,7 @@ import taichi as ti
 STRETCH_STEPS = 30  # Halley's iteration: 2 steps at 30 % strain, 12 for principal stretches between 0.02 and 50
 STRETCH_TOLERANCE = 1e-4  # relative change that ends it; the error is then about its cube
 RETURN_STEPS = 8  # contraction of the J2 return: 3 steps give 1e-5, 8 give rounding
-CUBE_ROOT_STEPS = 3  # see cube_root; the volume that a step of the return loses is far within them
+CUBE_ROOT_STEPS = 3  # for the volume that a step of the return puts right: of the order of the strain squared
 RETURN_TOLERANCE = 1e-7  # distance from the yield stress that ends the return [-]
 
 

@@ -92,8 +92,9 @@ def table(document: dict[str, Any]) -> str:
     lines.append(f"  {p['processes']} processes do {p['speed_up']:.2f} times the cuts of one")
     lines += [
         f"  elastic block: {row['ratio']:.1f} times {row['name']} {row['version']} ({row['Mps']:.2f} million a second)"
-        for row in document["peers"]
         if "ratio" in row
+        else f"  elastic block in {row['name']}: not measured, {row['error']}"
+        for row in document["peers"]
     ]
     return "\n".join([*lines, f"  time grows with particles times steps to the power {document['exponent']:.2f}"])
 

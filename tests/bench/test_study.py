@@ -162,4 +162,5 @@ def test_table_names_every_row(document):
     """The terminal shows each variant with its time and errors."""
     text = table(document)
     assert all(row["name"] in text for row in document["ablations"]) and "to the power 1.00" in text
+    assert "in Genesis: not measured, No module named" in text
     assert "3.9 times Warp" in text and "2 processes do 2.00 times" in text

@@ -238,6 +238,7 @@ if __name__ == "__main__":
 """
 
 
+# Only a signal that cannot be caught proves this; where there is none (Windows) no process can be ended so suddenly.
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="processes cannot be killed without notice here")
 def test_idle_workers_end_with_a_killed_main_process(tmp_path):
     """kill -9 of the main process leaves no worker behind, also none that has nothing to do."""
