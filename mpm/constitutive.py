@@ -56,21 +56,6 @@ def double(a, b):
 
 
 @ti.func
-def square(a):
-    """a a."""
-    return ti.Vector(
-        [
-            a[0] * a[0] + a[5] * a[5] + a[4] * a[4],
-            a[5] * a[5] + a[1] * a[1] + a[3] * a[3],
-            a[4] * a[4] + a[3] * a[3] + a[2] * a[2],
-            a[5] * a[4] + a[1] * a[3] + a[3] * a[2],
-            a[0] * a[4] + a[5] * a[3] + a[4] * a[2],
-            a[0] * a[5] + a[5] * a[1] + a[4] * a[3],
-        ]
-    )
-
-
-@ti.func
 def product_with_transpose(a, b, c, d, e, f, g, h, i):
     """Entries of F F^T from those of F, row by row."""
     xx, yy, zz = a * a + b * b + c * c, d * d + e * e + f * f, g * g + h * h + i * i
@@ -146,43 +131,89 @@ def left_stretch(b, j):
 
 
 @ti.func
-def mises_squared(b, v, mu):
-    """Square of the von Mises equivalent of the Kirchhoff stress 2 mu (V - 1) V = 2 mu (B - V) [Pa^2]."""
-    e = b - v
-    mean = trace(e) / 3
-    return 6 * mu * mu * ti.max(double(e, e) - 3 * mean * mean, 0.0)
+def mises_squared(xx, yy, zz, yz, xz, xy):
+    """Square of the von Mises equivalent of a stress, from its entries."""
+    mean = (xx + yy + zz) / 3
+    a, b, c = xx - mean, yy - mean, zz - mean
+    return 1.5 * (a * a + b * b + c * c) + 3 * (yz * yz + xz * xz + xy * xy)
 
 
 @ti.func
 def cube_root(r):
     """Cube root of a number near one by Halley's iteration: to rounding between 0.5 and 2, to 2e-7 between 0.1 and 10."""
-    y = 1.0
+    y = 0.0 * r + 1.0
     for _ in ti.static(range(CUBE_ROOT_STEPS)):
         y *= (y * y * y + 2 * r) / (2 * y * y * y + r)
     return y
 
 
 @ti.func
-def j2_return(b, v, j, mu, yield_stress):
-    """Left stretch returned to the yield surface of the corotated law itself, at constant volume.
+def deviator_stress(xx, yy, zz, yz, xz, xy, mu):
+    """Entries of 2 mu (V - 1) V, the Kirchhoff stress without its pressure lambda J (J - 1), from those of V [Pa]."""
+    return (
+        2 * mu * (xx * xx + xy * xy + xz * xz - xx),
+        2 * mu * (xy * xy + yy * yy + yz * yz - yy),
+        2 * mu * (xz * xz + yz * yz + zz * zz - zz),
+        2 * mu * (xy * xz + yy * yz + yz * zz - yz),
+        2 * mu * (xx * xz + xy * yz + xz * zz - xz),
+        2 * mu * (xx * xy + xy * yy + xz * yz - xy),
+    )
+
+
+@ti.func
+def j2_return(xx, yy, zz, yz, xz, xy, j, mises2, mu, yield_stress):
+    """Entries of the left stretches returned to the yield surface of the corotated law itself, at constant volume.
 
     The usual return of the logarithmic strain overshoots the yield stress of this law by up to 7 % at
     sigma_y / E = 0.1; scaling the deviator of V until the corotated stress itself yields does not.
+
+    Args:
+        xx, yy, zz, yz, xz, xy: Entries of V, each a vector with a place for each particle.
+        j: Determinants of V.
+        mises2: Squares of the von Mises equivalents of their stresses [Pa^2]; those that do not exceed the yield stress
+            are given back as they are.
+        mu: Shear modulus [Pa].
+        yield_stress: Yield stress [Pa].
     """
-    out = v
-    q = ti.sqrt(mises_squared(b, v, mu))
-    if q > yield_stress:
-        mean = trace(v) / 3
-        d = v - mean * unit()
-        a = 1.0
-        for _ in range(RETURN_STEPS):
-            a *= yield_stress / q
-            out = mean * unit() + a * d
-            out *= cube_root(j / determinant(out))
-            q = ti.sqrt(mises_squared(square(out), out, mu))
-            if ti.abs(q - yield_stress) < yield_stress * RETURN_TOLERANCE:
-                break
-    return out
+    flows = mises2 > yield_stress * yield_stress
+    mean = (xx + yy + zz) / 3
+    dx, dy, dz, dyz, dxz, dxy = xx - mean, yy - mean, zz - mean, yz, xz, xy
+    sx, sy, sz, syz, sxz, sxy = xx, yy, zz, yz, xz, xy
+    q, a = ti.select(flows, ti.sqrt(mises2), yield_stress), 0.0 * j + 1.0
+    for _ in range(RETURN_STEPS):
+        a *= yield_stress / q
+        vx, vy, vz, vyz, vxz, vxy = mean + a * dx, mean + a * dy, mean + a * dz, a * dyz, a * dxz, a * dxy
+        cx, _cy, _cz, _cyz, cxz, cxy = cofactors(vx, vy, vz, vyz, vxz, vxy)
+        grow = cube_root(j / (vx * cx + vxy * cxy + vxz * cxz))
+        sx, sy, sz = ti.select(flows, grow * vx, xx), ti.select(flows, grow * vy, yy), ti.select(flows, grow * vz, zz)
+        syz, sxz, sxy = (
+            ti.select(flows, grow * vyz, yz),
+            ti.select(flows, grow * vxz, xz),
+            ti.select(flows, grow * vxy, xy),
+        )
+        t = deviator_stress(sx, sy, sz, syz, sxz, sxy, mu)
+        q = ti.select(flows, ti.sqrt(mises_squared(t[0], t[1], t[2], t[3], t[4], t[5])), yield_stress)
+        if ti.abs(q - yield_stress).max() < yield_stress * RETURN_TOLERANCE:
+            break
+    return sx, sy, sz, syz, sxz, sxy
+
+
+@ti.func
+def j2_return_one(v, j, mises2, mu, yield_stress):
+    """:func:`j2_return` of one particle."""
+    xx, yy, zz, yz, xz, xy = j2_return(
+        ti.Vector([v[0]]),
+        ti.Vector([v[1]]),
+        ti.Vector([v[2]]),
+        ti.Vector([v[3]]),
+        ti.Vector([v[4]]),
+        ti.Vector([v[5]]),
+        ti.Vector([j]),
+        ti.Vector([mises2]),
+        mu,
+        yield_stress,
+    )
+    return ti.Vector([xx[0], yy[0], zz[0], yz[0], xz[0], xy[0]])
 
 
 @ti.func
@@ -190,6 +221,20 @@ def deviatoric_energy(v, mu):
     """mu |V - 1|^2 per volume [J/m^3]."""
     e = v - unit()
     return mu * double(e, e)
+
+
+@ti.func
+def norm_squared(xx, yy, zz, yz, xz, xy):
+    """Square of the Frobenius norm from the entries."""
+    return xx * xx + yy * yy + zz * zz + 2 * (yz * yz + xz * xz + xy * xy)
+
+
+@ti.func
+def exchange(xx, yy, zz, yz, xz, xy, j, rxx, ryy, rzz, ryz, rxz, rxy, a, b, c):
+    """One column (a, b, c) of F after its left stretch V gave way to R: of R V^-1 F, from the entries of V and R."""
+    cx, cy, cz, cyz, cxz, cxy = cofactors(xx, yy, zz, yz, xz, xy)
+    u, v, w = (cx * a + cxy * b + cxz * c) / j, (cxy * a + cy * b + cyz * c) / j, (cxz * a + cyz * b + cz * c) / j
+    return rxx * u + rxy * v + rxz * w, rxy * u + ryy * v + ryz * w, rxz * u + ryz * v + rzz * w
 
 
 @ti.func

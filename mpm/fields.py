@@ -74,8 +74,8 @@ class Fields:
         self.blocks = -(-n // self.lanes)
         room = self.blocks * self.lanes
         self.C, self.F = vec4.field(shape=(room, 3)), ti.Vector.field(self.lanes, real, (self.blocks, 9))
-        # elastic Kirchhoff stress (6), viscous loss, and whether the particle must be done by itself
-        self.tau = ti.Vector.field(self.lanes, real, (self.blocks, 8))
+        # Kirchhoff stress (6), viscous and plastic loss, and whether the particle must be done by itself
+        self.tau = ti.Vector.field(self.lanes, real, (self.blocks, 9))
         self.side, self.gap = ti.field(ti.i32, n), ti.field(real, n)
         self.foot = ti.field(real, n)
         self.kappa, self.strain = (ti.field(real, room if damage else 1) for _ in range(2))

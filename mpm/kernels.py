@@ -88,13 +88,13 @@ class Kernels(Survey):
         loss, tau = ti.Vector.zero(float, 4), 0.0 * unit()
         one_by_one = True
         if ti.static(self.branches == 0):
-            one_by_one = self.tau[block, 7][lane] > 0
+            one_by_one = self.tau[block, 8][lane] > 0
         if one_by_one:
             loss, tau = self.stress(p, block, lane, dt)
         else:
             for r in ti.static(range(6)):
                 tau[r] = self.tau[block, r][lane]
-            loss[2] = self.tau[block, 6][lane]
+            loss[2], loss[0] = self.tau[block, 6][lane], self.tau[block, 7][lane]
         base, fx = self.local(self.x[p])
         outside = 1.0 - self.inside(base, window)
         if outside == 0.0:

@@ -8,17 +8,20 @@ from mpm.constitutive import (
     cofactors,
     damage_of,
     degrade,
+    deviator_stress,
     deviatoric_energy,
     double,
+    exchange,
     full,
     halley,
     j2_return,
+    j2_return_one,
     largest_eigenvalue,
     left_cauchy_green,
     left_stretch,
     mises_squared,
+    norm_squared,
     product_with_transpose,
-    square,
     stretch_of,
     trace,
     unit,
@@ -84,7 +87,7 @@ class Stress(Edge):
     def elastic(self, block, dt):
         """Advance F of a block of particles and find their Kirchhoff stress and viscous loss, all at once.
 
-        Those that flow, are damaged or inverted, or whose stretch has not converged, are left as they are and marked;
+        Those that are damaged or inverted, or whose stretch has not converged, are left as they are and marked;
         :meth:`stress` does them one by one.
         """
         a0, a1, a2 = self.F[block, 0], self.F[block, 1], self.F[block, 2]
@@ -113,27 +116,38 @@ class Stress(Edge):
         x -= change
         vxx, vyy, vzz, vyz, vxz, vxy = stretch_of(x, first, j, xx, yy, zz, yz, xz, xy)
         mu, lam = self.par[MU], self.par[LAM]
-        txx, tyy, tzz = 2 * mu * (xx - vxx), 2 * mu * (yy - vyy), 2 * mu * (zz - vzz)
-        tyz, txz, txy = 2 * mu * (yz - vyz), 2 * mu * (xz - vxz), 2 * mu * (xy - vxy)
-        mean = (txx + tyy + tzz) / 3
-        mises2 = 1.5 * (txx * txx + tyy * tyy + tzz * tzz - 3 * mean * mean) + 3 * (tyz * tyz + txz * txz + txy * txy)
+        mises2 = mises_squared(xx - vxx, yy - vyy, zz - vzz, yz - vyz, xz - vxz, xy - vxy) * (4 * mu * mu)
+        plastic = 0.0 * j
+        if mises2.max() > self.par[YIELD] ** 2:
+            rxx, ryy, rzz, ryz, rxz, rxy = j2_return(vxx, vyy, vzz, vyz, vxz, vxy, j, mises2, mu, self.par[YIELD])
+            plastic = norm_squared(vxx - 1, vyy - 1, vzz - 1, vyz, vxz, vxy)
+            plastic = mu * (plastic - norm_squared(rxx - 1, ryy - 1, rzz - 1, ryz, rxz, rxy))
+            flows = mises2 > self.par[YIELD] ** 2
+            h0, h1, h2 = exchange(vxx, vyy, vzz, vyz, vxz, vxy, j, rxx, ryy, rzz, ryz, rxz, rxy, d0, e0, f0)
+            d0, e0, f0 = ti.select(flows, h0, d0), ti.select(flows, h1, e0), ti.select(flows, h2, f0)
+            h0, h1, h2 = exchange(vxx, vyy, vzz, vyz, vxz, vxy, j, rxx, ryy, rzz, ryz, rxz, rxy, d1, e1, f1)
+            d1, e1, f1 = ti.select(flows, h0, d1), ti.select(flows, h1, e1), ti.select(flows, h2, f1)
+            h0, h1, h2 = exchange(vxx, vyy, vzz, vyz, vxz, vxy, j, rxx, ryy, rzz, ryz, rxz, rxy, d2, e2, f2)
+            d2, e2, f2 = ti.select(flows, h0, d2), ti.select(flows, h1, e2), ti.select(flows, h2, f2)
+            vxx, vyy, vzz, vyz, vxz, vxy = rxx, ryy, rzz, ryz, rxz, rxy
+        txx, tyy, tzz, tyz, txz, txy = deviator_stress(vxx, vyy, vzz, vyz, vxz, vxy, mu)
         strain2 = 0.0 * j
         if ti.static(self.damage):
-            strain2 = (vxx - 1) ** 2 + (vyy - 1) ** 2 + (vzz - 1) ** 2 + 2 * (vyz * vyz + vxz * vxz + vxy * vxy)
+            strain2 = norm_squared(vxx - 1, vyy - 1, vzz - 1, vyz, vxz, vxy)
         swell = lxx + lyy + lzz
         shear, bulk = 2 * self.par[ETA_S] * j, self.par[ETA_B] * j * swell
         syz, sxz, sxy = 0.5 * (lyz + lzy), 0.5 * (lxz + lzx), 0.5 * (lxy + lyx)
         dxx, dyy, dzz = lxx - swell / 3, lyy - swell / 3, lzz - swell / 3
         press = lam * j * (j - 1) + bulk
         heat = shear * (dxx * dxx + dyy * dyy + dzz * dzz + 2 * (syz * syz + sxz * sxz + sxy * sxy)) + bulk * swell
-        flow2, eps0 = self.par[YIELD] ** 2, self.par[EPS0]
-        odd = (j <= 0) | (change > STRETCH_TOLERANCE * x) | (mises2 > flow2)
+        eps0 = self.par[EPS0]
+        odd = (j <= 0) | (change > STRETCH_TOLERANCE * x)
         if ti.static(self.damage):
             odd |= (strain2 > eps0 * eps0) & (eps0 > 0)
             for lane in ti.static(range(self.lanes)):
                 p = block * self.lanes + lane
                 odd[lane] |= (ti.max(self.kappa[p], self.strain[p]) > eps0) & (eps0 > 0)
-        self.tau[block, 7] = ti.cast(odd, float)
+        self.tau[block, 8] = ti.cast(odd, float)
         for r, new, old in ti.static(
             (
                 (0, d0, a0),
@@ -157,6 +171,7 @@ class Stress(Edge):
                 (4, txz + shear * sxz),
                 (5, txy + shear * sxy),
                 (6, heat * dt),
+                (7, plastic),
             )
         ):
             self.tau[block, r] = value
@@ -173,12 +188,16 @@ class Stress(Edge):
             mu, lam = self.par[MU], self.par[LAM]
             b = left_cauchy_green(f)
             v = left_stretch(b, j)
-            if mises_squared(b, v, mu) > self.par[YIELD] ** 2:
-                back = j2_return(b, v, j, mu, self.par[YIELD])
+            tau = 2 * mu * (b - v)
+            mises2 = mises_squared(tau[0], tau[1], tau[2], tau[3], tau[4], tau[5])
+            if mises2 > self.par[YIELD] ** 2:
+                back = j2_return_one(v, j, mises2, mu, self.par[YIELD])
                 plastic = deviatoric_energy(v, mu) - deviatoric_energy(back, mu)
                 f = full(back) @ (full(cofactor(v)) @ f) / j
-                v, b = back, square(back)
-            tau = 2 * mu * (b - v) + lam * j * (j - 1) * unit()
+                v = back
+                txx, tyy, tzz, tyz, txz, txy = deviator_stress(v[0], v[1], v[2], v[3], v[4], v[5], mu)
+                tau = ti.Vector([txx, tyy, tzz, tyz, txz, txy])
+            tau += lam * j * (j - 1) * unit()
             if ti.static(self.branches > 0):
                 add, loss = self.relaxed(p, f, v, j, mu)
                 tau += add

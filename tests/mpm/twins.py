@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import polar
+from scipy.optimize import brentq
 
 
 def kirchhoff(f: np.ndarray, mu: float, lam: float) -> np.ndarray:
@@ -23,6 +24,17 @@ def mises(tau: np.ndarray) -> float:
     """von Mises equivalent of a stress [Pa]."""
     dev = tau - np.trace(tau) / 3 * np.eye(3)
     return float(np.sqrt(1.5 * np.sum(dev**2)))
+
+
+def j2_return(stretch: np.ndarray, mu: float, yield_stress: float) -> np.ndarray:
+    """The stretch of the same volume and direction of deviator whose corotated stress has the yield stress."""
+    mean = np.trace(stretch) / 3 * np.eye(3)
+
+    def scaled(a: float) -> np.ndarray:
+        out = mean + a * (stretch - mean)
+        return out * np.cbrt(np.linalg.det(stretch) / np.linalg.det(out))
+
+    return scaled(brentq(lambda a: mises(kirchhoff(scaled(a), mu, 0.0)) - yield_stress, 0.0, 1.0, xtol=1e-15))
 
 
 def wedge(y: float, z: float, spine: float, angle: float) -> float:
