@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
+from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -127,6 +128,31 @@ class Pool:
                     waiting[self.submit(scene, values)] = (index, True)
                 else:
                     yield Evaluation(index, values, "failed", DIED, 0.0, np.empty(0), np.empty(0))
+
+    def each(self, work: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Result | None]]:
+        """Call ``work(*job, arch, threads)`` for each job; yields (place among the jobs, result) in order of completion.
+
+        A process that is killed takes its neighbours with it. All of them are made again one at a time, so that None is
+        the result only of the job whose process was killed when it ran alone.
+        """
+        waiting, alone = deque(range(len(jobs))), deque[int]()
+        running: dict[Future[Result], int] = {}
+        while waiting or alone or running:
+            while waiting and not alone and len(running) < self.workers:
+                k = waiting.popleft()
+                running[self._submit(work, *jobs[k], self.arch, self.threads)] = k
+            tried = alone.popleft() if alone and not running else None
+            if tried is not None:
+                running[self._submit(work, *jobs[tried], self.arch, self.threads)] = tried
+            done, _ = wait(running, return_when=FIRST_COMPLETED)
+            for future in done:
+                k = running.pop(future)
+                if not isinstance(future.exception(), BrokenProcessPool):
+                    yield k, future.result()
+                elif k == tried:
+                    yield k, None
+                else:
+                    alone.append(k)
 
     def submit(self, scene: Scene, values: Mapping[str, float]) -> Future[dict[str, Any]]:
         """Queue one run; a broken pool is started anew first."""

@@ -7,13 +7,14 @@ import sys
 from collections.abc import Sequence
 
 import calib
-from calib.cli import bench, calibrate, converge, foods, predict, report, simulate
+from calib.cli import bench, calibrate, converge, foods, predict, report, simulate, stress
 from mpm.errors import CutcalError
 
 COMMANDS = {
     "calibrate": calibrate,
     "converge": converge,
     "bench": bench,
+    "stress": stress,
     "predict": predict,
     "simulate": simulate,
     "report": report,

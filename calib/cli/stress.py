@@ -1,0 +1,85 @@
+"""``cutcal stress``: where the solver is stable, and how it ends where it is not."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from calib.errors import CurveError
+
+HELP = "stability map: stiffness, Poisson's ratio, time step, cell, speed, resistance and odd starts"
+DESCRIPTION = """Run some 250 small cuts with one or two things pushed to the end of their
+range or past it: stiffness, Poisson's ratio, time step, cell, speed, density,
+yield stress, cutting resistance, blades that miss the food, food in the air or
+a hundred times too dense. Each must end stable, or refused or stopped for a
+reason that is named; momentum and energy are audited. Writes stress.json and
+stress.svg to --out."""
+EPILOG = """examples:
+  cutcal stress --quick
+  cutcal stress --out runs/stress --workers 4
+
+Ctrl-C keeps what was computed; the same command with --resume goes on.
+Exit codes: 0 every physical cell below 0.8 of the time step's limit is stable
+and all others are explained, 1 error in input or run, 2 they are not."""
+SHOWN = 12  # cells that the table names
+
+
+def add_args(p: argparse.ArgumentParser) -> None:
+    """Options of this command."""
+    from mpm.runtime import ARCHES
+
+    p.add_argument("--quick", action="store_true", help="a dozen coarse cells instead of the whole map")
+    p.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
+    p.add_argument("--resume", action="store_true", help="go on with the map in --out; nothing is simulated twice")
+    p.add_argument("--out", metavar="DIR", help="folder of the results; never overwritten")
+    p.add_argument("--seed", type=int, default=0, help="seed of the particles")
+    p.add_argument("--arch", choices=ARCHES, default="cpu", help="device of the simulations")
+    p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the map; prints its table, or stress.json."""
+    from calib.hazards import cells, quick_cells
+    from calib.stability import run as study
+
+    if args.workers < 1 or args.seed < 0:
+        raise CurveError("--workers must be at least 1 and --seed at least 0")
+    out = Path(args.out or "cutcal-stress")
+    document = study(
+        (quick_cells if args.quick else cells)(args.seed),
+        out,
+        about={"command": ["stress", *(a for a in sys.argv[1:] if a != "stress")], "seed": args.seed},
+        workers=args.workers,
+        arch=args.arch,
+        resume=args.resume,
+        say=lambda text: print(text, file=sys.stderr, flush=True),
+    )
+    if args.json:
+        print((out / "stress.json").read_text(encoding="utf-8"), end="")
+    else:
+        print(table(document))
+        print(f"  wrote {out}")
+    return 0 if document["passed"] else 2
+
+
+def table(document: dict[str, Any]) -> str:
+    """What the terminal shows at the end."""
+    physical, limit = document["physical"], document["limits"]["dt_over_limit"]
+    lines = [
+        f"{len(document['cells'])} cells: {'passed' if document['passed'] else 'not passed'}",
+        f"  {physical['stable']} of {physical['cells']} physical cells below {limit:g} of the time step's limit are stable",
+    ]
+    for reason, count in sorted(document["counts"].items(), key=lambda item: -item[1]):
+        words = document["reasons"].get(reason, "reached the end, momentum and energy balance")
+        lines.append(f"  {count:4d} {reason}: {words}")
+    for title, names in (
+        ("physical, but not stable", physical["not_stable"]),
+        ("unexplained", document["unexplained_cells"]),
+    ):
+        reasons = {c["name"]: c["reason"] for c in document["cells"]}
+        lines += [f"  {title}: {name} ({reasons[name]})" for name in names[:SHOWN]]
+        if len(names) > SHOWN:
+            lines.append(f"  {title}: {len(names) - SHOWN} more, see stress.json")
+    return "\n".join(lines)
