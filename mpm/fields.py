@@ -48,16 +48,18 @@ class Fields:
         stations: Number of slices along the edge.
         threads: CPU threads, 0 on a GPU.
         nodal: Plain nodal projection instead of the cohesive edge and particle contact.
+        press: The tool presses on the food's surface instead of cutting.
         damage: Bulk damage on.
         turned: The grid is turned against the blade.
         branches: Number of Prony branches.
     """
 
-    def __init__(self, n, nodes, middle, planes, stations, threads, nodal, damage, turned=False, branches=0):
+    def __init__(self, n, nodes, middle, planes, stations, threads, nodal, press, damage, turned=False, branches=0):
         self.n, self.nodes = n, nodes
         self.i0, self.j0 = planes
         self.mx, self.my = self.i0 >= 0, self.j0 >= 0
         self.threads, self.nodal, self.damage, self.turned = max(threads, 1), nodal, damage, turned
+        self.press, self.cuts = press, not (nodal or press)
         self.atomic = threads == 0
         self.alone = not self.atomic  # short loops run where the kernel was launched
         self.parts = n if self.atomic else 1 if self.threads == 1 else self.threads * CPU_BLOCK
@@ -304,7 +306,7 @@ class Fields:
             Layers, two bits a column in the order of :meth:`layer`; 3 where all nodes are shared.
         """
         code = 0x3FFFF
-        if ti.static(not self.nodal):
+        if ti.static(self.cuts):
             reach = ti.static(2.2 if self.turned else 1.6) * self.par[DX]
             if ti.abs(q[1]) < reach:
                 front = self.front_at(q[0]) - 0.5 * self.par[ZONE]

@@ -53,7 +53,7 @@ class Kernels(Survey):
 
         At the board that is all of it, also what is pressed a little into the board.
         """
-        if ti.static(not self.nodal):
+        if ti.static(self.cuts):
             tip = self.edge_height(q[0])
             if self.side[p] == 0 and (q[2] > tip or tip <= 0) and self.under_blade(q[0]):
                 self.side[p] = 1 + self.half(p, q[1])
@@ -64,7 +64,7 @@ class Kernels(Survey):
         at = ti.Matrix.zero(ti.i32, 3, 3)
         for j, k in ti.static(ti.ndrange(3, 3)):
             at[j, k] = base[1] + j
-            if ti.static(not self.nodal):
+            if ti.static(self.cuts):
                 at[j, k] += 0 if k < self.layer(code, i, j) else self.second
         return at
 
@@ -174,6 +174,30 @@ class Kernels(Survey):
         return u
 
     @ti.func
+    def touch_press(self, p, m, dt, u, at):
+        """Contact of one particle with a plate or wedge that presses from above; returns its corrected velocity.
+
+        A particle meets it as far from its centre as it was from the food's surface.
+        """
+        sign = 1.0 if at[1] >= 0 else -1.0
+        above = at[2] - ti.cast(self.pose[Z], float)
+        d, n = blade_distance(sign * at[1], above, self.par[SPINE], self.par[COS], self.par[SIN], self.par[RADIUS])
+        n = ti.Vector([0.0, sign * n[1], n[2]])
+        depth = self.gap[p] - d
+        if depth > 0:
+            tool = ti.Vector([ti.cast(self.pose[VS], float), 0.0, ti.cast(self.pose[VZ], float)])
+            stretch = self.stick[1, p] - self.stick[1, p].dot(n) * n
+            rel = u - tool
+            stretch = stick_slip(stretch, dt * (rel - rel.dot(n) * n), depth, self.par[FRICTION])
+            self.stick[1, p] = stretch
+            dv = (depth * n - stretch) / dt
+            u += dv
+            self.tool(FACE, -m * dv)
+        else:
+            self.stick[1, p] = ti.Vector.zero(float, 3)
+        return u
+
+    @ti.func
     def gather(self, p, dt, window):
         """Grid to particle, then contact."""
         base, fx = self.local(self.x[p])
@@ -221,7 +245,11 @@ class Kernels(Survey):
             m = self.par[MASS] * ti.static((2 if self.mx else 1) * (2 if self.my else 1))
             there, v = self.blade_axes(at), self.blade_axes(u)
             v = self.touch_board(p, m, dt, v, there)
-            u = self.grid_axes(self.touch_blade(p, m, dt, v, there))
+            if ti.static(self.press):
+                v = self.touch_press(p, m, dt, v, there)
+            else:
+                v = self.touch_blade(p, m, dt, v, there)
+            u = self.grid_axes(v)
         self.v[p] = u
         self.x[p] = at
 
@@ -255,7 +283,7 @@ class Kernels(Survey):
             if ti.static(self.damage):
                 for d in ti.static(range(3)):
                     self.hot[d], self.hot[d + 3] = FAR, -FAR
-        if ti.static(not self.nodal):
+        if ti.static(self.cuts):
             ti.loop_config(serialize=self.alone)
             for i in range(self.stations):
                 self.lead(i)
@@ -296,7 +324,7 @@ class Kernels(Survey):
             i, j, low, high = self.row(c, w)
             for k in range(low, high):
                 self.update_node(i, j, k, dt)
-        if ti.static(not self.nodal):
+        if ti.static(self.cuts):
             ti.loop_config(serialize=self.alone)
             for i in range(self.stations):
                 self.near[i] = 0

@@ -55,6 +55,26 @@ class Knife:
 
 
 @dataclass(frozen=True)
+class Press:
+    """A rigid plate, or a wedge with its edge along x, that presses on the food from above and cuts nothing.
+
+    It reaches over the whole food. With a Scene's ``stroke`` it makes the compression and indentation tests that have
+    closed forms and finite-element references.
+
+    Attributes: name; half_angle between the faces and the vertical [rad], pi/2 for a plate; mu, Coulomb friction [-].
+    """
+
+    name: str = "plate"
+    half_angle: float = math.pi / 2
+    mu: float = 0.0
+
+    def __post_init__(self) -> None:
+        w = f"press {self.name}"
+        check_number(w, "half_angle", self.half_angle, 0.1, math.pi / 2 * (1 + 1e-9), "rad")
+        check_number(w, "mu", self.mu, -1e-300, 10.0, "")
+
+
+@dataclass(frozen=True)
 class Board:
     """The board under the food: Coulomb friction coefficient [-]."""
 
@@ -193,7 +213,7 @@ class Scene:
     """Everything that determines one cut."""
 
     food: Food
-    knife: Knife
+    knife: Knife | Press
     motion: Motion
     board: Board = field(default_factory=Board)
     edge: EdgeLaw = field(default_factory=EdgeLaw)
@@ -202,7 +222,7 @@ class Scene:
 
     def __post_init__(self) -> None:
         dx, shape = self.numerics.dx, self.food.shape
-        if self.numerics.contact == "cohesive" and self.edge.zone < dx * (1 - 1e-9):
+        if self.cuts and self.numerics.contact == "cohesive" and self.edge.zone < dx * (1 - 1e-9):
             raise SceneError(
                 f"edge: process zone {self.edge.zone * 1e3:g} mm is narrower than the cell {dx * 1e3:g} mm, so the edge "
                 f"would fall between nodes; use dx <= {self.edge.zone * 1e3:g} mm"
@@ -214,8 +234,15 @@ class Scene:
         self._check_band()
 
     @property
+    def cuts(self) -> bool:
+        """Whether the tool is a knife."""
+        return isinstance(self.knife, Knife)
+
+    @property
     def drop(self) -> float:
         """How much lower than its middle the tilted edge gets over the food [m]."""
+        if not isinstance(self.knife, Knife):
+            return 0.0
         reach = min(self.food.shape.width, self.knife.length * math.cos(self.motion.tilt)) / 2
         return reach * math.tan(abs(self.motion.tilt))
 
@@ -227,6 +254,8 @@ class Scene:
 
     def _check_motion(self) -> None:
         m, height = self.motion, self.food.shape.height
+        if not self.cuts and (m.tilt != 0 or self.numerics.contact != "cohesive"):
+            raise SceneError("knife: a press is level and touches particles; leave out motion.tilt and numerics.contact")
         if m.stroke + self.drop > height * (1 + 1e-9) and (self.arm.rigid or m.tilt != 0):
             raise SceneError(
                 f"motion: stroke {m.stroke * 1e3:g} mm goes below the board; the food is {height * 1e3:g} mm high"

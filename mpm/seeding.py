@@ -22,6 +22,7 @@ class Seeds:
         volume: Volume of one particle [m^3]; the particles of all mirror images add up to the shape's volume.
         spacing: Lattice spacing [m].
         foot: Distance of each particle from the lower surface, at most half a spacing [m], shape (n,).
+        head: The same from the upper surface.
         cells: Lattice cell of each particle, counted from the cut plane along y (-1, 0 on either side of it), shape
             (n, 3).
     """
@@ -30,6 +31,7 @@ class Seeds:
     volume: float
     spacing: float
     foot: np.ndarray
+    head: np.ndarray
     cells: np.ndarray
 
     @property
@@ -69,6 +71,7 @@ def seed(scene: Scene) -> Seeds:
     points = origin + (cells + rng.uniform(0.0, 1.0, cells.shape)) * h
     there = inside(shape, points)
     points, cells = points[there], cells[there] - [0, counts[1] - right, 0]
-    bottom, _ = surface(shape, points[:, 0], points[:, 1])
+    bottom, top = surface(shape, points[:, 0], points[:, 1])
     images = (2 if mirror_x else 1) * (2 if mirror_y else 1)
-    return Seeds(points, volume(shape) / images / len(points), h, np.minimum(points[:, 2] - bottom, h / 2), cells)
+    foot, head = np.minimum(points[:, 2] - bottom, h / 2), np.minimum(top - points[:, 2], h / 2)
+    return Seeds(points, volume(shape) / images / len(points), h, foot, head, cells)

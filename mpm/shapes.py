@@ -9,13 +9,26 @@ import numpy as np
 
 from mpm.errors import SceneError, check_number
 
-SHAPE_KINDS = ("block", "cylinder", "half_cylinder", "sphere", "hemisphere", "ellipsoid", "capsule")
+SHAPE_KINDS = (
+    "block",
+    "cylinder",
+    "half_cylinder",
+    "upright_cylinder",
+    "sphere",
+    "hemisphere",
+    "ellipsoid",
+    "capsule",
+)
 _FLAT_DOWN = ("half_cylinder", "hemisphere")
+_FLAT_TOP = ("block", "upright_cylinder")
 
 
 @dataclass(frozen=True)
 class Shape:
-    """Outline of the food. Attributes: kind, length along y [m], width along x [m], height along z [m]."""
+    """Outline of the food. Attributes: kind, length along y [m], width along x [m], height along z [m].
+
+    A cylinder lies along y, an upright one stands on its end.
+    """
 
     kind: str
     length: float
@@ -56,6 +69,8 @@ def surface(shape: Shape, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.
         inside = (np.abs(x) <= shape.width / 2) & (np.abs(y) <= shape.length / 2)
         return np.where(inside, 0.0, np.nan), np.where(inside, shape.height, np.nan)
     r2 = _radius2(shape, x, y)
+    if shape.kind == "upright_cylinder":
+        return np.where(r2 <= 1, 0.0, np.nan), np.where(r2 <= 1, shape.height, np.nan)
     rise = np.sqrt(np.where(r2 <= 1, 1 - r2, np.nan))
     if shape.kind in _FLAT_DOWN:
         return 0.0 * rise, shape.height * rise
@@ -75,7 +90,7 @@ def volume(shape: Shape) -> float:
     box = shape.length * shape.width * shape.height
     if shape.kind == "block":
         return box
-    if shape.kind in ("cylinder", "half_cylinder"):
+    if shape.kind in ("cylinder", "half_cylinder", "upright_cylinder"):
         return math.pi / 4 * box
     if shape.kind == "capsule":
         cap = min(shape.width, shape.length) / 2
@@ -87,7 +102,7 @@ def volume(shape: Shape) -> float:
 def section_area(shape: Shape) -> float:
     """Area of the section in the blade plane y = 0 [m^2]: what a complete cut severs."""
     box = shape.width * shape.height
-    return box if shape.kind == "block" else math.pi / 4 * box
+    return box if shape.kind in _FLAT_TOP else math.pi / 4 * box
 
 
 def skin_path(shape: Shape, x: np.ndarray, thickness: float) -> np.ndarray:
@@ -107,9 +122,9 @@ def skin_path(shape: Shape, x: np.ndarray, thickness: float) -> np.ndarray:
     x = np.asarray(x, float)
     bottom, top = surface(shape, x, np.zeros_like(x))
     inner_width = max(shape.width - 2 * thickness, 1e-9)
-    lift = 0.0 if shape.kind in (*_FLAT_DOWN, "block") else thickness
+    lift = 0.0 if shape.kind in (*_FLAT_DOWN, *_FLAT_TOP) else thickness
     inner_height = max(shape.height - thickness - lift, 1e-9)
-    if shape.kind == "block":
+    if shape.kind in _FLAT_TOP:
         inner_top = np.where(np.abs(x) <= inner_width / 2, inner_height, bottom)
     else:
         rise = np.sqrt(np.maximum(1 - (2 * x / inner_width) ** 2, 0.0))

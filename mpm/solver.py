@@ -15,7 +15,7 @@ from mpm.kernels import Kernels
 from mpm.material import Material
 from mpm.record import ForceRecord
 from mpm.runtime import Runtime, start
-from mpm.scene import BAND_CELLS, Scene
+from mpm.scene import BAND_CELLS, Press, Scene
 from mpm.seeding import seed
 from mpm.shapes import section_area, skin_path, slices
 from mpm.topology import topology
@@ -28,6 +28,8 @@ PATIENCE = 0.1  # time after which a run comes back from the device to say how f
 APPROACH = 0.1  # way of the blade above the food before contact, in cells
 EDGE_STEP = 0.5  # dt times the frequency of the edge's cohesive spring, 2 is unstable
 TACK_STEP = 0.5  # the same for the rising part of the adhesive traction
+
+ENDLESS = 1e3  # thickness of a wedge that never becomes a plate with parallel faces [m]
 
 KEPT = 3  # kernels that a process keeps: of the default cells, of coarse ones and of one scene more
 
@@ -76,6 +78,7 @@ class Simulation:
             len(self.stations),
             threads,
             scene.numerics.contact == "nodal",
+            not scene.cuts,
             scene.food.material.tensile_strength is not None,
             scene.numerics.grid_turn != 0,
             len(scene.food.material.prony),
@@ -132,7 +135,7 @@ class Simulation:
         omega = 2 * (material.stability_speed + speed) / num.dx  # highest frequency of a lone particle
         zeta = self._retardation(material) * omega / 2
         dt = num.safety * 2 / omega * (math.sqrt(1 + zeta * zeta) - zeta)
-        if num.contact == "cohesive":
+        if num.contact == "cohesive" and self.scene.cuts:
             spring = math.sqrt(max(material.start, 1e-12) / (edge.slip * material.rho * edge.zone**2))
             dt = min(dt, EDGE_STEP / spring)
             if material.adhesion > 0:
@@ -146,11 +149,10 @@ class Simulation:
         real = np.float64 if num.precision == "f64" else np.float32
         k.x.from_numpy(self._turn(self.seeds.x).astype(real))
         k.foot.from_numpy(self.seeds.foot.astype(real))
-        k.gap.from_numpy(self.seeds.gap.astype(real))
+        k.gap.from_numpy((self.seeds.gap if scene.cuts else self.seeds.head).astype(real))
         k.reset()
         sticky = self.seeds.beside & (material.adhesion > 0)
         k.tacky.from_numpy(np.where(sticky, 0, -1).astype(np.int32))
-        knife = scene.knife
         table = np.zeros(kn.N_PARAMETERS)
         table[kn.DX], table[kn.INV], table[kn.FIRST] = num.dx, 1 / num.dx, self.stations[0]
         table[kn.OX], table[kn.OY], table[kn.OZ] = self.origin
@@ -166,12 +168,13 @@ class Simulation:
             band = BAND_CELLS * num.dx
             table[kn.EPS0] = eps0
             table[kn.EPSF] = eps0 / 2 + material.fracture_energy / (material.tensile_strength * band)
-        table[kn.SPINE], table[kn.BLADE], table[kn.HALF_LENGTH] = knife.spine, knife.height, knife.length / 2
-        table[kn.COS], table[kn.SIN], table[kn.RADIUS] = (
-            math.cos(knife.angle / 2),
-            math.sin(knife.angle / 2),
-            knife.radius,
-        )
+        tool = scene.knife
+        if isinstance(tool, Press):
+            half, table[kn.FRICTION], table[kn.SPINE] = tool.half_angle, tool.mu, ENDLESS
+        else:
+            half, table[kn.SPINE], table[kn.RADIUS] = tool.angle / 2, tool.spine, tool.radius
+            table[kn.BLADE], table[kn.HALF_LENGTH] = tool.height, tool.length / 2
+        table[kn.COS], table[kn.SIN] = math.cos(half), math.sin(half)
         table[kn.TILT_COS], table[kn.TILT_SIN] = math.cos(scene.motion.tilt), math.sin(scene.motion.tilt)
         table[kn.YAW_COS], table[kn.YAW_SIN] = math.cos(num.grid_turn), math.sin(num.grid_turn)
         table[kn.GRAVITY] = num.gravity

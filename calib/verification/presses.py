@@ -1,0 +1,105 @@
+"""Foods between board and plate or under a wedge: particles against finite elements, force over stroke."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from calib.verification.rows import Case, Row
+from fem_reference.press import press
+from mpm.material import Material
+from mpm.runtime import Runtime
+from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
+from mpm.shapes import Shape
+from mpm.solver import Simulation
+
+FOOD = Material(E=1e5, nu=0.35, rho=1000.0, loss_factor=0.05)
+"""The loss factor takes the ringing out; its part of the force at this speed is below 0.2 %."""
+MACH = 0.003  # speed of the plate over that of the P-wave
+CELLS = (2e-3, 1e-3)
+STICKS = 9.9  # friction with which nothing slides [-]
+WINDOW = 0.02  # part of the last stroke over which the particles' force is averaged, on either side
+
+
+@dataclass(frozen=True)
+class Test:
+    """A press. Attributes: name; shape; strokes [m]; particles, options of the tool; elements, options of the reference."""
+
+    name: str
+    shape: Shape
+    strokes: tuple[float, ...]
+    half_angle: float = math.pi / 2
+    bonded: bool = False
+    yield_stress: float = math.inf
+    tolerance: float = 0.02
+    reference: tuple[tuple[str, Any], ...] = ()
+    slow: bool = True
+
+
+TESTS = (
+    Test("block, sliding", Shape("block", 0.02, 0.02, 0.02), (0.001, 0.002, 0.004), reference=(("cells", 2),), slow=False),
+    Test("block, bonded", Shape("block", 0.02, 0.02, 0.02), (0.001, 0.002, 0.004), bonded=True, reference=(("cells", 4), ("order", 2))),
+    Test("upright cylinder, bonded", Shape("upright_cylinder", 0.024, 0.024, 0.02), (0.001, 0.002, 0.004), bonded=True, reference=(("cells", 4), ("order", 2))),
+    Test("sphere", Shape("sphere", 0.03, 0.03, 0.03), (0.002, 0.004, 0.006), reference=(("cells", 4), ("order", 2), ("grade", 1.2))),
+    Test("lying cylinder", Shape("cylinder", 0.016, 0.03, 0.03), (0.002, 0.004, 0.006), reference=(("cells", 4), ("order", 2), ("grade", 1.2))),
+    Test("wedge of 140 degrees on a block", Shape("block", 0.03, 0.016, 0.02), (0.001, 0.002, 0.004), half_angle=math.radians(70), reference=(("cells", 8),)),
+    Test("wedge of 140 degrees on a lying cylinder", Shape("cylinder", 0.016, 0.03, 0.03), (0.002, 0.004, 0.006), half_angle=math.radians(70), reference=(("cells", 7), ("grade", 1.2))),
+    Test("block, sliding, J2", Shape("block", 0.02, 0.02, 0.02), (0.001, 0.002, 0.004), yield_stress=8e3, tolerance=0.03, reference=(("cells", 2),)),
+    Test("block, bonded, J2", Shape("block", 0.02, 0.02, 0.02), (0.001, 0.002, 0.004), bonded=True, yield_stress=8e3, tolerance=0.03, reference=(("cells", 4),)),
+)
+
+
+def particles(test: Test, dx: float, *, material: Material = FOOD, mach: float = MACH, seed: int = 0) -> np.ndarray:
+    """Force of the particles at the strokes of a test [N], shape (n,)."""
+    friction = STICKS if test.bonded else 0.0
+    end = test.strokes[-1] * (1 + 2 * WINDOW)
+    scene = Scene(
+        Food(test.shape, replace(material, yield_stress=test.yield_stress)),
+        Press(half_angle=test.half_angle, mu=friction),
+        Motion(end, mach),
+        Board(friction),
+        numerics=Numerics(dx=dx, gravity=0.0, output=end / 400, seed=seed),
+    )
+    record = Simulation(scene, Runtime(threads=1)).run()
+    if record.status != "done":
+        return np.full(len(test.strokes), math.nan)
+    near = WINDOW * test.strokes[-1]
+    return np.array([_at(record.stroke, record.face[:, 2], s, near) for s in test.strokes])
+
+
+def _at(stroke: np.ndarray, force: np.ndarray, s: float, near: float) -> float:
+    """Force at a stroke, from a straight line through what is near it [N]."""
+    on = np.abs(stroke - s) < near
+    return float(np.polyfit(stroke[on] - s, force[on], 1)[1])
+
+
+def compare(test: Test, sizes: Sequence[float]) -> Iterator[Row]:
+    """Rows of one press: the largest error over the strokes, on each grid."""
+    material = replace(FOOD, yield_stress=test.yield_stress)
+    # a law with a memory wants small steps; a wedge's first contact is one row of nodes
+    strokes = sorted({*test.strokes, *(np.arange(1, 9) / 8 * test.strokes[-1])})
+    options = dict(test.reference)
+    curve = press(test.shape, material, strokes, half_angle=test.half_angle, bonded=test.bonded, **options)
+    want = np.interp(test.strokes, curve.stroke, curve.force)
+    misses = []
+    for dx in sizes:
+        got = particles(test, dx)
+        k = int(np.argmax(np.abs(got / want - 1))) if np.isfinite(got).all() else 0
+        misses.append(float(got[k] / want[k] - 1))
+        name = f"{test.name}, dx {dx * 1e3:g} mm"
+        source = f"finite elements of the same law, {curve.unknowns} unknowns"
+        yield Row(name, f"force at {test.strokes[k] * 1e3:g} mm [N]", float(want[k]), float(got[k]), test.tolerance, source)
+
+
+def _case(test: Test) -> Case:
+    def run(quick: bool) -> Iterator[Row]:
+        yield from compare(test, CELLS[:1] if quick else CELLS)
+
+    return Case(f"press: {test.name}", run, fast=not test.slow)
+
+
+CASES = [_case(test) for test in TESTS]

@@ -1,0 +1,71 @@
+"""One line of the verification table, and the list of all cases."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+PARTS = ("laws", "motion", "presses", "cuts", "elements")
+"""Modules with cases, in the order of the table."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One comparison.
+
+    Attributes:
+        case: What is simulated.
+        quantity: What is compared, with its unit.
+        expected: Value of the closed form or the reference; with ``least`` the least value that passes.
+        got: What the solver gives.
+        error: Difference over the expected value, or the difference itself where that is 0 [-].
+        tolerance: Largest error that passes [-].
+        source: Where the expected value comes from.
+        least: Whether more is also right: orders of convergence.
+    """
+
+    case: str
+    quantity: str
+    expected: float
+    got: float
+    tolerance: float
+    source: str
+    least: bool = False
+
+    @property
+    def error(self) -> float:
+        """See the class."""
+        if not np.isfinite(self.got):
+            return float("inf")
+        difference = self.got - self.expected
+        return difference / abs(self.expected) if self.expected else difference
+
+    @property
+    def passed(self) -> bool:
+        """Whether the error is within the tolerance."""
+        return -self.error <= self.tolerance if self.least else abs(self.error) <= self.tolerance
+
+    def as_dict(self) -> dict[str, Any]:
+        """For verify.json."""
+        return {**vars(self), "error": self.error, "passed": self.passed}
+
+
+@dataclass(frozen=True)
+class Case:
+    """A function that makes rows.
+
+    Attributes: name; run, takes whether the coarse, quick version is wanted; fast, whether it belongs to the quick part.
+    """
+
+    name: str
+    run: Callable[[bool], Iterator[Row]]
+    fast: bool = True
+
+
+def cases() -> list[Case]:
+    """All cases in the order of the table."""
+    return [case for part in PARTS for case in importlib.import_module(f"calib.verification.{part}").CASES]

@@ -1,0 +1,255 @@
+"""A solid of finite elements: residual, consistent tangent and equilibrium by Newton's method with a line search."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import pyamg
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+import skfem as sk
+
+from fem_reference.contact import Contact
+from fem_reference.laws import Law, determinant, identity
+from mpm.errors import CutcalError
+
+ELEMENTS = {
+    ("hex", 1): (sk.ElementHex1, 2),
+    ("hex", 2): (sk.ElementHex2, 4),
+    ("tet", 1): (sk.ElementTetP1, 1),
+    ("tet", 2): (sk.ElementTetP2, 2),
+}
+"""Scalar element and order of quadrature by kind of mesh and order."""
+DIRECT = 4_000  # unknowns up to which a sparse factorisation is faster than multigrid
+NEWTON_STEPS = 40
+TOLERANCE = 1e-7  # of the residual over the forces in the solid
+SLOPPY = 1e-6  # residual of a linear solution over that at its start
+CUTS = 10  # halvings of the line search
+
+
+class EquilibriumError(CutcalError):
+    """Newton's method found no equilibrium."""
+
+
+@dataclass
+class Solid:
+    """A meshed body with a material law.
+
+    Args:
+        mesh: Hexahedra or tetrahedra [m].
+        law: Material law.
+        order: Order of the elements, 1 or 2.
+
+    Attributes:
+        nodes: Places of the element's nodes, of second order also those in the middle of edges [m], shape (n, 3).
+        u: Displacements in equilibrium [m], shape (n, 3).
+        state: Memory of the law at the quadrature points, or None.
+        body: Force per reference volume at the quadrature points [N/m^3], shape (3, elements, points), or None.
+        load: Forces on the nodes [N], shape (n, 3).
+        contacts: Pairs of nodes and obstacle.
+        iterations: Linear solutions so far.
+    """
+
+    mesh: sk.Mesh
+    law: Law
+    order: int = 1
+    nodes: np.ndarray = field(init=False)
+    u: np.ndarray = field(init=False)
+    state: np.ndarray | None = field(init=False)
+    body: np.ndarray | None = field(init=False, default=None)
+    load: np.ndarray = field(init=False)
+    contacts: list[Contact] = field(init=False, default_factory=list)
+    iterations: int = field(init=False, default=0)
+
+    def __post_init__(self) -> None:
+        kind = "hex" if isinstance(self.mesh, sk.MeshHex) else "tet"
+        element, points = ELEMENTS[kind, self.order]
+        self.element = element()
+        self.basis = sk.CellBasis(self.mesh, self.element, intorder=points)
+        self.nodes = self.basis.doflocs.T.copy()
+        self.cells = self.basis.element_dofs
+        self.gradients = np.stack([b[0].grad for b in self.basis.basis])  # [function, 3, element, point]
+        self.values = np.stack([b[0].value + np.zeros_like(self.basis.dx) for b in self.basis.basis])
+        self.weights = self.basis.dx
+        self.u, self.load = np.zeros_like(self.nodes), np.zeros_like(self.nodes)
+        self.state = self.law.start(self.weights.shape)
+        self.fixed: dict[int, float] = {}  # unknown (3 node + axis): displacement [m]
+        count = 3 * len(self.cells)
+        unknowns = (3 * self.cells[:, None] + np.arange(3)[:, None]).reshape(count, -1)  # [3 function + axis, element]
+        self._scatter = unknowns
+        self._rows = np.broadcast_to(unknowns[:, None], (count, count, unknowns.shape[1])).ravel()
+        self._columns = np.broadcast_to(unknowns[None], (count, count, unknowns.shape[1])).ravel()
+
+    def hold(self, nodes: np.ndarray, axes: Sequence[int], value: float = 0.0) -> None:
+        """Prescribe the displacement of some nodes along some axes [m]."""
+        for axis in axes:
+            self.fixed |= dict.fromkeys((3 * np.asarray(nodes) + axis).tolist(), value)
+
+    def free(self, nodes: np.ndarray, axes: Sequence[int]) -> None:
+        """Let go of nodes."""
+        for axis in axes:
+            for n in np.asarray(nodes):
+                self.fixed.pop(3 * int(n) + axis, None)
+
+    def areas(self, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes of some facets and the reference area that each stands for [m^2].
+
+        The areas are the integrals of the shape functions; of quadratic tetrahedra only nodes in the middle of edges
+        have one, and with those the sum over the nodes is exact to second order.
+        """
+        basis = sk.FacetBasis(self.mesh, self.element, facets=facets, intorder=2 * self.order)
+        area = np.zeros(len(self.nodes))
+        for b, dofs in zip(basis.basis, basis.element_dofs, strict=True):
+            np.add.at(area, dofs, (b[0].value * basis.dx).sum(axis=1))
+        nodes = np.flatnonzero(area > 1e-9 * area.max())
+        return nodes, area[nodes]
+
+    def deformation(self, u: np.ndarray) -> np.ndarray:
+        """Deformation gradients [3, 3, element, point]."""
+        local = u[self.cells]  # [function, element, 3]
+        return np.einsum("aei,ajeq->ijeq", local, self.gradients, optimize=True) + identity(self.weights.shape)
+
+    def forces(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+        """Internal forces less body forces on the nodes [N], shape (n, 3), and the state after the step."""
+        p, state = self.law.stress(self.deformation(u), self.state)
+        local = np.einsum("ijeq,ajeq->aie", p * self.weights, self.gradients, optimize=True)
+        if self.body is not None:
+            local -= np.einsum("aeq,ieq->aie", self.values, self.body * self.weights, optimize=True)
+        flat = np.bincount(self._scatter.ravel(), local.reshape(self._scatter.shape).ravel(), 3 * len(self.nodes))
+        return flat.reshape(-1, 3), state
+
+    def stiffness(self, u: np.ndarray) -> sp.csr_matrix:
+        """Consistent tangent [N/m]."""
+        a = self.law.tangent(self.deformation(u), self.state) * self.weights
+        half = np.einsum("ijkleq,bleq->ijkbeq", a, self.gradients, optimize=True)
+        local = np.einsum("ajeq,ijkbeq->aibke", self.gradients, half, optimize=True)
+        size = 3 * len(self.nodes)
+        return sp.coo_matrix((local.ravel(), (self._rows, self._columns)), shape=(size, size)).tocsr()
+
+    def residual(self, u: np.ndarray) -> tuple[np.ndarray, float]:
+        """Forces out of balance [N], shape (3 n,), and the size of those in the solid [N]."""
+        inner, _ = self.forces(u)
+        out = inner - self.load
+        for contact in self.contacts:
+            np.add.at(out, contact.nodes, -contact.force(self.nodes + u))
+        return out.ravel(), float(np.linalg.norm(inner)) + float(np.linalg.norm(self.load))
+
+    def solve(self) -> None:
+        """Bring ``u`` and ``state`` to equilibrium with what is held, loaded and touched.
+
+        Contact pressures are multipliers that are renewed until the obstacles are penetrated by less than their
+        tolerance (augmented Lagrangian, Simo and Laursen 1992).
+
+        Raises:
+            EquilibriumError: No equilibrium in reach; ``u`` and ``state`` are those before the call.
+        """
+        before = self.u.copy(), [c.pressure.copy() for c in self.contacts]
+        try:
+            u = self._newton(self._held(self.u))
+            for _ in range(NEWTON_STEPS):
+                if not [c for c in self.contacts if not c.settle(self.nodes + u)]:
+                    break
+                u = self._newton(u)
+        except EquilibriumError:
+            self.u = before[0]
+            for contact, pressure in zip(self.contacts, before[1], strict=True):
+                contact.pressure = pressure
+            raise
+        self.u, (_, self.state) = u, self.forces(u)
+
+    def reaction(self, nodes: np.ndarray) -> np.ndarray:
+        """Force of what holds or touches some nodes [N], shape (3,)."""
+        inner, _ = self.forces(self.u)
+        return (inner - self.load)[nodes].sum(axis=0)
+
+    def _held(self, u: np.ndarray) -> np.ndarray:
+        """Displacements with the prescribed ones put in; the others follow as an elastic solid would."""
+        index = np.fromiter(self.fixed, int, len(self.fixed))
+        change = np.fromiter(self.fixed.values(), float, len(self.fixed)) - u.ravel()[index]
+        if not np.abs(change).max(initial=0.0) > 0:
+            return u.copy()
+        k = self._contact_stiffness(self.stiffness(u), u)
+        free = np.setdiff1d(np.arange(u.size), index)
+        residual, _ = self.residual(u)
+        step = np.zeros(u.size)
+        step[index] = change
+        step[free] = self._linear(k[free][:, free], -(residual[free] + k[free][:, index] @ change), free)
+        for _ in range(CUTS):
+            new = u + step.reshape(-1, 3)
+            if (determinant(self.deformation(new)) > 0).all():
+                return new
+            step[free] *= 0.5
+        raise EquilibriumError(
+            "finite elements: the prescribed displacement turns elements inside out; use smaller steps"
+        )
+
+    def _newton(self, u: np.ndarray) -> np.ndarray:
+        index = np.fromiter(self.fixed, int, len(self.fixed))
+        free = np.setdiff1d(np.arange(u.size), index)
+        residual, scale = self.residual(u)
+        for _ in range(NEWTON_STEPS):
+            size = float(np.linalg.norm(residual[free]))
+            if size <= TOLERANCE * scale:
+                return u
+            k = self._contact_stiffness(self.stiffness(u), u)
+            step = np.zeros(u.size)
+            step[free] = self._linear(k[free][:, free], -residual[free], free)
+            u, residual, scale = self._search(u, step, free, size)
+        raise EquilibriumError(
+            f"finite elements: forces out of balance by {size / max(scale, 1e-300):.1e} of those in the solid after "
+            f"{NEWTON_STEPS} steps; use smaller load steps or a finer mesh"
+        )
+
+    def _search(
+        self, u: np.ndarray, step: np.ndarray, free: np.ndarray, size: float
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """The longest of the halved steps that turns no element inside out and does not lose balance."""
+        part = 1.0
+        for _ in range(CUTS):
+            new = u + part * step.reshape(-1, 3)
+            if (determinant(self.deformation(new)) > 0).all():
+                residual, scale = self.residual(new)
+                # contacts that come and go may raise the residual for one step
+                if np.linalg.norm(residual[free]) < (2.0 if self.contacts else 1.0) * size or part < 0.01:
+                    return new, residual, scale
+            part *= 0.5
+        raise EquilibriumError("finite elements: no step along Newton's direction reduces the forces out of balance")
+
+    def _contact_stiffness(self, k: sp.csr_matrix, u: np.ndarray) -> sp.csr_matrix:
+        for contact in self.contacts:
+            nodes, blocks = contact.stiffness(self.nodes + u)
+            rows = 3 * nodes[:, None, None] + np.arange(3)[:, None] + np.zeros((1, 3), int)
+            columns = np.swapaxes(rows, 1, 2)
+            k = k + sp.coo_matrix((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=k.shape).tocsr()
+        return k
+
+    def _linear(self, k: sp.csr_matrix, b: np.ndarray, free: np.ndarray) -> np.ndarray:
+        """Solution of K x = b: factorised when small, else by multigrid with the rigid-body modes."""
+        self.iterations += 1
+        if len(b) <= DIRECT:
+            return _factorised(k, b)
+        x, y, z = (self.nodes + self.u).T
+        modes = np.zeros((len(self.nodes), 3, 6))
+        modes[:, [0, 1, 2], [0, 1, 2]] = 1.0
+        modes[:, 0, 3], modes[:, 1, 3] = -y, x
+        modes[:, 1, 4], modes[:, 2, 4] = -z, y
+        modes[:, 2, 5], modes[:, 0, 5] = -x, z
+        method = "symmetric" if self.law.symmetric else "nonsymmetric"
+        solver = pyamg.smoothed_aggregation_solver(k.tocsr(), B=modes.reshape(-1, 6)[free], symmetry=method)
+        history: list[float] = []
+        accelerate = "cg" if self.law.symmetric else "gmres"
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of a matrix that is not positive definite: solved directly
+            out = solver.solve(b, tol=SLOPPY, maxiter=200, accel=accelerate, residuals=history)
+        if not history[-1] <= 10 * SLOPPY * history[0]:
+            return _factorised(k, b)
+        return out
+
+
+def _factorised(k: sp.csr_matrix, b: np.ndarray) -> np.ndarray:
+    """Solution of K x = b by a factorisation that uses the symmetric pattern of K."""
+    order = {"permc_spec": "MMD_AT_PLUS_A", "options": {"SymmetricMode": True}}
+    return spl.splu(k.tocsc(), diag_pivot_thresh=0.01, **order).solve(b)
