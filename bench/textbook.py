@@ -16,7 +16,7 @@ import taichi as ti
 from mpm.contact import blade_distance, coulomb
 from mpm.errors import SceneError
 from mpm.runtime import Runtime, start
-from mpm.scene import Scene
+from mpm.scene import Knife, Scene
 from mpm.seeding import seed
 
 BOTTOM = 4  # index of the nodes on the board
@@ -82,6 +82,8 @@ class Textbook:
         self.eps0 = THRESHOLD if m.tensile_strength is None else m.tensile_strength / m.E
         self.friction, self.speed = m.mu, speed
         self.top, self.middle = BOTTOM * dx + shape.height, nodes * dx / 2
+        if not isinstance(knife, Knife):
+            raise SceneError("textbook: cuts with a knife; this scene has a press")
         self.spine, self.cos, self.sin = knife.spine, math.cos(knife.angle / 2), math.sin(knife.angle / 2)
         self.height, self.board, self.gravity = knife.height, scene.board.mu, scene.numerics.gravity
         self.x, self.v = ti.Vector.field(3, real, self.n), ti.Vector.field(3, real, self.n)

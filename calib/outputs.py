@@ -17,6 +17,8 @@ MARKS = (
     "material.yaml",
     "curves.csv",
     "converge.json",
+    "stress.json",
+    "verify.json",
     "report.pdf",
     "force.csv",
     "evaluations.h5",

@@ -84,15 +84,9 @@ class Trial(Simulation):
         return self.cell.step * super()._time_step(material)
 
     def _load(self, material: Material) -> None:
-        """Fields of a cut, changed as the start says.
-
-        The grid is cleared: nodes that no particle has reached yet still hold what the run before left there, and where the
-        food is not under the blade the edge would feel that.
-        """
+        """Fields of a cut, changed as the start says."""
         super()._load(material)
         s, k = self.cell.start, self.k
-        k.g.fill(0.0)
-        k.u.fill(0.0)
         if s.lift or s.squeeze != 1:
             x = k.x.to_numpy()
             k.x.from_numpy(x * s.squeeze + np.array([0.0, 0.0, s.lift], x.dtype))

@@ -9,6 +9,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 import skfem as sk
+from skfem.io.meshio import from_meshio
 
 from mpm.errors import CutcalError
 from mpm.shapes import Shape
@@ -50,7 +51,9 @@ def _straight(shape: Shape, cells: int, grade: float) -> sk.MeshHex:
     a, b, h = shape.width / 2, shape.length / 2, shape.height / 2
     if shape.kind == "block":
         count = [max(2, round(cells * size / h)) for size in (a, b)]
-        return box(np.linspace(0, a, count[0] + 1), np.linspace(0, b, count[1] + 1), np.linspace(0, 2 * h, 2 * cells + 1))
+        return box(
+            np.linspace(0, a, count[0] + 1), np.linspace(0, b, count[1] + 1), np.linspace(0, 2 * h, 2 * cells + 1)
+        )
     if shape.kind == "upright_cylinder":
         layers = np.linspace(0, 2 * h, 2 * cells + 1)
         return _join(_disc(cells, grade, lambda p: p * [a, b], lambda p, s: np.stack([p[0], p[1], s]), layers))
@@ -64,6 +67,12 @@ def _straight(shape: Shape, cells: int, grade: float) -> sk.MeshHex:
     raise MeshError(f"mesh: no finite-element mesh of a {shape.kind}; give a mesh file, or use a block or cylinder")
 
 
+def bent(x: np.ndarray, y: np.ndarray, z: np.ndarray, to: Map) -> sk.MeshHex2:
+    """A block with nodes at these places along each axis, mapped (3, n) to (3, n) into elements with curved edges."""
+    mesh = sk.MeshHex2.from_mesh(box(x, y, z))
+    return replace(mesh, doflocs=to(mesh.doflocs))
+
+
 def read(path: Path | str) -> sk.Mesh:
     """Mesh of hexahedra or tetrahedra from any file that meshio reads, lengths in metres.
 
@@ -71,9 +80,11 @@ def read(path: Path | str) -> sk.Mesh:
         MeshError: No such file, no volume elements, or elements turned inside out.
     """
     try:
-        mesh = sk.Mesh.from_meshio(meshio.read(path))
+        mesh = from_meshio(meshio.read(path))
     except (OSError, meshio.ReadError, SystemExit, KeyError, ValueError) as e:
-        raise MeshError(f"{path}: cannot read a mesh from it ({e}); give a file that meshio reads, e.g. .msh or .vtu") from e
+        raise MeshError(
+            f"{path}: cannot read a mesh from it ({e}); give a file that meshio reads, e.g. .msh or .vtu"
+        ) from e
     if not isinstance(mesh, (sk.MeshHex, sk.MeshTet)):
         raise MeshError(f"{path}: holds {type(mesh).__name__}, not hexahedra or tetrahedra; export the volume elements")
     return mesh
@@ -158,7 +169,7 @@ def _rounded(mesh: sk.MeshHex, shape: Shape) -> sk.MeshHex2:
     """Quadratic elements whose nodes on round outer faces lie on the outline."""
     out = sk.MeshHex2.from_mesh(mesh)
     radii = np.array([shape.width, shape.length, shape.height])[:, None] / 2
-    round_axes = {"upright_cylinder": [0, 1], "cylinder": [0, 2]}.get(shape.kind, [0, 1, 2])
+    round_axes = np.array({"upright_cylinder": [0, 1], "cylinder": [0, 2]}.get(shape.kind, [0, 1, 2]))
     at = out.doflocs.copy()
     at[2] -= shape.height / 2
 
@@ -188,7 +199,9 @@ def _join(meshes: Sequence[sk.MeshHex]) -> sk.MeshHex:
     first = np.cumsum([0, *(m.p.shape[1] for m in meshes)])
     cells = np.concatenate([m.t + k for m, k in zip(meshes, first, strict=False)], axis=1)
     size = np.ptp(points, axis=1).max()
-    _, keep, same = np.unique(np.round(points / (MERGE * size)).astype(np.int64), axis=1, return_index=True, return_inverse=True)
+    _, keep, same = np.unique(
+        np.round(points / (MERGE * size)).astype(np.int64), axis=1, return_index=True, return_inverse=True
+    )
     cells, points = np.ravel(same)[cells], points[:, keep]
     a, b, c, d = (points[:, cells[k]] for k in (0, 1, 2, 3))
     wrong = np.einsum("ij,ij->j", np.cross(c - a, b - a, axis=0), d - a) < 0

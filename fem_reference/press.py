@@ -90,7 +90,8 @@ def press(
         solid.hold(np.flatnonzero(np.abs(place) < near), [axis])
     ends = [np.flatnonzero(np.abs(z - level) < near) for level in (0.0, h)]
     penalty, tolerance = STIFF * material.E / size, SHARP * size
-    tool: Obstacle = Plane((0, 0, h), (0, 0, -1)) if half_angle == math.pi / 2 else Wedge(h, half_angle)
+    plate, wedge = Plane((0, 0, h), (0, 0, -1)), Wedge(h, half_angle)
+    tool: Obstacle = plate if half_angle == math.pi / 2 else wedge
     if bonded:
         solid.hold(ends[0], [0, 1, 2])
         solid.hold(ends[1], [0, 1])
@@ -107,10 +108,7 @@ def press(
     def to(way: float) -> None:
         if bonded:
             solid.hold(ends[1], [2], -way)
-        elif isinstance(tool, Plane):
-            tool.point = (0.0, 0.0, h - way)
-        else:
-            tool.height = h - way
+        plate.point, wedge.height = (0.0, 0.0, h - way), h - way
         solid.solve()
 
     rows: list[tuple[float, float, float, float]] = []
@@ -128,7 +126,8 @@ def press(
         rows.append((way, 4 * force, 4 * board, max((c.penetration(at) for c in solid.contacts), default=0.0)))
         if progress is not None:
             progress(len(rows) / len(strokes), 4 * force)
-    return Curve(*np.array(rows).T, unknowns=solid.u.size)
+    stroke, forces, boards, deepest = np.array(rows).T
+    return Curve(stroke, forces, boards, deepest, solid.u.size)
 
 
 def _advance(to: Callable[[float], None], done: float, way: float, halvings: int = HALVINGS) -> None:

@@ -28,6 +28,8 @@ NEWTON_STEPS = 40
 TOLERANCE = 1e-7  # of the residual over the forces in the solid
 SLOPPY = 1e-6  # residual of a linear solution over that at its start
 CUTS = 10  # halvings of the line search
+ENOUGH = 0.9  # work of the forces out of balance after a step over that before it
+LEAST = 0.1  # part of a step that is taken even so, as where contacts come and go
 
 
 class EquilibriumError(CutcalError):
@@ -72,7 +74,7 @@ class Solid:
         self.nodes = self.basis.doflocs.T.copy()
         self.cells = self.basis.element_dofs
         self.gradients = np.stack([b[0].grad for b in self.basis.basis])  # [function, 3, element, point]
-        self.values = np.stack([b[0].value + np.zeros_like(self.basis.dx) for b in self.basis.basis])
+        self.values = np.stack([b[0] + np.zeros_like(self.basis.dx) for b in self.basis.basis])
         self.weights = self.basis.dx
         self.u, self.load = np.zeros_like(self.nodes), np.zeros_like(self.nodes)
         self.state = self.law.start(self.weights.shape)
@@ -103,9 +105,20 @@ class Solid:
         basis = sk.FacetBasis(self.mesh, self.element, facets=facets, intorder=2 * self.order)
         area = np.zeros(len(self.nodes))
         for b, dofs in zip(basis.basis, basis.element_dofs, strict=True):
-            np.add.at(area, dofs, (b[0].value * basis.dx).sum(axis=1))
+            np.add.at(area, dofs, (b[0] * basis.dx).sum(axis=1))
         nodes = np.flatnonzero(area > 1e-9 * area.max())
         return nodes, area[nodes]
+
+    def press(self, facets: np.ndarray, pressure: float) -> None:
+        """Add a pressure on the undeformed facets to the load [Pa]."""
+        basis = sk.FacetBasis(self.mesh, self.element, facets=facets, intorder=2 * self.order)
+        for b, dofs in zip(basis.basis, basis.element_dofs, strict=True):
+            share = -pressure * (b[0] * np.asarray(basis.normals) * basis.dx).sum(axis=2)
+            np.add.at(self.load, dofs, share.T)
+
+    def project(self, values: np.ndarray) -> np.ndarray:
+        """Values at the nodes, shape (n,), nearest in the mean square to those at the quadrature points."""
+        return self.basis.project(values)
 
     def deformation(self, u: np.ndarray) -> np.ndarray:
         """Deformation gradients [3, 3, element, point]."""
@@ -197,26 +210,25 @@ class Solid:
             k = self._contact_stiffness(self.stiffness(u), u)
             step = np.zeros(u.size)
             step[free] = self._linear(k[free][:, free], -residual[free], free)
-            u, residual, scale = self._search(u, step, free, size)
+            u = self._search(u, step, free, residual)
+            residual, scale = self.residual(u)
         raise EquilibriumError(
             f"finite elements: forces out of balance by {size / max(scale, 1e-300):.1e} of those in the solid after "
             f"{NEWTON_STEPS} steps; use smaller load steps or a finer mesh"
         )
 
-    def _search(
-        self, u: np.ndarray, step: np.ndarray, free: np.ndarray, size: float
-    ) -> tuple[np.ndarray, np.ndarray, float]:
-        """The longest of the halved steps that turns no element inside out and does not lose balance."""
-        part = 1.0
+    def _search(self, u: np.ndarray, step: np.ndarray, free: np.ndarray, residual: np.ndarray) -> np.ndarray:
+        """The longest of the halved steps that turns no element inside out and along which the forces out of balance
+        do less work than at its start (Matthies and Strang 1979)."""
+        work, part = abs(float(residual[free] @ step[free])), 1.0
         for _ in range(CUTS):
             new = u + part * step.reshape(-1, 3)
             if (determinant(self.deformation(new)) > 0).all():
-                residual, scale = self.residual(new)
-                # contacts that come and go may raise the residual for one step
-                if np.linalg.norm(residual[free]) < (2.0 if self.contacts else 1.0) * size or part < 0.01:
-                    return new, residual, scale
+                after, _ = self.residual(new)
+                if abs(float(after[free] @ step[free])) <= ENOUGH * work or part < LEAST:
+                    return new
             part *= 0.5
-        raise EquilibriumError("finite elements: no step along Newton's direction reduces the forces out of balance")
+        raise EquilibriumError("finite elements: Newton's direction turns elements inside out; use smaller load steps")
 
     def _contact_stiffness(self, k: sp.csr_matrix, u: np.ndarray) -> sp.csr_matrix:
         for contact in self.contacts:

@@ -117,7 +117,9 @@ class FreeBody:
         """Add a velocity to all particles [m/s], shape (3,)."""
         self._k.v.from_numpy(self.v + velocity)
 
-    def step(self, count: int = 1, *, dt: float | None = None, pull: Callable[[float], np.ndarray] | None = None) -> None:
+    def step(
+        self, count: int = 1, *, dt: float | None = None, pull: Callable[[float], np.ndarray] | None = None
+    ) -> None:
         """Advance some time steps.
 
         Args:
@@ -139,4 +141,6 @@ class FreeBody:
             self.impulse += sums[kn.BOARD : kn.BOARD + 3]
             reason = _health(sums, self._state)
             if reason != "done":
-                raise SimulationError(f"the free body stopped at {self.time:.3g} s: {reason}", reason=reason, fraction=0.0)
+                raise SimulationError(
+                    f"the free body stopped at {self.time:.3g} s: {reason}", reason=reason, fraction=0.0
+                )

@@ -91,7 +91,7 @@ class Edge(Nodes):
             level = self.par[R_START] * size / self.par[DEPTH]
             if level >= self.par[R_START] or (self.near[i] > 0 and level >= flesh):
                 self.start[i] = ti.max(level, 1e-9)
-                e *= limit / size
+                e *= limit / ti.max(size, 1e-30)  # without resistance a cut starts before the edge has slipped
         else:
             if size > limit:
                 self.cut[i] += (size - limit) * steep

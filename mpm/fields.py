@@ -121,6 +121,8 @@ class Fields:
         for b, r in self.F:
             for lane in ti.static(range(self.lanes)):
                 self.F[b, r][lane] = 1.0 if r % 4 == 0 else 0.0
+        for i, j, k in self.u:  # the edge also looks at nodes that no particle has reached yet
+            self.u[i, j, k] = ti.Vector.zero(float, 4)
         for p in self.kappa:
             self.kappa[p] = 0.0
             self.strain[p] = 0.0

@@ -255,7 +255,9 @@ class Scene:
     def _check_motion(self) -> None:
         m, height = self.motion, self.food.shape.height
         if not self.cuts and (m.tilt != 0 or self.numerics.contact != "cohesive"):
-            raise SceneError("knife: a press is level and touches particles; leave out motion.tilt and numerics.contact")
+            raise SceneError(
+                "knife: a press is level and touches particles; leave out motion.tilt and numerics.contact"
+            )
         if m.stroke + self.drop > height * (1 + 1e-9) and (self.arm.rigid or m.tilt != 0):
             raise SceneError(
                 f"motion: stroke {m.stroke * 1e3:g} mm goes below the board; the food is {height * 1e3:g} mm high"

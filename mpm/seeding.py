@@ -11,6 +11,10 @@ from mpm.scene import Scene
 from mpm.shapes import inside, surface, volume
 
 MAX_PARTICLES = 20_000_000
+JITTER = 0.5
+"""Part of its lattice cell in which a particle may lie. The noise of the sum over particles makes a solid softer: with
+the whole cell a bar of 26 cells swings 1.3 % slower than sqrt(E / rho) says, with half of it 0.5 %, on a lattice 0.15 %;
+but particles on a lattice feel where the blade is against them."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,7 @@ def seed(scene: Scene) -> Seeds:
     origin = np.array([low[0], (right - counts[1]) * h, 0.0])
     cells = np.stack(np.meshgrid(*[np.arange(n) for n in counts], indexing="ij"), -1).reshape(-1, 3)
     rng = np.random.default_rng(num.seed)
-    points = origin + (cells + rng.uniform(0.0, 1.0, cells.shape)) * h
+    points = origin + (cells + 0.5 + JITTER * rng.uniform(-0.5, 0.5, cells.shape)) * h
     there = inside(shape, points)
     points, cells = points[there], cells[there] - [0, counts[1] - right, 0]
     bottom, top = surface(shape, points[:, 0], points[:, 1])

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 
 import calib
-from calib.cli import bench, calibrate, converge, foods, predict, report, simulate, stress
+from calib.cli import bench, calibrate, converge, foods, predict, report, simulate, stress, verify
 from mpm.errors import CutcalError
 
 COMMANDS = {
@@ -17,6 +17,7 @@ COMMANDS = {
     "stress": stress,
     "predict": predict,
     "simulate": simulate,
+    "verify": verify,
     "report": report,
     "foods": foods,
 }

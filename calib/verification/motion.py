@@ -30,19 +30,50 @@ def numerics(dx: float = DX, gravity: float = 0.0, room: float = 0.5, safety: fl
 def conserved(quick: bool) -> Iterator[Row]:
     """A block that spins and stretches keeps its momenta; an affine velocity is transferred unchanged."""
     body = FreeBody(
-        BLOCK, SOFT, numerics(), velocity=lambda x: (x - [0, 0, BLOCK.height / 2]) @ SHEAR.T + 0.02, slope=lambda x: np.tile(SHEAR, (len(x), 1, 1))
+        BLOCK,
+        SOFT,
+        numerics(),
+        velocity=lambda x: (x - [0, 0, BLOCK.height / 2]) @ SHEAR.T + 0.02,
+        slope=lambda x: np.tile(SHEAR, (len(x), 1, 1)),
     )
     v0, l0 = body.v, body.spin()
     p0 = body.mass * v0.sum(axis=0)
-    middle = (np.abs(body.start - [0, 0, BLOCK.height / 2]) < np.array([BLOCK.width, BLOCK.length, BLOCK.height]) / 2 - 1.6 * DX)
+    middle = (
+        np.abs(body.start - [0, 0, BLOCK.height / 2])
+        < np.array([BLOCK.width, BLOCK.length, BLOCK.height]) / 2 - 1.6 * DX
+    )
     inner = middle.all(axis=1)
     body.step(1, dt=1e-9)  # so short that no stress has grown
-    miss = max(np.abs(body.v - v0)[inner].max() / np.abs(v0).max(), np.abs(body.gradient - SHEAR)[inner].max() / np.abs(SHEAR).max())
-    yield Row("affine patch", "largest error of v and of its gradient [-]", 0.0, float(miss), 1e-6, "exact transfer of affine fields")
+    miss = max(
+        np.abs(body.v - v0)[inner].max() / np.abs(v0).max(),
+        np.abs(body.gradient - SHEAR)[inner].max() / np.abs(SHEAR).max(),
+    )
+    yield Row(
+        "affine patch",
+        "largest error of v and of its gradient [-]",
+        0.0,
+        float(miss),
+        1e-6,
+        "exact transfer of affine fields",
+    )
     body.step(50 if quick else 150)
-    p, l = body.mass * body.v.sum(axis=0), body.spin()
-    yield Row("free block, momentum", "change over its size [-]", 0.0, float(np.abs(p - p0).max() / np.abs(p0).max()), 1e-11, "Newton")
-    yield Row("free block, angular momentum", "change over its size [-]", 0.0, float(np.abs(l - l0).max() / np.abs(l0).max()), 1e-10, "Euler; affine transfers keep it (Jiang et al. 2015)")
+    p, turn = body.mass * body.v.sum(axis=0), body.spin()
+    yield Row(
+        "free block, momentum",
+        "change over its size [-]",
+        0.0,
+        float(np.abs(p - p0).max() / np.abs(p0).max()),
+        1e-11,
+        "Newton",
+    )
+    yield Row(
+        "free block, angular momentum",
+        "change over its size [-]",
+        0.0,
+        float(np.abs(turn - l0).max() / np.abs(l0).max()),
+        1e-10,
+        "Euler; affine transfers keep it (Jiang et al. 2015)",
+    )
 
 
 def spinning(quick: bool) -> Iterator[Row]:
@@ -50,11 +81,15 @@ def spinning(quick: bool) -> Iterator[Row]:
     omega = 100.0
     turn = np.array([[0, -omega, 0], [omega, 0, 0], [0, 0, 0.0]])
     stiff = Material(E=1e7, nu=0.3, rho=1000.0)
-    body = FreeBody(BLOCK, stiff, numerics(), velocity=lambda x: x @ turn.T, slope=lambda x: np.tile(turn, (len(x), 1, 1)))
+    body = FreeBody(
+        BLOCK, stiff, numerics(), velocity=lambda x: x @ turn.T, slope=lambda x: np.tile(turn, (len(x), 1, 1))
+    )
     steps = math.ceil((0.02 if quick else 0.1) * 2 * math.pi / omega / body.dt)
     energy = body.mass * 0.5 * (body.v**2).sum()
     body.step(steps)
-    radius = np.hypot(*(body.x[:, :2] - body.x[:, :2].mean(axis=0)).T) / np.hypot(*(body.start[:, :2] - body.start[:, :2].mean(axis=0)).T)
+    radius = np.hypot(*(body.x[:, :2] - body.x[:, :2].mean(axis=0)).T) / np.hypot(
+        *(body.start[:, :2] - body.start[:, :2].mean(axis=0)).T
+    )
     # centrifugal strain rho omega^2 r^2 / E is below 1e-3
     yield Row("rigid spin", "mean radius over that at the start [-]", 1.0, float(radius.mean()), 2e-3, "rigid motion")
     yield Row("rigid spin, elastic energy", "over kinetic energy [-]", 0.0, body.elastic / energy, 0.01, "rigid motion")
@@ -66,7 +101,9 @@ def falling(quick: bool) -> Iterator[Row]:
     n = 50
     body.step(n)
     fall = float((body.start - body.x)[:, 2].mean())
-    yield Row("free fall", "way [m]", 9.81 * body.dt**2 * n * (n + 1) / 2, fall, 1e-9, "symplectic sum g dt^2 n (n + 1) / 2")
+    yield Row(
+        "free fall", "way [m]", 9.81 * body.dt**2 * n * (n + 1) / 2, fall, 1e-9, "symplectic sum g dt^2 n (n + 1) / 2"
+    )
 
 
 def vibrating(quick: bool) -> Iterator[Row]:
@@ -76,14 +113,29 @@ def vibrating(quick: bool) -> Iterator[Row]:
     not with the cells: the period is 1 % long with 8 particles a cell and 0.3 % with 27.
     """
     period, loss = _swing(3e-3, 3, 2)
-    yield Row("free bar of 26 cells, 27 particles a cell", *period, 0.005, "2 L / sqrt(E / rho), nu = 0 (de Vaucorbeil et al. 2020)")
+    yield Row(
+        "free bar of 26 cells, 27 particles a cell",
+        *period,
+        0.005,
+        "2 L / sqrt(E / rho), nu = 0 (de Vaucorbeil et al. 2020)",
+    )
     if quick:
         return
     coarse = _swing(3e-3, 2, 4)
     period, loss = _swing(1.5e-3, 2, 4)
     yield Row("free bar of 52 cells, 8 particles a cell", *period, 0.02, "2 L / sqrt(E / rho), nu = 0")
-    yield Row("free bar of 52 cells", "loss of amplitude in a period [-]", 0.0, loss, 0.02, "undamped; the transfer damps")
-    yield Row("free bar, 26 over 52 cells", "ratio of the losses [-]", 2.0, coarse[1] / loss, 0.0, "the transfer's damping is of first order", least=True)
+    yield Row(
+        "free bar of 52 cells", "loss of amplitude in a period [-]", 0.0, loss, 0.02, "undamped; the transfer damps"
+    )
+    yield Row(
+        "free bar, 26 over 52 cells",
+        "ratio of the losses [-]",
+        2.0,
+        coarse[1] / loss,
+        0.0,
+        "the transfer's damping is of first order",
+        least=True,
+    )
 
 
 def _swing(dx: float, ppc: int, swings: int) -> tuple[tuple[str, float, float], float]:
@@ -116,8 +168,23 @@ def turning(quick: bool) -> Iterator[Row]:
     miss = [vortex.errors(n, angle=0.1) for n in cells]
     order = math.log(miss[0][0] / miss[-1][0]) / math.log(cells[-1] / cells[0])
     source = "generalised vortex (Kamojjala et al. 2015) with the corotated law"
-    yield Row(f"vortex, {cells[0]} to {cells[-1]} cells across the ring", "order of the error of place [-]", 1.0, order, 0.0, source, least=True)
-    yield Row(f"vortex, {cells[-1]} cells across the ring", "largest error over the ring's radius [-]", 0.0, miss[-1][1], 0.03, source)
+    yield Row(
+        f"vortex, {cells[0]} to {cells[-1]} cells across the ring",
+        "order of the error of place [-]",
+        1.0,
+        order,
+        0.0,
+        source,
+        least=True,
+    )
+    yield Row(
+        f"vortex, {cells[-1]} cells across the ring",
+        "largest error over the ring's radius [-]",
+        0.0,
+        miss[-1][1],
+        0.03,
+        source,
+    )
 
 
 def wave(quick: bool) -> Iterator[Row]:
@@ -127,13 +194,26 @@ def wave(quick: bool) -> Iterator[Row]:
     c = math.sqrt(SOFT.E / SOFT.rho)
     dx = 2e-3
     way = 1.6 * bar.height * mach
-    scene = Scene(Food(bar, SOFT), Press(), Motion(max(way, 1e-4), mach), Board(0.0), numerics=Numerics(dx=dx, gravity=0.0, output=way / 400, safety=0.5))
+    scene = Scene(
+        Food(bar, SOFT),
+        Press(),
+        Motion(max(way, 1e-4), mach),
+        Board(0.0),
+        numerics=Numerics(dx=dx, gravity=0.0, output=way / 400, safety=0.5),
+    )
     record = Simulation(scene, Runtime(threads=1)).run()
     f, t = record.face[:, 2], record.time
     begun = t[np.argmax(f > 0.3 * f.max())]
     plateau = f[(t - begun > 0.3 * bar.height / c) & (t - begun < 0.9 * bar.height / c)].mean()
     area = bar.width * bar.length
-    yield Row("plate hits a bar", "force until the wave is back [N]", SOFT.rho * c * mach * c * area, float(plateau), 0.02, "rho c v A, nu = 0")
+    yield Row(
+        "plate hits a bar",
+        "force until the wave is back [N]",
+        SOFT.rho * c * mach * c * area,
+        float(plateau),
+        0.02,
+        "rho c v A, nu = 0",
+    )
     b = -record.board[:, 2]
     arrival = t[np.argmax(b > f.max() * 0.5)] - begun
     yield Row("plate hits a bar, arrival at the board", "time [s]", bar.height / c, float(arrival), 0.05, "L / c")
@@ -148,9 +228,22 @@ def resting(quick: bool) -> Iterator[Row]:
     before, since = body.impulse.copy(), body.time
     body.step(math.ceil(4 * period / body.dt))
     weight = damped.rho * BLOCK.width * BLOCK.length * BLOCK.height * 9.81
-    yield Row("block at rest", "force on the board [N]", -weight, float((body.impulse - before)[2] / (body.time - since)), 0.005, "m g")
+    yield Row(
+        "block at rest",
+        "force on the board [N]",
+        -weight,
+        float((body.impulse - before)[2] / (body.time - since)),
+        0.005,
+        "m g",
+    )
     mu, v0 = 0.4, 0.15
-    slide = FreeBody(BLOCK, damped, numerics(gravity=9.81, room=1.0), board=mu, velocity=lambda x: np.tile([0.0 * v0, 0.0, 0.0], (len(x), 1)))
+    slide = FreeBody(
+        BLOCK,
+        damped,
+        numerics(gravity=9.81, room=1.0),
+        board=mu,
+        velocity=lambda x: np.tile([0.0 * v0, 0.0, 0.0], (len(x), 1)),
+    )
     slide.step(math.ceil(6 * period / slide.dt))
     slide.kick(np.array([v0, 0.0, 0.0]))
     slide.step(math.ceil(2 * period / slide.dt))
@@ -163,7 +256,14 @@ def resting(quick: bool) -> Iterator[Row]:
 def bouncing(quick: bool) -> Iterator[Row]:
     """A ball bounces back from the board."""
     ball = Shape("sphere", 0.03, 0.03, 0.03)
-    body = FreeBody(ball, Material(E=1e5, nu=0.3, rho=1000.0), numerics(1.5e-3 if not quick else 2e-3), board=0.0, lift=1e-3, velocity=lambda x: np.tile([0.0, 0.0, -0.3], (len(x), 1)))
+    body = FreeBody(
+        ball,
+        Material(E=1e5, nu=0.3, rho=1000.0),
+        numerics(1.5e-3 if not quick else 2e-3),
+        board=0.0,
+        lift=1e-3,
+        velocity=lambda x: np.tile([0.0, 0.0, -0.3], (len(x), 1)),
+    )
     start = body.kinetic
     body.step(1)
     start = body.kinetic
@@ -172,7 +272,15 @@ def bouncing(quick: bool) -> Iterator[Row]:
         up = float(body.v[:, 2].mean())
         if up > 0 and body.x[:, 2].min() > 1.5e-3:
             break
-    yield Row("ball bounces", "speed after over before [-]", 0.9, up / 0.3, 0.0, "elastic impact: above 0.9 (Sulsky et al. 1994)", least=True)
+    yield Row(
+        "ball bounces",
+        "speed after over before [-]",
+        0.9,
+        up / 0.3,
+        0.0,
+        "elastic impact: above 0.9 (Sulsky et al. 1994)",
+        least=True,
+    )
     energy = (body.kinetic + body.elastic) / start
     yield Row("ball bounces, energy", "after over before [-]", 1.0, energy, 0.10, "elastic impact")
 

@@ -39,19 +39,19 @@ class Row:
     @property
     def error(self) -> float:
         """See the class."""
-        if not np.isfinite(self.got):
-            return float("inf")
         difference = self.got - self.expected
         return difference / abs(self.expected) if self.expected else difference
 
     @property
     def passed(self) -> bool:
         """Whether the error is within the tolerance."""
-        return -self.error <= self.tolerance if self.least else abs(self.error) <= self.tolerance
+        return -self.error <= self.tolerance if self.least else abs(self.error) <= self.tolerance  # false for nan
 
     def as_dict(self) -> dict[str, Any]:
         """For verify.json."""
-        return {**vars(self), "error": self.error, "passed": self.passed}
+        numbers = {"got": self.got, "error": self.error}
+        finite = {name: value if np.isfinite(value) else None for name, value in numbers.items()}
+        return {**vars(self), **finite, "passed": self.passed}
 
 
 @dataclass(frozen=True)

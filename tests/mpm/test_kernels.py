@@ -173,3 +173,21 @@ def test_many_simulations_wait_side_by_side():
     scenes = [replace(BRITTLE, food=replace(food, shape=replace(food.shape, length=x))) for x in lengths]
     made = [Simulation(replace(s, motion=replace(s.motion, stroke=3e-4)), Runtime(threads=1)) for s in scenes]
     assert made[0].run().status == "done"
+
+
+def test_a_run_does_not_feel_the_one_before():
+    """What a run left on the grid is gone before the next: the edge also reads nodes that no particle has reached."""
+    sim = Simulation(replace(PRISM, motion=replace(PRISM.motion, stroke=1e-3)), Runtime(threads=1))
+    sim.run()
+    assert sim.k.u.to_numpy().any()
+    sim._load(PRISM.food.material)
+    assert not sim.k.u.to_numpy().any()
+
+
+def test_food_without_resistance_is_cut():
+    """R = 0: a cut starts before the edge has slipped in the food, and no force is divided by no slip."""
+    soft = replace(PRISM.food.material, E=1e3, yield_stress=np.inf, R=0.0, R_initiation=0.0)
+    scene = replace(PRISM, food=Food(PRISM.food.shape, soft), numerics=replace(PRISM.numerics, room=3.0))
+    record = Simulation(replace(scene, motion=replace(PRISM.motion, stroke=6e-3)), Runtime(threads=1)).run()
+    assert record.status == "done"
+    assert np.abs(record.edge).max() < 1e-9

@@ -1,0 +1,134 @@
+"""cutcal verify: its rows, its fast cases, its exit codes."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+
+from calib.cli.main import main
+from calib.verification import rows
+from calib.verification.rows import Case, Row, cases
+from mpm.errors import SceneError
+
+FAST = [case for case in cases() if case.fast]
+
+
+def row(expected: float = 2.0, got: float = 2.0, tolerance: float = 0.01, least: bool = False) -> Row:
+    """A row about nothing."""
+    return Row("case", "quantity", expected, got, tolerance, "nowhere", least)
+
+
+@pytest.mark.parametrize(
+    ("one", "passed"),
+    [
+        (row(got=2.019), True),
+        (row(got=2.021), False),
+        (row(got=1.979), False),
+        (row(got=math.nan), False),
+        (row(expected=0.0, got=0.009), True),
+        (row(expected=0.0, got=-0.011), False),
+        (row(expected=-1.0, got=-1.02), False),
+        (row(got=3.0, least=True), True),
+        (row(got=1.9, least=True), False),
+        (row(got=math.nan, least=True), False),
+    ],
+)
+def test_a_row_passes_within_its_tolerance(one, passed):
+    """Relative to what is expected, or absolute where that is 0; an order may be larger; not a number never passes."""
+    assert one.passed is passed
+
+
+def test_there_are_enough_rows_of_every_kind():
+    """Every group has a case, and no two have the same name."""
+    names = [case.name for case in cases()]
+    assert len(set(names)) == len(names) >= 18
+    assert sum("press" in name for name in names) >= 6
+
+
+@pytest.mark.parametrize("case", FAST, ids=[case.name for case in FAST])
+def test_the_fast_cases_pass(case):
+    """Each row of the quick version."""
+    found = list(case.run(True))
+    assert found
+    assert not [f"{r.case}, {r.quantity}: {r.got:g} not {r.expected:g}" for r in found if not r.passed]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", cases(), ids=[case.name for case in cases()])
+def test_all_cases_pass(case):
+    """Each row of the whole table."""
+    assert not [f"{r.case}, {r.quantity}: {r.got:g} not {r.expected:g}" for r in case.run(False) if not r.passed]
+
+
+def fakes(monkeypatch: pytest.MonkeyPatch, *made: Case) -> None:
+    """Put other cases into the table."""
+    monkeypatch.setattr("calib.verification.study.cases", lambda: list(made))
+
+
+def good(quick: bool):
+    """A case that passes."""
+    yield row()
+
+
+def bad(quick: bool):
+    """A case that fails."""
+    yield row()
+    yield row(got=5.0)
+
+
+def broken(quick: bool):
+    """A case that breaks down after a row."""
+    yield row()
+    raise SceneError("the knife is bent")
+
+
+def test_a_failed_row_is_exit_code_2(monkeypatch, tmp_path, capsys):
+    """Table and document name it, and the figure is drawn."""
+    fakes(monkeypatch, Case("good", good), Case("bad", bad))
+    assert main(["verify", "--out", str(tmp_path / "a")]) == 2
+    text = capsys.readouterr().out
+    assert "FAIL" in text
+    assert "3 rows, 1 failed" in text
+    document = json.loads((tmp_path / "a/verify.json").read_text())
+    assert [r["passed"] for r in document["rows"]] == [True, True, False]
+    assert (tmp_path / "a/verify.svg").read_bytes().startswith(b"<?xml")
+    assert main(["verify", "--out", str(tmp_path / "b"), "--only", "good"]) == 0
+
+
+def test_a_case_that_breaks_down_fails_and_the_others_run(monkeypatch, tmp_path, capsys):
+    """Its message is kept; --json prints the document alone."""
+    fakes(monkeypatch, Case("broken", broken), Case("good", good))
+    assert main(["verify", "--out", str(tmp_path / "a"), "--json"]) == 2
+    document = json.loads(capsys.readouterr().out)
+    assert document["broken"] == {"broken": "the knife is bent"}
+    assert [r["group"] for r in document["rows"]] == ["broken", "good"]
+    assert document["complete"] and not document["passed"]
+
+
+def test_slow_cases_are_left_out_of_the_quick_run(monkeypatch, tmp_path):
+    """--quick runs the fast ones only, in their quick version."""
+    seen = []
+    fakes(
+        monkeypatch,
+        Case("fast", lambda quick: seen.append(quick) or good(quick)),
+        Case("slow", lambda quick: seen.append("slow") or good(quick), fast=False),
+    )
+    assert main(["verify", "--quick", "--out", str(tmp_path / "a")]) == 0
+    assert seen == [True]
+
+
+def test_an_unknown_case_and_a_used_folder_are_errors(monkeypatch, tmp_path, capsys):
+    """One line each, exit code 1."""
+    fakes(monkeypatch, Case("good", good))
+    assert main(["verify", "--only", "nothing", "--out", str(tmp_path / "a")]) == 1
+    assert "there are good" in capsys.readouterr().err
+    assert main(["verify", "--out", str(tmp_path / "a")]) == 0
+    assert main(["verify", "--out", str(tmp_path / "a")]) == 1
+    assert "never overwritten" in capsys.readouterr().err
+
+
+def test_parts_are_modules_with_cases():
+    """Every part of the table exists."""
+    assert len(cases()) > len(rows.PARTS)
