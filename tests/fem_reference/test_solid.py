@@ -135,5 +135,9 @@ def test_errors_say_what_to_do(tmp_path):
         meshes.quarter(Shape("capsule", 0.06, 0.03, 0.03), 2)
     with pytest.raises(meshes.MeshError, match="no flat ends"):
         press(Shape("sphere", 0.03, 0.03, 0.03), FOOD, [0.001], bonded=True)
-    with pytest.raises(EquilibriumError, match="smaller"):
-        press(CUBE, FOOD, [0.019999], bonded=True, cells=1)
+    solid = Solid(meshes.quarter(CUBE, 1), Corotated(1.0, 1.0))
+    for level, way in ((0.0, 0.0), (0.02, -0.03)):  # the upper face through the lower one
+        solid.hold(np.flatnonzero(np.abs(solid.nodes[:, 2] - level) < 1e-9), [0, 1, 2], way if level else 0.0)
+    with pytest.raises(EquilibriumError, match="use smaller"):
+        solid.solve()
+    np.testing.assert_array_equal(solid.u, 0.0)
