@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.optimize import brentq
+from scipy.special import spherical_jn
 
 from calib.verification import vortex
 from calib.verification.rows import Case, Row
@@ -155,11 +157,42 @@ def _swing(dx: float, ppc: int, swings: int) -> tuple[tuple[str, float, float], 
         times.append(body.time)
         amplitude.append(float(mode @ body.v[:, 1]))
     t, a = np.array(times), np.array(amplitude)
-    up = np.flatnonzero((a[:-1] < 0) & (a[1:] >= 0))
-    zeros = t[up] - a[up] * (t[up + 1] - t[up]) / (a[up + 1] - a[up])
+    got, zeros = _period(t, a)
     peaks = [np.abs(a[(t > z) & (t < z + period / 2)]).max() for z in zeros[:-1]]
     loss = 1 - (peaks[-1] / peaks[0]) ** (1 / (len(peaks) - 1)) if len(peaks) > 1 else math.nan
-    return ("period [s]", period, float(np.mean(np.diff(zeros)))), float(loss)
+    return ("period [s]", period, got), float(loss)
+
+
+def breathing(quick: bool) -> Iterator[Row]:
+    """A ball swells and shrinks in its first radial mode: the only case in which the bulk modulus rules."""
+    material, radius = Material(E=1e5, nu=0.4, rho=1000.0), 0.02
+    ratio = material.shear / (material.lame + 2 * material.shear)  # of the squares of the wave speeds
+    x = brentq(lambda s: math.sin(s) * (1 - s * s / (4 * ratio)) - s * math.cos(s), 0.6 * math.pi, 0.99 * math.pi)
+    period = 2 * math.pi * radius / (x * material.p_wave)
+
+    def velocity(places: np.ndarray) -> np.ndarray:
+        r = places - [0.0, 0.0, radius]
+        s = x * np.linalg.norm(r, axis=1, keepdims=True) / radius
+        return 0.05 * r / np.linalg.norm(r, axis=1, keepdims=True) * spherical_jn(1, s)
+
+    ball = Shape("sphere", 2 * radius, 2 * radius, 2 * radius)
+    body = FreeBody(ball, material, numerics(2.5e-3 if quick else 1.67e-3, ppc=3), velocity=velocity)
+    mode = velocity(body.start)
+    times, amplitude = [], []
+    while body.time < 2.4 * period:
+        body.step(2)
+        times.append(body.time)
+        amplitude.append(float((mode * body.v).sum()))
+    got = _period(np.array(times), np.array(amplitude))[0]
+    source = "first radial mode of an elastic ball (Lamb 1882)"
+    yield Row("ball breathes", "period [s]", period, got, 0.03 if quick else 0.02, source)
+
+
+def _period(t: np.ndarray, a: np.ndarray) -> tuple[float, np.ndarray]:
+    """Period of an oscillation and the times at which it crosses zero upwards [s]."""
+    up = np.flatnonzero((a[:-1] < 0) & (a[1:] >= 0))
+    zeros = t[up] - a[up] * (t[up + 1] - t[up]) / (a[up + 1] - a[up])
+    return float(np.mean(np.diff(zeros))), zeros
 
 
 def turning(quick: bool) -> Iterator[Row]:
@@ -290,6 +323,7 @@ CASES = [
     Case("spin", spinning),
     Case("fall", falling),
     Case("bar", vibrating),
+    Case("ball", breathing),
     Case("vortex", turning),
     Case("wave", wave),
     Case("rest and friction", resting),
