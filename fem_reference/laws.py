@@ -13,6 +13,7 @@ from scipy.optimize.elementwise import find_root
 
 POLAR_STEPS = 30
 POLAR_TOLERANCE = 1e-13
+MARGIN = 1e-10  # part of the yield stress that a state may exceed it by: rounding
 DIFFERENCE = 1e-6  # step of the central differences of a tangent [-]
 
 
@@ -206,7 +207,7 @@ class Plastic:
     def _returned(self, v: np.ndarray, j: np.ndarray) -> np.ndarray:
         """Left stretch on or inside the yield surface."""
         out = v.copy()
-        flows = mises(2 * self.mu * (product(v, v) - v)) > self.yield_stress
+        flows = mises(2 * self.mu * (product(v, v) - v)) > self.yield_stress * (1 + MARGIN)
         if not flows.any():
             return out
         v, j = v[:, :, flows], j[flows]

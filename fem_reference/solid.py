@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pyamg
@@ -13,7 +13,7 @@ import scipy.sparse.linalg as spl
 import skfem as sk
 
 from fem_reference.contact import Contact
-from fem_reference.laws import Law, determinant, identity
+from fem_reference.laws import Law, Plastic, determinant, identity
 from mpm.errors import CutcalError
 
 ELEMENTS = {
@@ -134,9 +134,10 @@ class Solid:
         flat = np.bincount(self._scatter.ravel(), local.reshape(self._scatter.shape).ravel(), 3 * len(self.nodes))
         return flat.reshape(-1, 3), state
 
-    def stiffness(self, u: np.ndarray) -> sp.csr_matrix:
-        """Consistent tangent [N/m]."""
-        a = self.law.tangent(self.deformation(u), self.state) * self.weights
+    def stiffness(self, u: np.ndarray, flow: bool = True) -> sp.csr_matrix:
+        """Consistent tangent, without ``flow`` that of a solid that does not yield [N/m]."""
+        law = self.law if flow or not isinstance(self.law, Plastic) else replace(self.law, yield_stress=np.inf)
+        a = law.tangent(self.deformation(u), self.state) * self.weights
         half = np.einsum("ijkleq,bleq->ijkbeq", a, self.gradients, optimize=True)
         local = np.einsum("ajeq,ijkbeq->aibke", self.gradients, half, optimize=True)
         size = 3 * len(self.nodes)
@@ -184,7 +185,7 @@ class Solid:
         change = np.fromiter(self.fixed.values(), float, len(self.fixed)) - u.ravel()[index]
         if not np.abs(change).max(initial=0.0) > 0:
             return u.copy()
-        k = self._contact_stiffness(self.stiffness(u), u)
+        k = self._contact_stiffness(self.stiffness(u, flow=False), u)  # one that flows resists hardly at all
         free = np.setdiff1d(np.arange(u.size), index)
         residual, _ = self.residual(u)
         step = np.zeros(u.size)
@@ -242,7 +243,7 @@ class Solid:
         """Solution of K x = b: factorised when small, else by multigrid with the rigid-body modes."""
         self.iterations += 1
         if len(b) <= DIRECT:
-            return _factorised(k, b)
+            return _factorised(k, b) if self.law.symmetric else spl.spsolve(k.tocsc(), b)
         x, y, z = (self.nodes + self.u).T
         modes = np.zeros((len(self.nodes), 3, 6))
         modes[:, [0, 1, 2], [0, 1, 2]] = 1.0

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter, NullFormatter
 
 from reports.figures import BLACK, BLUE, GREY, svg
 
@@ -35,6 +36,8 @@ def write_figure(out: Path) -> None:
         axes.axvline(1.0, color=GREY, lw=1)
         axes.set(xscale="log", xlim=(FLOOR / 1.5, SHOWN * 1.5), ylim=(len(rows) - 0.5, -0.5))
         axes.set_yticks(range(len(rows)), [f"{row['case']}: {row['quantity']}" for row in rows], fontsize=6)
+        axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_xlabel("error over the error allowed (crosses fail)")
         axes.grid(axis="x", color=GREY, lw=0.3)
 

@@ -99,7 +99,7 @@ TESTS = (
         bonded=True,
         yield_stress=8e3,
         tolerance=0.03,
-        reference=(("cells", 4),),
+        reference=(("cells", 4), ("order", 2)),
     ),
 )
 

@@ -60,3 +60,13 @@ def test_plastic_path_unloads_elastically():
     assert max(stress) == pytest.approx(SY / np.sqrt(3), rel=2e-3)
     assert stress[-2] - stress[-1] == pytest.approx(1e-3 * MU, rel=0.03)
     assert np.abs(np.linalg.inv(state[:, :, 0]) - np.eye(3)).max() > 0.05
+
+
+def test_a_point_on_the_yield_surface_stays_a_number():
+    """States that were returned before lie above or below the yield stress by rounding; none becomes not a number."""
+    law = Plastic(MU, LAM, SY)
+    state = law.start((40,))
+    for _ in range(4):
+        p, state = law.stress(F, state)
+        assert np.isfinite(p).all()
+        assert np.isfinite(law.tangent(F, state)).all()

@@ -141,3 +141,14 @@ def test_errors_say_what_to_do(tmp_path):
     with pytest.raises(EquilibriumError, match="use smaller"):
         solid.solve()
     np.testing.assert_array_equal(solid.u, 0.0)
+
+
+def test_a_bonded_block_flows_in_steps():
+    """J2 flow between bonded ends: more force than with sliding ones and less than without flow."""
+    soft = Material(E=1e5, nu=0.35, rho=1000.0, yield_stress=5e3)
+    strokes = [0.0005, 0.001, 0.0015]
+    flowing = press(CUBE, soft, strokes, bonded=True, cells=2).force
+    sliding, elastic = press(CUBE, soft, strokes, cells=2).force, press(CUBE, FOOD, strokes, bonded=True, cells=2).force
+    assert flowing[0] == pytest.approx(elastic[0], rel=0.03)
+    assert (flowing[1:] > 1.01 * sliding[1:]).all()
+    assert flowing[2] < 0.8 * elastic[2]
