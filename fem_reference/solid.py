@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import pyamg
@@ -167,6 +168,8 @@ class Solid:
                 if not [c for c in self.contacts if not c.settle(self.nodes + u)]:
                     break
                 u = self._newton(u)
+            else:
+                raise EquilibriumError("finite elements: the contact pressures do not settle; use a larger penalty")
         except EquilibriumError:
             self.u = before[0]
             for contact, pressure in zip(self.contacts, before[1], strict=True):
@@ -243,7 +246,7 @@ class Solid:
         """Solution of K x = b: factorised when small, else by multigrid with the rigid-body modes."""
         self.iterations += 1
         if len(b) <= DIRECT:
-            return _factorised(k, b) if self.law.symmetric else spl.spsolve(k.tocsc(), b)
+            return _factorised(k, b, self.law.symmetric)
         x, y, z = (self.nodes + self.u).T
         modes = np.zeros((len(self.nodes), 3, 6))
         modes[:, [0, 1, 2], [0, 1, 2]] = 1.0
@@ -258,11 +261,16 @@ class Solid:
             warnings.simplefilter("ignore", UserWarning)  # of a matrix that is not positive definite: solved directly
             out = solver.solve(b, tol=SLOPPY, maxiter=200, accel=accelerate, residuals=history)
         if not history[-1] <= 10 * SLOPPY * history[0]:
-            return _factorised(k, b)
+            return _factorised(k, b, self.law.symmetric)
         return out
 
 
-def _factorised(k: sp.csr_matrix, b: np.ndarray) -> np.ndarray:
-    """Solution of K x = b by a factorisation that uses the symmetric pattern of K."""
-    order = {"permc_spec": "MMD_AT_PLUS_A", "options": {"SymmetricMode": True}}
-    return spl.splu(k.tocsc(), diag_pivot_thresh=0.01, **order).solve(b)
+def _factorised(k: sp.csr_matrix, b: np.ndarray, symmetric: bool) -> np.ndarray:
+    """Solution of K x = b by a factorisation, of a symmetric K on the diagonal."""
+    options: dict[str, Any] = {}
+    if symmetric:
+        options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.01, "options": {"SymmetricMode": True}}
+    try:
+        return spl.splu(k.tocsc(), **options).solve(b)
+    except RuntimeError as e:  # exactly singular
+        raise EquilibriumError("finite elements: the solid can move freely; hold some of its nodes") from e

@@ -143,6 +143,14 @@ def test_errors_say_what_to_do(tmp_path):
     np.testing.assert_array_equal(solid.u, 0.0)
 
 
+def test_a_loose_solid_is_an_error():
+    """Nothing holds it: one message, not the factorisation's."""
+    solid = Solid(sk.MeshHex(), Corotated(1.0, 0.0))
+    solid.load[:, 2] = 1e-3
+    with pytest.raises(EquilibriumError, match="finite elements: "):
+        solid.solve()
+
+
 def test_a_bonded_block_flows_in_steps():
     """J2 flow between bonded ends: more force than with sliding ones and less than without flow."""
     soft = Material(E=1e5, nu=0.35, rho=1000.0, yield_stress=5e3)
