@@ -58,7 +58,6 @@ def press(
     order: int = 1,
     grade: float = 1.0,
     law: Law | None = None,
-    progress: Callable[[float, float], None] | None = None,
 ) -> Curve:
     """Press a food down.
 
@@ -72,7 +71,6 @@ def press(
         order: Order of the elements, 1 or 2.
         grade: Power by which the elements shrink towards the axis.
         law: Another law than the particles'.
-        progress: Called after each stroke with (part done, force [N]).
 
     Raises:
         MeshError: A shape without a mesh, or a bonded shape without flat ends.
@@ -124,8 +122,6 @@ def press(
             pushed = [float(c.force(at)[:, 2].sum()) for c in solid.contacts]
             force, board = -pushed[0], solid.reaction(lowest)[2] + sum(pushed[1:])
         rows.append((way, 4 * force, 4 * board, max((c.penetration(at) for c in solid.contacts), default=0.0)))
-        if progress is not None:
-            progress(len(rows) / len(strokes), 4 * force)
     stroke, forces, boards, deepest = np.array(rows).T
     return Curve(stroke, forces, boards, deepest, solid.u.size)
 

@@ -53,7 +53,6 @@ class Solid:
         body: Force per reference volume at the quadrature points [N/m^3], shape (3, elements, points), or None.
         load: Forces on the nodes [N], shape (n, 3).
         contacts: Pairs of nodes and obstacle.
-        iterations: Linear solutions so far.
     """
 
     mesh: sk.Mesh
@@ -65,7 +64,6 @@ class Solid:
     body: np.ndarray | None = field(init=False, default=None)
     load: np.ndarray = field(init=False)
     contacts: list[Contact] = field(init=False, default_factory=list)
-    iterations: int = field(init=False, default=0)
 
     def __post_init__(self) -> None:
         kind = "hex" if isinstance(self.mesh, sk.MeshHex) else "tet"
@@ -90,12 +88,6 @@ class Solid:
         """Prescribe the displacement of some nodes along some axes [m]."""
         for axis in axes:
             self.fixed |= dict.fromkeys((3 * np.asarray(nodes) + axis).tolist(), value)
-
-    def free(self, nodes: np.ndarray, axes: Sequence[int]) -> None:
-        """Let go of nodes."""
-        for axis in axes:
-            for n in np.asarray(nodes):
-                self.fixed.pop(3 * int(n) + axis, None)
 
     def areas(self, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Nodes of some facets and the reference area that each stands for [m^2].
@@ -244,7 +236,6 @@ class Solid:
 
     def _linear(self, k: sp.csr_matrix, b: np.ndarray, free: np.ndarray) -> np.ndarray:
         """Solution of K x = b: factorised when small, else by multigrid with the rigid-body modes."""
-        self.iterations += 1
         if len(b) <= DIRECT:
             return _factorised(k, b, self.law.symmetric)
         x, y, z = (self.nodes + self.u).T

@@ -68,7 +68,6 @@ class FreeBody:
             self._k.set_gradient(slope(self.start))
         self.dt, self.time = self._simulation._time_step(material), 0.0
         self.mass = material.rho * self._simulation.seeds.volume
-        self.volume = self._simulation.seeds.volume
         self.impulse = np.zeros(3)
         self._state = np.zeros(kn.N_STATE)
 
@@ -83,19 +82,9 @@ class FreeBody:
         return self._k.v.to_numpy()
 
     @property
-    def deformation(self) -> np.ndarray:
-        """Deformation gradients, shape (n, 3, 3)."""
-        return self._k.deformation()
-
-    @property
     def gradient(self) -> np.ndarray:
         """Velocity gradients [1/s], shape (n, 3, 3)."""
         return self._k.gradient()
-
-    @property
-    def momentum(self) -> np.ndarray:
-        """Linear momentum at the end of the last step [N s], shape (3,)."""
-        return self._state[:3]
 
     @property
     def kinetic(self) -> float:

@@ -42,7 +42,7 @@ def run(out: Path, *, quick: bool, only: str | None, about: dict[str, Any], say:
     document |= {"versions": versions(), "git": git_commit()}
     began = time.monotonic()
     for done, case in enumerate(todo, 1):
-        since, count = time.monotonic(), 0
+        since = time.monotonic()
         rows: list[Row] = []
         try:
             for row in case.run(quick):

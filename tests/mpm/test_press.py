@@ -1,0 +1,79 @@
+"""A plate or wedge that presses: its force balances, mirrors and grid change nothing, and it cuts nothing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpm.errors import SceneError
+from mpm.material import Material
+from mpm.record import ForceRecord
+from mpm.runtime import Runtime
+from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
+from mpm.shapes import Shape
+from mpm.solver import Simulation
+
+SOFT = Material(E=1e5, nu=0.35, rho=1000.0, loss_factor=0.1)
+SCENE = Scene(
+    Food(Shape("block", 0.02, 0.016, 0.016), SOFT),
+    Press("plate", mu=0.4),
+    Motion(2e-3, 5e-3),
+    Board(0.4),
+    numerics=Numerics(dx=2e-3, gravity=9.81),
+)
+
+
+def pressed(scene: Scene) -> ForceRecord:
+    """Run to a sound end."""
+    record = Simulation(scene, Runtime(threads=1)).run()
+    assert record.status == "done"
+    return record
+
+
+@pytest.mark.parametrize("half_angle", [math.pi / 2, math.radians(60)])
+@pytest.mark.parametrize("mirror", [True, False])
+def test_what_the_press_gives_the_board_takes(half_angle, mirror):
+    """Press + board + weight = change of momentum to rounding in every interval, also with friction and a wedge; at the end
+    the board carries the press's force and the weight within 2 %."""
+    numerics = replace(SCENE.numerics, mirror=mirror)
+    record = pressed(replace(SCENE, knife=Press("tool", half_angle, 0.4), numerics=numerics))
+    assert record.momentum_residual < 1e-10
+    late = record.stroke > 1.5e-3
+    down = record.face[late, 2].mean() - record.gravity[late, 2].mean()
+    assert -record.board[late, 2].mean() == pytest.approx(down, rel=0.02)
+    assert record.face[late, 2].min() > 0
+
+
+def test_a_quarter_is_the_whole():
+    """Mirrors change the force by less than other particles do: 2 %."""
+    quarter, whole = (pressed(replace(SCENE, numerics=replace(SCENE.numerics, mirror=m))) for m in (True, False))
+    late = whole.stroke > 1e-3
+    assert quarter.images == 4
+    np.testing.assert_allclose(quarter.face[late, 2].mean(), whole.face[late, 2].mean(), rtol=0.02)
+
+
+def test_a_press_cuts_nothing():
+    """Whatever the resistance, the edge carries no force and the food stays in one piece."""
+    record = pressed(SCENE.with_material(R=0.0))
+    np.testing.assert_array_equal(record.edge, 0.0)
+    assert not record.severed
+
+
+def test_friction_stiffens():
+    """Plate and board that hold the food's ends make it stiffer."""
+    slippery = pressed(replace(SCENE, knife=Press(), board=Board(0.0)))
+    rough = pressed(replace(SCENE, knife=Press(mu=5.0), board=Board(5.0)))
+    assert rough.face[-5:, 2].mean() > 1.05 * slippery.face[-5:, 2].mean()
+
+
+def test_what_a_press_cannot_do():
+    """A tilted press, nodal contact, and an angle that is none."""
+    with pytest.raises(SceneError, match="a press is level"):
+        replace(SCENE, motion=replace(SCENE.motion, tilt=0.1))
+    with pytest.raises(SceneError, match="a press is level"):
+        replace(SCENE, numerics=replace(SCENE.numerics, contact="nodal"))
+    with pytest.raises(SceneError, match="press tool: half_angle"):
+        Press("tool", 2.0)
