@@ -124,14 +124,12 @@ class Edge(Nodes):
         tip = self.edge_height(s)
         over = self.over(s)
         box = self.slice_nodes(i)
-        mass, mom = 0.0, ti.Vector.zero(float, 3)
-        images = ti.static(2.0 if self.my else 1.0)
+        mass = 0.0
         for a in range(box[0], box[3]):
             for j in range(box[1], box[4]):
                 for k in range(box[2], box[5]):
-                    q = images * self.zone_weight(i, a, j, k) * self.moving(a, j, k)
-                    mass += q[3]
-                    mom += ti.Vector([q[0], q[1], q[2]])
+                    mass += self.zone_weight(i, a, j, k) * self.moving(a, j, k)[3]
+        mass *= ti.static(2.0 if self.my else 1.0)
         # the zone reaches below the edge and beside the food, so the width that is cut is that of the outline
         begun = ti.math.clamp((self.top[i] - tip) / (self.top[i] - self.low[i]), 0.0, 1.0)
         ended = ti.math.clamp((self.floor_top[i] - tip) / (self.floor_top[i] - self.floor_low[i]), 0.0, 1.0)
@@ -139,7 +137,7 @@ class Edge(Nodes):
         full = SURFACE_FILL * self.par[FULL] * width * self.par[INV]
         if width > 0 and mass > EMPTY_ZONE * full:
             c, t = self.par[TILT_COS], self.par[TILT_SIN]
-            mean = self.blade_axes(mom / mass)
+            mean = self.velocity[i]
             if over > 0 and tip <= self.front[i] + self.par[SLIP]:
                 slide = (ti.cast(self.pose[VS], float) - mean[0]) * dt
                 fall = (mean[2] - ti.cast(self.pose[VZ], float)) * dt
@@ -154,6 +152,23 @@ class Edge(Nodes):
                     self.drift[i] = mean[2] * dt
         else:
             self.slip[i] = ti.Vector.zero(float, 2)
+
+    @ti.func
+    def follow(self, i):
+        """Mean velocity of the process zone of slice i after the edge's reaction.
+
+        The slip of the next step is counted against it.  Counted against the velocity before the reaction, the slip would
+        run ahead by force x dt / mass in every step, and the edge would do work on the food that nobody did on the edge.
+        """
+        box = self.slice_nodes(i)
+        total = ti.Vector.zero(float, 4)
+        for a in range(box[0], box[3]):
+            for j in range(box[1], box[4]):
+                for k in range(box[2], box[5]):
+                    total += self.zone_weight(i, a, j, k) * self.moving(a, j, k)
+        self.velocity[i] = ti.Vector.zero(float, 3)
+        if total[3] > 0:
+            self.velocity[i] = self.blade_axes(ti.Vector([total[0], total[1], total[2]]) / total[3])
 
     @ti.func
     def moving(self, a, j, k):

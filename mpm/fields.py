@@ -90,6 +90,7 @@ class Fields:
         self.u = vec4.field(shape=(nodes[0], deep, nodes[2]))
         self.hot = ti.field(ti.i32, 6)  # box of the lowest nodes of particles whose strain could damage something
         self.slip, self.push = ti.Vector.field(2, real, stations), ti.Vector.field(2, real, stations)
+        self.velocity = vec3.field(shape=stations)  # mean velocity of the material at the edge
         self.front, self.drift, self.cut = (ti.field(real, stations) for _ in range(3))
         self.soften, self.start = ti.field(real, stations), ti.field(real, stations)
         self.touched = ti.field(real, stations)
@@ -129,6 +130,7 @@ class Fields:
         for i in self.cut:
             self.slip[i] = ti.Vector.zero(float, 2)
             self.push[i] = ti.Vector.zero(float, 2)
+            self.velocity[i] = ti.Vector.zero(float, 3)
             self.cut[i] = 0.0
             self.drift[i] = 0.0
             self.start[i] = 0.0

@@ -339,6 +339,10 @@ class Kernels(Survey):
             for i in range(self.stations):
                 if i >= self.i0:
                     self.react(i)
+            ti.loop_config(serialize=self.alone)
+            for i in range(self.stations):
+                if i >= self.i0:
+                    self.follow(i)
         ti.loop_config(serialize=self.alone)
         for _ in range(1):
             self.pose[Z] += self.pose[VZ] * dt
