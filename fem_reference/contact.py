@@ -98,11 +98,14 @@ class Contact:
         """Deepest penetration [m]."""
         return float(max(-self.obstacle.distance(x[self.nodes])[0].min(), 0.0))
 
-    def settle(self, x: np.ndarray) -> bool:
-        """Whether penetration, and gaps that still carry pressure, are within tolerance; if not, renew the pressures."""
+    def settle(self, x: np.ndarray, part: float = 1.0) -> bool:
+        """Whether penetration, and gaps that still carry pressure, are within tolerance; if not, renew the pressures.
+
+        ``part`` is the part of the way from the old pressures to the new that is gone.
+        """
         p, _ = self._pressure(x)
         d = self.obstacle.distance(x[self.nodes])[0]
         if np.abs(np.where(p > 0, d, np.minimum(d, 0.0))).max(initial=0.0) <= self.tolerance:
             return True
-        self.pressure = p
+        self.pressure = self.pressure + part * (p - self.pressure)
         return False

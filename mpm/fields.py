@@ -80,6 +80,9 @@ class Fields:
         self.tau = ti.Vector.field(self.lanes, real, (self.blocks, 9))
         self.side, self.gap = ti.field(ti.i32, n), ti.field(real, n)
         self.foot = ti.field(real, n)
+        self.lever = vec4.field(
+            shape=(room, 2)
+        )  # moment of the contact's last impulse: gradient up, and across the blade
         self.kappa, self.strain = (ti.field(real, room if damage else 1) for _ in range(2))
         self.stick = vec3.field(shape=(2, n))  # board, blade
         self.tacky, self.layers = ti.field(ti.i32, n), ti.field(ti.i32, n)
@@ -119,6 +122,8 @@ class Fields:
                     self.memory[b, p] = ti.Matrix.zero(float, 3, 3)
         for p, d in self.C:
             self.C[p, d] = ti.Vector.zero(float, 4)
+        for p, d in self.lever:
+            self.lever[p, d] = ti.Vector.zero(float, 4)
         for b, r in self.F:
             for lane in ti.static(range(self.lanes)):
                 self.F[b, r][lane] = 1.0 if r % 4 == 0 else 0.0

@@ -40,6 +40,10 @@ from mpm.fields import (
 )
 from mpm.survey import Survey
 
+# Stiffness of the contact over mass / dt^2 of a particle. The stiffest sound one is 4, for a lone particle on a hard surface;
+# the arm of the impulse takes a third of that.
+CONTACT = 2.0
+
 TABLE = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
 
@@ -105,6 +109,14 @@ class Kernels(Survey):
             ax = pull * ti.Vector([tau[0], tau[5], tau[4], 0.0]) + carry * self.C[p, 0]
             ay = pull * ti.Vector([tau[5], tau[1], tau[3], 0.0]) + carry * self.C[p, 1]
             az = pull * ti.Vector([tau[4], tau[3], tau[2], 0.0]) + carry * self.C[p, 2]
+            if ti.static(not self.nodal):
+                az += carry * self.lever[p, 0]
+                if ti.static(self.turned):
+                    across = self.grid_axes(ti.Vector([0.0, 1.0, 0.0]))
+                    ax += across[0] * carry * self.lever[p, 1]
+                    ay += across[1] * carry * self.lever[p, 1]
+                else:
+                    ay += carry * self.lever[p, 1]
             v = self.v[p]
             corner = m * ti.Vector([v[0], v[1], v[2], 1.0]) - fx[0] * ax - fx[1] * ay - fx[2] * az
             code = self.split(p, base, q, self.half(p, q[1]))
@@ -122,22 +134,58 @@ class Kernels(Survey):
         return ti.Vector([loss[0], loss[1], loss[2], loss[3], outside])
 
     @ti.func
+    def touch(self, p, dt, u, at):
+        """Contact of one particle with board and tool; returns its corrected velocity.
+
+        What touches is the food's surface, not the particle's centre. Its distance from the centre stretches with the
+        food, it moves with the food's velocity there, and the impulse has the moment that belongs to it, so that the work
+        of the contact is that of the surface. At the centre a food of n cells would be 1 / n stiffer.
+        """
+        m = self.par[MASS] * ti.static((2 if self.mx else 1) * (2 if self.my else 1))
+        c = self.gradient_of(p)
+        up = self.blade_axes(c @ ti.Vector([0.0, 0.0, 1.0]))  # gradient of the velocity, upwards and across the blade
+        across = self.blade_axes(c @ self.grid_axes(ti.Vector([0.0, 1.0, 0.0])))
+        there, v = self.blade_axes(at), self.blade_axes(u)
+        reach = 0.5 * self.par[DX]
+        if there[2] < 2 * self.par[DX]:
+            self.foot[p] = ti.math.clamp(self.foot[p] * (1 + dt * up[2]), 0.0, reach)
+        kick = self.touch_board(p, m, dt, v - self.foot[p] * up, there)
+        high, wide = -self.foot[p] * kick, ti.Vector.zero(float, 3)
+        arm = ti.Vector.zero(float, 3)
+        push = ti.Vector.zero(float, 3)
+        if ti.static(self.press):
+            if there[2] > ti.cast(self.pose[Z], float) - 2 * self.par[DX]:
+                self.gap[p] = ti.math.clamp(self.gap[p] * (1 + dt * up[2]), 0.0, reach)
+            arm = ti.Vector([0.0, 0.0, self.gap[p]])
+            push = self.touch_press(p, m, dt, v + kick + self.gap[p] * up, there + arm)
+        else:
+            if ti.abs(there[1]) < 2 * self.par[DX]:
+                self.gap[p] = ti.math.clamp(self.gap[p] * (1 + dt * across[1]), 0.0, reach)
+            push, arm = self.touch_blade(p, m, dt, v + kick, up, across, there)
+        high += arm[2] * push
+        wide += arm[1] * push
+        scale = 4 * self.par[INV] * self.par[INV]
+        high, wide = self.grid_axes(high), self.grid_axes(wide)
+        self.lever[p, 0] = scale * ti.Vector([high[0], high[1], high[2], 0.0])
+        self.lever[p, 1] = scale * ti.Vector([wide[0], wide[1], wide[2], 0.0])
+        return self.grid_axes(v + kick + push)
+
+    @ti.func
     def touch_board(self, p, m, dt, u, at):
-        """Contact of one particle with the board; returns its corrected velocity."""
-        depth = self.foot[p] - at[2]
+        """Contact of one particle with the board; returns the change of its velocity. ``u`` is that of its surface."""
+        depth, dv = self.foot[p] - at[2], ti.Vector.zero(float, 3)
         if depth > 0:
             stretch = stick_slip(self.stick[0, p], dt * ti.Vector([u[0], u[1], 0.0]), depth, self.par[BOARD_MU])
             self.stick[0, p] = stretch
-            dv = (ti.Vector([0.0, 0.0, depth]) - stretch) / dt
-            u += dv
+            dv = CONTACT * (ti.Vector([0.0, 0.0, depth]) - stretch) / dt
             self.tool(BOARD, -m * dv)
         else:
             self.stick[0, p] = ti.Vector.zero(float, 3)
-        return u
+        return dv
 
     @ti.func
-    def touch_blade(self, p, m, dt, u, at):
-        """Contact of one severed particle with the blade's faces; returns its corrected velocity.
+    def touch_blade(self, p, m, dt, u, up, across, at):
+        """Contact of one severed particle with the blade's faces; returns the change of its velocity, and its lever arm.
 
         A particle meets the blade as far from its centre as it was from the cut plane when the food was whole, so
         that the faces displace the food by the true half thickness of the blade.
@@ -145,6 +193,7 @@ class Kernels(Survey):
         cos_t, sin_t = self.par[TILT_COS], self.par[TILT_SIN]
         above = (at[2] - self.edge_height(at[0])) * cos_t
         touching = False
+        dv, arm = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
         if self.side[p] != 0 and 0 < above < self.par[BLADE] and self.under_blade(at[0]):
             sign = 1.0 if self.side[p] == 2 else -1.0
             d, n = blade_distance(sign * at[1], above, self.par[SPINE], self.par[COS], self.par[SIN], self.par[RADIUS])
@@ -155,47 +204,46 @@ class Kernels(Survey):
                 self.tacky[p] = 1
             if depth <= 0 and self.tacky[p] == 1:
                 if -depth < self.par[TACK_GAP]:
-                    depth = -self.par[TACK] * tack(-depth, self.par[TACK_GAP]) * dt * dt
+                    depth = -self.par[TACK] * tack(-depth, self.par[TACK_GAP]) * dt * dt / CONTACT
                     press = -depth
                 else:
                     self.tacky[p] = 0
             if press > 0:
                 touching = True
+                arm = -self.gap[p] * n
                 tool = ti.Vector([ti.cast(self.pose[VS], float), 0.0, ti.cast(self.pose[VZ], float)])
-                rel = u - tool
+                rel = u + arm[2] * up + arm[1] * across - tool
                 stretch = self.stick[1, p] - self.stick[1, p].dot(n) * n
                 stretch = stick_slip(stretch, dt * (rel - rel.dot(n) * n), press, self.par[FRICTION])
                 self.stick[1, p] = stretch
-                dv = (depth * n - stretch) / dt
-                u += dv
+                dv = CONTACT * (depth * n - stretch) / dt
                 self.tool(FACE, -m * dv)
         if not touching:
             self.stick[1, p] = ti.Vector.zero(float, 3)
-        return u
+        return dv, arm
 
     @ti.func
     def touch_press(self, p, m, dt, u, at):
-        """Contact of one particle with a plate or wedge that presses from above; returns its corrected velocity.
+        """Contact of one particle with a plate or wedge that presses from above; returns the change of its velocity.
 
-        A particle meets it as far from its centre as it was from the food's surface.
+        ``at`` and ``u`` are place and velocity of the food's surface above the particle.
         """
         sign = 1.0 if at[1] >= 0 else -1.0
         above = at[2] - ti.cast(self.pose[Z], float)
         d, n = blade_distance(sign * at[1], above, self.par[SPINE], self.par[COS], self.par[SIN], self.par[RADIUS])
         n = ti.Vector([0.0, sign * n[1], n[2]])
-        depth = self.gap[p] - d
-        if depth > 0:
+        dv = ti.Vector.zero(float, 3)
+        if d < 0:
             tool = ti.Vector([ti.cast(self.pose[VS], float), 0.0, ti.cast(self.pose[VZ], float)])
             stretch = self.stick[1, p] - self.stick[1, p].dot(n) * n
             rel = u - tool
-            stretch = stick_slip(stretch, dt * (rel - rel.dot(n) * n), depth, self.par[FRICTION])
+            stretch = stick_slip(stretch, dt * (rel - rel.dot(n) * n), -d, self.par[FRICTION])
             self.stick[1, p] = stretch
-            dv = (depth * n - stretch) / dt
-            u += dv
+            dv = -CONTACT * (d * n + stretch) / dt
             self.tool(FACE, -m * dv)
         else:
             self.stick[1, p] = ti.Vector.zero(float, 3)
-        return u
+        return dv
 
     @ti.func
     def gather(self, p, dt, window):
@@ -242,14 +290,7 @@ class Kernels(Survey):
         self.C[p, 2] = (4 * self.par[INV]) * (mz - fx[2] * whole)
         at = self.x[p] + dt * u
         if ti.static(not self.nodal):
-            m = self.par[MASS] * ti.static((2 if self.mx else 1) * (2 if self.my else 1))
-            there, v = self.blade_axes(at), self.blade_axes(u)
-            v = self.touch_board(p, m, dt, v, there)
-            if ti.static(self.press):
-                v = self.touch_press(p, m, dt, v, there)
-            else:
-                v = self.touch_blade(p, m, dt, v, there)
-            u = self.grid_axes(v)
+            u = self.touch(p, dt, u, at)
         self.v[p] = u
         self.x[p] = at
 

@@ -1,4 +1,4 @@
-"""Particles from a shape: one in each cell of a cubic lattice, at a random place in its middle half."""
+"""Particles from a shape: one in each cell of a cubic lattice, at a random place in its middle."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from mpm.scene import Scene
 from mpm.shapes import inside, surface, volume
 
 MAX_PARTICLES = 20_000_000
-JITTER = 0.5
-"""Part of its lattice cell in which a particle may lie. The noise of the sum over particles makes a solid softer: with
-the whole cell a bar of 26 cells swings 1.3 % slower than sqrt(E / rho) says and loses 4 % of its amplitude in a period, with
-half of it 0.5 and 1.1 %, on a lattice 0.15 %; but particles on planes touch a plate or the board all at once, and a
-press between plates is 5 % too stiff (block of 10 cells)."""
+JITTER = 0.25
+"""Part of its lattice cell in which a particle may lie. The noise of the sum over particles makes a solid softer and damps
+it: with the whole cell a bar of 26 cells swings 1.3 % slower than sqrt(E / rho) says and loses 4 % of its amplitude in a
+period, with half of it 0.5 and 1.1 %, with a quarter 0.16 % and less than 0.1 %. On a lattice, planes of particles would
+touch a plate or pass the crack front all at once."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,8 @@ class Seeds:
         x: Positions [m], shape (n, 3); only the modelled half or quarter when mirrors are on.
         volume: Volume of one particle [m^3]; the particles of all mirror images add up to the shape's volume.
         spacing: Lattice spacing [m].
-        foot: Distance of each particle from the lower surface, at most half a spacing [m], shape (n,).
+        foot: Distance at which each particle meets the board [m], shape (n,): its own from the lower surface in the first
+            layer, half a spacing behind it.
         head: The same from the upper surface.
         cells: Lattice cell of each particle, counted from the cut plane along y (-1, 0 on either side of it), shape
             (n, 3).
@@ -41,8 +42,8 @@ class Seeds:
 
     @property
     def gap(self) -> np.ndarray:
-        """Distance of each particle from the cut plane, at most half a spacing [m], shape (n,)."""
-        return np.minimum(np.abs(self.x[:, 1]), self.spacing / 2)
+        """Distance at which each particle meets the blade [m], shape (n,), from the cut plane as ``foot`` from the board."""
+        return _depth(np.abs(self.x[:, 1]), self.spacing)
 
     @property
     def beside(self) -> np.ndarray:
@@ -78,5 +79,10 @@ def seed(scene: Scene) -> Seeds:
     points, cells = points[there], cells[there] - [0, counts[1] - right, 0]
     bottom, top = surface(shape, points[:, 0], points[:, 1])
     images = (2 if mirror_x else 1) * (2 if mirror_y else 1)
-    foot, head = np.minimum(points[:, 2] - bottom, h / 2), np.minimum(top - points[:, 2], h / 2)
+    foot, head = _depth(points[:, 2] - bottom, h), _depth(top - points[:, 2], h)
     return Seeds(points, volume(shape) / images / len(points), h, foot, head, cells)
+
+
+def _depth(distance: np.ndarray, spacing: float) -> np.ndarray:
+    """Distance at which particles meet a surface: their own in the first layer, half a spacing in those behind it [m]."""
+    return np.where(distance < spacing, distance, spacing / 2)

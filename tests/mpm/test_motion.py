@@ -38,12 +38,16 @@ def sliding() -> Simulation:
 
 @pytest.mark.parametrize("xi", [0.0, 0.5, 1.0, 2.0])
 def test_slicing_lowers_the_push_as_atkins_says(sliding, xi):
-    """Frictionless: V/(R w) = 1/(1 + xi^2) and H/(R w) = xi/(1 + xi^2) (Atkins, Xu and Jeronimidis 2004), within 5 %."""
-    sliding.scene = replace(HELD, motion=replace(PRISM.motion, slice_ratio=max(xi, 1e-9)))  # 0 would be mirrored
+    """Frictionless: V/(R w) = 1/(1 + xi^2) and H/(R w) = xi/(1 + xi^2) (Atkins, Xu and Jeronimidis 2004), within 3 %.
+
+    At half the usual Mach number: the food swings sideways when a blade at twice its speed sets off along it.
+    """
+    motion = replace(PRISM.motion, slice_ratio=max(xi, 1e-9), mach=0.005)  # a ratio of 0 would be mirrored
+    sliding.scene = replace(HELD, motion=motion)
     record = sliding.run()
     push, pull = (between(record, record.edge[:, axis], 11e-3, 16e-3) for axis in (2, 0))
-    assert push == pytest.approx(R_W / (1 + xi**2), rel=0.05)
-    assert -pull == pytest.approx(R_W * xi / (1 + xi**2), abs=0.05 * R_W)
+    assert push == pytest.approx(R_W / (1 + xi**2), rel=0.03)
+    assert -pull == pytest.approx(R_W * xi / (1 + xi**2), abs=0.03 * R_W)
     assert record.momentum_residual < 1e-10
 
 
@@ -148,7 +152,8 @@ def test_sticky_faces_hold_the_knife_back():
         up = record.stroke.argmax()
         rising = (record.stroke[up:] < 13.5e-3) & (record.stroke[up:] > 9.5e-3)
         pull[name] = -record.knife[up:][rising, 2].mean()
-    assert pull["sticky"] > 2.0 * pull["dry"] > 0
+    assert pull["sticky"] > max(2.0 * pull["dry"], 0.1)
+    assert pull["dry"] > -1e-9
     assert pull["sticky"] - pull["dry"] < 5e3 * 2 * 0.015 * 0.024
 
 

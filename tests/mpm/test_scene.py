@@ -50,7 +50,7 @@ def test_particles_add_up_to_the_food(kind, mirror):
     assert seeds.volume * len(seeds.x) * images == pytest.approx(volume(sc.food.shape), rel=1e-12)
     assert inside(sc.food.shape, seeds.x).all()
     assert seeds.volume == pytest.approx(seeds.spacing**3, rel=0.06)
-    assert (seeds.foot >= 0).all() and seeds.foot.max() <= seeds.spacing / 2
+    assert (seeds.foot >= 0).all() and seeds.foot.max() <= seeds.spacing
     if mirror:
         assert seeds.x[:, 0].min() >= 0 and seeds.x[:, 1].max() <= 0
 
@@ -63,13 +63,24 @@ def test_seeds_repeat_and_differ():
 
 
 def test_particles_are_no_lattice_aligned_with_the_blade():
-    """Distances from the blade plane are spread over the middle half of each lattice cell, not stacked on planes."""
+    """Distances from the blade plane are spread over the middle quarter of each lattice cell, not stacked on planes."""
     y = seed(scene("block", mirror=False)).x[:, 1]
     phase = (y / 1.5e-3) % 1.0
-    counts, _ = np.histogram(phase, bins=8, range=(0, 1))
-    middle = counts[2:6]
+    counts, _ = np.histogram(phase, bins=16, range=(0, 1))
+    middle = counts[6:10]
     assert middle.sum() == counts.sum()
     assert middle.min() > 0.95 * middle.mean()
+
+
+def test_first_layer_meets_a_surface_at_its_own_distance():
+    """Between flat ends the first layer touches at its own distance, so all of it at once; the layers behind at half a cell."""
+    seeds = seed(scene("block", mirror=False))
+    first = seeds.x[:, 2] < seeds.spacing
+    np.testing.assert_allclose(seeds.foot[first], seeds.x[first, 2])
+    assert (seeds.foot[~first] == seeds.spacing / 2).all()
+    beside = seeds.beside
+    np.testing.assert_allclose(seeds.gap[beside], np.abs(seeds.x[beside, 1]))
+    assert (seeds.gap[~beside] == seeds.spacing / 2).all()
 
 
 def test_mirrors_follow_the_grid():
