@@ -50,7 +50,7 @@ def coulomb(jn, tangent, mu):
 
 
 @ti.func
-def stick_slip(stick, slide, press, mu):
+def stick_slip(stick, slide, own, press, mu):
     """Elastic-sticking Coulomb friction: tangential spring as stiff as the normal one, capped at mu times its force.
 
     Capping each step's impulse at the one that stops the particle would make friction viscous, because the grid takes
@@ -59,13 +59,14 @@ def stick_slip(stick, slide, press, mu):
     Args:
         stick: Tangential stretch of the spring so far [m], 3-vector.
         slide: Sliding of the particle along the tool in this step [m], 3-vector, tangential.
-        press: Normal force over the normal spring's stiffness [m]: the penetration.
+        own: Tangential part of the food's own traction over the spring's stiffness [m], which needs no stretch.
+        press: Normal force over the normal spring's stiffness [m].
         mu: Friction coefficient [-].
 
     Returns:
-        New stretch [m].
+        Friction force over the spring's stiffness [m]; ``own`` less it is the new stretch.
     """
-    out = stick + slide
+    out = own - stick - slide
     size, cap = out.norm(), mu * press
     if size > cap:
         out *= cap / size

@@ -80,6 +80,8 @@ class Fields:
         self.tau = ti.Vector.field(self.lanes, real, (self.blocks, 9))
         self.side, self.gap = ti.field(ti.i32, n), ti.field(real, n)
         self.foot = ti.field(real, n)
+        # reference volume between a particle of the first layer and the board, and the tool; 0 behind the first layer
+        self.shell = ti.Vector.field(2, real, n)
         self.lever = vec4.field(
             shape=(room, 2)
         )  # moment of the contact's last impulse: gradient up, and across the blade

@@ -2,9 +2,7 @@
 
 import taichi as ti
 
-from mpm.constitutive import (
-    unit,
-)
+from mpm.constitutive import full, unit
 from mpm.contact import blade_distance, stick_slip, tack
 from mpm.fields import (
     ARM_C,
@@ -43,6 +41,7 @@ from mpm.survey import Survey
 # Stiffness of the contact over mass / dt^2 of a particle. The stiffest sound one is 4, for a lone particle on a hard surface;
 # the arm of the impulse takes a third of that.
 CONTACT = 2.0
+FLAT = 0.02  # least distance between a particle's centre and the surface that squeezing leaves, over the cell
 
 TABLE = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
@@ -95,6 +94,8 @@ class Kernels(Survey):
             one_by_one = self.tau[block, 8][lane] > 0
         if one_by_one:
             loss, tau = self.stress(p, block, lane, dt)
+            for r in ti.static(range(6)):
+                self.tau[block, r][lane] = tau[r]
         else:
             for r in ti.static(range(6)):
                 tau[r] = self.tau[block, r][lane]
@@ -140,27 +141,31 @@ class Kernels(Survey):
         What touches is the food's surface, not the particle's centre. Its distance from the centre stretches with the
         food, it moves with the food's velocity there, and the impulse has the moment that belongs to it, so that the work
         of the contact is that of the surface. At the centre a food of n cells would be 1 / n stiffer.
+
+        The force is the food's own traction on the surface and, for what is missing, a stiff spring (Nitsche's method:
+        Chouly and Hild 2013, SIAM J. Numer. Anal. 51:1295). The spring alone, as stiff as the time step allows, would
+        give way by as much as a third of a cell of food.
         """
         m = self.par[MASS] * ti.static((2 if self.mx else 1) * (2 if self.my else 1))
         c = self.gradient_of(p)
         up = self.blade_axes(c @ ti.Vector([0.0, 0.0, 1.0]))  # gradient of the velocity, upwards and across the blade
         across = self.blade_axes(c @ self.grid_axes(ti.Vector([0.0, 1.0, 0.0])))
         there, v = self.blade_axes(at), self.blade_axes(u)
-        reach = 0.5 * self.par[DX]
+        least, most = FLAT * self.par[DX], 0.5 * self.par[DX]
+        kick, high, wide = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
         if there[2] < 2 * self.par[DX]:
-            self.foot[p] = ti.math.clamp(self.foot[p] * (1 + dt * up[2]), 0.0, reach)
-        kick = self.touch_board(p, m, dt, v - self.foot[p] * up, there)
-        high, wide = -self.foot[p] * kick, ti.Vector.zero(float, 3)
-        arm = ti.Vector.zero(float, 3)
-        push = ti.Vector.zero(float, 3)
+            self.foot[p] = ti.math.clamp(self.foot[p] * (1 + dt * up[2]), least, most)
+            kick = self.touch_board(p, m, dt, v - self.foot[p] * up, there)
+            high -= self.foot[p] * kick
+        arm, push = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
         if ti.static(self.press):
             if there[2] > ti.cast(self.pose[Z], float) - 2 * self.par[DX]:
-                self.gap[p] = ti.math.clamp(self.gap[p] * (1 + dt * up[2]), 0.0, reach)
-            arm = ti.Vector([0.0, 0.0, self.gap[p]])
-            push = self.touch_press(p, m, dt, v + kick + self.gap[p] * up, there + arm)
+                self.gap[p] = ti.math.clamp(self.gap[p] * (1 + dt * up[2]), least, most)
+                arm = ti.Vector([0.0, 0.0, self.gap[p]])
+                push = self.touch_press(p, m, dt, v + kick + self.gap[p] * up, there + arm)
         else:
             if ti.abs(there[1]) < 2 * self.par[DX]:
-                self.gap[p] = ti.math.clamp(self.gap[p] * (1 + dt * across[1]), 0.0, reach)
+                self.gap[p] = ti.math.clamp(self.gap[p] * (1 + dt * across[1]), least, most)
             push, arm = self.touch_blade(p, m, dt, v + kick, up, across, there)
         high += arm[2] * push
         wide += arm[1] * push
@@ -171,13 +176,32 @@ class Kernels(Survey):
         return self.grid_axes(v + kick + push)
 
     @ti.func
+    def traction(self, p, shell, depth, n, dt):
+        """Force of a surface with outward normal n that the food's own stress asks for, over the contact's stiffness [m].
+
+        Of the first layer only: ``shell`` is the reference volume between centre and surface, ``depth`` their distance.
+        """
+        out = ti.Vector.zero(float, 3)
+        if shell > 0:
+            block = p // self.lanes
+            lane = p - block * self.lanes
+            t = ti.Vector([self.tau[block, r][lane] for r in range(6)])
+            out = self.blade_axes(full(t) @ self.grid_axes(n))
+            out *= -shell / depth * dt * dt / (CONTACT * self.par[MASS])
+        return out
+
+    @ti.func
     def touch_board(self, p, m, dt, u, at):
         """Contact of one particle with the board; returns the change of its velocity. ``u`` is that of its surface."""
-        depth, dv = self.foot[p] - at[2], ti.Vector.zero(float, 3)
-        if depth > 0:
-            stretch = stick_slip(self.stick[0, p], dt * ti.Vector([u[0], u[1], 0.0]), depth, self.par[BOARD_MU])
-            self.stick[0, p] = stretch
-            dv = CONTACT * (ti.Vector([0.0, 0.0, depth]) - stretch) / dt
+        dv = ti.Vector.zero(float, 3)
+        own = self.traction(p, self.shell[p][0], self.foot[p], ti.Vector([0.0, 0.0, 1.0]), dt)
+        force = self.foot[p] - at[2] + own[2]
+        own[2] = 0.0
+        if force > 0:
+            slide = dt * ti.Vector([u[0], u[1], 0.0])
+            hold = stick_slip(self.stick[0, p], slide, own, force, self.par[BOARD_MU])
+            self.stick[0, p] = own - hold
+            dv = CONTACT / dt * ti.Vector([hold[0], hold[1], force])
             self.tool(BOARD, -m * dv)
         else:
             self.stick[0, p] = ti.Vector.zero(float, 3)
@@ -198,14 +222,18 @@ class Kernels(Survey):
             sign = 1.0 if self.side[p] == 2 else -1.0
             d, n = blade_distance(sign * at[1], above, self.par[SPINE], self.par[COS], self.par[SIN], self.par[RADIUS])
             n = ti.Vector([-sin_t * n[2], sign * n[1], cos_t * n[2]])
-            depth = self.gap[p] - d
-            press = ti.max(depth, 0.0)
-            if depth > 0 and self.tacky[p] == 0:
+            own = self.traction(p, self.shell[p][1], self.gap[p], n, dt)
+            opening = d - self.gap[p]
+            force = own.dot(n) - opening
+            press = ti.max(force, 0.0)
+            own -= own.dot(n) * n
+            if force > 0 and self.tacky[p] == 0:
                 self.tacky[p] = 1
-            if depth <= 0 and self.tacky[p] == 1:
-                if -depth < self.par[TACK_GAP]:
-                    depth = -self.par[TACK] * tack(-depth, self.par[TACK_GAP]) * dt * dt / CONTACT
-                    press = -depth
+            if force <= 0 and self.tacky[p] == 1:
+                if opening < self.par[TACK_GAP]:
+                    opening = ti.max(opening, 0.0)
+                    force = -self.par[TACK] * tack(opening, self.par[TACK_GAP]) * dt * dt / CONTACT
+                    press = -force
                 else:
                     self.tacky[p] = 0
             if press > 0:
@@ -213,10 +241,10 @@ class Kernels(Survey):
                 arm = -self.gap[p] * n
                 tool = ti.Vector([ti.cast(self.pose[VS], float), 0.0, ti.cast(self.pose[VZ], float)])
                 rel = u + arm[2] * up + arm[1] * across - tool
-                stretch = self.stick[1, p] - self.stick[1, p].dot(n) * n
-                stretch = stick_slip(stretch, dt * (rel - rel.dot(n) * n), press, self.par[FRICTION])
-                self.stick[1, p] = stretch
-                dv = CONTACT * (depth * n - stretch) / dt
+                stick = self.stick[1, p] - self.stick[1, p].dot(n) * n
+                hold = stick_slip(stick, dt * (rel - rel.dot(n) * n), own, press, self.par[FRICTION])
+                self.stick[1, p] = own - hold
+                dv = CONTACT / dt * (force * n + hold)
                 self.tool(FACE, -m * dv)
         if not touching:
             self.stick[1, p] = ti.Vector.zero(float, 3)
@@ -232,14 +260,17 @@ class Kernels(Survey):
         above = at[2] - ti.cast(self.pose[Z], float)
         d, n = blade_distance(sign * at[1], above, self.par[SPINE], self.par[COS], self.par[SIN], self.par[RADIUS])
         n = ti.Vector([0.0, sign * n[1], n[2]])
+        own = self.traction(p, self.shell[p][1], self.gap[p], n, dt)
+        force = own.dot(n) - d
+        own -= own.dot(n) * n
         dv = ti.Vector.zero(float, 3)
-        if d < 0:
+        if force > 0:
             tool = ti.Vector([ti.cast(self.pose[VS], float), 0.0, ti.cast(self.pose[VZ], float)])
-            stretch = self.stick[1, p] - self.stick[1, p].dot(n) * n
+            stick = self.stick[1, p] - self.stick[1, p].dot(n) * n
             rel = u - tool
-            stretch = stick_slip(stretch, dt * (rel - rel.dot(n) * n), -d, self.par[FRICTION])
-            self.stick[1, p] = stretch
-            dv = -CONTACT * (d * n + stretch) / dt
+            hold = stick_slip(stick, dt * (rel - rel.dot(n) * n), own, force, self.par[FRICTION])
+            self.stick[1, p] = own - hold
+            dv = CONTACT / dt * (force * n + hold)
             self.tool(FACE, -m * dv)
         else:
             self.stick[1, p] = ti.Vector.zero(float, 3)

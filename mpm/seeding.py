@@ -29,6 +29,8 @@ class Seeds:
         foot: Distance at which each particle meets the board [m], shape (n,): its own from the lower surface in the first
             layer, half a spacing behind it.
         head: The same from the upper surface.
+        bottom: Whether a particle is in the first layer above the lower surface, shape (n,).
+        top: The same below the upper surface.
         cells: Lattice cell of each particle, counted from the cut plane along y (-1, 0 on either side of it), shape
             (n, 3).
     """
@@ -38,6 +40,8 @@ class Seeds:
     spacing: float
     foot: np.ndarray
     head: np.ndarray
+    bottom: np.ndarray
+    top: np.ndarray
     cells: np.ndarray
 
     @property
@@ -77,10 +81,11 @@ def seed(scene: Scene) -> Seeds:
     points = origin + (cells + 0.5 + JITTER * rng.uniform(-0.5, 0.5, cells.shape)) * h
     there = inside(shape, points)
     points, cells = points[there], cells[there] - [0, counts[1] - right, 0]
-    bottom, top = surface(shape, points[:, 0], points[:, 1])
+    low, high = surface(shape, points[:, 0], points[:, 1])
     images = (2 if mirror_x else 1) * (2 if mirror_y else 1)
-    foot, head = _depth(points[:, 2] - bottom, h), _depth(top - points[:, 2], h)
-    return Seeds(points, volume(shape) / images / len(points), h, foot, head, cells)
+    below, above = points[:, 2] - low, high - points[:, 2]
+    foot, head = _depth(below, h), _depth(above, h)
+    return Seeds(points, volume(shape) / images / len(points), h, foot, head, below < h, above < h, cells)
 
 
 def _depth(distance: np.ndarray, spacing: float) -> np.ndarray:

@@ -149,7 +149,10 @@ class Simulation:
         real = np.float64 if num.precision == "f64" else np.float32
         k.x.from_numpy(self._turn(self.seeds.x).astype(real))
         k.foot.from_numpy(self.seeds.foot.astype(real))
-        k.gap.from_numpy((self.seeds.gap if scene.cuts else self.seeds.head).astype(real))
+        gap, outer = (self.seeds.gap, self.seeds.beside) if scene.cuts else (self.seeds.head, self.seeds.top)
+        k.gap.from_numpy(gap.astype(real))
+        shell = np.stack([self.seeds.foot * self.seeds.bottom, gap * outer], axis=1) * self.seeds.spacing**2
+        k.shell.from_numpy(shell.astype(real))
         k.reset()
         sticky = self.seeds.beside & (material.adhesion > 0)
         k.tacky.from_numpy(np.where(sticky, 0, -1).astype(np.int32))

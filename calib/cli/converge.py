@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,7 @@ Ctrl-C keeps what was computed; the same command with --resume goes on.
 Exit codes: 0 converged (work within 2 %, peak within 3 % between the two finest
 grids), 1 error in input or run, 2 ran but did not converge."""
 WORDS = {"safety": "time step", "mach": "speed", "ppc": "particles", "offset": "offset", "seed": "seeds"}
-REFINED = (1.0, 2 / 3, 0.5)  # default cells over the scene's own one
+REFINED = (4 / 3, 1.0, 2 / 3, 0.5)  # default cells over the scene's own one; the first is the process zone
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
@@ -35,7 +36,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
         "--dx",
         type=numbers(1e-4, 0.02, "m"),
         metavar="M,M,...",
-        help="cell sizes [m]; the food's own one, two thirds and half of it by default",
+        help="cell sizes [m]; four thirds of the food's own one, itself, two thirds and half by default",
     )
     p.add_argument(
         "--safety", type=numbers(0, 0.9, "of the stability limit"), metavar="F,...", help="time steps to try"
@@ -72,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
             f"the coarsest cell is larger than the process zone of {zone * 1e3:g} mm, so all grids have one of "
             f"{scene.edge.zone * 1e3:g} mm: this is not the cut of the other commands; start from {zone * 1e3:g} mm or less"
         )
-    axes = {"dx": args.dx or tuple(round(scene.numerics.dx * part, 7) for part in REFINED)}
+    axes = {"dx": args.dx or tuple(math.floor(scene.numerics.dx * part * 1e7 + 1e-3) / 1e7 for part in REFINED)}
     axes |= {name: getattr(args, name) for name in ("safety", "mach", "ppc", "offset") if getattr(args, name)}
     out = Path(args.out or f"cutcal-converge-{food.name}")
     about = {

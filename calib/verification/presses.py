@@ -73,9 +73,9 @@ TESTS = (
     Test(
         "wedge of 140 degrees on a block",
         Shape("block", 0.03, 0.016, 0.02),
-        (0.001, 0.002, 0.004),
+        (0.002, 0.003, 0.004),  # below, one row of elements is not enough: references differ by 3 % at 1 mm
         half_angle=math.radians(70),
-        reference=(("cells", 8),),
+        reference=(("cells", 5), ("order", 2), ("grade", 1.3)),
     ),
     Test(
         "wedge of 140 degrees on a lying cylinder",
@@ -119,7 +119,8 @@ def particles(test: Test, dx: float, *, material: Material = FOOD, mach: float =
     if record.status != "done":
         return np.full(len(test.strokes), math.nan)
     near = WINDOW * test.strokes[-1]
-    return np.array([_at(record.stroke, record.face[:, 2], s, near) for s in test.strokes])
+    middle = 0.5 * (record.stroke[1:] + record.stroke[:-1])  # a force is the mean of its interval
+    return np.array([_at(middle, record.face[1:, 2], s, near) for s in test.strokes])
 
 
 def _at(stroke: np.ndarray, force: np.ndarray, s: float, near: float) -> float:

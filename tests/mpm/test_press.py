@@ -63,25 +63,26 @@ def test_a_press_cuts_nothing():
     assert not record.severed
 
 
-def test_a_sliding_block_has_the_force_of_uniaxial_compression():
-    """Between slippery plates a block is in uniaxial compression: the law's force within 2.5 % on 8 cells, 1 % on 16, and what is
-    left shrinks by a third or more."""
-    misses = []
-    for dx in (2e-3, 1e-3):
-        record = pressed(
-            replace(
-                SCENE,
-                knife=Press(),
-                board=Board(0.0),
-                motion=Motion(1.8e-3, 3e-3),
-                numerics=Numerics(dx=dx, gravity=0.0, output=1e-5),
-            )
-        )
-        near = abs(record.stroke - 1.6e-3) < 0.2e-3  # a tenth of the height, without the ringing
-        force = np.polyfit(record.stroke[near] - 1.6e-3, record.face[near, 2], 2)[2]
-        misses.append(force / (uniaxial(0.9, SOFT) * 0.02 * 0.016) - 1)
-    assert abs(misses[0]) < 0.025
-    assert abs(misses[1]) < min(0.01, abs(misses[0]) * 2 / 3)
+@pytest.mark.parametrize("changed", [{}, {"dx": 1e-3}, {"safety": 0.35}])
+def test_a_sliding_block_has_the_force_of_uniaxial_compression(changed):
+    """Between slippery plates a block is in uniaxial compression: the law's force within 1 % on 8 cells, on 16, and with half
+    the time step. The contact gives way by nothing that the grid or the time step decides."""
+    numerics = Numerics(**{"dx": 2e-3, "gravity": 0.0, "output": 1e-5, **changed})
+    record = pressed(replace(SCENE, knife=Press(), board=Board(0.0), motion=Motion(1.8e-3, 3e-3), numerics=numerics))
+    middle = 0.5 * (record.stroke[1:] + record.stroke[:-1])
+    near = abs(middle - 1.6e-3) < 0.2e-3  # a tenth of the height, without the ringing
+    force = np.polyfit(middle[near] - 1.6e-3, record.face[1:, 2][near], 2)[2]
+    assert force == pytest.approx(uniaxial(0.9, SOFT) * 0.02 * 0.016, rel=0.01)
+
+
+def test_the_contact_keeps_no_energy():
+    """What the plate does is in the food: elastic energy is the work within 1.5 %, nothing is left in the contact."""
+    food = replace(SCENE.food, material=replace(SOFT, loss_factor=0.0))
+    quiet = replace(SCENE.numerics, gravity=0.0)
+    record = pressed(
+        replace(SCENE, food=food, motion=Motion(2e-3, 3e-3), numerics=quiet, board=Board(9.0), knife=Press(mu=9.0))
+    )
+    assert record.elastic[-1] == pytest.approx(record.work_done[-1], rel=0.015)
 
 
 def uniaxial(stretch: float, material: Material) -> float:
