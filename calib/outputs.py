@@ -19,6 +19,7 @@ MARKS = (
     "converge.json",
     "stress.json",
     "verify.json",
+    "compress.json",
     "report.pdf",
     "force.csv",
     "evaluations.h5",

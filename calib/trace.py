@@ -29,11 +29,13 @@ _UNITS = {
     "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6},
     "force": {"N": 1.0, "n": 1.0, "kN": 1e3, "KN": 1e3, "kn": 1e3, "mN": 1e-3, "mn": 1e-3},
     "position": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6},
+    "compression": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6},
 }
 _TIME_STEM = re.compile(r"time|t|timestamp|elapsed(_time)?")
 _FORCE_STEM = re.compile(r"(.*_)?(force|load|resistance|f|fz)(_z)?")
 _HEIGHT_STEM = re.compile(r"((ee|knife|tool|tcp|blade)_)?(z|height|position|pos)(_z)?")
 _DEPTH_STEM = re.compile(r"(.*_)?(stroke|displacement|travel|depth|extension|penetration)")
+_COMPRESSION_STEM = re.compile(r"(.*_)?(compression|stroke|displacement|travel|extension)")
 _KNOWN_FORCE = {"base_fz": -1.0, "knife_fz": 1.0}
 """Columns whose sign is known: robot logs hold the force on the world in the base frame, downwards
 negative."""
@@ -42,6 +44,7 @@ _EXPECTED = {
     "time": ("time_s", "time_ms", "t_s"),
     "force": ("force_N", "fz_N", "base_Fz_N", "force_kN", "force_mN"),
     "position": ("ee_z_m", "position_m", "position_mm", "stroke_m", "displacement_mm"),
+    "compression": ("compression_mm", "displacement_mm", "stroke_m"),
 }
 
 
@@ -90,7 +93,7 @@ class Trace:
 
 
 @dataclass(frozen=True)
-class _Table:
+class Table:
     """Text of a CSV file: column names, rows and their line numbers in the file."""
 
     source: str
@@ -102,7 +105,7 @@ class _Table:
 
 
 @dataclass(frozen=True)
-class _Column:
+class Column:
     """One chosen column and the factor that turns its numbers into SI with our sign."""
 
     name: str
@@ -140,19 +143,19 @@ def read_trace(
     Raises:
         TraceError: The file or a column cannot be used; the message names file, column and row.
     """
-    table = _read_table(Path(path))
+    table = read_table(Path(path))
     columns = {
-        "time": _choose(table, "time", time_col),
-        "force": _choose(table, "force", force_col),
+        "time": choose(table, "time", time_col),
+        "force": choose(table, "force", force_col),
     }
-    if position_col != DISABLED and (position_col is not None or _candidates(table, "position")):
-        columns["position"] = _choose(table, "position", position_col)
+    if position_col != DISABLED and (position_col is not None or candidates(table, "position")):
+        columns["position"] = choose(table, "position", position_col)
     if sign is not None:
         force = columns["force"]
-        columns["force"] = _Column(force.name, force.index, abs(force.factor) * _parse_sign(sign))
+        columns["force"] = Column(force.name, force.index, abs(force.factor) * _parse_sign(sign))
     if len(table.rows) < MIN_SAMPLES:
         raise TraceError(f"{table.source}: {len(table.rows)} rows of data, at least {MIN_SAMPLES} are needed")
-    values = {role: _numbers(table, column) for role, column in columns.items()}
+    values = {role: numbers(table, column) for role, column in columns.items()}
     _check_clock(table, columns["time"], columns["force"], values["time"], values["force"])
     return Trace(
         time=values["time"],
@@ -173,8 +176,12 @@ def _parse_sign(sign: str | int) -> float:
     return signs[str(sign)]
 
 
-def _read_table(path: Path) -> _Table:
-    """Split a CSV file into header and rows; comments and blank lines are dropped, line numbers kept."""
+def read_table(path: Path) -> Table:
+    """Split a CSV file into header and rows; comments and blank lines are dropped, line numbers kept.
+
+    Raises:
+        TraceError: There is no such file, or it is no CSV file with a header.
+    """
     if path.is_dir():
         raise TraceError(f"{path} is a directory; name a CSV file")
     if not path.is_file():
@@ -199,7 +206,7 @@ def _read_table(path: Path) -> _Table:
     cells = list(csv.reader([line for _, line in body], delimiter=delimiter))
     names = [name.strip() for name in cells[0]]
     _check_header(path.name, names)
-    return _Table(
+    return Table(
         source=path.name,
         names=names,
         rows=cells[1:],
@@ -217,7 +224,7 @@ def _names_beside(path: Path) -> list[str]:
 def _check_header(source: str, names: list[str]) -> None:
     """Refuse a header with one column, without names, or with a name twice."""
     if len(names) < 2:
-        raise TraceError(f"{source}: not a CSV file with a time and a force column (header: {names[0][:60]!r})")
+        raise TraceError(f"{source}: not a CSV file with a force column and one beside it (header: {names[0][:60]!r})")
     if all(_as_float(name) is not None for name in names):
         raise TraceError(f"{source}: the first row holds numbers; add a header such as time_s,force_N")
     twice = sorted({name for name in names if names.count(name) > 1})
@@ -251,18 +258,23 @@ def _split_unit(name: str) -> tuple[str, str]:
 
 def _stem_matches(role: str, stem: str) -> bool:
     """Whether a stem names the role."""
-    patterns = {"time": (_TIME_STEM,), "force": (_FORCE_STEM,), "position": (_HEIGHT_STEM, _DEPTH_STEM)}
+    patterns = {
+        "time": (_TIME_STEM,),
+        "force": (_FORCE_STEM,),
+        "position": (_HEIGHT_STEM, _DEPTH_STEM),
+        "compression": (_COMPRESSION_STEM,),
+    }
     return any(pattern.fullmatch(stem) for pattern in patterns[role])
 
 
-def _candidates(table: _Table, role: str) -> list[str]:
+def candidates(table: Table, role: str) -> list[str]:
     """Columns whose name and unit fit a role; known ones alone if there are any."""
     fitting = []
     for name in table.names:
         stem, unit = _split_unit(name)
         if unit in _UNITS[role] and _stem_matches(role, stem):
             fitting.append(name)
-    known: Sequence[str] = {"force": tuple(_KNOWN_FORCE), "position": _KNOWN_POSITION, "time": ()}[role]
+    known: Sequence[str] = {"force": tuple(_KNOWN_FORCE), "position": _KNOWN_POSITION}.get(role, ())
     for stem in known:
         preferred = [name for name in fitting if _split_unit(name)[0] == stem]
         if preferred:
@@ -270,14 +282,18 @@ def _candidates(table: _Table, role: str) -> list[str]:
     return fitting
 
 
-def _choose(table: _Table, role: str, wanted: str | None) -> _Column:
-    """The column of a role, by name if the user gave one."""
+def choose(table: Table, role: str, wanted: str | None) -> Column:
+    """The column of a role (``time``, ``force``, ``position`` or ``compression``), by name if the user gave one.
+
+    Raises:
+        TraceError: There is no such column, or no single one whose name fits.
+    """
     option = f"--{role}-col"
     if wanted is not None:
         if wanted not in table.names:
             raise TraceError(f"{table.source}: no column {wanted!r} ({option}){_did_you_mean([wanted], table.names)}")
         return _column(table, role, wanted)
-    fitting = _candidates(table, role)
+    fitting = candidates(table, role)
     if len(fitting) == 1:
         return _column(table, role, fitting[0])
     if fitting:
@@ -300,7 +316,7 @@ def _did_you_mean(wanted: Sequence[str], names: list[str]) -> str:
     return f"; the columns are {', '.join(names)}"
 
 
-def _column(table: _Table, role: str, name: str) -> _Column:
+def _column(table: Table, role: str, name: str) -> Column:
     """Index and factor of a named column: unit, known sign of a force, depth turned into height."""
     stem, unit = _split_unit(name)
     factor = _UNITS[role].get(unit, 1.0)
@@ -308,11 +324,15 @@ def _column(table: _Table, role: str, name: str) -> _Column:
         factor *= _KNOWN_FORCE.get(stem, 1.0)
     if role == "position" and _DEPTH_STEM.fullmatch(stem):
         factor = -factor
-    return _Column(name, table.names.index(name), factor)
+    return Column(name, table.names.index(name), factor)
 
 
-def _numbers(table: _Table, column: _Column) -> np.ndarray:
-    """The numbers of a column in SI [shape (rows,)]; the first cell that is none is named."""
+def numbers(table: Table, column: Column) -> np.ndarray:
+    """The numbers of a column in SI, shape (rows,).
+
+    Raises:
+        TraceError: A cell holds no finite number; the message names the first one.
+    """
     values = np.empty(len(table.rows))
     for i, (row, line) in enumerate(zip(table.rows, table.lines, strict=True)):
         where = f"{table.source}, row {line}"
@@ -330,7 +350,7 @@ def _numbers(table: _Table, column: _Column) -> np.ndarray:
     return values * column.factor
 
 
-def _check_clock(table: _Table, time: _Column, force: _Column, t: np.ndarray, f: np.ndarray) -> None:
+def _check_clock(table: Table, time: Column, force: Column, t: np.ndarray, f: np.ndarray) -> None:
     """Refuse a time that does not increase, columns that look swapped, and milliseconds named as seconds."""
     steps = np.diff(t)
     if np.any(steps <= 0.0):

@@ -7,11 +7,12 @@ import sys
 from collections.abc import Sequence
 
 import calib
-from calib.cli import bench, calibrate, converge, foods, predict, report, simulate, stress, verify
+from calib.cli import bench, calibrate, compress, converge, foods, predict, report, simulate, stress, verify
 from mpm.errors import CutcalError
 
 COMMANDS = {
     "calibrate": calibrate,
+    "compress": compress,
     "converge": converge,
     "bench": bench,
     "stress": stress,
