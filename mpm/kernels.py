@@ -144,7 +144,7 @@ class Kernels(Survey):
 
         The force is the food's own traction on the surface and, for what is missing, a stiff spring (Nitsche's method:
         Chouly and Hild 2013, SIAM J. Numer. Anal. 51:1295). The spring alone, as stiff as the time step allows, would
-        give way by as much as a third of a cell of food.
+        give way as much as a fifth of a cell of food does.
         """
         m = self.par[MASS] * ti.static((2 if self.mx else 1) * (2 if self.my else 1))
         c = self.gradient_of(p)

@@ -47,7 +47,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("--bonded", action="store_true", help="the food sticks to the plates; they are frictionless else")
     p.add_argument("--bracket", action="store_true", help="also the modulus if the plates were the other way")
-    p.add_argument("--cells", type=int, default=15, help="cells over the height (default 15)")
+    p.add_argument("--cells", type=int, help="cells over the height (default 10, 15 between bonded plates)")
     p.add_argument("--compression-col", metavar="NAME", help="column of the compression; metres without a unit")
     p.add_argument("--force-col", metavar="NAME", help="column of the load; newtons without a unit")
     add_run(p)
@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
         args.nu,
         out,
         strain=args.strain,
-        cells=args.cells,
+        cells=args.cells if args.cells is not None else 15 if args.bonded else 10,
         bonded=args.bonded,
         bracket=args.bracket,
         compression_col=args.compression_col,
