@@ -153,7 +153,7 @@ class Kernels(Survey):
         there, v = self.blade_axes(at), self.blade_axes(u)
         least, most = FLAT * self.par[DX], 0.5 * self.par[DX]
         kick, high, wide = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
-        if there[2] < 2 * self.par[DX]:
+        if 0 < self.foot[p] and there[2] < 2 * self.par[DX]:  # a free body has none
             self.foot[p] = ti.math.clamp(self.foot[p] * (1 + dt * up[2]), least, most)
             kick = self.touch_board(p, m, dt, v - self.foot[p] * up, there)
             high -= self.foot[p] * kick
