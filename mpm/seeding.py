@@ -81,9 +81,9 @@ def seed(scene: Scene) -> Seeds:
     points = origin + (cells + 0.5 + JITTER * rng.uniform(-0.5, 0.5, cells.shape)) * h
     there = inside(shape, points)
     points, cells = points[there], cells[there] - [0, counts[1] - right, 0]
-    low, high = surface(shape, points[:, 0], points[:, 1])
+    floor, roof = surface(shape, points[:, 0], points[:, 1])
     images = (2 if mirror_x else 1) * (2 if mirror_y else 1)
-    below, above = points[:, 2] - low, high - points[:, 2]
+    below, above = points[:, 2] - floor, roof - points[:, 2]
     foot, head = _depth(below, h), _depth(above, h)
     return Seeds(points, volume(shape) / images / len(points), h, foot, head, below < h, above < h, cells)
 
