@@ -61,7 +61,7 @@ TESTS = (
     Test(
         "sphere",
         Shape("sphere", 0.03, 0.03, 0.03),
-        (0.002, 0.004, 0.006),
+        (0.004, 0.005, 0.006),  # below, few elements touch: references differ by 2 % at 2 mm and by 5 % at 1.5 mm
         reference=(("cells", 4), ("order", 2), ("grade", 1.2)),
     ),
     Test(
