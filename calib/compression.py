@@ -8,6 +8,7 @@ fitted by scaling it. Strain is compression / height, stress is force / A0: both
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ from scipy.stats import t as student
 
 from calib.errors import CurveError, TraceError
 from calib.outputs import prepare, write_csv, write_json
+from calib.progress import clock
 from calib.provenance import git_commit, versions
 from calib.trace import MIN_SAMPLES, Table, candidates, choose, numbers, read_table
 from calib.verdicts import Verdict
@@ -54,6 +56,8 @@ STICKS = 9.9
 """Friction with which nothing slides [-]."""
 BEYOND = 1.03
 """Stroke over the largest fitted one [-]: the end of the fitted curve has samples on both sides."""
+TELL = 5.0
+"""Time between two lines that say how far a press is [s]."""
 ROWS = 400
 """Rows of the record of a press."""
 DEGREE = 5
@@ -334,18 +338,28 @@ def press_scene(shape: Shape, nu: float, strain: float, *, cells: int, bonded: b
     )
 
 
-def unit_curve(scene: Scene, strain: float, *, arch: str = "cpu") -> UnitCurve:
+def unit_curve(scene: Scene, strain: float, *, arch: str = "cpu", say: Say | None = None) -> UnitCurve:
     """Press the specimen once.
 
     Args:
         scene: From :func:`press_scene`.
         strain: Largest engineering strain [-].
         arch: Device.
+        say: Called every few seconds with a line that says how far the press is.
 
     Raises:
         SimulationError: The run broke down.
     """
-    record = Simulation(scene, Runtime(arch, threads=1)).run()
+    began = told = time.monotonic()
+
+    def show(part: float, _: float) -> None:
+        nonlocal told
+        now = time.monotonic()
+        if say is not None and now - told >= TELL and part > 0.02:  # before that most of the time was compilation
+            told = now
+            say(f"  {part:.0%} of the press, about {clock((now - began) * (1 - part) / part)} left")
+
+    record = Simulation(scene, Runtime(arch, threads=1)).run(progress=show)
     if record.status != "done":
         raise SimulationError(
             f"the press stopped at {record.fraction:.0%} of its stroke: {record.status}; give a smaller --strain or "
@@ -526,7 +540,7 @@ def run(
         seed: Seed of the particles.
         arch: Device.
         about: What compress.json says beside the result.
-        say: Called with a line before each simulation.
+        say: Called with a line before each simulation, and every few seconds in it.
 
     Returns:
         The content of compress.json.
@@ -540,21 +554,21 @@ def run(
     measured = read_repeats(paths, shape, strain, compression_col=compression_col, force_col=force_col)
     prepare(out, resume=False)
     say(f"pressing to a strain of {strain:g} on {cells} cells over the height, plates {_plates(bonded)}")
-    unit = unit_curve(scene, strain, arch=arch)
+    unit = unit_curve(scene, strain, arch=arch, say=say)
     found = fit(measured, unit)
     error, change = None, None
     if bonded:
         fewer = round(COARSER * cells)
         say(f"pressing again on {fewer} cells")
         coarse = press_scene(shape, nu, strain, cells=fewer, bonded=True, seed=seed)
-        change = grid_change(unit, unit_curve(coarse, strain, arch=arch))
+        change = grid_change(unit, unit_curve(coarse, strain, arch=arch, say=say))
     else:
         error = solver_error(unit, nu)
     other = None
     if bracket:
         say(f"pressing again, plates {_plates(not bonded)}")
         second = press_scene(shape, nu, strain, cells=cells, bonded=not bonded, seed=seed)
-        modulus = scale(unit_curve(second, strain, arch=arch).stress, measured.stress).mean()
+        modulus = scale(unit_curve(second, strain, arch=arch, say=say).stress, measured.stress).mean()
         other = {"plates": _plates(not bonded), "E_Pa": float(modulus)}
     lines = judge(found, error, change)
     document: dict[str, Any] = {

@@ -157,7 +157,7 @@ class Edge(Nodes):
     def follow(self, i):
         """Mean velocity of the process zone of slice i after the edge's reaction.
 
-        The slip of the next step is counted against it.  Counted against the velocity before the reaction, the slip would
+        The slip of the next step is counted against it. Counted against the velocity before the reaction, the slip would
         run ahead by force x dt / mass in every step, and the edge would do work on the food that nobody did on the edge.
         """
         box = self.slice_nodes(i)

@@ -82,9 +82,8 @@ class Fields:
         self.foot = ti.field(real, n)
         # reference volume between a particle of the first layer and the board, and the tool; 0 behind the first layer
         self.shell = ti.Vector.field(2, real, n)
-        self.lever = vec4.field(
-            shape=(room, 2)
-        )  # moment of the contact's last impulse: gradient up, and across the blade
+        # moment of the contact's last impulse as a gradient of the velocity: upwards, and across the blade
+        self.lever = vec4.field(shape=(room, 2))
         self.kappa, self.strain = (ti.field(real, room if damage else 1) for _ in range(2))
         self.stick = vec3.field(shape=(2, n))  # board, blade
         self.tacky, self.layers = ti.field(ti.i32, n), ti.field(ti.i32, n)

@@ -38,8 +38,8 @@ from mpm.fields import (
 )
 from mpm.survey import Survey
 
-# Stiffness of the contact over mass / dt^2 of a particle. The stiffest sound one is 4, for a lone particle on a hard surface;
-# the arm of the impulse takes a third of that.
+# Stiffness of the contact over mass / dt^2 of a particle. The stiffest sound one is 4 for a lone particle on a hard surface,
+# over 1 + 4 arm^2 / dx^2 when the impulse has an arm, which is half a cell at most.
 CONTACT = 2.0
 FLAT = 0.02  # least distance between a particle's centre and the surface that squeezing leaves, over the cell
 
@@ -177,7 +177,7 @@ class Kernels(Survey):
 
     @ti.func
     def traction(self, p, shell, depth, n, dt):
-        """Force of a surface with outward normal n that the food's own stress asks for, over the contact's stiffness [m].
+        """Force that the food's own stress asks of a board or tool with outward normal n, over the contact's stiffness [m].
 
         Of the first layer only: ``shell`` is the reference volume between centre and surface, ``depth`` their distance.
         """
