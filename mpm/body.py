@@ -26,7 +26,8 @@ class FreeBody:
     Args:
         shape: Outline.
         material: Its constants.
-        numerics: Grid; mirrors are not used. ``room`` is all the space beside the body, above it are three cells.
+        numerics: Grid. ``room`` is all the space beside the body, above it are three cells.
+        place: Moves the particles before the start, (n, 3) to (n, 3) [m]; they keep to the grid around ``shape``.
         velocity: Velocities [m/s], shape (n, 3), of places (n, 3); at rest without it.
         slope: Velocity gradients [1/s], shape (n, 3, 3), of places; 0 without it.
         board: Friction on the board [-]; without it there is no board.
@@ -47,6 +48,7 @@ class FreeBody:
         material: Material,
         numerics: Numerics,
         *,
+        place: Places | None = None,
         velocity: Places | None = None,
         slope: Places | None = None,
         board: float | None = None,
@@ -60,7 +62,8 @@ class FreeBody:
         self._simulation._set_pose(FAR)
         if board is None:
             self._k.foot.fill(-FAR)
-        self.start = self._k.x.to_numpy() + [0.0, 0.0, lift]
+        seeds = self._k.x.to_numpy()
+        self.start = (place(seeds) if place else seeds) + [0.0, 0.0, lift]
         self._k.x.from_numpy(self.start)
         if velocity is not None:
             self._k.v.from_numpy(velocity(self.start).astype(self.start.dtype))

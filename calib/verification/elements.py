@@ -1,14 +1,15 @@
-"""The finite-element reference itself: manufactured solution, benchmarks with known answers, Hertz."""
+"""The finite-element reference itself: manufactured solution, benchmarks with known answers, Hertz, a punch."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from calib.verification.rows import Case, Row
-from fem_reference.laws import Corotated, Law
+from fem_reference.laws import Corotated, Law, Plastic
 from fem_reference.meshes import bent, box, surface
 from fem_reference.press import press
 from fem_reference.solid import Solid
@@ -182,7 +183,7 @@ def beams(quick: bool) -> Iterator[Row]:
 
 
 def hertz(quick: bool) -> Iterator[Row]:
-    """A ball between two plates."""
+    """A ball and a cylinder between two plates."""
     ball, food = Shape("sphere", 0.04, 0.04, 0.04), Material(E=1e5, nu=0.35, rho=1000.0)
     way = 0.3e-3  # contact radius over radius 0.09: Hertz holds where that is small
     curve = press(ball, food, [way / 2, way], cells=9, grade=2.0)
@@ -200,6 +201,45 @@ def hertz(quick: bool) -> Iterator[Row]:
     yield Row(
         "ball between plates", "force of the plate less that on the board [N]", 0.0, balance, 1e-4 * want, "balance"
     )
+    half, radius = (
+        0.002,
+        0.02,
+    )  # of the contact, of the cylinder: nu = 0, for which plane strain and free ends are the same
+    line = math.pi * food.E * half**2 / (4 * radius)
+    way = 2 * line / (math.pi * food.E) * (2 * math.log(4 * radius / half) - 1)
+    round_ = Shape("cylinder", 0.002, 2 * radius, 2 * radius)
+    soft = replace(food, nu=0.0)
+    curve = press(round_, soft, [way / 4, way / 2, 3 * way / 4, way], cells=6, order=2, grade=2.0)
+    yield Row(
+        "cylinder between plates",
+        f"force on its length at {way * 1e3:.2g} mm [N/m]",
+        line,
+        float(curve.force[-1]) / round_.length,
+        0.03,
+        "Hertz, against the middle of the cylinder (Johnson 1985, eq. 5.57)",
+    )
+
+
+def punch(quick: bool) -> Iterator[Row]:
+    """A flat punch of half width 1 on a deep block in plane strain that flows: the load at which it sinks in."""
+    n, wide, depth, steps = 4, 3.0, 0.03, 6
+    food, flow = Material(E=1e3, nu=0.3, rho=1.0), 1.0
+    shrink = np.linspace(0, 1, 2 * n + 1) ** 2  # elements become small at the punch's edge
+    across = np.concatenate([1 - np.linspace(1, 0, n + 1) ** 2, 1 + (wide - 1) * shrink[1:]])
+    block = box(np.linspace(0, 0.25, 2), across, -wide * shrink[::-1])
+    solid = Solid(block, Plastic(food.shear, food.lame, flow), 2)
+    _, y, z = solid.nodes.T
+    near = 1e-9
+    solid.hold(np.arange(len(y)), [0])
+    solid.hold(np.flatnonzero((y < near) | (y > wide - near)), [1])
+    solid.hold(np.flatnonzero(z < near - wide), [2])
+    under = np.flatnonzero((z > -near) & (y < 1 + near))
+    for k in range(1, steps + 1):
+        solid.hold(under, [2], -depth * k / steps)
+        solid.solve()
+    got = float(-solid.reaction(under)[2]) / 0.25
+    want = (2 + math.pi) / math.sqrt(3) * flow
+    yield Row("flat punch, J2", "mean pressure over yield stress [-]", want, got, 0.05, "Prandtl 1921, plane strain")
 
 
 CASES = [
@@ -207,4 +247,5 @@ CASES = [
     Case("finite elements: NAFEMS", nafems),
     Case("finite elements: beams", beams),
     Case("finite elements: Hertz", hertz, fast=False),
+    Case("finite elements: punch", punch, fast=False),
 ]

@@ -1,4 +1,4 @@
-"""Motions with closed forms: conservation, waves, vibration, weight, friction, impact, a manufactured solution."""
+"""Motions with closed forms: conservation, waves, vibration, a manufactured solution."""
 
 from __future__ import annotations
 
@@ -240,72 +240,6 @@ def wave(quick: bool) -> Iterator[Row]:
     yield Row("plate hits a bar, arrival at the board", "time [s]", bar.height / c, float(arrival), 0.05, "L / c")
 
 
-def resting(quick: bool) -> Iterator[Row]:
-    """What stands on the board weighs its weight; what slides is slowed by mu g."""
-    damped = Material(E=1e5, nu=0.0, rho=1000.0, loss_factor=0.5)
-    body = FreeBody(BLOCK, damped, numerics(gravity=9.81), board=0.0)
-    period = 4 * BLOCK.height / damped.p_wave
-    body.step(math.ceil((6 if quick else 12) * period / body.dt))
-    before, since = body.impulse.copy(), body.time
-    body.step(math.ceil(4 * period / body.dt))
-    weight = damped.rho * BLOCK.width * BLOCK.length * BLOCK.height * 9.81
-    yield Row(
-        "block at rest",
-        "force on the board [N]",
-        -weight,
-        float((body.impulse - before)[2] / (body.time - since)),
-        0.005,
-        "m g",
-    )
-    mu, v0 = 0.4, 0.15
-    slide = FreeBody(
-        BLOCK,
-        damped,
-        numerics(gravity=9.81, room=1.0),
-        board=mu,
-        velocity=lambda x: np.tile([0.0 * v0, 0.0, 0.0], (len(x), 1)),
-    )
-    slide.step(math.ceil(6 * period / slide.dt))
-    slide.kick(np.array([v0, 0.0, 0.0]))
-    slide.step(math.ceil(2 * period / slide.dt))
-    t0, u0 = slide.time, slide.v[:, 0].mean()
-    slide.step(math.ceil(0.5 * v0 / (mu * 9.81) / slide.dt))
-    slowed = (slide.v[:, 0].mean() - u0) / (slide.time - t0)
-    yield Row("block slides on the board", "acceleration [m/s^2]", -mu * 9.81, float(slowed), 0.02, "Coulomb: mu g")
-
-
-def bouncing(quick: bool) -> Iterator[Row]:
-    """A ball bounces back from the board."""
-    ball = Shape("sphere", 0.03, 0.03, 0.03)
-    body = FreeBody(
-        ball,
-        Material(E=1e5, nu=0.3, rho=1000.0),
-        numerics(1.5e-3 if not quick else 2e-3),
-        board=0.0,
-        lift=1e-3,
-        velocity=lambda x: np.tile([0.0, 0.0, -0.3], (len(x), 1)),
-    )
-    start = body.kinetic
-    body.step(1)
-    start = body.kinetic
-    for _ in range(4000):
-        body.step(10)
-        up = float(body.v[:, 2].mean())
-        if up > 0 and body.x[:, 2].min() > 1.5e-3:
-            break
-    yield Row(
-        "ball bounces",
-        "speed after over before [-]",
-        0.9,
-        up / 0.3,
-        0.0,
-        "elastic impact: above 0.9 (Sulsky et al. 1994)",
-        least=True,
-    )
-    energy = (body.kinetic + body.elastic) / start
-    yield Row("ball bounces, energy", "after over before [-]", 1.0, energy, 0.10, "elastic impact")
-
-
 CASES = [
     Case("conservation", conserved),
     Case("spin", spinning),
@@ -314,6 +248,4 @@ CASES = [
     Case("ball", breathing),
     Case("vortex", turning),
     Case("wave", wave),
-    Case("rest and friction", resting),
-    Case("bounce", bouncing),
 ]

@@ -27,7 +27,7 @@ WINDOW = 0.12  # part of the last stroke, on either side, over which the particl
 
 @dataclass(frozen=True)
 class Test:
-    """A press. Attributes: name; shape; strokes [m]; particles, options of the tool; elements, options of the reference."""
+    """A press. Attributes: name; shape; strokes [m]; options of the tool; of the reference; cell sizes of the particles [m]."""
 
     name: str
     shape: Shape
@@ -37,6 +37,7 @@ class Test:
     yield_stress: float = math.inf
     tolerance: float = 0.02
     reference: tuple[tuple[str, Any], ...] = ()
+    sizes: tuple[float, ...] = CELLS
     slow: bool = True
 
 
@@ -57,6 +58,21 @@ TESTS = (
         (0.001, 0.002, 0.004),
         bonded=True,
         reference=(("cells", 4), ("order", 2)),
+    ),
+    Test(
+        "cylinder of 50 x 30 mm to 40 %, sliding",
+        Shape("upright_cylinder", 0.05, 0.05, 0.03),
+        (0.003, 0.006, 0.009, 0.012),
+        reference=(("cells", 3),),
+        sizes=(3e-3, 2e-3),
+    ),
+    Test(
+        "cylinder of 50 x 30 mm to 40 %, bonded",
+        Shape("upright_cylinder", 0.05, 0.05, 0.03),
+        (0.003, 0.006, 0.009, 0.012),
+        bonded=True,
+        reference=(("cells", 4), ("order", 2)),
+        sizes=(3e-3, 2e-3),
     ),
     Test(
         "sphere",
@@ -151,7 +167,7 @@ def compare(test: Test, sizes: Sequence[float]) -> Iterator[Row]:
 
 def _case(test: Test) -> Case:
     def run(quick: bool) -> Iterator[Row]:
-        yield from compare(test, CELLS[:1] if quick else CELLS)
+        yield from compare(test, test.sizes[:1] if quick else test.sizes)
 
     return Case(f"press: {test.name}", run, fast=not test.slow)
 

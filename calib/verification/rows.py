@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-PARTS = ("laws", "motion", "presses", "cuts", "elements")
+PARTS = ("laws", "motion", "contact", "bending", "presses", "cuts", "elements")
 """Modules with cases, in the order of the table."""
 
 
