@@ -38,14 +38,14 @@ class Estimate:
 
     Attributes:
         verdict: One of :data:`VERDICTS`, from the three finest grids.
-        order: Observed order of the three finest grids [-], or None (two grids, divergent, equal values).
+        order: Observed order of the three finest grids [-], or None (two grids, divergent, noise, equal values).
         extrapolated: Richardson's value for an infinitely fine grid, or None.
         change: Difference of the two finest over the finest [-].
         gci: Grid convergence index of the finest, a fraction of its value [-].
         fitted: Value of the least-squares fit for an infinitely fine grid, or None with fewer than four grids.
         fitted_order: Order of that fit [-], or None.
         uncertainty: Numerical uncertainty of the finest at about 95 %, a fraction of its value [-]: of the least-squares
-            estimate where there is one, else the index.
+            estimate where there is one, else the index, and of the runs that should agree.
     """
 
     verdict: str
@@ -64,7 +64,7 @@ def estimate(h: Sequence[float], values: Sequence[float], repeat_sd: float = 0.0
     Args:
         h: Cell sizes [m], shape (n,), n >= 2, all different, in any order.
         values: The number on each grid, shape (n,).
-        repeat_sd: Its standard deviation between runs that should agree (other particles, other offsets).
+        repeat_sd: Its standard deviation between runs that should agree (other particles, the grid elsewhere).
 
     Raises:
         CurveError: Fewer than two grids, equal cell sizes, or values that are not finite.
@@ -73,19 +73,21 @@ def estimate(h: Sequence[float], values: Sequence[float], repeat_sd: float = 0.0
     scale = abs(phi[0]) if phi[0] else 1.0
     fine = phi[0] - phi[1]
     change = float(fine / scale)
+    noise = COVERAGE * repeat_sd / scale
     if len(phi) == 2:
         gci = float(SAFETY_FACTOR_DOUBT * abs(change) / (cells[1] / cells[0] - 1))
-        return Estimate("two grids", None, None, change, gci, None, None, gci)
+        return Estimate("two grids", None, None, change, gci, None, None, math.hypot(gci, noise))
     coarse = phi[1] - phi[2]
     verdict = _verdict(cells, fine, coarse, repeat_sd)
-    order = None if verdict == "divergent" else observed_order(cells[:3], phi[:3])
+    trend = verdict not in ("divergent", "noise-limited")
+    order = observed_order(cells[:3], phi[:3]) if trend else None
     factor, used = _credible(order)
     gci = float(factor * abs(change) / ((cells[1] / cells[0]) ** used - 1))
     extrapolated = None if order is None else float(phi[0] + fine / ((cells[1] / cells[0]) ** order - 1))
     if len(phi) == 3:
-        return Estimate(verdict, order, extrapolated, change, gci, None, None, gci)
+        return Estimate(verdict, order, extrapolated, change, gci, None, None, math.hypot(gci, noise))
     limit, p, band = _least_squares(cells, phi)
-    return Estimate(verdict, order, extrapolated, change, gci, limit, p, float(band / scale))
+    return Estimate(verdict, order, extrapolated, change, gci, limit, p, math.hypot(band / scale, noise))
 
 
 def observed_order(h: np.ndarray, values: np.ndarray) -> float | None:
@@ -119,7 +121,8 @@ class CurveEstimate:
     Attributes:
         order: Order by which the curves approach each other, in the root mean square [-], or None.
         gci: Index at each point, over the peak of the finest curve [-], shape (m,).
-        u_num: Standard numerical uncertainty of the finest curve [unit of the curve], shape (m,).
+        u_num: Standard numerical uncertainty of the finest curve, of the grid and of the runs that should agree [unit of
+            the curve], shape (m,).
     """
 
     order: float | None
@@ -127,12 +130,15 @@ class CurveEstimate:
     u_num: np.ndarray
 
 
-def curve_estimate(h: Sequence[float], curves: Sequence[np.ndarray]) -> CurveEstimate:
+def curve_estimate(
+    h: Sequence[float], curves: Sequence[np.ndarray], repeat_sd: np.ndarray | float = 0.0
+) -> CurveEstimate:
     """Index along a curve, with one order for all of it (local orders of a wavy curve mean nothing).
 
     Args:
         h: Cell sizes [m], shape (n,), n >= 2.
         curves: The curve on each grid, all at the same strokes, each of shape (m,).
+        repeat_sd: Standard deviation between curves that should agree, shape (m,).
 
     Raises:
         CurveError: Fewer than two grids, or curves of different lengths.
@@ -151,7 +157,7 @@ def curve_estimate(h: Sequence[float], curves: Sequence[np.ndarray]) -> CurveEst
     factor, used = _credible(order)
     band = factor * np.abs(rows[0] - rows[1]) / ((cells[1] / cells[0]) ** used - 1)
     peak = float(np.abs(rows[0]).max()) or 1.0
-    return CurveEstimate(order, band / peak, band / COVERAGE)
+    return CurveEstimate(order, band / peak, np.hypot(band / COVERAGE, repeat_sd))
 
 
 def _sorted(h: Sequence[float], values: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:

@@ -22,9 +22,12 @@ from calib.provenance import code_key, git_commit, key_of, versions
 from calib.store import TRANSIENT_REASONS, EvaluationStore, Header, content_key
 from mpm.scene import Scene
 
-AXES = ("safety", "mach", "ppc", "offset", "seed")
+AXES = ("safety", "mach", "ppc", "offset", "repeat")
 """What can be varied beside the cell size, each apart from the others: dt over its limit, speed over the P-wave's,
-particles per cell and direction, blade against the grid [cells], particle positions."""
+particles per cell and direction, blade against the grid [cells], and what should not matter at all."""
+PLACES = np.array([0.8191725134, 0.6710436067, 0.5497004779])
+"""Multiples of these, less whole cells, are the places of the grid in repeated runs: they fill the cell evenly (powers of the
+root of g^4 = g + 1: Roberts 2018)."""
 POINTS = 240
 """Points of the common stroke grid, as of a calibration."""
 WORK_LIMIT, PEAK_LIMIT = 0.02, 0.03
@@ -33,7 +36,7 @@ WORK_LIMIT, PEAK_LIMIT = 0.02, 0.03
 
 @dataclass(frozen=True)
 class Case:
-    """One run. Attributes: axis that is varied (``seed``: only the particles), its value, the scene."""
+    """One run. Attributes: axis that is varied (``repeat``: particles and the grid's place), its value, the scene."""
 
     axis: str
     value: float
@@ -43,7 +46,8 @@ class Case:
     def cost(self) -> float:
         """Particle steps of the run up to a constant."""
         n = self.scene.numerics
-        return n.ppc**3 / n.dx**4 / (n.safety * self.scene.motion.mach)
+        whole = 4 / 2 ** sum(self.scene.mirrors)
+        return n.ppc**3 / n.dx**4 / (n.safety * self.scene.motion.mach) * whole
 
     @property
     def words(self) -> str:
@@ -51,13 +55,14 @@ class Case:
         return f"dx {self.value * 1e3:g} mm" if self.axis == "dx" else f"{self.axis} {self.value:g}"
 
 
-def cases(scene: Scene, axes: Mapping[str, Sequence[float]], seeds: int) -> list[Case]:
-    """Runs of a study; the other axes and the seeds are varied on the coarsest grid.
+def cases(scene: Scene, axes: Mapping[str, Sequence[float]], repeats: int) -> list[Case]:
+    """Runs of a study; the other axes are varied on the coarsest grid, runs repeated on the next finer one.
 
     Args:
         scene: The cut.
         axes: Values of each axis to vary, ``dx`` at least two.
-        seeds: Other particle positions that are tried, to tell noise from trend.
+        repeats: Runs with other particles and the grid elsewhere, to tell noise from trend. With two grids they are on the
+            coarser one.
 
     Raises:
         CurveError: Fewer than two cell sizes.
@@ -77,9 +82,11 @@ def cases(scene: Scene, axes: Mapping[str, Sequence[float]], seeds: int) -> list
     for value in axes.get("offset", ()):
         shifted = replace(base.numerics, grid_shift=(0.0, value, 0.0))
         out.append(Case("offset", value, replace(base, numerics=shifted)))
-    for seed in range(1, seeds + 1):
-        numerics = replace(base.numerics, seed=base.numerics.seed + seed)
-        out.append(Case("seed", seed, replace(base, numerics=numerics)))
+    own = out[min(1, len(cells) - 2)].scene
+    for k in range(1, repeats + 1):
+        x, y, z = (float(part) for part in np.round(k * PLACES % 1.0, 4))
+        numerics = replace(own.numerics, seed=own.numerics.seed + k, grid_shift=(x, y, z))
+        out.append(Case("repeat", k, replace(own, numerics=numerics)))
     return out
 
 
@@ -89,7 +96,7 @@ def run(
     out: Path,
     *,
     about: Mapping[str, Any],
-    seeds: int = 2,
+    repeats: int = 3,
     workers: int = 2,
     arch: str = "cpu",
     resume: bool = False,
@@ -102,7 +109,7 @@ def run(
         axes: Values to try by axis.
         out: Output folder.
         about: What converge.json says of food, knife and command.
-        seeds: Other particle positions on the coarsest grid.
+        repeats: Runs with other particles and the grid elsewhere.
         workers: Simulations at a time.
         arch: Device.
         resume: Go on with the study in ``out``.
@@ -114,7 +121,7 @@ def run(
     Raises:
         CutcalError: Impossible values, or results of something else in ``out``; nothing that was computed is lost.
     """
-    todo = cases(scene, axes, seeds)
+    todo = cases(scene, axes, repeats)
     prepare(out, resume=resume)
     with EvaluationStore(out / "evaluations.h5", Header("", key_of(scene.as_dict())), resume=resume) as store:
         results = _evaluate(todo, store, workers, arch, say)
@@ -166,11 +173,12 @@ def _conclude(todo: Sequence[Case], results: Sequence[Evaluation], out: Path) ->
             f"fewer than two grids reached the end of the stroke ({reasons}); try other --dx or --set values"
         )
     h = [dx for dx, _ in sound]
-    noise = {name: _spread(todo, results, name) for name in ("peak_N", "work_J")}
+    same = _repeated(todo, results)
+    noise = {name: float(_deviation([r.scalars[name] for r in same])) for name in ("peak_N", "work_J")}
     by_name = {name: estimate(h, [r.scalars[name] for _, r in sound], noise[name]) for name in ("peak_N", "work_J")}
-    stroke = np.linspace(0.0, min(r.stroke[-1] for _, r in sound), POINTS)
+    stroke = np.linspace(0.0, min(r.stroke[-1] for r in (*(r for _, r in sound), *same)), POINTS)
     curves = [filter_simulated(stroke, r.stroke, r.force) for _, r in sound]
-    curve = curve_estimate(h, curves)
+    curve = curve_estimate(h, curves, _deviation([filter_simulated(stroke, r.stroke, r.force) for r in same]))
     columns = {f"force_dx_{dx:g}_N": values for dx, values in zip(h, curves, strict=True)}
     write_csv(out / "curves.csv", {"stroke_m": stroke, **columns, "u_num_N": curve.u_num})
     peak, work = by_name["peak_N"], by_name["work_J"]
@@ -206,8 +214,8 @@ def _row(r: Evaluation) -> dict[str, Any]:
 
 
 def _axis(todo: Sequence[Case], results: Sequence[Evaluation], axis: str) -> dict[str, Any] | None:
-    """Rows of one axis with the coarsest grid's own value among them, and the spread of what they give."""
-    base = next(c for c in todo if c.axis == "dx")
+    """Rows of one axis with the run that they differ from among them, and the spread of what they give."""
+    base = _base(todo, axis)
     own = {"safety": base.scene.numerics.safety, "mach": base.scene.motion.mach, "ppc": base.scene.numerics.ppc}
     rows = [(c.value, r) for c, r in zip(todo, results, strict=True) if c.axis == axis]
     if not rows:
@@ -226,9 +234,18 @@ def _axis(todo: Sequence[Case], results: Sequence[Evaluation], axis: str) -> dic
     return out
 
 
-def _spread(todo: Sequence[Case], results: Sequence[Evaluation], name: str) -> float:
-    """Standard deviation between runs that differ only in their particles; 0 where none was asked for."""
-    base = results[next(k for k, c in enumerate(todo) if c.axis == "dx")]
-    same = [base, *(r for c, r in zip(todo, results, strict=True) if c.axis == "seed")]
-    values = [r.scalars[name] for r in same if r.ok]
-    return float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
+def _base(todo: Sequence[Case], axis: str) -> Case:
+    """The run from which those of an axis differ."""
+    cells = {c.scene.numerics.dx for c in todo if c.axis == axis}
+    return next(c for c in todo if c.axis == "dx" and (not cells or c.value in cells))
+
+
+def _repeated(todo: Sequence[Case], results: Sequence[Evaluation]) -> list[Evaluation]:
+    """Results that should agree: runs that differ in their particles and the grid's place only."""
+    base = results[todo.index(_base(todo, "repeat"))]
+    return [r for r in (base, *(r for c, r in zip(todo, results, strict=True) if c.axis == "repeat")) if r.ok]
+
+
+def _deviation(values: Sequence[float] | Sequence[np.ndarray]) -> np.ndarray:
+    """Standard deviation between some values or curves; 0 where there are fewer than two."""
+    return np.asarray(np.std(values, axis=0, ddof=1) if len(values) > 1 else 0.0)

@@ -25,7 +25,7 @@ EPILOG = """examples:
 Ctrl-C keeps what was computed; the same command with --resume goes on.
 Exit codes: 0 converged (work within 2 %, peak within 3 % between the two finest
 grids), 1 error in input or run, 2 ran but did not converge."""
-WORDS = {"safety": "time step", "mach": "speed", "ppc": "particles", "offset": "offset", "seed": "seeds"}
+WORDS = {"safety": "time step", "mach": "speed", "ppc": "particles", "offset": "offset", "repeat": "repeats"}
 REFINED = (4 / 3, 1.0, 2 / 3, 0.5)  # default cells over the scene's own one; the first is the process zone
 
 
@@ -49,7 +49,12 @@ def add_args(p: argparse.ArgumentParser) -> None:
         metavar="CELLS,...",
         help="places of the blade against the grid to try",
     )
-    p.add_argument("--seeds", type=int, default=2, help="other particle positions on the coarsest grid (default 2)")
+    p.add_argument(
+        "--repeats",
+        type=int,
+        default=3,
+        help="runs with other particles and the grid elsewhere, on the second grid: what is noise (default 3)",
+    )
     p.add_argument(
         "--stroke", type=number(1e-4, 1, "m"), metavar="M", help="way of the edge; the whole height by default"
     )
@@ -62,8 +67,8 @@ def run(args: argparse.Namespace) -> int:
     """Run the study; prints its table, or converge.json."""
     from calib.refinement import run as study
 
-    if args.workers < 1 or args.seeds < 0:
-        raise CurveError("--workers must be at least 1 and --seeds at least 0")
+    if args.workers < 1 or args.repeats < 0:
+        raise CurveError("--workers must be at least 1 and --repeats at least 0")
     food, knife = food_of(args), load_knife(args.knife)
     shape, assumed = specimen(food, None, sizing_of(args))
     scene = cut_scene(food, shape, knife, stroke=args.stroke, dx=max(args.dx) if args.dx else None, seed=args.seed)
@@ -94,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
         axes,
         out,
         about=about,
-        seeds=args.seeds,
+        repeats=args.repeats,
         workers=args.workers,
         arch=args.arch,
         resume=args.resume,

@@ -9,6 +9,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from calib.cli.options import add_run
+from calib.errors import CurveError
+
 HELP = "compare the solver with closed forms and finite elements"
 DESCRIPTION = """Compare the solver with closed forms, and with finite elements of the same law:
 laws at a point, conservation, waves, vibration, friction, impact, a manufactured
@@ -18,6 +21,7 @@ EPILOG = """examples:
   cutcal verify --quick
   cutcal verify --only press --out runs/presses
 
+Ctrl-C keeps the cases that ended; the same command with --resume goes on.
 Exit codes: 0 all rows pass, 1 error in input or run, 2 a row fails."""
 
 
@@ -25,20 +29,26 @@ def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
     p.add_argument("--quick", action="store_true", help="coarse versions of the fast cases: a minute instead of many")
     p.add_argument("--only", metavar="TEXT", help="only cases with this in their name")
-    p.add_argument("--out", metavar="DIR", help="folder of the results; never overwritten")
-    p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
+    p.add_argument("--workers", type=int, default=2, help="cases at a time (default 2)")
+    p.add_argument("--resume", action="store_true", help="go on with the cases in --out; none that ended is run twice")
+    add_run(p)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the cases; prints their table, or verify.json."""
+    from calib.verification.rows import How
     from calib.verification.study import run as study
 
+    if args.workers < 1 or args.seed < 0:
+        raise CurveError("--workers must be at least 1 and --seed at least 0")
     out = Path(args.out or "cutcal-verify")
     document = study(
         out,
-        quick=args.quick,
+        How(args.quick, args.seed, args.arch),
         only=args.only,
         about={"command": ["verify", *(a for a in sys.argv[1:] if a != "verify")]},
+        workers=args.workers,
+        resume=args.resume,
         say=lambda text: print(text, file=sys.stderr, flush=True),
     )
     print(json.dumps(document, indent=2) if args.json else f"{table(document)}\n  wrote {out}")

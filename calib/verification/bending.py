@@ -9,11 +9,10 @@ from dataclasses import replace
 import numpy as np
 
 from calib.verification.motion import numerics
-from calib.verification.rows import Case, Row
+from calib.verification.rows import Case, How, Row
 from fem_reference.laws import Corotated
 from fem_reference.meshes import box
 from fem_reference.solid import Solid
-from mpm.body import FreeBody
 from mpm.material import Material
 from mpm.shapes import Shape
 
@@ -48,13 +47,13 @@ def elements() -> tuple[np.ndarray, np.ndarray]:
     return y[axis], solid.u[axis[0], 2] - solid.u[axis, 2]
 
 
-def particles(dx: float, ppc: int) -> tuple[float, float]:
+def particles(how: How, dx: float, ppc: int) -> tuple[float, float]:
     """A section near the end: its place from the middle [m] and its way down against the middle [m].
 
     The beam lies and bends along x, where the grid has room.
     """
     grid = replace(numerics(dx, room=1.5, ppc=ppc), mirror=True, grid_shift=(0.5, 0.0, 0.0))
-    body = FreeBody(Shape("block", 2 * HALF, DEPTH, WIDTH), FOOD, grid)
+    body = how.body(Shape("block", 2 * HALF, DEPTH, WIDTH), FOOD, grid)
     y = np.abs(body.start[:, 1])
     stiffness, line = FOOD.E * WIDTH * DEPTH**3 / 12, FOOD.rho * WIDTH * DEPTH
     omega = 3.516 / (HALF - GRIP) ** 2 * math.sqrt(stiffness / line)  # of a thin cantilever
@@ -66,7 +65,7 @@ def particles(dx: float, ppc: int) -> tuple[float, float]:
     return float(y[end].mean()), float(down[end].mean() - down[middle].mean())
 
 
-def sagging(quick: bool) -> Iterator[Row]:
+def sagging(how: How) -> Iterator[Row]:
     """A beam held in its middle, whose ends hang down.
 
     Of a food that is bent far, the sum over the particles is noisier than at rest and the beam softer: less so with more.
@@ -74,7 +73,7 @@ def sagging(quick: bool) -> Iterator[Row]:
     places, sag = elements()
     dx = DEPTH / 8
     for ppc, tolerance in ((2, 0.05), (3, 0.03)):
-        place, got = particles(dx, ppc)
+        place, got = particles(how, dx, ppc)
         want = float(np.interp(place, places, sag))
         source = f"finite elements of the same law, {want / (place - GRIP):.2f} of what hangs"
         name = f"beam held in its middle, 8 cells deep, {ppc**3} particles a cell"

@@ -10,23 +10,20 @@ from functools import partial
 import numpy as np
 
 from calib.verification.motion import BLOCK, SOFT, numerics
-from calib.verification.rows import Case, Row
-from mpm.body import FreeBody
+from calib.verification.rows import Case, How, Row
 from mpm.material import Material
-from mpm.runtime import Runtime
 from mpm.scene import Board, Food, Motion, Press, Scene
 from mpm.shapes import Shape
-from mpm.solver import Simulation
 
 G = 9.81
 DAMPED = replace(SOFT, loss_factor=0.5)
 
 
-def resting(quick: bool) -> Iterator[Row]:
+def resting(how: How) -> Iterator[Row]:
     """What stands on the board weighs its weight; what slides is slowed by mu g."""
-    body = FreeBody(BLOCK, DAMPED, numerics(gravity=G), board=0.0)
+    body = how.body(BLOCK, DAMPED, numerics(gravity=G), board=0.0)
     period = 4 * BLOCK.height / DAMPED.p_wave
-    body.step(math.ceil((6 if quick else 12) * period / body.dt))
+    body.step(math.ceil((6 if how.quick else 12) * period / body.dt))
     before, since = body.impulse.copy(), body.time
     body.step(math.ceil(4 * period / body.dt))
     weight = DAMPED.rho * BLOCK.width * BLOCK.length * BLOCK.height * G
@@ -39,7 +36,7 @@ def resting(quick: bool) -> Iterator[Row]:
         "m g",
     )
     mu, v0 = 0.4, 0.15
-    slide = FreeBody(
+    slide = how.body(
         BLOCK,
         DAMPED,
         numerics(gravity=G, room=1.0),
@@ -55,13 +52,13 @@ def resting(quick: bool) -> Iterator[Row]:
     yield Row("block slides on the board", "acceleration [m/s^2]", -mu * G, float(slowed), 0.02, "Coulomb: mu g")
 
 
-def bouncing(quick: bool) -> Iterator[Row]:
+def bouncing(how: How) -> Iterator[Row]:
     """A ball bounces back from the board."""
     ball = Shape("sphere", 0.03, 0.03, 0.03)
-    body = FreeBody(
+    body = how.body(
         ball,
         Material(E=1e5, nu=0.3, rho=1000.0),
-        numerics(1.5e-3 if not quick else 2e-3),
+        numerics(1.5e-3 if not how.quick else 2e-3),
         board=0.0,
         lift=1e-3,
         velocity=lambda x: np.tile([0.0, 0.0, -0.3], (len(x), 1)),
@@ -87,13 +84,13 @@ def bouncing(quick: bool) -> Iterator[Row]:
     yield Row("ball bounces, energy", "after over before [-]", 1.0, energy, 0.10, "elastic impact")
 
 
-def tilted(quick: bool) -> Iterator[Row]:
+def tilted(how: How) -> Iterator[Row]:
     """A block on a tilted board sticks below the angle of friction and slides with a known acceleration above it."""
     mu = 0.4
     for slope in (0.3, 0.6):
         angle = math.atan(slope)
         down = np.array([G * math.sin(angle), 0.0, 0.0])
-        body = FreeBody(BLOCK, DAMPED, numerics(gravity=G * math.cos(angle), room=1.0), board=mu)
+        body = how.body(BLOCK, DAMPED, numerics(gravity=G * math.cos(angle), room=1.0), board=mu)
         period = 4 * BLOCK.height / DAMPED.p_wave
         body.step(math.ceil(6 * period / body.dt))
         pull = partial(_constant, np.tile(down, (len(body.start), 1)))
@@ -119,27 +116,27 @@ def _constant(pull: np.ndarray, time: float) -> np.ndarray:
     return pull
 
 
-def discs(quick: bool) -> Iterator[Row]:
+def discs(how: How) -> Iterator[Row]:
     """Two discs that meet on a shared grid feel each other before they touch, and the transfers take energy from them."""
     source = "two discs (Sulsky, Chen and Schreyer 1994)"
     losses = []
-    for cells in (20,) if quick else (20, 40):
+    for cells in (20,) if how.quick else (20, 40):
         dx = 40e-3 / cells
-        gap, momentum, energy = _meet(dx)
+        gap, momentum, energy = _meet(how, dx)
         losses.append(1 - energy)
         name = f"two discs of {cells} cells"
         yield Row(name, "momentum gained over that of one disc [-]", 0.0, momentum, 1e-10, source)
         yield Row(name, "energy after over before [-]", 1.0, energy, 0.10, "elastic impact")
         # a quadratic kernel reaches 1.5 cells from either body (early contact, Bardenhagen et al. 2000)
         yield Row(name, "gap at which they feel each other, in cells [-]", 0.0, gap / dx, 3.0, source)
-    if not quick:
+    if not how.quick:
         ratio = losses[0] / losses[1]
         yield Row(
             "two discs", "loss of energy over that on half the cells [-]", 2.0, ratio, 0.1, "first order", least=True
         )
 
 
-def _meet(dx: float) -> tuple[float, float, float]:
+def _meet(how: How, dx: float) -> tuple[float, float, float]:
     """Gap when the first disc has lost 1 % of its speed [m], change of momentum and energy after the impact [-]."""
     radius, thick, apart, speed = 0.02, 0.01, 0.016, 0.5
     material = Material(E=1e5, nu=0.3, rho=1000.0)
@@ -148,7 +145,7 @@ def _meet(dx: float) -> tuple[float, float, float]:
         upper = x[:, 2] > thick
         return x + np.where(upper[:, None], [apart, apart, -thick], [-apart, -apart, 0.0])
 
-    body = FreeBody(
+    body = how.body(
         Shape("upright_cylinder", 2 * radius, 2 * radius, 2 * thick),
         material,
         numerics(dx, room=1.0),
@@ -173,14 +170,14 @@ def _meet(dx: float) -> tuple[float, float, float]:
     return gap, momentum, (body.kinetic + body.elastic) / before
 
 
-def hertz(quick: bool) -> Iterator[Row]:
+def hertz(how: How) -> Iterator[Row]:
     """A plate on half a lying cylinder of nu = 0, for which plane strain and free ends are the same.
 
     Not on a ball, whose far side Hertz leaves out: at a contact of a fifth of the radius finite elements give 7 % more. For a
     cylinder it is in the formula.
     """
     radius, share = 0.04, 0.1  # at 0.2 the force of finite elements is 4 % below Hertz's, as that of the particles is
-    for cells in (4,) if quick else (4, 8):
+    for cells in (4,) if how.quick else (4, 8):
         half = share * radius  # half the width of the contact
         dx = half / cells
         line = math.pi * SOFT.E * half**2 / (4 * radius)
@@ -192,7 +189,7 @@ def hertz(quick: bool) -> Iterator[Row]:
             Board(0.0),
             numerics=replace(numerics(dx), mirror=True, output=way / 200),
         )
-        record = Simulation(scene, Runtime(threads=1)).run()
+        record = how.simulate(scene)
         stroke, force = 0.5 * (record.stroke[1:] + record.stroke[:-1]), record.face[1:, 2] / (4 * dx)
         near = np.abs(stroke - way) < 0.1 * way
         got = float(np.polyval(np.polyfit(stroke[near], force[near], 1), way))

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from calib.verification.rows import Case, Row
+from calib.verification.rows import Case, How, Row
 from fem_reference.laws import Corotated, Law, Plastic
 from fem_reference.meshes import bent, box, surface
 from fem_reference.press import press
@@ -58,7 +58,7 @@ def manufactured(cells: int, order: int, law: Law) -> tuple[float, float]:
     )
 
 
-def orders(quick: bool) -> Iterator[Row]:
+def orders(how: How) -> Iterator[Row]:
     """Errors on two meshes, for both orders of the elements."""
     law = Corotated(1.0, 1.5)
     for order, (coarse, fine), cap in ((1, (4, 8), 2e-3), (2, (2, 4), 5e-4)):
@@ -103,9 +103,9 @@ def _stress_at_d(solid: Solid, height: float) -> float:
     return float(solid.project(p[1, 1])[at])
 
 
-def nafems(quick: bool) -> Iterator[Row]:
+def nafems(how: How) -> Iterator[Row]:
     """Elliptic membrane under outward pressure, thick plate under normal pressure."""
-    cells = 5 if quick else 8
+    cells = 5 if how.quick else 8
     thin = _elliptic(0.05, 1, cells)
     thin.hold(np.flatnonzero(np.abs(thin.nodes[:, 2]) < 1e-9), [2])
     thin.press(surface(thin.mesh, lambda x: _outline(x) > 0.98), -10e6)
@@ -113,7 +113,7 @@ def nafems(quick: bool) -> Iterator[Row]:
     yield Row(
         "NAFEMS LE1, elliptic membrane", "stress at D [Pa]", 92.7e6, _stress_at_d(thin, 0.0), 0.02, "NAFEMS (1990)"
     )
-    thick = _elliptic(0.6, 2 if quick else 4, cells)
+    thick = _elliptic(0.6, 2 if how.quick else 4, cells)
     rim = np.flatnonzero(_outline(thick.nodes.T) > 1 - 1e-6)
     thick.hold(rim, [0, 1])
     thick.hold(rim[np.abs(thick.nodes[rim, 2] - 0.3) < 1e-9], [2])
@@ -124,14 +124,14 @@ def nafems(quick: bool) -> Iterator[Row]:
         "stress at D [Pa]",
         -5.38e6,
         _stress_at_d(thick, 0.6),
-        0.05 if quick else 0.02,
+        0.05 if how.quick else 0.02,
         "NAFEMS (1990)",
     )
 
 
-def beams(quick: bool) -> Iterator[Row]:
+def beams(how: How) -> Iterator[Row]:
     """Cook's tapered panel, and a slender beam bent far."""
-    n = 6 if quick else 10
+    n = 6 if how.quick else 10
 
     def place(p: np.ndarray) -> np.ndarray:
         low, high = 44 * p[0] / 48, 44 + 16 * p[0] / 48
@@ -182,7 +182,7 @@ def beams(quick: bool) -> Iterator[Row]:
     )
 
 
-def hertz(quick: bool) -> Iterator[Row]:
+def hertz(how: How) -> Iterator[Row]:
     """A ball and a cylinder between two plates."""
     ball, food = Shape("sphere", 0.04, 0.04, 0.04), Material(E=1e5, nu=0.35, rho=1000.0)
     way = 0.3e-3  # contact radius over radius 0.09: Hertz holds where that is small
@@ -220,7 +220,7 @@ def hertz(quick: bool) -> Iterator[Row]:
     )
 
 
-def punch(quick: bool) -> Iterator[Row]:
+def punch(how: How) -> Iterator[Row]:
     """A flat punch of half width 1 on a deep block in plane strain that flows: the load at which it sinks in."""
     n, wide, depth, steps = 4, 3.0, 0.03, 6
     food, flow = Material(E=1e3, nu=0.3, rho=1.0), 1.0

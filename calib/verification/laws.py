@@ -9,20 +9,20 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from calib.verification.rows import Case, Row
+from calib.verification.rows import Case, How, Row
 from mpm.material import Material
-from mpm.runtime import Runtime, start
+from mpm.runtime import start
 
 UNIT = Material(E=1.0, nu=0.35, rho=1.0)
 NOMINAL = {0.9: -0.10507, 0.7: -0.35968, 0.5: -0.72098}
 """Nominal stress over E at these stretches, nu = 0.35: root of the lateral stress of the corotated law, by hand."""
 
 
-def elastic(quick: bool) -> Iterator[Row]:
+def elastic(how: How) -> Iterator[Row]:
     """Uniaxial stress and objectivity of the corotated law."""
     from calib.verification.point import Point
 
-    start(Runtime(threads=1), "f64")
+    start(how.runtime, "f64")
     point = Point(UNIT.shear, UNIT.lame)
     for stretch, want in NOMINAL.items():
         side = brentq(lambda s, x=stretch: point.stress(np.diag([x, s, s]))[1][1, 1], 0.9, 1.4)
@@ -48,11 +48,11 @@ def elastic(quick: bool) -> Iterator[Row]:
     )
 
 
-def plastic(quick: bool) -> Iterator[Row]:
+def plastic(how: How) -> Iterator[Row]:
     """J2 flow in simple shear and on a random path."""
     from calib.verification.point import Point
 
-    start(Runtime(threads=1), "f64")
+    start(how.runtime, "f64")
     for ratio in (0.003, 0.01):
         point, f = Point(UNIT.shear, UNIT.lame, ratio), np.eye(3)
         step = np.eye(3) + np.array([[0, ratio / 50, 0], [0, 0, 0], [0, 0, 0]])
@@ -67,7 +67,7 @@ def plastic(quick: bool) -> Iterator[Row]:
             "von Mises",
         )
     point, f, rng, worst, volume = Point(UNIT.shear, UNIT.lame, 0.05), np.eye(3), np.random.default_rng(0), 0.0, 0.0
-    for _ in range(50 if quick else 300):
+    for _ in range(50 if how.quick else 300):
         trial = (np.eye(3) + rng.uniform(-0.03, 0.03, (3, 3))) @ f
         f, tau = point.stress(trial)
         dev = tau - np.trace(tau) / 3 * np.eye(3)
@@ -91,11 +91,11 @@ def plastic(quick: bool) -> Iterator[Row]:
     )
 
 
-def softening(quick: bool) -> Iterator[Row]:
+def softening(how: How) -> Iterator[Row]:
     """The energy that damage dissipates, over the width of the crack band."""
     from calib.verification.point import Point
 
-    start(Runtime(threads=1), "f64")
+    start(how.runtime, "f64")
     point = Point(1.0, 1.0)
     modulus, strength, toughness = 3e6, 2e5, 100.0
     eps0 = strength / modulus

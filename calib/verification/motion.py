@@ -10,13 +10,10 @@ from scipy.optimize import brentq
 from scipy.special import spherical_jn
 
 from calib.verification import vortex
-from calib.verification.rows import Case, Row
-from mpm.body import FreeBody
+from calib.verification.rows import Case, How, Row
 from mpm.material import Material
-from mpm.runtime import Runtime
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
 from mpm.shapes import Shape
-from mpm.solver import Simulation
 
 DX = 2.5e-3
 SOFT = Material(E=1e5, nu=0.0, rho=1000.0)
@@ -29,9 +26,9 @@ def numerics(dx: float = DX, gravity: float = 0.0, room: float = 0.5, safety: fl
     return Numerics(dx=dx, gravity=gravity, room=room, mirror=False, safety=safety, ppc=ppc)
 
 
-def conserved(quick: bool) -> Iterator[Row]:
+def conserved(how: How) -> Iterator[Row]:
     """A block that spins and stretches keeps its momenta; an affine velocity is transferred unchanged."""
-    body = FreeBody(
+    body = how.body(
         BLOCK,
         SOFT,
         numerics(),
@@ -58,7 +55,7 @@ def conserved(quick: bool) -> Iterator[Row]:
         1e-6,
         "exact transfer of affine fields",
     )
-    body.step(50 if quick else 150)
+    body.step(50 if how.quick else 150)
     p, turn = body.mass * body.v.sum(axis=0), body.spin()
     yield Row(
         "free block, momentum",
@@ -78,15 +75,15 @@ def conserved(quick: bool) -> Iterator[Row]:
     )
 
 
-def spinning(quick: bool) -> Iterator[Row]:
+def spinning(how: How) -> Iterator[Row]:
     """A body that turns rigidly carries no stress."""
     omega = 100.0
     turn = np.array([[0, -omega, 0], [omega, 0, 0], [0, 0, 0.0]])
     stiff = Material(E=1e7, nu=0.3, rho=1000.0)
-    body = FreeBody(
+    body = how.body(
         BLOCK, stiff, numerics(), velocity=lambda x: x @ turn.T, slope=lambda x: np.tile(turn, (len(x), 1, 1))
     )
-    steps = math.ceil((0.02 if quick else 0.1) * 2 * math.pi / omega / body.dt)
+    steps = math.ceil((0.02 if how.quick else 0.1) * 2 * math.pi / omega / body.dt)
     energy = body.mass * 0.5 * (body.v**2).sum()
     body.step(steps)
     radius = np.hypot(*(body.x[:, :2] - body.x[:, :2].mean(axis=0)).T) / np.hypot(
@@ -97,9 +94,9 @@ def spinning(quick: bool) -> Iterator[Row]:
     yield Row("rigid spin, elastic energy", "over kinetic energy [-]", 0.0, body.elastic / energy, 0.01, "rigid motion")
 
 
-def falling(quick: bool) -> Iterator[Row]:
+def falling(how: How) -> Iterator[Row]:
     """Free fall, summed as the time steps sum it."""
-    body = FreeBody(BLOCK, SOFT, numerics(gravity=9.81))
+    body = how.body(BLOCK, SOFT, numerics(gravity=9.81))
     n = 50
     body.step(n)
     fall = float((body.start - body.x)[:, 2].mean())
@@ -108,27 +105,27 @@ def falling(quick: bool) -> Iterator[Row]:
     )
 
 
-def vibrating(quick: bool) -> Iterator[Row]:
+def vibrating(how: How) -> Iterator[Row]:
     """A free bar swings lengthwise in its first mode.
 
     Particles at random places make the bar softer by the noise of the sum over them, which falls with their number and
     not with the cells: the period is 1 % long with 8 particles a cell and 0.3 % with 27.
     """
-    period, loss = _swing(3e-3, 3, 2)
+    period, loss = _swing(how, 3e-3, 3, 2)
     yield Row(
         "free bar of 26 cells, 27 particles a cell",
         *period,
         0.005,
         "2 L / sqrt(E / rho), nu = 0 (de Vaucorbeil et al. 2020)",
     )
-    if quick:
+    if how.quick:
         return
-    period, loss = _swing(1.5e-3, 2, 4)
+    period, loss = _swing(how, 1.5e-3, 2, 4)
     yield Row("free bar of 52 cells, 8 particles a cell", *period, 0.02, "2 L / sqrt(E / rho), nu = 0")
     yield Row("free bar of 52 cells", "loss of amplitude in a period [-]", 0.0, loss, 0.005, "undamped")
 
 
-def _swing(dx: float, ppc: int, swings: int) -> tuple[tuple[str, float, float], float]:
+def _swing(how: How, dx: float, ppc: int, swings: int) -> tuple[tuple[str, float, float], float]:
     """Period of a free bar of 78 mm, expected and got, and the part of its amplitude that a period takes."""
     bar = Shape("block", 0.078, 0.012, 0.012)
     k = math.pi / bar.length
@@ -136,7 +133,7 @@ def _swing(dx: float, ppc: int, swings: int) -> tuple[tuple[str, float, float], 
     def velocity(x: np.ndarray) -> np.ndarray:
         return 0.02 * np.outer(-np.sin(k * x[:, 1]), [0.0, 1.0, 0.0])
 
-    body = FreeBody(bar, SOFT, numerics(dx, room=0.1, ppc=ppc), velocity=velocity)
+    body = how.body(bar, SOFT, numerics(dx, room=0.1, ppc=ppc), velocity=velocity)
     mode = np.sin(k * body.start[:, 1])
     period = 2 * bar.length / math.sqrt(SOFT.E / SOFT.rho)
     times, amplitude = [], []
@@ -151,7 +148,7 @@ def _swing(dx: float, ppc: int, swings: int) -> tuple[tuple[str, float, float], 
     return ("period [s]", period, got), float(loss)
 
 
-def breathing(quick: bool) -> Iterator[Row]:
+def breathing(how: How) -> Iterator[Row]:
     """A ball swells and shrinks in its first radial mode: the only case in which the bulk modulus rules."""
     material, radius = Material(E=1e5, nu=0.4, rho=1000.0), 0.02
     ratio = material.shear / (material.lame + 2 * material.shear)  # of the squares of the wave speeds
@@ -164,7 +161,7 @@ def breathing(quick: bool) -> Iterator[Row]:
         return 0.05 * r / np.linalg.norm(r, axis=1, keepdims=True) * spherical_jn(1, s)
 
     ball = Shape("sphere", 2 * radius, 2 * radius, 2 * radius)
-    body = FreeBody(ball, material, numerics(2.5e-3 if quick else 1.67e-3, ppc=3), velocity=velocity)
+    body = how.body(ball, material, numerics(2.5e-3 if how.quick else 1.67e-3, ppc=3), velocity=velocity)
     mode = velocity(body.start)
     times, amplitude = [], []
     while body.time < 2.4 * period:
@@ -173,7 +170,7 @@ def breathing(quick: bool) -> Iterator[Row]:
         amplitude.append(float((mode * body.v).sum()))
     got = _period(np.array(times), np.array(amplitude))[0]
     source = "first radial mode of an elastic ball (Lamb 1882)"
-    yield Row("ball breathes", "period [s]", period, got, 0.03 if quick else 0.02, source)
+    yield Row("ball breathes", "period [s]", period, got, 0.03 if how.quick else 0.02, source)
 
 
 def _period(t: np.ndarray, a: np.ndarray) -> tuple[float, np.ndarray]:
@@ -183,10 +180,10 @@ def _period(t: np.ndarray, a: np.ndarray) -> tuple[float, np.ndarray]:
     return float(np.mean(np.diff(zeros))), zeros
 
 
-def turning(quick: bool) -> Iterator[Row]:
+def turning(how: How) -> Iterator[Row]:
     """The generalised vortex."""
-    cells = (4, 8) if quick else (4, 8, 16)
-    miss = [vortex.errors(n, angle=0.1) for n in cells]
+    cells = (4, 8) if how.quick else (4, 8, 16)
+    miss = [vortex.errors(how, n, angle=0.1) for n in cells]
     order = math.log(miss[0][0] / miss[-1][0]) / math.log(cells[-1] / cells[0])
     source = "generalised vortex (Kamojjala et al. 2015) with the corotated law"
     yield Row(
@@ -208,9 +205,9 @@ def turning(quick: bool) -> Iterator[Row]:
     )
 
 
-def wave(quick: bool) -> Iterator[Row]:
+def wave(how: How) -> Iterator[Row]:
     """A plate hits a bar: rho c v behind the front until it has come back from the free end."""
-    bar = Shape("block", 0.012, 0.012, 0.06 if quick else 0.09)
+    bar = Shape("block", 0.012, 0.012, 0.06 if how.quick else 0.09)
     mach = 0.004
     c = math.sqrt(SOFT.E / SOFT.rho)
     dx = 2e-3
@@ -222,7 +219,7 @@ def wave(quick: bool) -> Iterator[Row]:
         Board(0.0),
         numerics=Numerics(dx=dx, gravity=0.0, output=way / 400, safety=0.5),
     )
-    record = Simulation(scene, Runtime(threads=1)).run()
+    record = how.simulate(scene)
     f, t = record.face[:, 2], record.time
     begun = t[np.argmax(f > 0.3 * f.max())]
     plateau = f[(t - begun > 0.3 * bar.height / c) & (t - begun < 0.9 * bar.height / c)].mean()

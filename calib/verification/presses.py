@@ -9,13 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from calib.verification.rows import Case, Row
+from calib.verification.rows import Case, How, Row
 from fem_reference.press import press
 from mpm.material import Material
-from mpm.runtime import Runtime
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
 from mpm.shapes import Shape
-from mpm.solver import Simulation
 
 FOOD = Material(E=1e5, nu=0.35, rho=1000.0, loss_factor=0.05)
 """The loss factor takes the ringing out; its part of the force at this speed is below 0.2 %."""
@@ -120,7 +118,7 @@ TESTS = (
 )
 
 
-def particles(test: Test, dx: float, *, material: Material = FOOD, mach: float = MACH, seed: int = 0) -> np.ndarray:
+def particles(how: How, test: Test, dx: float, *, material: Material = FOOD, mach: float = MACH) -> np.ndarray:
     """Force of the particles at the strokes of a test [N], shape (n,)."""
     friction = STICKS if test.bonded else 0.0
     end = test.strokes[-1] * (1 + WINDOW)
@@ -129,9 +127,9 @@ def particles(test: Test, dx: float, *, material: Material = FOOD, mach: float =
         Press(half_angle=test.half_angle, mu=friction),
         Motion(end, mach),
         Board(friction),
-        numerics=Numerics(dx=dx, gravity=0.0, output=end / 400, seed=seed),
+        numerics=Numerics(dx=dx, gravity=0.0, output=end / 400),
     )
-    record = Simulation(scene, Runtime(threads=1)).run()
+    record = how.simulate(scene)
     if record.status != "done":
         return np.full(len(test.strokes), math.nan)
     near = WINDOW * test.strokes[-1]
@@ -145,7 +143,7 @@ def _at(stroke: np.ndarray, force: np.ndarray, s: float, near: float) -> float:
     return float(np.polyfit(stroke[on] - s, force[on], 2)[2])
 
 
-def compare(test: Test, sizes: Sequence[float]) -> Iterator[Row]:
+def compare(how: How, test: Test, sizes: Sequence[float]) -> Iterator[Row]:
     """Rows of one press: the largest error over the strokes, on each grid."""
     material = replace(FOOD, yield_stress=test.yield_stress)
     # a law with a memory wants small steps; a wedge's first contact is one row of nodes
@@ -155,7 +153,7 @@ def compare(test: Test, sizes: Sequence[float]) -> Iterator[Row]:
     want = np.interp(test.strokes, curve.stroke, curve.force)
     misses = []
     for dx in sizes:
-        got = particles(test, dx)
+        got = particles(how, test, dx)
         k = int(np.argmax(np.abs(got / want - 1))) if np.isfinite(got).all() else 0
         misses.append(float(got[k] / want[k] - 1))
         name = f"{test.name}, dx {dx * 1e3:g} mm"
@@ -166,8 +164,8 @@ def compare(test: Test, sizes: Sequence[float]) -> Iterator[Row]:
 
 
 def _case(test: Test) -> Case:
-    def run(quick: bool) -> Iterator[Row]:
-        yield from compare(test, test.sizes[:1] if quick else test.sizes)
+    def run(how: How) -> Iterator[Row]:
+        yield from compare(how, test, test.sizes[:1] if how.quick else test.sizes)
 
     return Case(f"press: {test.name}", run, fast=not test.slow)
 

@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+
+from mpm.body import FreeBody
+from mpm.material import Material
+from mpm.record import ForceRecord
+from mpm.runtime import Runtime
+from mpm.scene import Numerics, Scene
+from mpm.shapes import Shape
+from mpm.solver import Simulation
 
 PARTS = ("laws", "motion", "contact", "bending", "presses", "cuts", "elements")
 """Modules with cases, in the order of the table."""
@@ -55,14 +63,33 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Case:
-    """A function that makes rows.
+class How:
+    """What is common to all cases. Attributes: quick, for coarse versions; seed of the particles; arch, Taichi device."""
 
-    Attributes: name; run, takes whether the coarse, quick version is wanted; fast, whether it belongs to the quick part.
-    """
+    quick: bool = False
+    seed: int = 0
+    arch: str = "cpu"
+
+    @property
+    def runtime(self) -> Runtime:
+        """Device of the simulations."""
+        return Runtime(self.arch, threads=1)
+
+    def body(self, shape: Shape, material: Material, grid: Numerics, **options: Any) -> FreeBody:
+        """A free body of this seed, on this device; see :class:`mpm.body.FreeBody`."""
+        return FreeBody(shape, material, replace(grid, seed=self.seed), runtime=self.runtime, **options)
+
+    def simulate(self, scene: Scene) -> ForceRecord:
+        """A cut or press of this seed, on this device."""
+        return Simulation(replace(scene, numerics=replace(scene.numerics, seed=self.seed)), self.runtime).run()
+
+
+@dataclass(frozen=True)
+class Case:
+    """A function that makes rows. Attributes: name; run; fast, whether it belongs to the quick part."""
 
     name: str
-    run: Callable[[bool], Iterator[Row]]
+    run: Callable[[How], Iterator[Row]]
     fast: bool = True
 
 

@@ -2,66 +2,128 @@
 
 from __future__ import annotations
 
+import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from calib.errors import CurveError
 from calib.outputs import prepare, write_json
+from calib.pool import Pool
 from calib.progress import clock
-from calib.provenance import git_commit, versions
-from calib.verification.rows import Row, cases
+from calib.provenance import code_key, git_commit, versions
+from calib.verification.rows import Case, How, cases
 from mpm.errors import CutcalError
 
 Say = Callable[[str], None]
 
 
-def run(out: Path, *, quick: bool, only: str | None, about: dict[str, Any], say: Say) -> dict[str, Any]:
+def run(
+    out: Path,
+    how: How,
+    *,
+    only: str | None,
+    about: dict[str, Any],
+    workers: int = 2,
+    resume: bool = False,
+    say: Say,
+) -> dict[str, Any]:
     """Run cases and write verify.json after each.
 
     Args:
         out: Output folder.
-        quick: Coarse versions of the fast cases.
+        how: Quick or whole, seed, device.
         only: Part of the name of the cases to run, or None for all.
         about: What verify.json says beside the rows.
+        workers: Cases at a time, each in a process of its own.
+        resume: Keep the cases of ``out`` that ran to their end.
         say: Called with a line after each case.
 
     Returns:
         The content of verify.json.
 
     Raises:
-        CurveError: No case has such a name.
+        CurveError: No case has such a name, or ``out`` holds cases of another seed, device, extent or version.
     """
-    todo = [c for c in cases() if (c.fast or not quick) and (only is None or only.lower() in c.name.lower())]
+    todo = [c for c in cases() if (c.fast or not how.quick) and (only is None or only.lower() in c.name.lower())]
     if not todo:
         names = ", ".join(c.name for c in cases())
         raise CurveError(f"--only {only}: no case has this in its name; there are {names}")
-    prepare(out, resume=False)
-    document: dict[str, Any] = {**about, "quick": quick, "complete": False, "rows": [], "seconds": {}, "broken": {}}
-    document |= {"versions": versions(), "git": git_commit()}
+    prepare(out, resume=resume)
+    own = {"quick": how.quick, "seed": how.seed, "device": how.arch, "code": code_key()}
+    found = _known(out, own) if resume else {}
+    new = [c for c in todo if c.name not in found]
+    document = {**about, **own, "versions": versions(), "git": git_commit()}
+    if len(new) < len(todo):
+        say(f"{len(todo) - len(new)} of {len(todo)} cases are known already")
     began = time.monotonic()
-    for done, case in enumerate(todo, 1):
-        since = time.monotonic()
-        rows: list[Row] = []
-        try:
-            for row in case.run(quick):
-                rows.append(row)
-        except CutcalError as e:  # a case that breaks down fails; the others still run
-            document["broken"][case.name] = str(e)
-        count = sum(not row.passed for row in rows)
-        document["rows"] += [{"group": case.name, **row.as_dict()} for row in rows]
-        document["seconds"][case.name] = time.monotonic() - since
-        write_json(out / "verify.json", document)
-        left = (time.monotonic() - began) / done * (len(todo) - done)
-        state = "broke down" if case.name in document["broken"] else f"{count} failed" if count else "passed"
-        say(f"{case.name}: {len(rows)} rows, {state}; {done} of {len(todo)} cases, about {clock(left)} left")
-    document |= {
-        "complete": True,
-        "passed": not document["broken"] and all(row["passed"] for row in document["rows"]),
-    }
+    with Pool(min(workers, max(len(new), 1)), how.arch) as pool:
+        for k, done in pool.each(_rows, [(c.name, how) for c in new]):
+            name = new[k].name
+            found[name] = done or {
+                "rows": [],
+                "seconds": 0.0,
+                "broken": "its process was killed, perhaps for lack of memory",
+            }
+            write_json(out / "verify.json", document | _table(todo, found))
+            count = sum(not row["passed"] for row in found[name]["rows"])
+            state = "broke down" if found[name]["broken"] else f"{count} failed" if count else "passed"
+            finished = len(found) - len(todo) + len(new)
+            left = (time.monotonic() - began) / finished * (len(new) - finished)
+            say(
+                f"{name}: {len(found[name]['rows'])} rows, {state}; {len(found)} of {len(todo)} cases, about {clock(left)} left"
+            )
+    document |= _table(todo, found)
     write_json(out / "verify.json", document)
     from reports.verification import write_figure
 
     write_figure(out)
     return document
+
+
+def _rows(name: str, how: How, arch: str, threads: int) -> dict[str, Any]:
+    """The rows of one case as plain data; one that breaks down has those before, and says why."""
+    case = next(c for c in cases() if c.name == name)
+    began, rows, broken = time.monotonic(), [], None
+    try:
+        for row in case.run(how):
+            rows.append({"group": name, **row.as_dict()})
+    except CutcalError as e:
+        broken = str(e)
+    return {"rows": rows, "seconds": time.monotonic() - began, "broken": broken}
+
+
+def _table(todo: Sequence[Case], found: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
+    """What verify.json says of the cases that are done, in the order of the table."""
+    done = {c.name: found[c.name] for c in todo if c.name in found}
+    rows = [row for one in done.values() for row in one["rows"]]
+    broken = {name: one["broken"] for name, one in done.items() if one["broken"]}
+    return {
+        "complete": len(done) == len(todo),
+        "passed": len(done) == len(todo) and not broken and all(row["passed"] for row in rows),
+        "rows": rows,
+        "seconds": {name: one["seconds"] for name, one in done.items()},
+        "broken": broken,
+    }
+
+
+def _known(out: Path, own: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Cases of an earlier run that need not run again: those that did not break down."""
+    path = out / "verify.json"
+    if not path.exists():
+        return {}
+    try:
+        before = json.loads(path.read_text(encoding="utf-8"))
+        other = [name for name, value in own.items() if before[name] != value]
+        seconds = {name: s for name, s in before["seconds"].items() if name not in before["broken"]}
+        rows = before["rows"]
+    except (ValueError, KeyError, TypeError):
+        raise CurveError(f"--resume: {path} is damaged; choose another folder") from None
+    if other:
+        words = ", ".join(f"{name} {before[name]}, not {own[name]}" for name in other)
+        raise CurveError(f"--resume: {path} holds another verification ({words}); choose another folder")
+    return {
+        name: {"rows": [row for row in rows if row["group"] == name], "seconds": s, "broken": None}
+        for name, s in seconds.items()
+    }

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from mpm.body import FreeBody
+from calib.verification.rows import How
 from mpm.material import Material
 from mpm.scene import Numerics
 from mpm.shapes import Shape
@@ -73,10 +73,11 @@ class Vortex:
         return out
 
 
-def errors(cells: int, *, angle: float = 0.5, swing: float = 0.5) -> tuple[float, float]:
+def errors(how: How, cells: int, *, angle: float = 0.5, swing: float = 0.5) -> tuple[float, float]:
     """Root-mean-square and largest error of place of the ring's particles, over its mean radius [-].
 
     Args:
+        how: Seed and device.
         cells: Grid cells across the ring.
         angle: Largest rotation [rad].
         swing: Part of half a swing that is simulated, 0.5 up to the largest rotation.
@@ -98,7 +99,7 @@ def errors(cells: int, *, angle: float = 0.5, swing: float = 0.5) -> tuple[float
         columns = [(velocity(x + d * e) - velocity(x - d * e)) / (2 * d) for e in np.eye(3)]
         return np.stack(columns, axis=2)
 
-    body = FreeBody(Shape("block", side, side, 4 * dx), material, grid, velocity=velocity, slope=slope)
+    body = how.body(Shape("block", side, side, 4 * dx), material, grid, velocity=velocity, slope=slope)
     steps = math.ceil(swing * span / body.dt)
     body.step(steps, dt=swing * span / steps, pull=lambda t: vortex.force(body.start, t))
     r = np.hypot(body.start[:, 0], body.start[:, 1]) / radius

@@ -65,7 +65,9 @@ def test_differences_below_repeatability_are_noise():
     """What is smaller than 2.8 standard deviations between equal runs is no trend."""
     values = [5.00, 5.01, 5.03]
     assert estimate(H[:3], values).verdict == "monotone"
-    assert estimate(H[:3], values, repeat_sd=0.02).verdict == "noise-limited"
+    e = estimate(H[:3], values, repeat_sd=0.02)
+    assert (e.verdict, e.order, e.extrapolated) == ("noise-limited", None, None)
+    assert e.gci == pytest.approx(3.0 * (0.01 / 5.00) / (1.5 - 1), rel=1e-9)  # first order, the large factor of safety
 
 
 def test_two_grids_take_the_factor_three():
@@ -95,3 +97,17 @@ def test_curve_converges_with_one_order():
     np.testing.assert_allclose(c.u_num, 1.25 * truth / 2, rtol=2e-3, atol=1e-9)
     with pytest.raises(CurveError, match="different lengths"):
         curve_estimate(H[:2], [s, s[1:]])
+
+
+def test_noise_widens_the_uncertainty_but_not_the_index():
+    """Two standard deviations between runs that should agree are added in squares; of a curve at each of its points."""
+    values = 5.0 + 0.1 * H
+    quiet, noisy = estimate(H, values), estimate(H, values, repeat_sd=0.01)
+    assert noisy.gci == quiet.gci
+    assert noisy.uncertainty == pytest.approx(np.hypot(quiet.uncertainty, 2 * 0.01 / values[0]), rel=1e-9)
+    s = np.linspace(0, 1, 11)
+    curves = [np.sin(np.pi * s) + 0.02 * h for h in H]
+    sd = 0.03 * s
+    calm, wild = curve_estimate(H, curves), curve_estimate(H, curves, sd)
+    np.testing.assert_allclose(wild.u_num, np.hypot(calm.u_num, sd), rtol=1e-12)
+    np.testing.assert_allclose(wild.gci, calm.gci, rtol=1e-12)

@@ -9,7 +9,7 @@ import pytest
 
 from calib.cli.main import main
 
-SMALL = ["converge", "--food", "banana", "--stroke", "4e-3", "--seeds", "0", "--dx", "6e-3,4.5e-3", "--mach", "0.02"]
+SMALL = ["converge", "--food", "banana", "--stroke", "4e-3", "--repeats", "1", "--dx", "6e-3,4.5e-3", "--mach", "0.02"]
 
 
 @pytest.fixture(scope="module")
@@ -35,6 +35,11 @@ def test_study_writes_what_it_promises(study):
     curves = pd.read_csv(out / "curves.csv")
     assert list(curves) == ["stroke_m", "force_dx_0.006_N", "force_dx_0.0045_N", "u_num_N"]
     assert (curves["u_num_N"] >= 0).all()
+    (own, other) = document["repeat"]["rows"]
+    assert own["repeat"] == 0
+    assert own["work_J"] == document["grids"][0]["work_J"]  # of two grids on the coarser one
+    assert other["work_J"] != own["work_J"]
+    assert document["repeat_sd_work_J"] == pytest.approx(abs(own["work_J"] - other["work_J"]) / 2**0.5, rel=1e-9)
     assert (out / "converge.svg").read_bytes().startswith(b"<?xml")
 
 
@@ -46,7 +51,7 @@ def test_resume_simulates_nothing_twice(study, capsys):
     before = json.loads((out / "converge.json").read_text())["grids"]
     assert main([*SMALL, "--out", str(out), "--resume"]) == code
     err = capsys.readouterr().err
-    assert "3 of 3 runs are known already" in err
+    assert "4 of 4 runs are known already" in err
     assert "left" not in err
     assert json.loads((out / "converge.json").read_text())["grids"] == before
 

@@ -8,8 +8,9 @@ import math
 import pytest
 
 from calib.cli.main import main
+from calib.pool import Pool
 from calib.verification import rows
-from calib.verification.rows import Case, Row, cases
+from calib.verification.rows import Case, How, Row, cases
 from mpm.errors import SceneError
 
 FAST = [case for case in cases() if case.fast]
@@ -50,7 +51,7 @@ def test_there_are_enough_rows_of_every_kind():
 @pytest.mark.parametrize("case", FAST, ids=[case.name for case in FAST])
 def test_the_fast_cases_pass(case):
     """Each row of the quick version."""
-    found = list(case.run(True))
+    found = list(case.run(How(quick=True)))
     assert found
     assert not [f"{r.case}, {r.quantity}: {r.got:g} not {r.expected:g}" for r in found if not r.passed]
 
@@ -59,26 +60,32 @@ def test_the_fast_cases_pass(case):
 @pytest.mark.parametrize("case", cases(), ids=[case.name for case in cases()])
 def test_all_cases_pass(case):
     """Each row of the whole table."""
-    assert not [f"{r.case}, {r.quantity}: {r.got:g} not {r.expected:g}" for r in case.run(False) if not r.passed]
+    assert not [f"{r.case}, {r.quantity}: {r.got:g} not {r.expected:g}" for r in case.run(How()) if not r.passed]
 
 
 def fakes(monkeypatch: pytest.MonkeyPatch, *made: Case) -> None:
-    """Put other cases into the table."""
+    """Put other cases into the table, and run them in this process."""
+
+    def each(self: Pool, work, jobs):
+        for k, job in enumerate(jobs):
+            yield k, None if job[0] == "killed" else work(*job, self.arch, self.threads)
+
     monkeypatch.setattr("calib.verification.study.cases", lambda: list(made))
+    monkeypatch.setattr(Pool, "each", each)
 
 
-def good(quick: bool):
+def good(how: How):
     """A case that passes."""
     yield row()
 
 
-def bad(quick: bool):
+def bad(how: How):
     """A case that fails."""
     yield row()
     yield row(got=5.0)
 
 
-def broken(quick: bool):
+def broken(how: How):
     """A case that breaks down after a row."""
     yield row()
     raise SceneError("the knife is bent")
@@ -114,11 +121,11 @@ def test_slow_cases_are_left_out_of_the_quick_run(monkeypatch, tmp_path):
     seen = []
     fakes(
         monkeypatch,
-        Case("fast", lambda quick: seen.append(quick) or good(quick)),
-        Case("slow", lambda quick: seen.append("slow") or good(quick), fast=False),
+        Case("fast", lambda how: seen.append(how) or good(how)),
+        Case("slow", lambda how: seen.append("slow") or good(how), fast=False),
     )
-    assert main(["verify", "--quick", "--out", str(tmp_path / "a")]) == 0
-    assert seen == [True]
+    assert main(["verify", "--quick", "--seed", "3", "--out", str(tmp_path / "a")]) == 0
+    assert seen == [How(quick=True, seed=3)]
 
 
 def test_an_unknown_case_and_a_used_folder_are_errors(monkeypatch, tmp_path, capsys):
@@ -129,6 +136,42 @@ def test_an_unknown_case_and_a_used_folder_are_errors(monkeypatch, tmp_path, cap
     assert main(["verify", "--out", str(tmp_path / "a")]) == 0
     assert main(["verify", "--out", str(tmp_path / "a")]) == 1
     assert "never overwritten" in capsys.readouterr().err
+
+
+def test_resume_runs_what_did_not_end(monkeypatch, tmp_path, capsys):
+    """Cases that ended are kept, one that broke down or whose process was killed runs again; another seed is refused."""
+    seen = []
+    counted = Case("good", lambda how: seen.append("good") or good(how))
+    again = ["verify", "--out", str(tmp_path / "a"), "--resume"]
+    fakes(monkeypatch, counted, Case("broken", broken), Case("killed", good))
+    assert main(again) == 2
+    document = json.loads((tmp_path / "a/verify.json").read_text())
+    assert set(document["broken"]) == {"broken", "killed"}
+    assert "killed" in document["broken"]["killed"]
+    fakes(monkeypatch, Case("killed", good), counted, Case("broken", good))
+    monkeypatch.setattr(
+        Pool, "each", lambda self, work, jobs: ((k, work(*job, "cpu", 1)) for k, job in enumerate(jobs))
+    )
+    capsys.readouterr()
+    assert main(again) == 0
+    assert "1 of 3 cases are known already" in capsys.readouterr().err
+    assert seen == ["good"]
+    document = json.loads((tmp_path / "a/verify.json").read_text())
+    assert [r["group"] for r in document["rows"]] == ["killed", "good", "broken"]
+    assert main([*again, "--seed", "1"]) == 1
+    assert "seed 0, not 1" in capsys.readouterr().err
+    (tmp_path / "a/verify.json").write_text("{")
+    assert main(again) == 1
+    assert "damaged" in capsys.readouterr().err
+
+
+def test_cases_run_in_processes(tmp_path):
+    """The whole path with real workers, on cases that take a moment."""
+    out = tmp_path / "a"
+    assert main(["verify", "--quick", "--only", "law", "--out", str(out)]) == 0
+    document = json.loads((out / "verify.json").read_text())
+    assert list(document["seconds"]) == ["elastic law", "plastic law", "damage law"]
+    assert document["complete"] and document["passed"]
 
 
 def test_parts_are_modules_with_cases():
