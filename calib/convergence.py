@@ -38,7 +38,8 @@ class Estimate:
 
     Attributes:
         verdict: One of :data:`VERDICTS`, from the three finest grids.
-        order: Observed order of the three finest grids [-], or None (two grids, divergent, noise, equal values).
+        order: Observed order of the three finest grids [-], or None: two grids, divergent, equal values, or where the
+            differences are noise and give none that is credible.
         extrapolated: Richardson's value for an infinitely fine grid, or None.
         change: Difference of the two finest over the finest [-].
         gci: Grid convergence index of the finest, a fraction of its value [-].
@@ -79,8 +80,9 @@ def estimate(h: Sequence[float], values: Sequence[float], repeat_sd: float = 0.0
         return Estimate("two grids", None, None, change, gci, None, None, math.hypot(gci, noise))
     coarse = phi[1] - phi[2]
     verdict = _verdict(cells, fine, coarse, repeat_sd)
-    trend = verdict not in ("divergent", "noise-limited")
-    order = observed_order(cells[:3], phi[:3]) if trend else None
+    order = None if verdict == "divergent" else observed_order(cells[:3], phi[:3])
+    if verdict == "noise-limited" and order is not None and not ORDERS[0] <= order <= ORDERS[1]:
+        order = None  # of the noise, not of the grid
     factor, used = _credible(order)
     gci = float(factor * abs(change) / ((cells[1] / cells[0]) ** used - 1))
     extrapolated = None if order is None else float(phi[0] + fine / ((cells[1] / cells[0]) ** order - 1))

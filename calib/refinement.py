@@ -19,15 +19,13 @@ from calib.outputs import prepare, write_csv, write_json
 from calib.pool import Pool
 from calib.progress import clock
 from calib.provenance import code_key, git_commit, key_of, versions
+from calib.scenes import elsewhere
 from calib.store import TRANSIENT_REASONS, EvaluationStore, Header, content_key
 from mpm.scene import Scene
 
 AXES = ("safety", "mach", "ppc", "offset", "repeat")
 """What can be varied beside the cell size, each apart from the others: dt over its limit, speed over the P-wave's,
 particles per cell and direction, blade against the grid [cells], and what should not matter at all."""
-PLACES = np.array([0.8191725134, 0.6710436067, 0.5497004779])
-"""Multiples of these, less whole cells, are the places of the grid in repeated runs: they fill the cell evenly (powers of the
-root of g^4 = g + 1: Roberts 2018)."""
 POINTS = 240
 """Points of the common stroke grid, as of a calibration."""
 WORK_LIMIT, PEAK_LIMIT = 0.02, 0.03
@@ -84,9 +82,7 @@ def cases(scene: Scene, axes: Mapping[str, Sequence[float]], repeats: int) -> li
         out.append(Case("offset", value, replace(base, numerics=shifted)))
     own = out[min(1, len(cells) - 2)].scene
     for k in range(1, repeats + 1):
-        x, y, z = (float(part) for part in np.round(k * PLACES % 1.0, 4))
-        numerics = replace(own.numerics, seed=own.numerics.seed + k, grid_shift=(x, y, z))
-        out.append(Case("repeat", k, replace(own, numerics=numerics)))
+        out.append(Case("repeat", k, elsewhere(own, k)))
     return out
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from calib.conditioning import Conditioned
 from calib.materials import FoodSpec
 from mpm.scene import EdgeLaw, Knife, Motion, Numerics, Scene
@@ -16,6 +18,9 @@ CELL_PER_ZONE = 0.75  # default cell, so that the zone spans 1.3 cells; the coar
 CLEARANCE_ZONES = 1.0  # least food left below the edge where a trace ends under load
 HEIGHT_SPAN = 1.25  # a specimen of unknown height may be at least this many times higher than the lowest it can be
 UNDER_LOAD = 0.5  # the trace ends under load when its last force exceeds this part of its median after the peak
+# Multiples of these, less whole cells, are the places of the grid in repeated runs: they fill the cell evenly (powers of the root
+# of g^4 = g + 1: Roberts 2018).
+PLACES = np.array([0.8191725134, 0.6710436067, 0.5497004779])
 LENGTH_PER_HEIGHT = 1.0  # simulated length across the blade; the rest of a long food carries no load
 
 
@@ -121,6 +126,12 @@ def place(scene: Scene, values: Mapping[str, float], kept: Collection[str] = ())
         ),
         rest,
     )
+
+
+def elsewhere(scene: Scene, k: int) -> Scene:
+    """The scene with other particles and the grid shifted along all three axes, for k = 1, 2, ...: nothing that should matter."""
+    x, y, z = (float(part) for part in np.round(k * PLACES % 1.0, 4))
+    return replace(scene, numerics=replace(scene.numerics, seed=scene.numerics.seed + k, grid_shift=(x, y, z)))
 
 
 def cut_scene(

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from calib.checks import Check, check
 from calib.conditioning import Conditioned, condition
 from calib.errors import MaterialError
 from calib.filters import filter_simulated
@@ -160,9 +161,14 @@ def run(
         say("simulating the best values once more for their full record")
         scene, values = place(setup.fine, result.best.evaluation.parameters, setup.kept)
         setup = replace(setup, fine=scene)
-        record = pool.record(scene.with_material(**values))
+        scene = scene.with_material(**values)
+        record = pool.record(scene)
+        checks: list[Check] = []
+        if result.status != "interrupted":
+            say("simulating them at half the speed, and with the grid and the particles elsewhere")
+            checks = check(scene, record, pool, store)
     add_conditioning(out / "evaluations.h5", setup.curve)
-    return _write(request, setup, result, record, start, out, time.monotonic() - began)
+    return _write(request, setup, result, record, checks, start, out, time.monotonic() - began)
 
 
 def _start_curve(setup: Setup, result: FitResult, fine: CachedEvaluator) -> np.ndarray:
@@ -181,6 +187,7 @@ def _write(
     setup: Setup,
     result: FitResult,
     record: ForceRecord,
+    checks: Sequence[Check],
     start: np.ndarray,
     out: Path,
     wall: float,
@@ -195,7 +202,7 @@ def _write(
     if result.jacobian is not None:
         rows = setup.objective.effective_rows
         doubt = uncertainty(result.parameters, result.jacobian, best.residual, effective_rows=rows)
-    summary = summarise(request, setup, result, record, metrics, nulls, doubt)
+    summary = summarise(request, setup, result, record, metrics, nulls, doubt, checks)
     summary["wall_s"] = wall
     write_csv(out / "curves.csv", _curves(curve, best.curve, record, start, nulls))
     fitted = _fitted_food(request, setup, best.evaluation.parameters)

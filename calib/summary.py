@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
 import h5py
 
+from calib.checks import Check
 from calib.conditioning import Conditioned
 from calib.errors import OutputError
 from calib.fit import FitResult
@@ -34,6 +35,7 @@ def summarise(
     metrics: Metrics,
     nulls: Mapping[str, NullModel],
     doubt: Uncertainty | None,
+    checks: Sequence[Check],
 ) -> dict[str, Any]:
     """All figures of a calibration but its run time.
 
@@ -45,6 +47,7 @@ def summarise(
         metrics: Best curve against the trace.
         nulls: Null models against the trace.
         doubt: Intervals, None when the fit ended too early for them.
+        checks: What numerical choices change.
     """
     parameters = _parameters(request, result, doubt)
     verdicts = judge(
@@ -53,6 +56,7 @@ def summarise(
         momentum_residual=record.momentum_residual,
         ke_over_ie=record.ke_over_ie,
         parameters=parameters,
+        checks=checks,
     )
     trace = setup.curve.trace
     stopped = result.status == "interrupted"
@@ -74,6 +78,7 @@ def summarise(
         "fixed_parameters": _fixed(request, parameters),
         **_runs(result),
         **_numerics(request, setup, record),
+        "numerical_checks": [c.as_dict() for c in checks],
         "warnings": [*request.food.warnings(), *setup.curve.warnings],
         "limits": said,
     }

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from calib.checks import Check
 from calib.metrics import Metrics
 
 # Limits of a single in-sample calibration. Peak: the figure that published work quotes (CulinaryCut, "within 5 %").
@@ -15,6 +16,7 @@ PEAK_LIMIT = 0.05
 NRMSE_LIMIT = 0.08
 SHAPE_LIMIT = 0.08
 MOMENTUM_LIMIT = 0.01
+CHANGE_LIMIT = 0.05  # of peak and work by numerical choices: as much as the peak may miss the trace
 KINETIC_LIMIT = 0.10  # explicit quasi-static practice: kinetic energy below 5 to 10 % of internal energy
 # Ends of what is physically possible: a fit that ends there found a one-sided answer (the cut shows no friction, say),
 # whereas one that ends on a bound of ours asks for a value that it was not allowed.
@@ -42,6 +44,14 @@ def _below(name: str, value: float, limit: float, unit: str = "fraction", note: 
     return Verdict(name, value, limit, unit, bool(abs(value) <= limit), note)
 
 
+def _change(check: Check) -> Verdict:
+    change = check.change
+    if change is None:
+        return Verdict(check.name, None, CHANGE_LIMIT, "fraction", False, f"broke down: {check.reason}")
+    note = f"peak {check.peak_change:+.1%}, work {check.work_change:+.1%}"
+    return Verdict(check.name, change, CHANGE_LIMIT, "fraction", change <= CHANGE_LIMIT, note)
+
+
 def judge(
     metrics: Metrics,
     nulls: Mapping[str, Metrics],
@@ -49,6 +59,7 @@ def judge(
     momentum_residual: float,
     ke_over_ie: float,
     parameters: Mapping[str, Mapping[str, Any]],
+    checks: Sequence[Check] = (),
 ) -> list[Verdict]:
     """The verdict table of a calibration.
 
@@ -58,6 +69,7 @@ def judge(
         momentum_residual: Momentum balance that does not close, part of the peak [-].
         ke_over_ie: Kinetic over internal energy [-].
         parameters: Fitted parameters with their verdicts.
+        checks: What numerical choices change; none were made where the fit was interrupted.
 
     Returns:
         All lines; those with ``passed`` None were not run and decide nothing.
@@ -81,6 +93,7 @@ def judge(
     )
     lines.append(_below("momentum balance residual", momentum_residual, MOMENTUM_LIMIT, note="part of the peak force"))
     lines.append(_below("kinetic over internal energy", ke_over_ie, KINETIC_LIMIT))
+    lines += [_change(c) for c in checks]
     on = [n for n, p in parameters.items() if p["verdict"] == "at_bound"]
     stuck = [n for n in on if n != SIZE and parameters[n]["value"] != NATURAL_LIMITS.get(n)]
     note = ", ".join(stuck + [f"{n} at its natural limit" for n in on if n not in stuck])

@@ -246,11 +246,11 @@ class Solid:
         modes[:, 1, 4], modes[:, 2, 4] = -z, y
         modes[:, 2, 5], modes[:, 0, 5] = -x, z
         method = "symmetric" if self.law.symmetric else "nonsymmetric"
-        solver = pyamg.smoothed_aggregation_solver(k.tocsr(), B=modes.reshape(-1, 6)[free], symmetry=method)
         history: list[float] = []
         accelerate = "cg" if self.law.symmetric else "gmres"
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of a matrix that is not positive definite: solved directly
+            solver = pyamg.smoothed_aggregation_solver(k.tocsr(), B=modes.reshape(-1, 6)[free], symmetry=method)
             out = solver.solve(b, tol=SLOPPY, maxiter=200, accel=accelerate, residuals=history)
         if not history[-1] <= 10 * SLOPPY * history[0]:
             return _factorised(k, b, self.law.symmetric)

@@ -204,9 +204,9 @@ def hertz(how: How) -> Iterator[Row]:
 
 
 CASES = [
-    Case("rest and friction", resting),
-    Case("tilted board", tilted),
-    Case("bounce", bouncing),
-    Case("two discs", discs),
-    Case("Hertz", hertz, fast=False),
+    Case("rest and friction", resting, cost=30),
+    Case("tilted board", tilted, cost=30),
+    Case("bounce", bouncing, cost=12),
+    Case("two discs", discs, cost=45),
+    Case("Hertz", hertz, fast=False, cost=120),
 ]

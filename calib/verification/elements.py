@@ -246,6 +246,6 @@ CASES = [
     Case("finite elements: orders", orders),
     Case("finite elements: NAFEMS", nafems),
     Case("finite elements: beams", beams),
-    Case("finite elements: Hertz", hertz, fast=False),
-    Case("finite elements: punch", punch, fast=False),
+    Case("finite elements: Hertz", hertz, fast=False, cost=120),
+    Case("finite elements: punch", punch, fast=False, cost=140),
 ]

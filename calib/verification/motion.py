@@ -241,8 +241,8 @@ CASES = [
     Case("conservation", conserved),
     Case("spin", spinning),
     Case("fall", falling),
-    Case("bar", vibrating),
-    Case("ball", breathing),
-    Case("vortex", turning),
-    Case("wave", wave),
+    Case("bar", vibrating, cost=20),
+    Case("ball", breathing, cost=15),
+    Case("vortex", turning, cost=60),
+    Case("wave", wave, cost=12),
 ]

@@ -25,7 +25,12 @@ WINDOW = 0.12  # part of the last stroke, on either side, over which the particl
 
 @dataclass(frozen=True)
 class Test:
-    """A press. Attributes: name; shape; strokes [m]; options of the tool; of the reference; cell sizes of the particles [m]."""
+    """A press.
+
+    Attributes: name; shape; strokes [m]; half_angle of the tool [rad]; bonded, whether it and the board stick; yield_stress
+    [Pa]; tolerance [-]; reference, options of the finite elements; sizes, cells of the particles [m]; slow and cost as of
+    a case.
+    """
 
     name: str
     shape: Shape
@@ -37,6 +42,7 @@ class Test:
     reference: tuple[tuple[str, Any], ...] = ()
     sizes: tuple[float, ...] = CELLS
     slow: bool = True
+    cost: float = 90.0
 
 
 TESTS = (
@@ -77,12 +83,14 @@ TESTS = (
         Shape("sphere", 0.03, 0.03, 0.03),
         (0.004, 0.005, 0.006),  # below, few elements touch: references differ by 2 % at 2 mm and by 5 % at 1.5 mm
         reference=(("cells", 4), ("order", 2), ("grade", 1.2)),
+        cost=300.0,
     ),
     Test(
         "lying cylinder",
         Shape("cylinder", 0.016, 0.03, 0.03),
         (0.002, 0.004, 0.006),
         reference=(("cells", 4), ("order", 2), ("grade", 1.2)),
+        cost=300.0,
     ),
     Test(
         "wedge of 140 degrees on a block",
@@ -90,6 +98,7 @@ TESTS = (
         (0.002, 0.003, 0.004),  # below, one row of elements is not enough: references differ by 3 % at 1 mm
         half_angle=math.radians(70),
         reference=(("cells", 5), ("order", 2), ("grade", 1.3)),
+        cost=300.0,
     ),
     Test(
         "wedge of 140 degrees on a lying cylinder",
@@ -97,6 +106,7 @@ TESTS = (
         (0.002, 0.004, 0.006),
         half_angle=math.radians(70),
         reference=(("cells", 7), ("grade", 1.2)),
+        cost=300.0,
     ),
     Test(
         "block, sliding, J2",
@@ -167,7 +177,7 @@ def _case(test: Test) -> Case:
     def run(how: How) -> Iterator[Row]:
         yield from compare(how, test, test.sizes[:1] if how.quick else test.sizes)
 
-    return Case(f"press: {test.name}", run, fast=not test.slow)
+    return Case(f"press: {test.name}", run, fast=not test.slow, cost=test.cost)
 
 
 CASES = [_case(test) for test in TESTS]

@@ -86,11 +86,15 @@ class How:
 
 @dataclass(frozen=True)
 class Case:
-    """A function that makes rows. Attributes: name; run; fast, whether it belongs to the quick part."""
+    """A function that makes rows.
+
+    Attributes: name; run; fast, whether it belongs to the quick part; cost, about the seconds that it takes: long ones start first.
+    """
 
     name: str
     run: Callable[[How], Iterator[Row]]
     fast: bool = True
+    cost: float = 5.0
 
 
 def cases() -> list[Case]:

@@ -53,11 +53,11 @@ def run(
     prepare(out, resume=resume)
     own = {"quick": how.quick, "seed": how.seed, "device": how.arch, "code": code_key()}
     found = _known(out, own) if resume else {}
-    new = [c for c in todo if c.name not in found]
+    new = sorted((c for c in todo if c.name not in found), key=lambda c: -c.cost)
     document = {**about, **own, "versions": versions(), "git": git_commit()}
     if len(new) < len(todo):
         say(f"{len(todo) - len(new)} of {len(todo)} cases are known already")
-    began = time.monotonic()
+    began, total, spent = time.monotonic(), sum(c.cost for c in new), 0.0
     with Pool(min(workers, max(len(new), 1)), how.arch) as pool:
         for k, done in pool.each(_rows, [(c.name, how) for c in new]):
             name = new[k].name
@@ -69,8 +69,8 @@ def run(
             write_json(out / "verify.json", document | _table(todo, found))
             count = sum(not row["passed"] for row in found[name]["rows"])
             state = "broke down" if found[name]["broken"] else f"{count} failed" if count else "passed"
-            finished = len(found) - len(todo) + len(new)
-            left = (time.monotonic() - began) / finished * (len(new) - finished)
+            spent += new[k].cost
+            left = (time.monotonic() - began) * (total - spent) / spent
             say(
                 f"{name}: {len(found[name]['rows'])} rows, {state}; {len(found)} of {len(todo)} cases, about {clock(left)} left"
             )

@@ -56,6 +56,21 @@ def finished(killed: tuple[Path, list[bytes]]) -> tuple[Path, int]:
     return out, main(["calibrate", *SMALL, "--out", str(out), "--resume"])
 
 
+def test_numerical_choices_are_checked(finished):
+    """The best values run again at half the speed and elsewhere on the grid, in lines of the verdict; resuming runs neither."""
+    out, _ = finished
+    summary = json.loads((out / "summary.json").read_text())
+    assert [c["name"] for c in summary["numerical_checks"]] == [
+        "half the simulated speed",
+        "grid and particles elsewhere",
+    ]
+    for one in summary["numerical_checks"]:
+        line = next(v for v in summary["verdicts"] if v["name"] == one["name"])
+        assert one["reason"] is None
+        assert line["value"] == max(abs(one["peak_change"]), abs(one["work_change"]))
+        assert 0 < line["value"] < 0.2
+
+
 def test_kill_loses_nothing_and_resume_repeats_nothing(killed, finished):
     """What was stored before the kill is in the finished file unchanged, and no key is there twice."""
     _, before = killed

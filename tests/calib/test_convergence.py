@@ -66,6 +66,13 @@ def test_differences_below_repeatability_are_noise():
     values = [5.00, 5.01, 5.03]
     assert estimate(H[:3], values).verdict == "monotone"
     e = estimate(H[:3], values, repeat_sd=0.02)
+    assert e.verdict == "noise-limited"
+    assert e.order is None  # 3.1 is not credible
+    straight = [5.00, 5.01, 5.02]
+    assert estimate(H[:3], straight, repeat_sd=0.02).order == pytest.approx(1.0, abs=1e-6)
+    odd = [5.00, 5.01, 5.011]
+    assert estimate(H[:3], odd).verdict == "divergent"
+    e = estimate(H[:3], odd, repeat_sd=0.02)
     assert (e.verdict, e.order, e.extrapolated) == ("noise-limited", None, None)
     assert e.gci == pytest.approx(3.0 * (0.01 / 5.00) / (1.5 - 1), rel=1e-9)  # first order, the large factor of safety
 

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from calib.checks import Check
 from calib.conditioning import condition
 from calib.errors import MaterialError
 from calib.knives import load_knife
@@ -130,7 +131,19 @@ def test_verdicts_fail_what_fails():
         "mu": {"verdict": "at_bound", "value": 0.0},
         "R": {"verdict": "identified", "value": 300.0},
     }
-    lines = judge(compare(s, real, 1.2 * real), nulls, momentum_residual=0.02, ke_over_ie=0.2, parameters=parameters)
+    checks = [
+        Check("slower", None, 0.01, -0.06),
+        Check("aside", None, 0.02, -0.02),
+        Check("broken", "inverted", None, None),
+    ]
+    lines = judge(
+        compare(s, real, 1.2 * real),
+        nulls,
+        momentum_residual=0.02,
+        ke_over_ie=0.2,
+        parameters=parameters,
+        checks=checks,
+    )
     failed = {v.name for v in lines if v.passed is False}
     assert failed == {
         "peak force error",
@@ -138,7 +151,12 @@ def test_verdicts_fail_what_fails():
         "momentum balance residual",
         "kinetic over internal energy",
         "parameters at a bound",
+        "slower",
+        "broken",
     }
+    notes = {v.name: (v.value, v.note) for v in lines}
+    assert notes["slower"] == (0.06, "peak +1.0%, work -6.0%")
+    assert notes["broken"] == (None, "broke down: inverted")
     assert sum(v.passed is None for v in lines) == 3
     bounds = next(v for v in lines if v.name == "parameters at a bound")
     assert bounds.value == 1 and "mu at its natural limit" in bounds.note

@@ -1,0 +1,78 @@
+"""What numerical choices do to a calibrated force: the best values once more, slower and elsewhere on the grid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from calib.pool import Pool
+from calib.provenance import code_key
+from calib.scenes import elsewhere
+from calib.store import TRANSIENT_REASONS, EvaluationStore, content_key
+from mpm.record import ForceRecord
+from mpm.scene import Scene
+
+
+def _slower(scene: Scene) -> Scene:
+    return replace(scene, motion=replace(scene.motion, mach=scene.motion.mach / 2))
+
+
+VARIANTS: Mapping[str, Callable[[Scene], Scene]] = {
+    "half the simulated speed": _slower,
+    "grid and particles elsewhere": lambda scene: elsewhere(scene, 1),
+}
+"""What should not matter, by name. The finer grid, which does, is the business of a convergence study."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """A repeated simulation against the one that is reported.
+
+    Attributes: name; reason why it broke down, or None; changes of peak and work, as fractions, None where it broke down.
+    """
+
+    name: str
+    reason: str | None
+    peak_change: float | None
+    work_change: float | None
+
+    @property
+    def change(self) -> float | None:
+        """The larger of the two, without its sign."""
+        if self.peak_change is None or self.work_change is None:
+            return None
+        return max(abs(self.peak_change), abs(self.work_change))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return asdict(self)
+
+
+def check(scene: Scene, record: ForceRecord, pool: Pool, store: EvaluationStore) -> list[Check]:
+    """Simulate the variants of a scene; what the store knows is not simulated again.
+
+    Args:
+        scene: The scene with its calibrated material.
+        record: Its record.
+        pool: Where they run.
+        store: Where they are kept.
+    """
+    scenes = [vary(scene) for vary in VARIANTS.values()]
+    keys = [content_key(s.as_dict(), {}, code_key()) for s in scenes]
+    found = {k: known for k, key in enumerate(keys) if (known := store.get(key)) is not None}
+    found = {k: known for k, known in found.items() if known.reason not in TRANSIENT_REASONS}
+    new = [k for k in range(len(scenes)) if k not in found]
+    for result in pool.run([(scenes[k], {}) for k in new]):
+        k = new[result.index]
+        store.append(keys[k], result, "check")
+        found[k] = result
+    out = []
+    for k, name in enumerate(VARIANTS):
+        run = found[k]
+        if run.ok and record.peak > 0 and record.work > 0:
+            peak, work = (run.scalars[key] / own - 1 for key, own in (("peak_N", record.peak), ("work_J", record.work)))
+            out.append(Check(name, None, peak, work))
+        else:
+            out.append(Check(name, run.reason or "no force", None, None))
+    return out
