@@ -86,7 +86,8 @@ class ForceRecord:
         """Upward force on the blade's faces, averaged over one cell of stroke [N], shape (n,).
 
         The crack front behind the edge advances by whole node layers, so the force on the faces carries a ripple with
-        the period of one cell. A moving mean over exactly one cell removes it and nothing longer.
+        the period of one cell. A moving mean over exactly one cell removes it and nothing longer; on the last half cell,
+        which has no such window, the curve is carried on along the last two whole ones.
         """
         return _moving_mean(self.time * self.speed, self.face[:, 2], self.cell)
 
@@ -174,7 +175,12 @@ class ForceRecord:
 
 
 def _moving_mean(way: np.ndarray, values: np.ndarray, width: float) -> np.ndarray:
-    """Mean of interval values over a centred window of the way, exact for piecewise constant values."""
+    """Mean of interval values over a centred window of the way, exact for piecewise constant values.
+
+    Where the window would reach beyond the end, the means over the last two whole windows are carried on along their line: a
+    window that shrinks would let through what it is there to remove. At the beginning it shrinks, where there is nothing
+    to remove yet.
+    """
     if len(way) == 0:
         return values
     edges = np.concatenate([[0.0], way])
@@ -182,4 +188,11 @@ def _moving_mean(way: np.ndarray, values: np.ndarray, width: float) -> np.ndarra
     centre = (edges[1:] + edges[:-1]) / 2
     half = np.minimum(width / 2, np.minimum(centre - edges[0], edges[-1] - centre))
     upper, lower = np.interp(centre + half, edges, integral), np.interp(centre - half, edges, integral)
-    return (upper - lower) / (2 * half)
+    out = (upper - lower) / (2 * half)
+    if way[-1] >= 2 * width:
+        end = edges[-1] - width / 2
+        late = centre > end
+        below, under, top = np.interp(edges[-1] - width * np.array([2.0, 1.0, 0.0]), edges, integral)
+        last, before = (top - under) / width, (under - below) / width
+        out[late] = last + (last - before) / width * (centre[late] - end)
+    return out
