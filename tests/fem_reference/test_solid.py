@@ -12,8 +12,10 @@ from fem_reference import meshes
 from fem_reference.contact import Contact, Plane, Wedge
 from fem_reference.laws import Corotated, NeoHookean
 from fem_reference.press import press
+from fem_reference.slit import cleave
 from fem_reference.solid import EquilibriumError, Solid
 from mpm.material import Material
+from mpm.scene import Knife
 from mpm.shapes import Shape, volume
 from tests.mpm import twins
 
@@ -160,3 +162,18 @@ def test_a_bonded_block_flows_in_steps():
     assert flowing[0] == pytest.approx(elastic[0], rel=0.03)
     assert (flowing[1:] > 1.01 * sliding[1:]).all()
     assert flowing[2] < 0.8 * elastic[2]
+
+
+def test_a_blade_in_a_slit():
+    """The force on its faces is proportional to the stiffness, grows with its thickness, and comes near on finer elements."""
+    block, lead, stroke = Shape("block", 0.024, 0.016, 0.018), 3e-3, 6e-3
+
+    def force(E: float = 1e6, spine: float = 2e-3, cells: int = 2) -> np.ndarray:
+        knife = Knife("blade", spine, math.radians(11.0), 0.02, 0.2)
+        return cleave(block, Material(E=E, nu=0.35, rho=1000.0), knife, lead, stroke, cells=cells).force
+
+    once = force()
+    assert len(once) == 4 and (once > 0).all()
+    np.testing.assert_allclose(force(E=2e6), 2 * once, rtol=1e-4)
+    assert force(spine=1e-3)[-1] < 0.9 * once[-1]
+    assert force(cells=3)[-1] == pytest.approx(once[-1], rel=0.1)
