@@ -36,13 +36,7 @@ def resting(how: How) -> Iterator[Row]:
         "m g",
     )
     mu, v0 = 0.4, 0.15
-    slide = how.body(
-        BLOCK,
-        DAMPED,
-        numerics(gravity=G, room=1.0),
-        board=mu,
-        velocity=lambda x: np.tile([0.0 * v0, 0.0, 0.0], (len(x), 1)),
-    )
+    slide = how.body(BLOCK, DAMPED, numerics(gravity=G, room=1.0), board=mu)
     slide.step(math.ceil(6 * period / slide.dt))
     slide.kick(np.array([v0, 0.0, 0.0]))
     slide.step(math.ceil(2 * period / slide.dt))
@@ -63,7 +57,6 @@ def bouncing(how: How) -> Iterator[Row]:
         lift=1e-3,
         velocity=lambda x: np.tile([0.0, 0.0, -0.3], (len(x), 1)),
     )
-    start = body.kinetic
     body.step(1)
     start = body.kinetic
     for _ in range(4000):

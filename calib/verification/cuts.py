@@ -111,7 +111,7 @@ def invariance(how: How) -> Iterator[Row]:
 def slit(how: How) -> Iterator[Row]:
     """A wedge without friction in a slit that leads its edge: the force on the faces against finite elements.
 
-    The weakest row. On cells of 3, 2 and 1.5 mm the particles need 22, 18 and 16 % less; with the blade half-way between two
+    The weakest row. On cells of 3, 2 and 1.5 mm the particles need 22, 18 and 15 % less; with the blade half-way between two
     planes of nodes 14, 12 and 11 %.
     """
     block, lead, stroke = Shape("block", 0.024, 0.016, 0.024), 1.5e-3, 9e-3

@@ -201,10 +201,8 @@ def hertz(how: How) -> Iterator[Row]:
     yield Row(
         "ball between plates", "force of the plate less that on the board [N]", 0.0, balance, 1e-4 * want, "balance"
     )
-    half, radius = (
-        0.002,
-        0.02,
-    )  # of the contact, of the cylinder: nu = 0, for which plane strain and free ends are the same
+    # of the contact, of the cylinder: nu = 0, for which plane strain and free ends are the same
+    half, radius = 0.002, 0.02
     line = math.pi * food.E * half**2 / (4 * radius)
     way = 2 * line / (math.pi * food.E) * (2 * math.log(4 * radius / half) - 1)
     round_ = Shape("cylinder", 0.002, 2 * radius, 2 * radius)

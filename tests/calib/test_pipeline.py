@@ -27,7 +27,7 @@ from calib.nulls import null_models
 from calib.outputs import prepare, write_json
 from calib.pool import DIED, Pool, SceneEvaluator
 from calib.provenance import code_key, key_of, versions
-from calib.scenes import Sizing, cut_scene, height_range, place, specimen
+from calib.scenes import Sizing, cut_scene, elsewhere, height_range, place, specimen
 from calib.study import fit_parameters
 from calib.trace import Trace
 from calib.verdicts import judge, limits
@@ -117,6 +117,19 @@ def test_fit_takes_any_property_and_refuses_others():
     assert fit_parameters(food, ("E", "nu", "rho")).names == ("E", "nu", "rho")
     with pytest.raises(MaterialError, match="tensile_strength"):
         fit_parameters(food, ("tensile_strength",))
+
+
+def test_elsewhere_moves_the_grid_but_not_the_blades_plane():
+    """Other particles, the grid shifted along the blade and upwards by less than a cell, each time by something else."""
+    food = load_food("banana")
+    scene = cut_scene(food, specimen(food, None, Sizing())[0], load_knife("kitchen"))
+    moved = [elsewhere(scene, k) for k in (1, 2, 3)]
+    for one in moved:
+        x, y, z = one.numerics.grid_shift
+        assert 0 < x < 1 and y == 0 and 0 < z < 1
+        assert one.mirrors == (False, True)
+        assert replace(one, numerics=scene.numerics) == scene
+    assert len({one.numerics.grid_shift for one in moved}) == len({one.numerics.seed for one in moved}) == 3
 
 
 def test_verdicts_fail_what_fails():
