@@ -10,7 +10,7 @@ import numpy as np
 from fem_reference.contact import Contact, Plane, Wedge
 from fem_reference.meshes import box, surface
 from fem_reference.press import SHARP, STIFF, law_of
-from fem_reference.solid import Solid
+from fem_reference.solid import EquilibriumError, Solid
 from mpm.material import Material
 from mpm.scene import Knife
 from mpm.shapes import Shape
@@ -18,28 +18,40 @@ from mpm.shapes import Shape
 LAYERS = 3  # elements over half the width
 ACROSS = 12  # elements over half the length, smaller near the slit
 GRADE = 2.0
+RISES = 20  # renewals of the blade's place while the end of the slit rises
+SETTLED = 1e-2  # change of that rise that is small enough, over the height of an element
 
 
 @dataclass(frozen=True, eq=False)
 class Opening:
-    """Force over stroke. Attributes: stroke [m], force upwards on both faces of the blade [N], shape (n,); unknowns."""
+    """Force over stroke.
+
+    Attributes:
+        stroke: Way of the edge below the top [m], shape (n,).
+        force: Force upwards on both faces of the blade [N], shape (n,).
+        rise: How far the end of the slit has risen [m], shape (n,).
+        unknowns: Number of unknown displacements.
+    """
 
     stroke: np.ndarray
     force: np.ndarray
+    rise: np.ndarray
     unknowns: int
 
 
 def cleave(block: Shape, material: Material, knife: Knife, lead: float, stroke: float, *, cells: int = 2) -> Opening:
     """Push a blade into a block whose halves part at a fixed way ahead of the edge, without friction.
 
-    The halves are held together below the slit and free above; nothing is spent on parting them.
+    The halves are held together below the slit and free above; nothing is spent on parting them. The block stands on a
+    smooth floor. Its halves turn outwards, so the lower outer edges carry it and its middle rises from the floor; the way
+    between the slit's end and the edge is that of the deformed block.
 
     Args:
         block: Outline, a block.
         material: Its constants.
         knife: A sharp blade.
         lead: Way of the slit's end ahead of the edge [m].
-        stroke: Way of the edge into the block [m]; rounded to whole elements.
+        stroke: Way of the edge into the block [m]; the last that ends the slit at a node is less.
         cells: Elements over the lead; all elements are as high, and the slit ends at their nodes.
 
     Raises:
@@ -53,7 +65,7 @@ def cleave(block: Shape, material: Material, knife: Knife, lead: float, stroke: 
     x, y, z = solid.nodes.T
     near = 1e-6 * h
     solid.hold(np.flatnonzero(x < near), [0])
-    solid.hold(np.flatnonzero((y < near) & (z < near)), [2])
+    solid.hold(np.flatnonzero((y > block.length / 2 - near) & (z < near)), [2])
     penalty, tolerance = STIFF * material.E / size, SHARP * size
     wedge = Wedge(h, knife.angle / 2, knife.spine)
     nodes, areas = solid.areas(surface(mesh, lambda p: p[1] < near))
@@ -62,17 +74,23 @@ def cleave(block: Shape, material: Material, knife: Knife, lead: float, stroke: 
     solid.contacts += [blade, Contact(Plane((0, 0, 0), (0, 0, 1)), floor, under, penalty, tolerance)]
     middle = np.flatnonzero(y < near)
     whole = {3 * int(k) + 1: z[k] for k in middle}
-    strokes, forces = [], []
-    for k in range(1, math.floor(stroke / size + 1e-9) + 1):
-        way = k * size
-        wedge.height = h - way
-        end = max(h - way - lead, 0.0)
+    strokes, forces, rises = [], [], []
+    for end in h - lead - size * np.arange(1, math.floor(stroke / size + 1e-9) + 1):
         for unknown, height in whole.items():
             if height <= end + near:
                 solid.fixed[unknown] = 0.0
             else:
                 solid.fixed.pop(unknown, None)
-        solid.solve()
-        strokes.append(way)
+        tip = middle[np.abs(z[middle] - end) < near]
+        for _ in range(RISES):
+            risen = float(solid.u[tip, 2].mean())
+            wedge.height = end + risen + lead
+            solid.solve()
+            if abs(float(solid.u[tip, 2].mean()) - risen) < SETTLED * size:
+                break
+        else:
+            raise EquilibriumError("finite elements: the end of the slit and the edge do not settle; use more cells")
+        strokes.append(h - wedge.height)
+        rises.append(risen)
         forces.append(-4 * float(blade.force(solid.nodes + solid.u)[:, 2].sum()))
-    return Opening(np.array(strokes), np.array(forces), solid.u.size)
+    return Opening(np.array(strokes), np.array(forces), np.array(rises), solid.u.size)

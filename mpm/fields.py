@@ -27,7 +27,7 @@ FAR = 1 << 20  # a node that no grid has
 BESIDE = 3  # cells on either side of the cut plane whose nodes may carry both halves
 REGISTER = 32  # bytes of a register of a CPU: as many particles as fill it have their elastic stress found at once
 CPU_BLOCK = 512  # Taichi runs CPU loops shorter than this on one thread, so one iteration in 512 works for a thread
-CRACK_LEAD = 0.25  # cells by which the split of the nodes lags the crack it makes; see Fields.split
+CRACK_LEAD = 0.5  # cells by which the split of the nodes lags the crack it makes; see Fields.split
 
 
 @ti.data_oriented
@@ -296,10 +296,12 @@ class Fields:
         - The crack leads the edge by half a process zone, the equivalent elastic crack of Irwin: food opens ahead of
           the edge, as far on any grid. Held at the edge itself, the force of the wedge grows without end as the cells
           shrink (0.31, 0.35, 0.37 J for dx = 3, 2, 1.5 mm against 0.321, 0.320, 0.315 J so).
-        - The nodes part early, so the front is held a quarter of a cell higher. A crack that is loaded far away wants
-          half a cell (0.2 either way over offsets and cell sizes, tests/mpm/test_split.py); the force of a wedge close
-          behind its front varies less with a quarter (stiff food without friction, dx = 4, 3, 2, 1.5 mm: 4.4, 4.3, 4.2, 4.3 N)
-          than with a half (4.9, 4.6, 4.5, 4.5 N).
+        - The nodes part early, so the front is held half a cell higher: then a crack that is loaded far away is as long as
+          it should be, to 0.2 cells over offsets and cell sizes (tests/mpm/test_split.py), and a wedge in a slit needs the
+          force that finite elements need, to 3 %: 0.175, 0.174, 0.175, 0.175 and 0.175 N on 3, 2.5, 2, 1.5 and 1 mm where they
+          need 0.179 N (calib/verification/cuts.py). That is with the blade on a plane of nodes, where every scene has it whose
+          grid is not turned. Between two planes the food near the front opens less: 0.195, 0.189, 0.185, 0.181 N on 3, 2,
+          1.5 and 1 mm.
 
         All particles have the same front, so the nodes part row by row. That is a ripple with the period of a cell,
         which the moving mean over one cell takes out (ForceRecord.resolved_face). Spreading the fronts of the particles

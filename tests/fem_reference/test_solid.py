@@ -12,7 +12,7 @@ from fem_reference import meshes
 from fem_reference.contact import Contact, Plane, Wedge
 from fem_reference.laws import Corotated, NeoHookean
 from fem_reference.press import press
-from fem_reference.slit import cleave
+from fem_reference.slit import Opening, cleave
 from fem_reference.solid import EquilibriumError, Solid
 from mpm.material import Material
 from mpm.scene import Knife
@@ -168,12 +168,31 @@ def test_a_blade_in_a_slit():
     """The force on its faces is proportional to the stiffness, grows with its thickness, and comes near on finer elements."""
     block, lead, stroke = Shape("block", 0.024, 0.016, 0.018), 3e-3, 6e-3
 
-    def force(E: float = 1e6, spine: float = 2e-3, cells: int = 2) -> np.ndarray:
+    def opening(E: float = 1e6, spine: float = 2e-3, cells: int = 2) -> Opening:
         knife = Knife("blade", spine, math.radians(11.0), 0.02, 0.2)
-        return cleave(block, Material(E=E, nu=0.35, rho=1000.0), knife, lead, stroke, cells=cells).force
+        return cleave(block, Material(E=E, nu=0.35, rho=1000.0), knife, lead, stroke, cells=cells)
 
-    once = force()
-    assert len(once) == 4 and (once > 0).all()
-    np.testing.assert_allclose(force(E=2e6), 2 * once, rtol=1e-4)
-    assert force(spine=1e-3)[-1] < 0.9 * once[-1]
-    assert force(cells=3)[-1] == pytest.approx(once[-1], rel=0.1)
+    once = opening()
+    assert len(once.force) == 4 and (once.force > 0).all()
+    np.testing.assert_allclose(opening(E=2e6).force, 2 * once.force, rtol=1e-4)
+    assert opening(spine=1e-3).force[-1] < 0.9 * once.force[-1]
+    assert opening(cells=3).force[-1] == pytest.approx(once.force[-1], rel=0.1)
+    # the halves turn outwards about the lower edges, so the middle rises, and the edge is where the slit's end leaves it
+    assert (np.diff(once.rise) > 0).all() and once.rise[0] > 0
+    np.testing.assert_allclose(once.stroke + once.rise, lead / 2 * np.arange(1, 5), rtol=1e-2)
+
+
+def test_a_block_in_a_slit_is_held_by_nothing_but_blade_and_floor(monkeypatch):
+    """Blade and floor are in balance, and the floor only pushes."""
+    solids = []
+    monkeypatch.setattr("fem_reference.slit.Solid", lambda *a: solids.append(Solid(*a)) or solids[0])
+    block = Shape("block", 0.024, 0.016, 0.018)
+    found = cleave(block, FOOD, Knife("blade", 2e-3, math.radians(11.0), 0.02, 0.2), 3e-3, 6e-3)
+    (solid,) = solids
+    _, floor = solid.contacts
+    outer = np.flatnonzero((solid.nodes[:, 1] > 0.008 - 1e-9) & (solid.nodes[:, 2] < 1e-9))
+    corner = solid.reaction(outer)[2]  # of what holds the outer edge and of the floor under it
+    inner = ~np.isin(floor.nodes, outer)
+    rest = floor.force(solid.nodes + solid.u)[inner, 2].sum()
+    assert 4 * (corner + rest) == pytest.approx(found.force[-1], rel=1e-3)
+    assert corner > 0 and rest >= 0
