@@ -43,6 +43,7 @@ class Estimate:
         extrapolated: Richardson's value for an infinitely fine grid, or None.
         change: Difference of the two finest over the finest [-].
         gci: Grid convergence index of the finest, a fraction of its value [-].
+        gci_coarsest: The same index of the coarsest: the way from it to the extrapolated value instead.
         fitted: Value of the least-squares fit for an infinitely fine grid, or None with fewer than four grids.
         fitted_order: Order of that fit [-], or None.
         uncertainty: Numerical uncertainty of the finest at about 95 %, a fraction of its value [-]: of the least-squares
@@ -54,6 +55,7 @@ class Estimate:
     extrapolated: float | None
     change: float
     gci: float
+    gci_coarsest: float
     fitted: float | None
     fitted_order: float | None
     uncertainty: float
@@ -77,19 +79,21 @@ def estimate(h: Sequence[float], values: Sequence[float], repeat_sd: float = 0.0
     noise = COVERAGE * repeat_sd / scale
     if len(phi) == 2:
         gci = float(SAFETY_FACTOR_DOUBT * abs(change) / (cells[1] / cells[0] - 1))
-        return Estimate("two grids", None, None, change, gci, None, None, math.hypot(gci, noise))
+        far = float(gci * cells[1] / cells[0])
+        return Estimate("two grids", None, None, change, gci, far, None, None, math.hypot(gci, noise))
     coarse = phi[1] - phi[2]
     verdict = _verdict(cells, fine, coarse, repeat_sd)
     order = None if verdict == "divergent" else observed_order(cells[:3], phi[:3])
     if verdict == "noise-limited" and order is not None and not ORDERS[0] <= order <= ORDERS[1]:
         order = None  # of the noise, not of the grid
     factor, used = _credible(order)
-    gci = float(factor * abs(change) / ((cells[1] / cells[0]) ** used - 1))
+    limit = float(phi[0] + fine / ((cells[1] / cells[0]) ** used - 1))
+    gci, far = (float(factor * abs(phi[k] - limit) / scale) for k in (0, -1))
     extrapolated = None if order is None else float(phi[0] + fine / ((cells[1] / cells[0]) ** order - 1))
     if len(phi) == 3:
-        return Estimate(verdict, order, extrapolated, change, gci, None, None, math.hypot(gci, noise))
-    limit, p, band = _least_squares(cells, phi)
-    return Estimate(verdict, order, extrapolated, change, gci, limit, p, math.hypot(band / scale, noise))
+        return Estimate(verdict, order, extrapolated, change, gci, far, None, None, math.hypot(gci, noise))
+    fitted, p, band = _least_squares(cells, phi)
+    return Estimate(verdict, order, extrapolated, change, gci, far, fitted, p, math.hypot(band / scale, noise))
 
 
 def observed_order(h: np.ndarray, values: np.ndarray) -> float | None:
@@ -125,11 +129,13 @@ class CurveEstimate:
         gci: Index at each point, over the peak of the finest curve [-], shape (m,).
         u_num: Standard numerical uncertainty of the finest curve, of the grid and of the runs that should agree [unit of
             the curve], shape (m,).
+        u_coarsest: The same of the coarsest curve, shape (m,).
     """
 
     order: float | None
     gci: np.ndarray
     u_num: np.ndarray
+    u_coarsest: np.ndarray
 
 
 def curve_estimate(
@@ -157,9 +163,10 @@ def curve_estimate(
         if 0 < near and _shrinks(cells, near, far):
             order = observed_order(cells[:3], np.array([0.0, near, near + far]))
     factor, used = _credible(order)
-    band = factor * np.abs(rows[0] - rows[1]) / ((cells[1] / cells[0]) ** used - 1)
+    limit = rows[0] + (rows[0] - rows[1]) / ((cells[1] / cells[0]) ** used - 1)
     peak = float(np.abs(rows[0]).max()) or 1.0
-    return CurveEstimate(order, band / peak, np.hypot(band / COVERAGE, repeat_sd))
+    near, far = (factor * np.abs(rows[k] - limit) for k in (0, -1))
+    return CurveEstimate(order, near / peak, *(np.hypot(band / COVERAGE, repeat_sd) for band in (near, far)))
 
 
 def _sorted(h: Sequence[float], values: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:

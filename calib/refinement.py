@@ -176,7 +176,10 @@ def _conclude(todo: Sequence[Case], results: Sequence[Evaluation], out: Path) ->
     curves = [filter_simulated(stroke, r.stroke, r.force) for _, r in sound]
     curve = curve_estimate(h, curves, _deviation([filter_simulated(stroke, r.stroke, r.force) for r in same]))
     columns = {f"force_dx_{dx:g}_N": values for dx, values in zip(h, curves, strict=True)}
-    write_csv(out / "curves.csv", {"stroke_m": stroke, **columns, "u_num_N": curve.u_num})
+    write_csv(
+        out / "curves.csv",
+        {"stroke_m": stroke, **columns, "u_num_N": curve.u_num, "u_num_coarsest_N": curve.u_coarsest},
+    )
     peak, work = by_name["peak_N"], by_name["work_J"]
     return {
         "grids": [{"dx_m": c.value, **_row(r)} for c, r in grids],

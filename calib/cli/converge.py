@@ -16,7 +16,8 @@ from calib.scenes import cut_scene, specimen
 HELP = "repeat one cut on finer grids: order, grid convergence index, numerical uncertainty"
 DESCRIPTION = """Repeat one cut on finer grids, and apart from that with other time steps,
 speeds and particles. Writes converge.json, curves.csv (with the standard
-numerical uncertainty u_num_N over the stroke) and converge.svg to --out."""
+numerical uncertainty over the stroke, u_num_N of the finest grid and
+u_num_coarsest_N of the coarsest) and converge.svg to --out."""
 EPILOG = """examples:
   cutcal converge --food banana
   cutcal converge --food potato --material runs/potato/material.yaml --knife edc \\
@@ -26,7 +27,7 @@ Ctrl-C keeps what was computed; the same command with --resume goes on.
 Exit codes: 0 converged (work within 2 %, peak within 3 % between the two finest
 grids), 1 error in input or run, 2 ran but did not converge."""
 WORDS = {"safety": "time step", "mach": "speed", "ppc": "particles", "offset": "offset", "repeat": "repeats"}
-REFINED = (4 / 3, 1.0, 2 / 3, 0.5)  # default cells over the scene's own one; the first is the process zone
+REFINED = (1.0, 2 / 3, 1 / 2, 1 / 3)  # default cells over the scene's own one, which comes first
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
@@ -36,7 +37,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
         "--dx",
         type=numbers(1e-4, 0.02, "m"),
         metavar="M,M,...",
-        help="cell sizes [m]; four thirds of the food's own one, itself, two thirds and half by default",
+        help="cell sizes [m]; the food's own one, which the other commands use, two thirds, half and a third by default",
     )
     p.add_argument(
         "--safety", type=numbers(0, 0.9, "of the stability limit"), metavar="F,...", help="time steps to try"
@@ -126,8 +127,8 @@ def table(document: dict[str, Any]) -> str:
         e = document[name]
         order = "-" if e["order"] is None else f"{e['order']:.2f}"
         lines.append(
-            f"  {name}: {e['verdict']}, order {order}, {e['change']:+.2%} between the two finest, GCI {e['gci']:.2%}, "
-            f"uncertainty {e['uncertainty']:.2%}"
+            f"  {name}: {e['verdict']}, order {order}, {e['change']:+.2%} between the two finest, uncertainty "
+            f"{e['uncertainty']:.2%}, GCI {e['gci']:.2%}, of the coarsest grid {e['gci_coarsest']:.2%}"
         )
     lines.append(
         f"  curve: GCI {document['gci_curve_median']:.2%} of the peak (median), {document['gci_curve_max']:.2%} (largest)"

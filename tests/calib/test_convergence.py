@@ -40,6 +40,8 @@ def test_exact_power_is_recovered(order):
     assert e.fitted == pytest.approx(5.0, abs=2e-3)
     assert e.fitted_order == pytest.approx(order, abs=0.01)
     assert 1.24 * 0.1 / 5.1 < e.uncertainty < 3.0 * 0.1 / 5.1
+    assert e.gci == pytest.approx(1.25 * 0.1 / 5.1, rel=1e-3)
+    assert e.gci_coarsest == pytest.approx(1.25 * 0.1 * 3.0**order / 5.1, rel=1e-3)
 
 
 @pytest.mark.parametrize("order", [1.0, 1.5, 2.0])
@@ -82,6 +84,7 @@ def test_two_grids_take_the_factor_three():
     e = estimate([1.0, 2.0], [10.0, 10.2])
     assert e.verdict == "two grids"
     assert e.gci == pytest.approx(3 * 0.02)
+    assert e.gci_coarsest == pytest.approx(3 * 0.04)
 
 
 @pytest.mark.parametrize(
@@ -102,6 +105,7 @@ def test_curve_converges_with_one_order():
     assert c.order == pytest.approx(1.5, abs=1e-3)
     truth = np.abs(curves[0] - np.sin(np.pi * s))
     np.testing.assert_allclose(c.u_num, 1.25 * truth / 2, rtol=2e-3, atol=1e-9)
+    np.testing.assert_allclose(c.u_coarsest, 3.0**1.5 * c.u_num, rtol=2e-3, atol=1e-9)
     with pytest.raises(CurveError, match="different lengths"):
         curve_estimate(H[:2], [s, s[1:]])
 
