@@ -9,7 +9,7 @@ from typing import Any
 from calib.pool import Pool
 from calib.provenance import code_key
 from calib.scenes import elsewhere
-from calib.store import TRANSIENT_REASONS, EvaluationStore, content_key
+from calib.store import EvaluationStore, content_key
 from mpm.record import ForceRecord
 from mpm.scene import Scene
 
@@ -60,8 +60,7 @@ def check(scene: Scene, record: ForceRecord, pool: Pool, store: EvaluationStore)
     """
     scenes = [vary(scene) for vary in VARIANTS.values()]
     keys = [content_key(s.as_dict(), {}, code_key()) for s in scenes]
-    found = {k: known for k, key in enumerate(keys) if (known := store.get(key)) is not None}
-    found = {k: known for k, known in found.items() if known.reason not in TRANSIENT_REASONS}
+    found = {k: known for k, key in enumerate(keys) if (known := store.get(key))}
     new = [k for k in range(len(scenes)) if k not in found]
     for result in pool.run([(scenes[k], {}) for k in new]):
         k = new[result.index]

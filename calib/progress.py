@@ -63,6 +63,25 @@ def clock(seconds: float) -> str:
     return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
 
 
+class Countdown:
+    """How long the rest of some work takes, from what its finished part took.
+
+    Args:
+        total: Cost of all of it, in any measure.
+        now: Clock [s].
+    """
+
+    def __init__(self, total: float, now: Callable[[], float] = time.monotonic) -> None:
+        self._total, self._spent, self._now = total, 0.0, now
+        self._began = now()
+
+    def left(self, cost: float) -> str:
+        """The time left, in words, after a part of this cost is done too."""
+        self._spent += cost
+        took = self._now() - self._began
+        return f"about {clock(took * (self._total - self._spent) / self._spent)} left"
+
+
 class ProgressBar:
     """Callback that shows :class:`Progress` on a stream; a context manager that ends the line it rewrites.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,10 +16,10 @@ from calib.filters import filter_simulated
 from calib.objective import Evaluation
 from calib.outputs import prepare, write_csv, write_json
 from calib.pool import Pool
-from calib.progress import clock
+from calib.progress import Countdown
 from calib.provenance import code_key, git_commit, key_of, versions
 from calib.scenes import elsewhere
-from calib.store import TRANSIENT_REASONS, EvaluationStore, Header, content_key
+from calib.store import EvaluationStore, Header, content_key
 from mpm.scene import Scene
 
 AXES = ("safety", "mach", "ppc", "offset", "repeat")
@@ -135,11 +134,12 @@ def _evaluate(
 ) -> list[Evaluation]:
     """Results of all cases in their order; what the store knows is not run again, and the longest runs start first."""
     keys = [content_key(case.scene.as_dict(), {}, code_key()) for case in todo]
-    found = {k: known for k, key in enumerate(keys) if (known := store.get(key)) and _final(known)}
+    found = {k: known for k, key in enumerate(keys) if (known := store.get(key))}
     new = sorted((k for k in range(len(todo)) if k not in found), key=lambda k: -todo[k].cost)
     if found:
         say(f"{len(found)} of {len(todo)} runs are known already")
-    began, total, spent = time.monotonic(), sum(todo[k].cost for k in new), 0.0
+    total = sum(todo[k].cost for k in new)
+    rest = Countdown(total)
     if new:
         say(f"{len(new)} runs; the finest grid costs {max(todo[k].cost for k in new) / total:.0%} of them")
         with Pool(workers, arch) as pool:
@@ -147,16 +147,10 @@ def _evaluate(
                 k = new[result.index]
                 store.append(keys[k], result, todo[k].words)
                 found[k] = result
-                spent += todo[k].cost
-                left = (time.monotonic() - began) * (total - spent) / spent
                 peak, work = (result.scalars.get(name, math.nan) for name in ("peak_N", "work_J"))
                 state = f"peak {peak:.2f} N, work {work:.4f} J" if result.ok else f"broke down ({result.reason})"
-                say(f"{todo[k].words}: {state}; {len(found)} of {len(todo)} runs, about {clock(left)} left")
+                say(f"{todo[k].words}: {state}; {len(found)} of {len(todo)} runs, {rest.left(todo[k].cost)}")
     return [found[k] for k in range(len(todo))]
-
-
-def _final(result: Evaluation) -> bool:
-    return result.reason not in TRANSIENT_REASONS
 
 
 def _conclude(todo: Sequence[Case], results: Sequence[Evaluation], out: Path) -> dict[str, Any]:

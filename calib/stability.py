@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import os
 import threading
-import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -17,9 +16,9 @@ from calib.hazards import SOUND_STEP, Cell
 from calib.objective import Evaluation
 from calib.outputs import prepare, write_json
 from calib.pool import DIED, Pool
-from calib.progress import clock
+from calib.progress import Countdown
 from calib.provenance import code_key, git_commit, key_of, versions
-from calib.store import TRANSIENT_REASONS, EvaluationStore, Header
+from calib.store import EvaluationStore, Header
 
 REASONS = {
     "not_finite": "a force, energy or position is no number",
@@ -85,14 +84,14 @@ def evaluate(
     """Results of all cells in their order, None for a refused one; what the store knows is not run again."""
     code = _code()
     keys = [key_of([one.key, code]) if one.scene is not None else "" for one in cells]
-    found = {key: known for key in keys if key and (known := store.get(key)) and known.reason not in TRANSIENT_REASONS}
+    found = {key: known for key in keys if key and (known := store.get(key))}
     new = list({key: k for k, key in enumerate(keys) if key and key not in found}.values())
     new.sort(key=lambda k: _order(cells[k]))
     runs = len(found) + len(new)
     if found:
         say(f"{len(found)} of {runs} runs are known already")
     costs = {k: GUESS + cells[k].cost / RATE for k in new}
-    began, total, spent = time.monotonic(), sum(costs.values()), 0.0
+    rest = Countdown(sum(costs.values()))
     if new:
         say(f"{len(new)} runs; {sum(not key for key in keys)} cells are refused without one")
         with Pool(workers, arch) as pool:
@@ -101,10 +100,8 @@ def evaluate(
                 done = evaluation(result)
                 store.append(keys[k], done, cells[k].family)
                 found[keys[k]] = done
-                spent += costs[k]
-                left = (time.monotonic() - began) * (total - spent) / spent
                 state = "stable" if done.ok else f"{done.reason} at {done.fraction:.0%}"
-                say(f"{cells[k].words}: {state}; {len(found)} of {runs} runs, about {clock(left)} left")
+                say(f"{cells[k].words}: {state}; {len(found)} of {runs} runs, {rest.left(costs[k])}")
     return [found[key] if key else None for key in keys]
 
 

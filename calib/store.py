@@ -29,7 +29,7 @@ import hashlib
 import json
 import os
 import zlib
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import TracebackType
@@ -153,9 +153,12 @@ class EvaluationStore:
         self.close()
 
     def get(self, key: str) -> Evaluation | None:
-        """The run with this content key, or None."""
+        """The run with this content key; None where there is none, or where it may come out otherwise the next time."""
         record = self._records.get(key)
-        return None if record is None else record.evaluation
+        if record is None:
+            return None
+        run = record.evaluation
+        return run if run.status in REPEATABLE_STATUS and run.reason not in TRANSIENT_REASONS else None
 
     def append(self, key: str, evaluation: Evaluation, fidelity: str) -> None:
         """Store a run; it is on disk when this returns.  A run with a known key takes the place of that one.
@@ -259,7 +262,6 @@ class CachedEvaluator:
         scene: Everything that determines a simulation besides its parameters, as plain JSON types.
         code: Version of the simulating code.
         fidelity: Label of the resolution.
-        transient: Reasons of failures that are tried again.
     """
 
     def __init__(
@@ -270,11 +272,9 @@ class CachedEvaluator:
         scene: Mapping[str, Any],
         code: str,
         fidelity: str = "fine",
-        transient: Collection[str] = TRANSIENT_REASONS,
     ) -> None:
         self._evaluator, self._store = evaluator, store
         self._scene, self._code, self._fidelity = scene, code, fidelity
-        self._transient = frozenset(transient)
         self.computed = 0
         """Runs that were not in the store."""
 
@@ -284,7 +284,7 @@ class CachedEvaluator:
         new = []
         for index, key in enumerate(keys):
             known = self._store.get(key)
-            if known is not None and self._reusable(known):
+            if known is not None:
                 yield replace(known, index=index)
             else:
                 new.append(index)
@@ -295,9 +295,6 @@ class CachedEvaluator:
             self._store.append(keys[index], evaluation, self._fidelity)
             self.computed += 1
             yield replace(evaluation, index=index)
-
-    def _reusable(self, evaluation: Evaluation) -> bool:
-        return evaluation.status in REPEATABLE_STATUS and evaluation.reason not in self._transient
 
 
 def _write_line(stream: BinaryIO, document: Mapping[str, Any]) -> None:

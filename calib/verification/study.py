@@ -11,7 +11,7 @@ from typing import Any
 from calib.errors import CurveError
 from calib.outputs import prepare, write_json
 from calib.pool import Pool
-from calib.progress import clock
+from calib.progress import Countdown
 from calib.provenance import code_key, git_commit, versions
 from calib.verification.rows import Case, How, cases
 from mpm.errors import CutcalError
@@ -57,7 +57,7 @@ def run(
     document = {**about, **own, "versions": versions(), "git": git_commit()}
     if len(new) < len(todo):
         say(f"{len(todo) - len(new)} of {len(todo)} cases are known already")
-    began, total, spent = time.monotonic(), sum(c.cost for c in new), 0.0
+    rest = Countdown(sum(c.cost for c in new))
     with Pool(min(workers, max(len(new), 1)), how.arch) as pool:
         for k, done in pool.each(_rows, [(c.name, how) for c in new]):
             name = new[k].name
@@ -69,11 +69,8 @@ def run(
             write_json(out / "verify.json", document | _table(todo, found))
             count = sum(not row["passed"] for row in found[name]["rows"])
             state = "broke down" if found[name]["broken"] else f"{count} failed" if count else "passed"
-            spent += new[k].cost
-            left = (time.monotonic() - began) * (total - spent) / spent
-            say(
-                f"{name}: {len(found[name]['rows'])} rows, {state}; {len(found)} of {len(todo)} cases, about {clock(left)} left"
-            )
+            done_now = f"{len(found)} of {len(todo)} cases, {rest.left(new[k].cost)}"
+            say(f"{name}: {len(found[name]['rows'])} rows, {state}; {done_now}")
     document |= _table(todo, found)
     write_json(out / "verify.json", document)
     from reports.verification import write_figure

@@ -7,7 +7,7 @@ import math
 
 import pytest
 
-from calib.progress import Progress, ProgressBar, clock
+from calib.progress import Countdown, Progress, ProgressBar, clock
 
 
 class Terminal(io.StringIO):
@@ -45,6 +45,13 @@ def test_line_tells_count_budget_failures_misfit_and_time() -> None:
 def test_clock(seconds: float, text: str) -> None:
     """Durations are rounded before they are split, so that there is no 0:60."""
     assert clock(seconds) == text
+
+
+def test_countdown_goes_by_cost() -> None:
+    """A quarter of the cost took 30 s, so the rest takes 90 s; half of it done after 40 s, as long again."""
+    times = iter([0.0, 30.0, 40.0])
+    rest = Countdown(8.0, now=lambda: next(times))
+    assert [rest.left(2.0), rest.left(2.0)] == ["about 1:30 left", "about 0:40 left"]
 
 
 def test_terminal_line_is_rewritten() -> None:
