@@ -72,9 +72,7 @@ class Trial(Simulation):
         n, volume = self.scene.numerics, self.images * len(self.seeds.x) * self.seeds.volume
         return record, audit(
             record,
-            gravity=n.gravity,
             precision=n.precision,
-            lagging=n.contact != "nodal",
             stored=self.stored,
             least=ROUNDING * self.scene.food.material.E * volume,
         )

@@ -17,6 +17,7 @@ NRMSE_LIMIT = 0.08
 SHAPE_LIMIT = 0.08
 MOMENTUM_LIMIT = 0.01
 CHANGE_LIMIT = 0.05  # of peak and work by numerical choices: as much as the peak may miss the trace
+LOSS_LIMIT = 0.05  # energy that no law has taken, of all work: the force is too large by about that
 KINETIC_LIMIT = 0.10  # explicit quasi-static practice: kinetic energy below 5 to 10 % of internal energy
 # Ends of what is physically possible: a fit that ends there found a one-sided answer (the cut shows no friction, say),
 # whereas one that ends on a bound of ours asks for a value that it was not allowed.
@@ -52,12 +53,41 @@ def _change(check: Check) -> Verdict:
     return Verdict(check.name, change, CHANGE_LIMIT, "fraction", change <= CHANGE_LIMIT, note)
 
 
+SPENT = {
+    "parting": "parting the food",
+    "friction": "friction",
+    "plastic": "flow",
+    "damage": "damage",
+    "viscous": "loss factor",
+    "elastic": "elastic",
+    "kinetic": "kinetic",
+}
+"""Where the work of a cut goes, in words."""
+LEAST = 0.005  # part of the work that is named
+
+
+def spent(energy: Mapping[str, float]) -> str:
+    """Where the work of a cut has gone, in words, largest first; what is less than half a per cent is left out."""
+    total = sum(energy.values())
+    parts = {words: energy[name] / total for name, words in SPENT.items()} if total > 0 else {}
+    large = sorted((part, words) for words, part in parts.items() if part >= LEAST)
+    return ", ".join(f"{words} {part:.0%}" for part, words in reversed(large))
+
+
+def _loss(energy: Mapping[str, float]) -> Verdict:
+    name, total = "energy lost by the discretisation", sum(energy.values())
+    if not total > 0:
+        return Verdict(name, None, LOSS_LIMIT, "fraction", False, "the knife did no work")
+    return _below(name, energy["numerical"] / total, LOSS_LIMIT, note="of the work; " + spent(energy))
+
+
 def judge(
     metrics: Metrics,
     nulls: Mapping[str, Metrics],
     *,
     momentum_residual: float,
     ke_over_ie: float,
+    energy: Mapping[str, float],
     parameters: Mapping[str, Mapping[str, Any]],
     checks: Sequence[Check] = (),
 ) -> list[Verdict]:
@@ -68,6 +98,7 @@ def judge(
         nulls: Null models against trace.
         momentum_residual: Momentum balance that does not close, part of the peak [-].
         ke_over_ie: Kinetic over internal energy [-].
+        energy: Where the work of the cut has gone [J], by the names of :data:`mpm.record.ENERGIES`.
         parameters: Fitted parameters with their verdicts.
         checks: What numerical choices change; none were made where the fit was interrupted.
 
@@ -93,6 +124,7 @@ def judge(
     )
     lines.append(_below("momentum balance residual", momentum_residual, MOMENTUM_LIMIT, note="part of the peak force"))
     lines.append(_below("kinetic over internal energy", ke_over_ie, KINETIC_LIMIT))
+    lines.append(_loss(energy))
     lines += [_change(c) for c in checks]
     on = [n for n, p in parameters.items() if p["verdict"] == "at_bound"]
     stuck = [n for n in on if n != SIZE and parameters[n]["value"] != NATURAL_LIMITS.get(n)]

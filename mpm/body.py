@@ -40,6 +40,7 @@ class FreeBody:
         time: Time since the beginning [s].
         mass: Mass of a particle [kg].
         impulse: Impulse on the board so far [N s], shape (3,).
+        friction: Energy that friction has taken so far [J].
     """
 
     def __init__(
@@ -71,7 +72,7 @@ class FreeBody:
             self._k.set_gradient(slope(self.start))
         self.dt, self.time = self._simulation._time_step(material), 0.0
         self.mass = material.rho * self._simulation.seeds.volume
-        self.impulse = np.zeros(3)
+        self.impulse, self.friction = np.zeros(3), 0.0
         self._state = np.zeros(kn.N_STATE)
 
     @property
@@ -131,6 +132,7 @@ class FreeBody:
             sums, self._state, _ = np.split(row, (kn.N_SUMS, kn.N_SUMS + kn.N_STATE))
             self.time += n * span
             self.impulse += sums[kn.BOARD : kn.BOARD + 3]
+            self.friction += float(sums[kn.RUBBED])
             reason = _health(sums, self._state)
             if reason != "done":
                 raise SimulationError(

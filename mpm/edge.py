@@ -14,6 +14,7 @@ from mpm.fields import (
     OX,
     OY,
     OZ,
+    PARTED,
     R_FLESH,
     R_START,
     SLIP,
@@ -146,6 +147,7 @@ class Edge(Nodes):
                 impulse = ti.Vector([along, -down]) * width / c * over * dt
                 self.push[i] = impulse / mass
                 self.tool(EDGE, -self.images_x(i) * ti.Vector([impulse[0], 0.0, impulse[1]]))
+                self.sums[PARTED] += self.images_x(i) * (impulse[0] * slide - impulse[1] * fall) / dt
             else:
                 self.slip[i] = ti.Vector.zero(float, 2)
                 if self.front[i] < 1e2:  # the blade has gone: the front stays in the material

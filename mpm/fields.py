@@ -13,8 +13,8 @@ DX, INV, OX, OY, OZ, FIRST = range(34, 40)
 N_PARAMETERS = 40
 # Rows of the accumulator table, cleared by the host at each output interval.
 EDGE, FACE, BOARD = 0, 3, 6
-PLASTIC, DAMAGE, VISCOUS, INVERTED, OUTSIDE = 9, 10, 11, 12, 13
-N_SUMS = 14
+PLASTIC, DAMAGE, VISCOUS, INVERTED, OUTSIDE, RUBBED, PARTED = range(9, 16)
+N_SUMS = 16
 # Rows of the tool's pose: height of the edge in the middle of the blade, its middle along the blade, their velocities,
 # the height that is commanded, the vertical impulse booked before this step.
 Z, S, VZ, VS, COMMAND, BOOKED = range(6)
@@ -82,7 +82,8 @@ class Fields:
         self.foot = ti.field(real, n)
         # reference volume between a particle of the first layer and the board, and the tool; 0 behind the first layer
         self.shell = ti.Vector.field(2, real, n)
-        # moment of the contact's last impulse as a gradient of the velocity: upwards, and across the blade
+        # moment of the contact's last impulse as a gradient of the velocity: upwards, and across the blade; the fourth
+        # entry upwards is the kinetic energy per mass that this impulse gave
         self.lever = vec4.field(shape=(room, 2))
         self.kappa, self.strain = (ti.field(real, room if damage else 1) for _ in range(2))
         self.stick = vec3.field(shape=(2, n))  # board, blade

@@ -24,6 +24,7 @@ from mpm.fields import (
     MASS,
     PLASTIC,
     RADIUS,
+    RUBBED,
     SIN,
     SPINE,
     TACK,
@@ -171,9 +172,11 @@ class Kernels(Survey):
         wide += arm[1] * push
         scale = 4 * self.par[INV] * self.par[INV]
         high, wide = self.grid_axes(high), self.grid_axes(wide)
-        self.lever[p, 0] = scale * ti.Vector([high[0], high[1], high[2], 0.0])
+        new = v + kick + push
+        gift = 0.5 * (new.norm_sqr() - v.norm_sqr())
+        self.lever[p, 0] = ti.Vector([scale * high[0], scale * high[1], scale * high[2], gift])
         self.lever[p, 1] = scale * ti.Vector([wide[0], wide[1], wide[2], 0.0])
-        return self.grid_axes(v + kick + push)
+        return self.grid_axes(new)
 
     @ti.func
     def traction(self, p, shell, depth, n, dt):
@@ -203,6 +206,7 @@ class Kernels(Survey):
             self.stick[0, p] = own - hold
             dv = CONTACT / dt * ti.Vector([hold[0], hold[1], force])
             self.tool(BOARD, -m * dv)
+            self.sums[RUBBED] -= m / dt * dv.dot(slide)
         else:
             self.stick[0, p] = ti.Vector.zero(float, 3)
         return dv
@@ -241,11 +245,13 @@ class Kernels(Survey):
                 arm = -self.gap[p] * n
                 tool = ti.Vector([ti.cast(self.pose[VS], float), 0.0, ti.cast(self.pose[VZ], float)])
                 rel = u + arm[2] * up + arm[1] * across - tool
+                slide = rel - rel.dot(n) * n
                 stick = self.stick[1, p] - self.stick[1, p].dot(n) * n
-                hold = stick_slip(stick, dt * (rel - rel.dot(n) * n), own, press, self.par[FRICTION])
+                hold = stick_slip(stick, dt * slide, own, press, self.par[FRICTION])
                 self.stick[1, p] = own - hold
                 dv = CONTACT / dt * (force * n + hold)
                 self.tool(FACE, -m * dv)
+                self.sums[RUBBED] -= m * dv.dot(slide if force > 0 else rel)
         if not touching:
             self.stick[1, p] = ti.Vector.zero(float, 3)
         return dv, arm
@@ -267,11 +273,13 @@ class Kernels(Survey):
         if force > 0:
             tool = ti.Vector([ti.cast(self.pose[VS], float), 0.0, ti.cast(self.pose[VZ], float)])
             stick = self.stick[1, p] - self.stick[1, p].dot(n) * n
-            rel = u - tool
-            hold = stick_slip(stick, dt * (rel - rel.dot(n) * n), own, force, self.par[FRICTION])
+            slide = u - tool
+            slide -= slide.dot(n) * n
+            hold = stick_slip(stick, dt * slide, own, force, self.par[FRICTION])
             self.stick[1, p] = own - hold
             dv = CONTACT / dt * (force * n + hold)
             self.tool(FACE, -m * dv)
+            self.sums[RUBBED] -= m * dv.dot(slide)
         else:
             self.stick[1, p] = ti.Vector.zero(float, 3)
         return dv

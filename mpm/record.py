@@ -9,6 +9,9 @@ import numpy as np
 
 from mpm.topology import Topology
 
+ENERGIES = ("kinetic", "elastic", "plastic", "damage", "viscous", "friction", "parting", "numerical")
+"""Where the work of knife and gravity has gone, each a column of a record; together they are that work."""
+
 
 @dataclass(frozen=True)
 class ForceRecord:
@@ -27,11 +30,16 @@ class ForceRecord:
         gravity: Weight [N], shape (n, 3).
         momentum: Momentum of the food at the end of each interval [N s], shape (n, 3).
         residual: Momentum balance that does not close [N], shape (n, 3).
-        kinetic: Kinetic energy [J], shape (n,).
+        kinetic: Kinetic energy of the motion, without what contact gave in the last step [J], shape (n,).
         elastic: Elastic energy [J], shape (n,).
         plastic: Energy dissipated by J2 flow so far [J], shape (n,).
         damage: Energy dissipated by bulk damage so far [J], shape (n,).
         viscous: Energy dissipated by the loss factor so far [J], shape (n,).
+        friction: Energy that friction, and faces that stick, have taken so far [J], shape (n,); of particles that touch, so
+            that of the ``nodal`` contact is not in it.
+        parting: Energy that the cutting edge has taken so far [J], shape (n,): the new surface, and the start of the cut.
+        mass: Mass of the food, mirror images included [kg].
+        lagging: Whether contact acts on particles after they were moved: all but ``nodal`` contact.
         cell: Cell size [m].
         speed: Simulated blade speed [m/s].
         dt: Time step [s].
@@ -62,6 +70,10 @@ class ForceRecord:
     plastic: np.ndarray
     damage: np.ndarray
     viscous: np.ndarray
+    friction: np.ndarray
+    parting: np.ndarray
+    mass: float
+    lagging: bool
     cell: float
     speed: float
     dt: float
@@ -123,6 +135,35 @@ class ForceRecord:
         return np.cumsum(down - self.knife[:, 0] * np.diff(self.slide, prepend=0.0))
 
     @property
+    def numerical(self) -> np.ndarray:
+        """Energy that nothing physical has taken [J], shape (n,): work of the knife and of gravity less all that is booked.
+
+        The transfers between particles and grid smooth the velocities and the contact stops what approaches it, and both
+        cost energy. It is no part of the force balance, but where it is large the food is stiffer or tougher than its laws.
+        """
+        booked = self.kinetic + self.elastic + self.plastic + self.damage + self.viscous + self.friction + self.parting
+        return self.work_done + self.weighing - booked
+
+    @property
+    def budget(self) -> dict[str, float]:
+        """Where the work has gone by the end [J], by the names of :data:`ENERGIES`."""
+        return {name: float(getattr(self, name)[-1]) if len(self.stroke) else 0.0 for name in ENERGIES}
+
+    @property
+    def weighing(self) -> np.ndarray:
+        """Work of gravity so far [J], shape (n,).
+
+        The momentum of a record is that which the next transfer gets; with contact of particles it is ahead of the motion
+        by the impulse of one step.
+        """
+        span = np.diff(self.time, prepend=0.0)
+        p = self.momentum[:, 2]
+        moved = np.cumsum((p + np.concatenate([[0.0], p[:-1]])) / 2 * span)
+        if self.lagging:
+            moved += self.dt * np.cumsum((self.face + self.board)[:, 2] * span)
+        return self.gravity[:, 2] / self.mass * moved
+
+    @property
     def momentum_residual(self) -> float:
         """Largest part of the momentum balance that does not close, over the peak force [-]."""
         return float(np.abs(self.residual).max() / self.peak) if self.peak > 0 else 0.0
@@ -143,7 +184,7 @@ class ForceRecord:
             values = getattr(self, name)
             out |= {f"{name}_f{axis}_N": values[:, k] for k, axis in enumerate("xyz")}
         out |= {f"balance_{axis}_N": self.residual[:, k] for k, axis in enumerate("xyz")}
-        for name in ("kinetic", "elastic", "plastic", "damage", "viscous"):
+        for name in ENERGIES:
             out[f"{name}_J"] = getattr(self, name)
         return out
 
@@ -162,6 +203,7 @@ class ForceRecord:
             "dt_s": self.dt,
             "speed_m_s": self.speed,
             "wall_s": self.wall,
+            "energy_J": self.budget,
             "severed": self.severed,
             "components": len(self.pieces.volumes) if self.pieces is not None else None,
             "volumes_m3": list(self.pieces.volumes) if self.pieces is not None else None,

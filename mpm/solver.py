@@ -313,7 +313,7 @@ class Simulation:
         weight = np.array([0.0, 0.0, -material.rho * self.seeds.volume * len(self.seeds.x) * self.images * gravity])
         residual = (momentum - last) / span - weight + edge + face + board
         lost = [self.images * self.seeds.volume * sums[r] for r in (kn.PLASTIC, kn.DAMAGE, kn.VISCOUS)]
-        energy = [state[3] * self.images, state[4] * self.images, *lost]
+        energy = [state[3] * self.images, state[4] * self.images, *lost, sums[kn.RUBBED], sums[kn.PARTED]]
         return [list(momentum), list(edge), list(face), list(board), list(weight), list(residual), energy]
 
     def _topology(self) -> Any:
@@ -344,7 +344,7 @@ class Simulation:
         a = np.array(rows)
         parts = {n: a[:, 4 + 3 * k : 7 + 3 * k] for k, n in enumerate(("p", "edge", "face", "board", "g", "res"))}
         kinetic, elastic = a[:, 22], a[:, 23]
-        plastic, damage, viscous = np.cumsum(a[:, 24:27], axis=0).T
+        plastic, damage, viscous, friction, parting = np.cumsum(a[:, 24:29], axis=0).T
         pieces = self._topology() if status == "done" else None
         area = section_area(self.scene.food.shape)
         return ForceRecord(
@@ -363,6 +363,10 @@ class Simulation:
             plastic=plastic,
             damage=damage,
             viscous=viscous,
+            friction=friction,
+            parting=parting,
+            mass=material.rho * self.seeds.volume * len(self.seeds.x) * self.images,
+            lagging=self.scene.numerics.contact != "nodal",
             cell=self.scene.numerics.dx,
             speed=speed,
             dt=dt,

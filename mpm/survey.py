@@ -15,7 +15,11 @@ class Survey(Stress):
 
     @ti.func
     def measured(self, p):
-        """Momentum (3), kinetic and elastic energy of a particle [N s, J]."""
+        """Momentum (3), kinetic and elastic energy of a particle [N s, J].
+
+        The kinetic energy is that of the motion, without what contact has just given, as the stress that will balance it has
+        not acted yet: food at rest on a board would else have the energy of the fall that the board stops in every step.
+        """
         m, u = self.par[MASS], self.v[p]
         spin = self.C[p, 0].norm_sqr() + self.C[p, 1].norm_sqr() + self.C[p, 2].norm_sqr()
         f = self.deformation_of(p)
@@ -36,7 +40,7 @@ class Survey(Stress):
                 stored += self.memory[b, p].norm_sqr() / (4 * self.par[MU] * self.share_of[b])
             dev = held * dev + stored
         keep = 1.0 - d
-        kinetic = 0.5 * m * (u.norm_sqr() + 0.25 * self.par[DX] * self.par[DX] * spin)
+        kinetic = m * (0.5 * u.norm_sqr() - self.lever[p, 0][3] + 0.125 * self.par[DX] * self.par[DX] * spin)
         energy = self.par[VOL] * (keep * dev + (keep if j > 1 else 1.0) * vol)
         return ti.Vector([m * u[0], m * u[1], m * u[2], kinetic, energy])
 

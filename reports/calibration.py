@@ -16,6 +16,7 @@ import numpy as np
 from calib.errors import CurveError
 from calib.metrics import compare
 from calib.properties import PROPERTIES
+from calib.verdicts import spent
 from reports import figures
 from reports.document import breakable, count, duration, interval, listed, plain, publish, quantity, uncertain
 from reports.finished import Data, Finished, read_finished
@@ -350,10 +351,19 @@ def _numerics(s: Data) -> Data:
         "mach": quantity(s["mach"], "-"), "momentum": quantity(s["momentum_residual"], "fraction"),
         "kinetic": quantity(s["ke_over_ie"], "fraction"), "ripple": quantity(ripple, "N"),
         "ripple_part": quantity(part, "fraction", digits=2), "wall": duration(s["wall_s"]),
+        **_energy(s.get("energy_J") or {}),
         "simulations": count(s["simulations"]), "failed": count(s["failed_simulations"]),
         "coarse": count(s["coarse_simulations"]) if s.get("coarse_simulations") else None,
         "counters": s.get("counters"),
     }  # fmt: skip
+
+
+def _energy(energy: Data) -> Data:
+    """Part of the work that no law has taken, and where the rest has gone; None where it was not recorded."""
+    total = sum(energy.values())
+    if not total > 0.0:
+        return {"loss": None, "spent": None}
+    return {"loss": quantity(energy["numerical"] / total, "fraction", digits=2), "spent": spent(energy)}
 
 
 def _failures(failures: list[Data]) -> list[list[str]]:

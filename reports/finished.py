@@ -62,6 +62,7 @@ EXTRA: Data = {
     "baseline_window_s": [_NUM],
     "end_sd_s": _OPT,
     "counters": {"*": (int,)},
+    "energy_J": {"*": _NUM},
     "coarse_simulations": (int,),
 }
 

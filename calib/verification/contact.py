@@ -40,10 +40,14 @@ def resting(how: How) -> Iterator[Row]:
     slide.step(math.ceil(6 * period / slide.dt))
     slide.kick(np.array([v0, 0.0, 0.0]))
     slide.step(math.ceil(2 * period / slide.dt))
-    t0, u0 = slide.time, slide.v[:, 0].mean()
+    t0, u0, x0, rubbed = slide.time, slide.v[:, 0].mean(), slide.x[:, 0].mean(), slide.friction
     slide.step(math.ceil(0.5 * v0 / (mu * G) / slide.dt))
     slowed = (slide.v[:, 0].mean() - u0) / (slide.time - t0)
     yield Row("block slides on the board", "acceleration [m/s^2]", -mu * G, float(slowed), 0.02, "Coulomb: mu g")
+    work, way = slide.friction - rubbed, float(slide.x[:, 0].mean() - x0)
+    yield Row(
+        "block slides on the board", "energy of friction [J]", mu * weight * way, work, 0.03, "mu m g times the way"
+    )
 
 
 def bouncing(how: How) -> Iterator[Row]:

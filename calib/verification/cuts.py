@@ -68,6 +68,14 @@ def resistance(how: How) -> Iterator[Row]:
         0.02,
         source,
     )
+    deep = [int(np.searchsorted(base.stroke, at)) for at in (8e-3, 16e-3)]
+    parted, area = float(np.diff(base.parting[deep])[0]), PRISM.width * float(np.diff(base.stroke[deep])[0])
+    yield Row("thin blade", "energy of parting over the new area [J/m^2]", FLESH.R, parted / area, 0.01, "R")
+    energy = base.budget
+    lost = energy["numerical"] / sum(energy.values())
+    yield Row(
+        "thin blade", "energy lost by the discretisation, of the work [-]", 0.0, lost, 0.02, "conservation of energy"
+    )
     balance = float(np.abs(base.residual).max() / base.peak)
     yield Row(
         "thin blade, balance",
@@ -100,6 +108,15 @@ def invariance(how: How) -> Iterator[Row]:
         ("other particles", replace(how, seed=how.seed + 1), {}),
     )
     base = cut(how, knife=WEDGE, material=food)
+    lost = base.budget["numerical"] / sum(base.budget.values())
+    yield Row(
+        "wedge with friction",
+        "energy lost by the discretisation, of the work [-]",
+        0.0,
+        lost,
+        0.04,
+        "conservation of energy",
+    )
     for name, so, change in changes[:1] if how.quick else changes:
         other = cut(so, knife=WEDGE, material=food, **change)
         yield Row(f"wedge, {name}", "work [J]", base.work, other.work, 0.05, "the same cut")

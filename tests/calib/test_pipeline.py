@@ -32,6 +32,7 @@ from calib.study import fit_parameters
 from calib.trace import Trace
 from calib.verdicts import judge, limits
 from mpm.errors import SimulationError
+from mpm.record import ENERGIES
 from mpm.seeding import seed
 from mpm.shapes import SHAPE_KINDS
 
@@ -154,6 +155,7 @@ def test_verdicts_fail_what_fails():
         nulls,
         momentum_residual=0.02,
         ke_over_ie=0.2,
+        energy={**dict.fromkeys(ENERGIES, 0.0), "parting": 0.7, "friction": 0.2, "damage": 0.004, "numerical": 0.096},
         parameters=parameters,
         checks=checks,
     )
@@ -163,12 +165,15 @@ def test_verdicts_fail_what_fails():
         "curve error (NRMSE)",
         "momentum balance residual",
         "kinetic over internal energy",
+        "energy lost by the discretisation",
         "parameters at a bound",
         "slower",
         "broken",
     }
     notes = {v.name: (v.value, v.note) for v in lines}
     assert notes["slower"] == (0.06, "peak +1.0%, work -6.0%")
+    value, words = notes["energy lost by the discretisation"]
+    assert value == pytest.approx(0.096) and words == "of the work; parting the food 70%, friction 20%"
     assert notes["broken"] == (None, "broke down: inverted")
     assert sum(v.passed is None for v in lines) == 3
     bounds = next(v for v in lines if v.name == "parameters at a bound")
