@@ -292,7 +292,7 @@ def _ways(seed: int) -> Iterator[Cell]:
     yield way("whole block", numerics={"mirror": False})
     yield way("turned", numerics={"grid_turn": 0.4})
     yield way("no gravity", numerics={"gravity": 0.0})
-    yield way("one particle a cell", numerics={"ppc": 1})
+    yield way("27 particles a cell", numerics={"ppc": 3})
     yield way("sliced", motion={"slice_ratio": 3.0}, board={"mu": 5.0})
     yield way("sliced, pulled off the board", motion={"slice_ratio": 3.0}, board={"mu": 0.0})
     yield way("tilted", motion={"tilt": 0.2, "stroke": 0.015})
@@ -330,7 +330,7 @@ def _starts(seed: int) -> Iterator[Cell]:
 def _nonsense(seed: int) -> Iterator[Cell]:
     for name, value in (("E", 0.0), ("E", math.nan), ("nu", 0.5), ("rho", -1.0), ("yield_stress", 0.0), ("R", -1.0)):
         yield cell("nonsense", {name: value}, material={name: value}, numerics={"seed": seed})
-    for name, value in (("safety", 0.0), ("safety", math.inf), ("dx", 0.0), ("dx", 6e-3), ("ppc", 0)):
+    for name, value in (("safety", 0.0), ("safety", math.inf), ("dx", 0.0), ("dx", 6e-3), ("ppc", 0), ("ppc", 1)):
         yield cell("nonsense", {name: value}, numerics={"seed": seed, name: value})
     for name, value in (("stroke", 0.03), ("mach", 1.0), ("speed", 0.0)):
         yield cell("nonsense", {name: value}, motion={name: value}, numerics={"seed": seed})

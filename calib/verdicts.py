@@ -168,8 +168,8 @@ def limits(
         "whole fruit is not cut."
     )
     said.append(
-        "The blade lay on a plane of the grid's nodes. Between two planes the same values give other forces, by 10 to 25 % where "
-        "the faces carry most of them (cutcal converge --material --offset 0.5 measures it)."
+        "The blade lay on a plane of the grid's nodes. Between two planes the same values give other work, by 1 % in a stiff food "
+        "with little friction and by 10 to 20 % where a soft one flows or rubs hard (cutcal converge --material --offset 0.5 measures it)."
     )
     said.append(
         "One grid was used; the discretisation error of the calibrated force was not measured in this run "

@@ -169,7 +169,7 @@ class Numerics:
 
     Attributes:
         dx: Cell size [m].
-        ppc: Particles per cell and direction.
+        ppc: Particles per cell and direction, at least 2.
         contact: ``cohesive`` (edge law and particle contact) or ``nodal`` (the plain projection of grid velocities).
         grid_shift: Position of the grid against the scene along x, y, z [cells].
         grid_turn: Angle of food and blade against the grid [rad].
@@ -199,6 +199,11 @@ class Numerics:
         w = "numerics"
         check_number(w, "dx", self.dx, 1e-5, 0.05, "m")
         check_number(w, "ppc", self.ppc, 0.5, 8.5, "")
+        if self.ppc < 2:
+            raise SceneError(
+                "numerics: ppc 1: one particle a cell does not integrate the grid's functions, and where a cut starts energy "
+                "comes from nothing; use 2 (8 particles a cell) or 3"
+            )
         check_number(w, "room", self.room, 0.0, 100.0, "of half the food's size")
         check_number(w, "safety", self.safety, 0.0, 0.9001, "of the stability limit")
         check_number(w, "output", self.output, 0.0, 0.1, "m")

@@ -137,3 +137,10 @@ def test_unknown_kinds_are_refused_with_the_list():
         Numerics(contact="sticky")
     with pytest.raises(SceneError, match="f64"):
         Numerics(precision="f16")
+
+
+def test_one_particle_a_cell_is_refused():
+    """Where a cut starts it makes energy from nothing, a quarter of the work so far; two each way do not."""
+    with pytest.raises(SceneError, match="one particle a cell"):
+        Numerics(ppc=1)
+    assert Numerics(ppc=2).ppc == 2
