@@ -77,20 +77,15 @@ def estimate(h: Sequence[float], values: Sequence[float], repeat_sd: float = 0.0
     fine = phi[0] - phi[1]
     change = float(fine / scale)
     noise = COVERAGE * repeat_sd / scale
-    if len(phi) == 2:
-        gci = float(SAFETY_FACTOR_DOUBT * abs(change) / (cells[1] / cells[0] - 1))
-        far = float(gci * cells[1] / cells[0])
-        return Estimate("two grids", None, None, change, gci, far, None, None, math.hypot(gci, noise))
-    coarse = phi[1] - phi[2]
-    verdict = _verdict(cells, fine, coarse, repeat_sd)
-    order = None if verdict == "divergent" else observed_order(cells[:3], phi[:3])
+    verdict = "two grids" if len(phi) == 2 else _verdict(cells, fine, phi[1] - phi[2], repeat_sd)
+    order = None if verdict in ("two grids", "divergent") else observed_order(cells[:3], phi[:3])
     if verdict == "noise-limited" and order is not None and not ORDERS[0] <= order <= ORDERS[1]:
         order = None  # of the noise, not of the grid
     factor, used = _credible(order)
     limit = float(phi[0] + fine / ((cells[1] / cells[0]) ** used - 1))
     gci, far = (float(factor * abs(phi[k] - limit) / scale) for k in (0, -1))
     extrapolated = None if order is None else float(phi[0] + fine / ((cells[1] / cells[0]) ** order - 1))
-    if len(phi) == 3:
+    if len(phi) < 4:
         return Estimate(verdict, order, extrapolated, change, gci, far, None, None, math.hypot(gci, noise))
     fitted, p, band = _least_squares(cells, phi)
     return Estimate(verdict, order, extrapolated, change, gci, far, fitted, p, math.hypot(band / scale, noise))

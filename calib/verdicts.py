@@ -74,11 +74,17 @@ def spent(energy: Mapping[str, float]) -> str:
     return ", ".join(f"{words} {part:.0%}" for part, words in reversed(large))
 
 
+def lost(energy: Mapping[str, float]) -> float | None:
+    """Part of the work of a cut that no law has taken [-]; None where no work was done."""
+    total = sum(energy.values())
+    return energy["numerical"] / total if total > 0 else None
+
+
 def _loss(energy: Mapping[str, float]) -> Verdict:
-    name, total = "energy lost by the discretisation", sum(energy.values())
-    if not total > 0:
+    name, part = "energy lost by the discretisation", lost(energy)
+    if part is None:
         return Verdict(name, None, LOSS_LIMIT, "fraction", False, "the knife did no work")
-    return _below(name, energy["numerical"] / total, LOSS_LIMIT, note="of the work; " + spent(energy))
+    return _below(name, part, LOSS_LIMIT, note="of the work; " + spent(energy))
 
 
 def judge(

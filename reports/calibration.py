@@ -16,7 +16,7 @@ import numpy as np
 from calib.errors import CurveError
 from calib.metrics import compare
 from calib.properties import PROPERTIES
-from calib.verdicts import spent
+from calib.verdicts import lost, spent
 from reports import figures
 from reports.document import breakable, count, duration, interval, listed, plain, publish, quantity, uncertain
 from reports.finished import Data, Finished, read_finished
@@ -360,10 +360,8 @@ def _numerics(s: Data) -> Data:
 
 def _energy(energy: Data) -> Data:
     """Part of the work that no law has taken, and where the rest has gone; None where it was not recorded."""
-    total = sum(energy.values())
-    if not total > 0.0:
-        return {"loss": None, "spent": None}
-    return {"loss": quantity(energy["numerical"] / total, "fraction", digits=2), "spent": spent(energy)}
+    part = lost(energy)
+    return {"loss": None if part is None else quantity(part, "fraction", digits=2), "spent": spent(energy)}
 
 
 def _failures(failures: list[Data]) -> list[list[str]]:
