@@ -38,7 +38,7 @@ from calib.errors import MaterialError
 from calib.objective import Evaluation, Evaluator, Objective, Trial
 from calib.parameters import ParameterSet
 from calib.progress import Progress
-from calib.uncertainty import CurveProcess, coordinate_unit
+from calib.surrogate import CurveProcess, coordinate_unit
 from mpm.errors import SimulationError
 
 FloatArray = npt.NDArray[np.float64]

@@ -1,8 +1,4 @@
-"""What a fit does not know: of the curve between its runs, and of the parameters at its end.
-
-:class:`CurveProcess` is a Gaussian process through all simulated curves of a fit (Rasmussen & Williams
-(2006), Gaussian Processes for Machine Learning, MIT Press, chapters 2 and 5); it proposes points and gives
-the Jacobian.
+"""What a fit does not know of its parameters.
 
 :func:`uncertainty` gives 95 % intervals from the curvature of chi-square at the optimum, in internal
 coordinates (so those of log parameters are asymmetric in SI), with J_d the rows of the data and J_p those of
@@ -23,32 +19,11 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import cho_factor, cho_solve, eigh
-from scipy.optimize import least_squares, minimize
 
-from calib.objective import LARGEST_DIFFERENCE, Objective, Trial
-from calib.parameters import LINEAR_STEP, Z95, Parameter, ParameterSet
+from calib.parameters import Z95, Parameter, ParameterSet
 
 FloatArray = npt.NDArray[np.float64]
 Verdict = Literal["identified", "weak", "not_seen", "at_bound"]
-
-#: Standard deviations in the process, parts of the peak: what a broken-down and a coarse run say about the
-#: curve of a whole, fine one; the offset common to all coarse curves; the offset of the best curve by its own
-#: noise.
-BROKEN_SD, COARSE_SD, COARSE_OFFSET, OFFSET = 0.3, 0.02, 0.2, 0.05
-#: Log-normal priors (mean, sd) and ranges of the process's hyperparameters: amplitude of its curved and its
-#: linear part and its noise (parts of the peak), and the length scale of each parameter (coordinate units).
-AMPLITUDE_PRIOR = (math.log(0.4), 1.0, math.log(0.08), math.log(2.0))
-LENGTH_PRIOR = (math.log(1.5), 0.7, math.log(0.3), math.log(8.0))
-NOISE_PRIOR = (math.log(0.012), 0.4, math.log(0.004), math.log(0.04))
-
-#: 95 % point of chi-square with 20 degrees of freedom over 20: how much more than its mean the information
-#: that noise feigns along one direction may be in 20 independent points of a curve.
-NOISE_MARGIN = 1.57
-
-#: An expected missing part of the stroke up to this is not held against a point: the process is smooth, the
-#: limit of what can be simulated is not, so that whole runs beside it would be shunned.
-OVERSHOOT = 0.1
 
 #: A parameter is identified when its posterior is narrower than this part of its prior, and not seen when it
 #: is wider than the other: below one half the cut says more than the literature, above 0.9 next to nothing.
@@ -57,165 +32,6 @@ IDENTIFIED, NOT_SEEN = 0.5, 0.9
 ON_BOUND = 0.1
 #: Two parameters that correlate more are only known together.
 TIED = 0.95
-
-
-def coordinate_unit(parameters: ParameterSet) -> FloatArray:
-    """Unit of the internal coordinates (p,): 1 for a log parameter, the prior's 95 % range for another."""
-    return np.array([1.0 if p.log else p.step / LINEAR_STEP for p in parameters])
-
-
-class CurveProcess:
-    """Gaussian process through the smoothed curves of a fit, with the scaling of force by stress built in.
-
-        curve(z) = e^s (c + q g(x)),   x = (z - z_best) / unit
-
-    s is the mean of z - z_best over the stress-like parameters, c and q are the best run's curve and peak; g
-    has mean zero and the covariance :meth:`_kernel`, the same for each point of the curve.  One more output
-    is the part of the stroke that is missing.
-
-    Args:
-        objective: Turns curves into residuals.
-        trials: Runs so far.
-        best: The run about which the process is written.
-        guess: Hyperparameters of an earlier process to start from (p + 3,).
-    """
-
-    def __init__(
-        self, objective: Objective, trials: Sequence[Trial], best: Trial, guess: FloatArray | None = None
-    ) -> None:
-        self.objective, self.best = objective, best
-        law = objective.parameters.stress_like()
-        self._law = law / max(float(law.sum()), 1.0)
-        self.unit = coordinate_unit(objective.parameters)
-        self._peak = float(np.abs(best.curve).max())
-        used = [t for t in trials if t.evaluation.stroke.size > 1]
-        self._x = np.array([(t.z - best.z) / self.unit for t in used])
-        self._coarse = np.array([float(t.coarse) for t in used])
-        self._extra = np.array([t.coarse * COARSE_SD**2 + (not t.ok) * BROKEN_SD**2 for t in used])
-        curves = np.array([t.curve * math.exp(-self._scale(t.z)) for t in used])
-        missing = np.array([0.0 if t.ok else 1.0 - t.evaluation.fraction for t in used])
-        y = np.clip((curves - best.curve) / self._peak, -LARGEST_DIFFERENCE, LARGEST_DIFFERENCE)
-        self.hyper = self._learn(y, guess)
-        self._inverse = cho_solve(cho_factor(self._covariance(self.hyper)), np.eye(len(used)))
-        exact = self._kernel(self._x, self._x, self.hyper) + self.noise**2 * np.eye(len(used))
-        self._weights = np.column_stack([self._inverse @ y, np.linalg.solve(exact, missing)])
-
-    @property
-    def noise(self) -> float:
-        """Standard deviation of one simulated curve about the process, part of the peak [-]."""
-        return math.exp(self.hyper[-1])
-
-    def _scale(self, z: FloatArray) -> float:
-        return float(self._law @ (z - self.best.z))
-
-    def _kernel(self, a: FloatArray, b: FloatArray, h: FloatArray) -> FloatArray:
-        """Covariance (k, l) of g between points (k, p) and (l, p): offset + linear + squared exponential."""
-        gap = ((a[:, None] - b[None]) / np.exp(h[2:-1])) ** 2
-        out: FloatArray = OFFSET**2 + np.exp(2.0 * h[1]) * (a @ b.T) + np.exp(2.0 * h[0] - 0.5 * gap.sum(axis=2))
-        return out
-
-    def _covariance(self, h: FloatArray) -> FloatArray:
-        """Covariance of the runs (m, m) with their noise."""
-        own = self._kernel(self._x, self._x, h) + np.diag(self._extra + math.exp(2.0 * h[-1]))
-        out: FloatArray = own + COARSE_OFFSET**2 * np.outer(self._coarse, self._coarse)
-        return out
-
-    def _learn(self, y: FloatArray, guess: FloatArray | None) -> FloatArray:
-        """Hyperparameters (p + 3,), logarithms, of largest posterior."""
-        priors = [AMPLITUDE_PRIOR, AMPLITUDE_PRIOR, *[LENGTH_PRIOR] * len(self.unit), NOISE_PRIOR]
-        mean, sd, low, high = np.array(priors).T
-        count = self.objective.effective_points
-        gram = y @ y.T * (count / y.shape[1])
-
-        def cost(h: FloatArray) -> tuple[float, FloatArray]:
-            """Minus the logarithm of the posterior, and its gradient (Rasmussen & Williams, eq. 5.9)."""
-            factor = cho_factor(self._covariance(h), lower=True)
-            inverse = cho_solve(factor, np.eye(len(y)))
-            pull = (h - mean) / sd
-            value = 0.5 * float(np.sum(inverse * gram)) + count * float(np.log(np.diag(factor[0])).sum())
-            inner = 0.5 * (count * inverse - inverse @ gram @ inverse)
-            slope = [float(np.sum(inner * d)) for d in self._derivatives(h)]
-            return value + 0.5 * float(pull @ pull), np.array(slope) + pull / sd
-
-        start = mean if guess is None else guess
-        bounds = np.column_stack([low, high])
-        found = minimize(cost, start, jac=True, bounds=bounds, method="L-BFGS-B", options={"maxiter": 15})
-        return np.asarray(found.x)
-
-    def _derivatives(self, h: FloatArray) -> list[FloatArray]:
-        """Derivatives of the covariance of the runs (m, m) by each hyperparameter."""
-        gap = ((self._x[:, None] - self._x[None]) / np.exp(h[2:-1])) ** 2
-        curved = np.exp(2.0 * h[0] - 0.5 * gap.sum(axis=2))
-        linear = math.exp(2.0 * h[1]) * (self._x @ self._x.T)
-        noise = math.exp(2.0 * h[-1]) * np.eye(len(self._x))
-        return [2.0 * curved, 2.0 * linear, *(curved * g for g in np.moveaxis(gap, 2, 0)), 2.0 * noise]
-
-    def predict(self, z: FloatArray) -> tuple[FloatArray, float, float]:
-        """Expected curve [N] (n,), its standard deviation [N] and the completed part of the stroke at z."""
-        x = ((z - self.best.z) / self.unit)[None]
-        k = self._kernel(x, self._x, self.hyper)
-        own = OFFSET**2 + math.exp(2.0 * self.hyper[1]) * float(x[0] @ x[0]) + math.exp(2.0 * self.hyper[0])
-        variance = own - float(k[0] @ self._inverse @ k[0])
-        out = (k @ self._weights)[0]
-        size = math.exp(self._scale(z))
-        curve = size * (self.best.curve + self._peak * out[:-1])
-        sd = size * self._peak * math.sqrt(max(variance, 0.0))
-        return curve, sd, 1.0 - min(max(float(out[-1]) - OVERSHOOT, 0.0), 1.0)
-
-    def residual(self, z: FloatArray) -> FloatArray:
-        """Residual vector (n + 2 + p,) of the expected curve at z."""
-        curve, _, fraction = self.predict(z)
-        return self.objective.residual(curve, fraction, z)
-
-    def doubt(self, z: FloatArray) -> float:
-        """Square root of the chi-square that not knowing the curve adds at z [-]."""
-        return self.predict(z)[1] * math.sqrt(self.objective.effective_points) / self.objective.sigma
-
-    def expected(self, z: FloatArray, caution: float) -> float:
-        """Chi-square at z [-], the part from not knowing the curve weighted by ``caution``."""
-        rows = self._cautious(z, caution)
-        return float(rows @ rows)
-
-    def _cautious(self, z: FloatArray, caution: float) -> FloatArray:
-        curve, sd, fraction = self.predict(z)
-        doubt = sd * math.sqrt(caution * self.objective.effective_points) / self.objective.sigma
-        return np.append(self.objective.residual(curve, fraction, z), doubt)
-
-    def least(self, start: FloatArray, radius: float, caution: float) -> FloatArray:
-        """Point (p,) of least ``expected`` within the bounds and ``radius`` units of the best run."""
-        parameters = self.objective.parameters
-        edge = 1e-9 * self.unit
-        low = np.maximum(parameters.lower, self.best.z - radius * self.unit) - edge
-        high = np.minimum(parameters.upper, self.best.z + radius * self.unit) + edge
-        inside = np.clip(start, low + 0.5 * edge, high - 0.5 * edge)
-        found = least_squares(
-            self._cautious, inside, bounds=(low, high), x_scale=self.unit, max_nfev=15, args=(caution,)
-        )
-        return parameters.clip(np.asarray(found.x))
-
-    def jacobian(self, z: FloatArray) -> FloatArray:
-        """Derivative (n + 2 + p, p) of ``residual`` at z, less what is only the noise of the runs.
-
-        A noisy Jacobian J + D has the information (J + D)^T (J + D), on average J^T J + E[D^T D]: too much,
-        and a parameter without influence looks identified.  E[D^T D] follows from the weights that the
-        process gives to each run; the directions of J are shrunk until J^T J is without it, to zero where
-        there is nothing else.
-        """
-        objective, p = self.objective, len(self.unit)
-        steps = 1e-3 * self.unit
-        moves = np.diag(steps)
-        rows = np.array([self.residual(z + d) - self.residual(z - d) for d in moves]).T / (2.0 * steps)
-        x = np.array([z + d for d in moves] + [z - d for d in moves])
-        k = self._kernel((x - self.best.z) / self.unit, self._x, self.hyper)
-        weights = self._inverse @ ((k[:p] - k[p:]) / (2.0 * steps[:, None])).T
-        noise = (weights.T * (self._extra + self.noise**2)) @ weights
-        per_row = objective.effective_points / objective.sigma**2 + 1.0 / objective.sigma_peak**2
-        noise *= self._peak**2 * per_row
-        data = rows[: objective.data_rows]
-        data[-1] = 0.0  # the penalty of a failure is no measurement
-        ratio, basis = eigh(data.T @ data, noise)
-        kept = np.sqrt(np.maximum(ratio - NOISE_MARGIN, 0.0) / np.maximum(ratio, NOISE_MARGIN))
-        return np.vstack([data @ (basis * kept) @ np.linalg.inv(basis), rows[objective.data_rows :]])
 
 
 @dataclass(frozen=True)
