@@ -60,10 +60,12 @@ class Conditioned:
         stroke_source: ``position``, ``speed`` or ``height``.
         stroke_length_m: Length of the downward stroke after contact [m].
         noise_sd_N: Robust standard deviation of one unfiltered sample before contact [N].
+        curve_noise_sd_N: What of it is left in a point of the filtered curve, its correlation counted [N].
         filter_sd_m: Standard deviation of the Gaussian filter [m].
         peak_N: Maximum of the curve from a parabola through the points around it [N].
         peak_sd_N: Its standard uncertainty from filtered noise and baseline [N].
         drift_N_per_s: Drift of the force in the baseline window [N/s].
+        drift_sd_N_per_s: Its standard uncertainty [N/s].
         warnings: What a reader should know, one sentence each.
     """
 
@@ -81,10 +83,12 @@ class Conditioned:
     stroke_source: str
     stroke_length_m: float
     noise_sd_N: float
+    curve_noise_sd_N: float
     filter_sd_m: float
     peak_N: float
     peak_sd_N: float
     drift_N_per_s: float
+    drift_sd_N_per_s: float
     warnings: tuple[str, ...]
 
     def __post_init__(self) -> None:
@@ -137,7 +141,8 @@ def condition(
     tared = force - contact.baseline.level
     stroke, end, source = _stroke_axis(trace, tared, contact, last, speed, height, warnings)
     grid, curve = _on_grid(trace, stroke, tared, contact.onset, end)
-    peak, peak_sd = _peak(curve, contact, len(tared[(stroke >= 0.0) & (stroke <= grid[-1])]), grid[-1])
+    noise = _filtered_noise(contact, len(tared[(stroke >= 0.0) & (stroke <= grid[-1])]), grid[-1])
+    peak = _peak(curve)
     _check_peak(trace, peak)
     return Conditioned(
         trace=trace,
@@ -154,10 +159,12 @@ def condition(
         stroke_source=source,
         stroke_length_m=float(grid[-1]),
         noise_sd_N=contact.baseline.noise_sd,
+        curve_noise_sd_N=noise,
         filter_sd_m=FILTER_SD_M,
         peak_N=peak,
-        peak_sd_N=peak_sd,
+        peak_sd_N=float(np.hypot(noise, contact.baseline.level_sd)),
         drift_N_per_s=contact.baseline.slope,
+        drift_sd_N_per_s=contact.baseline.slope_sd,
         warnings=tuple(warnings),
     )
 
@@ -334,19 +341,25 @@ def _on_grid(
     return grid, smooth(grid, force[len(lead) :], FILTER_SD_M, before=force[: len(lead)])
 
 
-def _peak(curve: np.ndarray, contact: Contact, samples: int, length: float) -> tuple[float, float]:
-    """Peak by a parabola around the maximum, and its uncertainty from noise and baseline [N]."""
+def _peak(curve: np.ndarray) -> float:
+    """Peak by a parabola around the maximum [N]."""
     i = int(np.argmax(curve))
-    peak = float(curve[i])
     if PEAK_HALF_WIDTH <= i < len(curve) - PEAK_HALF_WIDTH:
         x = np.arange(-PEAK_HALF_WIDTH, PEAK_HALF_WIDTH + 1)
         a, b, c = np.polyfit(x, curve[i + x], 2)
         if a < 0.0 and abs(b / (2.0 * a)) <= PEAK_HALF_WIDTH:
-            peak = float(c - b * b / (4.0 * a))
-    averaged = 2.0 * np.sqrt(np.pi) * FILTER_SD_M * samples / length
+            return float(c - b * b / (4.0 * a))
+    return float(curve[i])
+
+
+def _filtered_noise(contact: Contact, samples: int, length: float) -> float:
+    """Standard deviation of the noise that is left in a point of the filtered curve [N].
+
+    The Gaussian averages 2 sqrt(pi) of its standard deviations' worth of samples.
+    """
     base = contact.baseline
-    noise = base.noise_sd * np.sqrt(min(1.0, base.inflation / max(averaged, 1.0)))
-    return peak, float(np.hypot(noise, base.level_sd))
+    averaged = 2.0 * np.sqrt(np.pi) * FILTER_SD_M * samples / length
+    return float(base.noise_sd * np.sqrt(min(1.0, base.inflation / max(averaged, 1.0))))
 
 
 def _check_peak(trace: Trace, peak: float) -> None:

@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -35,10 +35,11 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import chi2, qmc
 
 from calib.errors import MaterialError
+from calib.joint import JointObjective, residual
 from calib.objective import Evaluation, Evaluator, Objective, Trial
 from calib.parameters import ParameterSet
 from calib.progress import Progress
-from calib.surrogate import CurveProcess, coordinate_unit
+from calib.surrogate import Surrogate, coordinate_unit
 from mpm.errors import SimulationError
 
 FloatArray = npt.NDArray[np.float64]
@@ -153,7 +154,7 @@ class FitResult:
 
 
 def calibrate(
-    objective: Objective,
+    objective: Objective | JointObjective,
     evaluator: Evaluator,
     *,
     coarse: Evaluator | None = None,
@@ -195,7 +196,7 @@ class _Search:
 
     def __init__(
         self,
-        objective: Objective,
+        objective: Objective | JointObjective,
         evaluator: Evaluator,
         coarse: Evaluator | None,
         options: FitOptions,
@@ -207,7 +208,7 @@ class _Search:
         self.trials: list[Trial] = []
         self.random = np.random.default_rng(options.seed)
         self.unit = coordinate_unit(self.parameters)
-        self.hyper: FloatArray | None = None
+        self.hyper: list[FloatArray] | None = None
         self.centre: FloatArray | None = None
         self.strode: list[FloatArray] = []
         self.screening = False
@@ -326,10 +327,12 @@ class _Search:
     def _scaled(self, trial: Trial) -> tuple[float, FloatArray]:
         """Least chi-square that jointly scaled stress-like parameters would give, and the point of it."""
         along = self.parameters.stress_like()
+        curves = [t.curve for t in trial.each]
+        ones = [1.0] * len(curves)
 
         def cost(log_k: float) -> float:
             z = self.parameters.clip(trial.z + log_k * along)
-            rows = self.objective.residual(trial.curve * math.exp(log_k), 1.0, z)
+            rows = residual(self.objective, [math.exp(log_k) * curve for curve in curves], ones, z)
             return float(rows @ rows)
 
         found = minimize_scalar(cost, bounds=(-LARGEST_SCALE, LARGEST_SCALE), method="bounded")
@@ -379,7 +382,7 @@ class _Search:
                 return "converged" if calm >= CALM_ROUNDS else "stalled"
         return "budget"
 
-    def _far(self, process: CurveProcess) -> FloatArray:
+    def _far(self, process: Surrogate) -> FloatArray:
         """The most promising point within the bounds, sought from random points and all runs."""
         low, high = self.parameters.box
         starts = list(self.random.uniform(low, high, (STARTS, len(low)))) + [t.z for t in self.trials]
@@ -387,7 +390,7 @@ class _Search:
         found = [process.least(z, math.inf, CAUTION_FAR) for z in starts[:FOLLOWED]]
         return min(found, key=lambda z: process.expected(z, CAUTION_FAR))
 
-    def _probes(self, process: CurveProcess, near: FloatArray, count: int) -> list[FloatArray]:
+    def _probes(self, process: Surrogate, near: FloatArray, count: int) -> list[FloatArray]:
         """Of points drawn from the posterior about ``near`` the ``count`` least known good ones."""
         if count < 1:
             return []
@@ -399,11 +402,11 @@ class _Search:
         good = cost < max(process.best.misfit, cost.min()) + PROBE_COST
         return [points[i] for i in np.argsort(np.where(good, -doubt, 0.0))[:count]]
 
-    def _process(self) -> CurveProcess:
+    def _process(self) -> Surrogate:
         trials: Sequence[Trial] = self.trials
         if self.screening:  # one evaluator: no offset
-            trials = [replace(t, coarse=False) for t in trials]
-        process = CurveProcess(self.objective, trials, self.best, self.hyper)
+            trials = [t.as_fine() for t in trials]
+        process = Surrogate(self.objective, trials, self.best, self.hyper)
         self.hyper = process.hyper
         return process
 
@@ -456,11 +459,11 @@ class _Search:
         )
 
 
-def _near(process: CurveProcess) -> FloatArray:
+def _near(process: Surrogate) -> FloatArray:
     """Point of least expected chi-square near the best one."""
     return process.least(process.best.z, RADIUS, CAUTION_NEAR)
 
 
-def _promise(process: CurveProcess, z: FloatArray) -> float:
+def _promise(process: Surrogate, z: FloatArray) -> float:
     """Gain in chi-square that the process expects of z over the best point [-]."""
     return process.expected(process.best.z, CAUTION_NEAR) - process.expected(z, CAUTION_NEAR)

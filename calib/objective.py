@@ -7,9 +7,12 @@ Rows of the vector (n grid points, p parameters; all without dimension, one stan
     otherwise outvote n+1        P (1 - fraction)          zero for a run that reached the end of the stroke
     n+2 ..     (z_j - mean_j) / sd_j     literature priors in internal coordinates
 
-    sigma^2  = noise_sd^2 + (discrepancy * max r)^2
+    sigma^2  = noise_sd^2 + (discrepancy * max r)^2 + u_num^2
     s_peak^2 = peak_sd^2 + (peak * max r)^2
     w        = sqrt(n_eff / n),   n_eff = stroke length / correlation length
+
+What the tare, the drift and the lag of the measurement leave open correlates the first n + 1 rows; they are whitened with
+that covariance (:mod:`calib.nuisance`).
 
 A run that broke down gives a vector of the same length: where it computed nothing, its last mean difference
 to the real curve is held.  The vector is finite, continuous in ``fraction``, and passes into that of a
@@ -20,13 +23,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from calib.errors import TraceError
+from calib.nuisance import Nuisance, NuisanceEstimate, Whitening, estimate
 from calib.parameters import ParameterSet
 
 FloatArray = npt.NDArray[np.float64]
@@ -71,6 +76,7 @@ class Evaluation:
         force: Force of the food on the knife, upwards positive [N] (k,).
         scalars: Named results: momentum_residual, ke_over_ie, wall_s, ...
         seconds: Wall time of the run [s].
+        parts: The runs of a joint evaluation, one per trace; empty for a single one.
 
     Raises:
         ValueError: A fraction outside [0, 1], or stroke and force that are not vectors of one length.
@@ -85,6 +91,7 @@ class Evaluation:
     force: FloatArray
     scalars: dict[str, float] = field(default_factory=dict)
     seconds: float = 0.0
+    parts: tuple[Evaluation, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.fraction <= 1.0:
@@ -142,6 +149,7 @@ class Target:
         noise_sd: Standard deviation of the noise of ``curve`` [N].
         peak_sd: Standard deviation of its peak [N].
         smooth: Puts a raw simulated record on given strokes, smoothed like ``curve``.
+        u_num: Numerical standard uncertainty of the simulated curve [N], one for all or (n,).
 
     Raises:
         TraceError: A curve that is not finite, not matching its grid, or without a positive peak.
@@ -152,6 +160,7 @@ class Target:
     noise_sd: float
     peak_sd: float
     smooth: Smoother
+    u_num: float | FloatArray = 0.0
 
     def __post_init__(self) -> None:
         if self.stroke.ndim != 1 or self.stroke.shape != self.curve.shape or self.stroke.size < 2:
@@ -191,6 +200,7 @@ class Trial:
         residual: Its residual vector (n + 2 + p,).
         coarse: Whether it was run at the coarse resolution.
         stage: Why it was run: design, scaled, difference, round or screened.
+        parts: The trial as each trace of a joint objective sees it; empty for a single one.
     """
 
     z: FloatArray
@@ -199,6 +209,16 @@ class Trial:
     residual: FloatArray
     coarse: bool = False
     stage: str = "design"
+    parts: tuple[Trial, ...] = ()
+
+    def as_fine(self) -> Trial:
+        """The same trial, as if its resolution were the one that counts."""
+        return replace(self, coarse=False, parts=tuple(t.as_fine() for t in self.parts))
+
+    @property
+    def each(self) -> tuple[Trial, ...]:
+        """The trial of each trace."""
+        return self.parts or (self,)
 
     @property
     def misfit(self) -> float:
@@ -211,6 +231,21 @@ class Trial:
         return self.evaluation.ok
 
 
+@dataclass(frozen=True, eq=False)
+class Case:
+    """One trace of an objective.
+
+    Attributes:
+        name: Name of the trace; empty where there is only one.
+        objective: Its own objective, over those parameters that its simulation takes.
+        index: Places of those among the parameters of the whole (q,).
+    """
+
+    name: str
+    objective: Objective
+    index: npt.NDArray[np.intp]
+
+
 @dataclass(frozen=True)
 class Objective:
     """Residual vector and chi-square of evaluations against one target, with priors.
@@ -219,16 +254,24 @@ class Objective:
         target: The real curve.
         parameters: The fitted parameters with their priors.
         errors: The error model.
+        nuisances: What the measurement leaves open.
     """
 
     target: Target
     parameters: ParameterSet
     errors: ErrorModel = field(default_factory=ErrorModel)
+    nuisances: tuple[Nuisance, ...] = ()
+
+    @cached_property
+    def sigmas(self) -> FloatArray:
+        """Standard deviation of each point of the curve [N] (n,)."""
+        own = math.hypot(self.target.noise_sd, self.errors.discrepancy * self.target.peak)
+        return np.hypot(own, np.broadcast_to(self.target.u_num, self.target.curve.shape))
 
     @property
     def sigma(self) -> float:
-        """Standard deviation of one point of the curve [N]."""
-        return math.hypot(self.target.noise_sd, self.errors.discrepancy * self.target.peak)
+        """Standard deviation of one point of the curve, root of the mean square [N]."""
+        return float(np.sqrt(np.mean(self.sigmas**2)))
 
     @property
     def sigma_peak(self) -> float:
@@ -283,17 +326,53 @@ class Objective:
         """All rows (n + 2 + p,) of a curve [N] (n,) from a run at ``z`` (p,) that completed ``fraction``."""
         return np.concatenate([self.data_residual(curve, fraction), self.parameters.prior_residual(z)])
 
+    @property
+    def cases(self) -> tuple[Case, ...]:
+        """The one trace, as a joint objective has several."""
+        return (Case("", self, np.arange(len(self.parameters))),)
+
     def trial(self, evaluation: Evaluation, *, coarse: bool = False, stage: str = "design") -> Trial:
         """Curve and residual vector of an evaluation; always finite."""
         z = self.parameters.to_vector(evaluation.parameters)
         curve, fraction = self.curve(evaluation)
         return Trial(z, evaluation, curve, self.residual(curve, fraction, z), coarse, stage)
 
+    def nuisance_estimates(self, curve: FloatArray) -> tuple[NuisanceEstimate, ...]:
+        """What a simulated curve [N] (n,) says of the nuisances, those that the search may not use included."""
+        return estimate(self.nuisances, self._columns(self.nuisances), self._bare(curve))
+
+    def unsearched(self) -> FloatArray:
+        """Residual by one standard deviation of each nuisance that the search may not use (n + 2, k)."""
+        columns = self._columns([n for n in self.nuisances if not n.searched])
+        return np.vstack([self._whiten(columns), np.zeros(columns.shape[1])])
+
+    def curve_residual(self, curve: FloatArray) -> FloatArray:
+        """Rows of the curve alone (n,), not whitened, in standard deviations of a point."""
+        out: FloatArray = (curve - self.target.curve) / self.sigmas
+        return out
+
     def _compare(self, curve: FloatArray) -> FloatArray:
-        """Rows of curve and peak (n + 1,)."""
-        weight = math.sqrt(self.effective_points / curve.size) / self.sigma
+        """Rows of curve and peak (n + 1,), whitened."""
+        return self._whiten(self._bare(curve))
+
+    def _bare(self, curve: FloatArray) -> FloatArray:
+        """Rows of curve and peak (n + 1,), as if the measurement left nothing open."""
         peak = (float(curve.max()) - self.target.peak) / self.sigma_peak
-        return np.append(weight * (curve - self.target.curve), peak)
+        return np.append(self._weights * (curve - self.target.curve), peak)
+
+    @cached_property
+    def _weights(self) -> FloatArray:
+        """One over the standard deviation of each point, correlation counted [1/N] (n,)."""
+        return math.sqrt(self.effective_points / self.target.stroke.size) / self.sigmas
+
+    @cached_property
+    def _whiten(self) -> Whitening:
+        return Whitening(self._columns([n for n in self.nuisances if n.searched]))
+
+    def _columns(self, chosen: Sequence[Nuisance]) -> FloatArray:
+        """Rows of curve and peak by one prior standard deviation of each nuisance (n + 1, k)."""
+        columns = [-n.sd * np.append(self._weights * n.shape, n.peak / self.sigma_peak) for n in chosen]
+        return np.array(columns).reshape(len(columns), self.target.stroke.size + 1).T
 
 
 def _usable(evaluation: Evaluation, target: Target) -> tuple[FloatArray, FloatArray, float]:

@@ -37,6 +37,20 @@ LINEAR_STEP = 0.1
 STRESS_LIKE = ("E", "yield_stress", "R", "R_initiation", "R_skin", "tensile_strength", "fracture_energy")
 
 
+OF = "@"
+"""Between the name of a property and that of the trace which has a value of its own: ``R_skin@cut2``."""
+
+
+def own(name: str, trace: str) -> str:
+    """Name of the parameter that a property is for one trace alone."""
+    return f"{name}{OF}{trace}"
+
+
+def plain(name: str) -> str:
+    """Name of the property that a parameter is."""
+    return name.split(OF)[0]
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One fitted material property.
@@ -239,7 +253,7 @@ class ParameterSet:
 
     def stress_like(self, names: Sequence[str] = STRESS_LIKE) -> FloatArray:
         """Direction (p,) of a joint scaling of the stress-like parameters: 1 for each on a log scale."""
-        return np.array([1.0 if p.log and p.name in names else 0.0 for p in self.items])
+        return np.array([1.0 if p.log and plain(p.name) in names else 0.0 for p in self.items])
 
     def with_values(self, values: Mapping[str, float]) -> ParameterSet:
         """The same parameters with other present values [unit]; names not mentioned keep theirs."""

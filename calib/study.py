@@ -31,7 +31,7 @@ from calib.scenes import cut_scene, height_range, place, specimen
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.summary import add_conditioning, summarise
 from calib.trace import read_trace
-from calib.uncertainty import uncertainty
+from calib.uncertainty import evidence, uncertainty
 from mpm.record import ForceRecord
 
 # Hard bounds reach this factor beyond the literature's range, so that a trace may contradict the literature.
@@ -200,8 +200,7 @@ def _write(
     nulls = null_models(curve.stroke, curve.curve)
     doubt = None
     if result.jacobian is not None:
-        rows = setup.objective.effective_rows
-        doubt = uncertainty(result.parameters, result.jacobian, best.residual, effective_rows=rows)
+        doubt = uncertainty(result.parameters, evidence(setup.objective, best, result.jacobian))
     summary = summarise(request, setup, result, record, metrics, nulls, doubt, checks)
     summary["wall_s"] = wall
     write_csv(out / "curves.csv", _curves(curve, best.curve, record, start, nulls))

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve, eigh
 from scipy.optimize import least_squares, minimize
 
+from calib.joint import JointObjective, residual
 from calib.objective import LARGEST_DIFFERENCE, Objective, Trial
 from calib.parameters import LINEAR_STEP, ParameterSet
 
@@ -33,6 +34,9 @@ NOISE_PRIOR = (math.log(0.012), 0.4, math.log(0.004), math.log(0.04))
 #: that noise feigns along one direction may be in 20 independent points of a curve.
 NOISE_MARGIN = 1.57
 
+#: Width of the differences of expected curves [coordinate units].
+STEP = 1e-3
+
 #: An expected missing part of the stroke up to this is not held against a point: the process is smooth, the
 #: limit of what can be simulated is not, so that whole runs beside it would be shunned.
 OVERSHOOT = 0.1
@@ -44,7 +48,7 @@ def coordinate_unit(parameters: ParameterSet) -> FloatArray:
 
 
 class CurveProcess:
-    """Gaussian process through the smoothed curves of a fit, with the scaling of force by stress built in.
+    """Gaussian process through the smoothed curves of one trace, with the scaling of force by stress built in.
 
         curve(z) = e^s (c + q g(x)),   x = (z - z_best) / unit
 
@@ -53,8 +57,8 @@ class CurveProcess:
     is the part of the stroke that is missing.
 
     Args:
-        objective: Turns curves into residuals.
-        trials: Runs so far.
+        objective: That of the trace.
+        trials: Its runs so far.
         best: The run about which the process is written.
         guess: Hyperparameters of an earlier process to start from (p + 3,).
     """
@@ -141,24 +145,89 @@ class CurveProcess:
         sd = size * self._peak * math.sqrt(max(variance, 0.0))
         return curve, sd, 1.0 - min(max(float(out[-1]) - OVERSHOOT, 0.0), 1.0)
 
-    def residual(self, z: FloatArray) -> FloatArray:
-        """Residual vector (n + 2 + p,) of the expected curve at z."""
-        curve, _, fraction = self.predict(z)
-        return self.objective.residual(curve, fraction, z)
-
     def doubt(self, z: FloatArray) -> float:
         """Square root of the chi-square that not knowing the curve adds at z [-]."""
         return self.predict(z)[1] * math.sqrt(self.objective.effective_points) / self.objective.sigma
 
+    def feigned(self, z: FloatArray) -> FloatArray:
+        """Information (p, p) that the noise of the runs feigns in differences of expected curves at z.
+
+        A noisy Jacobian J + D has the information (J + D)^T (J + D), on average J^T J + E[D^T D].  E[D^T D] follows from the
+        weights that the process gives to each run.
+        """
+        objective, p = self.objective, len(self.unit)
+        steps = STEP * self.unit
+        moves = np.diag(steps)
+        x = np.array([z + d for d in moves] + [z - d for d in moves])
+        k = self._kernel((x - self.best.z) / self.unit, self._x, self.hyper)
+        weights = self._inverse @ ((k[:p] - k[p:]) / (2.0 * steps[:, None])).T
+        noise = (weights.T * (self._extra + self.noise**2)) @ weights
+        per_row = objective.effective_points / objective.sigma**2 + 1.0 / objective.sigma_peak**2
+        out: FloatArray = noise * self._peak**2 * per_row
+        return out
+
+
+class Surrogate:
+    """The processes of all traces of an objective, and the chi-square that they expect.
+
+    Args:
+        objective: Turns curves into residuals.
+        trials: Runs so far.
+        best: The run about which the processes are written.
+        guess: Hyperparameters of an earlier one to start from, by trace.
+    """
+
+    def __init__(
+        self,
+        objective: Objective | JointObjective,
+        trials: Sequence[Trial],
+        best: Trial,
+        guess: Sequence[FloatArray] | None = None,
+    ) -> None:
+        self.objective, self.best = objective, best
+        self.unit = coordinate_unit(objective.parameters)
+        guesses: Sequence[FloatArray | None] = guess or [None] * len(objective.cases)
+        self.each = [
+            CurveProcess(c.objective, [t.each[k] for t in trials], best.each[k], g)
+            for k, (c, g) in enumerate(zip(objective.cases, guesses, strict=True))
+        ]
+
+    @property
+    def hyper(self) -> list[FloatArray]:
+        """Hyperparameters by trace."""
+        return [process.hyper for process in self.each]
+
+    @property
+    def noise(self) -> float:
+        """Largest standard deviation of one simulated curve about its process, part of the peak [-]."""
+        return max(process.noise for process in self.each)
+
+    def _predicted(self, z: FloatArray) -> list[tuple[FloatArray, float, float]]:
+        cases = self.objective.cases
+        return [process.predict(z[c.index]) for process, c in zip(self.each, cases, strict=True)]
+
+    def residual(self, z: FloatArray) -> FloatArray:
+        """Residual vector of the expected curves at z."""
+        curves, _, fractions = zip(*self._predicted(z), strict=True)
+        return residual(self.objective, curves, fractions, z)
+
+    def doubt(self, z: FloatArray) -> float:
+        """Square root of the chi-square that not knowing the curves adds at z [-]."""
+        cases = self.objective.cases
+        return math.hypot(*(process.doubt(z[c.index]) for process, c in zip(self.each, cases, strict=True)))
+
     def expected(self, z: FloatArray, caution: float) -> float:
-        """Chi-square at z [-], the part from not knowing the curve weighted by ``caution``."""
+        """Chi-square at z [-], the part from not knowing the curves weighted by ``caution``."""
         rows = self._cautious(z, caution)
         return float(rows @ rows)
 
     def _cautious(self, z: FloatArray, caution: float) -> FloatArray:
-        curve, sd, fraction = self.predict(z)
-        doubt = sd * math.sqrt(caution * self.objective.effective_points) / self.objective.sigma
-        return np.append(self.objective.residual(curve, fraction, z), doubt)
+        curves, sds, fractions = zip(*self._predicted(z), strict=True)
+        goals = [c.objective for c in self.objective.cases]
+        doubts = [
+            sd * math.sqrt(caution * goal.effective_points) / goal.sigma for sd, goal in zip(sds, goals, strict=True)
+        ]
+        return np.append(residual(self.objective, curves, fractions, z), doubts)
 
     def least(self, start: FloatArray, radius: float, caution: float) -> FloatArray:
         """Point (p,) of least ``expected`` within the bounds and ``radius`` units of the best run."""
@@ -173,25 +242,22 @@ class CurveProcess:
         return parameters.clip(np.asarray(found.x))
 
     def jacobian(self, z: FloatArray) -> FloatArray:
-        """Derivative (n + 2 + p, p) of ``residual`` at z, less what is only the noise of the runs.
+        """Derivative of ``residual`` at z by internal coordinates, less what is only the noise of the runs.
 
-        A noisy Jacobian J + D has the information (J + D)^T (J + D), on average J^T J + E[D^T D]: too much,
-        and a parameter without influence looks identified.  E[D^T D] follows from the weights that the
-        process gives to each run; the directions of J are shrunk until J^T J is without it, to zero where
-        there is nothing else.
+        The directions of each trace's Jacobian are shrunk until its information is without what the noise feigns, to zero
+        where there is nothing else; a parameter without influence would look identified otherwise.
         """
-        objective, p = self.objective, len(self.unit)
-        steps = 1e-3 * self.unit
+        steps = STEP * self.unit
         moves = np.diag(steps)
         rows = np.array([self.residual(z + d) - self.residual(z - d) for d in moves]).T / (2.0 * steps)
-        x = np.array([z + d for d in moves] + [z - d for d in moves])
-        k = self._kernel((x - self.best.z) / self.unit, self._x, self.hyper)
-        weights = self._inverse @ ((k[:p] - k[p:]) / (2.0 * steps[:, None])).T
-        noise = (weights.T * (self._extra + self.noise**2)) @ weights
-        per_row = objective.effective_points / objective.sigma**2 + 1.0 / objective.sigma_peak**2
-        noise *= self._peak**2 * per_row
-        data = rows[: objective.data_rows]
-        data[-1] = 0.0  # the penalty of a failure is no measurement
-        ratio, basis = eigh(data.T @ data, noise)
-        kept = np.sqrt(np.maximum(ratio - NOISE_MARGIN, 0.0) / np.maximum(ratio, NOISE_MARGIN))
-        return np.vstack([data @ (basis * kept) @ np.linalg.inv(basis), rows[objective.data_rows :]])
+        first = 0
+        for process, case in zip(self.each, self.objective.cases, strict=True):
+            part = slice(first, first + case.objective.data_rows)
+            data = rows[part]
+            data[-1] = 0.0  # the penalty of a failure is no measurement
+            own = data[:, case.index]
+            ratio, basis = eigh(own.T @ own, process.feigned(z[case.index]))
+            kept = np.sqrt(np.maximum(ratio - NOISE_MARGIN, 0.0) / np.maximum(ratio, NOISE_MARGIN))
+            data[:, case.index] = own @ (basis * kept) @ np.linalg.inv(basis)
+            first = part.stop
+        return rows

@@ -16,7 +16,7 @@ from calib.objective import Evaluation, Evaluator, Objective, Target
 from calib.parameters import Parameter, ParameterSet
 from calib.progress import Progress
 from calib.store import CachedEvaluator, EvaluationStore, Header
-from calib.uncertainty import uncertainty
+from calib.uncertainty import evidence, uncertainty
 from mpm.errors import SimulationError
 
 LENGTH, WIDTH = 0.04, 0.03
@@ -157,9 +157,7 @@ def test_recovers_five_parameters_within_eighty_runs(truth: dict[str, float]) ->
     for name in ("E", "R", "R_skin"):
         assert values(result)[name] == pytest.approx(truth[name], rel=0.2)
     assert result.jacobian is not None
-    found = uncertainty(
-        result.parameters, result.jacobian, result.best.residual, effective_rows=objective.effective_rows
-    )
+    found = uncertainty(result.parameters, evidence(objective, result.best, result.jacobian))
     assert sum(i.low95 <= truth[i.parameter.name] <= i.high95 for i in found.intervals) >= 4
     assert found.intervals[2].verdict == "identified"
     assert result.repeatability == pytest.approx(NOISE, rel=0.4)

@@ -9,8 +9,8 @@ import pytest
 
 from calib.objective import Evaluation, Objective, Target, Trial
 from calib.parameters import Parameter, ParameterSet
-from calib.surrogate import CurveProcess
-from calib.uncertainty import uncertainty
+from calib.surrogate import Surrogate
+from calib.uncertainty import evidence, uncertainty
 from tests.calib.synthetic import X, correlated_noise
 
 PEAK = 10.0
@@ -59,30 +59,30 @@ def true_jacobian(z: np.ndarray) -> np.ndarray:
 def test_process_goes_through_the_runs_and_knows_where_it_does_not() -> None:
     """Between noise-free runs the curve is met to 1 % of the peak; doubt is small there, large far away."""
     runs = trials(25, noise=0.0)
-    process = CurveProcess(goal(), runs, runs[0])
+    process = Surrogate(goal(), runs, runs[0])
     z = THREE.start + np.array([0.15, -0.1, 0.1])
-    assert np.abs(process.predict(z)[0] - cut(z)).max() < 0.01 * PEAK
+    assert np.abs(process.each[0].predict(z)[0] - cut(z)).max() < 0.01 * PEAK
     assert process.doubt(z) < 0.3 * process.doubt(z + 3.0)
 
 
 def test_process_scales_force_with_stress_exactly() -> None:
     """From a single run the force at 5 times the stress-like parameter is 5 times the force."""
     run = trials(1, noise=0.0)
-    process = CurveProcess(goal(), run, run[0])
+    process = Surrogate(goal(), run, run[0])
     z = THREE.start + np.array([math.log(5.0), 0.0, 0.0])
-    assert process.predict(z)[0] == pytest.approx(cut(z), abs=0.02 * PEAK)
+    assert process.each[0].predict(z)[0] == pytest.approx(cut(z), abs=0.02 * PEAK)
 
 
 def test_process_estimates_the_noise_of_a_run() -> None:
     """The noise of curves of 2 % is found to a third from 40 runs."""
     runs = trials(40, noise=0.02)
-    assert CurveProcess(goal(), runs, runs[0]).noise == pytest.approx(0.02, rel=0.35)
+    assert Surrogate(goal(), runs, runs[0]).noise == pytest.approx(0.02, rel=0.35)
 
 
 def test_jacobian_of_noise_free_runs_is_the_true_one() -> None:
     """Without noise the process's Jacobian is the derivative of the residual vector to 5 %."""
     runs = trials(40, noise=0.0, spread=0.2)
-    found, true = CurveProcess(goal(), runs, runs[0]).jacobian(THREE.start), true_jacobian(THREE.start)
+    found, true = Surrogate(goal(), runs, runs[0]).jacobian(THREE.start), true_jacobian(THREE.start)
     assert np.linalg.norm(found - true) < 0.05 * np.linalg.norm(true)
 
 
@@ -94,14 +94,14 @@ def test_noise_does_not_pass_for_information() -> None:
     unseen = claimed = 0
     for seed in range(10):
         runs = trials(25, noise=0.02, seed=seed)
-        jacobian = CurveProcess(goal(), runs, runs[0]).jacobian(THREE.start)
-        found = uncertainty(THREE, jacobian, runs[0].residual, effective_rows=goal().effective_rows)
+        jacobian = Surrogate(goal(), runs, runs[0]).jacobian(THREE.start)
+        found = uncertainty(THREE, evidence(goal(), runs[0], jacobian))
         unseen += found.intervals[2].verdict == "not_seen"
         assert found.intervals[0].verdict == "identified"
         plain = jacobian.copy()
         change = trials(1, noise=0.02, seed=100 + seed)[0].residual - runs[0].residual
         plain[:-3, 2] = change[:-3] / math.log(1.1)
-        naive = uncertainty(THREE, plain, runs[0].residual, effective_rows=goal().effective_rows)
+        naive = uncertainty(THREE, evidence(goal(), runs[0], plain))
         claimed += naive.intervals[2].verdict == "identified"
     assert unseen >= 9 and claimed >= 9
 
@@ -111,10 +111,10 @@ def test_coarse_runs_inform_through_their_common_offset() -> None:
     runs = trials(1, noise=0.0)
     for t in trials(15, noise=0.0, seed=3)[1:]:
         runs.append(Trial(t.z, t.evaluation, 1.08 * t.curve, t.residual, coarse=True))
-    process = CurveProcess(goal(), runs, runs[0])
+    process = Surrogate(goal(), runs, runs[0])
     z = THREE.start + np.array([0.0, 0.25, 0.0])
-    assert np.abs(process.predict(THREE.start)[0] - cut(THREE.start)).max() < 0.015 * PEAK
-    assert np.abs(process.predict(z)[0] - cut(z)).max() < 0.03 * PEAK
+    assert np.abs(process.each[0].predict(THREE.start)[0] - cut(THREE.start)).max() < 0.015 * PEAK
+    assert np.abs(process.each[0].predict(z)[0] - cut(z)).max() < 0.03 * PEAK
 
 
 def test_broken_runs_are_expected_to_break_again() -> None:
@@ -124,8 +124,8 @@ def test_broken_runs_are_expected_to_break_again() -> None:
     part = slice(0, 96)
     broken = Evaluation(0, THREE.to_dict(z), "failed", "inverted", 0.4, 0.04 * X[part], cut(z)[part])
     runs.append(goal().trial(broken))
-    process = CurveProcess(goal(), runs, runs[0])
-    assert process.predict(z)[2] < 0.8 and process.predict(THREE.start)[2] == 1.0
+    process = Surrogate(goal(), runs, runs[0])
+    assert process.each[0].predict(z)[2] < 0.8 and process.each[0].predict(THREE.start)[2] == 1.0
     assert process.expected(z, 0.0) > process.expected(THREE.start, 0.0) + 100.0
 
 
@@ -135,7 +135,7 @@ def test_a_failure_is_no_measurement() -> None:
     z = THREE.start + np.array([0.0, 0.0, 1.5])
     part = slice(0, 96)
     broken = Evaluation(0, THREE.to_dict(z), "failed", "inverted", 0.4, 0.04 * X[part], cut(z)[part])
-    process = CurveProcess(goal(), [*runs, goal().trial(broken)], runs[0])
+    process = Surrogate(goal(), [*runs, goal().trial(broken)], runs[0])
     assert process.residual(z)[goal().data_rows - 1] > 10.0
     assert np.all(process.jacobian(z)[goal().data_rows - 1] == 0.0)
 
@@ -144,7 +144,7 @@ def test_least_stays_within_bounds_and_radius() -> None:
     """The proposed point is better than the best run, within the radius and the hard bounds."""
     runs = trials(25, noise=0.0)[1:]
     best = min(runs, key=lambda t: t.misfit)
-    process = CurveProcess(goal(), runs, best)
+    process = Surrogate(goal(), runs, best)
     z = process.least(best.z, 1.0, 1.0)
     assert process.expected(z, 1.0) < process.expected(best.z, 1.0)
     close = process.least(best.z, 0.01, 1.0)

@@ -1,0 +1,107 @@
+"""What the measurement leaves open: it is integrated out exactly, found where it is there, and said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calib.conditioning import Conditioned, condition
+from calib.errors import TraceError
+from calib.nuisance import GAIN_SD, TORQUE_GAIN_SD, Nuisance, Sensor, Whitening, nuisances, sensor_of
+from calib.objective import Objective, Target
+from calib.parameters import Parameter, ParameterSet
+from calib.trace import Trace
+
+ONE = ParameterSet((Parameter("E", 1e5, 1e3, 1e7, "Pa", 5e4, 2e5),))
+
+
+def cut(column: str = "force_N") -> Conditioned:
+    """A cut of 10 N at 50 mm/s over 40 mm with noise of 0.1 N."""
+    time = np.arange(0.0, 1.4, 0.005)
+    stroke = np.clip(0.05 * (time - 0.5), 0.0, None)
+    force = 10.0 * np.sin(np.pi * np.clip(stroke / 0.04, 0.0, 1.0) / 1.2)
+    noise = 0.1 * np.random.default_rng(0).standard_normal(len(time))
+    trace = Trace(time, force + noise + 3.0, 0.1 - 0.05 * time, "cut.csv", "", {"force": column, "position": "z_m"})
+    return condition(trace, t_end=1.3)
+
+
+def goal(curve: Conditioned, given: tuple[Nuisance, ...]) -> Objective:
+    """The objective of a cut."""
+    target = Target(curve.stroke, curve.curve, 0.1, 0.1, np.interp)
+    return Objective(target, ONE, nuisances=given)
+
+
+def test_whitening_is_the_inverse_root_of_the_covariance() -> None:
+    """V^(-1/2) V V^(-1/2) = 1 with V = 1 + G G^T, for columns that are far from independent."""
+    columns = np.random.default_rng(1).standard_normal((30, 3)) @ np.diag([5.0, 1.0, 0.1])
+    columns[:, 2] += columns[:, 0]
+    root = Whitening(columns)(np.eye(30))
+    assert root @ (np.eye(30) + columns @ columns.T) @ root == pytest.approx(np.eye(30), abs=1e-9)
+    assert Whitening(np.zeros((30, 0)))(np.arange(30.0)) == pytest.approx(np.arange(30.0))
+
+
+def test_chi_square_is_the_least_over_the_nuisances() -> None:
+    """The whitened chi-square equals the least one over all sizes of the nuisances, each paying for itself."""
+    curve = cut()
+    given = nuisances(curve, Sensor(0.1, 0.01))
+    searched = [n for n in given if n.searched]
+    whole, bare = goal(curve, given), goal(curve, ())
+    simulated = np.interp(curve.stroke - 5e-4, curve.stroke, curve.curve) + 0.05
+    columns = np.array([np.append(bare._weights * n.shape, n.peak / bare.sigma_peak) * n.sd for n in searched]).T
+    rows = bare.data_residual(simulated)[:-1]
+    system = np.vstack([columns, np.eye(len(searched))])
+    least = np.linalg.lstsq(system, np.concatenate([rows, np.zeros(len(searched))]), rcond=None)[1][0]
+    assert float(np.sum(whole.data_residual(simulated)[:-1] ** 2)) == pytest.approx(least, rel=1e-9)
+    assert least < 0.7 * float(rows @ rows)
+
+
+@pytest.mark.parametrize(
+    ("name", "size"), [("tare", 0.5), ("drift", 0.3), ("lag", 4e-4), ("gain", 0.06)], ids=lambda x: str(x)
+)
+def test_each_is_found_where_it_is_there(name: str, size: float) -> None:
+    """A measured curve that is off by one of them gives that one back within two standard deviations, and no other."""
+    curve = cut()
+    given = tuple(replace(n, sd=s) for n, s in zip(nuisances(curve, Sensor(0.1)), (1.0, 0.5, 1e-3, 0.1), strict=True))
+    off = next(n for n in given if n.name == name)
+    found = {e.name: e for e in goal(curve, given).nuisance_estimates(curve.curve - size * off.shape)}
+    assert found[name].value == pytest.approx(size, abs=2.0 * found[name].sd) and found[name].sd < off.sd
+    assert all(abs(e.value) < 2.0 * e.sd for e in found.values() if e.name != name)
+
+
+def test_a_gain_beyond_three_of_its_prior_is_outside() -> None:
+    """A curve 30 % too large for a sensor that is good to 2 % contradicts it; 3 % does not."""
+    curve = cut()
+    given = tuple(n for n in nuisances(curve, Sensor(GAIN_SD)) if n.name == "gain")
+    for size, outside in ((0.3, True), (0.03, False)):
+        (found,) = goal(curve, given).nuisance_estimates(curve.curve / (1.0 + size))
+        assert found.outside is outside
+
+
+def test_the_gain_is_not_searched_unless_it_is_the_width_of_a_specimen() -> None:
+    """Nothing may make a force look right: the search sees the gain only where a joint fit has a factor for each specimen."""
+    curve = cut()
+    assert [n.name for n in nuisances(curve, Sensor()) if not n.searched] == ["gain"]
+    scaled = nuisances(curve, Sensor(0.15), scale_sd=0.2)
+    assert all(n.searched for n in scaled) and scaled[-1].name == "scale"
+    assert scaled[-1].sd == pytest.approx(0.25)
+    half = goal(curve, nuisances(curve, Sensor(10e-9))).data_residual(0.5 * curve.curve)
+    assert half @ half > 100.0
+
+
+def test_a_wrench_from_joint_torques_has_an_uncertain_gain() -> None:
+    """The sensor is told by its column, the user's word goes before, and nonsense is refused."""
+    robot, said = sensor_of(cut("base_Fz_N"), None, None)
+    assert robot.gain_sd == TORQUE_GAIN_SD and said is not None and "--gain-sd" in said
+    assert sensor_of(cut(), None, 0.02) == (Sensor(GAIN_SD, 0.02), None)
+    assert sensor_of(cut("base_Fz_N"), 0.01, None) == (Sensor(0.01, 0.0), None)
+    with pytest.raises(TraceError, match="--gain-sd 15"):
+        Sensor(15.0)
+
+
+def test_a_drift_is_not_extrapolated_without_end() -> None:
+    """A short baseline says nothing of the drift over the cut: its standard deviation ends at a twentieth of the peak."""
+    curve = replace(cut(), drift_sd_N_per_s=50.0)
+    drift = next(n for n in nuisances(curve, Sensor()) if n.name == "drift")
+    assert drift.sd == pytest.approx(0.05 * float(curve.curve.max()))
