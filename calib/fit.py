@@ -128,6 +128,7 @@ class FitResult:
         repeatability: Noise of a simulated curve as seen by the fit, part of the peak [-]; NaN without
             Jacobian.
         history: All runs in the order of the search.
+        surrogate: The process through them, about the best run; None where the Jacobian is.
     """
 
     status: str
@@ -136,6 +137,7 @@ class FitResult:
     jacobian: FloatArray | None
     repeatability: float
     history: tuple[Trial, ...]
+    surrogate: Surrogate | None = None
 
     @property
     def simulations(self) -> int:
@@ -291,12 +293,12 @@ class _Search:
 
     def result(self, status: str) -> FitResult:
         """What was found, with a Jacobian if there are runs enough for one."""
-        best, jacobian, repeatability = self.best, None, math.nan
+        best, jacobian, repeatability, process = self.best, None, math.nan, None
         if len(self.finished) > len(self.parameters):
             process = self._process()
             jacobian, repeatability = process.jacobian(best.z), process.noise
         parameters = self.parameters.with_values(best.evaluation.parameters)
-        return FitResult(status, best, parameters, jacobian, repeatability, tuple(self.trials))
+        return FitResult(status, best, parameters, jacobian, repeatability, tuple(self.trials), process)
 
     def _unseen(self) -> bool:
         """Whether there is another design that can be paid together with the rounds it may call for."""

@@ -8,7 +8,7 @@ model, Rasmussen & Williams 2006, section 2.7):
     V = diag(sigma^2) + sum_k sd_k^2 g_k g_k^T
 
     tare   1                     drift   s / L (0 at contact, 1 at the end of the stroke)
-    lag    -dF/ds                gain    F
+    lag    -dF/ds                gain    F, as for a width that is not known
 """
 
 from __future__ import annotations
@@ -90,13 +90,13 @@ class Nuisance:
     """One thing that the measurement leaves open.
 
     Attributes:
-        name: ``tare``, ``drift``, ``lag``, ``gain`` or ``scale``.
+        name: ``tare``, ``drift``, ``lag``, ``gain``, ``width`` or ``scale``.
         unit: Unit of its size.
         sd: Prior standard deviation [unit]; the prior mean is zero.
         shape: Change of the measured curve by one unit [N/unit] (n,).
         peak: Change of the measured peak by one unit [N/unit].
-        searched: Whether the search is free to use it. The gain is not: the headline figures are those of the bare
-            simulation, and the gain widens the intervals.
+        searched: Whether the search is free to use it. In a calibration on one trace none is: the headline figures are those
+            of the bare simulation against the bare trace, and what the measurement leaves open widens the intervals.
     """
 
     name: str
@@ -104,7 +104,7 @@ class Nuisance:
     sd: float
     shape: FloatArray
     peak: float
-    searched: bool = True
+    searched: bool
 
 
 @dataclass(frozen=True)
@@ -136,14 +136,17 @@ class NuisanceEstimate:
         }
 
 
-def nuisances(curve: Conditioned, sensor: Sensor, *, scale_sd: float = 0.0) -> tuple[Nuisance, ...]:
+def nuisances(
+    curve: Conditioned, sensor: Sensor, *, width_sd: float = 0.0, scaled: bool = False
+) -> tuple[Nuisance, ...]:
     """What the measurement of a curve leaves open.
 
     Args:
         curve: The conditioned trace.
         sensor: Its sensor.
-        scale_sd: Relative standard deviation of the specimen's width [-] where the search may use it: in a joint fit the
-            width of a specimen and the gain of its sensor are one factor. 0: the width is not searched.
+        width_sd: Relative standard deviation of the specimen's width [-], 0 where it was measured.
+        scaled: Whether the search may use them, as it must where several specimens share their flesh; gain and width are
+            one factor then.
     """
     length = curve.stroke_length_m
     speed = length / (curve.end_s - curve.onset_s)
@@ -152,16 +155,18 @@ def nuisances(curve: Conditioned, sensor: Sensor, *, scale_sd: float = 0.0) -> t
     lag = float(np.hypot(curve.onset_sd_s, sensor.lag_sd)) * speed
     slope = np.gradient(curve.curve, curve.stroke)
     top = float(curve.stroke[int(curve.curve.argmax())]) / length
+    one = np.ones_like(curve.curve)
     found = [
-        Nuisance("tare", "N", curve.baseline_sd_N, np.ones_like(curve.curve), 1.0),
-        Nuisance("drift", "N", drift, curve.stroke / length, top),
-        Nuisance("lag", "m", lag, -slope, 0.0),
+        ("tare", "N", curve.baseline_sd_N, one, 1.0),
+        ("drift", "N", drift, curve.stroke / length, top),
+        ("lag", "m", lag, -slope, 0.0),
     ]
-    if scale_sd > 0.0:
-        found.append(Nuisance("scale", "-", float(np.hypot(scale_sd, sensor.gain_sd)), curve.curve, peak))
+    if scaled:
+        found.append(("scale", "-", float(np.hypot(width_sd, sensor.gain_sd)), curve.curve, peak))
     else:
-        found.append(Nuisance("gain", "-", sensor.gain_sd, curve.curve, peak, searched=False))
-    return tuple(n for n in found if n.sd > 0.0)
+        found.append(("gain", "-", sensor.gain_sd, curve.curve, peak))
+        found.append(("width", "-", width_sd, curve.curve, peak))
+    return tuple(Nuisance(*n, searched=scaled) for n in found if n[2] > 0.0)
 
 
 class Whitening:

@@ -347,8 +347,11 @@ class Objective:
         return np.vstack([self._whiten(columns), np.zeros(columns.shape[1])])
 
     def curve_residual(self, curve: FloatArray) -> FloatArray:
-        """Rows of the curve alone (n,), not whitened, in standard deviations of a point."""
-        out: FloatArray = (curve - self.target.curve) / self.sigmas
+        """Rows of the curve alone (n,), in standard deviations of a point, less what the nuisances explain of them."""
+        explained = sum(
+            (e.value * n.shape for e, n in zip(self.nuisance_estimates(curve), self.nuisances, strict=True)), 0.0
+        )
+        out: FloatArray = (curve - self.target.curve + explained) / self.sigmas
         return out
 
     def _compare(self, curve: FloatArray) -> FloatArray:

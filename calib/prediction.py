@@ -11,10 +11,10 @@ from calib.filters import filter_simulated
 from calib.knives import load_knife
 from calib.metrics import Metrics, compare
 from calib.outputs import prepare, write_csv, write_json
+from calib.preparation import conditioned
 from calib.provenance import git_commit, versions
 from calib.request import Request
 from calib.scenes import cut_scene, specimen
-from calib.study import conditioned
 from mpm.errors import SimulationError
 
 NRMSE_LIMIT, RATING_LIMIT = 0.10, 0.80

@@ -29,6 +29,10 @@ class Request:
         sizing: What is known of the specimen.
         fit: Names of the fitted properties; None for the food's default.
         dx: Cell size [m], or None.
+        gain_sd: Relative standard deviation of the sensor's gain [-]; None for what its kind suggests.
+        lag_sd: Standard deviation of the sensor's delay [s], or None.
+        scaled: Whether the search has a factor for the width of the specimen, as it has in a fit of several.
+        u_num: Folder of a convergence study whose numerical uncertainty enters the likelihood, or None.
         budget: Largest number of simulations.
         workers: Simulations at a time.
         seed: Seed of particles and search.
@@ -46,6 +50,10 @@ class Request:
     sizing: Sizing = field(default_factory=Sizing)
     fit: tuple[str, ...] | None = None
     dx: float | None = None
+    gain_sd: float | None = None
+    lag_sd: float | None = None
+    scaled: bool = False
+    u_num: Path | None = None
     budget: float = 100
     workers: int = 2
     seed: int = 0

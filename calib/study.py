@@ -11,103 +11,23 @@ from typing import Any
 import numpy as np
 
 from calib.checks import Check, check
-from calib.conditioning import Conditioned, condition
-from calib.errors import MaterialError
+from calib.conditioning import Conditioned
+from calib.doubt import Doubt, doubt_of
 from calib.filters import filter_simulated
 from calib.fit import FitOptions, FitResult, calibrate
-from calib.knives import load_knife
 from calib.materials import FoodSpec, dump_material
 from calib.metrics import compare
 from calib.nulls import NullModel, null_models
-from calib.objective import Objective, Target
 from calib.outputs import prepare, write_csv, write_json
-from calib.parameters import Parameter, ParameterSet
 from calib.pool import Pool
+from calib.preparation import set_up
 from calib.progress import Progress
-from calib.properties import rule_of
 from calib.provenance import code_key, key_of
 from calib.request import Request, Setup
-from calib.scenes import cut_scene, height_range, place, specimen
+from calib.scenes import place
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.summary import add_conditioning, summarise
-from calib.trace import read_trace
-from calib.uncertainty import evidence, uncertainty
 from mpm.record import ForceRecord
-
-# Hard bounds reach this factor beyond the literature's range, so that a trace may contradict the literature.
-BOUND_FACTOR = 5.0
-LINEAR = {"nu": (0.0, 0.49), "mu": (0.0, 1.2)}  # fitted on a linear scale, with their hard bounds
-
-
-def fit_parameters(
-    food: FoodSpec, names: tuple[str, ...], heights: tuple[float, float, float] | None = None
-) -> ParameterSet:
-    """The fitted properties with start value, hard bounds and literature prior.
-
-    Args:
-        food: The food.
-        names: Properties, and ``height`` for the specimen's.
-        heights: Lowest, likely and largest height of the specimen [m]; None where it is known.
-
-    Raises:
-        MaterialError: An unknown or repeated name, a property without a literature range, or a height that is known.
-    """
-    chosen = []
-    for name in names:
-        if name == "height":
-            if heights is None:
-                raise MaterialError(
-                    "--fit height: the height is known (given, or the trace ends released); leave one of both out"
-                )
-            low, likely, high = heights
-            chosen.append(Parameter(name, likely, low, high, "m", low, high))
-            continue
-        rule, (low, high) = rule_of(name), food.prior(name)
-        value = food.value(name)
-        assert value is not None  # prior() has a range only where there is a value
-        if name in LINEAR:
-            bottom, top = LINEAR[name]
-            chosen.append(Parameter(name, value, bottom, top, rule.unit, low, high, scale="linear"))
-            continue
-        if low <= 0:
-            raise MaterialError(f"{food.name}: {name} cannot be fitted from a range that starts at {low:g} {rule.unit}")
-        bottom, top = max(rule.low, low / BOUND_FACTOR), min(rule.high, high * BOUND_FACTOR)
-        chosen.append(Parameter(name, value, bottom, top, rule.unit, low, high))
-    return ParameterSet(tuple(chosen))
-
-
-def conditioned(request: Request) -> tuple[Conditioned, str | None]:
-    """The trace of a request, conditioned, and the SHA-256 of its air run (None without one).
-
-    Raises:
-        CutcalError: Anything wrong with the records.
-    """
-    trace = read_trace(request.trace, **request.columns)
-    air = read_trace(request.air, **request.columns) if request.air is not None else None
-    known = request.sizing.height or request.food.dims["height"].value
-    curve = condition(trace, air=air, speed=request.speed, height=known, t_end=request.t_end)
-    return curve, None if air is None else air.sha256
-
-
-def _set_up(request: Request) -> Setup:
-    """Condition the trace, and make the scenes and the objective of a calibration.
-
-    Raises:
-        CutcalError: Anything wrong with the input.
-    """
-    food = request.food
-    curve, air_sha256 = conditioned(request)
-    shape, assumed = specimen(food, curve, request.sizing)
-    knife = load_knife(request.knife)
-    fine, coarse = (
-        cut_scene(food, shape, knife, stroke=curve.stroke_length_m, dx=request.dx, seed=request.seed, coarse=screening)
-        for screening in (False, True)
-    )
-    target = Target(curve.stroke, curve.curve, curve.noise_sd_N, curve.peak_sd_N, filter_simulated)
-    heights = height_range(food, curve, request.sizing)
-    names = request.fit or (food.default_fit if heights is None else (*food.default_fit, "height"))
-    objective = Objective(target, fit_parameters(food, names, heights))
-    return Setup(curve, fine, coarse, objective, assumed, request.sizing.kept, air_sha256)
 
 
 def run(
@@ -135,7 +55,7 @@ def run(
     """
     say = say or (lambda text: None)
     began = time.monotonic()
-    setup = _set_up(request)
+    setup = set_up(request)
     for text in [*request.food.warnings(), *setup.curve.warnings, *setup.assumed]:
         say(text)
     options = FitOptions(budget=request.budget, batch=request.workers, seed=request.seed)
@@ -165,7 +85,9 @@ def run(
         record = pool.record(scene)
         checks: list[Check] = []
         if result.status != "interrupted":
-            say("simulating them at half the speed, and with the grid and the particles elsewhere")
+            say(
+                "simulating them at half the speed, with the grid and the particles elsewhere, and on cells of two thirds"
+            )
             checks = check(scene, record, pool, store)
     add_conditioning(out / "evaluations.h5", setup.curve)
     return _write(request, setup, result, record, checks, start, out, time.monotonic() - began)
@@ -198,12 +120,10 @@ def _write(
     curve, best = setup.curve, result.best
     metrics = compare(curve.stroke, curve.curve, best.curve)
     nulls = null_models(curve.stroke, curve.curve)
-    doubt = None
-    if result.jacobian is not None:
-        doubt = uncertainty(result.parameters, evidence(setup.objective, best, result.jacobian))
+    doubt = doubt_of(setup.objective, result, request.seed)
     summary = summarise(request, setup, result, record, metrics, nulls, doubt, checks)
     summary["wall_s"] = wall
-    write_csv(out / "curves.csv", _curves(curve, best.curve, record, start, nulls))
+    write_csv(out / "curves.csv", _curves(curve, best.curve, record, start, nulls, doubt))
     fitted = _fitted_food(request, setup, best.evaluation.parameters)
     keep = ("created", "trace_sha256", "passed", "peak_error", "nrmse", "shape_error", "git", "versions")
     dump_material(fitted, out / "material.yaml", {k: summary[k] for k in keep} | {"trace": curve.trace.label})
@@ -225,7 +145,12 @@ def _fitted_food(request: Request, setup: Setup, parameters: Mapping[str, float]
 
 
 def _curves(
-    curve: Conditioned, best: np.ndarray, record: ForceRecord, start: np.ndarray, nulls: Mapping[str, NullModel]
+    curve: Conditioned,
+    best: np.ndarray,
+    record: ForceRecord,
+    start: np.ndarray,
+    nulls: Mapping[str, NullModel],
+    doubt: Doubt | None,
 ) -> dict[str, np.ndarray]:
     """Columns of curves.csv, all on the trace's stroke grid."""
     parts = {
@@ -233,4 +158,5 @@ def _curves(
         "face_N": filter_simulated(curve.stroke, record.stroke, record.resolved_face),
     }
     columns = {"stroke_m": curve.stroke, "real_N": curve.curve, "sim_N": best, "residual_N": best - curve.curve}
-    return columns | parts | {"start_N": start} | {f"{name}_N": n.curve for name, n in nulls.items()}
+    band = {} if doubt is None else {"band_low_N": doubt.bands[0].low, "band_high_N": doubt.bands[0].high}
+    return columns | parts | {"start_N": start} | {f"{name}_N": n.curve for name, n in nulls.items()} | band

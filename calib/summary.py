@@ -14,16 +14,19 @@ import h5py
 
 from calib.checks import Check
 from calib.conditioning import Conditioned
+from calib.doubt import Doubt
 from calib.errors import OutputError
 from calib.fit import FitResult
 from calib.metrics import Metrics
 from calib.nulls import NullModel
+from calib.parameters import STRESS_LIKE, plain
 from calib.provenance import git_commit, versions
 from calib.request import Request, Setup
 from calib.uncertainty import Uncertainty
 from calib.verdicts import judge, limits
 from mpm.record import ForceRecord
 
+WITH_WIDTH = 0.5  # an interval that a measured width would halve belongs to the product with it
 UNKNOWN = "unknown"  # verdict of a parameter when a fit ended before its curvature was known
 
 
@@ -34,7 +37,7 @@ def summarise(
     record: ForceRecord,
     metrics: Metrics,
     nulls: Mapping[str, NullModel],
-    doubt: Uncertainty | None,
+    doubt: Doubt | None,
     checks: Sequence[Check],
 ) -> dict[str, Any]:
     """All figures of a calibration but its run time.
@@ -46,10 +49,11 @@ def summarise(
         record: Full record of the best values.
         metrics: Best curve against the trace.
         nulls: Null models against the trace.
-        doubt: Intervals, None when the fit ended too early for them.
+        doubt: What the fit does not know; None when it ended too early for that.
         checks: What numerical choices change.
     """
-    parameters = _parameters(request, result, doubt)
+    parameters = _parameters(request, result, None if doubt is None else doubt.uncertainty)
+    open_ends = {} if doubt is None else {e.name: e.as_dict() for e in doubt.nuisances}
     verdicts = judge(
         metrics,
         {n: m.metrics for n, m in nulls.items()},
@@ -58,6 +62,7 @@ def summarise(
         energy=record.budget,
         parameters=parameters,
         checks=checks,
+        nuisances=open_ends,
     )
     trace = setup.curve.trace
     stopped = result.status == "interrupted"
@@ -75,7 +80,9 @@ def summarise(
         **_agreement(metrics, nulls),
         "peak_real_sd_N": setup.curve.peak_sd_N,
         "parameters": parameters,
-        "correlations": _correlations(result, doubt),
+        "nuisances": open_ends,
+        **_doubt(setup, doubt),
+        "correlations": _correlations(result, None if doubt is None else doubt.uncertainty),
         "fixed_parameters": _fixed(request, parameters),
         **_runs(result),
         **_numerics(request, setup, record),
@@ -145,7 +152,31 @@ def _parameters(request: Request, result: FitResult, doubt: Uncertainty | None) 
             for name in names:
                 if name in tie.combination.split() and out[name]["verdict"] in ("identified", "weak"):
                     out[name]["verdict"] = "only_as_product"
+        for name, part in doubt.known_width().items():
+            if part < WITH_WIDTH and plain(name) in STRESS_LIKE and out[name]["verdict"] in ("identified", "weak"):
+                out[name]["verdict"] = "only_as_product"
     return out
+
+
+def _doubt(setup: Setup, doubt: Doubt | None) -> dict[str, Any]:
+    """Profiles, the size and correlation of the errors, and how much of the trace lies in the predictive band."""
+    if doubt is None:
+        return {"profiles": {}, "reduced_chi2": None, "correlation_length_m": None, "predictive_inside": None}
+    found = doubt.uncertainty
+    chosen = setup.objective.parameters
+    return {
+        "profiles": {
+            p.name: {
+                "value": [chosen[p.name].from_internal(z) for z in p.z],
+                "rise": [float(x) for x in p.rise],
+                "trace_alone": [float(x) for x in p.data],
+            }
+            for p in doubt.profiles
+        },
+        "reduced_chi2": found.reduced_chi2,
+        "correlation_length_m": found.data.lengths[0] * setup.curve.stroke_length_m,
+        "predictive_inside": doubt.bands[0].inside,
+    }
 
 
 def _correlations(result: FitResult, doubt: Uncertainty | None) -> dict[str, float]:

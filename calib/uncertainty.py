@@ -29,7 +29,7 @@ from calib.objective import Objective, Trial
 from calib.parameters import Z95, Parameter, ParameterSet
 
 FloatArray = npt.NDArray[np.float64]
-Verdict = Literal["identified", "weak", "not_seen", "at_bound"]
+Verdict = Literal["identified", "weak", "one_sided", "not_seen", "at_bound"]
 
 #: A parameter is identified when its posterior is narrower than this part of its prior, and not seen when it
 #: is wider than the other: below one half the cut says more than the literature, above 0.9 next to nothing.
@@ -42,6 +42,9 @@ TIED = 0.95
 COVERED = 0.95
 #: Residuals that keep their sign over more than this part of the stroke are a wrong model, not noise.
 LARGEST_CORRELATION = 0.5
+#: Standard deviations of the logarithm of the correlation length: of what is assumed before the residuals are seen (a factor
+#: of 2.7 either way), and of what one curve shows (0.16 of made-up noise of one kind, more of a real misfit).
+ASSUMED_SPREAD, SEEN_SPREAD = 0.5, 0.4
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,7 @@ class Interval:
         clipped: Whether a hard bound cut the interval off.
         width: Posterior over prior standard deviation in the internal coordinate [-].
         verdict: ``at_bound``: the best value lies on a hard bound; else by width ``identified`` (below 0.5),
-            ``weak``, or ``not_seen`` (above 0.9: the interval is the literature's).
+            ``weak``, or ``not_seen`` (above 0.9: the interval is the literature's). Profiles refine it, with ``one_sided``.
     """
 
     parameter: Parameter
@@ -92,50 +95,6 @@ class Tie:
     correlation: float
 
 
-@dataclass(frozen=True)
-class Uncertainty:
-    """Posterior about the best point, in the normal approximation.
-
-    Attributes:
-        intervals: One per parameter.
-        covariance: In internal coordinates (p, p).
-        correlation: Its correlation matrix (p, p).
-        only_as_product: Pairs with a correlation beyond 0.95 either way.
-        reduced_chi2: Chi-square of the data per degree of freedom [-].
-        size: Factor on the variance of the data's errors, ``reduced_chi2`` but at least 1 [-].
-    """
-
-    intervals: tuple[Interval, ...]
-    covariance: FloatArray
-    correlation: FloatArray
-    only_as_product: tuple[Tie, ...]
-    reduced_chi2: float
-    size: float
-
-
-def correlation_length(residual: FloatArray, determined: float) -> float:
-    """Correlation length of the residuals along a curve, part of its length [-].
-
-    The integral of their autocorrelation up to the first pair of lags with a negative sum (Geyer 1992, Statist. Sci. 7:473).
-    A fit takes part of the correlation away: with p parameters that the curve determines, lengths l of 0.02 to 0.2 of the
-    stroke are seen as l / (1 + p l) to 10 % (400 curves each), which is undone.
-
-    Args:
-        residual: Residuals on a uniform grid (n,).
-        determined: Number of parameters that the curve determines [-].
-    """
-    n = len(residual)
-    power = float(residual @ residual)
-    if not power > 0.0:
-        return 1.0 / n
-    acf = np.correlate(residual, residual, "full")[n - 1 :] / power
-    pairs = acf[: n // 2 * 2 : 2] + acf[1 : n // 2 * 2 : 2]
-    ends = np.flatnonzero(pairs <= 0.0)
-    last = int(ends[0]) if len(ends) else len(pairs)
-    seen = min(max((2.0 * float(pairs[:last].sum()) - 1.0) / n, 1.0 / n), LARGEST_CORRELATION)
-    return min(seen / max(1.0 - determined * seen, seen), LARGEST_CORRELATION)
-
-
 @dataclass(frozen=True, eq=False)
 class Evidence:
     """What the data of a fit say, independent rows of unit variance if the stated errors are right.
@@ -146,6 +105,7 @@ class Evidence:
         unsearched: Residuals by one prior standard deviation of what the measurement leaves open and the search may not use
             (k, m).
         rows: Effective number of independent ones among them [-].
+        weights: What the rows of the objective were multiplied by for the correlation that their residuals show (k,).
         lengths: Correlation length of each trace's residuals, part of its stroke [-].
     """
 
@@ -153,7 +113,69 @@ class Evidence:
     residual: FloatArray
     unsearched: FloatArray
     rows: float
+    weights: FloatArray
     lengths: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Posterior about the best point, in the normal approximation.
+
+    Attributes:
+        intervals: One per parameter.
+        covariance: In internal coordinates (p, p).
+        correlation: Its correlation matrix (p, p).
+        only_as_product: Pairs with a correlation beyond 0.95 either way.
+        reduced_chi2: Chi-square of the data per degree of freedom [-].
+        widened: Factor on the variance of the data's errors [-]: ``reduced_chi2`` but at least 1, times Student's where it
+            is more.
+        data: What the data say at the best values.
+        alone: The covariance if gain and width were known (p, p).
+        unsearched: Posterior mean and standard deviation of each nuisance that the search may not use, in prior standard
+            deviations.
+    """
+
+    intervals: tuple[Interval, ...]
+    covariance: FloatArray
+    correlation: FloatArray
+    only_as_product: tuple[Tie, ...]
+    reduced_chi2: float
+    widened: float
+    data: Evidence
+    alone: FloatArray
+    unsearched: tuple[tuple[float, float], ...] = ()
+
+    def known_width(self) -> dict[str, float]:
+        """Width of each parameter's interval if gain and width were known, over what it is [-], by name."""
+        part = np.sqrt(np.diag(self.alone) / np.diag(self.covariance))
+        return {i.parameter.name: float(x) for i, x in zip(self.intervals, part, strict=True)}
+
+
+def correlation_length(residual: FloatArray, determined: float, assumed: float) -> float:
+    """Correlation length of the residuals along a curve, part of its length [-].
+
+    The integral of their autocorrelation up to the first pair of lags with a negative sum (Geyer 1992, Statist. Sci. 7:473).
+    A fit takes part of the correlation away: with p parameters that the curve determines, lengths l of 0.02 to 0.2 of the
+    stroke are seen as l / (1 + p l) to 10 % (400 curves each), which is undone.  One curve tells it to a factor of 1.5, so that the
+    assumed length still counts, as a lognormal prior.
+
+    Args:
+        residual: Residuals on a uniform grid (n,).
+        determined: Number of parameters that the curve determines [-].
+        assumed: Correlation length before the residuals were seen, part of the length [-].
+    """
+    n = len(residual)
+    power = float(residual @ residual)
+    if not power > 0.0:
+        return assumed
+    acf = np.correlate(residual, residual, "full")[n - 1 :] / power
+    pairs = acf[: n // 2 * 2 : 2] + acf[1 : n // 2 * 2 : 2]
+    ends = np.flatnonzero(pairs <= 0.0)
+    last = int(ends[0]) if len(ends) else len(pairs)
+    seen = min(max((2.0 * float(pairs[:last].sum()) - 1.0) / n, 1.0 / n), LARGEST_CORRELATION)
+    alone = min(seen / max(1.0 - determined * seen, seen), LARGEST_CORRELATION)
+    trust = ASSUMED_SPREAD**2 / (ASSUMED_SPREAD**2 + SEEN_SPREAD**2)
+    return float(assumed ** (1.0 - trust) * alone**trust)
 
 
 def evidence(objective: Objective | JointObjective, best: Trial, jacobian: FloatArray) -> Evidence:
@@ -165,24 +187,25 @@ def evidence(objective: Objective | JointObjective, best: Trial, jacobian: Float
         jacobian: Derivative of its residual vector (k + p, p), prior rows last.
     """
     first, rows, lengths = 0, 0.0, []
-    parts: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+    weights, open_ended = [], []
     prior = objective.parameters.prior_jacobian()
     for trial, case in zip(best.each, objective.cases, strict=True):
         goal = case.objective
         part = slice(first, first + goal.data_rows)
         first = part.stop
-        slope, misses = jacobian[part], best.residual[part]
+        slope = jacobian[part]
         information = slope.T @ slope
         determined = float(np.trace(np.linalg.solve(information + prior.T @ prior, information)))
         points = goal.target.stroke.size
-        length = correlation_length(goal.curve_residual(trial.curve), determined)
+        length = correlation_length(goal.curve_residual(trial.curve), determined, goal.errors.correlation)
         weight = math.sqrt(1.0 / (length * goal.effective_points))
-        parts.append((weight * slope, weight * misses, weight * goal.unsearched()))
+        weights.append(np.full(goal.data_rows, weight))
+        open_ended.append(weight * goal.unsearched())
         rows += min(1.0 / length, points) + 1.0
         lengths.append(length)
-    unsearched = block_diag(*(u for _, _, u in parts))
-    slopes, misses = np.vstack([s for s, _, _ in parts]), np.concatenate([m for _, m, _ in parts])
-    return Evidence(slopes, misses, unsearched, rows, tuple(lengths))
+    scale = np.concatenate(weights)
+    slopes = scale[:, None] * jacobian[: len(scale)]
+    return Evidence(slopes, scale * best.residual[: len(scale)], block_diag(*open_ended), rows, scale, tuple(lengths))
 
 
 def uncertainty(parameters: ParameterSet, data: Evidence) -> Uncertainty:
@@ -200,12 +223,34 @@ def uncertainty(parameters: ParameterSet, data: Evidence) -> Uncertainty:
     reduced = float(data.residual @ data.residual) / freedom
     size = max(1.0, reduced)
     tails = float(student.ppf(0.5 + 0.5 * COVERED, freedom)) / Z95 if reduced > 1.0 else 1.0
-    widened = _marginal(data.jacobian, data.unsearched, size * tails**2)
-    covariance: FloatArray = np.asarray(np.linalg.inv(widened + own), dtype=np.float64)
+    widened = size * tails**2
+    marginal = _marginal(data.jacobian, data.unsearched, widened)
+    covariance: FloatArray = np.asarray(np.linalg.inv(marginal + own), dtype=np.float64)
     sd = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(sd, sd)
     intervals = tuple(_interval(q, z, s) for q, z, s in zip(parameters, parameters.start, sd, strict=True))
-    return Uncertainty(intervals, covariance, correlation, _ties(parameters.names, correlation), reduced, size)
+    beside = _beside(data, own, prior.T @ parameters.prior_residual(parameters.start), size)
+    ties = _ties(parameters.names, correlation)
+    alone: FloatArray = np.asarray(np.linalg.inv(information / widened + own), dtype=np.float64)
+    return Uncertainty(intervals, covariance, correlation, ties, reduced, widened, data, alone, beside)
+
+
+def _beside(data: Evidence, own: FloatArray, pull: FloatArray, size: float) -> tuple[tuple[float, float], ...]:
+    """Mean and standard deviation of each unsearched nuisance, in prior ones, with the parameters free beside it.
+
+    Args:
+        data: What the data say at the best values.
+        own: Information of the parameters' priors (p, p).
+        pull: Gradient of half their chi-square (p,).
+        size: Factor on the variance of the errors.
+    """
+    count = data.unsearched.shape[1]
+    slopes = np.hstack([data.jacobian, data.unsearched]) / math.sqrt(size)
+    information = slopes.T @ slopes + block_diag(own, np.eye(count))
+    gradient = slopes.T @ data.residual / math.sqrt(size) + np.append(pull, np.zeros(count))
+    inverse = np.linalg.inv(information)
+    mean, sd = -inverse @ gradient, np.sqrt(np.diag(inverse))
+    return tuple((float(m), float(d)) for m, d in zip(mean[len(pull) :], sd[len(pull) :], strict=True))
 
 
 def _marginal(jacobian: FloatArray, unsearched: FloatArray, size: float) -> FloatArray:

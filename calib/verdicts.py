@@ -8,6 +8,7 @@ from typing import Any
 
 from calib.checks import Check
 from calib.metrics import Metrics
+from calib.nuisance import OUTSIDE
 
 # Limits of a single in-sample calibration. Peak: the figure that published work quotes (CulinaryCut, "within 5 %").
 # Curve and shape: twice the target of a validated model (5 %), because absolute forces of the sensors that such traces
@@ -53,6 +54,17 @@ def _change(check: Check) -> Verdict:
     return Verdict(check.name, change, CHANGE_LIMIT, "fraction", change <= CHANGE_LIMIT, note)
 
 
+JUDGED = {"lag": "delay of the trace within its uncertainty", "gain": "sensor's gain within its uncertainty"}
+"""Nuisances that the validation hangs on, in words: a trace that asks for more of them than its sensor leaves open fails."""
+
+
+def _nuisance(name: str, n: Mapping[str, Any]) -> Verdict:
+    size = abs(n["value"]) / n["prior_sd"]
+    unit = "" if n["unit"] == "-" else f" {n['unit']}"
+    note = f"{name} {n['value']:+.2g} ± {n['sd']:.1g}{unit}, expected 0 ± {n['prior_sd']:.1g}{unit}"
+    return Verdict(JUDGED[name], size, OUTSIDE, "sd", not n["outside"], note)
+
+
 SPENT = {
     "parting": "parting the food",
     "friction": "friction",
@@ -96,6 +108,7 @@ def judge(
     energy: Mapping[str, float],
     parameters: Mapping[str, Mapping[str, Any]],
     checks: Sequence[Check] = (),
+    nuisances: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> list[Verdict]:
     """The verdict table of a calibration.
 
@@ -107,6 +120,7 @@ def judge(
         energy: Where the work of the cut has gone [J], by the names of :data:`mpm.record.ENERGIES`.
         parameters: Fitted parameters with their verdicts.
         checks: What numerical choices change; none were made where the fit was interrupted.
+        nuisances: What the fit says of the measurement: value, sd, prior_sd, unit and outside, by name.
 
     Returns:
         All lines; those with ``passed`` None were not run and decide nothing.
@@ -132,6 +146,7 @@ def judge(
     lines.append(_below("kinetic over internal energy", ke_over_ie, KINETIC_LIMIT))
     lines.append(_loss(energy))
     lines += [_change(c) for c in checks]
+    lines += [_nuisance(name, n) for name, n in (nuisances or {}).items() if name in JUDGED]
     on = [n for n, p in parameters.items() if p["verdict"] == "at_bound"]
     stuck = [n for n in on if n != SIZE and parameters[n]["value"] != NATURAL_LIMITS.get(n)]
     note = ", ".join(stuck + [f"{n} at its natural limit" for n in on if n not in stuck])
@@ -155,7 +170,7 @@ def limits(
         said.append(f"The trace is {label}, not a measurement: agreement with it says nothing about a real food.")
     said.append("All figures are in-sample: the same trace was fitted and compared. Nothing here is validated.")
     said += [f"{v.name}: failed; see the first page." for v in verdicts if v.passed is False]
-    unseen = [n for n, p in parameters.items() if p["verdict"] in ("not_seen", "weak")]
+    unseen = [n for n, p in parameters.items() if p["verdict"] in ("not_seen", "weak", "one_sided")]
     if unseen:
         said.append(
             f"The trace hardly sees {', '.join(unseen)}: these values are the literature's as much as the trace's."
@@ -178,7 +193,7 @@ def limits(
         "with little friction and by 10 to 20 % where a soft one flows or rubs hard (cutcal converge --material --offset 0.5 measures it)."
     )
     said.append(
-        "One grid was used; the discretisation error of the calibrated force was not measured in this run "
-        "(cutcal converge --material measures it)."
+        "One finer grid was tried, which gives a difference but neither an order nor an uncertainty (cutcal converge --material "
+        "measures both; calibrate --u-num takes them into the likelihood)."
     )
     return said

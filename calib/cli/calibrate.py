@@ -37,6 +37,11 @@ def add_args(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("--budget", type=number(0, 1e6, ""), default=100, help="largest number of simulations (default 100)")
     p.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
+    p.add_argument(
+        "--u-num",
+        metavar="DIR",
+        help="a cutcal converge study of this food and knife: its numerical uncertainty enters the likelihood",
+    )
     p.add_argument("--resume", action="store_true", help="go on with the run in --out; nothing is simulated twice")
     add_run(p)
 
@@ -52,6 +57,18 @@ def add_trace(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--speed", type=number(0, 10, "m/s"), metavar="M/S", help="knife speed, where the trace has no position"
     )
+    p.add_argument(
+        "--gain-sd",
+        type=number(0, 1, ""),
+        metavar="PART",
+        help="how well the sensor's gain is known (default 0.02; 0.15 for a wrench estimated from joint torques)",
+    )
+    p.add_argument(
+        "--lag-sd",
+        type=number(0, 1, "s"),
+        metavar="S",
+        help="how well the delay of the force against the position is known, besides the onset's own uncertainty",
+    )
     p.add_argument("--t-end", type=float, metavar="S", help="ignore the record after this time (board contact)")
 
 
@@ -64,7 +81,8 @@ def request_of(args: argparse.Namespace, command: Sequence[str]) -> Request:
     if args.workers < 1:
         raise CutcalError(f"--workers {args.workers}: at least 1")
     named = None if args.fit is None else tuple(n.strip() for n in args.fit.split(",") if n.strip())
-    return replace(measured(args, command), fit=named, budget=args.budget, workers=args.workers)
+    u_num = None if args.u_num is None else Path(args.u_num)
+    return replace(measured(args, command), fit=named, budget=args.budget, workers=args.workers, u_num=u_num)
 
 
 def measured(args: argparse.Namespace, command: Sequence[str]) -> Request:
@@ -87,6 +105,8 @@ def measured(args: argparse.Namespace, command: Sequence[str]) -> Request:
         knife=args.knife,
         speed=args.speed,
         t_end=args.t_end,
+        gain_sd=args.gain_sd,
+        lag_sd=args.lag_sd,
         sizing=sizing_of(args),
         dx=args.dx,
         seed=args.seed,

@@ -45,8 +45,7 @@ def test_whitening_is_the_inverse_root_of_the_covariance() -> None:
 def test_chi_square_is_the_least_over_the_nuisances() -> None:
     """The whitened chi-square equals the least one over all sizes of the nuisances, each paying for itself."""
     curve = cut()
-    given = nuisances(curve, Sensor(0.1, 0.01))
-    searched = [n for n in given if n.searched]
+    searched = given = nuisances(curve, Sensor(0.1, 0.01), scaled=True)
     whole, bare = goal(curve, given), goal(curve, ())
     simulated = np.interp(curve.stroke - 5e-4, curve.stroke, curve.curve) + 0.05
     columns = np.array([np.append(bare._weights * n.shape, n.peak / bare.sigma_peak) * n.sd for n in searched]).T
@@ -55,6 +54,8 @@ def test_chi_square_is_the_least_over_the_nuisances() -> None:
     least = np.linalg.lstsq(system, np.concatenate([rows, np.zeros(len(searched))]), rcond=None)[1][0]
     assert float(np.sum(whole.data_residual(simulated)[:-1] ** 2)) == pytest.approx(least, rel=1e-9)
     assert least < 0.7 * float(rows @ rows)
+    unsearched = goal(curve, nuisances(curve, Sensor(0.1, 0.01)))
+    assert unsearched.data_residual(simulated)[:-1] == pytest.approx(rows)
 
 
 @pytest.mark.parametrize(
@@ -79,11 +80,11 @@ def test_a_gain_beyond_three_of_its_prior_is_outside() -> None:
         assert found.outside is outside
 
 
-def test_the_gain_is_not_searched_unless_it_is_the_width_of_a_specimen() -> None:
-    """Nothing may make a force look right: the search sees the gain only where a joint fit has a factor for each specimen."""
+def test_a_single_trace_is_searched_as_it_is() -> None:
+    """Nothing may make a force look right: the search is free to use them only where specimens share their flesh."""
     curve = cut()
-    assert [n.name for n in nuisances(curve, Sensor()) if not n.searched] == ["gain"]
-    scaled = nuisances(curve, Sensor(0.15), scale_sd=0.2)
+    assert not any(n.searched for n in nuisances(curve, Sensor(), width_sd=0.2))
+    scaled = nuisances(curve, Sensor(0.15), width_sd=0.2, scaled=True)
     assert all(n.searched for n in scaled) and scaled[-1].name == "scale"
     assert scaled[-1].sd == pytest.approx(0.25)
     half = goal(curve, nuisances(curve, Sensor(10e-9))).data_residual(0.5 * curve.curve)

@@ -26,9 +26,9 @@ from calib.metrics import compare
 from calib.nulls import null_models
 from calib.outputs import prepare, write_json
 from calib.pool import DIED, Pool, SceneEvaluator
+from calib.preparation import fit_parameters
 from calib.provenance import code_key, key_of, versions
 from calib.scenes import Sizing, cut_scene, elsewhere, height_range, place, specimen
-from calib.study import fit_parameters
 from calib.trace import Trace
 from calib.verdicts import judge, limits
 from mpm.errors import SimulationError

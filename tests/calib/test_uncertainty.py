@@ -26,7 +26,7 @@ def parameters(count: int = 3, value: float = 1.0) -> ParameterSet:
 def data_of(rows: np.ndarray, residual: np.ndarray, effective: float) -> Evidence:
     """The data rows of a Jacobian and a residual whose last rows are those of the priors, nothing left open."""
     p = rows.shape[1]
-    return Evidence(rows[:-p], residual[:-p], np.zeros((len(rows) - p, 0)), effective)
+    return Evidence(rows[:-p], residual[:-p], np.zeros((len(rows) - p, 0)), effective, np.ones(len(rows) - p))
 
 
 def linear_fit(random: np.random.Generator, noise: float) -> tuple[np.ndarray, Uncertainty]:
@@ -146,18 +146,18 @@ def test_correlation_length_is_found_in_what_a_fit_leaves(length: float) -> None
     found = []
     for _ in range(100):
         noise = correlated_noise(random, length)
-        found.append(correlation_length(noise - basis @ np.linalg.lstsq(basis, noise, rcond=None)[0], 5.0))
+        found.append(correlation_length(noise - basis @ np.linalg.lstsq(basis, noise, rcond=None)[0], 5.0, length))
     assert np.median(found) == pytest.approx(length, rel=1 / 6)
 
 
 def test_a_residual_of_one_sign_is_no_independent_noise() -> None:
-    """A constant residual counts as two points at most, a vanishing one as all of them."""
-    assert correlation_length(np.ones(240), 0.0) == 0.5
-    assert correlation_length(np.zeros(240), 3.0) == pytest.approx(1 / 240)
+    """A constant residual is drawn from the assumed length far towards its own, half the stroke; a vanishing one says nothing."""
+    assert correlation_length(np.ones(240), 0.0, 0.05) == pytest.approx(0.05 * 10.0 ** (0.25 / 0.41))
+    assert correlation_length(np.zeros(240), 3.0, 0.05) == 0.05
 
 
 def test_a_nuisance_that_was_not_searched_widens_the_interval() -> None:
     """Force in proportion to one parameter, known to 1/10, and a gain known to 1/3: variances add, as 1/100 + 1/9."""
     rows, gain = np.full((100, 1), 1.0), np.full((100, 1), 1.0 / 3.0)
-    wide = uncertainty(parameters(1), Evidence(rows, np.zeros(100), gain, 100.0)).intervals[0]
+    wide = uncertainty(parameters(1), Evidence(rows, np.zeros(100), gain, 100.0, np.ones(100))).intervals[0]
     assert wide.width == pytest.approx((1.0 + 1.0 / (1 / 100 + 1 / 9)) ** -0.5)

@@ -1,0 +1,209 @@
+"""Profile likelihoods on the surrogate: intervals that follow the curvature of chi-square, and what the trace alone bounds.
+
+Along each parameter the others are fitted anew, each step from the last one's optimum:
+
+    P_i(v) = min over the others of  chi2_data(z) / s + chi2_prior(z),   z_i = v
+
+The 95 % interval is where P_i has risen by 3.84 (Venzon & Moolgavkar 1988, Appl. Statist. 37:87), more where the size of the
+errors is estimated.  The same profile without the parameter's own prior says what the *trace* bounds: both sides, one, or none
+(Raue et al. 2009, Bioinformatics 25:1923: identifiable, practically non-identifiable).  That part of the rise which the noise of
+the runs feigns is taken off, as the normal approximation's Jacobian is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import least_squares
+
+from calib.nuisance import Whitening
+from calib.parameters import Z95, ParameterSet
+from calib.surrogate import Surrogate
+from calib.uncertainty import IDENTIFIED, NOT_SEEN, Interval, Uncertainty, Verdict
+
+FloatArray = npt.NDArray[np.float64]
+
+RISE = Z95**2
+"""Rise of chi-square at the ends of a 95 % interval: 3.84."""
+STEPS = 4
+"""Steps to a half width of the normal approximation."""
+LONGEST = 6
+"""Half widths of the normal approximation after which a profile that has not risen is flat."""
+EVALUATIONS = 12
+"""Evaluations of the surrogate with which the others follow a step."""
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """One parameter's profile.
+
+    Attributes:
+        name: The parameter.
+        z: Internal coordinates along it (k,), rising.
+        rise: Rise of the whole chi-square above its least (k,).
+        data: Rise without the parameter's own prior (k,).
+    """
+
+    name: str
+    z: FloatArray
+    rise: FloatArray
+    data: FloatArray
+
+    def end(self, side: int, rise: FloatArray) -> float | None:
+        """Internal coordinate where ``rise`` reaches :data:`RISE` below (-1) or above (+1) the best value, None if never."""
+        best = int(np.argmin(np.abs(self.z - self.best)))
+        order = range(best, -1, -1) if side < 0 else range(best, len(self.z))
+        last = None
+        for k in order:
+            if last is not None and rise[k] >= RISE > rise[last]:
+                part = (math.sqrt(RISE) - _root(rise[last])) / (_root(rise[k]) - _root(rise[last]))
+                return float(self.z[last] + part * (self.z[k] - self.z[last]))
+            last = k
+        return None
+
+    @property
+    def best(self) -> float:
+        """Internal coordinate of the best value."""
+        return float(self.z[int(np.argmin(self.rise))])
+
+
+def _root(rise: float) -> float:
+    """Root of a rise, in which a parabola is a straight line."""
+    return math.sqrt(max(rise, 0.0))
+
+
+def profiles(surrogate: Surrogate, parameters: ParameterSet, found: Uncertainty) -> tuple[Profile, ...]:
+    """Profile of each parameter about the best values.
+
+    Args:
+        surrogate: The process of the fit.
+        parameters: The parameters with their best values.
+        found: Their normal approximation: size of the errors, step of the profile.
+    """
+    return tuple(_Walker(surrogate, parameters, found, i).profile() for i in range(len(parameters)))
+
+
+class _Walker:
+    """Walks along one parameter with the others following."""
+
+    def __init__(self, surrogate: Surrogate, parameters: ParameterSet, found: Uncertainty, i: int) -> None:
+        self.surrogate, self.parameters, self.found, self.i = surrogate, parameters, found, i
+        self.others = np.array([k != i for k in range(len(parameters))])
+        self.p = len(parameters)
+        self.low, self.high = parameters.lower, parameters.upper
+        self.weights = found.data.weights / math.sqrt(found.widened)
+        self.whiten = Whitening(found.data.unsearched / math.sqrt(found.widened))
+
+    def rows(self, z: FloatArray) -> FloatArray:
+        """Rows of data and priors, the data's weighted, widened and marginal as in the normal approximation."""
+        rows = self.surrogate.residual(z)
+        return np.concatenate([self.whiten(self.weights * rows[: -self.p]), rows[-self.p :]])
+
+    def follow(self, z: FloatArray) -> FloatArray:
+        """The others' optimum from ``z`` with this parameter held."""
+        if not self.others.any():
+            return z
+
+        def rows(free: FloatArray) -> FloatArray:
+            whole = z.copy()
+            whole[self.others] = free
+            return self.rows(whole)
+
+        low, high = self.low[self.others], self.high[self.others]
+        edge = 1e-9 * self.surrogate.unit[self.others]
+        start = np.clip(z[self.others], low, high)
+        scale = self.surrogate.unit[self.others]
+        bounds = (low - edge, high + edge)
+        solved = least_squares(rows, start, bounds=bounds, x_scale=scale, max_nfev=EVALUATIONS)
+        out = z.copy()
+        out[self.others] = np.clip(solved.x, low, high)
+        return out
+
+    def profile(self) -> Profile:
+        """Both sides from the best values."""
+        start = self.follow(self.parameters.start)
+        points, costs = [start], [self.cost(start)]
+        sd = math.sqrt(self.found.covariance[self.i, self.i])
+        for side in (-1.0, 1.0):
+            z = start
+            for k in range(1, LONGEST * STEPS + 1):
+                v = float(start[self.i] + side * k * Z95 * sd / STEPS)
+                v = min(max(v, float(self.low[self.i])), float(self.high[self.i]))
+                if v == z[self.i]:
+                    break
+                z = z.copy()
+                z[self.i] = v
+                z = self.follow(z)
+                points.append(z)
+                costs.append(self.cost(z))
+                if costs[-1][1] - costs[0][1] > 2.0 * RISE:
+                    break
+        order = np.argsort([z[self.i] for z in points])
+        along = np.array([points[k][self.i] for k in order])
+        whole, alone = (np.array([costs[k][j] for k in order]) for j in (0, 1))
+        share = self.share()
+        prior = (along - self.parameters.prior_mean[self.i]) ** 2 / self.parameters.prior_sd[self.i] ** 2
+        alone = (alone - alone.min()) * share
+        whole = np.maximum(alone + prior - (alone + prior).min(), 0.0)
+        return Profile(self.parameters.names[self.i], along, whole, alone)
+
+    def cost(self, z: FloatArray) -> tuple[float, float]:
+        """Chi-square with all priors, and without this parameter's own."""
+        rows = self.rows(z)
+        whole = float(rows @ rows)
+        return whole, whole - float(rows[self.i - self.p]) ** 2
+
+    def share(self) -> float:
+        """Part of the data's rise that is not feigned by the noise of the runs [-], 0 to 1: that of the curvatures."""
+        raw = np.array(
+            [self.rows(self.parameters.start + d) - self.rows(self.parameters.start - d) for d in self.steps]
+        )
+        raw = raw.T / (2.0 * np.diag(self.steps))
+        own = self.parameters.prior_jacobian()
+        naive = np.linalg.inv(raw.T @ raw)[self.i, self.i]
+        pull = float(own[self.i, self.i]) ** 2
+        bare, kept = 1.0 / naive - pull, 1.0 / self.found.covariance[self.i, self.i] - pull
+        return min(max(kept / bare, 0.0), 1.0) if bare > 0.0 else 1.0
+
+    @property
+    def steps(self) -> FloatArray:
+        """Small steps along each parameter (p, p), diagonal."""
+        return np.diag(1e-3 * self.surrogate.unit)
+
+
+def with_profiles(found: Uncertainty, walked: Sequence[Profile]) -> Uncertainty:
+    """The same uncertainty with the intervals and verdicts of the profiles.
+
+    A parameter is ``identified`` where the trace bounds it on both sides and its interval is narrower than half the prior's,
+    ``weak`` where it is wider, ``one_sided`` where the trace bounds one side and leaves the other to the prior or to what is
+    possible, and ``not_seen`` where it bounds neither.
+    """
+    return replace(found, intervals=tuple(_interval(i, p) for i, p in zip(found.intervals, walked, strict=True)))
+
+
+def _interval(interval: Interval, profile: Profile) -> Interval:
+    parameter = interval.parameter
+    low, high = parameter.to_internal(parameter.low), parameter.to_internal(parameter.high)
+    ends = [profile.end(side, profile.rise) for side in (-1, 1)]
+    bottom, top = (low if ends[0] is None else ends[0]), (high if ends[1] is None else ends[1])
+    bounded = [profile.end(side, profile.data) is not None for side in (-1, 1)]
+    width = (top - bottom) / (2.0 * Z95 * parameter.prior_sd)
+    verdict: Verdict = "not_seen"
+    if all(bounded) and width <= NOT_SEEN:
+        verdict = "identified" if width < IDENTIFIED else "weak"
+    elif any(bounded):
+        verdict = "one_sided"
+    if interval.verdict == "at_bound":
+        verdict = "at_bound"
+    return replace(
+        interval,
+        low95=parameter.from_internal(bottom),
+        high95=parameter.from_internal(top),
+        clipped=None in ends,
+        width=width,
+        verdict=verdict,
+    )
