@@ -10,7 +10,6 @@ from calib.pool import Pool
 from calib.provenance import code_key
 from calib.scenes import elsewhere
 from calib.store import EvaluationStore, content_key
-from mpm.record import ForceRecord
 from mpm.scene import Scene
 
 
@@ -58,12 +57,13 @@ class Check:
         return asdict(self)
 
 
-def check(scene: Scene, record: ForceRecord, pool: Pool, store: EvaluationStore) -> list[Check]:
+def check(scene: Scene, peak: float, work: float, pool: Pool, store: EvaluationStore) -> list[Check]:
     """Simulate the variants of a scene; what the store knows is not simulated again.
 
     Args:
         scene: The scene with its calibrated material.
-        record: Its record.
+        peak: Its peak force [N].
+        work: Its work [J].
         pool: Where they run.
         store: Where they are kept.
     """
@@ -78,9 +78,8 @@ def check(scene: Scene, record: ForceRecord, pool: Pool, store: EvaluationStore)
     out = []
     for k, name in enumerate(VARIANTS):
         run = found[k]
-        if run.ok and record.peak > 0 and record.work > 0:
-            peak, work = (run.scalars[key] / own - 1 for key, own in (("peak_N", record.peak), ("work_J", record.work)))
-            out.append(Check(name, None, peak, work))
+        if run.ok and peak > 0 and work > 0:
+            out.append(Check(name, None, run.scalars["peak_N"] / peak - 1, run.scalars["work_J"] / work - 1))
         else:
             out.append(Check(name, run.reason or "no force", None, None))
     return out

@@ -54,9 +54,9 @@ def bands(surrogate: Surrogate, z: FloatArray, found: Uncertainty, seed: int = 0
     out = []
     for process, case, length in zip(surrogate.each, surrogate.objective.cases, found.data.lengths, strict=True):
         goal = case.objective
-        errors = _errors(goal, length, math.sqrt(found.widened), len(drawn), random)
+        added = errors(goal, length, math.sqrt(found.widened), len(drawn), random)
         curves = []
-        for point, error in zip(drawn, errors, strict=True):
+        for point, error in zip(drawn, added, strict=True):
             curve, sd, _ = process.predict(point[case.index])
             curves.append(curve + sd * float(random.standard_normal()) + error)
         out.append(band_of(np.array(curves), goal.target.curve))
@@ -90,16 +90,23 @@ def _materials(surrogate: Surrogate, z: FloatArray, found: Uncertainty, random: 
     return chosen
 
 
-def _errors(goal: Objective, length: float, widened: float, count: int, random: np.random.Generator) -> FloatArray:
-    """Errors of the model and the measurement [N] (count, n)."""
+def errors(goal: Objective, length: float, widened: float, count: int, random: np.random.Generator) -> FloatArray:
+    """Errors of the model and the measurement [N] (count, n).
+
+    Args:
+        goal: The objective of a trace.
+        length: Correlation length of the model's errors, part of the stroke [-].
+        widened: Their standard deviation over the stated one [-].
+        count: How many.
+        random: Source of randomness.
+    """
     n = goal.target.stroke.size
     parts = np.linspace(0.0, 1.0, n)
     kernel = np.exp(-math.pi * ((parts[:, None] - parts) / length) ** 2) + JITTER * np.eye(n)
     values, vectors = np.linalg.eigh(kernel)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    errors = widened * goal.sigmas * (random.standard_normal((count, n)) @ root.T)
+    out: FloatArray = widened * goal.sigmas * (random.standard_normal((count, n)) @ root.T)
     for nuisance in goal.nuisances:
         if nuisance.name in ("tare", "drift", "lag"):
-            errors += nuisance.sd * random.standard_normal((count, 1)) * nuisance.shape
-    out: FloatArray = errors
+            out += nuisance.sd * random.standard_normal((count, 1)) * nuisance.shape
     return out

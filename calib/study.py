@@ -88,7 +88,7 @@ def run(
             say(
                 "simulating them at half the speed, with the grid and the particles elsewhere, and on cells of two thirds"
             )
-            checks = check(scene, record, pool, store)
+            checks = check(scene, record.peak, record.work, pool, store)
     add_conditioning(out / "evaluations.h5", setup.curve)
     return _write(request, setup, result, record, checks, start, out, time.monotonic() - began)
 

@@ -23,6 +23,7 @@ position_m, ...); robot logs with base_Fz_N and ee_z_m are known."""
 EPILOG = """examples:
   calibrate --food banana --trace force_data/banana_reconstructed.csv
   calibrate --food potato --trace cut.csv --air air.csv --knife edc --out runs/potato
+  calibrate --config potatoes.yaml --out runs/potatoes
 
 Ctrl-C keeps what was computed; the same command with --resume goes on.
 Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass."""
@@ -30,12 +31,19 @@ Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass."
 
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
-    add_food(p)
-    add_trace(p)
+    add_food(p, required=False)
+    add_trace(p, required=False)
+    p.add_argument(
+        "--config",
+        metavar="YAML",
+        help="fit several cuts of one food together, some held out; in place of --food, --trace and their options",
+    )
     p.add_argument(
         "--fit", metavar="NAMES", help="properties to fit, e.g. E,nu,R,mu (default: those that cutting sees)"
     )
-    p.add_argument("--budget", type=number(0, 1e6, ""), default=100, help="largest number of simulations (default 100)")
+    p.add_argument(
+        "--budget", type=number(0, 1e6, ""), help="largest number of simulations (default 100, of each trace)"
+    )
     p.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
     p.add_argument(
         "--u-num",
@@ -46,9 +54,9 @@ def add_args(p: argparse.ArgumentParser) -> None:
     add_run(p)
 
 
-def add_trace(p: argparse.ArgumentParser) -> None:
+def add_trace(p: argparse.ArgumentParser, *, required: bool = True) -> None:
     """Options that say what was measured."""
-    p.add_argument("--trace", required=True, metavar="CSV", help="record of the cut")
+    p.add_argument("--trace", required=required, metavar="CSV", help="record of the cut")
     p.add_argument("--air", metavar="CSV", help="the same motion without food, subtracted at equal time")
     p.add_argument("--time-col", metavar="NAME", help="column of the time")
     p.add_argument("--force-col", metavar="NAME", help="column of the force on the knife")
@@ -72,6 +80,10 @@ def add_trace(p: argparse.ArgumentParser) -> None:
     p.add_argument("--t-end", type=float, metavar="S", help="ignore the record after this time (board contact)")
 
 
+BUDGET = 100.0
+"""Simulations that a calibration on one trace may take."""
+
+
 def request_of(args: argparse.Namespace, command: Sequence[str]) -> Request:
     """The request that the options make.
 
@@ -82,7 +94,7 @@ def request_of(args: argparse.Namespace, command: Sequence[str]) -> Request:
         raise CutcalError(f"--workers {args.workers}: at least 1")
     named = None if args.fit is None else tuple(n.strip() for n in args.fit.split(",") if n.strip())
     u_num = None if args.u_num is None else Path(args.u_num)
-    return replace(measured(args, command), fit=named, budget=args.budget, workers=args.workers, u_num=u_num)
+    return replace(measured(args, command), fit=named, budget=args.budget or BUDGET, workers=args.workers, u_num=u_num)
 
 
 def measured(args: argparse.Namespace, command: Sequence[str]) -> Request:
@@ -120,6 +132,11 @@ def run(args: argparse.Namespace) -> int:
     from calib.study import run as calibrate
 
     command = ["calibrate", *(a for a in sys.argv[1:] if a != "calibrate")]
+    if args.config is not None:
+        return run_study(args, command)
+    missing = [f"--{name}" for name in ("food", "trace") if getattr(args, name) is None]
+    if missing:
+        raise CutcalError(f"{' and '.join(missing)} missing: name the food and its trace, or a study with --config")
     request = request_of(args, command)
     out = Path(args.out or f"cutcal-{request.food.name}-{request.trace.stem}")
 
@@ -133,6 +150,53 @@ def run(args: argparse.Namespace) -> int:
     else:
         print(verdict_text(summary, out))
     return 0 if summary["passed"] else 2
+
+
+def run_study(args: argparse.Namespace, command: Sequence[str]) -> int:
+    """Fit and predict the cuts of a study; prints its table, or the summary as JSON."""
+    from calib.config import overridden, read_study
+    from calib.several import run as study_run
+
+    taken = [n for n in ("food", "trace", "air", "material", "fit") if getattr(args, n) is not None]
+    if taken:
+        raise CutcalError(f"--{taken[0]} beside --config: write it into {args.config}, where it belongs to a trace")
+    read = read_study(args.config)
+    study = overridden(read, budget=args.budget, workers=args.workers, arch=args.arch, command=tuple(command))
+    out = Path(args.out or f"cutcal-{Path(args.config).stem}")
+
+    def say(text: str) -> None:
+        print(f"note: {text}", file=sys.stderr, flush=True)
+
+    with ProgressBar() as bar:
+        summary = study_run(study, out, resume=args.resume, progress=bar, say=say)
+    if args.json:
+        print((out / "summary.json").read_text(encoding="utf-8"), end="")
+    else:
+        print(study_text(summary, out))
+    return 0 if summary["passed"] else 2
+
+
+def study_text(summary: dict[str, Any], out: Path) -> str:
+    """What the terminal shows at the end of a study."""
+    lines = [f"  {'':24s}{'peak':>8s}{'NRMSE':>8s}{'shape':>8s}{'R':>7s}{'in band':>9s}{'factor':>8s}"]
+    kinds = (("in-sample", summary["traces"]), ("held out", summary["hold_out"]))
+    for words, group in kinds:
+        for name, t in group.items():
+            m, inside = t["metrics"], t["predictive_inside"]
+            within = "" if inside is None else f"{inside:.0%}"
+            lines.append(
+                f"  {'pass' if t['passed'] else 'FAIL'}  {name + ', ' + words:18s}{m['peak_error']:+8.1%}{m['nrmse']:8.3f}"
+                f"{m['shape_error']:8.3f}{m['iso18571']['R']:7.3f}{within:>9s}{t['factor']:8.3g}"
+            )
+    lines.append(f"  {'fitted':24s}{'value':>10s} {'':6s}{'95 % interval':>24s}")
+    for name, p in summary["parameters"].items():
+        interval = "" if p["low95"] is None else f"{p['low95']:.3g} to {p['high95']:.3g}"
+        lines.append(f"  {name:24s}{p['value']:>10.4g} {p['unit']:6s}{interval:>24s}  {p['verdict']}")
+    head = (
+        f"{summary['food']}, {summary['study']}: {'passed' if summary['passed'] else 'not passed'}; "
+        f"{summary['simulations']} simulations in {summary['wall_s']:.0f} s"
+    )
+    return "\n".join([head, *lines, f"  wrote {out}"])
 
 
 def verdict_text(summary: dict[str, Any], out: Path) -> str:

@@ -41,9 +41,9 @@ def numbers(low: float, high: float, unit: str) -> Callable[[str], tuple[float, 
     return convert
 
 
-def add_food(p: argparse.ArgumentParser, *, cell: bool = True) -> None:
+def add_food(p: argparse.ArgumentParser, *, cell: bool = True, required: bool = True) -> None:
     """Options that say what is cut with what."""
-    p.add_argument("--food", required=True, metavar="NAME", help="food of materials.yaml (cutcal foods lists them)")
+    p.add_argument("--food", required=required, metavar="NAME", help="food of materials.yaml (cutcal foods lists them)")
     p.add_argument(
         "--material", metavar="YAML", help="take the food from this file, e.g. a calibration's material.yaml"
     )

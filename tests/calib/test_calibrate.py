@@ -57,12 +57,13 @@ def finished(killed: tuple[Path, list[bytes]]) -> tuple[Path, int]:
 
 
 def test_numerical_choices_are_checked(finished):
-    """The best values run again at half the speed and elsewhere on the grid, in lines of the verdict; resuming runs neither."""
+    """The best values run again at half the speed, elsewhere on the grid and on a finer one, in lines of the verdict; resuming runs none."""
     out, _ = finished
     summary = json.loads((out / "summary.json").read_text())
     assert [c["name"] for c in summary["numerical_checks"]] == [
         "half the simulated speed",
         "grid and particles elsewhere",
+        "cells of two thirds",
     ]
     for one in summary["numerical_checks"]:
         line = next(v for v in summary["verdicts"] if v["name"] == one["name"])

@@ -1,0 +1,188 @@
+"""A held-out cut predicted with the flesh of the others.
+
+Fitted to it is only what its own specimen has for itself: its skin, its size, one factor for width and sensor.  The band comes
+from simulating materials drawn from the posterior of the flesh, each with its own factor, and from errors of the size and
+correlation that the fit of the others showed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib.filters import filter_simulated
+from calib.fit import FitOptions, calibrate
+from calib.metrics import Metrics, compare
+from calib.nulls import null_models
+from calib.objective import Objective
+from calib.parameters import ParameterSet
+from calib.prediction import NRMSE_LIMIT, RATING_LIMIT
+from calib.predictive import Band, band_of, errors
+from calib.specimens import Fitted, Specimens, factor
+from mpm.errors import SimulationError
+
+FloatArray = np.ndarray
+
+BUDGET = 40.0
+"""Simulations at most for the few parameters of a specimen."""
+DESIGN = 5
+DRAWS = 16
+"""Materials of the posterior that are simulated for the band; errors are drawn for each a hundred times."""
+REPEATED = 100
+INSIDE_LIMIT = 0.90
+"""Least part of the measured points within their 95 % band."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """A held-out cut and what was predicted of it.
+
+    Attributes:
+        name: The trace.
+        trained: Traces whose flesh it is predicted with.
+        curve: Predicted force with the specimen's factor [N] (n,).
+        values: All values [SI] of the simulation by property.
+        fitted: Those of them that are the specimen's own.
+        factor: That factor [-].
+        metrics: Prediction against the measured curve.
+        nulls: Curves that explain nothing against it, by name.
+        band: 95 % band.
+        simulations: Number of simulations.
+    """
+
+    name: str
+    trained: tuple[str, ...]
+    curve: FloatArray
+    values: dict[str, float]
+    fitted: tuple[str, ...]
+    factor: float
+    metrics: Metrics
+    nulls: dict[str, Metrics]
+    band: Band
+    simulations: int
+
+    @property
+    def passed(self) -> bool:
+        """Whether curve, rating and band are within their limits."""
+        m = self.metrics
+        return m.nrmse <= NRMSE_LIMIT and m.iso18571.R >= RATING_LIMIT and self.band.inside >= INSIDE_LIMIT
+
+    @property
+    def beaten(self) -> tuple[str, ...]:
+        """Null models that the prediction beats in both rating and shape."""
+        m = self.metrics
+        return tuple(n for n, x in self.nulls.items() if m.iso18571.R > x.iso18571.R and m.shape_error < x.shape_error)
+
+    def as_dict(self) -> dict[str, object]:
+        """Plain data."""
+        return {
+            "trained_on": list(self.trained),
+            "passed": self.passed,
+            "metrics": self.metrics.as_dict(),
+            "factor": self.factor,
+            "fitted": {n: self.values[n] for n in self.fitted},
+            "predictive_inside": self.band.inside,
+            "limits": {"nrmse": NRMSE_LIMIT, "rating": RATING_LIMIT, "inside": INSIDE_LIMIT},
+            "null_models": {
+                n: {"nrmse": x.nrmse, "shape_error": x.shape_error, "R": x.iso18571.R} for n, x in self.nulls.items()
+            },
+            "beats": list(self.beaten),
+            "simulations": self.simulations,
+        }
+
+
+def predict(specimens: Specimens, fitted: Fitted, name: str) -> Prediction:
+    """Predict the cut of a trace that the fit has not seen.
+
+    Raises:
+        CutcalError: No simulation of it reached the end of its stroke.
+    """
+    setup = specimens.setups[name]
+    goal = setup.objective
+    best, count = _specimen(specimens, fitted.flesh(), name)
+    values = {**fitted.flesh(), **best}
+    drawn = _drawn(fitted, specimens.study.seed)
+    curves = [_curve(specimens, name, v) for v in [values, *({**flesh, **best} for flesh in drawn)]]
+    own_curve = curves[0]
+    if own_curve is None:
+        raise SimulationError(
+            f"{name}: the predicted cut did not reach the end of its stroke with {values}; give its height if you measured it",
+            reason="held out",
+            fraction=0.0,
+        )
+    k = factor(goal, own_curve)
+    real, stroke = goal.target.curve, goal.target.stroke
+    nulls = {n: m.metrics for n, m in null_models(stroke, real).items()}
+    nulls |= {"mean of the others": compare(stroke, real, _mean(specimens, fitted.names, name))}
+    return Prediction(
+        name=name,
+        trained=fitted.names,
+        curve=k * own_curve,
+        values=values,
+        fitted=tuple(best),
+        factor=k,
+        metrics=compare(stroke, real, k * own_curve),
+        nulls=nulls,
+        band=_band(goal, [c for c in curves if c is not None], fitted, specimens.study.seed),
+        simulations=count + len(curves),
+    )
+
+
+def _specimen(specimens: Specimens, flesh: Mapping[str, float], name: str) -> tuple[dict[str, float], int]:
+    """The specimen's own values with the flesh held, and the number of simulations that it took."""
+    setup, chosen = specimens.setups[name], specimens.own_parameters(name)
+    if not chosen:
+        return {}, 0
+    goal = replace(setup.objective, parameters=ParameterSet(chosen))
+    fine, coarse = (
+        specimens.evaluator(scene.with_material(**flesh), name, fidelity)
+        for fidelity, scene in (("fine", setup.fine), ("coarse", setup.coarse))
+    )
+    options = FitOptions(budget=BUDGET, batch=specimens.pool.workers, design=DESIGN, seed=specimens.study.seed)
+    result = calibrate(
+        goal, fine, coarse=coarse, options=options, progress=specimens.staged(f"specimen of {name}, held out")
+    )
+    if result.status == "interrupted":
+        raise KeyboardInterrupt
+    return dict(result.best.evaluation.parameters), len(result.history)
+
+
+def _curve(specimens: Specimens, name: str, values: Mapping[str, float]) -> FloatArray | None:
+    """Smoothed force of a simulation on the trace's stroke [N]; None where it broke down."""
+    setup = specimens.setups[name]
+    evaluation = next(iter(specimens.evaluator(setup.fine, name, "fine").evaluate([dict(values)])))
+    if not evaluation.ok:
+        return None
+    return filter_simulated(setup.curve.stroke, evaluation.stroke, evaluation.force)
+
+
+def _drawn(fitted: Fitted, seed: int) -> list[dict[str, float]]:
+    """Materials from the normal approximation of the posterior of the flesh."""
+    if fitted.doubt is None:
+        return []
+    random = np.random.default_rng(seed)
+    root = np.linalg.cholesky(fitted.doubt.uncertainty.covariance)
+    z = fitted.result.best.z
+    parameters = fitted.objective.parameters
+    return [fitted.flesh(parameters.clip(z + root @ random.standard_normal(len(z)))) for _ in range(DRAWS)]
+
+
+def _mean(specimens: Specimens, names: tuple[str, ...], held: str) -> FloatArray:
+    """Mean of the other traces' curves over their own peaks and strokes, scaled to the held-out one [N]."""
+    curves = [specimens.setups[n].curve.curve for n in names]
+    mean = np.mean([c / c.max() for c in curves], axis=0)
+    real = specimens.setups[held].curve.curve
+    out: FloatArray = mean * float(mean @ real) / float(mean @ mean)
+    return out
+
+
+def _band(goal: Objective, curves: list[FloatArray], fitted: Fitted, seed: int) -> Band:
+    """Band of the simulated curves, each with its own factor, and of errors as the fit showed them."""
+    random = np.random.default_rng(seed)
+    doubt = fitted.doubt
+    widened = 1.0 if doubt is None else float(np.sqrt(doubt.uncertainty.widened))
+    length = goal.errors.correlation if doubt is None else float(np.mean(doubt.uncertainty.data.lengths))
+    drawn = [factor(goal, c) * c + error for c in curves for error in errors(goal, length, widened, REPEATED, random)]
+    return band_of(np.array(drawn), goal.target.curve)
