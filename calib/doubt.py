@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from threadpoolctl import threadpool_limits
+
 from calib.fit import FitResult
 from calib.joint import JointObjective
 from calib.nuisance import NuisanceEstimate
@@ -40,9 +42,10 @@ def doubt_of(objective: Objective | JointObjective, result: FitResult, seed: int
     """
     if result.jacobian is None or result.surrogate is None:
         return None
-    found = uncertainty(result.parameters, evidence(objective, result.best, result.jacobian))
-    walked = profiles(result.surrogate, result.parameters, found)
-    drawn = bands(result.surrogate, result.best.z, found, seed)
+    with threadpool_limits(1, "blas"):
+        found = uncertainty(result.parameters, evidence(objective, result.best, result.jacobian))
+        walked = profiles(result.surrogate, result.parameters, found)
+        drawn = bands(result.surrogate, result.best.z, found, seed)
     return Doubt(with_profiles(found, walked), walked, _nuisances(objective, result, found), drawn)
 
 

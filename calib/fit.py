@@ -33,6 +33,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize_scalar
 from scipy.stats import chi2, qmc
+from threadpoolctl import threadpool_limits
 
 from calib.errors import MaterialError
 from calib.joint import JointObjective, residual
@@ -184,13 +185,16 @@ def calibrate(
     options = FitOptions() if options is None else options
     options.check(len(objective.parameters))
     search = _Search(objective, evaluator, coarse, options, progress)
-    try:
-        status = search.run()
-    except KeyboardInterrupt:
-        if not search.finished:
-            raise
-        status = "interrupted"
-    return search.result(status)
+    with threadpool_limits(
+        1, "blas"
+    ):  # the workers have the cores, and sums in another order would ask for other points
+        try:
+            status = search.run()
+        except KeyboardInterrupt:
+            if not search.finished:
+                raise
+            status = "interrupted"
+        return search.result(status)
 
 
 class _Search:

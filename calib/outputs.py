@@ -20,6 +20,8 @@ MARKS = (
     "stress.json",
     "verify.json",
     "compress.json",
+    "coverage.json",
+    "coverage.jsonl",
     "report.pdf",
     "force.csv",
     "evaluations.h5",

@@ -101,7 +101,7 @@ def set_up(request: Request) -> Setup:
     given = nuisances(curve, sensor, width_sd=width_sd, scaled=request.scaled)
     heights = height_range(food, curve, request.sizing)
     names = request.fit or (food.default_fit if heights is None else (*food.default_fit, "height"))
-    objective = Objective(target, fit_parameters(food, names, heights), nuisances=given)
+    objective = Objective(target, fit_parameters(food, names, heights), request.errors, given)
     return Setup(curve, fine, coarse, objective, assumed, request.sizing.kept, air_sha256)
 
 

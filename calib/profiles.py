@@ -33,6 +33,8 @@ STEPS = 4
 """Steps to a half width of the normal approximation."""
 LONGEST = 6
 """Half widths of the normal approximation after which a profile that has not risen is flat."""
+KNOWN = 0.15
+"""Largest relative standard deviation of an identified parameter [-]: its median error is then 10 %."""
 EVALUATIONS = 12
 """Evaluations of the surrogate with which the others follow a step."""
 
@@ -178,7 +180,8 @@ class _Walker:
 def with_profiles(found: Uncertainty, walked: Sequence[Profile]) -> Uncertainty:
     """The same uncertainty with the intervals and verdicts of the profiles.
 
-    A parameter is ``identified`` where the trace bounds it on both sides and its interval is narrower than half the prior's,
+    A parameter is ``identified`` where the trace bounds it on both sides and its interval is narrower than half the prior's and no
+    wider than 15 % (one standard deviation),
     ``weak`` where it is wider, ``one_sided`` where the trace bounds one side and leaves the other to the prior or to what is
     possible, and ``not_seen`` where it bounds neither.
     """
@@ -194,7 +197,8 @@ def _interval(interval: Interval, profile: Profile) -> Interval:
     width = (top - bottom) / (2.0 * Z95 * parameter.prior_sd)
     verdict: Verdict = "not_seen"
     if all(bounded) and width <= NOT_SEEN:
-        verdict = "identified" if width < IDENTIFIED else "weak"
+        sd = width * parameter.prior_sd / (1.0 if parameter.log else max(abs(parameter.value), 1e-12))
+        verdict = "identified" if width < IDENTIFIED and sd <= KNOWN else "weak"
     elif any(bounded):
         verdict = "one_sided"
     if interval.verdict == "at_bound":

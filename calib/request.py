@@ -9,7 +9,7 @@ from typing import Any
 
 from calib.conditioning import Conditioned
 from calib.materials import FoodSpec
-from calib.objective import Objective
+from calib.objective import ErrorModel, Objective
 from calib.scenes import Sizing
 from mpm.scene import Scene
 
@@ -33,6 +33,7 @@ class Request:
         lag_sd: Standard deviation of the sensor's delay [s], or None.
         scaled: Whether the search has a factor for the width of the specimen, as it has in a fit of several.
         u_num: Folder of a convergence study whose numerical uncertainty enters the likelihood, or None.
+        errors: How far a right model may be from the trace.
         budget: Largest number of simulations.
         workers: Simulations at a time.
         seed: Seed of particles and search.
@@ -54,6 +55,7 @@ class Request:
     lag_sd: float | None = None
     scaled: bool = False
     u_num: Path | None = None
+    errors: ErrorModel = field(default_factory=ErrorModel)
     budget: float = 100
     workers: int = 2
     seed: int = 0

@@ -58,7 +58,7 @@ class Interval:
         clipped: Whether a hard bound cut the interval off.
         width: Posterior over prior standard deviation in the internal coordinate [-].
         verdict: ``at_bound``: the best value lies on a hard bound; else by width ``identified`` (below 0.5),
-            ``weak``, or ``not_seen`` (above 0.9: the interval is the literature's). Profiles refine it, with ``one_sided``.
+            ``weak``, or ``not_seen`` (above 0.9: the interval is the literature's). Profiles refine it.
     """
 
     parameter: Parameter

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from calib.cli.options import add_food, add_run, food_of, number, sizing_of
+from calib.objective import ErrorModel
 from calib.progress import ProgressBar
 from calib.request import Request
 from mpm.errors import CutcalError
@@ -45,6 +46,12 @@ def add_args(p: argparse.ArgumentParser) -> None:
         "--budget", type=number(0, 1e6, ""), help="largest number of simulations (default 100, of each trace)"
     )
     p.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
+    p.add_argument(
+        "--discrepancy",
+        type=number(0, 1, ""),
+        metavar="PART",
+        help="how far a right model may be from the curve, part of its peak (default 0.03)",
+    )
     p.add_argument(
         "--u-num",
         metavar="DIR",
@@ -94,7 +101,15 @@ def request_of(args: argparse.Namespace, command: Sequence[str]) -> Request:
         raise CutcalError(f"--workers {args.workers}: at least 1")
     named = None if args.fit is None else tuple(n.strip() for n in args.fit.split(",") if n.strip())
     u_num = None if args.u_num is None else Path(args.u_num)
-    return replace(measured(args, command), fit=named, budget=args.budget or BUDGET, workers=args.workers, u_num=u_num)
+    errors = ErrorModel() if args.discrepancy is None else ErrorModel(discrepancy=args.discrepancy)
+    return replace(
+        measured(args, command),
+        errors=errors,
+        fit=named,
+        budget=args.budget or BUDGET,
+        workers=args.workers,
+        u_num=u_num,
+    )
 
 
 def measured(args: argparse.Namespace, command: Sequence[str]) -> Request:

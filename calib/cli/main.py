@@ -7,13 +7,14 @@ import sys
 from collections.abc import Sequence
 
 import calib
-from calib.cli import bench, calibrate, compress, converge, foods, predict, report, simulate, stress, verify
+from calib.cli import bench, calibrate, compress, converge, coverage, foods, predict, report, simulate, stress, verify
 from mpm.errors import CutcalError
 
 COMMANDS = {
     "calibrate": calibrate,
     "compress": compress,
     "converge": converge,
+    "coverage": coverage,
     "bench": bench,
     "stress": stress,
     "predict": predict,
