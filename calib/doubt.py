@@ -4,15 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
 from calib.fit import FitResult
 from calib.joint import JointObjective
 from calib.nuisance import NuisanceEstimate
-from calib.objective import Objective
+from calib.objective import Evaluator, Objective, Trial
 from calib.predictive import Band, bands
 from calib.profiles import Profile, profiles, with_profiles
+from calib.surrogate import Surrogate
 from calib.uncertainty import Uncertainty, evidence, uncertainty
+
+FloatArray = npt.NDArray[np.float64]
+
+ROUNDS = 2
+"""How often the ends that the profiles claim are simulated and the profiles walked again."""
+CLOSE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,29 +33,67 @@ class Doubt:
         profiles: Profile likelihood of each parameter.
         nuisances: What the best curves say of the measurement, trace by trace.
         bands: Posterior predictive band of each trace.
+        runs: Coarse simulations made to confirm the ends of the intervals.
     """
 
     uncertainty: Uncertainty
     profiles: tuple[Profile, ...]
     nuisances: tuple[NuisanceEstimate, ...]
     bands: tuple[Band, ...]
+    runs: tuple[Trial, ...] = ()
 
 
-def doubt_of(objective: Objective | JointObjective, result: FitResult, seed: int = 0) -> Doubt | None:
+def doubt_of(
+    objective: Objective | JointObjective, result: FitResult, *, scout: Evaluator | None = None, seed: int = 0
+) -> Doubt | None:
     """What a fit does not know; None where it ended before there were runs enough to tell.
 
     Args:
         objective: What was fitted.
         result: How.
+        scout: Runs cheap simulations at the ends that the profiles claim, which are then walked again; without it they rest on
+            the runs of the search alone.
         seed: Seed of the predictive draws.
     """
     if result.jacobian is None or result.surrogate is None:
         return None
     with threadpool_limits(1, "blas"):
-        found = uncertainty(result.parameters, evidence(objective, result.best, result.jacobian))
-        walked = profiles(result.surrogate, result.parameters, found)
-        drawn = bands(result.surrogate, result.best.z, found, seed)
-    return Doubt(with_profiles(found, walked), walked, _nuisances(objective, result, found), drawn)
+        surrogate, jacobian, runs = result.surrogate, result.jacobian, list(result.history)
+        for remaining in range(ROUNDS, -1, -1):
+            found = uncertainty(result.parameters, evidence(objective, result.best, jacobian))
+            walked = profiles(surrogate, result.parameters, found)
+            asked = (
+                []
+                if scout is None or not remaining
+                else _new(objective, [z for p in walked for z in p.frontier()], runs)
+            )
+            if not asked:
+                break
+            runs += _run(objective, scout, asked)
+            surrogate = Surrogate(objective, runs, result.best, surrogate.hyper)
+            jacobian = surrogate.jacobian(result.best.z)
+        drawn = bands(surrogate, result.best.z, found, seed)
+    added = tuple(runs[len(result.history) :])
+    return Doubt(with_profiles(found, walked), walked, _nuisances(objective, result, found), drawn, added)
+
+
+def _new(objective: Objective | JointObjective, points: list[FloatArray], runs: list[Trial]) -> list[FloatArray]:
+    """Points that are not close to each other or to a run: further than a twentieth of a prior standard deviation."""
+    sd = objective.parameters.prior_sd
+    chosen: list[FloatArray] = []
+    for z in points:
+        known = [*(t.z for t in runs), *chosen]
+        if all(np.any(np.abs(z - other) > CLOSE * sd) for other in known):
+            chosen.append(z)
+    return chosen
+
+
+def _run(objective: Objective | JointObjective, scout: Evaluator | None, points: list[FloatArray]) -> list[Trial]:
+    """Coarse trials at some points, in their order."""
+    assert scout is not None
+    batch = [objective.parameters.to_dict(z) for z in points]
+    found = sorted(scout.evaluate(batch), key=lambda e: e.index)
+    return [objective.trial(e, coarse=True, stage="profile") for e in found]
 
 
 def _nuisances(

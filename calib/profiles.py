@@ -6,8 +6,9 @@ Along each parameter the others are fitted anew, each step from the last one's o
 
 The 95 % interval is where P_i has risen by 3.84 (Venzon & Moolgavkar 1988, Appl. Statist. 37:87), more where the size of the
 errors is estimated.  The same profile without the parameter's own prior says what the *trace* bounds: both sides, one, or none
-(Raue et al. 2009, Bioinformatics 25:1923: identifiable, practically non-identifiable).  That part of the rise which the noise of
-the runs feigns is taken off, as the normal approximation's Jacobian is.
+(Raue et al. 2009, Bioinformatics 25:1923: identifiable, practically non-identifiable).  What the noise of the runs feigns of the
+rise is taken off: near the best values its curvature, as in the normal approximation's Jacobian, and further away no more than one
+noisy run would feign.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 
 from calib.nuisance import Whitening
-from calib.parameters import Z95, ParameterSet
+from calib.parameters import Z95, Parameter, ParameterSet
 from calib.surrogate import Surrogate
 from calib.uncertainty import IDENTIFIED, NOT_SEEN, Interval, Uncertainty, Verdict
 
@@ -48,12 +49,29 @@ class Profile:
         z: Internal coordinates along it (k,), rising.
         rise: Rise of the whole chi-square above its least (k,).
         data: Rise without the parameter's own prior (k,).
+        points: Internal coordinates of all parameters along it (k, p).
     """
 
     name: str
     z: FloatArray
     rise: FloatArray
     data: FloatArray
+    points: FloatArray
+
+    def frontier(self) -> list[FloatArray]:
+        """Points (p,) at which an end of the interval, or a bound that the trace alone sets, is claimed or missed.
+
+        To the others' optimum, which is the surrogate's word, comes the point where they have their best values.
+        """
+        best = int(np.argmin(np.abs(self.z - self.best)))
+        found: list[FloatArray] = []
+        for side in (range(best, -1, -1), range(best, len(self.z))):
+            ends = [next((k for k in side if rise[k] >= RISE), side[-1]) for rise in (self.rise, self.data)]
+            for k in dict.fromkeys(ends):
+                if k != best:
+                    beside = np.where(self.points[k] == self.z[k], self.points[k], self.points[best])
+                    found += [self.points[k], beside]
+        return found
 
     def end(self, side: int, rise: FloatArray) -> float | None:
         """Internal coordinate where ``rise`` reaches :data:`RISE` below (-1) or above (+1) the best value, None if never."""
@@ -147,11 +165,11 @@ class _Walker:
         order = np.argsort([z[self.i] for z in points])
         along = np.array([points[k][self.i] for k in order])
         whole, alone = (np.array([costs[k][j] for k in order]) for j in (0, 1))
-        share = self.share()
+        feigned = np.minimum(self.feigned() * (along - start[self.i]) ** 2, self.one_run())
         prior = (along - self.parameters.prior_mean[self.i]) ** 2 / self.parameters.prior_sd[self.i] ** 2
-        alone = (alone - alone.min()) * share
+        alone = np.maximum(alone - alone.min() - feigned, 0.0)
         whole = np.maximum(alone + prior - (alone + prior).min(), 0.0)
-        return Profile(self.parameters.names[self.i], along, whole, alone)
+        return Profile(self.parameters.names[self.i], along, whole, alone, np.array([points[k] for k in order]))
 
     def cost(self, z: FloatArray) -> tuple[float, float]:
         """Chi-square with all priors, and without this parameter's own."""
@@ -159,17 +177,23 @@ class _Walker:
         whole = float(rows @ rows)
         return whole, whole - float(rows[self.i - self.p]) ** 2
 
-    def share(self) -> float:
-        """Part of the data's rise that is not feigned by the noise of the runs [-], 0 to 1: that of the curvatures."""
+    def feigned(self) -> float:
+        """Curvature of the data's rise that the noise of the runs feigns: what the normal approximation leaves out."""
         raw = np.array(
             [self.rows(self.parameters.start + d) - self.rows(self.parameters.start - d) for d in self.steps]
         )
         raw = raw.T / (2.0 * np.diag(self.steps))
-        own = self.parameters.prior_jacobian()
-        naive = np.linalg.inv(raw.T @ raw)[self.i, self.i]
-        pull = float(own[self.i, self.i]) ** 2
-        bare, kept = 1.0 / naive - pull, 1.0 / self.found.covariance[self.i, self.i] - pull
-        return min(max(kept / bare, 0.0), 1.0) if bare > 0.0 else 1.0
+        naive = 1.0 / np.linalg.inv(raw.T @ raw)[self.i, self.i]
+        return max(naive - 1.0 / float(self.found.covariance[self.i, self.i]), 0.0)
+
+    def one_run(self) -> float:
+        """Chi-square of the difference that the noise of one simulated curve makes [-]."""
+        parts = zip(self.surrogate.each, self.surrogate.objective.cases, self.found.data.lengths, strict=True)
+        sizes = [
+            (process.noise * process.peak / case.objective.sigma) ** 2 / (length * self.found.widened)
+            for process, case, length in parts
+        ]
+        return math.fsum(sizes)
 
     @property
     def steps(self) -> FloatArray:
@@ -180,10 +204,10 @@ class _Walker:
 def with_profiles(found: Uncertainty, walked: Sequence[Profile]) -> Uncertainty:
     """The same uncertainty with the intervals and verdicts of the profiles.
 
-    A parameter is ``identified`` where the trace bounds it on both sides and its interval is narrower than half the prior's and no
-    wider than 15 % (one standard deviation),
-    ``weak`` where it is wider, ``one_sided`` where the trace bounds one side and leaves the other to the prior or to what is
-    possible, and ``not_seen`` where it bounds neither.
+    A side is bounded by the trace where the trace alone ends it within the literature's range. A parameter is ``identified``
+    where both sides are, its interval is narrower than half the prior's, and it is known to 15 % (one standard deviation);
+    ``weak`` where the interval is wider; ``one_sided`` where the trace bounds one side and leaves the other to the prior or to
+    what is possible; ``not_seen`` where it bounds neither.
     """
     return replace(found, intervals=tuple(_interval(i, p) for i, p in zip(found.intervals, walked, strict=True)))
 
@@ -193,7 +217,7 @@ def _interval(interval: Interval, profile: Profile) -> Interval:
     low, high = parameter.to_internal(parameter.low), parameter.to_internal(parameter.high)
     ends = [profile.end(side, profile.rise) for side in (-1, 1)]
     bottom, top = (low if ends[0] is None else ends[0]), (high if ends[1] is None else ends[1])
-    bounded = [profile.end(side, profile.data) is not None for side in (-1, 1)]
+    bounded = [_bounds(profile.end(side, profile.data), side, parameter) for side in (-1, 1)]
     width = (top - bottom) / (2.0 * Z95 * parameter.prior_sd)
     verdict: Verdict = "not_seen"
     if all(bounded) and width <= NOT_SEEN:
@@ -211,3 +235,8 @@ def _interval(interval: Interval, profile: Profile) -> Interval:
         width=width,
         verdict=verdict,
     )
+
+
+def _bounds(end: float | None, side: int, parameter: Parameter) -> bool:
+    """Whether the end that the trace alone sets lies within the literature's range, so that it says something new."""
+    return end is not None and side * (end - parameter.prior_mean) < Z95 * parameter.prior_sd

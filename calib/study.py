@@ -77,6 +77,9 @@ def run(
             for name, scene in (("fine", setup.fine), ("coarse", setup.coarse))
         )
         result = calibrate(setup.objective, fine, coarse=coarse, options=options, progress=progress)
+        doubt = doubt_of(setup.objective, result, scout=coarse, seed=request.seed)
+        if doubt is not None:
+            result = replace(result, history=(*result.history, *doubt.runs))
         start = _start_curve(setup, result, fine)
         say("simulating the best values once more for their full record")
         scene, values = place(setup.fine, result.best.evaluation.parameters, setup.kept)
@@ -90,7 +93,7 @@ def run(
             )
             checks = check(scene, record.peak, record.work, pool, store)
     add_conditioning(out / "evaluations.h5", setup.curve)
-    return _write(request, setup, result, record, checks, start, out, time.monotonic() - began)
+    return _write(request, setup, result, doubt, record, checks, start, out, time.monotonic() - began)
 
 
 def _start_curve(setup: Setup, result: FitResult, fine: CachedEvaluator) -> np.ndarray:
@@ -108,6 +111,7 @@ def _write(
     request: Request,
     setup: Setup,
     result: FitResult,
+    doubt: Doubt | None,
     record: ForceRecord,
     checks: Sequence[Check],
     start: np.ndarray,
@@ -120,7 +124,6 @@ def _write(
     curve, best = setup.curve, result.best
     metrics = compare(curve.stroke, curve.curve, best.curve)
     nulls = null_models(curve.stroke, curve.curve)
-    doubt = doubt_of(setup.objective, result, request.seed)
     summary = summarise(request, setup, result, record, metrics, nulls, doubt, checks)
     summary["wall_s"] = wall
     write_csv(out / "curves.csv", _curves(curve, best.curve, record, start, nulls, doubt))

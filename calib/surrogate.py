@@ -70,14 +70,15 @@ class CurveProcess:
         law = objective.parameters.stress_like()
         self._law = law / max(float(law.sum()), 1.0)
         self.unit = coordinate_unit(objective.parameters)
-        self._peak = float(np.abs(best.curve).max())
+        self.peak = float(np.abs(best.curve).max())
+        """Largest force of the best run [N]."""
         used = [t for t in trials if t.evaluation.stroke.size > 1]
         self._x = np.array([(t.z - best.z) / self.unit for t in used])
         self._coarse = np.array([float(t.coarse) for t in used])
         self._extra = np.array([t.coarse * COARSE_SD**2 + (not t.ok) * BROKEN_SD**2 for t in used])
         curves = np.array([t.curve * math.exp(-self._scale(t.z)) for t in used])
         missing = np.array([0.0 if t.ok else 1.0 - t.evaluation.fraction for t in used])
-        y = np.clip((curves - best.curve) / self._peak, -LARGEST_DIFFERENCE, LARGEST_DIFFERENCE)
+        y = np.clip((curves - best.curve) / self.peak, -LARGEST_DIFFERENCE, LARGEST_DIFFERENCE)
         self.hyper = self._learn(y, guess)
         self._inverse = cho_solve(cho_factor(self._covariance(self.hyper)), np.eye(len(used)))
         exact = self._kernel(self._x, self._x, self.hyper) + self.noise**2 * np.eye(len(used))
@@ -141,8 +142,8 @@ class CurveProcess:
         variance = own - float(k[0] @ self._inverse @ k[0])
         out = (k @ self._weights)[0]
         size = math.exp(self._scale(z))
-        curve = size * (self.best.curve + self._peak * out[:-1])
-        sd = size * self._peak * math.sqrt(max(variance, 0.0))
+        curve = size * (self.best.curve + self.peak * out[:-1])
+        sd = size * self.peak * math.sqrt(max(variance, 0.0))
         return curve, sd, 1.0 - min(max(float(out[-1]) - OVERSHOOT, 0.0), 1.0)
 
     def doubt(self, z: FloatArray) -> float:
@@ -163,7 +164,7 @@ class CurveProcess:
         weights = self._inverse @ ((k[:p] - k[p:]) / (2.0 * steps[:, None])).T
         noise = (weights.T * (self._extra + self.noise**2)) @ weights
         per_row = objective.effective_points / objective.sigma**2 + 1.0 / objective.sigma_peak**2
-        out: FloatArray = noise * self._peak**2 * per_row
+        out: FloatArray = noise * self.peak**2 * per_row
         return out
 
 

@@ -199,7 +199,7 @@ def evidence(objective: Objective | JointObjective, best: Trial, jacobian: Float
         points = goal.target.stroke.size
         length = correlation_length(goal.curve_residual(trial.curve), determined, goal.errors.correlation)
         weight = math.sqrt(1.0 / (length * goal.effective_points))
-        weights.append(np.full(goal.data_rows, weight))
+        weights.append(np.append(np.full(goal.data_rows - 1, weight), 0.0))  # a failure is no measurement
         open_ended.append(weight * goal.unsearched())
         rows += min(1.0 / length, points) + 1.0
         lengths.append(length)

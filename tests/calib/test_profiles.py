@@ -1,0 +1,129 @@
+"""Profiles: the normal approximation where chi-square is a parabola, and what the trace alone bounds where it is not."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from calib.doubt import Doubt, doubt_of
+from calib.fit import FitOptions, FitResult, calibrate
+from calib.objective import Evaluation, Objective, Target
+from calib.parameters import Z95, Parameter, ParameterSet
+from calib.predictive import band_of, errors
+from calib.profiles import RISE, Profile
+from tests.calib.fake import GRID, NOISE, STROKE, Fake, goal, noise, three_terms
+
+
+def parabola(centre: float, sd: float, share: float) -> Profile:
+    """A profile with the given standard deviation, to which the trace contributes a share of the curvature."""
+    z = centre + sd * np.linspace(-4.0, 4.0, 33)
+    rise = ((z - centre) / sd) ** 2
+    return Profile("E", z, rise, share * rise, z[:, None])
+
+
+def test_ends_of_a_parabola_are_at_1_96_standard_deviations() -> None:
+    """Interpolated in the root of the rise, a parabola's ends are exact although no point lies there."""
+    profile = parabola(2.0, 0.3, 0.5)
+    for side in (-1, 1):
+        assert profile.end(side, profile.rise) == pytest.approx(2.0 + side * Z95 * 0.3, abs=1e-9)
+    assert RISE == pytest.approx(3.8415, abs=1e-4)
+
+
+def test_a_side_that_does_not_rise_has_no_end() -> None:
+    """One-sided: the trace bounds the parameter from below only."""
+    profile = parabola(0.0, 1.0, 1.0)
+    data = np.where(profile.z > 0.0, 0.2 * profile.data, profile.data)
+    assert profile.end(-1, data) == pytest.approx(-Z95, abs=1e-9)
+    assert profile.end(1, data) is None
+
+
+ONE_SIDED = ParameterSet(
+    (
+        Parameter("E", 5e5, 2e4, 1e7, "Pa", 1e5, 2e6),
+        Parameter("yield_stress", 2e5, 2e3, 5e6, "Pa", 1e4, 3e6),
+        Parameter("R", 300.0, 10.0, 5e3, "J/m^2", 80.0, 1200.0),
+    )
+)
+
+
+def elastic(p: dict[str, float]) -> np.ndarray:
+    """A cut in which flow shows only near 40 kPa and below: a plateau for R, a wedge for E, softened by yield."""
+    soft = 1.0 / (1.0 + (4e4 / p["yield_stress"]) ** 2)
+    return 0.03 * p["R"] * (1.0 - np.exp(-STROKE / 0.002)) + 6.0 * (p["E"] / 5e5) * soft * STROKE / STROKE[-1]
+
+
+@pytest.fixture(scope="module")
+def one_sided() -> tuple[Objective, FitResult, Doubt]:
+    """A fit of the elastic cut with 0.4 % of noise."""
+    truth = {"E": 5e5, "yield_stress": 4e5, "R": 300.0}
+    curve = np.interp(GRID, STROKE, elastic(truth))
+    objective = Objective(Target(GRID, curve, 0.05, 0.05, np.interp), ONE_SIDED)
+    simulator = Fake(elastic, noisy=0.004)
+    result = calibrate(objective, simulator, options=FitOptions(budget=60))
+    doubt = doubt_of(objective, result, scout=simulator)
+    assert doubt is not None
+    return objective, result, doubt
+
+
+def test_verdicts_say_what_the_trace_bounds(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+    """R is identified; a yield stress that nothing reaches is bounded from below and left to the literature above."""
+    doubt = one_sided[2]
+    found = {i.parameter.name: i for i in doubt.uncertainty.intervals}
+    assert found["R"].verdict == "identified" and found["R"].low95 < 300.0 < found["R"].high95
+    assert found["yield_stress"].verdict == "one_sided"
+    assert found["yield_stress"].high95 > 2e6 and found["yield_stress"].low95 > 2e4
+    walked = {p.name: p for p in doubt.profiles}
+    above = walked["yield_stress"].end(1, walked["yield_stress"].data)
+    assert above is None or math.exp(above) > 3e6
+
+
+def test_profile_of_a_known_parameter_is_that_of_the_curvature(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+    """Where chi-square is a parabola, profile and normal approximation agree to a quarter in the width."""
+    doubt = one_sided[2]
+    i = doubt.uncertainty.intervals[2]
+    sd = math.sqrt(doubt.uncertainty.covariance[2, 2])
+    assert math.log(i.high95 / i.low95) == pytest.approx(2.0 * Z95 * sd, rel=0.25)
+
+
+def test_the_band_holds_the_curve_it_was_drawn_about(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+    """Nearly all of the measured curve lies in its band, and a curve that is 15 % off does not."""
+    objective, _, doubt = one_sided
+    band = doubt.bands[0]
+    assert band.inside > 0.9
+    off = 1.15 * objective.target.curve
+    assert np.mean((off >= band.low) & (off <= band.high)) < 0.5
+
+
+def test_band_of_normal_draws_is_1_96_wide() -> None:
+    """The pointwise band of 4000 draws of unit variance ends at 1.96 to 0.15, and holds 95 % of another one."""
+    random = np.random.default_rng(0)
+    band = band_of(random.standard_normal((4000, 50)), np.zeros(50))
+    assert np.abs(band.high - Z95).max() < 0.15 and np.abs(band.low + Z95).max() < 0.15 and band.inside == 1.0
+
+
+def test_errors_have_the_size_and_the_length_that_they_should() -> None:
+    """Variance of each point is sigma^2, and half a correlation length away the correlation is exp(-pi/4)."""
+    objective = goal({"E": 3e5, "yield_stress": 4e4, "R": 500.0, "R_skin": 200.0, "mu": 0.2})
+    drawn = errors(objective, 0.1, 2.0, 4000, np.random.default_rng(1))
+    assert np.sqrt((drawn**2).mean()) == pytest.approx(2.0 * objective.sigma, rel=0.03)
+    half = round(0.05 * 239)
+    seen = np.mean(drawn[:, 100] * drawn[:, 100 + half]) / np.mean(drawn[:, 100] ** 2)
+    assert seen == pytest.approx(math.exp(-math.pi * (half / 239 / 0.1) ** 2), abs=0.05)
+
+
+def test_an_interrupted_search_has_no_doubt() -> None:
+    """Fewer runs than parameters: nothing is said instead of something wrong."""
+    objective = goal({"E": 3e5, "yield_stress": 4e4, "R": 500.0, "R_skin": 200.0, "mu": 0.2})
+    result = calibrate(objective, Fake(interrupt_after=3), options=FitOptions(budget=60))
+    assert result.status == "interrupted" and doubt_of(objective, result) is None
+
+
+def test_fake_and_noise_are_repeatable() -> None:
+    """What these tests rest on: the same parameters give the same run."""
+    values = {"E": 3e5, "yield_stress": 4e4, "R": 500.0, "R_skin": 200.0, "mu": 0.2}
+    first, second = (next(iter(Fake().evaluate([values]))) for _ in range(2))
+    assert isinstance(first, Evaluation) and np.array_equal(first.force, second.force)
+    assert not np.array_equal(noise(values, NOISE), noise(values | {"mu": 0.21}, NOISE))
+    assert three_terms(values).shape == STROKE.shape
