@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 
 import calib
-from calib.cli import bench, calibrate, compress, converge, foods, predict, report, simulate, stress, verify
+from calib.cli import bench, calibrate, compress, converge, foods, predict, prior, report, simulate, stress, verify
 from mpm.errors import CutcalError
 
 COMMANDS = {
@@ -21,6 +21,7 @@ COMMANDS = {
     "verify": verify,
     "report": report,
     "foods": foods,
+    "prior": prior,
 }
 INTERRUPTED = 130  # what a shell reports for a program ended by Ctrl-C
 
