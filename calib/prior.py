@@ -51,12 +51,14 @@ class Plan:
 
     Attributes:
         food: The food.
+        knife: The knife.
         scene: Its default cut on the coarse grid.
         parameters: The default fit parameters with their priors.
         candidates: Values [SI] by name: the food's own first, then the draws.
     """
 
     food: FoodSpec
+    knife: Knife
     scene: Scene
     parameters: ParameterSet
     candidates: tuple[dict[str, float], ...]
@@ -75,9 +77,11 @@ class Plan:
     @property
     def inputs(self) -> str:
         """Hash of everything a user may edit that the curves depend on: food, priors, knife."""
-        priors = [(p.name, p.prior_low, p.prior_high) for p in self.parameters]
-        shape, material, knife = (vars(x) for x in (self.scene.food.shape, self.scene.food.material, self.scene.knife))
-        return key_of([shape, material, knife, priors])[:KEY_LENGTH]
+        food, knife = self.food, self.knife
+        values = {name: item.value for name, item in (dict(food.dims) | dict(food.properties)).items()}
+        priors = {p.name: (p.prior_low, p.prior_high) for p in self.parameters}
+        blade = [knife.spine, knife.angle, knife.height, knife.length]
+        return key_of([food.shape_kind, values, priors, blade])[:KEY_LENGTH]
 
 
 def plan(food: FoodSpec, knife: Knife, draws: int = DRAWS, seed: int = 0) -> Plan:
@@ -96,7 +100,7 @@ def plan(food: FoodSpec, knife: Knife, draws: int = DRAWS, seed: int = 0) -> Pla
     parameters = fit_parameters(food, food.default_fit)
     default = {p.name: p.value for p in parameters}
     drawn = tuple(draw(parameters, draws, seed))
-    return Plan(food, cut_scene(food, shape, knife, coarse=True, seed=seed), parameters, (default, *drawn))
+    return Plan(food, knife, cut_scene(food, shape, knife, coarse=True, seed=seed), parameters, (default, *drawn))
 
 
 def draw(parameters: ParameterSet, count: int, seed: int = 0) -> list[dict[str, float]]:
