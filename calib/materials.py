@@ -27,7 +27,7 @@ from calib.properties import (
     check_override,
     rule_of,
 )
-from calib.validation import Dumper, Place, check_keys, choice, data_path, mapping, read_yaml, suggest
+from calib.validation import Dumper, Place, check_keys, choice, data_path, mapping, read_yaml, suggest, text
 from mpm.shapes import SHAPE_KINDS
 
 if TYPE_CHECKING:
@@ -61,6 +61,7 @@ class FoodSpec:
         dims: ``length``, ``width``, ``height`` [m].
         properties: By name; a property the food has no value for (null in the file) is absent.
         calibration: Provenance of a calibrated food, or None.
+        not_modelled: What a real one has and the simulated one has not, such as a stone, or None.
 
     Raises:
         MaterialError: Unknown shape, a missing property, or a skin without resistance.
@@ -71,6 +72,7 @@ class FoodSpec:
     dims: Mapping[str, Property]
     properties: Mapping[str, Property]
     calibration: Mapping[str, Any] | None = field(default=None, compare=False)
+    not_modelled: str | None = None
 
     def __post_init__(self) -> None:
         here = Place("", (self.name,))
@@ -142,9 +144,10 @@ class FoodSpec:
         return replace(self, properties=new)
 
     def warnings(self) -> list[str]:
-        """What a user of this food must know: disagreeing or flagged sources, values outside their range."""
+        """What a user of this food must know: what is not modelled, sources that disagree or are flagged, odd values."""
         both = {"shape": self.dims, "properties": self.properties}
-        said = [
+        said = [] if self.not_modelled is None else [f"{self.name}: not modelled: {self.not_modelled}"]
+        said += [
             f"{self.name}.{group}.{name}: {w}"
             for group, items in both.items()
             for name, item in items.items()
@@ -190,7 +193,8 @@ class FoodSpec:
         """Plain data in the layout of ``materials.yaml``."""
         shape = {"kind": self.shape_kind} | {n: self.dims[n].as_dict() for n in DIMENSIONS}
         have = {n: p.as_dict() for n, p in self.properties.items()}
-        return {"shape": shape, "properties": {n: have.get(n) for n in PROPERTIES}}
+        said = {} if self.not_modelled is None else {"not_modelled": self.not_modelled}
+        return {**said, "shape": shape, "properties": {n: have.get(n) for n in PROPERTIES}}
 
 
 def load_foods(path: Path | str | None = None) -> dict[str, FoodSpec]:
@@ -267,7 +271,8 @@ def dump_material(food: FoodSpec, path: Path | str, provenance: Mapping[str, Any
 
 def _read_food(place: Place, raw: Any) -> FoodSpec:
     food = mapping(place, raw)
-    check_keys(place, food, ("shape", "properties"))
+    check_keys(place, food, ("shape", "properties"), ("not_modelled",))
+    said = text(place.at("not_modelled"), food["not_modelled"]) if "not_modelled" in food else None
     shape = mapping(place.at("shape"), food["shape"])
     given = mapping(place.at("properties"), food["properties"])
     check_keys(place.at("shape"), shape, ("kind", *DIMENSIONS), synonyms=SYNONYMS)
@@ -276,7 +281,7 @@ def _read_food(place: Place, raw: Any) -> FoodSpec:
     have = [n for n in PROPERTIES if given[n] is not None or n not in _NULLABLE]
     properties = {n: _read_property(place.at("properties"), n, given[n]) for n in have}
     try:
-        return FoodSpec(place.path[-1], shape["kind"], dims, properties)
+        return FoodSpec(place.path[-1], shape["kind"], dims, properties, not_modelled=said)
     except MaterialError as e:
         raise replace(place, path=()).error(str(e)) from None
 

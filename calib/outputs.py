@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ MARKS = (
     "compress.json",
     "coverage.json",
     "coverage.jsonl",
+    "prior.json",
     "report.pdf",
     "force.csv",
     "evaluations.h5",
@@ -57,9 +59,10 @@ def write_json(path: Path, content: dict[str, Any]) -> None:
     _replace(path, json.dumps(_finite(content), indent=2, ensure_ascii=False) + "\n")
 
 
-def write_csv(path: Path, columns: dict[str, Any]) -> None:
-    """Write columns of equal length atomically, 9 significant digits."""
-    _replace(path, pd.DataFrame(columns).to_csv(index=False, float_format="%.9g"))
+def write_csv(path: Path, columns: Mapping[str, Any], *, head: Sequence[str] = (), digits: int = 9) -> None:
+    """Write columns of equal length atomically, with this many significant digits, below comments if there are any."""
+    body = pd.DataFrame(columns).to_csv(index=False, float_format=f"%.{digits}g")
+    _replace(path, "".join(f"# {line}\n" for line in head) + body)
 
 
 def _replace(path: Path, text: str) -> None:

@@ -7,7 +7,20 @@ import sys
 from collections.abc import Sequence
 
 import calib
-from calib.cli import bench, calibrate, compress, converge, coverage, foods, predict, report, simulate, stress, verify
+from calib.cli import (
+    bench,
+    calibrate,
+    compress,
+    converge,
+    coverage,
+    foods,
+    predict,
+    prior,
+    report,
+    simulate,
+    stress,
+    verify,
+)
 from mpm.errors import CutcalError
 
 COMMANDS = {
@@ -22,6 +35,7 @@ COMMANDS = {
     "verify": verify,
     "report": report,
     "foods": foods,
+    "prior": prior,
 }
 INTERRUPTED = 130  # what a shell reports for a program ended by Ctrl-C
 

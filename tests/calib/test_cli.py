@@ -131,7 +131,7 @@ def test_numbers_are_checked_by_the_parser(value, capsys):
 
 def test_help_fits_a_screen_and_shows_an_example(capsys):
     """The help of each command has an example and at most 80 lines."""
-    for command in ("calibrate", "compress", "simulate", "report", "foods"):
+    for command in ("calibrate", "compress", "simulate", "report", "foods", "prior"):
         with pytest.raises(SystemExit):
             main([command, "--help"])
         text = capsys.readouterr().out
@@ -144,5 +144,7 @@ def test_foods_lists_and_shows(capsys):
     assert "potato" in capsys.readouterr().out.split()
     assert main(["foods", "banana"]) == 0
     assert "Table 2" in capsys.readouterr().out
+    assert main(["foods", "cherry"]) == 0
+    assert "! cherry: not modelled: the stone" in capsys.readouterr().out
     assert main(["foods", "banana", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["banana"]["properties"]["E"]["value"] == load_food("banana").value("E")

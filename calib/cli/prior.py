@@ -1,0 +1,84 @@
+"""``cutcal prior``: what the literature predicts of a cut before any trace is seen."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from calib.errors import CurveError
+from calib.knives import load_knife
+from calib.materials import load_food, load_foods
+
+HELP = "forces that the literature predicts before any trace: default values and draws from the priors"
+DESCRIPTION = """Simulate the default cut of a food at its values of materials.yaml and at draws
+from the priors of its default fit, on the coarse grid that a fit screens with.
+Writes the quantiles of the force over stroke (FOOD.csv), of peak and work
+(prior.json) and a figure (prior.svg) to --out. A trace far outside the band is
+of another specimen or knife, in another unit, or worth a look."""
+EPILOG = """examples:
+  cutcal prior banana cherry
+  cutcal prior --out runs/prior --workers 4
+
+Ctrl-C keeps what was computed; the same command with --resume goes on.
+Exit codes: 0 the default values of every food finish the cut, 1 error in input
+or run, 2 they do not."""
+
+
+def add_args(p: argparse.ArgumentParser) -> None:
+    """Options of this command."""
+    from mpm.runtime import ARCHES
+
+    p.add_argument("names", nargs="*", metavar="FOOD", help="foods of materials.yaml; all of them by default")
+    p.add_argument("--draws", type=int, default=32, help="draws from the priors of each food (default 32)")
+    p.add_argument("--knife", default="kitchen", metavar="NAME", help="knife of knives.yaml, or a YAML file")
+    p.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
+    p.add_argument("--resume", action="store_true", help="go on with the runs in --out; nothing is simulated twice")
+    p.add_argument("--out", metavar="DIR", help="folder of the results; never overwritten")
+    p.add_argument("--seed", type=int, default=0, help="seed of the draws and of the particles")
+    p.add_argument("--arch", choices=ARCHES, default="cpu", help="device of the simulations")
+    p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Simulate; prints the table, or prior.json."""
+    from calib.prior import run as study
+
+    if min(args.workers, args.draws) < 1 or args.seed < 0:
+        raise CurveError("--workers and --draws must be at least 1 and --seed at least 0")
+    foods = [load_food(name) for name in dict.fromkeys(args.names)] or list(load_foods().values())
+    out = Path(args.out or "cutcal-prior")
+    document = study(
+        foods,
+        out,
+        load_knife(args.knife),
+        draws=args.draws,
+        seed=args.seed,
+        workers=args.workers,
+        arch=args.arch,
+        resume=args.resume,
+        say=lambda text: print(text, file=sys.stderr, flush=True),
+    )
+    if args.json:
+        print((out / "prior.json").read_text(encoding="utf-8"), end="")
+        return 0 if document["passed"] else 2
+    for food in foods:
+        for warning in food.warnings():
+            print(f"note: {warning}", file=sys.stderr)
+    print(table(document))
+    print(f"wrote {out}")
+    return 0 if document["passed"] else 2
+
+
+def table(document: dict[str, Any]) -> str:
+    """What the terminal shows at the end."""
+    lines = [f"{'food':13s} {'peak [N]':>9s} {'95 % of the draws':>19s} {'work [J]':>9s}  draws that broke down"]
+    for name, row in document["foods"].items():
+        peak, work = row["peak_N"], row["work_J"]
+        span = f"{peak['q025']:.3g} to {peak['q975']:.3g}"
+        failed = ", ".join(f"{count} {reason}" for reason, count in row["failed"].items()) or "-"
+        if row["default_status"] != "ok":
+            failed = f"DEFAULT VALUES: {row['default_status']}; {failed}"
+        lines.append(f"{name:13s} {peak['default']:9.3g} {span:>19s} {work['default']:9.3g}  {failed}")
+    return "\n".join(lines)
