@@ -20,7 +20,7 @@ from calib.objective import Objective
 from calib.parameters import ParameterSet
 from calib.prediction import NRMSE_LIMIT, RATING_LIMIT
 from calib.predictive import Band, band_of, errors
-from calib.specimens import Fitted, Specimens, factor
+from calib.specimens import Fitted, Specimens
 from mpm.errors import SimulationError
 
 FloatArray = np.ndarray
@@ -104,7 +104,7 @@ def predict(specimens: Specimens, fitted: Fitted, name: str) -> Prediction:
     best, count = _specimen(specimens, fitted.flesh(), name)
     values = {**fitted.flesh(), **best}
     drawn = _drawn(fitted, specimens.study.seed)
-    curves = [_curve(specimens, name, v) for v in [values, *({**flesh, **best} for flesh in drawn)]]
+    curves = _curves(specimens, name, [values, *({**flesh, **best} for flesh in drawn)])
     own_curve = curves[0]
     if own_curve is None:
         raise SimulationError(
@@ -112,7 +112,7 @@ def predict(specimens: Specimens, fitted: Fitted, name: str) -> Prediction:
             reason="held out",
             fraction=0.0,
         )
-    k = factor(goal, own_curve)
+    k = goal.factor(own_curve)
     real, stroke = goal.target.curve, goal.target.stroke
     nulls = {n: m.metrics for n, m in null_models(stroke, real).items()}
     nulls |= {"mean of the others": compare(stroke, real, _mean(specimens, fitted.names, name))}
@@ -149,13 +149,14 @@ def _specimen(specimens: Specimens, flesh: Mapping[str, float], name: str) -> tu
     return dict(result.best.evaluation.parameters), len(result.history)
 
 
-def _curve(specimens: Specimens, name: str, values: Mapping[str, float]) -> FloatArray | None:
-    """Smoothed force of a simulation on the trace's stroke [N]; None where it broke down."""
+def _curves(specimens: Specimens, name: str, batch: list[dict[str, float]]) -> list[FloatArray | None]:
+    """Smoothed force of simulations on the trace's stroke [N]; None for one that broke down."""
     setup = specimens.setups[name]
-    evaluation = next(iter(specimens.evaluator(setup.fine, name, "fine").evaluate([dict(values)])))
-    if not evaluation.ok:
-        return None
-    return filter_simulated(setup.curve.stroke, evaluation.stroke, evaluation.force)
+    out: list[FloatArray | None] = [None] * len(batch)
+    for e in specimens.evaluator(setup.fine, name, "fine").evaluate(batch):
+        if e.ok:
+            out[e.index] = filter_simulated(setup.curve.stroke, e.stroke, e.force)
+    return out
 
 
 def _drawn(fitted: Fitted, seed: int) -> list[dict[str, float]]:
@@ -184,5 +185,5 @@ def _band(goal: Objective, curves: list[FloatArray], fitted: Fitted, seed: int) 
     doubt = fitted.doubt
     widened = 1.0 if doubt is None else float(np.sqrt(doubt.uncertainty.widened))
     length = goal.errors.correlation if doubt is None else float(np.mean(doubt.uncertainty.data.lengths))
-    drawn = [factor(goal, c) * c + error for c in curves for error in errors(goal, length, widened, REPEATED, random)]
+    drawn = [goal.factor(c) * c + error for c in curves for error in errors(goal, length, widened, REPEATED, random)]
     return band_of(np.array(drawn), goal.target.curve)

@@ -341,6 +341,19 @@ class Objective:
         """What a simulated curve [N] (n,) says of the nuisances, those that the search may not use included."""
         return estimate(self.nuisances, self._columns(self.nuisances), self._bare(curve))
 
+    def factor(self, curve: FloatArray) -> float:
+        """The factor that a specimen's width and sensor ask for on its simulated force (n,), least squares with its prior [-].
+
+        1 where the search has none.
+        """
+        scale = next((n for n in self.nuisances if n.name == "scale"), None)
+        if scale is None:
+            return 1.0
+        weight = self.effective_points / (curve.size * self.sigma**2)
+        pull = 1.0 / scale.sd**2
+        measured = float(curve @ self.target.curve)
+        return (weight * measured + pull) / (weight * float(curve @ curve) + pull)
+
     def unsearched(self) -> FloatArray:
         """Residual by one standard deviation of each nuisance that the search may not use (n + 2, k)."""
         columns = self._columns([n for n in self.nuisances if not n.searched])

@@ -58,7 +58,8 @@ def bands(surrogate: Surrogate, z: FloatArray, found: Uncertainty, seed: int = 0
         curves = []
         for point, error in zip(drawn, added, strict=True):
             curve, sd, _ = process.predict(point[case.index])
-            curves.append(curve + sd * float(random.standard_normal()) + error)
+            drawn_curve = curve + sd * float(random.standard_normal())
+            curves.append(goal.factor(drawn_curve) * drawn_curve + error)
         out.append(band_of(np.array(curves), goal.target.curve))
     return tuple(out)
 

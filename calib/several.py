@@ -22,7 +22,7 @@ from calib.progress import Progress
 from calib.provenance import git_commit, key_of, versions
 from calib.request import Setup
 from calib.scenes import place
-from calib.specimens import Fitted, Specimens, factor, pressed, set_ups
+from calib.specimens import Fitted, Specimens, pressed, set_ups
 from calib.store import EvaluationStore, Header
 from calib.verdicts import CHANGE_LIMIT, NRMSE_LIMIT, PEAK_LIMIT, SHAPE_LIMIT
 
@@ -157,7 +157,7 @@ def _trace(setup: Setup, fitted: Fitted, name: str, checks: list[Check]) -> dict
     """One fitted trace: in-sample figures with the specimen's factor, what the measurement left open, numerical checks."""
     k = fitted.names.index(name)
     trial, curve = fitted.result.best.each[k], setup.curve
-    scale = factor(setup.objective, trial.curve)
+    scale = setup.objective.factor(trial.curve)
     metrics = compare(curve.stroke, curve.curve, scale * trial.curve)
     changes = {c.name: c.change for c in checks}
     steady = all(change is not None and change <= CHANGE_LIMIT for change in changes.values())
@@ -223,7 +223,7 @@ def _curves(setup: Setup, fitted: Fitted, held: Prediction | None, name: str) ->
     if name in fitted.names:
         k = fitted.names.index(name)
         curve = fitted.result.best.each[k].curve
-        columns["sim_N"] = factor(setup.objective, curve) * curve
+        columns["sim_N"] = setup.objective.factor(curve) * curve
         if fitted.doubt is not None:
             columns |= {"band_low_N": fitted.doubt.bands[k].low, "band_high_N": fitted.doubt.bands[k].high}
     if held is not None:

@@ -16,7 +16,6 @@ from calib.config import Press, Study
 from calib.doubt import Doubt, doubt_of
 from calib.fit import FitOptions, FitResult, calibrate
 from calib.joint import JointEvaluator, JointObjective
-from calib.objective import Objective
 from calib.parameters import Z95, Parameter, ParameterSet, own, plain
 from calib.pool import Pool
 from calib.preparation import set_up
@@ -34,17 +33,6 @@ PRESS_STRAIN = 0.2
 PLATES = 0.1
 """Relative standard deviation of a modulus from plates whose friction is not known: bonded plates make a specimen as wide as
 high some 10 to 20 % stiffer than frictionless ones (docs/compression.md)."""
-
-
-def factor(objective: Objective, curve: FloatArray) -> float:
-    """The factor on a simulated force that its specimen's width and sensor ask for, least squares with its prior [-]."""
-    scale = next((n for n in objective.nuisances if n.name == "scale"), None)
-    if scale is None:
-        return 1.0
-    weight = objective.effective_points / (len(curve) * objective.sigma**2)
-    measured = objective.target.curve
-    pull = 1.0 / scale.sd**2
-    return float((weight * (curve @ measured) + pull) / (weight * (curve @ curve) + pull))
 
 
 @dataclass(frozen=True)
