@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from calib.pool import Pool
 from calib.provenance import code_key
 from calib.scenes import elsewhere
 from calib.store import EvaluationStore, content_key
+from calib.workers import Workers
 from mpm.record import ForceRecord
 from mpm.scene import Scene
 
@@ -49,7 +49,7 @@ class Check:
         return asdict(self)
 
 
-def check(scene: Scene, record: ForceRecord, pool: Pool, store: EvaluationStore) -> list[Check]:
+def check(scene: Scene, record: ForceRecord, pool: Workers, store: EvaluationStore) -> list[Check]:
     """Simulate the variants of a scene; what the store knows is not simulated again.
 
     Args:

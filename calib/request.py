@@ -30,7 +30,6 @@ class Request:
         fit: Names of the fitted properties; None for the food's default.
         dx: Cell size [m], or None.
         budget: Largest number of simulations.
-        workers: Simulations at a time.
         seed: Seed of particles and search.
         arch: Device.
         command: Command line, for provenance.
@@ -47,7 +46,6 @@ class Request:
     fit: tuple[str, ...] | None = None
     dx: float | None = None
     budget: float = 100
-    workers: int = 2
     seed: int = 0
     arch: str = "cpu"
     command: tuple[str, ...] = ()

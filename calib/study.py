@@ -22,7 +22,6 @@ from calib.nulls import NullModel, null_models
 from calib.objective import Objective, Target
 from calib.outputs import prepare, write_csv, write_json
 from calib.parameters import Parameter, ParameterSet
-from calib.pool import Pool
 from calib.progress import Progress
 from calib.properties import rule_of
 from calib.provenance import code_key, key_of
@@ -32,6 +31,7 @@ from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.summary import add_conditioning, summarise
 from calib.trace import read_trace
 from calib.uncertainty import uncertainty
+from calib.workers import Workers
 from mpm.record import ForceRecord
 
 # Hard bounds reach this factor beyond the literature's range, so that a trace may contradict the literature.
@@ -113,6 +113,7 @@ def _set_up(request: Request) -> Setup:
 def run(
     request: Request,
     out: Path,
+    pool: Workers,
     *,
     resume: bool = False,
     progress: Callable[[Progress], None] | None = None,
@@ -123,6 +124,7 @@ def run(
     Args:
         request: What to calibrate.
         out: Output folder.
+        pool: Where the simulations run; as many of them at a time are asked for as it has workers.
         resume: Continue the run in ``out`` instead of refusing it.
         progress: Called after each simulation.
         say: Called with each warning and stage, as one sentence.
@@ -138,14 +140,11 @@ def run(
     setup = _set_up(request)
     for text in [*request.food.warnings(), *setup.curve.warnings, *setup.assumed]:
         say(text)
-    options = FitOptions(budget=request.budget, batch=request.workers, seed=request.seed)
+    options = FitOptions(budget=request.budget, batch=pool.workers, seed=request.seed)
     options.check(len(setup.objective.parameters))
     prepare(out, resume=resume)
     header = Header(setup.curve.trace.sha256, key_of(setup.fine.as_dict()))
-    with (
-        EvaluationStore(out / "evaluations.h5", header, resume=resume) as store,
-        Pool(request.workers, request.arch) as pool,
-    ):
+    with EvaluationStore(out / "evaluations.h5", header, resume=resume) as store:
         fine, coarse = (
             CachedEvaluator(
                 pool.evaluator(scene, setup.kept),

@@ -9,10 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_food, add_run, food_of, number, sizing_of
+from calib.cli.options import add_food, add_run, add_workers, food_of, number, sizing_of, workers_of
 from calib.progress import ProgressBar
 from calib.request import Request
-from mpm.errors import CutcalError
 
 HELP = "fit a food to a measured knife-force trace and write a report"
 DESCRIPTION = """Fit a food's cutting properties to a knife-force trace.
@@ -36,7 +35,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
         "--fit", metavar="NAMES", help="properties to fit, e.g. E,nu,R,mu (default: those that cutting sees)"
     )
     p.add_argument("--budget", type=number(0, 1e6, ""), default=100, help="largest number of simulations (default 100)")
-    p.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
+    add_workers(p, "simulations")
     p.add_argument("--resume", action="store_true", help="go on with the run in --out; nothing is simulated twice")
     add_run(p)
 
@@ -61,10 +60,8 @@ def request_of(args: argparse.Namespace, command: Sequence[str]) -> Request:
     Raises:
         CutcalError: An impossible value, an unknown name, a missing file.
     """
-    if args.workers < 1:
-        raise CutcalError(f"--workers {args.workers}: at least 1")
     named = None if args.fit is None else tuple(n.strip() for n in args.fit.split(",") if n.strip())
-    return replace(measured(args, command), fit=named, budget=args.budget, workers=args.workers)
+    return replace(measured(args, command), fit=named, budget=args.budget)
 
 
 def measured(args: argparse.Namespace, command: Sequence[str]) -> Request:
@@ -106,8 +103,8 @@ def run(args: argparse.Namespace) -> int:
     def say(text: str) -> None:
         print(f"note: {text}", file=sys.stderr, flush=True)
 
-    with ProgressBar() as bar:
-        summary = calibrate(request, out, resume=args.resume, progress=bar, say=say)
+    with workers_of(args) as pool, ProgressBar() as bar:
+        summary = calibrate(request, out, pool, resume=args.resume, progress=bar, say=say)
     if args.json:
         print((out / "summary.json").read_text(encoding="utf-8"), end="")
     else:

@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
@@ -25,12 +24,13 @@ from calib.materials import load_food, load_foods
 from calib.metrics import compare
 from calib.nulls import null_models
 from calib.outputs import prepare, write_json
-from calib.pool import DIED, Pool, SceneEvaluator
+from calib.pool import Pool
 from calib.provenance import code_key, key_of, versions
 from calib.scenes import Sizing, cut_scene, elsewhere, height_range, place, specimen
 from calib.study import fit_parameters
 from calib.trace import Trace
 from calib.verdicts import judge, limits
+from calib.workers import DIED, SceneEvaluator
 from mpm.errors import SimulationError
 from mpm.record import ENERGIES
 from mpm.seeding import seed
@@ -208,11 +208,12 @@ class FlakyPool(Pool):
     """A pool whose first ``deaths`` runs lose their process."""
 
     def __init__(self, deaths: int) -> None:
+        self.workers, self.arch, self.threads = 2, "cpu", 1
         self.deaths, self.runs = deaths, 0
 
-    def submit(self, scene: object, values: Mapping[str, float]) -> Future[dict[str, Any]]:
+    def _submit(self, work: object, *args: object) -> Future[Any]:
         self.runs += 1
-        future: Future[dict[str, Any]] = Future()
+        future: Future[Any] = Future()
         if self.runs <= self.deaths:
             future.set_exception(BrokenProcessPool("killed"))
             return future
@@ -244,7 +245,8 @@ class LastRun(Pool):
     """A pool whose last run loses its process ``deaths`` times."""
 
     def __init__(self, deaths: int) -> None:
-        self.deaths, self.arch, self.threads = deaths, "cpu", 1
+        self.workers, self.arch, self.threads = 2, "cpu", 1
+        self.deaths = deaths
 
     def _submit(self, work: object, *args: object) -> Future[Any]:
         future: Future[Any] = Future()
