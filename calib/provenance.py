@@ -44,12 +44,15 @@ def _git(top: Path, *words: str) -> str:
     return done.stdout.strip()
 
 
-def code_key() -> str:
-    """SHA-256 over the solver's source: a stored run is reused only by the code that made it."""
+def code_key(*packages: str) -> str:
+    """SHA-256 over the source of these packages, of the solver where none is named: a stored run is reused only by the
+    code that made it.
+    """
     top = Path(calib.__file__).resolve().parent.parent
     digest = hashlib.sha256()
-    for path in sorted((top / "mpm").glob("*.py")):
-        digest.update(path.name.encode() + path.read_bytes())
+    for package in packages or ("mpm",):
+        for path in sorted((top / package).rglob("*.py")):
+            digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()
 
 

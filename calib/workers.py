@@ -29,7 +29,11 @@ def _run(scene: Scene, values: dict[str, Any], arch: str, threads: int) -> dict[
 
     simulation = Simulation(scene, Runtime(arch, threads))
     material: Material = replace(scene.food.material, **values)
-    record = simulation.run(material)
+    return plain(simulation.run(material))
+
+
+def plain(record: ForceRecord) -> dict[str, Any]:
+    """What an evaluation keeps of a record."""
     scalars = {
         "peak_N": record.peak,
         "work_J": record.work,

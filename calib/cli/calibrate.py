@@ -22,6 +22,7 @@ position_m, ...); robot logs with base_Fz_N and ee_z_m are known."""
 EPILOG = """examples:
   calibrate --food banana --trace force_data/banana_reconstructed.csv
   calibrate --food potato --trace cut.csv --air air.csv --knife edc --out runs/potato
+  calibrate --food potato --trace cut.csv --scheduler tcp://host:8786
 
 Ctrl-C keeps what was computed; the same command with --resume goes on.
 Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass."""
@@ -103,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
     def say(text: str) -> None:
         print(f"note: {text}", file=sys.stderr, flush=True)
 
-    with workers_of(args) as pool, ProgressBar() as bar:
+    with workers_of(args, say) as pool, ProgressBar() as bar:
         summary = calibrate(request, out, pool, resume=args.resume, progress=bar, say=say)
     if args.json:
         print((out / "summary.json").read_text(encoding="utf-8"), end="")

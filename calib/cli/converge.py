@@ -95,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
 
     for text in about["warnings"]:
         say(f"note: {text}")
-    with workers_of(args) as pool:
+    with workers_of(args, say) as pool:
         document = study(scene, axes, out, pool, about=about, repeats=args.repeats, resume=args.resume, say=say)
     if args.json:
         print((out / "converge.json").read_text(encoding="utf-8"), end="")

@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    with workers_of(args) as pool:
+    with workers_of(args, say) as pool:
         todo = (quick_cells if args.quick else cells)(args.seed)
         document = study(todo, out, pool, about=about, resume=args.resume, say=say)
     if args.json:

@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
     def say(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
 
-    with workers_of(args) as pool:
+    with workers_of(args, say) as pool:
         how = How(args.quick, args.seed, args.arch)
         document = study(out, how, pool, only=args.only, about=about, resume=args.resume, say=say)
     print(json.dumps(document, indent=2) if args.json else f"{table(document)}\n  wrote {out}")

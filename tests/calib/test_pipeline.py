@@ -306,11 +306,11 @@ def _alive(process: int) -> bool:
 
 
 def test_imports_stay_light():
-    """Importing calib and mpm loads neither Taichi nor any plotting; nothing is printed, and Taichi will call nobody."""
+    """Importing calib and mpm loads neither Taichi nor any plotting nor Dask; nothing is printed, and Taichi will call nobody."""
     code = (
         "import os, sys, calib, mpm, calib.study, calib.cli.main\n"
         "assert os.environ['TI_SKIP_VERSION_CHECK'] == 'ON'\n"
-        "heavy = {'taichi', 'matplotlib', 'pyvista', 'typst', 'skfem'} & set(sys.modules)\n"
+        "heavy = {'taichi', 'matplotlib', 'pyvista', 'typst', 'skfem', 'distributed'} & set(sys.modules)\n"
         "assert not heavy, heavy"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
