@@ -49,7 +49,9 @@ class Check:
         return asdict(self)
 
 
-def check(scene: Scene, record: ForceRecord, pool: Workers, store: EvaluationStore) -> list[Check]:
+def check(
+    scene: Scene, record: ForceRecord, pool: Workers, store: EvaluationStore, say: Callable[[str], None]
+) -> list[Check]:
     """Simulate the variants of a scene; what the store knows is not simulated again.
 
     Args:
@@ -57,11 +59,14 @@ def check(scene: Scene, record: ForceRecord, pool: Workers, store: EvaluationSto
         record: Its record.
         pool: Where they run.
         store: Where they are kept.
+        say: Told when they are simulated.
     """
     scenes = [vary(scene) for vary in VARIANTS.values()]
     keys = [content_key(s.as_dict(), {}, code_key()) for s in scenes]
     found = {k: known for k, key in enumerate(keys) if (known := store.get(key))}
     new = [k for k in range(len(scenes)) if k not in found]
+    if new:
+        say("simulating them at half the speed, and with the grid and the particles elsewhere")
     for result in pool.run([(scenes[k], {}) for k in new]):
         k = new[result.index]
         store.append(keys[k], result, "check")

@@ -25,6 +25,7 @@ from calib.parameters import Parameter, ParameterSet
 from calib.progress import Progress
 from calib.properties import rule_of
 from calib.provenance import code_key, key_of
+from calib.records import whole_record
 from calib.request import Request, Setup
 from calib.scenes import cut_scene, height_range, place, specimen
 from calib.store import CachedEvaluator, EvaluationStore, Header
@@ -157,15 +158,13 @@ def run(
         )
         result = calibrate(setup.objective, fine, coarse=coarse, options=options, progress=progress)
         start = _start_curve(setup, result, fine)
-        say("simulating the best values once more for their full record")
         scene, values = place(setup.fine, result.best.evaluation.parameters, setup.kept)
         setup = replace(setup, fine=scene)
         scene = scene.with_material(**values)
-        record = pool.record(scene)
+        record = whole_record(scene, pool, out / "record.h5", say)
         checks: list[Check] = []
         if result.status != "interrupted":
-            say("simulating them at half the speed, and with the grid and the particles elsewhere")
-            checks = check(scene, record, pool, store)
+            checks = check(scene, record, pool, store, say)
     add_conditioning(out / "evaluations.h5", setup.curve)
     return _write(request, setup, result, record, checks, start, out, time.monotonic() - began)
 

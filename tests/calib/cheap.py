@@ -54,10 +54,10 @@ def whole(scene: Scene, arch: str, threads: int) -> ForceRecord:
 
 
 def _noted(kind: str, scene: Scene) -> ForceRecord:
-    name = f"{kind}:{key_of(scene.as_dict())}"
-    _note(f"begin {name} {os.getpid()}")
-    time.sleep(float(os.environ.get(SECONDS, 0.0)))
     record = cut(scene)
+    name = f"{kind}:{record.peak!r}"  # which no other scene has
+    _note(f"begin {name} {os.getpid()}")
+    time.sleep(record.wall)
     _note(f"end {name} {os.getpid()}")
     return record
 
