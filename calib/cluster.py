@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 CONNECT_S = 5.0  # time in which a scheduler must answer
 LOOK_S = 1.0  # time between two looks at which workers there are, while no run ends
-FETCH_S = 60.0  # time in which the result of a run that has ended must arrive
+FETCH_S = 30.0  # time in which the result of a run that has ended must arrive
 DESERTED_S = 120.0  # time without any worker after which a study gives up; a nanny needs seconds to start another
 KILLS = 2  # workers that a job may kill
 EXECUTED = ("mpm", "calib", "fem_reference")  # packages whose code runs in workers
@@ -132,7 +132,7 @@ class Cluster(Workers):
                     future.add_done_callback(ended.put)
                 for future in _over(running, ended, ready):
                     k, worker = running.pop(future)
-                    result, killed = _outcome(future, worker)
+                    result, killed = _outcome(future, worker, left=worker not in ready)
                     kills[k] += killed
                     if result is not LOST or kills[k] >= KILLS:
                         yield k, None if result is LOST else result
@@ -213,7 +213,7 @@ async def _kind(address: str) -> str:
 def _fault(answer: object, threads: int) -> str:
     """Why a worker that answered so to :func:`identity` cannot be used; empty where it can."""
     if not isinstance(answer, dict):
-        return f"cannot load cutcal ({answer!r}); install it there, the same version as here"
+        return f"cannot load cutcal ({answer}); install it there, the same version as here"
     other = [f"{name} {answer.get(name)}, here {own}" for name, own in identity().items() if answer.get(name) != own]
     if other:
         return f"runs another version ({'; '.join(other)}); install the same there and restart the worker"
@@ -236,7 +236,7 @@ def _over(
     return [future] if future in running else []
 
 
-def _outcome(future: Future[bytes], worker: str) -> tuple[Any, int]:
+def _outcome(future: Future[bytes], worker: str, *, left: bool) -> tuple[Any, int]:
     """Result of a job that has ended, or whose worker has left, and how many workers died of it.
 
     Raises:
@@ -252,8 +252,8 @@ def _outcome(future: Future[bytes], worker: str) -> tuple[Any, int]:
         raise ClusterError(f"worker {worker}: {error}") if isinstance(error, CutcalError) else error
     if future.status == "cancelled":  # by somebody else, or with the scheduler's connection
         return LOST, 0
-    if future.status == "pending":
-        return LOST, 1
+    if left:  # and a result that was not fetched with it
+        return LOST, int(future.status == "pending")
     try:
         return pickle.loads(future.result(timeout=FETCH_S)), 0
     except (Late, CancelledError):

@@ -191,6 +191,20 @@ def test_keys_follow_the_content():
     assert versions()["cutcal"].count(".") == 2
 
 
+def test_code_is_the_same_in_a_checkout_and_installed(tmp_path, monkeypatch):
+    """The key of the code follows every module of the packages that are named, and not the data an installed one holds."""
+    (tmp_path / "calib" / "part").mkdir(parents=True)
+    own = tmp_path / "calib" / "__init__.py"
+    own.write_text("")
+    monkeypatch.setattr("calib.provenance.calib.__file__", str(own))
+    keys = [code_key("calib")]
+    for name in ("data/script.py", "part/module.py"):
+        (tmp_path / "calib" / name).parent.mkdir(exist_ok=True)
+        (tmp_path / "calib" / name).write_text("1")
+        keys.append(code_key("calib"))
+    assert keys[0] == keys[1] != keys[2]
+
+
 def test_json_is_written_whole_and_finite(tmp_path):
     """NaN becomes null, NumPy numbers become numbers, and no temporary file stays behind."""
     write_json(tmp_path / "s.json", {"a": np.float64(np.nan), "b": (np.int64(2), True)})

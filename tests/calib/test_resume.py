@@ -33,14 +33,13 @@ AT_A_TIME = 2  # simulations, and so at most so many in flight when the study is
 RUN_S = 0.05
 PATIENCE_S = 120.0  # until a study that was started anew has got on, on a loaded machine
 STUDY = """
-import sys
-from calib.cli import options
-from calib.cli.main import main
-from tests.calib.cheap import CheapPool
-
-options.Pool = CheapPool
-
 if __name__ == "__main__":
+    import sys
+    from calib.cli import options
+    from calib.cli.main import main
+    from tests.calib.cheap import CheapPool
+
+    options.Pool = CheapPool
     sys.exit(main(sys.argv[1:]))
 """
 
