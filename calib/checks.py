@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from calib.pool import Pool
 from calib.provenance import code_key
 from calib.scenes import elsewhere
 from calib.store import EvaluationStore, content_key
+from calib.workers import Workers
 from mpm.scene import Scene
 
 
@@ -57,7 +57,9 @@ class Check:
         return asdict(self)
 
 
-def check(scene: Scene, peak: float, work: float, pool: Pool, store: EvaluationStore) -> list[Check]:
+def check(
+    scene: Scene, peak: float, work: float, pool: Workers, store: EvaluationStore, say: Callable[[str], None]
+) -> list[Check]:
     """Simulate the variants of a scene; what the store knows is not simulated again.
 
     Args:
@@ -66,11 +68,14 @@ def check(scene: Scene, peak: float, work: float, pool: Pool, store: EvaluationS
         work: Its work [J].
         pool: Where they run.
         store: Where they are kept.
+        say: Told when they are simulated.
     """
     scenes = [vary(scene) for vary in VARIANTS.values()]
     keys = [content_key(s.as_dict(), {}, code_key()) for s in scenes]
     found = {k: known for k, key in enumerate(keys) if (known := store.get(key))}
     new = [k for k in range(len(scenes)) if k not in found]
+    if new:
+        say("simulating them at half the speed, with the grid and the particles elsewhere, and on cells of two thirds")
     for result in pool.run([(scenes[k], {}) for k in new]):
         k = new[result.index]
         store.append(keys[k], result, "check")

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from calib.errors import CurveError, MaterialError
+from calib.errors import MaterialError
 from calib.materials import FoodSpec, load_food, load_material_file
 from calib.parameters import OF
 from calib.properties import check_override
@@ -205,16 +205,8 @@ def _number(place: Place, given: Mapping[str, Any], name: str) -> float | None:
     return x
 
 
-def overridden(study: Study, *, budget: float | None, workers: int, arch: str, command: tuple[str, ...]) -> Study:
-    """The study with what the command line says of how to run it.
-
-    Raises:
-        CurveError: Fewer than one worker.
-    """
-    if workers < 1:
-        raise CurveError(f"--workers {workers}: at least 1")
+def overridden(study: Study, *, budget: float | None, arch: str, command: tuple[str, ...]) -> Study:
+    """The study with what the command line says of how to run it."""
     spend = study.budget if budget is None else budget
-    requests = {
-        n: replace(r, budget=spend, workers=workers, arch=arch, command=command) for n, r in study.requests.items()
-    }
+    requests = {n: replace(r, budget=spend, arch=arch, command=command) for n, r in study.requests.items()}
     return replace(study, requests=requests, budget=spend)

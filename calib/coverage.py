@@ -25,13 +25,13 @@ from calib.knives import load_knife
 from calib.materials import FoodSpec
 from calib.objective import ErrorModel
 from calib.outputs import prepare, write_json
-from calib.pool import Pool
 from calib.preparation import fit_parameters, set_up
 from calib.progress import Countdown
 from calib.provenance import code_key, git_commit, key_of, versions
 from calib.request import Request
 from calib.scenes import Sizing, cut_scene, specimen
 from calib.store import CachedEvaluator, EvaluationStore, Header
+from calib.workers import Workers
 from mpm.errors import CutcalError
 from mpm.scene import Scene
 
@@ -85,13 +85,12 @@ class MadeUpSensor:
 def run(
     food: FoodSpec,
     out: Path,
+    pool: Workers,
     *,
     traces: int,
     knife: str,
     dx: float | None,
-    workers: int,
     seed: int,
-    arch: str,
     resume: bool,
     command: tuple[str, ...],
     say: Callable[[str], None],
@@ -102,12 +101,11 @@ def run(
     Args:
         food: The food; its ranges are those that truths are drawn from.
         out: Output folder; a line for each trace is there as soon as it is calibrated.
+        pool: Where the simulations run.
         traces: How many.
         knife: Name or YAML file.
         dx: Cell of truths and fits [m], or None for the food's own.
-        workers: Simulations at a time.
         seed: Seed of truths, sensors and fits.
-        arch: Device.
         resume: Go on with the study in ``out``.
         command: Command line, for provenance.
         say: Called with a line after each trace.
@@ -133,12 +131,11 @@ def run(
         dx=dx,
         gain_sd=sensor.gain_sd,
         errors=RIGHT,
-        workers=workers,
-        arch=arch,
+        arch=pool.arch,
     )
     lines = out / "coverage.jsonl"
     done = _known(lines)
-    with EvaluationStore(out / "evaluations.h5", header, resume=resume) as store, Pool(workers, arch) as pool:
+    with EvaluationStore(out / "evaluations.h5", header, resume=resume) as store:
         for k in range(traces):
             if k not in done:
                 done[k] = _one(k, seed, request, truth, sensor, store, pool)
@@ -161,7 +158,7 @@ def run(
 
 
 def _one(
-    k: int, seed: int, request: Request, truth: Scene, sensor: MadeUpSensor, store: EvaluationStore, pool: Pool
+    k: int, seed: int, request: Request, truth: Scene, sensor: MadeUpSensor, store: EvaluationStore, pool: Workers
 ) -> dict[str, Any]:
     """Make up a trace, calibrate it, and compare with the truth."""
     random = np.random.default_rng([seed, k])
@@ -199,7 +196,7 @@ def _one(
 
 
 def _truth(
-    k: int, random: np.random.Generator, food: FoodSpec, truth: Scene, store: EvaluationStore, pool: Pool
+    k: int, random: np.random.Generator, food: FoodSpec, truth: Scene, store: EvaluationStore, pool: Workers
 ) -> tuple[dict[str, float], tuple[np.ndarray, np.ndarray]]:
     """Values of a food whose cut reaches the end of its stroke, and that cut: stroke [m] and force [N]."""
     parameters = fit_parameters(food, food.default_fit)

@@ -19,3 +19,7 @@ class MaterialError(CutcalError):
 
 class OutputError(CutcalError):
     """An output folder or file that cannot be written, or that belongs to another calibration."""
+
+
+class ClusterError(CutcalError):
+    """A Dask cluster that cannot be reached, has no workers, or such as cannot be used."""

@@ -28,6 +28,7 @@ MARKS = (
     "force.csv",
     "evaluations.h5",
     "evaluations.h5.journal",
+    "record.h5",
 )
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import calib
 
+DATA = "data"  # folder of a package that an installed one has and a checkout has not
 PACKAGES = ("taichi", "numpy", "scipy", "pandas", "h5py", "matplotlib", "typst")
 
 
@@ -44,12 +45,16 @@ def _git(top: Path, *words: str) -> str:
     return done.stdout.strip()
 
 
-def code_key() -> str:
-    """SHA-256 over the solver's source: a stored run is reused only by the code that made it."""
+def code_key(*packages: str) -> str:
+    """SHA-256 over the source of these packages, of the solver where none is named: a stored run is reused only by the
+    code that made it.
+    """
     top = Path(calib.__file__).resolve().parent.parent
     digest = hashlib.sha256()
-    for path in sorted((top / "mpm").glob("*.py")):
-        digest.update(path.name.encode() + path.read_bytes())
+    for package in packages or ("mpm",):
+        for path in sorted((top / package).rglob("*.py")):
+            if path.relative_to(top).parts[1] != DATA:
+                digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()
 
 

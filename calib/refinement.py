@@ -15,11 +15,11 @@ from calib.errors import CurveError
 from calib.filters import filter_simulated
 from calib.objective import Evaluation
 from calib.outputs import prepare, write_csv, write_json
-from calib.pool import Pool
 from calib.progress import Countdown
 from calib.provenance import code_key, git_commit, key_of, versions
 from calib.scenes import elsewhere
 from calib.store import EvaluationStore, Header, content_key
+from calib.workers import Workers
 from mpm.scene import Scene
 
 AXES = ("safety", "mach", "ppc", "offset", "repeat")
@@ -89,11 +89,10 @@ def run(
     scene: Scene,
     axes: Mapping[str, Sequence[float]],
     out: Path,
+    pool: Workers,
     *,
     about: Mapping[str, Any],
     repeats: int = 3,
-    workers: int = 2,
-    arch: str = "cpu",
     resume: bool = False,
     say: Callable[[str], None],
 ) -> dict[str, Any]:
@@ -103,10 +102,9 @@ def run(
         scene: The cut; its cell size is not used.
         axes: Values to try by axis.
         out: Output folder.
+        pool: Where the runs are made.
         about: What converge.json says of food, knife and command.
         repeats: Runs with other particles and the grid elsewhere.
-        workers: Simulations at a time.
-        arch: Device.
         resume: Go on with the study in ``out``.
         say: Called with a line after each run.
 
@@ -119,9 +117,9 @@ def run(
     todo = cases(scene, axes, repeats)
     prepare(out, resume=resume)
     with EvaluationStore(out / "evaluations.h5", Header("", key_of(scene.as_dict())), resume=resume) as store:
-        results = _evaluate(todo, store, workers, arch, say)
+        results = _evaluate(todo, store, pool, say)
     document = {**about, **_conclude(todo, results, out)}
-    document |= {"device": arch, "versions": versions(), "git": git_commit()}
+    document |= {"device": pool.arch, "versions": versions(), "git": git_commit()}
     write_json(out / "converge.json", document)
     from reports.convergence import write_figure
 
@@ -130,7 +128,7 @@ def run(
 
 
 def _evaluate(
-    todo: Sequence[Case], store: EvaluationStore, workers: int, arch: str, say: Callable[[str], None]
+    todo: Sequence[Case], store: EvaluationStore, pool: Workers, say: Callable[[str], None]
 ) -> list[Evaluation]:
     """Results of all cases in their order; what the store knows is not run again, and the longest runs start first."""
     keys = [content_key(case.scene.as_dict(), {}, code_key()) for case in todo]
@@ -142,14 +140,13 @@ def _evaluate(
     rest = Countdown(total)
     if new:
         say(f"{len(new)} runs; the finest grid costs {max(todo[k].cost for k in new) / total:.0%} of them")
-        with Pool(workers, arch) as pool:
-            for result in pool.run([(todo[k].scene, {}) for k in new]):
-                k = new[result.index]
-                store.append(keys[k], result, todo[k].words)
-                found[k] = result
-                peak, work = (result.scalars.get(name, math.nan) for name in ("peak_N", "work_J"))
-                state = f"peak {peak:.2f} N, work {work:.4f} J" if result.ok else f"broke down ({result.reason})"
-                say(f"{todo[k].words}: {state}; {len(found)} of {len(todo)} runs, {rest.left(todo[k].cost)}")
+        for result in pool.run([(todo[k].scene, {}) for k in new]):
+            k = new[result.index]
+            store.append(keys[k], result, todo[k].words)
+            found[k] = result
+            peak, work = (result.scalars.get(name, math.nan) for name in ("peak_N", "work_J"))
+            state = f"peak {peak:.2f} N, work {work:.4f} J" if result.ok else f"broke down ({result.reason})"
+            say(f"{todo[k].words}: {state}; {len(found)} of {len(todo)} runs, {rest.left(todo[k].cost)}")
     return [found[k] for k in range(len(todo))]
 
 

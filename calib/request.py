@@ -35,7 +35,6 @@ class Request:
         u_num: Folder of a convergence study whose numerical uncertainty enters the likelihood, or None.
         errors: How far a right model may be from the trace.
         budget: Largest number of simulations.
-        workers: Simulations at a time.
         seed: Seed of particles and search.
         arch: Device.
         command: Command line, for provenance.
@@ -57,7 +56,6 @@ class Request:
     u_num: Path | None = None
     errors: ErrorModel = field(default_factory=ErrorModel)
     budget: float = 100
-    workers: int = 2
     seed: int = 0
     arch: str = "cpu"
     command: tuple[str, ...] = ()

@@ -17,7 +17,6 @@ from calib.metrics import Metrics, compare
 from calib.nulls import null_models
 from calib.outputs import prepare, write_csv, write_json
 from calib.parameters import plain
-from calib.pool import Pool
 from calib.progress import Progress
 from calib.provenance import git_commit, key_of, versions
 from calib.request import Setup
@@ -25,11 +24,13 @@ from calib.scenes import place
 from calib.specimens import Fitted, Specimens, pressed, set_ups
 from calib.store import EvaluationStore, Header
 from calib.verdicts import CHANGE_LIMIT, NRMSE_LIMIT, PEAK_LIMIT, SHAPE_LIMIT
+from calib.workers import Workers
 
 
 def run(
     study: Study,
     out: Path,
+    pool: Workers,
     *,
     resume: bool = False,
     progress: Callable[[Progress], None] | None = None,
@@ -40,6 +41,7 @@ def run(
     Args:
         study: What to fit and what to hold out.
         out: Output folder.
+        pool: Where the simulations run.
         resume: Go on with the study in ``out``; nothing is simulated twice.
         progress: Called after each simulation.
         say: Called with each warning and stage, as one sentence.
@@ -59,10 +61,7 @@ def run(
     prepare(out, resume=resume)
     header = Header(_sha256(setups), key_of({n: s.fine.as_dict() for n, s in setups.items()}))
     first = next(iter(study.requests.values()))
-    with (
-        EvaluationStore(out / "evaluations.h5", header, resume=resume) as store,
-        Pool(first.workers, first.arch) as pool,
-    ):
+    with EvaluationStore(out / "evaluations.h5", header, resume=resume) as store:
         specimens = Specimens(study, setups, tests, pool, store, progress, say)
         held = {name: _held_out(specimens, name) for name in study.hold_out}
         kept = [n for n in setups if n not in study.hold_out] or list(setups)
@@ -120,9 +119,13 @@ def _checks(specimens: Specimens, fitted: Fitted, name: str) -> list[Check]:
     setup = specimens.setups[name]
     scene, values = place(setup.fine, fitted.values(name), setup.kept)
     own = fitted.result.best.evaluation.parts[fitted.names.index(name)]
-    specimens.say(f"simulating {name} at half the speed, with the grid elsewhere, and on cells of two thirds")
     return check(
-        scene.with_material(**values), own.scalars["peak_N"], own.scalars["work_J"], specimens.pool, specimens.store
+        scene.with_material(**values),
+        own.scalars["peak_N"],
+        own.scalars["work_J"],
+        specimens.pool,
+        specimens.store,
+        lambda text: specimens.say(f"{name}: {text}"),
     )
 
 

@@ -17,12 +17,12 @@ from calib.doubt import Doubt, doubt_of
 from calib.fit import FitOptions, FitResult, calibrate
 from calib.joint import JointEvaluator, JointObjective
 from calib.parameters import Z95, Parameter, ParameterSet, own, plain
-from calib.pool import Pool
 from calib.preparation import set_up
 from calib.progress import Progress
 from calib.provenance import code_key
 from calib.request import Setup
 from calib.store import CachedEvaluator, EvaluationStore
+from calib.workers import Workers
 from mpm.scene import Scene
 from mpm.shapes import Shape
 
@@ -133,7 +133,7 @@ class Specimens:
     study: Study
     setups: Mapping[str, Setup]
     tests: tuple[Pressed, ...]
-    pool: Pool
+    pool: Workers
     store: EvaluationStore
     progress: Callable[[Progress], None] | None = None
     say: Callable[[str], None] = field(default=lambda text: None)

@@ -15,10 +15,10 @@ import numpy as np
 from calib.hazards import SOUND_STEP, Cell
 from calib.objective import Evaluation
 from calib.outputs import prepare, write_json
-from calib.pool import DIED, Pool
 from calib.progress import Countdown
 from calib.provenance import code_key, git_commit, key_of, versions
 from calib.store import EvaluationStore, Header
+from calib.workers import DIED, Workers
 
 REASONS = {
     "not_finite": "a force, energy or position is no number",
@@ -42,10 +42,9 @@ RATE = 2e6  # particle steps a second, for that estimate alone
 def run(
     cells: Sequence[Cell],
     out: Path,
+    pool: Workers,
     *,
     about: dict[str, Any],
-    workers: int = 2,
-    arch: str = "cpu",
     resume: bool = False,
     say: Callable[[str], None],
 ) -> dict[str, Any]:
@@ -54,9 +53,8 @@ def run(
     Args:
         cells: The map.
         out: Output folder.
+        pool: Where the runs are made.
         about: What stress.json says of the command.
-        workers: Simulations at a time.
-        arch: Device.
         resume: Go on with the map in ``out``.
         say: Called with a line after each run.
 
@@ -68,9 +66,9 @@ def run(
     """
     prepare(out, resume=resume)
     with EvaluationStore(out / "evaluations.h5", Header("", "stability map"), resume=resume) as store:
-        results = evaluate(cells, store, workers, arch, say)
+        results = evaluate(cells, store, pool, say)
     document = {**about, **conclude(cells, results)}
-    document |= {"device": arch, "versions": versions(), "git": git_commit()}
+    document |= {"device": pool.arch, "versions": versions(), "git": git_commit()}
     write_json(out / "stress.json", document)
     from reports.stability import write_figure
 
@@ -79,7 +77,7 @@ def run(
 
 
 def evaluate(
-    cells: Sequence[Cell], store: EvaluationStore, workers: int, arch: str, say: Callable[[str], None]
+    cells: Sequence[Cell], store: EvaluationStore, pool: Workers, say: Callable[[str], None]
 ) -> list[Evaluation | None]:
     """Results of all cells in their order, None for a refused one; what the store knows is not run again."""
     code = _code()
@@ -94,14 +92,13 @@ def evaluate(
     rest = Countdown(sum(costs.values()))
     if new:
         say(f"{len(new)} runs; {sum(not key for key in keys)} cells are refused without one")
-        with Pool(workers, arch) as pool:
-            for place, result in pool.each(attempt, [(cells[k], MOST, LONGEST) for k in new]):
-                k = new[place]
-                done = evaluation(result)
-                store.append(keys[k], done, cells[k].family)
-                found[keys[k]] = done
-                state = "stable" if done.ok else f"{done.reason} at {done.fraction:.0%}"
-                say(f"{cells[k].words}: {state}; {len(found)} of {runs} runs, {rest.left(costs[k])}")
+        for place, result in pool.each(attempt, [(cells[k], MOST, LONGEST) for k in new]):
+            k = new[place]
+            done = evaluation(result)
+            store.append(keys[k], done, cells[k].family)
+            found[keys[k]] = done
+            state = "stable" if done.ok else f"{done.reason} at {done.fraction:.0%}"
+            say(f"{cells[k].words}: {state}; {len(found)} of {runs} runs, {rest.left(costs[k])}")
     return [found[key] if key else None for key in keys]
 
 

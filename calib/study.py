@@ -19,20 +19,22 @@ from calib.materials import FoodSpec, dump_material
 from calib.metrics import compare
 from calib.nulls import NullModel, null_models
 from calib.outputs import prepare, write_csv, write_json
-from calib.pool import Pool
 from calib.preparation import set_up
 from calib.progress import Progress
 from calib.provenance import code_key, key_of
+from calib.records import whole_record
 from calib.request import Request, Setup
 from calib.scenes import place
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.summary import add_conditioning, summarise
+from calib.workers import Workers
 from mpm.record import ForceRecord
 
 
 def run(
     request: Request,
     out: Path,
+    pool: Workers,
     *,
     resume: bool = False,
     progress: Callable[[Progress], None] | None = None,
@@ -43,6 +45,7 @@ def run(
     Args:
         request: What to calibrate.
         out: Output folder.
+        pool: Where the simulations run; as many of them at a time are asked for as it has workers.
         resume: Continue the run in ``out`` instead of refusing it.
         progress: Called after each simulation.
         say: Called with each warning and stage, as one sentence.
@@ -58,14 +61,11 @@ def run(
     setup = set_up(request)
     for text in [*request.food.warnings(), *setup.curve.warnings, *setup.assumed]:
         say(text)
-    options = FitOptions(budget=request.budget, batch=request.workers, seed=request.seed)
+    options = FitOptions(budget=request.budget, batch=pool.workers, seed=request.seed)
     options.check(len(setup.objective.parameters))
     prepare(out, resume=resume)
     header = Header(setup.curve.trace.sha256, key_of(setup.fine.as_dict()))
-    with (
-        EvaluationStore(out / "evaluations.h5", header, resume=resume) as store,
-        Pool(request.workers, request.arch) as pool,
-    ):
+    with EvaluationStore(out / "evaluations.h5", header, resume=resume) as store:
         fine, coarse = (
             CachedEvaluator(
                 pool.evaluator(scene, setup.kept),
@@ -81,17 +81,13 @@ def run(
         if doubt is not None:
             result = replace(result, history=(*result.history, *doubt.runs))
         start = _start_curve(setup, result, fine)
-        say("simulating the best values once more for their full record")
         scene, values = place(setup.fine, result.best.evaluation.parameters, setup.kept)
         setup = replace(setup, fine=scene)
         scene = scene.with_material(**values)
-        record = pool.record(scene)
+        record = whole_record(scene, pool, out / "record.h5", say)
         checks: list[Check] = []
         if result.status != "interrupted":
-            say(
-                "simulating them at half the speed, with the grid and the particles elsewhere, and on cells of two thirds"
-            )
-            checks = check(scene, record.peak, record.work, pool, store)
+            checks = check(scene, record.peak, record.work, pool, store, say)
     add_conditioning(out / "evaluations.h5", setup.curve)
     return _write(request, setup, result, doubt, record, checks, start, out, time.monotonic() - began)
 

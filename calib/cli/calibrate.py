@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_food, add_run, food_of, number, sizing_of
+from calib.cli.options import add_food, add_run, add_workers, food_of, number, sizing_of, workers_of
 from calib.objective import ErrorModel
 from calib.progress import ProgressBar
 from calib.request import Request
@@ -25,6 +25,7 @@ EPILOG = """examples:
   calibrate --food banana --trace force_data/banana_reconstructed.csv
   calibrate --food potato --trace cut.csv --air air.csv --knife edc --out runs/potato
   calibrate --config potatoes.yaml --out runs/potatoes
+  calibrate --food potato --trace cut.csv --scheduler tcp://host:8786
 
 Ctrl-C keeps what was computed; the same command with --resume goes on.
 Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass."""
@@ -45,7 +46,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--budget", type=number(0, 1e6, ""), help="largest number of simulations (default 100, of each trace)"
     )
-    p.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
+    add_workers(p, "simulations")
     p.add_argument(
         "--discrepancy",
         type=number(0, 1, ""),
@@ -97,8 +98,6 @@ def request_of(args: argparse.Namespace, command: Sequence[str]) -> Request:
     Raises:
         CutcalError: An impossible value, an unknown name, a missing file.
     """
-    if args.workers < 1:
-        raise CutcalError(f"--workers {args.workers}: at least 1")
     named = None if args.fit is None else tuple(n.strip() for n in args.fit.split(",") if n.strip())
     u_num = None if args.u_num is None else Path(args.u_num)
     errors = ErrorModel() if args.discrepancy is None else ErrorModel(discrepancy=args.discrepancy)
@@ -107,7 +106,6 @@ def request_of(args: argparse.Namespace, command: Sequence[str]) -> Request:
         errors=errors,
         fit=named,
         budget=args.budget or BUDGET,
-        workers=args.workers,
         u_num=u_num,
     )
 
@@ -158,8 +156,8 @@ def run(args: argparse.Namespace) -> int:
     def say(text: str) -> None:
         print(f"note: {text}", file=sys.stderr, flush=True)
 
-    with ProgressBar() as bar:
-        summary = calibrate(request, out, resume=args.resume, progress=bar, say=say)
+    with workers_of(args, say) as pool, ProgressBar() as bar:
+        summary = calibrate(request, out, pool, resume=args.resume, progress=bar, say=say)
     if args.json:
         print((out / "summary.json").read_text(encoding="utf-8"), end="")
     else:
@@ -176,14 +174,14 @@ def run_study(args: argparse.Namespace, command: Sequence[str]) -> int:
     if taken:
         raise CutcalError(f"--{taken[0]} beside --config: write it into {args.config}, where it belongs to a trace")
     read = read_study(args.config)
-    study = overridden(read, budget=args.budget, workers=args.workers, arch=args.arch, command=tuple(command))
+    study = overridden(read, budget=args.budget, arch=args.arch, command=tuple(command))
     out = Path(args.out or f"cutcal-{Path(args.config).stem}")
 
     def say(text: str) -> None:
         print(f"note: {text}", file=sys.stderr, flush=True)
 
-    with ProgressBar() as bar:
-        summary = study_run(study, out, resume=args.resume, progress=bar, say=say)
+    with workers_of(args, say) as pool, ProgressBar() as bar:
+        summary = study_run(study, out, pool, resume=args.resume, progress=bar, say=say)
     if args.json:
         print((out / "summary.json").read_text(encoding="utf-8"), end="")
     else:

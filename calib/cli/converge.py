@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_food, add_run, food_of, number, numbers, sizing_of
+from calib.cli.options import add_food, add_run, add_workers, food_of, number, numbers, sizing_of, workers_of
 from calib.errors import CurveError
 from calib.knives import load_knife
 from calib.scenes import cut_scene, specimen
@@ -59,7 +59,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--stroke", type=number(1e-4, 1, "m"), metavar="M", help="way of the edge; the whole height by default"
     )
-    p.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
+    add_workers(p, "simulations")
     p.add_argument("--resume", action="store_true", help="go on with the study in --out; nothing is simulated twice")
     add_run(p)
 
@@ -68,8 +68,8 @@ def run(args: argparse.Namespace) -> int:
     """Run the study; prints its table, or converge.json."""
     from calib.refinement import run as study
 
-    if args.workers < 1 or args.repeats < 0:
-        raise CurveError("--workers must be at least 1 and --repeats at least 0")
+    if args.repeats < 0:
+        raise CurveError(f"--repeats {args.repeats}: at least 0")
     food, knife = food_of(args), load_knife(args.knife)
     shape, assumed = specimen(food, None, sizing_of(args))
     scene = cut_scene(food, shape, knife, stroke=args.stroke, dx=max(args.dx) if args.dx else None, seed=args.seed)
@@ -95,17 +95,8 @@ def run(args: argparse.Namespace) -> int:
 
     for text in about["warnings"]:
         say(f"note: {text}")
-    document = study(
-        scene,
-        axes,
-        out,
-        about=about,
-        repeats=args.repeats,
-        workers=args.workers,
-        arch=args.arch,
-        resume=args.resume,
-        say=say,
-    )
+    with workers_of(args, say) as pool:
+        document = study(scene, axes, out, pool, about=about, repeats=args.repeats, resume=args.resume, say=say)
     if args.json:
         print((out / "converge.json").read_text(encoding="utf-8"), end="")
     else:

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_food, add_run, food_of
+from calib.cli.options import add_food, add_run, add_workers, food_of, workers_of
 from calib.errors import CurveError
 
 HELP = "calibrate made-up traces of known truth: do the intervals hold it?"
@@ -28,7 +28,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
     add_food(p)
     p.add_argument("--traces", type=int, default=100, help="how many (default 100)")
-    p.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
+    add_workers(p, "simulations")
     p.add_argument("--resume", action="store_true", help="go on with the study in --out; nothing is simulated twice")
     add_run(p)
 
@@ -37,23 +37,27 @@ def run(args: argparse.Namespace) -> int:
     """Run the study; prints its table, or coverage.json."""
     from calib.coverage import run as study
 
-    if args.workers < 1 or args.traces < 1 or args.seed < 0:
-        raise CurveError("--workers and --traces must be at least 1, --seed at least 0")
+    if args.traces < 1 or args.seed < 0:
+        raise CurveError("--traces must be at least 1, --seed at least 0")
     food = food_of(args)
     out = Path(args.out or f"cutcal-coverage-{food.name}")
-    document = study(
-        food,
-        out,
-        traces=args.traces,
-        knife=args.knife,
-        dx=args.dx,
-        workers=args.workers,
-        seed=args.seed,
-        arch=args.arch,
-        resume=args.resume,
-        command=("coverage", *(a for a in sys.argv[1:] if a != "coverage")),
-        say=lambda text: print(text, file=sys.stderr, flush=True),
-    )
+
+    def say(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
+    with workers_of(args, say) as pool:
+        document = study(
+            food,
+            out,
+            pool,
+            traces=args.traces,
+            knife=args.knife,
+            dx=args.dx,
+            seed=args.seed,
+            resume=args.resume,
+            command=("coverage", *(a for a in sys.argv[1:] if a != "coverage")),
+            say=say,
+        )
     if args.json:
         print((out / "coverage.json").read_text(encoding="utf-8"), end="")
     else:

@@ -6,11 +6,16 @@ import argparse
 import math
 from collections.abc import Callable
 
+from calib.cluster import Cluster
 from calib.materials import FoodSpec, check_override, load_food, load_material_file
+from calib.pool import Pool
 from calib.scenes import Sizing
+from calib.workers import Workers
 from mpm.errors import CutcalError
 from mpm.runtime import ARCHES
 from mpm.shapes import SHAPE_KINDS
+
+LOCAL_WORKERS = 2  # simulations at a time on this machine: a process each
 
 
 def number(low: float, high: float, unit: str) -> Callable[[str], float]:
@@ -64,6 +69,33 @@ def add_run(p: argparse.ArgumentParser) -> None:
     p.add_argument("--seed", type=int, default=0, help="seed of the particles and of the search")
     p.add_argument("--arch", choices=ARCHES, default="cpu", help="device of the simulations")
     p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
+
+
+def add_workers(p: argparse.ArgumentParser, what: str) -> None:
+    """Options that say how many at a time, and on which machines."""
+    p.add_argument(
+        "--workers", type=int, metavar="N", help=f"{what} at a time (default 2; on a cluster all its workers)"
+    )
+    p.add_argument(
+        "--scheduler", metavar="ADDRESS", help="run them on the Dask cluster of this scheduler, e.g. tcp://host:8786"
+    )
+
+
+def workers_of(args: argparse.Namespace, say: Callable[[str], None]) -> Workers:
+    """Where the options want the simulations to run; nothing is started before it has to do.
+
+    Args:
+        args: The options.
+        say: Called with a sentence about the workers of a cluster.
+
+    Raises:
+        CutcalError: An impossible number, or a cluster that cannot be used.
+    """
+    if args.workers is not None and args.workers < 1:
+        raise CutcalError(f"--workers {args.workers}: at least 1")
+    if args.scheduler is not None:
+        return Cluster(args.scheduler, args.workers, args.arch, say=say)
+    return Pool(LOCAL_WORKERS if args.workers is None else args.workers, args.arch)
 
 
 def food_of(args: argparse.Namespace) -> FoodSpec:

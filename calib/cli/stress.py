@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from calib.cli.options import add_workers, workers_of
 from calib.errors import CurveError
 
 HELP = "stability map: stiffness, Poisson's ratio, time step, cell, speed, resistance and odd starts"
@@ -31,7 +32,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     from mpm.runtime import ARCHES
 
     p.add_argument("--quick", action="store_true", help="a dozen coarse cells instead of the whole map")
-    p.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
+    add_workers(p, "simulations")
     p.add_argument("--resume", action="store_true", help="go on with the map in --out; nothing is simulated twice")
     p.add_argument("--out", metavar="DIR", help="folder of the results; never overwritten")
     p.add_argument("--seed", type=int, default=0, help="seed of the particles")
@@ -44,18 +45,17 @@ def run(args: argparse.Namespace) -> int:
     from calib.hazards import cells, quick_cells
     from calib.stability import run as study
 
-    if args.workers < 1 or args.seed < 0:
-        raise CurveError("--workers must be at least 1 and --seed at least 0")
+    if args.seed < 0:
+        raise CurveError(f"--seed {args.seed}: at least 0")
     out = Path(args.out or "cutcal-stress")
-    document = study(
-        (quick_cells if args.quick else cells)(args.seed),
-        out,
-        about={"command": ["stress", *(a for a in sys.argv[1:] if a != "stress")], "seed": args.seed},
-        workers=args.workers,
-        arch=args.arch,
-        resume=args.resume,
-        say=lambda text: print(text, file=sys.stderr, flush=True),
-    )
+    about = {"command": ["stress", *(a for a in sys.argv[1:] if a != "stress")], "seed": args.seed}
+
+    def say(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
+    with workers_of(args, say) as pool:
+        todo = (quick_cells if args.quick else cells)(args.seed)
+        document = study(todo, out, pool, about=about, resume=args.resume, say=say)
     if args.json:
         print((out / "stress.json").read_text(encoding="utf-8"), end="")
     else:

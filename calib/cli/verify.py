@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_run
+from calib.cli.options import add_run, add_workers, workers_of
 from calib.errors import CurveError
 
 HELP = "compare the solver with closed forms and finite elements"
@@ -29,7 +29,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
     p.add_argument("--quick", action="store_true", help="coarse versions of the fast cases: a minute instead of many")
     p.add_argument("--only", metavar="TEXT", help="only cases with this in their name")
-    p.add_argument("--workers", type=int, default=2, help="cases at a time (default 2)")
+    add_workers(p, "cases")
     p.add_argument("--resume", action="store_true", help="go on with the cases in --out; none that ended is run twice")
     add_run(p)
 
@@ -39,18 +39,17 @@ def run(args: argparse.Namespace) -> int:
     from calib.verification.rows import How
     from calib.verification.study import run as study
 
-    if args.workers < 1 or args.seed < 0:
-        raise CurveError("--workers must be at least 1 and --seed at least 0")
+    if args.seed < 0:
+        raise CurveError(f"--seed {args.seed}: at least 0")
     out = Path(args.out or "cutcal-verify")
-    document = study(
-        out,
-        How(args.quick, args.seed, args.arch),
-        only=args.only,
-        about={"command": ["verify", *(a for a in sys.argv[1:] if a != "verify")]},
-        workers=args.workers,
-        resume=args.resume,
-        say=lambda text: print(text, file=sys.stderr, flush=True),
-    )
+    about = {"command": ["verify", *(a for a in sys.argv[1:] if a != "verify")]}
+
+    def say(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
+    with workers_of(args, say) as pool:
+        how = How(args.quick, args.seed, args.arch)
+        document = study(out, how, pool, only=args.only, about=about, resume=args.resume, say=say)
     print(json.dumps(document, indent=2) if args.json else f"{table(document)}\n  wrote {out}")
     return 0 if document["passed"] else 2
 

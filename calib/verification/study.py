@@ -10,10 +10,10 @@ from typing import Any
 
 from calib.errors import CurveError
 from calib.outputs import prepare, write_json
-from calib.pool import Pool
 from calib.progress import Countdown
 from calib.provenance import code_key, git_commit, versions
 from calib.verification.rows import Case, How, cases
+from calib.workers import Workers
 from mpm.errors import CutcalError
 
 Say = Callable[[str], None]
@@ -22,10 +22,10 @@ Say = Callable[[str], None]
 def run(
     out: Path,
     how: How,
+    pool: Workers,
     *,
     only: str | None,
     about: dict[str, Any],
-    workers: int = 2,
     resume: bool = False,
     say: Say,
 ) -> dict[str, Any]:
@@ -34,9 +34,9 @@ def run(
     Args:
         out: Output folder.
         how: Quick or whole, seed, device.
+        pool: Where the cases run, each in a process of its own.
         only: Part of the name of the cases to run, or None for all.
         about: What verify.json says beside the rows.
-        workers: Cases at a time, each in a process of its own.
         resume: Keep the cases of ``out`` that ran to their end.
         say: Called with a line after each case.
 
@@ -58,19 +58,18 @@ def run(
     if len(new) < len(todo):
         say(f"{len(todo) - len(new)} of {len(todo)} cases are known already")
     rest = Countdown(sum(c.cost for c in new))
-    with Pool(min(workers, max(len(new), 1)), how.arch) as pool:
-        for k, done in pool.each(_rows, [(c.name, how) for c in new]):
-            name = new[k].name
-            found[name] = done or {
-                "rows": [],
-                "seconds": 0.0,
-                "broken": "its process was killed, perhaps for lack of memory",
-            }
-            write_json(out / "verify.json", document | _table(todo, found))
-            count = sum(not row["passed"] for row in found[name]["rows"])
-            state = "broke down" if found[name]["broken"] else f"{count} failed" if count else "passed"
-            done_now = f"{len(found)} of {len(todo)} cases, {rest.left(new[k].cost)}"
-            say(f"{name}: {len(found[name]['rows'])} rows, {state}; {done_now}")
+    for k, done in pool.each(_rows, [(c.name, how) for c in new]):
+        name = new[k].name
+        found[name] = done or {
+            "rows": [],
+            "seconds": 0.0,
+            "broken": "its process was killed, perhaps for lack of memory",
+        }
+        write_json(out / "verify.json", document | _table(todo, found))
+        count = sum(not row["passed"] for row in found[name]["rows"])
+        state = "broke down" if found[name]["broken"] else f"{count} failed" if count else "passed"
+        done_now = f"{len(found)} of {len(todo)} cases, {rest.left(new[k].cost)}"
+        say(f"{name}: {len(found[name]['rows'])} rows, {state}; {done_now}")
     document |= _table(todo, found)
     write_json(out / "verify.json", document)
     from reports.verification import write_figure

@@ -18,6 +18,7 @@ import pytest
 from calib.cli.main import main
 from calib.materials import load_material_file
 from calib.metrics import compare
+from calib.pool import Pool
 
 ROOT = Path(__file__).resolve().parents[2]
 TRACE = ROOT / "force_data" / "banana_reconstructed.csv"
@@ -82,8 +83,9 @@ def test_kill_loses_nothing_and_resume_repeats_nothing(killed, finished):
     assert len(stored) >= 3
 
 
-def test_second_run_costs_no_simulation(finished, capsys):
-    """Resuming a finished run simulates nothing new and prints one JSON document on stdout."""
+def test_second_run_costs_no_simulation(finished, capsys, monkeypatch):
+    """Resuming a finished run simulates nothing, the record of the best values included, and prints one JSON document."""
+    monkeypatch.setattr(Pool, "_submit", lambda self, work, *job: pytest.fail(f"{work.__name__} was asked for"))
     with h5py.File(finished[0] / "evaluations.h5") as f:
         before = f["key"][()].tolist()
     code = main(["calibrate", *SMALL, "--out", str(finished[0]), "--resume", "--json"])

@@ -10,7 +10,6 @@ import pandas as pd
 import pytest
 
 from calib.config import OWN, overridden, read_study
-from calib.errors import CurveError
 from calib.nuisance import Nuisance
 from calib.specimens import pinned, pressed
 from mpm.errors import CutcalError
@@ -55,13 +54,11 @@ def test_each_is_all_in_turn(tmp_path: Path) -> None:
 
 
 def test_the_command_line_says_how_to_run_it(tmp_path: Path) -> None:
-    """Budget, workers and device reach every trace; no worker is an error."""
+    """Budget, device and command reach every trace."""
     study = read_study(written(tmp_path, GOOD))
-    new = overridden(study, budget=30.0, workers=1, arch="cpu", command=("calibrate",))
-    assert {(r.budget, r.workers, r.command) for r in new.requests.values()} == {(30.0, 1, ("calibrate",))}
+    new = overridden(study, budget=30.0, arch="cpu", command=("calibrate",))
+    assert {(r.budget, r.arch, r.command) for r in new.requests.values()} == {(30.0, "cpu", ("calibrate",))}
     assert new.budget == 30.0
-    with pytest.raises(CurveError, match="--workers 0"):
-        overridden(study, budget=None, workers=0, arch="cpu", command=())
 
 
 @pytest.mark.parametrize(

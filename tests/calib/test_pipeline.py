@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
@@ -25,12 +24,13 @@ from calib.materials import load_food, load_foods
 from calib.metrics import compare
 from calib.nulls import null_models
 from calib.outputs import prepare, write_json
-from calib.pool import DIED, Pool, SceneEvaluator
+from calib.pool import Pool
 from calib.preparation import fit_parameters
 from calib.provenance import code_key, key_of, versions
 from calib.scenes import Sizing, cut_scene, elsewhere, height_range, place, specimen
 from calib.trace import Trace
 from calib.verdicts import judge, limits
+from calib.workers import DIED, SceneEvaluator
 from mpm.errors import SimulationError
 from mpm.record import ENERGIES
 from mpm.seeding import seed
@@ -191,6 +191,20 @@ def test_keys_follow_the_content():
     assert versions()["cutcal"].count(".") == 2
 
 
+def test_code_is_the_same_in_a_checkout_and_installed(tmp_path, monkeypatch):
+    """The key of the code follows every module of the packages that are named, and not the data an installed one holds."""
+    (tmp_path / "calib" / "part").mkdir(parents=True)
+    own = tmp_path / "calib" / "__init__.py"
+    own.write_text("")
+    monkeypatch.setattr("calib.provenance.calib.__file__", str(own))
+    keys = [code_key("calib")]
+    for name in ("data/script.py", "part/module.py"):
+        (tmp_path / "calib" / name).parent.mkdir(exist_ok=True)
+        (tmp_path / "calib" / name).write_text("1")
+        keys.append(code_key("calib"))
+    assert keys[0] == keys[1] != keys[2]
+
+
 def test_json_is_written_whole_and_finite(tmp_path):
     """NaN becomes null, NumPy numbers become numbers, and no temporary file stays behind."""
     write_json(tmp_path / "s.json", {"a": np.float64(np.nan), "b": (np.int64(2), True)})
@@ -208,11 +222,12 @@ class FlakyPool(Pool):
     """A pool whose first ``deaths`` runs lose their process."""
 
     def __init__(self, deaths: int) -> None:
+        self.workers, self.arch, self.threads = 2, "cpu", 1
         self.deaths, self.runs = deaths, 0
 
-    def submit(self, scene: object, values: Mapping[str, float]) -> Future[dict[str, Any]]:
+    def _submit(self, work: object, *args: object) -> Future[Any]:
         self.runs += 1
-        future: Future[dict[str, Any]] = Future()
+        future: Future[Any] = Future()
         if self.runs <= self.deaths:
             future.set_exception(BrokenProcessPool("killed"))
             return future
@@ -244,7 +259,8 @@ class LastRun(Pool):
     """A pool whose last run loses its process ``deaths`` times."""
 
     def __init__(self, deaths: int) -> None:
-        self.deaths, self.arch, self.threads = deaths, "cpu", 1
+        self.workers, self.arch, self.threads = 2, "cpu", 1
+        self.deaths = deaths
 
     def _submit(self, work: object, *args: object) -> Future[Any]:
         future: Future[Any] = Future()
@@ -304,11 +320,11 @@ def _alive(process: int) -> bool:
 
 
 def test_imports_stay_light():
-    """Importing calib and mpm loads neither Taichi nor any plotting; nothing is printed, and Taichi will call nobody."""
+    """Importing calib and mpm loads neither Taichi nor any plotting nor Dask; nothing is printed, and Taichi will call nobody."""
     code = (
         "import os, sys, calib, mpm, calib.study, calib.cli.main\n"
         "assert os.environ['TI_SKIP_VERSION_CHECK'] == 'ON'\n"
-        "heavy = {'taichi', 'matplotlib', 'pyvista', 'typst', 'skfem'} & set(sys.modules)\n"
+        "heavy = {'taichi', 'matplotlib', 'pyvista', 'typst', 'skfem', 'distributed'} & set(sys.modules)\n"
         "assert not heavy, heavy"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)

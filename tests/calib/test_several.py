@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,12 +12,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import calib.several
+import calib.cli.calibrate
 from calib.cli.main import main
 from calib.materials import load_material_file
 from calib.objective import Evaluation
-from calib.pool import Pool, SceneEvaluator
 from calib.scenes import place
+from calib.workers import Workers
 from mpm.scene import Scene
 
 FLESH = {"E": 4e5, "R": 420.0}
@@ -35,20 +35,20 @@ def force(stroke: np.ndarray, height: float, width: float, p: Mapping[str, float
     return width * (skin + flesh + faces)
 
 
-class FakePool(Pool):
+class FakePool(Workers):
     """A pool without processes: the analytic cut at each scene's size, with its material where nothing is fitted."""
 
     runs = 0
 
-    def __init__(self, workers: int = 2, arch: str = "cpu", threads: int = 1) -> None:
-        self.workers, self.arch, self.threads = workers, arch, threads
+    def __init__(self) -> None:
+        super().__init__(2, "cpu", 1)
 
     def close(self) -> None:
         """Nothing to end."""
 
-    def evaluator(self, scene: Scene, kept: Collection[str] = ()) -> SceneEvaluator:
-        """As of the real pool."""
-        return SceneEvaluator(self, scene, kept)
+    def each(self, work: Any, jobs: Any) -> Any:
+        """Nothing else is asked for."""
+        raise NotImplementedError
 
     def run(self, jobs: Sequence[tuple[Scene, Mapping[str, float]]]) -> Iterator[Evaluation]:
         """Each cut at once, with half a per cent of repeatable waviness."""
@@ -66,7 +66,7 @@ class FakePool(Pool):
 @pytest.fixture(autouse=True)
 def fake_pool(monkeypatch: pytest.MonkeyPatch) -> None:
     """No particles in this file."""
-    monkeypatch.setattr(calib.several, "Pool", FakePool)
+    monkeypatch.setattr(calib.cli.calibrate, "workers_of", lambda args, say: FakePool())
 
 
 @pytest.fixture
@@ -106,7 +106,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, int]
     folder = tmp_path_factory.mktemp("study")
     study = made_up(folder)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(calib.several, "Pool", FakePool)
+        patch.setattr(calib.cli.calibrate, "workers_of", lambda args, say: FakePool())
         code, _ = ran(study, folder / "out")
     return study, folder / "out", code
 

@@ -235,31 +235,21 @@ def test_only_the_run_that_kills_its_process_counts_as_dead():
     assert pool.calls[6:] == [4, 5]
 
 
-def test_known_cells_are_not_run_again(tmp_path, monkeypatch):
+def test_known_cells_are_not_run_again(tmp_path):
     """A second study runs only what has no result yet, and once more what was killed."""
     ran, dead = [], {CRUSHED.words}
 
     class FakePool:
-        def __init__(self, *_):
-            pass
-
-        def __enter__(self):
-            return self
-
-        def __exit__(self, *_):
-            pass
-
         def each(self, _, jobs):
             for k, (one, *_limits) in enumerate(jobs):
                 ran.append(one.words)
                 yield k, None if one.words in dead else {"status": "ok", "reason": "", "fraction": 1.0}
 
-    monkeypatch.setattr(stability, "Pool", FakePool)
     todo = [BASE, REFUSED, CRUSHED, replace(BASE, family="again")]
     for resume, expected in ((False, {BASE.words, CRUSHED.words}), (True, {CRUSHED.words}), (True, set())):
         ran.clear()
         with EvaluationStore(tmp_path / "e.h5", Header("", "x"), resume=resume) as store:
-            results = evaluate(todo, store, 2, "cpu", lambda _: None)
+            results = evaluate(todo, store, FakePool(), lambda _: None)
         ran_words = {w.replace("again", "base") for w in ran}
         assert ran_words == expected
         assert len(ran) == len(expected)

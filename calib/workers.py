@@ -1,0 +1,143 @@
+"""What worker processes are asked to do, wherever they are: run candidates of a scene, one simulation at a time each."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from calib.objective import Evaluation
+from calib.scenes import place
+from mpm.errors import SimulationError
+from mpm.material import Material
+from mpm.record import ForceRecord
+from mpm.scene import Scene
+
+Result = TypeVar("Result")
+Kind = TypeVar("Kind", bound="Workers")
+
+DIED = "worker_died"  # reason of a run whose process was killed, for instance for lack of memory
+
+
+def _run(scene: Scene, values: dict[str, Any], arch: str, threads: int) -> dict[str, Any]:
+    """One simulation in a worker; everything that is sent back is plain data."""
+    from mpm.runtime import Runtime
+    from mpm.solver import Simulation
+
+    simulation = Simulation(scene, Runtime(arch, threads))
+    material: Material = replace(scene.food.material, **values)
+    return plain(simulation.run(material))
+
+
+def plain(record: ForceRecord) -> dict[str, Any]:
+    """What an evaluation keeps of a record."""
+    scalars = {
+        "peak_N": record.peak,
+        "work_J": record.work,
+        "momentum_residual": record.momentum_residual,
+        "ke_over_ie": record.ke_over_ie,
+        "ripple_N": record.ripple,
+        "steps": float(record.steps),
+        "particles": float(record.particles),
+    }
+    return {
+        "status": "ok" if record.status == "done" else "failed",
+        "reason": "" if record.status == "done" else record.status,
+        "fraction": record.fraction,
+        "stroke": record.stroke,
+        "force": record.resolved,
+        "scalars": scalars,
+        "seconds": record.wall,
+    }
+
+
+def _whole(scene: Scene, arch: str, threads: int) -> ForceRecord:
+    """One simulation in a worker, its whole record."""
+    from mpm.runtime import Runtime
+    from mpm.solver import Simulation
+
+    return Simulation(scene, Runtime(arch, threads)).run()
+
+
+class Workers(ABC):
+    """Processes that run jobs; a context manager that ends what they were asked for.
+
+    Args:
+        workers: Jobs at a time: what a search should ask for at once.
+        arch: Taichi device of each.
+        threads: CPU threads of each.
+    """
+
+    def __init__(self, workers: int, arch: str, threads: int) -> None:
+        self.workers, self.arch, self.threads = workers, arch, threads
+
+    def __enter__(self: Kind) -> Kind:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @abstractmethod
+    def close(self) -> None:
+        """End at once; runs that have not finished are lost."""
+
+    @abstractmethod
+    def each(self, work: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Result | None]]:
+        """Call ``work(*job, arch, threads)`` for each job; yields (place among the jobs, result) in order of completion.
+
+        A job whose process was killed is made once more. None is the result only of a job whose process was killed a
+        second time, when nothing else ran in it.
+        """
+
+    def run(self, jobs: Sequence[tuple[Scene, Mapping[str, float]]]) -> Iterator[Evaluation]:
+        """Run each scene with its material values; yields in order of completion, ``index`` is the place among the jobs.
+
+        A run that killed its process twice is a failed one, for the reason :data:`DIED`.
+        """
+        for index, result in self.each(_run, [(scene, dict(values)) for scene, values in jobs]):
+            values = dict(jobs[index][1])
+            if result is None:
+                yield Evaluation(index, values, "failed", DIED, 0.0, np.empty(0), np.empty(0))
+            else:
+                yield Evaluation(index=index, parameters=values, **result)
+
+    def record(self, scene: Scene) -> ForceRecord:
+        """The whole record of one scene.
+
+        Raises:
+            SimulationError: Its process was killed twice.
+        """
+        ((_, record),) = self.each(_whole, [(scene,)])
+        if record is None:
+            raise SimulationError(
+                "the process of the last simulation was killed twice, perhaps for lack of memory; every run before it is "
+                "stored: free some memory and add --resume",
+                reason=DIED,
+                fraction=0.0,
+            )
+        return record
+
+    def evaluator(self, scene: Scene, kept: Collection[str] = ()) -> SceneEvaluator:
+        """Evaluator of candidates of one scene; ``kept`` sizes do not follow a fitted height."""
+        return SceneEvaluator(self, scene, kept)
+
+
+class SceneEvaluator:
+    """Runs candidates of one scene: material values, and the specimen's height where that is fitted.
+
+    Args:
+        workers: Where they run.
+        scene: The scene.
+        kept: Sizes of the specimen that do not follow a fitted height.
+    """
+
+    def __init__(self, workers: Workers, scene: Scene, kept: Collection[str] = ()) -> None:
+        self.workers, self.scene, self.kept = workers, scene, kept
+
+    def evaluate(self, batch: Sequence[Mapping[str, float]]) -> Iterator[Evaluation]:
+        """Run each candidate; yields in order of completion, ``index`` is the place in the batch."""
+        for evaluation in self.workers.run([place(self.scene, values, self.kept) for values in batch]):
+            yield replace(evaluation, parameters=dict(batch[evaluation.index]))
