@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,7 @@ from calib.fit import FitResult
 from calib.joint import JointObjective
 from calib.nuisance import NuisanceEstimate
 from calib.objective import Evaluator, Objective, Trial
+from calib.posterior import Posterior, sampled
 from calib.predictive import Band, bands
 from calib.profiles import Profile, profiles, with_profiles
 from calib.surrogate import Surrogate
@@ -34,6 +35,7 @@ class Doubt:
         nuisances: What the best curves say of the measurement, trace by trace.
         bands: Posterior predictive band of each trace.
         runs: Coarse simulations made to confirm the ends of the intervals.
+        sampled: 95 % intervals [unit] from a sample of the posterior by name, where one was asked for.
     """
 
     uncertainty: Uncertainty
@@ -41,10 +43,16 @@ class Doubt:
     nuisances: tuple[NuisanceEstimate, ...]
     bands: tuple[Band, ...]
     runs: tuple[Trial, ...] = ()
+    sampled: dict[str, tuple[float, float]] = field(default_factory=dict)
 
 
 def doubt_of(
-    objective: Objective | JointObjective, result: FitResult, *, scout: Evaluator | None = None, seed: int = 0
+    objective: Objective | JointObjective,
+    result: FitResult,
+    *,
+    scout: Evaluator | None = None,
+    seed: int = 0,
+    sample: bool = False,
 ) -> Doubt | None:
     """What a fit does not know; None where it ended before there were runs enough to tell.
 
@@ -54,6 +62,10 @@ def doubt_of(
         scout: Runs cheap simulations at the ends that the profiles claim, which are then walked again; without it they rest on
             the runs of the search alone.
         seed: Seed of the predictive draws.
+        sample: Whether the posterior is sampled as well.
+
+    Raises:
+        CurveError: A sample is asked for and emcee is not installed.
     """
     if result.jacobian is None or result.surrogate is None:
         return None
@@ -73,8 +85,10 @@ def doubt_of(
             surrogate = Surrogate(objective, runs, result.best, surrogate.hyper)
             jacobian = surrogate.jacobian(result.best.z)
         drawn = bands(surrogate, result.best.z, found, seed)
+        posterior = Posterior(surrogate, result.parameters, found)
+        own = sampled(posterior, result.best.z, seed) if sample else {}
     added = tuple(runs[len(result.history) :])
-    return Doubt(with_profiles(found, walked), walked, _nuisances(objective, result, found), drawn, added)
+    return Doubt(with_profiles(found, walked), walked, _nuisances(objective, result, found), drawn, added, own)
 
 
 def _new(objective: Objective | JointObjective, points: list[FloatArray], runs: list[Trial]) -> list[FloatArray]:

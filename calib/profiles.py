@@ -21,8 +21,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
-from calib.nuisance import Whitening
 from calib.parameters import Z95, Parameter, ParameterSet
+from calib.posterior import Posterior
 from calib.surrogate import Surrogate
 from calib.uncertainty import IDENTIFIED, NOT_SEEN, Interval, Uncertainty, Verdict
 
@@ -115,13 +115,7 @@ class _Walker:
         self.others = np.array([k != i for k in range(len(parameters))])
         self.p = len(parameters)
         self.low, self.high = parameters.lower, parameters.upper
-        self.weights = found.data.weights / math.sqrt(found.widened)
-        self.whiten = Whitening(found.data.unsearched / math.sqrt(found.widened))
-
-    def rows(self, z: FloatArray) -> FloatArray:
-        """Rows of data and priors, the data's weighted, widened and marginal as in the normal approximation."""
-        rows = self.surrogate.residual(z)
-        return np.concatenate([self.whiten(self.weights * rows[: -self.p]), rows[-self.p :]])
+        self.rows = Posterior(surrogate, parameters, found).rows
 
     def follow(self, z: FloatArray) -> FloatArray:
         """The others' optimum from ``z`` with this parameter held."""

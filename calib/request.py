@@ -34,6 +34,7 @@ class Request:
         scaled: Whether the search has a factor for the width of the specimen, as it has in a fit of several.
         u_num: Folder of a convergence study whose numerical uncertainty enters the likelihood, or None.
         errors: How far a right model may be from the trace.
+        sample: Whether the posterior is sampled beside its profiles.
         budget: Largest number of simulations.
         seed: Seed of particles and search.
         arch: Device.
@@ -55,6 +56,7 @@ class Request:
     scaled: bool = False
     u_num: Path | None = None
     errors: ErrorModel = field(default_factory=ErrorModel)
+    sample: bool = False
     budget: float = 100
     seed: int = 0
     arch: str = "cpu"

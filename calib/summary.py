@@ -53,6 +53,8 @@ def summarise(
         checks: What numerical choices change.
     """
     parameters = _parameters(request, result, None if doubt is None else doubt.uncertainty)
+    for name, ends in ({} if doubt is None else doubt.sampled).items():
+        parameters[name]["sampled95"] = list(ends)
     open_ends = {} if doubt is None else {e.name: e.as_dict() for e in doubt.nuisances}
     verdicts = judge(
         metrics,

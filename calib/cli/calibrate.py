@@ -53,6 +53,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
         metavar="PART",
         help="how far a right model may be from the curve, part of its peak (default 0.03)",
     )
+    p.add_argument("--sample", action="store_true", help="sample the posterior as well (needs emcee)")
     p.add_argument(
         "--u-num",
         metavar="DIR",
@@ -107,6 +108,7 @@ def request_of(args: argparse.Namespace, command: Sequence[str]) -> Request:
         fit=named,
         budget=args.budget or BUDGET,
         u_num=u_num,
+        sample=args.sample,
     )
 
 

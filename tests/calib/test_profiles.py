@@ -127,3 +127,15 @@ def test_fake_and_noise_are_repeatable() -> None:
     assert isinstance(first, Evaluation) and np.array_equal(first.force, second.force)
     assert not np.array_equal(noise(values, NOISE), noise(values | {"mu": 0.21}, NOISE))
     assert three_terms(values).shape == STROKE.shape
+
+
+def test_a_sample_agrees_with_the_profile(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+    """R by the ensemble of walkers and by its profile: the ends within a quarter of the interval."""
+    objective, result, _ = one_sided
+    doubt = doubt_of(objective, result, sample=True)
+    assert doubt is not None
+    interval = next(i for i in doubt.uncertainty.intervals if i.parameter.name == "R")
+    width = interval.high95 - interval.low95
+    assert doubt.sampled["R"] == pytest.approx((interval.low95, interval.high95), abs=0.25 * width)
+    again = doubt_of(objective, result, sample=True)
+    assert again is not None and again.sampled == doubt.sampled
