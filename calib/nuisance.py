@@ -90,7 +90,7 @@ class Nuisance:
     """One thing that the measurement leaves open.
 
     Attributes:
-        name: ``tare``, ``drift``, ``lag``, ``gain``, ``width`` or ``scale``.
+        name: ``tare``, ``drift``, ``lag``, ``gain`` or ``width``.
         unit: Unit of its size.
         sd: Prior standard deviation [unit]; the prior mean is zero.
         shape: Change of the measured curve by one unit [N/unit] (n,).
@@ -146,7 +146,7 @@ def nuisances(
         sensor: Its sensor.
         width_sd: Relative standard deviation of the specimen's width [-], 0 where it was measured.
         scaled: Whether the search may use them, as it must where several specimens share their flesh; gain and width are
-            one factor then.
+            one factor then, which the objective has (``scale_sd``).
     """
     length = curve.stroke_length_m
     speed = length / (curve.end_s - curve.onset_s)
@@ -161,9 +161,7 @@ def nuisances(
         ("drift", "N", drift, curve.stroke / length, top),
         ("lag", "m", lag, -slope, 0.0),
     ]
-    if scaled:
-        found.append(("scale", "-", float(np.hypot(width_sd, sensor.gain_sd)), curve.curve, peak))
-    else:
+    if not scaled:
         found.append(("gain", "-", sensor.gain_sd, curve.curve, peak))
         found.append(("width", "-", width_sd, curve.curve, peak))
     return tuple(Nuisance(*n, searched=scaled) for n in found if n[2] > 0.0)

@@ -7,6 +7,9 @@ Rows of the vector (n grid points, p parameters; all without dimension, one stan
     otherwise outvote n+1        P (1 - fraction)          zero for a run that reached the end of the stroke
     n+2 ..     (z_j - mean_j) / sd_j     literature priors in internal coordinates
 
+Where a study has several specimens, m is k times the simulated force; k is the factor of width and sensor, the best one for
+each curve, with a lognormal prior whose row ln k / sd_k stands before that of the failure.
+
     sigma^2  = noise_sd^2 + (discrepancy * max r)^2 + u_num^2
     s_peak^2 = peak_sd^2 + (peak * max r)^2
     w        = sqrt(n_eff / n),   n_eff = stroke length / correlation length
@@ -56,6 +59,9 @@ PEAK = 0.02
 #: Samples further than this many real peaks from the real curve count as that far: a spike of a run that
 #: blows up must not overflow the sum of squares.
 LARGEST_DIFFERENCE = 10.0
+
+#: Steps of Newton's method for the factor; from the least squares without prior, four reach rounding.
+NEWTON = 6
 
 #: A run that broke down is continued at the mean difference over this last part of the stroke: over less, the
 #: spike with which it broke down would be held.
@@ -255,12 +261,14 @@ class Objective:
         parameters: The fitted parameters with their priors.
         errors: The error model.
         nuisances: What the measurement leaves open.
+        scale_sd: Standard deviation of the logarithm of the factor of width and sensor [-]; 0: there is none.
     """
 
     target: Target
     parameters: ParameterSet
     errors: ErrorModel = field(default_factory=ErrorModel)
     nuisances: tuple[Nuisance, ...] = ()
+    scale_sd: float = 0.0
 
     @cached_property
     def sigmas(self) -> FloatArray:
@@ -290,13 +298,13 @@ class Objective:
 
     @property
     def data_rows(self) -> int:
-        """Length of :meth:`data_residual`: grid points, peak, failure."""
-        return self.target.stroke.size + 2
+        """Length of :meth:`data_residual`: grid points, peak, factor where there is one, failure."""
+        return self.target.stroke.size + 2 + (self.scale_sd > 0.0)
 
     @property
     def failure_weight(self) -> float:
         """Penalty P of a run that computed nothing: the misfit of predicting no force at all [-]."""
-        return float(np.linalg.norm(self._compare(np.zeros_like(self.target.curve))))
+        return float(np.linalg.norm(self._whiten(self._bare(np.zeros_like(self.target.curve)))))
 
     def curve(self, evaluation: Evaluation) -> tuple[FloatArray, float]:
         """Smoothed force on the target's grid [N] (n,) and the part of the stroke [-] that was completed.
@@ -319,7 +327,7 @@ class Objective:
         return target.smooth(target.stroke, stroke, force), fraction
 
     def data_residual(self, curve: FloatArray, fraction: float = 1.0) -> FloatArray:
-        """Rows of curve, peak and failure (n + 2,) of a curve [N] (n,) that completed ``fraction``."""
+        """Rows of curve, peak, factor and failure (n + 2 or n + 3,) of a curve [N] (n,) that completed ``fraction``."""
         return np.append(self._compare(curve), self.failure_weight * (1.0 - fraction))
 
     def residual(self, curve: FloatArray, fraction: float, z: FloatArray) -> FloatArray:
@@ -339,42 +347,56 @@ class Objective:
 
     def nuisance_estimates(self, curve: FloatArray) -> tuple[NuisanceEstimate, ...]:
         """What a simulated curve [N] (n,) says of the nuisances, those that the search may not use included."""
-        return estimate(self.nuisances, self._columns(self.nuisances), self._bare(curve))
+        own = self.factor(curve) * curve
+        return estimate(self.nuisances, self._columns(self.nuisances), self._bare(own))
 
     def factor(self, curve: FloatArray) -> float:
         """The factor that a specimen's width and sensor ask for on its simulated force (n,), least squares with its prior [-].
 
-        1 where the search has none.
+        1 where there is none.
         """
-        scale = next((n for n in self.nuisances if n.name == "scale"), None)
-        if scale is None:
+        if not self.scale_sd > 0.0:
             return 1.0
-        weight = self.effective_points / (curve.size * self.sigma**2)
-        pull = 1.0 / scale.sd**2
-        measured = float(curve @ self.target.curve)
-        return (weight * measured + pull) / (weight * float(curve @ curve) + pull)
+        own = self._whiten(np.append(self._weights * curve, float(curve.max()) / self.sigma_peak))
+        size, cross = float(own @ own), float(own @ self._measured)
+        if not (size > 0.0 and cross > 0.0):
+            return 1.0
+        log, pull = math.log(cross / size), self.scale_sd**-2
+        for _ in range(NEWTON):  # (k^2 size - 2 k cross + (ln k / sd)^2)' = 0 by ln k; curvature positive near its root
+            k = math.exp(log)
+            slope, curvature = k * (k * size - cross) + pull * log, k * (2.0 * k * size - cross) + pull
+            log -= min(max(slope / max(curvature, pull), -1.0), 1.0)
+        return math.exp(log)
 
     def unsearched(self) -> FloatArray:
         """Residual by one standard deviation of each nuisance that the search may not use (n + 2, k)."""
         columns = self._columns([n for n in self.nuisances if not n.searched])
-        return np.vstack([self._whiten(columns), np.zeros(columns.shape[1])])
+        return np.vstack([self._whiten(columns), np.zeros((self.data_rows - len(columns), columns.shape[1]))])
 
     def curve_residual(self, curve: FloatArray) -> FloatArray:
         """Rows of the curve alone (n,), in standard deviations of a point, less what the nuisances explain of them."""
+        own = self.factor(curve) * curve
         explained = sum(
             (e.value * n.shape for e, n in zip(self.nuisance_estimates(curve), self.nuisances, strict=True)), 0.0
         )
-        out: FloatArray = (curve - self.target.curve + explained) / self.sigmas
+        out: FloatArray = (own - self.target.curve + explained) / self.sigmas
         return out
 
     def _compare(self, curve: FloatArray) -> FloatArray:
-        """Rows of curve and peak (n + 1,), whitened."""
-        return self._whiten(self._bare(curve))
+        """Rows of curve and peak (n + 1,), whitened, and that of the factor where there is one."""
+        k = self.factor(curve)
+        rows = self._whiten(self._bare(k * curve))
+        return np.append(rows, math.log(k) / self.scale_sd) if self.scale_sd > 0.0 else rows
 
     def _bare(self, curve: FloatArray) -> FloatArray:
         """Rows of curve and peak (n + 1,), as if the measurement left nothing open."""
         peak = (float(curve.max()) - self.target.peak) / self.sigma_peak
         return np.append(self._weights * (curve - self.target.curve), peak)
+
+    @cached_property
+    def _measured(self) -> FloatArray:
+        """Rows of the measured curve and peak (n + 1,), whitened."""
+        return self._whiten(np.append(self._weights * self.target.curve, self.target.peak / self.sigma_peak))
 
     @cached_property
     def _weights(self) -> FloatArray:

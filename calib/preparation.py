@@ -99,9 +99,10 @@ def set_up(request: Request) -> Setup:
     u_num = 0.0 if request.u_num is None else numerical(request.u_num, food.name, fine, curve)
     target = Target(curve.stroke, curve.curve, curve.curve_noise_sd_N, curve.peak_sd_N, filter_simulated, u_num)
     given = nuisances(curve, sensor, width_sd=width_sd, scaled=request.scaled)
+    scale_sd = math.hypot(width_sd, sensor.gain_sd) if request.scaled else 0.0
     heights = height_range(food, curve, request.sizing)
     names = request.fit or (food.default_fit if heights is None else (*food.default_fit, "height"))
-    objective = Objective(target, fit_parameters(food, names, heights), request.errors, given)
+    objective = Objective(target, fit_parameters(food, names, heights), request.errors, given, scale_sd)
     return Setup(curve, fine, coarse, objective, assumed, request.sizing.kept, air_sha256)
 
 

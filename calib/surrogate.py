@@ -148,7 +148,13 @@ class CurveProcess:
 
     def doubt(self, z: FloatArray) -> float:
         """Square root of the chi-square that not knowing the curve adds at z [-]."""
-        return self.predict(z)[1] * math.sqrt(self.objective.effective_points) / self.objective.sigma
+        curve, sd, _ = self.predict(z)
+        return self.doubted(curve, sd)
+
+    def doubted(self, curve: FloatArray, sd: float) -> float:
+        """The same for an expected curve [N] (n,) with standard deviation ``sd`` [N]."""
+        goal = self.objective
+        return goal.factor(curve) * sd * math.sqrt(goal.effective_points) / goal.sigma
 
     def feigned(self, z: FloatArray) -> FloatArray:
         """Information (p, p) that the noise of the runs feigns in differences of expected curves at z.
@@ -164,6 +170,7 @@ class CurveProcess:
         weights = self._inverse @ ((k[:p] - k[p:]) / (2.0 * steps[:, None])).T
         noise = (weights.T * (self._extra + self.noise**2)) @ weights
         per_row = objective.effective_points / objective.sigma**2 + 1.0 / objective.sigma_peak**2
+        per_row *= objective.factor(self.predict(z)[0]) ** 2
         out: FloatArray = noise * self.peak**2 * per_row
         return out
 
@@ -224,9 +231,9 @@ class Surrogate:
 
     def _cautious(self, z: FloatArray, caution: float) -> FloatArray:
         curves, sds, fractions = zip(*self._predicted(z), strict=True)
-        goals = [c.objective for c in self.objective.cases]
         doubts = [
-            sd * math.sqrt(caution * goal.effective_points) / goal.sigma for sd, goal in zip(sds, goals, strict=True)
+            math.sqrt(caution) * process.doubted(curve, sd)
+            for process, curve, sd in zip(self.each, curves, sds, strict=True)
         ]
         return np.append(residual(self.objective, curves, fractions, z), doubts)
 

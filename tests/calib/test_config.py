@@ -10,7 +10,6 @@ import pandas as pd
 import pytest
 
 from calib.config import OWN, overridden, read_study
-from calib.nuisance import Nuisance
 from calib.specimens import pinned, pressed
 from mpm.errors import CutcalError
 from tests.calib.fake import FIVE, goal
@@ -113,5 +112,5 @@ def test_factor_of_a_specimen_is_least_squares_with_its_prior() -> None:
     curve = one.target.curve
     assert one.factor(0.5 * curve) == 1.0
     for sd, expected in ((10.0, 2.0), (1e-3, 1.0)):
-        scaled = replace(one, nuisances=(Nuisance("scale", "-", sd, curve, float(curve.max()), True),))
+        scaled = replace(one, scale_sd=sd)
         assert scaled.factor(0.5 * curve) == pytest.approx(expected, abs=0.01)

@@ -9,7 +9,6 @@ import pytest
 
 from calib.fit import FitOptions, calibrate
 from calib.joint import JointEvaluator, JointObjective
-from calib.nuisance import Nuisance
 from calib.objective import Evaluation, Objective
 from calib.surrogate import Surrogate
 from tests.calib.fake import FIVE, STROKE, Fake, goal, three_terms
@@ -27,8 +26,7 @@ def objectives(scaled: bool = False) -> dict[str, Objective]:
         one = goal(FLESH | {"R_skin": skin})
         if scaled:
             curve = FACTORS[name] * one.target.curve
-            scale = Nuisance("scale", "-", 0.3, curve, float(curve.max()), True)
-            one = Objective(replace(one.target, curve=curve), FIVE, nuisances=(scale,))
+            one = Objective(replace(one.target, curve=curve), FIVE, scale_sd=0.3)
         out[name] = one
     return out
 
@@ -77,10 +75,20 @@ def test_shared_flesh_is_found_through_two_specimens() -> None:
         assert values[f"R_skin@{name}"] / values["R"] == pytest.approx(skin / FLESH["R"], rel=0.2)
     assert all(f.runs == result.simulations for f in fakes)
     found = {
-        name: case.objective.nuisance_estimates(trial.curve)[0].value
+        name: case.objective.factor(trial.curve)
         for name, case, trial in zip(SKINS, joint.cases, result.best.each, strict=True)
     }
-    assert 1.0 - found["a"] == pytest.approx((1.0 - found["b"]) * 0.7, rel=0.1)
+    assert found["b"] == pytest.approx(0.7 * found["a"], rel=0.1)
+
+
+def test_the_factor_pays_for_itself_in_its_logarithm() -> None:
+    """A simulation five times too weak is as far from its prior as one five times too strong, and cannot hide in it."""
+    one = objectives(scaled=True)["a"]
+    weak, strong = (one.data_residual(k * one.target.curve) for k in (0.2, 5.0))
+    assert weak @ weak == pytest.approx(strong @ strong, rel=0.02)
+    assert weak @ weak == pytest.approx((np.log(5.0) / 0.3) ** 2, rel=0.1)
+    assert one.factor(0.2 * one.target.curve) == pytest.approx(5.0, rel=0.05)
+    assert len(weak) == one.data_rows and one.data_residual(one.target.curve) == pytest.approx(np.zeros(len(weak)))
 
 
 def test_a_surrogate_of_two_traces_does_not_mix_their_skins() -> None:
