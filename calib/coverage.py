@@ -269,8 +269,13 @@ def _words(row: Mapping[str, Any]) -> str:
 
 
 def _known(path: Path) -> dict[int, dict[str, Any]]:
-    """Traces calibrated before an interruption; a line that was being written is left out."""
-    return {row["trace"]: row for row in _rows(path)} if path.exists() else {}
+    """Traces calibrated before an interruption; a line that was being written is left out, and ended."""
+    if not path.exists():
+        return {}
+    if not path.read_text(encoding="utf-8").endswith("\n"):
+        with path.open("a", encoding="utf-8") as stream:
+            stream.write("\n")
+    return {row["trace"]: row for row in _rows(path)}
 
 
 def _rows(path: Path) -> Iterator[dict[str, Any]]:
