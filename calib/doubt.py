@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -53,6 +54,7 @@ def doubt_of(
     scout: Evaluator | None = None,
     seed: int = 0,
     sample: bool = False,
+    say: Callable[[str], None] = lambda text: None,
 ) -> Doubt | None:
     """What a fit does not know; None where it ended before there were runs enough to tell.
 
@@ -63,6 +65,7 @@ def doubt_of(
             the runs of the search alone.
         seed: Seed of the predictive draws.
         sample: Whether the posterior is sampled as well.
+        say: Called before each round of simulations, with one sentence.
 
     Raises:
         CurveError: A sample is asked for and emcee is not installed.
@@ -81,6 +84,7 @@ def doubt_of(
             )
             if not asked:
                 break
+            say(f"simulating {len(asked)} ends of intervals on coarse cells")
             runs += _run(objective, scout, asked)
             surrogate = Surrogate(objective, runs, result.best, surrogate.hyper)
             jacobian = surrogate.jacobian(result.best.z)

@@ -176,7 +176,9 @@ class Specimens:
         result = calibrate(joint, fine, coarse=coarse, options=options, progress=self.staged(words))
         if result.status == "interrupted":
             raise KeyboardInterrupt
-        return Fitted(tuple(names), joint, result, doubt_of(joint, result, scout=coarse, seed=self.study.seed))
+        return Fitted(
+            tuple(names), joint, result, doubt_of(joint, result, scout=coarse, seed=self.study.seed, say=self.say)
+        )
 
     def staged(self, words: str) -> Callable[[Progress], None] | None:
         """The progress callback with what is being fitted before each stage."""

@@ -77,7 +77,7 @@ def run(
             for name, scene in (("fine", setup.fine), ("coarse", setup.coarse))
         )
         result = calibrate(setup.objective, fine, coarse=coarse, options=options, progress=progress)
-        doubt = doubt_of(setup.objective, result, scout=coarse, seed=request.seed, sample=request.sample)
+        doubt = doubt_of(setup.objective, result, scout=coarse, seed=request.seed, sample=request.sample, say=say)
         if doubt is not None:
             result = replace(result, history=(*result.history, *doubt.runs))
         start = _start_curve(setup, result, fine)
