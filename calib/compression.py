@@ -22,7 +22,8 @@ from calib.errors import CurveError, TraceError
 from calib.outputs import prepare, write_csv, write_json
 from calib.progress import clock
 from calib.provenance import git_commit, versions
-from calib.trace import MIN_SAMPLES, Table, candidates, choose, numbers, read_table
+from calib.tables import Table, candidates, choose, numbers, read_table
+from calib.trace import MIN_SAMPLES
 from calib.verdicts import Verdict
 from mpm.errors import SimulationError
 from mpm.material import Material
