@@ -120,6 +120,11 @@ def condition(
     warnings: list[str] = []
     if trace.label == "reconstructed":
         warnings.append(f"{trace.source} is a reconstruction, not a measurement: nothing fitted to it is validated")
+    if trace.start:
+        warnings.append(
+            f"the clock of {trace.source} starts at {trace.start:.10g} s; all times, also --t-end, are counted from "
+            "there"
+        )
     force = trace.force
     if air is not None:
         force = force - _air_force(trace, air)

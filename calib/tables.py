@@ -1,103 +1,164 @@
-"""Tables of measured columns: what their names say of quantity, unit and sign, and their numbers."""
+"""Tables of measured columns as a file holds them: CSV here, JSON and HDF5 in their own modules."""
 
 from __future__ import annotations
 
 import csv
 import difflib
 import hashlib
+import os
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+import reprlib
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from calib.errors import TraceError
 
 LABELS = ("measured", "reconstructed")
-
-_UNITS = {
-    "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6},
-    "force": {"N": 1.0, "n": 1.0, "kN": 1e3, "KN": 1e3, "kn": 1e3, "mN": 1e-3, "mn": 1e-3},
-    "position": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6},
-    "compression": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6},
-}
-_TIME_STEM = re.compile(r"time|t|timestamp|elapsed(_time)?")
-_FORCE_STEM = re.compile(r"(.*_)?(force|load|resistance|f|fz)(_z)?")
-_HEIGHT_STEM = re.compile(r"((ee|knife|tool|tcp|blade)_)?(z|height|position|pos)(_z)?")
-_DEPTH_STEM = re.compile(r"(.*_)?(stroke|displacement|travel|depth|extension|penetration)")
-_COMPRESSION_STEM = re.compile(r"(.*_)?(compression|stroke|displacement|travel|extension)")
-_KNOWN_FORCE = {"base_fz": -1.0, "knife_fz": 1.0}
-"""Columns whose sign is known: robot logs hold the force on the world in the base frame, downwards
-negative."""
-_KNOWN_POSITION = ("ee_z",)
-_EXPECTED = {
-    "time": ("time_s", "time_ms", "t_s"),
-    "force": ("force_N", "fz_N", "base_Fz_N", "force_kN", "force_mN"),
-    "position": ("ee_z_m", "position_m", "position_mm", "stroke_m", "displacement_mm"),
-    "compression": ("compression_mm", "displacement_mm", "stroke_m"),
-}
+SHOWN_LETTERS, SHOWN_NAMES = 40, 8
+"""Letters of a name or cell, and names of a list, that an error shows."""
+_JSON_SUFFIXES = (".json", ".jsonl", ".ndjson")
+_JSON_START = re.compile(rb"(\xef\xbb\xbf)?\s*(\{|\[\s*[\[{])")
+_HDF5_ADDRESS = re.compile(r"(.+\.(?:h5|hdf5|hdf|he5)):(.*)", re.IGNORECASE | re.DOTALL)
+_HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5")
 
 
 @dataclass(frozen=True)
 class Table:
-    """Text of a CSV file: column names, rows and their line numbers in the file."""
+    """Named columns of one length.
+
+    Attributes:
+        source: What errors call the table: file name, with the group of an HDF5 file.
+        columns: Cells of each column by name, as the file holds them: text, numbers or whatever else, n of each.
+        rows: What the file calls each row: line of a CSV file, index of a JSON list or of a data set, n of them.
+        row: What such a number is: ``row`` or ``index``.
+        sha256: SHA-256 of the file.
+        label: ``measured`` or ``reconstructed``, or what else the file says.
+        units: Units that the file states beside the names of columns.
+        left_out: Columns that the table cannot hold, and why.
+    """
 
     source: str
-    names: list[str]
-    rows: list[list[str]]
-    lines: list[int]
-    label: str
+    columns: Mapping[str, Sequence[Any] | np.ndarray]
+    rows: Sequence[Any]
+    row: str
     sha256: str
+    label: str = LABELS[0]
+    units: Mapping[str, str] = field(default_factory=dict)
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Column:
-    """One chosen column and the factor that turns its numbers into SI with our sign."""
+def read_table(path: str | Path) -> Table:
+    """Read a table from a file; its content and suffix tell of what kind it is.
 
-    name: str
-    index: int
-    factor: float
-
-
-def read_table(path: Path) -> Table:
-    """Split a CSV file into header and rows; comments and blank lines are dropped, line numbers kept.
+    Args:
+        path: A CSV file with one header line, a JSON file of lists or records, or an HDF5 file (``file.h5``, or
+            ``file.h5:/group`` for a group or data set in it).
 
     Raises:
-        TraceError: There is no such file, or it is no CSV file with a header.
+        TraceError: There is no such file, or it holds no table.
     """
-    if path.is_dir():
-        raise TraceError(f"{path} is a directory; name a CSV file")
-    if not path.is_file():
-        near = difflib.get_close_matches(path.name, _names_beside(path), n=3)
-        hint = f"; did you mean {' or '.join(near)}?" if near else ""
-        raise TraceError(f"{path}: no such file{hint}")
-    raw = path.read_bytes()
-    if not raw.strip():
-        raise TraceError(f"{path.name} is empty")
+    file, address = split_address(path)
+    raw = _content(file)
+    if raw.startswith(_HDF5_SIGNATURE) or file.suffix.lower() in _HDF5_SUFFIXES:
+        from calib.hdf5 import table_of_hdf5
+
+        return table_of_hdf5(file, raw, address)
+    if file.suffix.lower() in _JSON_SUFFIXES or _JSON_START.match(raw):
+        from calib.logs import table_of_json
+
+        return table_of_json(file.name, raw)
+    return _table_of_csv(file.name, raw)
+
+
+def split_address(path: str | Path) -> tuple[Path, str]:
+    """File and, for ``file.h5:/group``, the address in it; empty for none."""
+    found = _HDF5_ADDRESS.fullmatch(str(path))
+    if found is None or os.path.exists(path):
+        return Path(path), ""
+    return Path(found.group(1)), found.group(2).replace("\\", "/")
+
+
+def as_float(cell: Any) -> float | None:
+    """The number in a cell, or None; true and false are no numbers, nor is ``1_000``."""
+    if isinstance(cell, (bool, np.bool_)) or not isinstance(cell, (str, int, float, np.number)):
+        return None
+    if isinstance(cell, str) and "_" in cell:
+        return None
+    try:
+        return float(cell)
+    except (ValueError, TypeError):
+        return None
+    except OverflowError:
+        return float("inf")
+
+
+def brief(name: object) -> str:
+    """A name or value as an error shows it: on one line, not too long, nothing that cannot be printed."""
+    plain = name.item() if isinstance(name, np.generic) else name
+    text = plain if isinstance(plain, str) else reprlib.repr(plain)
+    text = text if text.isprintable() else ascii(text)[1:-1]
+    return text if len(text) <= SHOWN_LETTERS else text[: SHOWN_LETTERS - 3] + "..."
+
+
+def listed(names: Sequence[object]) -> str:
+    """The first names of a list, and how many more there are."""
+    more = len(names) - SHOWN_NAMES
+    return ", ".join(brief(name) for name in names[:SHOWN_NAMES]) + (f" and {more} more" if more > 0 else "")
+
+
+def decoded(source: str, raw: bytes, kind: str) -> str:
+    """The text of a file.
+
+    Raises:
+        TraceError: It is not text.
+    """
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise TraceError(f"{path.name}: not a text CSV file (byte {error.start} is not UTF-8)") from error
+        raise TraceError(
+            f"{source}: not a text {kind} file (byte {error.start} is not UTF-8); save the record as CSV, JSON or HDF5"
+        ) from None
     if "\0" in text:
-        raise TraceError(f"{path.name}: not a text CSV file (it holds zero bytes)")
-    numbered = [(i, line) for i, line in enumerate(text.splitlines(), start=1) if line.strip()]
-    comments = [line for _, line in numbered if line.lstrip().startswith("#")]
-    body = [(i, line) for i, line in numbered if not line.lstrip().startswith("#")]
-    if len(body) < 2:
-        raise TraceError(f"{path.name}: {'a header but no data' if body else 'nothing but comments'}")
-    delimiter = max(",;\t", key=body[0][1].count)
-    cells = list(csv.reader([line for _, line in body], delimiter=delimiter))
-    names = [name.strip() for name in cells[0]]
-    _check_header(path.name, names)
-    return Table(
-        source=path.name,
-        names=names,
-        rows=cells[1:],
-        lines=[i for i, _ in body[1:]],
-        label=_label(comments),
-        sha256=hashlib.sha256(raw).hexdigest(),
-    )
+        raise TraceError(f"{source}: not a text {kind} file (it holds zero bytes)")
+    return text
+
+
+def check_names(source: str, names: Sequence[str]) -> None:
+    """Refuse a name that occurs twice.
+
+    Raises:
+        TraceError: It does.
+    """
+    twice = next((name for name, count in Counter(names).items() if count > 1), None)
+    if twice is not None:
+        raise TraceError(f"{source}: column name {brief(twice)!r} occurs {names.count(twice)} times; rename one")
+
+
+def _content(path: Path) -> bytes:
+    """All bytes of a file.
+
+    Raises:
+        TraceError: There is none, or it cannot be read.
+    """
+    try:
+        if path.is_dir():
+            raise TraceError(f"{path} is a directory; name a CSV, JSON or HDF5 file")
+        if not path.is_file():
+            near = difflib.get_close_matches(path.name, _names_beside(path), n=3)
+            hint = f"; did you mean {' or '.join(near)}?" if near else ""
+            raise TraceError(f"{path}: no such file{hint}")
+        raw = path.read_bytes()
+    except OSError as error:
+        raise TraceError(f"{path}: cannot be read ({error.strerror})") from None
+    if not raw.strip():
+        raise TraceError(f"{path.name} is empty")
+    return raw
 
 
 def _names_beside(path: Path) -> list[str]:
@@ -105,15 +166,62 @@ def _names_beside(path: Path) -> list[str]:
     return [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
 
 
+def _table_of_csv(source: str, raw: bytes) -> Table:
+    """Split a CSV file into header and rows; comments and blank lines are dropped, line numbers kept.
+
+    Raises:
+        TraceError: It is no CSV file with a header.
+    """
+    text = decoded(source, raw, "CSV")
+    numbered = [(i, line) for i, line in enumerate(re.split(r"\r\n|\n|\r", text), start=1) if line.strip()]
+    comments = [line for _, line in numbered if line.lstrip().startswith("#")]
+    body = [(i, line) for i, line in numbered if not line.lstrip().startswith("#")]
+    if len(body) < 2:
+        raise TraceError(f"{source}: {'a header but no data' if body else 'nothing but comments'}")
+    (_, header), *rows = _cells(source, body)
+    names = [name.strip() or f"column {i}" for i, name in enumerate(header, start=1)]
+    _check_header(source, names)
+    for line, row in rows:
+        if len(row) != len(names):
+            raise TraceError(f"{source}, row {line}: {len(row)} cells, the header has {len(names)}")
+    return Table(
+        source=source,
+        columns=dict(zip(names, zip(*(row for _, row in rows), strict=True), strict=True)),
+        rows=[line for line, _ in rows],
+        row="row",
+        sha256=hashlib.sha256(raw).hexdigest(),
+        label=_label(comments),
+    )
+
+
+def _cells(source: str, body: list[tuple[int, str]]) -> list[tuple[int, list[str]]]:
+    """Line number and cells of each row; a quoted cell may hold several lines.
+
+    Raises:
+        TraceError: A quote that is not closed, or a cell that is too long.
+    """
+    delimiter = max(",;\t", key=body[0][1].count)
+    reader = csv.reader([line for _, line in body], delimiter=delimiter, strict=True)
+    rows: list[tuple[int, list[str]]] = []
+    begin = 0
+    try:
+        for row in reader:
+            rows.append((body[begin][0], row))
+            begin = reader.line_num
+    except csv.Error as error:
+        raise TraceError(f"{source}, row {body[begin][0]}: not CSV ({error}); check the quotes in this row") from None
+    return rows
+
+
 def _check_header(source: str, names: list[str]) -> None:
     """Refuse a header with one column, without names, or with a name twice."""
     if len(names) < 2:
-        raise TraceError(f"{source}: not a CSV file with a force column and one beside it (header: {names[0][:60]!r})")
-    if all(_as_float(name) is not None for name in names):
+        raise TraceError(
+            f"{source}: not a CSV file with a force column and one beside it (header: {brief(names[0])!r})"
+        )
+    if all(as_float(name) is not None for name in names):
         raise TraceError(f"{source}: the first row holds numbers; add a header such as time_s,force_N")
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise TraceError(f"{source}: column name {twice[0]!r} occurs {names.count(twice[0])} times; rename one")
+    check_names(source, names)
 
 
 def _label(comments: list[str]) -> str:
@@ -123,112 +231,3 @@ def _label(comments: list[str]) -> str:
         if found:
             return found.group(1).lower()
     return LABELS[0]
-
-
-def _as_float(cell: str) -> float | None:
-    """The number in a cell, or None."""
-    try:
-        return float(cell)
-    except ValueError:
-        return None
-
-
-def _split_unit(name: str) -> tuple[str, str]:
-    """Stem (lower case, words joined by _) and unit of a column name such as ``force_N`` or ``Force [N]``."""
-    found = re.fullmatch(r"(.+?)(?:[\s_]+|\s*[\[(])\[?\(?([A-Za-z]+)[\])]?", name)
-    stem, unit = (found.group(1), found.group(2)) if found else (name, "")
-    return re.sub(r"[^a-z0-9]+", "_", stem.lower()).strip("_"), unit
-
-
-def _stem_matches(role: str, stem: str) -> bool:
-    """Whether a stem names the role."""
-    patterns = {
-        "time": (_TIME_STEM,),
-        "force": (_FORCE_STEM,),
-        "position": (_HEIGHT_STEM, _DEPTH_STEM),
-        "compression": (_COMPRESSION_STEM,),
-    }
-    return any(pattern.fullmatch(stem) for pattern in patterns[role])
-
-
-def candidates(table: Table, role: str) -> list[str]:
-    """Columns whose name and unit fit a role; known ones alone if there are any."""
-    fitting = []
-    for name in table.names:
-        stem, unit = _split_unit(name)
-        if unit in _UNITS[role] and _stem_matches(role, stem):
-            fitting.append(name)
-    known: Sequence[str] = {"force": tuple(_KNOWN_FORCE), "position": _KNOWN_POSITION}.get(role, ())
-    for stem in known:
-        preferred = [name for name in fitting if _split_unit(name)[0] == stem]
-        if preferred:
-            return preferred
-    return fitting
-
-
-def choose(table: Table, role: str, wanted: str | None) -> Column:
-    """The column of a role (``time``, ``force``, ``position`` or ``compression``), by name if the user gave one.
-
-    Raises:
-        TraceError: There is no such column, or no single one whose name fits.
-    """
-    option = f"--{role}-col"
-    if wanted is not None:
-        if wanted not in table.names:
-            raise TraceError(f"{table.source}: no column {wanted!r} ({option}){_did_you_mean([wanted], table.names)}")
-        return _column(table, role, wanted)
-    fitting = candidates(table, role)
-    if len(fitting) == 1:
-        return _column(table, role, fitting[0])
-    if fitting:
-        raise TraceError(
-            f"{table.source}: several columns could be the {role}: {', '.join(fitting)}; choose one with {option}"
-        )
-    raise TraceError(
-        f"{table.source}: no {role} column with its unit in the name, such as "
-        f"{', '.join(_EXPECTED[role][:3])}{_did_you_mean(_EXPECTED[role], table.names)}; name one with "
-        f"{option}"
-    )
-
-
-def _did_you_mean(wanted: Sequence[str], names: list[str]) -> str:
-    """A hint with the nearest existing names, or with all of them."""
-    lower = {name.lower(): name for name in names}
-    near = [n for w in wanted for n in difflib.get_close_matches(w.lower(), lower, n=1, cutoff=0.7)]
-    if near:
-        return f"; did you mean {lower[near[0]]!r}?"
-    return f"; the columns are {', '.join(names)}"
-
-
-def _column(table: Table, role: str, name: str) -> Column:
-    """Index and factor of a named column: unit, known sign of a force, depth turned into height."""
-    stem, unit = _split_unit(name)
-    factor = _UNITS[role].get(unit, 1.0)
-    if role == "force":
-        factor *= _KNOWN_FORCE.get(stem, 1.0)
-    if role == "position" and _DEPTH_STEM.fullmatch(stem):
-        factor = -factor
-    return Column(name, table.names.index(name), factor)
-
-
-def numbers(table: Table, column: Column) -> np.ndarray:
-    """The numbers of a column in SI, shape (rows,).
-
-    Raises:
-        TraceError: A cell holds no finite number; the message names the first one.
-    """
-    values = np.empty(len(table.rows))
-    for i, (row, line) in enumerate(zip(table.rows, table.lines, strict=True)):
-        where = f"{table.source}, row {line}"
-        if len(row) != len(table.names):
-            raise TraceError(f"{where}: {len(row)} cells, the header has {len(table.names)}")
-        cell = row[column.index].strip()
-        number = _as_float(cell)
-        if number is None:
-            hint = "; write decimals with a point" if _as_float(cell.replace(",", ".")) is not None else ""
-            shown = repr(cell) if cell else "an empty cell"
-            raise TraceError(f"{where}, column {column.name}: {shown} is not a number{hint}")
-        if not np.isfinite(number):
-            raise TraceError(f"{where}, column {column.name}: {cell!r} is not finite; remove or repair the row")
-        values[i] = number
-    return values * column.factor

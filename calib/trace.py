@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import hashlib
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from calib.columns import Column, candidates, choose, numbers
 from calib.errors import TraceError
-from calib.tables import LABELS, Column, Table, candidates, choose, numbers, read_table
+from calib.tables import LABELS, Table, brief, read_table
+
+if TYPE_CHECKING:
+    import pandas
 
 MIN_SAMPLES = 20
 """Fewest samples of a trace: below this, baseline, onset and ramp have under seven samples each."""
-MS_SUSPICION_S = 1.0
-"""Median sampling interval [s] above which a time column is taken for milliseconds: no cut is sampled so
-slowly."""
+SLOWEST_S, FASTEST_S = 0.5, 2e-5
+"""Median sampling intervals outside are taken for a unit mix-up [s]: a clock of a kilohertz in milliseconds read as
+seconds has 1 s, one of 50 Hz in seconds read as milliseconds 2e-5 s."""
+CLOCK_START_S = 1000.0
+"""Time of the first sample from which on a clock has begun elsewhere [s], at the start of a robot or in 1970; the trace
+then counts from its first sample."""
 CLOCK_JITTER = 0.5
 """Largest deviation of a step from the mean step for a column that looks like a clock [-]."""
+FRAME = "DataFrame"
+"""What a trace from a DataFrame is called that says nothing else."""
 DISABLED = "none"
 """Value of ``position_col`` that leaves a position column unused."""
 
@@ -29,23 +40,31 @@ class Trace:
         time: Time of each sample, strictly increasing [s], shape (n,).
         force: Vertical force, resistance to the downward knife positive, not tared [N], shape (n,).
         position: Height of the tool, z up [m], shape (n,), or None.
-        source: File name.
-        sha256: SHA-256 of the file, empty for a trace made in memory.
+        source: File name, or what else errors and reports call the trace.
+        sha256: SHA-256 of the file (and of the address in it), of the content for a DataFrame, empty for arrays.
         columns: The column used for each of ``time``, ``force`` and ``position``.
         label: ``measured`` or ``reconstructed``.
+        start: Time of the first sample on the file's clock where that began elsewhere, and was subtracted [s].
+
+    Raises:
+        TraceError: Too few samples, unequal lengths, a number that is not finite, a clock that does not run.
     """
 
     time: np.ndarray
     force: np.ndarray
-    position: np.ndarray | None
-    source: str
-    sha256: str
-    columns: dict[str, str]
-    label: str = "measured"
+    position: np.ndarray | None = None
+    source: str = "trace"
+    sha256: str = ""
+    columns: dict[str, str] = field(default_factory=dict)
+    label: str = LABELS[0]
+    start: float = 0.0
 
     def __post_init__(self) -> None:
+        for name in ("time", "force", "position"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, self._numbers(name))
         if self.label not in LABELS:
-            raise TraceError(f"{self.source}: label {self.label!r} is not one of {', '.join(LABELS)}")
+            raise TraceError(f"{self.source}: label {brief(self.label)!r} is not one of {', '.join(LABELS)}")
         if len(self.time) < MIN_SAMPLES:
             raise TraceError(
                 f"{self.source}: {len(self.time)} samples, at least {MIN_SAMPLES} are needed; record the "
@@ -59,6 +78,71 @@ class Trace:
         if not (np.all(np.isfinite(self.time)) and np.all(np.diff(self.time) > 0.0)):
             raise TraceError(f"{self.source}: time is not strictly increasing")
 
+    def _numbers(self, name: str) -> np.ndarray:
+        """A column as an array of numbers.
+
+        Raises:
+            TraceError: It holds something else.
+        """
+        try:
+            values = np.asarray(getattr(self, name), dtype=float)
+        except (TypeError, ValueError):
+            raise TraceError(f"{self.source}: {name} holds something that is not a number") from None
+        if values.ndim != 1:
+            raise TraceError(f"{self.source}: {name} has shape {values.shape}; give one number a sample")
+        return values
+
+    @classmethod
+    def read(cls, path: str | Path, **columns: Any) -> Trace:
+        """A trace from a file; see :func:`read_trace`."""
+        return read_trace(path, **columns)
+
+    @classmethod
+    def from_frame(
+        cls, frame: pandas.DataFrame, *, source: str | None = None, label: str | None = None, **columns: Any
+    ) -> Trace:
+        """A trace from a pandas DataFrame; columns as in :func:`read_trace`.
+
+        Args:
+            frame: A row for each sample; an index with a name is a column too.
+            source: What errors and reports call it; ``frame.attrs["source"]`` or ``DataFrame`` if not given.
+            label: ``measured`` or ``reconstructed``; ``frame.attrs["label"]`` or ``measured`` if not given.
+            columns: ``time_col``, ``force_col``, ``position_col`` and ``sign``.
+
+        Raises:
+            TraceError: As :func:`read_trace`.
+        """
+        import pandas
+
+        from calib.frames import table_of_frame
+
+        if not isinstance(frame, pandas.DataFrame):
+            raise TraceError(f"a {type(frame).__name__} is no record: give the path of a file, or a pandas DataFrame")
+        source = source or str(frame.attrs.get("source") or FRAME)
+        label = label or str(frame.attrs.get("label") or LABELS[0])
+        return _trace(table_of_frame(frame, source=source, label=label), **columns)
+
+    def frame(self) -> pandas.DataFrame:
+        """The trace as a pandas DataFrame: ``time_s``, ``force_N`` and, where it has one, ``position_m``.
+
+        :meth:`from_frame` makes the same numbers of it, with the label, and says that they passed through a DataFrame.
+        """
+        import pandas
+
+        columns = {"time_s": self.time, "force_N": self.force}
+        if self.position is not None:
+            columns["position_m"] = self.position
+        frame = pandas.DataFrame(columns)
+        source = self.source if self.source.startswith(FRAME) else f"{FRAME} of {self.source}"
+        frame.attrs |= {"source": source, "label": self.label}
+        return frame
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the numbers, for a trace that comes from no file."""
+        content = [np.ascontiguousarray(x) for x in (self.time, self.force, self.position) if x is not None]
+        return hashlib.sha256(b"".join(x.tobytes() for x in content)).hexdigest()
+
     @property
     def dt(self) -> float:
         """Median sampling interval [s]."""
@@ -66,24 +150,28 @@ class Trace:
 
 
 def read_trace(
-    path: str | Path,
+    path: str | Path | pandas.DataFrame,
     *,
     time_col: str | None = None,
     force_col: str | None = None,
     position_col: str | None = None,
     sign: str | int | None = None,
 ) -> Trace:
-    """Read a force trace from a CSV file.
+    """Read a force trace from a CSV, JSON or HDF5 file, or a pandas DataFrame.
 
-    Columns are found by their names, which carry the unit: ``time_s``, ``time_ms``, ``t_s``; ``force_N``,
-        ``fz_N``,
-    ``force_kN``; heights ``ee_z_m``, ``position_mm``; depths ``stroke_m``, ``displacement_mm`` (positive
-    downwards, turned into heights). ``base_Fz_N`` of a robot log is preferred to a derived ``cut_force_z_N``
-    and has its sign turned round. Lines that start with ``#`` are comments; ``# label: reconstructed`` sets
-    the label.
+    Columns are found by their names, which carry the unit: ``time_s``, ``time_ms``, ``t_s``; ``force_N``, ``fz_N``,
+    ``force_kN``; heights ``ee_z_m``, ``position_mm``; depths ``stroke_m``, ``displacement_mm`` (positive downwards,
+    turned into heights). ``base_Fz_N`` of a robot log is preferred to a derived ``cut_force_z_N`` and has its sign turned
+    round. In CSV files, lines that start with ``#`` are comments; ``# label: reconstructed`` sets the label.
+
+    JSON files hold lists by name, or a list of records; HDF5 files data sets of one group (``file.h5:/group``) or a
+    structured one, with units in names or attributes. In both, vectors become columns ``_x``, ``_y``, ``_z``, and
+    libfranka's ``O_F_ext_hat_K``, ``K_F_ext_hat_K`` and ``O_T_EE`` become ``base_Fz_N``, ``knife_Fz_N``, ``ee_z_m`` and
+    so on. Names that ``rostopic echo -p`` and PlotJuggler write for ROS messages are known with their units. A clock
+    that starts after more than 1000 s counts from its first sample.
 
     Args:
-        path: CSV file with one header line.
+        path: The file, or the DataFrame.
         time_col: Column to use as time; without a unit in its name it is taken as seconds.
         force_col: Column to use as force; without a unit in its name it is taken as newtons.
         position_col: Column to use as position (metres if its name has no unit); ``none`` uses no position.
@@ -95,7 +183,30 @@ def read_trace(
     Raises:
         TraceError: The file or a column cannot be used; the message names file, column and row.
     """
-    table = read_table(Path(path))
+    columns: dict[str, Any] = {
+        "time_col": time_col,
+        "force_col": force_col,
+        "position_col": position_col,
+        "sign": sign,
+    }
+    if not isinstance(path, (str, Path)):
+        return Trace.from_frame(path, **columns)
+    return _trace(read_table(path), **columns)
+
+
+def _trace(
+    table: Table,
+    *,
+    time_col: str | None = None,
+    force_col: str | None = None,
+    position_col: str | None = None,
+    sign: str | int | None = None,
+) -> Trace:
+    """The trace in a table.
+
+    Raises:
+        TraceError: As :func:`read_trace`.
+    """
     columns = {
         "time": choose(table, "time", time_col),
         "force": choose(table, "force", force_col),
@@ -104,19 +215,22 @@ def read_trace(
         columns["position"] = choose(table, "position", position_col)
     if sign is not None:
         force = columns["force"]
-        columns["force"] = Column(force.name, force.index, abs(force.factor) * _parse_sign(sign))
+        columns["force"] = replace(force, factor=abs(force.factor) * _parse_sign(sign))
     if len(table.rows) < MIN_SAMPLES:
         raise TraceError(f"{table.source}: {len(table.rows)} rows of data, at least {MIN_SAMPLES} are needed")
     values = {role: numbers(table, column) for role, column in columns.items()}
     _check_clock(table, columns["time"], columns["force"], values["time"], values["force"])
+    start = float(values["time"][0])
+    start = start if abs(start) > CLOCK_START_S else 0.0
     return Trace(
-        time=values["time"],
+        time=values["time"] - start,
         force=values["force"],
         position=values.get("position"),
         source=table.source,
         sha256=table.sha256,
         columns={role: column.name for role, column in columns.items()},
         label=table.label,
+        start=start,
     )
 
 
@@ -124,7 +238,7 @@ def _parse_sign(sign: str | int) -> float:
     """The factor of a ``--sign`` option."""
     signs = {"+": 1.0, "-": -1.0, "1": 1.0, "+1": 1.0, "-1": -1.0}
     if str(sign) not in signs:
-        raise TraceError(f"sign {sign!r} is not one of +, -, 1, -1 (option --sign)")
+        raise TraceError(f"sign {brief(sign)!r} is not one of +, -, 1, -1 (option --sign)")
     return signs[str(sign)]
 
 
@@ -136,19 +250,18 @@ def _check_clock(table: Table, time: Column, force: Column, t: np.ndarray, f: np
         mean = float(force_steps.mean())
         if mean > 0.0 and np.all(np.abs(force_steps - mean) <= CLOCK_JITTER * mean):
             raise TraceError(
-                f"{table.source}: columns {time.name} and {force.name} look swapped ({force.name} rises in "
-                f"equal steps like a clock, {time.name} does not); exchange their names or use --time-col "
+                f"{table.source}: columns {brief(time.name)} and {brief(force.name)} look swapped ({brief(force.name)} "
+                f"rises in equal steps like a clock, {brief(time.name)} does not); exchange their names or use --time-col "
                 "and --force-col"
             )
         i = int(np.argmax(steps <= 0.0))
         raise TraceError(
-            f"{table.source}, row {table.lines[i + 1]}, column {time.name}: time does not increase "
-            f"({t[i]:g} s, then {t[i + 1]:g} s); remove repeated rows, or cut the file where the clock "
-            "restarts"
+            f"{table.source}, {table.row} {brief(table.rows[i + 1])}, column {brief(time.name)}: time does not increase "
+            f"({t[i]:.10g} s, then {t[i + 1]:.10g} s); remove repeated rows, or cut the file where the clock restarts"
         )
     median = float(np.median(steps))
-    if median > MS_SUSPICION_S:
-        raise TraceError(
-            f"{table.source}, column {time.name}: samples are {median:g} s apart; this looks like "
-            "milliseconds: name the column time_ms"
-        )
+    where = f"{table.source}, column {brief(time.name)}: samples are {median:g} s apart"
+    if median >= SLOWEST_S:
+        raise TraceError(f"{where}; this looks like milliseconds: name the column time_ms")
+    if median < FASTEST_S:
+        raise TraceError(f"{where}, more than {1 / FASTEST_S:g} a second; check the unit of the column")

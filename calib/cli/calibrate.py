@@ -18,8 +18,9 @@ HELP = "fit a food to a measured knife-force trace and write a report"
 DESCRIPTION = """Fit a food's cutting properties to a knife-force trace.
 
 Writes summary.json, material.yaml, evaluations.h5, curves.csv and report.pdf
-to --out. The trace is a CSV with units in its column names (time_s, force_N,
-position_m, ...); robot logs with base_Fz_N and ee_z_m are known."""
+to --out. The trace is a CSV, JSON or HDF5 file (file.h5:/group) with units in its
+column names (time_s, force_N, position_m, ...); robot logs with base_Fz_N and
+ee_z_m, libfranka's fields and CSV exports of ROS messages are known."""
 EPILOG = """examples:
   calibrate --food banana --trace force_data/banana_reconstructed.csv
   calibrate --food potato --trace cut.csv --air air.csv --knife edc --out runs/potato
@@ -43,8 +44,8 @@ def add_args(p: argparse.ArgumentParser) -> None:
 
 def add_trace(p: argparse.ArgumentParser) -> None:
     """Options that say what was measured."""
-    p.add_argument("--trace", required=True, metavar="CSV", help="record of the cut")
-    p.add_argument("--air", metavar="CSV", help="the same motion without food, subtracted at equal time")
+    p.add_argument("--trace", required=True, metavar="FILE", help="record of the cut")
+    p.add_argument("--air", metavar="FILE", help="the same motion without food, subtracted at equal time")
     p.add_argument("--time-col", metavar="NAME", help="column of the time")
     p.add_argument("--force-col", metavar="NAME", help="column of the force on the knife")
     p.add_argument("--position-col", metavar="NAME", help="column of the knife's height ('none': there is none)")

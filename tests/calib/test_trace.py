@@ -147,7 +147,7 @@ def test_missing_file_names_its_neighbour(tmp_path: Path) -> None:
         (b"0.0,1.0\n0.1,1.0\n", "add a header"),
         (b"time_s,force_N,force_N\n0,1,1\n", "'force_N' occurs 2 times"),
         (
-            b"# label: guessed\ntime_s,force_N\n" + b"".join(b"%d.5,1\n" % i for i in range(30)),
+            b"# label: guessed\ntime_s,force_N\n" + b"".join(b"0.%02d,1\n" % i for i in range(30)),
             "label 'guessed'",
         ),
     ],
