@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from calib.errors import TraceError
-from calib.tables import Table, as_float, brief, listed
+from calib.tables import Table, as_float
+from calib.wording import brief, listed, quoted
 
 _SECONDS = {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "millisecond": 1e-3, "milliseconds": 1e-3,
             "us": 1e-6, "usec": 1e-6, "ns": 1e-9, "nsec": 1e-9, "nanosecond": 1e-9, "nanoseconds": 1e-9}  # fmt: skip
@@ -99,8 +100,8 @@ def choose(table: Table, role: str, wanted: str | None) -> Column:
     if wanted is not None:
         if wanted not in table.columns:
             why = table.left_out.get(wanted)
-            hint = f": it was left out, {why}" if why else _did_you_mean([wanted], list(table.columns))
-            raise TraceError(f"{table.source}: no column {brief(wanted)!r} ({option}){hint}")
+            hint = f": it was left out, {why}" if why else _did_you_mean([wanted], table)
+            raise TraceError(f"{table.source}: no column {quoted(wanted)} ({option}){hint}")
         return _column(table, role, wanted)
     fitting = candidates(table, role)
     if len(fitting) == 1:
@@ -112,7 +113,7 @@ def choose(table: Table, role: str, wanted: str | None) -> Column:
     left = "; ".join(f"{brief(name)} was left out, {why}" for name, why in list(table.left_out.items())[:3])
     raise TraceError(
         f"{table.source}: no {role} column with its unit in the name, such as "
-        f"{', '.join(_EXPECTED[role][:3])}{_did_you_mean(_EXPECTED[role], list(table.columns))}; name one with "
+        f"{', '.join(_EXPECTED[role][:3])}{_did_you_mean(_EXPECTED[role], table)}; name one with "
         f"{option}{f' ({left})' if left else ''}"
     )
 
@@ -167,7 +168,7 @@ def _where(table: Table, column: Column, i: int) -> str:
 def _shown(cell: Any) -> str:
     """A cell in an error."""
     if isinstance(cell, str):
-        return repr(brief(cell.strip()))
+        return quoted(cell.strip())
     return brief(cell) if isinstance(cell, (int, float, np.number)) else f"{type(cell).__name__} {brief(cell)}"
 
 
@@ -214,11 +215,13 @@ def _column(table: Table, role: str, name: str) -> Column:
     named = _split_unit(name[:LONGEST])[1]
     if name in table.units and unit not in _UNITS[role]:
         raise TraceError(
-            f"{table.source}, column {brief(name)}: its unit is {unit!r}, which is none of a {role}; use one of "
+            f"{table.source}, column {brief(name)}: its unit is {quoted(unit)}, which is none of a {role}; use one of "
             f"{', '.join(list(_UNITS[role])[:6])}"
         )
     if name in table.units and _UNITS[role].get(named, _UNITS[role][unit]) != _UNITS[role][unit]:
-        raise TraceError(f"{table.source}, column {brief(name)}: its unit is stated as {unit!r}; correct one of them")
+        raise TraceError(
+            f"{table.source}, column {brief(name)}: its unit is stated as {quoted(unit)}; correct one of them"
+        )
     factor = _UNITS[role].get(unit, 1.0)
     if role == "force":
         factor *= _KNOWN_FORCE.get(stem, 1.0)
@@ -227,10 +230,11 @@ def _column(table: Table, role: str, name: str) -> Column:
     return Column(name, role, factor)
 
 
-def _did_you_mean(wanted: Sequence[str], names: list[str]) -> str:
+def _did_you_mean(wanted: Sequence[str], table: Table) -> str:
     """A hint with the nearest existing names, or with all of them."""
-    lower = {name.lower(): name for name in names if len(name) <= LONGEST}
-    near = [n for w in wanted for n in difflib.get_close_matches(w.lower(), lower, n=1, cutoff=0.7)]
-    if near:
-        return f"; did you mean {brief(lower[near[0]])!r}?"
-    return f"; the columns are {listed(names)}"
+    lower = {name.lower(): name for name in table.columns if len(name) <= LONGEST}
+    near = [lower[n] for w in wanted for n in difflib.get_close_matches(w.lower(), lower, n=1, cutoff=0.7)]
+    if not near:
+        return f"; the columns are {listed(list(table.columns))}"
+    stated = table.units.get(near[0])
+    return f"; did you mean {quoted(near[0])}{f', whose unit is stated as {quoted(stated)}' if stated else ''}?"

@@ -48,8 +48,7 @@ def table_of_fields(
     Raises:
         TraceError: Two columns have one name.
     """
-    lengths = Counter(len(values) for values in fields.values())
-    rows = max([n for n, count in lengths.items() if count > 1] or lengths)
+    rows = row_count(fields)
     columns: list[tuple[str, Values]] = []
     left_out: dict[str, str] = {}
     said = dict(stated or {})
@@ -77,6 +76,12 @@ def table_of_fields(
         units=units(fields, dict(columns)) | said,
         left_out=left_out,
     )
+
+
+def row_count(fields: Mapping[str, Values]) -> int:
+    """Length of the longest lists that are not alone in it: lists of another are settings, or were cut off."""
+    lengths = Counter(len(values) for values in fields.values())
+    return max([n for n, count in lengths.items() if count > 1] or lengths)
 
 
 def width_of(values: Values) -> int | None:

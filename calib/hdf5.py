@@ -11,7 +11,8 @@ import numpy as np
 
 from calib.errors import TraceError
 from calib.fields import LONGEST_VECTOR, Values, table_of_fields
-from calib.tables import LABELS, Table, brief, listed
+from calib.tables import LABELS, Table
+from calib.wording import brief, listed
 
 UNIT_ATTRIBUTES = ("unit", "units")
 MOST_VALUES = 10**8

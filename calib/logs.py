@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from calib.errors import TraceError
-from calib.fields import LONGEST_VECTOR, table_of_fields, width_of
-from calib.tables import LABELS, Table, brief, check_names, decoded
+from calib.fields import LONGEST_VECTOR, row_count, table_of_fields, width_of
+from calib.tables import LABELS, Table, check_names, decoded
+from calib.wording import brief, quoted
 
 
 def table_of_json(source: str, raw: bytes) -> Table:
@@ -82,7 +83,7 @@ def _fields(source: str, name: str, value: Any) -> Iterator[tuple[str, list[Any]
         return
     if any(isinstance(item, dict) for item in value):
         if not all(item is None or isinstance(item, dict) for item in value):
-            raise TraceError(f"{source}: the list {brief(name)!r} holds records and other values; write records only")
+            raise TraceError(f"{source}: the list {quoted(name)} holds records and other values; write records only")
         keys = dict.fromkeys(key for item in value if item for key in item)
         for key in keys:
             inner = [item.get(key) if item else None for item in value]
@@ -95,10 +96,17 @@ def _fields(source: str, name: str, value: Any) -> Iterator[tuple[str, list[Any]
 
 
 def _common_group_removed(fields: dict[str, list[Any]]) -> dict[str, list[Any]]:
-    """The same fields without a first group that all of them are in."""
-    while fields and len({name.partition(".")[0] for name in fields}) == 1 and all("." in name for name in fields):
-        fields = {name.partition(".")[2]: values for name, values in fields.items()}
-    return fields
+    """The same fields without a first group that all columns are in."""
+    rows = row_count(fields)
+    while True:
+        groups = {name.rpartition(".")[0].partition(".")[0] for name, values in fields.items() if len(values) == rows}
+        group = groups.pop()
+        if groups or not group:
+            return fields
+        renamed = {name.removeprefix(f"{group}."): values for name, values in fields.items()}
+        if len(renamed) < len(fields):
+            return fields
+        fields = renamed
 
 
 def _label(content: Any) -> str:

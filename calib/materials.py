@@ -28,6 +28,7 @@ from calib.properties import (
     rule_of,
 )
 from calib.validation import Dumper, Place, check_keys, choice, data_path, mapping, read_yaml, suggest
+from calib.wording import listed
 from mpm.shapes import SHAPE_KINDS
 
 if TYPE_CHECKING:
@@ -233,7 +234,7 @@ def load_material_file(path: Path | str) -> FoodSpec:
     top, content = read_yaml(path)
     provenance = content.pop("calibration", None)
     if len(content) != 1:
-        raise top.error(f"has {len(content)} foods, but one is needed; leave one of: {', '.join(content)}")
+        raise top.error(f"has {len(content)} foods, but one is needed; leave one of: {listed(list(content))}")
     name, raw = next(iter(content.items()))
     kept = None if provenance is None else mapping(top.at("calibration"), provenance)
     return replace(_read_food(top.at(name), raw), calibration=kept)

@@ -7,7 +7,6 @@ import difflib
 import hashlib
 import os
 import re
-import reprlib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,10 +16,9 @@ from typing import Any
 import numpy as np
 
 from calib.errors import TraceError
+from calib.wording import quoted
 
 LABELS = ("measured", "reconstructed")
-SHOWN_LETTERS, SHOWN_NAMES = 40, 8
-"""Letters of a name or cell, and names of a list, that an error shows."""
 _JSON_SUFFIXES = (".json", ".jsonl", ".ndjson")
 _JSON_START = re.compile(rb"(\xef\xbb\xbf)?\s*(\{|\[\s*[\[{])")
 _HDF5_ADDRESS = re.compile(r"(.+\.(?:h5|hdf5|hdf|he5)):(.*)", re.IGNORECASE | re.DOTALL)
@@ -98,20 +96,6 @@ def as_float(cell: Any) -> float | None:
         return float("inf")
 
 
-def brief(name: object) -> str:
-    """A name or value as an error shows it: on one line, not too long, nothing that cannot be printed."""
-    plain = name.item() if isinstance(name, np.generic) else name
-    text = plain if isinstance(plain, str) else reprlib.repr(plain)
-    text = text if text.isprintable() else ascii(text)[1:-1]
-    return text if len(text) <= SHOWN_LETTERS else text[: SHOWN_LETTERS - 3] + "..."
-
-
-def listed(names: Sequence[object]) -> str:
-    """The first names of a list, and how many more there are."""
-    more = len(names) - SHOWN_NAMES
-    return ", ".join(brief(name) for name in names[:SHOWN_NAMES]) + (f" and {more} more" if more > 0 else "")
-
-
 def decoded(source: str, raw: bytes, kind: str) -> str:
     """The text of a file.
 
@@ -137,7 +121,7 @@ def check_names(source: str, names: Sequence[str]) -> None:
     """
     twice = next((name for name, count in Counter(names).items() if count > 1), None)
     if twice is not None:
-        raise TraceError(f"{source}: column name {brief(twice)!r} occurs {names.count(twice)} times; rename one")
+        raise TraceError(f"{source}: column name {quoted(twice)} occurs {names.count(twice)} times; rename one")
 
 
 def _content(path: Path) -> bytes:
@@ -157,7 +141,7 @@ def _content(path: Path) -> bytes:
     except OSError as error:
         raise TraceError(f"{path}: cannot be read ({error.strerror})") from None
     if not raw.strip():
-        raise TraceError(f"{path.name} is empty")
+        raise TraceError(f"{path.name} is empty; check that the record was saved")
     return raw
 
 
@@ -216,9 +200,7 @@ def _cells(source: str, body: list[tuple[int, str]]) -> list[tuple[int, list[str
 def _check_header(source: str, names: list[str]) -> None:
     """Refuse a header with one column, without names, or with a name twice."""
     if len(names) < 2:
-        raise TraceError(
-            f"{source}: not a CSV file with a force column and one beside it (header: {brief(names[0])!r})"
-        )
+        raise TraceError(f"{source}: not a CSV file with a force column and one beside it (header: {quoted(names[0])})")
     if all(as_float(name) is not None for name in names):
         raise TraceError(f"{source}: the first row holds numbers; add a header such as time_s,force_N")
     check_names(source, names)

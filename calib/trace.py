@@ -11,7 +11,8 @@ import numpy as np
 
 from calib.columns import Column, candidates, choose, numbers
 from calib.errors import TraceError
-from calib.tables import LABELS, Table, brief, read_table
+from calib.tables import LABELS, Table, read_table
+from calib.wording import brief, quoted
 
 if TYPE_CHECKING:
     import pandas
@@ -64,7 +65,7 @@ class Trace:
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, self._numbers(name))
         if self.label not in LABELS:
-            raise TraceError(f"{self.source}: label {brief(self.label)!r} is not one of {', '.join(LABELS)}")
+            raise TraceError(f"{self.source}: label {quoted(self.label)} is not one of {', '.join(LABELS)}")
         if len(self.time) < MIN_SAMPLES:
             raise TraceError(
                 f"{self.source}: {len(self.time)} samples, at least {MIN_SAMPLES} are needed; record the "
@@ -238,7 +239,7 @@ def _parse_sign(sign: str | int) -> float:
     """The factor of a ``--sign`` option."""
     signs = {"+": 1.0, "-": -1.0, "1": 1.0, "+1": 1.0, "-1": -1.0}
     if str(sign) not in signs:
-        raise TraceError(f"sign {brief(sign)!r} is not one of +, -, 1, -1 (option --sign)")
+        raise TraceError(f"sign {quoted(sign)} is not one of +, -, 1, -1 (option --sign)")
     return signs[str(sign)]
 
 
