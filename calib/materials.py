@@ -82,6 +82,17 @@ class FoodSpec:
         if self.properties["skin_thickness"].value > 0.0 and "R_skin" not in self.properties:
             raise here.at("properties").error("skin_thickness > 0 needs R_skin; give it, or skin_thickness 0")
 
+    @classmethod
+    def load(cls, name: str | Path) -> FoodSpec:
+        """A food by its name in ``materials.yaml``, or from the YAML file of one food, as a calibration writes it.
+
+        Raises:
+            MaterialError: There is no such food, or something is wrong with the file.
+        """
+        if isinstance(name, Path) or str(name).endswith((".yaml", ".yml")):
+            return load_material_file(name)
+        return load_food(name)
+
     @property
     def default_fit(self) -> tuple[str, ...]:
         """Names of the properties that a calibration fits unless told otherwise."""

@@ -30,7 +30,6 @@ from calib.request import Request, Setup
 from calib.scenes import cut_scene, height_range, place, specimen
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.summary import add_conditioning, summarise
-from calib.trace import read_trace
 from calib.uncertainty import uncertainty
 from mpm.record import ForceRecord
 
@@ -82,8 +81,7 @@ def conditioned(request: Request) -> tuple[Conditioned, str | None]:
     Raises:
         CutcalError: Anything wrong with the records.
     """
-    trace = read_trace(request.trace, **request.columns)
-    air = read_trace(request.air, **request.columns) if request.air is not None else None
+    trace, air = request.records()
     known = request.sizing.height or request.food.dims["height"].value
     curve = condition(trace, air=air, speed=request.speed, height=known, t_end=request.t_end)
     return curve, None if air is None else air.sha256

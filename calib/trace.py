@@ -106,7 +106,7 @@ class Trace:
 
         Args:
             frame: A row for each sample; an index with a name is a column too.
-            source: What errors and reports call it; ``frame.attrs["source"]`` or ``DataFrame`` if not given.
+            source: Name in errors and reports, which say that it was a DataFrame; ``frame.attrs["source"]`` if not given.
             label: ``measured`` or ``reconstructed``; ``frame.attrs["label"]`` or ``measured`` if not given.
             columns: ``time_col``, ``force_col``, ``position_col`` and ``sign``.
 
@@ -119,14 +119,16 @@ class Trace:
 
         if not isinstance(frame, pandas.DataFrame):
             raise TraceError(f"a {type(frame).__name__} is no record: give the path of a file, or a pandas DataFrame")
-        source = source or str(frame.attrs.get("source") or FRAME)
+        source = source or str(frame.attrs.get("source") or "")
+        if FRAME not in source:
+            source = f"{source} ({FRAME})" if source else FRAME
         label = label or str(frame.attrs.get("label") or LABELS[0])
         return _trace(table_of_frame(frame, source=source, label=label), **columns)
 
     def frame(self) -> pandas.DataFrame:
         """The trace as a pandas DataFrame: ``time_s``, ``force_N`` and, where it has one, ``position_m``.
 
-        :meth:`from_frame` makes the same numbers of it, with the label, and says that they passed through a DataFrame.
+        :meth:`from_frame` makes the same numbers of it, with the label, and says that they were in a DataFrame.
         """
         import pandas
 
@@ -134,8 +136,7 @@ class Trace:
         if self.position is not None:
             columns["position_m"] = self.position
         frame = pandas.DataFrame(columns)
-        source = self.source if self.source.startswith(FRAME) else f"{FRAME} of {self.source}"
-        frame.attrs |= {"source": source, "label": self.label}
+        frame.attrs |= {"source": self.source, "label": self.label}
         return frame
 
     @property

@@ -102,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
 
     command = ["calibrate", *(a for a in sys.argv[1:] if a != "calibrate")]
     request = request_of(args, command)
-    out = Path(args.out or f"cutcal-{request.food.name}-{request.trace.stem}")
+    out = Path(args.out or f"cutcal-{request.food.name}-{request.stem}")
 
     def say(text: str) -> None:
         print(f"note: {text}", file=sys.stderr, flush=True)

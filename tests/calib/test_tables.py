@@ -332,17 +332,20 @@ def test_frames(tmp_path: Path) -> None:
     [
         (
             lambda f: f.assign(force_N=f.force_N.astype(object).where(f.index != 17, "x")),
-            "mine, row 17, column force_N: 'x'",
+            r"mine \(DataFrame\), row 17, column force_N: 'x'",
         ),
-        (lambda f: f.assign(force_N=f.force_N.where(f.index != 17)), "mine, row 17, column force_N: nan is not finite"),
+        (
+            lambda f: f.assign(force_N=f.force_N.where(f.index != 17)),
+            r"mine \(DataFrame\), row 17, column force_N: nan is not finite",
+        ),
         (
             lambda f: f.set_index(pd.Index(list(range(100, 140)))).assign(time_s=0.0),
-            "mine, row 101, column time_s: time",
+            r"mine \(DataFrame\), row 101, column time_s: time",
         ),
-        (lambda f: f.rename(columns={"force_N": "time_s"}), "mine: column name 'time_s' occurs 2 times"),
+        (lambda f: f.rename(columns={"force_N": "time_s"}), r"mine \(DataFrame\): column name 'time_s' occurs 2 times"),
         (lambda f: f.rename(columns={"force_N": "forse_N"}), "did you mean 'forse_N'"),
-        (lambda f: f.iloc[:0], "mine: 0 rows"),
-        (lambda f: f.iloc[:5], "mine: 5 rows of data"),
+        (lambda f: f.iloc[:0], r"mine \(DataFrame\): 0 rows"),
+        (lambda f: f.iloc[:5], r"mine \(DataFrame\): 5 rows of data"),
         (lambda f: f.force_N, "a Series is no record"),
     ],
 )
@@ -361,8 +364,8 @@ def test_frame_out_and_in_again() -> None:
     again = Trace.from_frame(frame)
     for name in ("time", "force", "position"):
         np.testing.assert_array_equal(getattr(again, name), getattr(trace, name))
-    assert (again.source, again.label) == ("DataFrame of cut.csv", "reconstructed")
-    assert Trace.from_frame(again.frame()).source == "DataFrame of cut.csv"
+    assert (again.source, again.label) == ("cut.csv (DataFrame)", "reconstructed")
+    assert Trace.from_frame(again.frame()).source == "cut.csv (DataFrame)"
     assert list(Trace(TIME, LOAD).frame()) == ["time_s", "force_N"]
 
 
