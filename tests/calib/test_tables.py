@@ -52,6 +52,7 @@ def channels() -> dict[str, Any]:
     return {
         "robot": "arm 2",
         "gains": [1.0, 2.0, 3.0],
+        "look_up_table": [0.0] * (2 * N),
         "time": (12460.0 + TIME).tolist(),
         "O_F_ext_hat_K": WRENCH.tolist(),
         "K_F_ext_hat_K": (-WRENCH).tolist(),
@@ -184,6 +185,9 @@ def test_hdf5_in_all_places(tmp_path: Path) -> None:
     assert read_trace(root).sha256 == hashlib.sha256(root.read_bytes()).hexdigest()
     assert read_trace(f"{two}:/cut").source == "c.hdf5:/cut"
     assert read_trace(f"{two}:/cut").sha256 != read_trace(f"{two}:/air").sha256
+    with h5py.File(one, "a") as file:
+        file["runs/cut/settings"] = table[:1]
+    assert read_trace(one).source == "b.h5"
     with pytest.raises(
         TraceError, match=r"c.hdf5: several groups could be the record; name one: c.hdf5:/air, c.hdf5:/cut"
     ):
@@ -344,6 +348,10 @@ def test_frames(tmp_path: Path) -> None:
         ),
         (lambda f: f.rename(columns={"force_N": "time_s"}), r"mine \(DataFrame\): column name 'time_s' occurs 2 times"),
         (lambda f: f.rename(columns={"force_N": "forse_N"}), "did you mean 'forse_N'"),
+        (
+            lambda f: f.astype("Float64").reindex(range(17)).reindex(range(40)),
+            r"mine \(DataFrame\), row 17, column time_s: an empty cell is not a number",
+        ),
         (lambda f: f.iloc[:0], r"mine \(DataFrame\): 0 rows"),
         (lambda f: f.iloc[:5], r"mine \(DataFrame\): 5 rows of data"),
         (lambda f: f.force_N, "a Series is no record"),
