@@ -18,11 +18,13 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import t as student
 
+from calib.columns import candidates, choose, numbers
 from calib.errors import CurveError, TraceError
 from calib.outputs import prepare, write_csv, write_json
 from calib.progress import clock
 from calib.provenance import git_commit, versions
-from calib.trace import MIN_SAMPLES, Table, candidates, choose, numbers, read_table
+from calib.tables import Table, read_table
+from calib.trace import MIN_SAMPLES
 from calib.verdicts import Verdict
 from mpm.errors import SimulationError
 from mpm.material import Material
@@ -176,7 +178,7 @@ def read_repeats(
     loading is used, up to ``strain``.
 
     Args:
-        paths: CSV files, each one repeat or several with a column ``replicate``; all of one material.
+        paths: CSV, JSON or HDF5 files, each one repeat or several with a column ``replicate``; all of one material.
         shape: The specimen.
         strain: Largest engineering strain [-].
         compression_col: Column of the way of the plate; metres if its name has no unit.
@@ -218,11 +220,10 @@ def read_repeats(
 
 def _repeats(table: Table) -> list[tuple[str, np.ndarray]]:
     """Name and rows of each repeat of a file; one without a name where there is no such column."""
-    lower = [name.lower() for name in table.names]
-    if REPLICATE not in lower:
+    column = next((cells for name, cells in table.columns.items() if name.lower() == REPLICATE), None)
+    if column is None:
         return [("", np.arange(len(table.rows)))]
-    column = lower.index(REPLICATE)
-    of = np.array([row[column].strip() for row in table.rows])
+    of = np.array([str(cell).strip() for cell in column])
     return [(name, np.flatnonzero(of == name)) for name in dict.fromkeys(of.tolist())]
 
 
@@ -527,7 +528,7 @@ def run(
     """Calibrate and write compress.json, curves.csv and compress.svg.
 
     Args:
-        paths: CSV files of one material.
+        paths: CSV, JSON or HDF5 files of one material.
         shape: The specimen.
         nu: Poisson's ratio [-].
         out: Output folder.

@@ -34,6 +34,8 @@ STROKE_RANGE_M = (1e-3, 0.5)
 knife's way."""
 PEAK_RANGE_N = (0.05, 5e3)
 """Peak forces outside are taken for a unit mix-up [N]."""
+NOTHING_N = 1e-6
+"""Variation of a force below which there is nothing in it but rounding [N]."""
 PEAK_HALF_WIDTH = 2
 """Points on each side of the maximum through which the parabola of the peak is fitted."""
 MAX_DESCENT_FRACTION = 0.5
@@ -124,10 +126,26 @@ def condition(
     warnings: list[str] = []
     if trace.label == "reconstructed":
         warnings.append(f"{trace.source} is a reconstruction, not a measurement: nothing fitted to it is validated")
+    if trace.start:
+        warnings.append(
+            f"the clock of {trace.source} starts at {trace.start:.10g} s; all times, also --t-end, are counted from "
+            "there"
+        )
     force = trace.force
     if air is not None:
         force = force - _air_force(trace, air)
     last = _lowest(trace)
+    if last + 1 < MIN_SAMPLES:
+        raise TraceError(
+            f"{trace.source}, column {trace.columns.get('position')}: the position is at its lowest after {last + 1} samples, "
+            f"at least {MIN_SAMPLES} are needed on the way down; it must be a height, or a depth named like stroke_m; name "
+            "another with --position-col, or none and give --speed"
+        )
+    if 0.0 < np.ptp(force[: last + 1]) < NOTHING_N:
+        raise TraceError(
+            f"{trace.source}, column {trace.columns.get('force')}: no contact found: the force varies by "
+            f"{np.ptp(force[: last + 1]):.3g} N in all; check the column and its unit (force_N, force_mN, force_kN)"
+        )
     contact = find_contact(trace.time[: last + 1], force[: last + 1], source=trace.source)
     if air is None:
         warnings += _drift_warnings(trace, force, contact, trace.time[last])

@@ -138,7 +138,9 @@ def run(
     with EvaluationStore(out / "evaluations.h5", header, resume=resume) as store:
         for k in range(traces):
             if k not in done:
-                done[k] = _one(k, seed, request, truth, sensor, store, pool)
+                done[k] = _one(
+                    k, seed, replace(request, trace=out / f"trace-{k:03d}.csv", seed=k), truth, sensor, store, pool
+                )
                 _append(lines, done[k])
             say(f"trace {k + 1} of {traces}: {_words(done[k])}; {rest.left(1.0)}")
     document = summarise([done[k] for k in range(traces)])
@@ -163,11 +165,10 @@ def _one(
     """Make up a trace, calibrate it, and compare with the truth."""
     random = np.random.default_rng([seed, k])
     values, force = _truth(k, random, request.food, truth, store, pool)
-    path = request.trace / f"trace-{k:03d}.csv"
-    sensor.measure(*force, random).to_csv(path, index=False, float_format="%.6g")
+    sensor.measure(*force, random).to_csv(request.trace, index=False, float_format="%.6g")
     row: dict[str, Any] = {"trace": k, "truth": values, "peak_N": float(force[1].max())}
     try:
-        setup = set_up(replace(request, trace=path, seed=k))
+        setup = set_up(request)
         evaluators = [
             CachedEvaluator(
                 pool.evaluator(scene, setup.kept), store, scene=scene.as_dict(), code=code_key(), fidelity=name

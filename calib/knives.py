@@ -18,6 +18,7 @@ from calib.validation import (
     suggest,
     text,
 )
+from calib.wording import listed
 from mpm.errors import SceneError
 from mpm.scene import Knife
 
@@ -64,7 +65,9 @@ def load_knife(name: str | Path) -> Knife:
     if isinstance(name, Path) or name.endswith((".yaml", ".yml")):
         knives = load_knives(name)
         if len(knives) != 1:
-            raise SceneError(f"{name}: has {len(knives)} knives, but one is needed; leave one of: {', '.join(knives)}")
+            raise SceneError(
+                f"{name}: has {len(knives)} knives, but one is needed; leave one of: {listed(list(knives))}"
+            )
         return next(iter(knives.values()))
     knives = load_knives()
     if name not in knives:

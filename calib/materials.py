@@ -28,6 +28,7 @@ from calib.properties import (
     rule_of,
 )
 from calib.validation import Dumper, Place, check_keys, choice, data_path, mapping, read_yaml, suggest, text
+from calib.wording import listed
 from mpm.shapes import SHAPE_KINDS
 
 if TYPE_CHECKING:
@@ -82,6 +83,17 @@ class FoodSpec:
         check_keys(here.at("properties"), self.properties, needed, _NULLABLE, SYNONYMS)
         if self.properties["skin_thickness"].value > 0.0 and "R_skin" not in self.properties:
             raise here.at("properties").error("skin_thickness > 0 needs R_skin; give it, or skin_thickness 0")
+
+    @classmethod
+    def load(cls, name: str | Path) -> FoodSpec:
+        """A food by its name in ``materials.yaml``, or from the YAML file of one food, as a calibration writes it.
+
+        Raises:
+            MaterialError: There is no such food, or something is wrong with the file.
+        """
+        if isinstance(name, Path) or str(name).endswith((".yaml", ".yml")):
+            return load_material_file(name)
+        return load_food(name)
 
     @property
     def default_fit(self) -> tuple[str, ...]:
@@ -237,7 +249,7 @@ def load_material_file(path: Path | str) -> FoodSpec:
     top, content = read_yaml(path)
     provenance = content.pop("calibration", None)
     if len(content) != 1:
-        raise top.error(f"has {len(content)} foods, but one is needed; leave one of: {', '.join(content)}")
+        raise top.error(f"has {len(content)} foods, but one is needed; leave one of: {listed(list(content))}")
     name, raw = next(iter(content.items()))
     kept = None if provenance is None else mapping(top.at("calibration"), provenance)
     return replace(_read_food(top.at(name), raw), calibration=kept)

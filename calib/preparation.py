@@ -20,7 +20,6 @@ from calib.parameters import Z95, Parameter, ParameterSet
 from calib.properties import rule_of
 from calib.request import Request, Setup
 from calib.scenes import cut_scene, height_range, specimen
-from calib.trace import read_trace
 from mpm.scene import Scene
 
 # Hard bounds reach this factor beyond the literature's range, so that a trace may contradict the literature.
@@ -71,8 +70,7 @@ def conditioned(request: Request) -> tuple[Conditioned, str | None]:
     Raises:
         CutcalError: Anything wrong with the records.
     """
-    trace = read_trace(request.trace, **request.columns)
-    air = read_trace(request.air, **request.columns) if request.air is not None else None
+    trace, air = request.records()
     known = request.sizing.height or request.food.dims["height"].value
     curve = condition(trace, air=air, speed=request.speed, height=known, t_end=request.t_end)
     return curve, None if air is None else air.sha256

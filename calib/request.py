@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,8 @@ from calib.conditioning import Conditioned
 from calib.materials import FoodSpec
 from calib.objective import ErrorModel, Objective
 from calib.scenes import Sizing
+from calib.tables import split_address
+from calib.trace import Trace, read_trace
 from mpm.scene import Scene
 
 
@@ -20,9 +22,9 @@ class Request:
 
     Attributes:
         food: The food with its literature ranges.
-        trace: CSV of the cut.
-        air: CSV of the same motion without food, or None.
-        columns: ``time_col``, ``force_col``, ``position_col``, ``sign`` for reading the CSVs.
+        trace: The cut, or its file.
+        air: The same motion without food, or its file, or None.
+        columns: ``time_col``, ``force_col``, ``position_col``, ``sign`` for reading files.
         knife: Name or YAML file.
         speed: Knife speed [m/s], or None.
         t_end: End of the record [s], or None.
@@ -42,8 +44,8 @@ class Request:
     """
 
     food: FoodSpec
-    trace: Path
-    air: Path | None = None
+    trace: Path | Trace
+    air: Path | Trace | None = None
     columns: Mapping[str, Any] = field(default_factory=dict)
     knife: str = "kitchen"
     speed: float | None = None
@@ -61,6 +63,38 @@ class Request:
     seed: int = 0
     arch: str = "cpu"
     command: tuple[str, ...] = ()
+
+    @property
+    def air_source(self) -> str | None:
+        """What the air run is called, None without one."""
+        return None if self.air is None else _source(self.air)
+
+    @property
+    def stem(self) -> str:
+        """Name of the trace for a folder."""
+        return Path(_source(self.trace).replace(":", "_")).stem
+
+    def records(self) -> tuple[Trace, Trace | None]:
+        """The cut, and the air run where there is one.
+
+        Raises:
+            TraceError: A file cannot be read.
+        """
+        return self._record(self.trace), None if self.air is None else self._record(self.air)
+
+    def _record(self, given: Path | Trace) -> Trace:
+        """A record, with the SHA-256 of its numbers if it comes from no file and no DataFrame."""
+        if not isinstance(given, Trace):
+            return read_trace(given, **self.columns)
+        return given if given.sha256 else replace(given, source=_source(given), sha256=given.digest)
+
+
+def _source(given: Path | Trace) -> str:
+    """What a record is called; one made from arrays says so."""
+    if not isinstance(given, Trace):
+        file, address = split_address(given)
+        return f"{file.name}:{address}" if address else file.name
+    return given.source if given.sha256 else f"{given.source} (arrays)"
 
 
 @dataclass(frozen=True)

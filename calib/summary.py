@@ -107,7 +107,7 @@ def _trace(request: Request, setup: Setup) -> dict[str, Any]:
             "columns": dict(trace.columns),
         },
         "trace_sha256": trace.sha256,
-        "air": None if request.air is None else {"source": request.air.name, "sha256": setup.air_sha256},
+        "air": None if request.air is None else {"source": request.air_source, "sha256": setup.air_sha256},
         "baseline_N": curve.baseline_N,
         "baseline_sd_N": curve.baseline_sd_N,
         "baseline_kind": curve.baseline_kind,

@@ -1,51 +1,36 @@
-"""Reading a measured force trace: columns, units and signs, and everything that can be wrong with a file."""
+"""A measured force trace: reading it from a table, and everything that can be wrong with its clock."""
 
 from __future__ import annotations
 
-import csv
-import difflib
 import hashlib
-import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from calib.columns import Column, candidates, choose, numbers
 from calib.errors import TraceError
+from calib.tables import LABELS, Table, read_table
+from calib.wording import brief, quoted
+
+if TYPE_CHECKING:
+    import pandas
 
 MIN_SAMPLES = 20
 """Fewest samples of a trace: below this, baseline, onset and ramp have under seven samples each."""
-MS_SUSPICION_S = 1.0
-"""Median sampling interval [s] above which a time column is taken for milliseconds: no cut is sampled so
-slowly."""
+SLOWEST_S, FASTEST_S = 0.5, 2e-5
+"""Median sampling intervals outside are taken for a unit mix-up [s]: a clock of a kilohertz in milliseconds read as
+seconds has 1 s, one of 50 Hz in seconds read as milliseconds 2e-5 s."""
+CLOCK_START_S = 1000.0
+"""Time of the first sample from which on a clock has begun elsewhere [s], at the start of a robot or in 1970; the trace
+then counts from its first sample."""
 CLOCK_JITTER = 0.5
 """Largest deviation of a step from the mean step for a column that looks like a clock [-]."""
+FRAME = "DataFrame"
+"""What a trace from a DataFrame is called that says nothing else."""
 DISABLED = "none"
 """Value of ``position_col`` that leaves a position column unused."""
-LABELS = ("measured", "reconstructed")
-
-_UNITS = {
-    "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6},
-    "force": {"N": 1.0, "n": 1.0, "kN": 1e3, "KN": 1e3, "kn": 1e3, "mN": 1e-3, "mn": 1e-3},
-    "position": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6},
-    "compression": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6},
-}
-_TIME_STEM = re.compile(r"time|t|timestamp|elapsed(_time)?")
-_FORCE_STEM = re.compile(r"(.*_)?(force|load|resistance|f|fz)(_z)?")
-_HEIGHT_STEM = re.compile(r"((ee|knife|tool|tcp|blade)_)?(z|height|position|pos)(_z)?")
-_DEPTH_STEM = re.compile(r"(.*_)?(stroke|displacement|travel|depth|extension|penetration)")
-_COMPRESSION_STEM = re.compile(r"(.*_)?(compression|stroke|displacement|travel|extension)")
-_KNOWN_FORCE = {"base_fz": -1.0, "knife_fz": 1.0}
-"""Columns whose sign is known: robot logs hold the force on the world in the base frame, downwards
-negative."""
-_KNOWN_POSITION = ("ee_z",)
-_EXPECTED = {
-    "time": ("time_s", "time_ms", "t_s"),
-    "force": ("force_N", "fz_N", "base_Fz_N", "force_kN", "force_mN"),
-    "position": ("ee_z_m", "position_m", "position_mm", "stroke_m", "displacement_mm"),
-    "compression": ("compression_mm", "displacement_mm", "stroke_m"),
-}
 
 
 @dataclass(frozen=True)
@@ -56,23 +41,31 @@ class Trace:
         time: Time of each sample, strictly increasing [s], shape (n,).
         force: Vertical force, resistance to the downward knife positive, not tared [N], shape (n,).
         position: Height of the tool, z up [m], shape (n,), or None.
-        source: File name.
-        sha256: SHA-256 of the file, empty for a trace made in memory.
+        source: File name, or what else errors and reports call the trace.
+        sha256: SHA-256 of the file (and of the address in it), of the content for a DataFrame, empty for arrays.
         columns: The column used for each of ``time``, ``force`` and ``position``.
         label: ``measured`` or ``reconstructed``.
+        start: Time of the first sample on the file's clock where that began elsewhere, and was subtracted [s].
+
+    Raises:
+        TraceError: Too few samples, unequal lengths, a number that is not finite, a clock that does not run.
     """
 
     time: np.ndarray
     force: np.ndarray
-    position: np.ndarray | None
-    source: str
-    sha256: str
-    columns: dict[str, str]
-    label: str = "measured"
+    position: np.ndarray | None = None
+    source: str = "trace"
+    sha256: str = ""
+    columns: dict[str, str] = field(default_factory=dict)
+    label: str = LABELS[0]
+    start: float = 0.0
 
     def __post_init__(self) -> None:
+        for name in ("time", "force", "position"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, self._numbers(name))
         if self.label not in LABELS:
-            raise TraceError(f"{self.source}: label {self.label!r} is not one of {', '.join(LABELS)}")
+            raise TraceError(f"{self.source}: label {quoted(self.label)} is not one of {', '.join(LABELS)}")
         if len(self.time) < MIN_SAMPLES:
             raise TraceError(
                 f"{self.source}: {len(self.time)} samples, at least {MIN_SAMPLES} are needed; record the "
@@ -86,52 +79,101 @@ class Trace:
         if not (np.all(np.isfinite(self.time)) and np.all(np.diff(self.time) > 0.0)):
             raise TraceError(f"{self.source}: time is not strictly increasing")
 
+    def _numbers(self, name: str) -> np.ndarray:
+        """A column as an array of numbers.
+
+        Raises:
+            TraceError: It holds something else.
+        """
+        try:
+            values = np.asarray(getattr(self, name), dtype=float)
+        except (TypeError, ValueError):
+            raise TraceError(f"{self.source}: {name} holds something that is not a number") from None
+        if values.ndim != 1:
+            raise TraceError(f"{self.source}: {name} has shape {values.shape}; give one number a sample")
+        return values
+
+    @classmethod
+    def read(cls, path: str | Path, **columns: Any) -> Trace:
+        """A trace from a file; see :func:`read_trace`."""
+        return read_trace(path, **columns)
+
+    @classmethod
+    def from_frame(
+        cls, frame: pandas.DataFrame, *, source: str | None = None, label: str | None = None, **columns: Any
+    ) -> Trace:
+        """A trace from a pandas DataFrame; columns as in :func:`read_trace`.
+
+        Args:
+            frame: A row for each sample; an index with a name is a column too.
+            source: Name in errors and reports, which say that it was a DataFrame; ``frame.attrs["source"]`` if not given.
+            label: ``measured`` or ``reconstructed``; ``frame.attrs["label"]`` or ``measured`` if not given.
+            columns: ``time_col``, ``force_col``, ``position_col`` and ``sign``.
+
+        Raises:
+            TraceError: As :func:`read_trace`.
+        """
+        import pandas
+
+        from calib.frames import table_of_frame
+
+        if not isinstance(frame, pandas.DataFrame):
+            raise TraceError(f"a {type(frame).__name__} is no record: give the path of a file, or a pandas DataFrame")
+        source = source or str(frame.attrs.get("source") or "")
+        if FRAME not in source:
+            source = f"{source} ({FRAME})" if source else FRAME
+        label = label or str(frame.attrs.get("label") or LABELS[0])
+        return _trace(table_of_frame(frame, source=source, label=label), **columns)
+
+    def frame(self) -> pandas.DataFrame:
+        """The trace as a pandas DataFrame: ``time_s``, ``force_N`` and, where it has one, ``position_m``.
+
+        :meth:`from_frame` makes the same numbers of it, with the label, and says that they were in a DataFrame.
+        """
+        import pandas
+
+        columns = {"time_s": self.time, "force_N": self.force}
+        if self.position is not None:
+            columns["position_m"] = self.position
+        frame = pandas.DataFrame(columns)
+        frame.attrs |= {"source": self.source, "label": self.label}
+        return frame
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the numbers, for a trace that comes from no file."""
+        content = [np.ascontiguousarray(x) for x in (self.time, self.force, self.position) if x is not None]
+        return hashlib.sha256(b"".join(x.tobytes() for x in content)).hexdigest()
+
     @property
     def dt(self) -> float:
         """Median sampling interval [s]."""
         return float(np.median(np.diff(self.time)))
 
 
-@dataclass(frozen=True)
-class Table:
-    """Text of a CSV file: column names, rows and their line numbers in the file."""
-
-    source: str
-    names: list[str]
-    rows: list[list[str]]
-    lines: list[int]
-    label: str
-    sha256: str
-
-
-@dataclass(frozen=True)
-class Column:
-    """One chosen column and the factor that turns its numbers into SI with our sign."""
-
-    name: str
-    index: int
-    factor: float
-
-
 def read_trace(
-    path: str | Path,
+    path: str | Path | pandas.DataFrame,
     *,
     time_col: str | None = None,
     force_col: str | None = None,
     position_col: str | None = None,
     sign: str | int | None = None,
 ) -> Trace:
-    """Read a force trace from a CSV file.
+    """Read a force trace from a CSV, JSON or HDF5 file, or a pandas DataFrame.
 
-    Columns are found by their names, which carry the unit: ``time_s``, ``time_ms``, ``t_s``; ``force_N``,
-        ``fz_N``,
-    ``force_kN``; heights ``ee_z_m``, ``position_mm``; depths ``stroke_m``, ``displacement_mm`` (positive
-    downwards, turned into heights). ``base_Fz_N`` of a robot log is preferred to a derived ``cut_force_z_N``
-    and has its sign turned round. Lines that start with ``#`` are comments; ``# label: reconstructed`` sets
-    the label.
+    Columns are found by their names, which carry the unit: ``time_s``, ``time_ms``, ``t_s``; ``force_N``, ``fz_N``,
+    ``force_kN``; heights ``ee_z_m``, ``position_mm``; depths ``stroke_m``, ``displacement_mm`` (positive downwards,
+    turned into heights). ``base_Fz_N`` of a robot log is preferred to a derived ``cut_force_z_N`` and has its sign turned
+    round. In CSV files, lines that start with ``#`` are comments; ``# label: reconstructed`` sets the label.
+
+    JSON files hold lists by name, or a list of records; HDF5 files data sets of one group (``file.h5:/group``) or a
+    structured one, with units in names or attributes. In both, vectors become columns ``_x``, ``_y``, ``_z``, and
+    libfranka's ``O_F_ext_hat_K``, ``K_F_ext_hat_K`` and ``O_T_EE`` become ``base_Fz_N``, ``knife_Fz_N``, ``ee_z_m`` and
+    so on. Names that ``rostopic echo -p`` and PlotJuggler write for ROS messages are known with their units. A clock
+    that starts after more than 1000 s counts from its first sample.
 
     Args:
-        path: CSV file with one header line.
+        path: The file, or the DataFrame.
         time_col: Column to use as time; without a unit in its name it is taken as seconds.
         force_col: Column to use as force; without a unit in its name it is taken as newtons.
         position_col: Column to use as position (metres if its name has no unit); ``none`` uses no position.
@@ -143,7 +185,30 @@ def read_trace(
     Raises:
         TraceError: The file or a column cannot be used; the message names file, column and row.
     """
-    table = read_table(Path(path))
+    columns: dict[str, Any] = {
+        "time_col": time_col,
+        "force_col": force_col,
+        "position_col": position_col,
+        "sign": sign,
+    }
+    if not isinstance(path, (str, Path)):
+        return Trace.from_frame(path, **columns)
+    return _trace(read_table(path), **columns)
+
+
+def _trace(
+    table: Table,
+    *,
+    time_col: str | None = None,
+    force_col: str | None = None,
+    position_col: str | None = None,
+    sign: str | int | None = None,
+) -> Trace:
+    """The trace in a table.
+
+    Raises:
+        TraceError: As :func:`read_trace`.
+    """
     columns = {
         "time": choose(table, "time", time_col),
         "force": choose(table, "force", force_col),
@@ -152,19 +217,22 @@ def read_trace(
         columns["position"] = choose(table, "position", position_col)
     if sign is not None:
         force = columns["force"]
-        columns["force"] = Column(force.name, force.index, abs(force.factor) * _parse_sign(sign))
+        columns["force"] = replace(force, factor=abs(force.factor) * _parse_sign(sign))
     if len(table.rows) < MIN_SAMPLES:
         raise TraceError(f"{table.source}: {len(table.rows)} rows of data, at least {MIN_SAMPLES} are needed")
     values = {role: numbers(table, column) for role, column in columns.items()}
     _check_clock(table, columns["time"], columns["force"], values["time"], values["force"])
+    start = float(values["time"][0])
+    start = start if abs(start) > CLOCK_START_S else 0.0
     return Trace(
-        time=values["time"],
+        time=values["time"] - start,
         force=values["force"],
         position=values.get("position"),
         source=table.source,
         sha256=table.sha256,
         columns={role: column.name for role, column in columns.items()},
         label=table.label,
+        start=start,
     )
 
 
@@ -172,182 +240,8 @@ def _parse_sign(sign: str | int) -> float:
     """The factor of a ``--sign`` option."""
     signs = {"+": 1.0, "-": -1.0, "1": 1.0, "+1": 1.0, "-1": -1.0}
     if str(sign) not in signs:
-        raise TraceError(f"sign {sign!r} is not one of +, -, 1, -1 (option --sign)")
+        raise TraceError(f"sign {quoted(sign)} is not one of +, -, 1, -1 (option --sign)")
     return signs[str(sign)]
-
-
-def read_table(path: Path) -> Table:
-    """Split a CSV file into header and rows; comments and blank lines are dropped, line numbers kept.
-
-    Raises:
-        TraceError: There is no such file, or it is no CSV file with a header.
-    """
-    if path.is_dir():
-        raise TraceError(f"{path} is a directory; name a CSV file")
-    if not path.is_file():
-        near = difflib.get_close_matches(path.name, _names_beside(path), n=3)
-        hint = f"; did you mean {' or '.join(near)}?" if near else ""
-        raise TraceError(f"{path}: no such file{hint}")
-    raw = path.read_bytes()
-    if not raw.strip():
-        raise TraceError(f"{path.name} is empty")
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise TraceError(f"{path.name}: not a text CSV file (byte {error.start} is not UTF-8)") from error
-    if "\0" in text:
-        raise TraceError(f"{path.name}: not a text CSV file (it holds zero bytes)")
-    numbered = [(i, line) for i, line in enumerate(text.splitlines(), start=1) if line.strip()]
-    comments = [line for _, line in numbered if line.lstrip().startswith("#")]
-    body = [(i, line) for i, line in numbered if not line.lstrip().startswith("#")]
-    if len(body) < 2:
-        raise TraceError(f"{path.name}: {'a header but no data' if body else 'nothing but comments'}")
-    delimiter = max(",;\t", key=body[0][1].count)
-    cells = list(csv.reader([line for _, line in body], delimiter=delimiter))
-    names = [name.strip() for name in cells[0]]
-    _check_header(path.name, names)
-    return Table(
-        source=path.name,
-        names=names,
-        rows=cells[1:],
-        lines=[i for i, _ in body[1:]],
-        label=_label(comments),
-        sha256=hashlib.sha256(raw).hexdigest(),
-    )
-
-
-def _names_beside(path: Path) -> list[str]:
-    """File names in the folder where a missing file was looked for."""
-    return [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
-
-
-def _check_header(source: str, names: list[str]) -> None:
-    """Refuse a header with one column, without names, or with a name twice."""
-    if len(names) < 2:
-        raise TraceError(f"{source}: not a CSV file with a force column and one beside it (header: {names[0][:60]!r})")
-    if all(_as_float(name) is not None for name in names):
-        raise TraceError(f"{source}: the first row holds numbers; add a header such as time_s,force_N")
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise TraceError(f"{source}: column name {twice[0]!r} occurs {names.count(twice[0])} times; rename one")
-
-
-def _label(comments: list[str]) -> str:
-    """The label that a ``# label: ...`` comment gives, ``measured`` without one."""
-    for comment in comments:
-        found = re.match(r"\s*#\s*label\s*:\s*(\S+)", comment)
-        if found:
-            return found.group(1).lower()
-    return LABELS[0]
-
-
-def _as_float(cell: str) -> float | None:
-    """The number in a cell, or None."""
-    try:
-        return float(cell)
-    except ValueError:
-        return None
-
-
-def _split_unit(name: str) -> tuple[str, str]:
-    """Stem (lower case, words joined by _) and unit of a column name such as ``force_N`` or ``Force [N]``."""
-    found = re.fullmatch(r"(.+?)(?:[\s_]+|\s*[\[(])\[?\(?([A-Za-z]+)[\])]?", name)
-    stem, unit = (found.group(1), found.group(2)) if found else (name, "")
-    return re.sub(r"[^a-z0-9]+", "_", stem.lower()).strip("_"), unit
-
-
-def _stem_matches(role: str, stem: str) -> bool:
-    """Whether a stem names the role."""
-    patterns = {
-        "time": (_TIME_STEM,),
-        "force": (_FORCE_STEM,),
-        "position": (_HEIGHT_STEM, _DEPTH_STEM),
-        "compression": (_COMPRESSION_STEM,),
-    }
-    return any(pattern.fullmatch(stem) for pattern in patterns[role])
-
-
-def candidates(table: Table, role: str) -> list[str]:
-    """Columns whose name and unit fit a role; known ones alone if there are any."""
-    fitting = []
-    for name in table.names:
-        stem, unit = _split_unit(name)
-        if unit in _UNITS[role] and _stem_matches(role, stem):
-            fitting.append(name)
-    known: Sequence[str] = {"force": tuple(_KNOWN_FORCE), "position": _KNOWN_POSITION}.get(role, ())
-    for stem in known:
-        preferred = [name for name in fitting if _split_unit(name)[0] == stem]
-        if preferred:
-            return preferred
-    return fitting
-
-
-def choose(table: Table, role: str, wanted: str | None) -> Column:
-    """The column of a role (``time``, ``force``, ``position`` or ``compression``), by name if the user gave one.
-
-    Raises:
-        TraceError: There is no such column, or no single one whose name fits.
-    """
-    option = f"--{role}-col"
-    if wanted is not None:
-        if wanted not in table.names:
-            raise TraceError(f"{table.source}: no column {wanted!r} ({option}){_did_you_mean([wanted], table.names)}")
-        return _column(table, role, wanted)
-    fitting = candidates(table, role)
-    if len(fitting) == 1:
-        return _column(table, role, fitting[0])
-    if fitting:
-        raise TraceError(
-            f"{table.source}: several columns could be the {role}: {', '.join(fitting)}; choose one with {option}"
-        )
-    raise TraceError(
-        f"{table.source}: no {role} column with its unit in the name, such as "
-        f"{', '.join(_EXPECTED[role][:3])}{_did_you_mean(_EXPECTED[role], table.names)}; name one with "
-        f"{option}"
-    )
-
-
-def _did_you_mean(wanted: Sequence[str], names: list[str]) -> str:
-    """A hint with the nearest existing names, or with all of them."""
-    lower = {name.lower(): name for name in names}
-    near = [n for w in wanted for n in difflib.get_close_matches(w.lower(), lower, n=1, cutoff=0.7)]
-    if near:
-        return f"; did you mean {lower[near[0]]!r}?"
-    return f"; the columns are {', '.join(names)}"
-
-
-def _column(table: Table, role: str, name: str) -> Column:
-    """Index and factor of a named column: unit, known sign of a force, depth turned into height."""
-    stem, unit = _split_unit(name)
-    factor = _UNITS[role].get(unit, 1.0)
-    if role == "force":
-        factor *= _KNOWN_FORCE.get(stem, 1.0)
-    if role == "position" and _DEPTH_STEM.fullmatch(stem):
-        factor = -factor
-    return Column(name, table.names.index(name), factor)
-
-
-def numbers(table: Table, column: Column) -> np.ndarray:
-    """The numbers of a column in SI, shape (rows,).
-
-    Raises:
-        TraceError: A cell holds no finite number; the message names the first one.
-    """
-    values = np.empty(len(table.rows))
-    for i, (row, line) in enumerate(zip(table.rows, table.lines, strict=True)):
-        where = f"{table.source}, row {line}"
-        if len(row) != len(table.names):
-            raise TraceError(f"{where}: {len(row)} cells, the header has {len(table.names)}")
-        cell = row[column.index].strip()
-        number = _as_float(cell)
-        if number is None:
-            hint = "; write decimals with a point" if _as_float(cell.replace(",", ".")) is not None else ""
-            shown = repr(cell) if cell else "an empty cell"
-            raise TraceError(f"{where}, column {column.name}: {shown} is not a number{hint}")
-        if not np.isfinite(number):
-            raise TraceError(f"{where}, column {column.name}: {cell!r} is not finite; remove or repair the row")
-        values[i] = number
-    return values * column.factor
 
 
 def _check_clock(table: Table, time: Column, force: Column, t: np.ndarray, f: np.ndarray) -> None:
@@ -358,19 +252,18 @@ def _check_clock(table: Table, time: Column, force: Column, t: np.ndarray, f: np
         mean = float(force_steps.mean())
         if mean > 0.0 and np.all(np.abs(force_steps - mean) <= CLOCK_JITTER * mean):
             raise TraceError(
-                f"{table.source}: columns {time.name} and {force.name} look swapped ({force.name} rises in "
-                f"equal steps like a clock, {time.name} does not); exchange their names or use --time-col "
+                f"{table.source}: columns {brief(time.name)} and {brief(force.name)} look swapped ({brief(force.name)} "
+                f"rises in equal steps like a clock, {brief(time.name)} does not); exchange their names or use --time-col "
                 "and --force-col"
             )
         i = int(np.argmax(steps <= 0.0))
         raise TraceError(
-            f"{table.source}, row {table.lines[i + 1]}, column {time.name}: time does not increase "
-            f"({t[i]:g} s, then {t[i + 1]:g} s); remove repeated rows, or cut the file where the clock "
-            "restarts"
+            f"{table.source}, {table.row} {brief(table.rows[i + 1])}, column {brief(time.name)}: time does not increase "
+            f"({t[i]:.10g} s, then {t[i + 1]:.10g} s); remove repeated rows, or cut the file where the clock restarts"
         )
     median = float(np.median(steps))
-    if median > MS_SUSPICION_S:
-        raise TraceError(
-            f"{table.source}, column {time.name}: samples are {median:g} s apart; this looks like "
-            "milliseconds: name the column time_ms"
-        )
+    where = f"{table.source}, column {brief(time.name)}: samples are {median:g} s apart"
+    if median >= SLOWEST_S:
+        raise TraceError(f"{where}; this looks like milliseconds: name the column time_ms")
+    if median < FASTEST_S:
+        raise TraceError(f"{where}, more than {1 / FASTEST_S:g} a second; check the unit of the column")

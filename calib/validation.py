@@ -17,6 +17,7 @@ from typing import Any
 import yaml
 
 from calib.errors import MaterialError
+from calib.wording import brief, quoted
 from mpm.errors import CutcalError
 
 #: Units a value may have been meant in, and what one of them is in the SI unit.
@@ -33,6 +34,13 @@ MULTIPLES: dict[str, dict[str, float]] = {
 _FLOAT_TAG = "tag:yaml.org,2002:float"
 _FLOAT = re.compile(r"^[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+$")
 _FLOAT_START = list("-+.0123456789")
+
+
+# What PyYAML lets through from Python where a date, a number or a tagged value is none, such as 2024-13-01 or "!!int x".
+_UNCONSTRUCTED = (ValueError, KeyError, IndexError, AttributeError, TypeError, OverflowError)
+
+#: Letters of a key from which on it is the name of nothing.
+LONGEST_KEY = 60
 
 
 class _Loader(yaml.SafeLoader):
@@ -143,9 +151,13 @@ def read_yaml(path: Path | str, *, kind: type[CutcalError] = MaterialError) -> t
     except yaml.MarkedYAMLError as e:
         mark = e.problem_mark or e.context_mark
         where = f"line {mark.line + 1}, column {mark.column + 1}: " if mark else ""
-        raise top.error(f"{where}{e.problem or e.context}") from None
+        raise top.error(f"{where}{brief(e.problem or e.context, 200)}") from None
     except yaml.YAMLError as e:
-        raise top.error(f"not YAML: {e}") from None
+        raise top.error(f"not YAML: {' '.join(str(e).split())}") from None
+    except RecursionError:
+        raise top.error("is nested too deeply; three levels are needed") from None
+    except _UNCONSTRUCTED as e:
+        raise top.error(f"holds a value that YAML does not have ({brief(str(e))}); put it in quotes") from None
     return top, mapping(top, content)
 
 
@@ -161,7 +173,9 @@ def mapping(place: Place, value: Any) -> dict[str, Any]:
         raise place.error(f"is {_kind(value)}, but a mapping of names to values is needed here")
     for key in value:
         if not isinstance(key, str):
-            raise place.error(f"the key {key!r} is {_kind(key)}, not text; put it in quotes")
+            raise place.error(f"the key {brief(key)} is {_kind(key)}, not text; put it in quotes")
+        if not key.isprintable() or len(key) > LONGEST_KEY:
+            raise place.error(f"the key {quoted(key)} is no name: use one line of at most {LONGEST_KEY} letters")
     return value
 
 
@@ -194,11 +208,15 @@ def number(place: Place, value: Any) -> float:
         CutcalError: It is text, true or false, empty, a list, infinite or not a number.
     """
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        shown = f" {value!r}" if isinstance(value, (str, bool)) else ""
+        shown = f" {quoted(value)}" if isinstance(value, (str, bool)) else ""
         raise place.error(f"is {_kind(value)}{shown}, but a plain number such as 3.0e5 is needed here")
-    if not math.isfinite(value):
-        raise place.error(f"is {value!r}; a finite number is needed here")
-    return float(value)
+    try:
+        plain = float(value)
+    except OverflowError:
+        plain = math.inf
+    if not math.isfinite(plain):
+        raise place.error(f"is {brief(value)}; a finite number is needed here")
+    return plain
 
 
 def text(place: Place, value: Any) -> str:
@@ -221,7 +239,7 @@ def choice(place: Place, value: Any, options: Iterable[str]) -> str:
     options = list(options)
     if value not in options:
         hint = suggest(value, options) if isinstance(value, str) else f"; known: {', '.join(options)}"
-        raise place.error(f"unknown value {value!r}{hint}")
+        raise place.error(f"unknown value {quoted(value)}{hint}")
     return str(value)
 
 
@@ -233,9 +251,10 @@ def check_unit(place: Place, unit: Any, expected: str, value: float) -> None:
     """
     if unit == expected:
         return
-    factor = MULTIPLES.get(expected, {}).get(str(unit))
+    known = MULTIPLES.get(expected, {})
+    factor = known.get(str(unit)) if isinstance(unit, (str, int)) else None
     if factor is None:
-        raise place.error(f"has unit {unit!r}, but its unit is {expected!r}")
+        raise place.error(f"has unit {quoted(unit)}, but its unit is {expected!r}")
     si = f"value: {value * factor:.6g}, unit: {expected!r}"
     raise place.error(f"has unit {unit!r}; write it in {expected!r}: {si}")
 

@@ -19,8 +19,9 @@ HELP = "fit a food to a measured knife-force trace and write a report"
 DESCRIPTION = """Fit a food's cutting properties to a knife-force trace.
 
 Writes summary.json, material.yaml, evaluations.h5, curves.csv and report.pdf
-to --out. The trace is a CSV with units in its column names (time_s, force_N,
-position_m, ...); robot logs with base_Fz_N and ee_z_m are known."""
+to --out. The trace is a CSV, JSON or HDF5 file (file.h5:/group) with units in its
+column names (time_s, force_N, position_m, ...); robot logs with base_Fz_N and
+ee_z_m, libfranka's fields and CSV exports of ROS messages are known."""
 EPILOG = """examples:
   calibrate --food banana --trace force_data/banana_reconstructed.csv
   calibrate --food potato --trace cut.csv --air air.csv --knife edc --out runs/potato
@@ -65,8 +66,8 @@ def add_args(p: argparse.ArgumentParser) -> None:
 
 def add_trace(p: argparse.ArgumentParser, *, required: bool = True) -> None:
     """Options that say what was measured."""
-    p.add_argument("--trace", required=required, metavar="CSV", help="record of the cut")
-    p.add_argument("--air", metavar="CSV", help="the same motion without food, subtracted at equal time")
+    p.add_argument("--trace", required=required, metavar="FILE", help="record of the cut")
+    p.add_argument("--air", metavar="FILE", help="the same motion without food, subtracted at equal time")
     p.add_argument("--time-col", metavar="NAME", help="column of the time")
     p.add_argument("--force-col", metavar="NAME", help="column of the force on the knife")
     p.add_argument("--position-col", metavar="NAME", help="column of the knife's height ('none': there is none)")
@@ -153,7 +154,7 @@ def run(args: argparse.Namespace) -> int:
     if missing:
         raise CutcalError(f"{' and '.join(missing)} missing: name the food and its trace, or a study with --config")
     request = request_of(args, command)
-    out = Path(args.out or f"cutcal-{request.food.name}-{request.trace.stem}")
+    out = Path(args.out or f"cutcal-{request.food.name}-{request.stem}")
 
     def say(text: str) -> None:
         print(f"note: {text}", file=sys.stderr, flush=True)

@@ -32,7 +32,7 @@ bonded plates against a grid of two thirds of the cells)."""
 
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
-    p.add_argument("--trace", required=True, nargs="+", metavar="FILE", help="CSV files of one material")
+    p.add_argument("--trace", required=True, nargs="+", metavar="FILE", help="CSV, JSON or HDF5 files of one material")
     p.add_argument("--height", type=number(1e-3, 1.0, "m"), metavar="M", help="height of the specimen [m]")
     p.add_argument("--diameter", type=number(1e-3, 1.0, "m"), metavar="M", help="diameter of an upright cylinder [m]")
     for name in ("width", "length"):

@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     if args.material is None:
         raise MaterialError("predict needs the calibrated food: add --material with the material.yaml of a calibration")
     request = measured(args, ["predict", *(a for a in sys.argv[1:] if a != "predict")])
-    out = Path(args.out or f"cutcal-predict-{request.food.name}-{request.trace.stem}")
+    out = Path(args.out or f"cutcal-predict-{request.food.name}-{request.stem}")
 
     def say(text: str) -> None:
         print(f"note: {text}", file=sys.stderr, flush=True)

@@ -434,6 +434,21 @@ def test_filters_refuse_bad_grids() -> None:
         smooth(s[::-1], s)
 
 
+def test_forces_of_nothing_are_no_contact() -> None:
+    """A force that varies by less than a micronewton, down to where squares vanish, is refused before it is fitted."""
+    for scale in (1e-8, 1e-160, 1e-300):
+        with pytest.raises(TraceError, match="column force_N: no contact found: the force varies by .* in all; check"):
+            condition(replace(made(), force=made().force * scale), speed=SPEED)
+
+
+def test_position_without_a_way_down() -> None:
+    """A position that is at its lowest in the first samples, or never moves, is named before a baseline is looked for."""
+    trace = made(position=True)
+    for height in (np.full(len(trace.time), 0.1), np.where(trace.time < 0.02, 0.1, 0.05)):
+        with pytest.raises(TraceError, match="column ee_z_m: the position is at its lowest after [0-9]+ samples"):
+            condition(replace(trace, position=height))
+
+
 def test_conditioned_refuses_broken_curves() -> None:
     """A curve with NaN cannot become a conditioned cut."""
     cut = condition(made(), speed=SPEED)

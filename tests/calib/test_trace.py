@@ -146,8 +146,16 @@ def test_missing_file_names_its_neighbour(tmp_path: Path) -> None:
         (b"just some words\nand more\n", "not a CSV file"),
         (b"0.0,1.0\n0.1,1.0\n", "add a header"),
         (b"time_s,force_N,force_N\n0,1,1\n", "'force_N' occurs 2 times"),
+        (b'time_s,force_N\n0,"1\n', "row 2: not CSV .unexpected end of data.; check the quotes"),
+        (b"time_s,force_N\n0," + b"1" * 140_000, "row 2: not CSV .field larger than field limit"),
+        (b'time_s,force_N\n0,"1\n\n2"\n1,2,3\n', "row 5: 3 cells, the header has 2"),
         (
-            b"# label: guessed\ntime_s,force_N\n" + b"".join(b"%d.5,1\n" % i for i in range(30)),
+            b",".join(b"c%d" % i for i in range(3000)) + b"\n" + b"1," * 2999 + b"1\n",
+            "the columns are c0, .* and 2992 more;",
+        ),
+        (b"odd\x07,f%s\n0,1\n" % (b"x" * 500), r"the columns are odd\\x07, fxxx.*xxx\.\.\.;"),
+        (
+            b"# label: guessed\ntime_s,force_N\n" + b"".join(b"0.%02d,1\n" % i for i in range(30)),
             "label 'guessed'",
         ),
     ],
@@ -192,6 +200,9 @@ def test_ambiguous_force_lists_the_candidates(tmp_path: Path) -> None:
         ("", "row 8, column force_N: an empty cell is not a number"),
         ("nan", "row 8, column force_N: 'nan' is not finite"),
         ("inf", "row 8, column force_N: 'inf' is not finite"),
+        ("1_000", "row 8, column force_N: '1_000' is not a number"),
+        ("1\x0c2", r"row 8, column force_N: '1\\x0c2' is not a number"),
+        ("9" * 300, r"row 8, column force_N: '9999.*9\.\.\.' is beyond 1e\+06 N"),
         ("1,5", "row 8: 3 cells, the header has 2"),
         ('"1,5"', "row 8, column force_N: '1,5' is not a number; write decimals with a point"),
     ],
@@ -203,6 +214,18 @@ def test_bad_cells_are_located(tmp_path: Path, cell: str, message: str) -> None:
     lines[7] = f"{lines[7].split(',')[0]},{cell}"
     path.write_text("\n".join(lines))
     with pytest.raises(TraceError, match=f"cut.csv, {message}"):
+        read_trace(path)
+
+
+def test_cells_of_several_lines_do_not_shift_the_rows(tmp_path: Path) -> None:
+    """A remark in quotes may hold a line break; the rows after it keep their numbers."""
+    path = write(tmp_path, "time_s,force_N", [clock(), load()])
+    lines = [f"{line},fine" for line in path.read_text().splitlines()]
+    lines[0], lines[3] = "time_s,force_N,remark", lines[3].replace("fine", '"not\nfine"')
+    path.write_text("\n".join(lines))
+    np.testing.assert_allclose(read_trace(path).force, load())
+    path.write_text("\n".join(lines).replace("0.1,", "now,"))
+    with pytest.raises(TraceError, match="row 13, column time_s: 'now'"):
         read_trace(path)
 
 
