@@ -65,6 +65,7 @@ SIMULATED: dict[str, Any] = {"color": RED, "lw": 1.8, "dashes": (4.5, 1.4)}
 EDGE: dict[str, Any] = {"color": BLUE, "lw": 1.1, "dashes": (1.2, 1.2)}
 FACE: dict[str, Any] = {"color": GREEN, "lw": 1.1, "dashes": (7.0, 1.6, 1.2, 1.6)}
 BAND: dict[str, Any] = {"facecolor": LIGHT, "edgecolor": GREY, "hatch": "////", "lw": 0.0}
+PREDICTIVE: dict[str, Any] = {"facecolor": "#ebebeb", "edgecolor": "#a8a8a8", "lw": 0.5}
 NULLS: dict[str, dict[str, Any]] = {
     "ramp_N": {"label": "ramp", "color": BLUE, "lw": 0.8, "dashes": (1.5, 1.5)},
     "half_sine_N": {"label": "half sine", "color": GREEN, "lw": 0.8, "dashes": (8.0, 2.0)},
@@ -106,19 +107,21 @@ class Record:
     peak_sd: float | None
 
 
-def forces(curves: Curves, measured: str, simulated: str, height: float) -> bytes:
-    """Measured and simulated force over stroke, with the parts of the simulation.
+def forces(curves: Curves, measured: str, simulated: str, height: float, inside: str = "") -> bytes:
+    """Measured and simulated force over stroke, with the parts of the simulation and the predictive band if there is one.
 
     Args:
         curves: Columns of ``curves.csv``: stroke [m] and forces [N], shape (n,).
         measured, simulated: Labels of the two curves in the legend.
         height: Height of the figure [mm].
+        inside: What the legend says of the trace within the band, in brackets.
     """
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
         x = 1e3 * curves["stroke_m"]
         axes.axhline(0.0, color=BLACK, lw=0.5)
+        predictive(axes, x, curves, "band_low_N", "band_high_N", f"95 % predictive band{inside}")
         axes.plot(x, curves["edge_N"], label="edge part of the simulation", **EDGE)
         axes.plot(x, curves["face_N"], label="face part of the simulation", **FACE)
         axes.plot(x, curves["real_N"], label=measured, **MEASURED)
@@ -126,10 +129,18 @@ def forces(curves: Curves, measured: str, simulated: str, height: float) -> byte
         stroke_axis(axes, x)
         axes.set_ylabel("force on the knife [N]")
         handles, labels = axes.get_legend_handles_labels()
-        handles, labels = ([items[i] for i in (2, 3, 0, 1)] for items in (handles, labels))
+        order = [*range(len(labels) - 2, len(labels)), *range(len(labels) - 2)]
+        order = [i for i in order if labels[i].startswith("95")] + [i for i in order if not labels[i].startswith("95")]
+        handles, labels = ([items[i] for i in order] for items in (handles, labels))
         figure.legend(handles, labels, loc="outside upper left", ncols=2)
 
     return svg(draw, height)
+
+
+def predictive(axes: Axes, x: np.ndarray, curves: Curves, low: str, high: str, label: str) -> None:
+    """A predictive band behind the curves, nothing where the columns are absent or empty."""
+    if low in curves and high in curves and np.any(np.isfinite(curves[low])):
+        axes.fill_between(x, curves[low], curves[high], label=label, zorder=0.5, **PREDICTIVE)
 
 
 def conditioning(record: Record, curves: Curves) -> bytes:

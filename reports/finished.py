@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,8 @@ COLUMNS = ("stroke_m", "real_N", "sim_N", "residual_N", "edge_N", "face_N", "sta
            "half_sine_N", "three_term_N")  # fmt: skip
 #: These must be finite; a part of the simulation or a null model may be missing (NaN).
 COMPLETE = COLUMNS[:4]
+#: These may be left out, by an interrupted run and by older versions.
+BAND = ("band_low_N", "band_high_N")
 STATUS = ("done", "interrupted")
 LABELS = ("measured", "reconstructed")
 RECORD = ("time_s", "raw_N", "tared_N")
@@ -64,7 +66,24 @@ EXTRA: Data = {
     "counters": {"*": (int,)},
     "energy_J": {"*": _NUM},
     "coarse_simulations": (int,),
+    "nuisances": {"*": {"value sd prior_sd": _NUM, "unit": _TEXT, "outside": (bool,)}},
+    "profiles": {"*": {"value rise trace_alone": [_NUM]}},
+    "sensitivity": {"*": {"*": {"first total total_conf": _OPT}}},
+    "reduced_chi2 correlation_length_m predictive_inside": _OPT,
 }
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """The simulations of a fit that ended by themselves, m of them.
+
+    Attributes:
+        parameters: Values [SI] by name, each (m,), NaN where a run has none.
+        failed: Whether a run broke down (m,).
+    """
+
+    parameters: dict[str, np.ndarray] = field(default_factory=dict)
+    failed: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
 
 @dataclass(frozen=True)
@@ -74,10 +93,11 @@ class Finished:
     Attributes:
         summary: ``summary.json``, checked against SCHEMA; numbers that are not finite are None.
         created: When the run was made.
-        curves: Columns of ``curves.csv`` by name: stroke [m] and forces [N], shape (n,).
+        curves: Columns of ``curves.csv`` by name: stroke [m] and forces [N], shape (n,); BAND only where the file has it.
         time: Time of the whole record [s], shape (k,).
         raw: Force as recorded [N], shape (k,).
         tared: Force less its baseline [N], shape (k,).
+        runs: The simulations, none where the store has no table of them.
     """
 
     summary: Data
@@ -86,6 +106,7 @@ class Finished:
     time: np.ndarray
     raw: np.ndarray
     tared: np.ndarray
+    runs: Runs
 
 
 def read_finished(run: Path) -> Finished:
@@ -101,7 +122,8 @@ def read_finished(run: Path) -> Finished:
         raise ReportError(f"{run}: no such folder; give the output folder of a calibration")
     summary, created = _read_summary(run / "summary.json")
     curves = _read_curves(run / "curves.csv")
-    return Finished(summary, created, curves, *_read_record(run / "evaluations.h5"))
+    store = run / "evaluations.h5"
+    return Finished(summary, created, curves, *_read_record(store), _read_runs(store))
 
 
 def _read_summary(path: Path) -> tuple[Data, datetime]:
@@ -112,9 +134,13 @@ def _read_summary(path: Path) -> tuple[Data, datetime]:
     except ValueError as e:
         raise ReportError(f"{path}: damaged, not JSON ({e}); {REMEDY}") from None
     _check(path, "", data, SCHEMA)
-    for name, kind in EXTRA.items():
-        if data.get(name) is not None:
-            _check(path, name, data[name], kind)
+    for names, kind in EXTRA.items():
+        for name in names.split():
+            if data.get(name) is not None:
+                _check(path, name, data[name], kind)
+    for name, p in (data.get("profiles") or {}).items():
+        if len({len(p[key]) for key in ("value", "rise", "trace_alone")}) != 1:
+            raise ReportError(f"{path}: profiles.{name} has lists of unequal length; {REMEDY}")
     if len(data.get("baseline_window_s") or (0.0, 0.0)) != 2:
         raise ReportError(f"{path}: baseline_window_s is not a pair of times; {REMEDY}")
     if data["trace"]["label"] not in LABELS:
@@ -168,7 +194,8 @@ def _read_curves(path: Path) -> dict[str, np.ndarray]:
     if len(rows) < 2 or len(rows) < len(cells):
         bad_row = next((i for i, row in enumerate(cells) if len(row) != len(header)), len(cells)) + 2
         raise ReportError(f"{path}: row {bad_row} is cut off or missing; {REMEDY}")
-    curves = {name: rows[:, header.index(name)] for name in COLUMNS}
+    kept = (*COLUMNS, *(BAND if set(BAND) <= set(header) else ()))
+    curves = {name: rows[:, header.index(name)] for name in kept}
     gaps = [name for name in COMPLETE if not np.all(np.isfinite(curves[name]))]
     if gaps:
         raise ReportError(f"{path}: column {gaps[0]} has a value that is not finite; {REMEDY}")
@@ -195,6 +222,24 @@ def _read_record(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     if time.ndim != 1 or len(time) < 2 or not time.shape == raw.shape == tared.shape or not finite:
         raise ReportError(f"{path}: conditioning holds records of unequal length or with gaps; {REMEDY}")
     return time, raw, tared
+
+
+def _read_runs(path: Path) -> Runs:
+    """The simulations in evaluations.h5 that finished or failed and have parameters."""
+    try:
+        with h5py.File(path, "r") as store:
+            if "status" not in store or "parameters" not in store:
+                return Runs()
+            status = np.asarray(store["status"].asstr()[()], dtype=str)
+            columns = {name: np.asarray(values[()], dtype=float) for name, values in store["parameters"].items()}
+    except (OSError, TypeError, AttributeError) as e:
+        raise ReportError(f"{path}: its table of simulations is damaged ({e}); {REMEDY}") from None
+    if any(x.shape != status.shape for x in columns.values()):
+        raise ReportError(f"{path}: its table of simulations has columns of unequal length; {REMEDY}")
+    ended = np.isin(status, ("ok", "failed"))
+    if columns:
+        ended &= np.any(np.isfinite(np.array(list(columns.values()))), axis=0)
+    return Runs({name: x[ended] for name, x in columns.items()}, status[ended] == "failed")
 
 
 def _unreadable(path: Path, e: OSError) -> ReportError:
