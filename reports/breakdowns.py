@@ -106,7 +106,7 @@ def picture(runs: Runs, found: list[Split]) -> bytes:
             axes.set_yticks([])
         figure.legend(loc="outside upper left", ncols=2)
 
-    return svg(draw, 62.0 if len(found) > 1 else 32.0)
+    return svg(draw, 54.0 if len(found) > 1 else 32.0)
 
 
 def _shown(split: Split) -> np.ndarray:

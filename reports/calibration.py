@@ -18,9 +18,10 @@ from reports.document import breakable, count, listed, plain, publish, quantity,
 from reports.finished import Data, Finished, read_finished
 from reports.words import capital, shown, words
 
-#: First page [mm]: what title, sentence and facts leave, a line of the table, a banner; letters in a line of
-#: a note; least and largest height of the main figure.
-PAGE_ROOM, LINE_HEIGHT, BANNER_HEIGHT, NOTE_LETTERS, FIGURE_HEIGHT = 193.0, 5.2, 20.0, 50, (70.0, 125.0)
+#: First page [mm]: what title, a sentence of two lines and facts leave, a line of the table and one more in it, a line of the
+#: sentence, a banner; letters in a line of a name, a note and the sentence; least and largest height of the main figure.
+PAGE_ROOM, LINE_HEIGHT, NEXT_LINE, SENTENCE_LINE, BANNER_HEIGHT = 200.0, 4.9, 3.7, 5.2, 20.0
+NAME_LETTERS, NOTE_LETTERS, SENTENCE_LETTERS, FIGURE_HEIGHT = 42, 47, 92, (60.0, 125.0)
 #: What the null models are compared in: key, label, unit, and whether more is better.
 MEASURES = (
     ("nrmse", "NRMSE", "fraction", False),
@@ -30,10 +31,10 @@ MEASURES = (
 #: What a measurement leaves open of its own curve.
 LEFT_OPEN = {
     "tare": "level of the force before contact",
-    "drift": "change of that level from contact to the end",
+    "drift": "change of that level until the end",
     "lag": "shift of the force along the stroke",
     "gain": "factor on the force: the sensor",
-    "width": "factor on the force: the specimen's width",
+    "width": "factor on the force: width of the specimen",
     "scale": "factor on the force: width and sensor",
 }
 RELATIONS = {"<=": "≤ ", ">=": "≥ "}
@@ -101,8 +102,10 @@ def _inside(s: Data) -> str:
 def _room(s: Data) -> float:
     """Height for the main figure that fills the first page [mm]: what the lines above it leave."""
     banners = (s["trace"]["label"] == "reconstructed") + (s["status"] == "interrupted")
-    lines = sum(1 + len(v["note"] or "") // NOTE_LETTERS for v in s["verdicts"])
-    left = PAGE_ROOM - LINE_HEIGHT * lines - BANNER_HEIGHT * banners
+    table = [(len(v["name"]) // NAME_LETTERS, len(v["note"] or "") // NOTE_LETTERS) for v in s["verdicts"]]
+    said = max(len(_sentence(s)) // SENTENCE_LETTERS - 1, 0)
+    left = PAGE_ROOM - LINE_HEIGHT * len(table) - NEXT_LINE * sum(map(max, table))
+    left -= SENTENCE_LINE * said + BANNER_HEIGHT * banners
     return min(max(left, FIGURE_HEIGHT[0]), FIGURE_HEIGHT[1])
 
 

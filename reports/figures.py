@@ -129,9 +129,7 @@ def forces(curves: Curves, measured: str, simulated: str, height: float, inside:
         stroke_axis(axes, x)
         axes.set_ylabel("force on the knife [N]")
         handles, labels = axes.get_legend_handles_labels()
-        order = [*range(len(labels) - 2, len(labels)), *range(len(labels) - 2)]
-        order = [i for i in order if labels[i].startswith("95")] + [i for i in order if not labels[i].startswith("95")]
-        handles, labels = ([items[i] for i in order] for items in (handles, labels))
+        handles, labels = ([*items[-2:], *items[:-2]] for items in (handles, labels))
         figure.legend(handles, labels, loc="outside upper left", ncols=2)
 
     return svg(draw, height)
@@ -154,7 +152,7 @@ def conditioning(record: Record, curves: Curves) -> bytes:
         handles, labels = panels["raw"].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper left", ncols=4 if len(labels) < 5 else 3)
 
-    return svg(draw, 138.0)
+    return svg(draw, 102.0)
 
 
 def fit(curves: Curves, noise_sd: float, trace: str) -> bytes:
@@ -234,7 +232,7 @@ def misfit(history: Sequence[tuple[float, float]]) -> bytes:
         axes.set_xlabel("simulation number")
         axes.set_ylabel("best chi-square so far")
 
-    return svg(draw, 48.0)
+    return svg(draw, 42.0)
 
 
 def envelope(x: np.ndarray, y: np.ndarray, columns: int = COLUMNS) -> tuple[np.ndarray, np.ndarray]:
@@ -272,9 +270,9 @@ def stroke_axis(axes: Axes, x: np.ndarray) -> None:
     axes.set_xlabel("stroke from contact [mm]")
 
 
-def log_ticks(axis: Axis, low: float, high: float) -> None:
+def log_ticks(axis: Axis, low: float, high: float, few: float = FEW_DECADES) -> None:
     """Plain numbers at 1, 2 and 5 of each decade, or at 1 only where there are many decades."""
-    subs = (1.0, 2.0, 5.0) if high / low < FEW_DECADES else (1.0,)
+    subs = (1.0, 2.0, 5.0) if high / low < few else (1.0,)
     axis.set_major_locator(LogLocator(subs=subs))
     axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
     axis.set_minor_formatter(NullFormatter())

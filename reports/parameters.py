@@ -21,6 +21,8 @@ RISE, TOP = 3.84, 8.0
 ACROSS = 4
 #: A log axis that spans less than this factor has the ticks of a linear one.
 NARROW = 5.0
+#: From this factor on only powers of ten have room under a panel.
+SHORT_AXIS = 40.0
 WITH_PRIOR: dict[str, Any] = {"color": BLACK, "lw": 1.4}
 TRACE_ALONE: dict[str, Any] = {"color": BLUE, "lw": 1.2, "dashes": (3.5, 1.5)}
 
@@ -97,7 +99,7 @@ def ranges(rows: Sequence[Row]) -> bytes:
         axes.spines["left"].set_visible(False)
         axes.set_xlabel("value / middle of the literature's range")
 
-    return svg(draw, 20.0 + 8.5 * max(len(rows), 2))
+    return svg(draw, 20.0 + 7.6 * max(len(rows), 2))
 
 
 def profiles(panels: Sequence[Panel]) -> bytes:
@@ -128,7 +130,7 @@ def _profile(axes: Axes, panel: Panel) -> None:
             axes.xaxis.set_minor_locator(NullLocator())
             axes.xaxis.set_minor_formatter(NullFormatter())
         else:
-            log_ticks(axes.xaxis, low, high)
+            log_ticks(axes.xaxis, low, high, SHORT_AXIS)
     else:
         axes.xaxis.set_major_locator(MaxNLocator(4))
     if panel.prior is not None and panel.prior[0] < high and panel.prior[1] > low:

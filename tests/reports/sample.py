@@ -257,8 +257,9 @@ def profiles(parameters: dict[str, Any]) -> dict[str, Any]:
         at = z + np.where(parts < 0.0, parts * (z - low), parts * (high - z))
         rise = 3.84 * parts**2
         share = np.where(parts < 0.0, *alone.get(p["verdict"], (0.03, 0.03)))
-        value = np.exp(at) if log else np.maximum(at, 0.0)
-        out[name] = {"value": value.tolist(), "rise": rise.tolist(), "trace_alone": (share * rise).tolist()}
+        value = np.exp(at) if log else at
+        columns = {"value": value, "rise": rise, "trace_alone": share * rise}
+        out[name] = {key: column[value >= 0.0].tolist() for key, column in columns.items()}
     return out
 
 
