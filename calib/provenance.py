@@ -12,7 +12,7 @@ from typing import Any
 
 import calib
 
-PACKAGES = ("taichi", "numpy", "scipy", "pandas", "h5py", "matplotlib", "typst")
+PACKAGES = ("taichi", "numpy", "scipy", "SALib", "pandas", "h5py", "matplotlib", "typst")
 
 
 def versions() -> dict[str, str]:
