@@ -187,7 +187,10 @@ def test_what_moves_the_curve_names_the_strong_ones_first(content: Content) -> N
 def test_region_of_failures_is_named(content: Content) -> None:
     """Failed runs at high R and low yield stress are said to be there, with medians; two failures are no region."""
     said = spaced(content("failed")["broke_down"])
-    assert said.startswith("Simulations failed at high R (median 1460 J/m² against ") and "low yield_stress (median" in said
+    assert (
+        said.startswith("Simulations failed at high R (median 1460 J/m² against ")
+        and "low yield_stress (median" in said
+    )
     assert content()["broke_down"] == ""
 
 
