@@ -6,14 +6,13 @@ Numbers and the sentences that depend on them are made here; the other words are
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import numpy as np
 
 from calib.errors import CurveError
 from calib.metrics import compare
-from reports import breakdowns, figures, fitted, parameters, soundness
+from reports import breakdowns, figures, fitted, measurement, parameters, soundness
 from reports.document import breakable, count, listed, plain, publish, quantity, uncertain
 from reports.finished import Data, Finished, read_finished
 from reports.words import capital, shown, words
@@ -28,15 +27,6 @@ MEASURES = (
     ("shape_error", "shape error", "-", False),
     ("R", "rating R", "-", True),
 )
-#: What a measurement leaves open of its own curve.
-LEFT_OPEN = {
-    "tare": "level of the force before contact",
-    "drift": "change of that level until the end",
-    "lag": "shift of the force along the stroke",
-    "gain": "factor on the force: the sensor",
-    "width": "factor on the force: width of the specimen",
-    "scale": "factor on the force: width and sensor",
-}
 RELATIONS = {"<=": "≤ ", ">=": "≥ "}
 
 
@@ -143,8 +133,8 @@ def _content(done: Finished) -> Data:
         "specimen": _specimen(s["shape"]),
         "knife": _knife(s["knife"]),
         "conditioning": _conditioning(done),
-        "left_open": [_left_open(name, n) for name, n in (s.get("nuisances") or {}).items()],
-        "errors": _errors(s, len(done.curves["stroke_m"])),
+        "left_open": [measurement.left_open(name, n) for name, n in (s.get("nuisances") or {}).items()],
+        "errors": measurement.errors(s, len(done.curves["stroke_m"])),
         "null_rows": _null_rows(done),
         "null_sentences": _null_sentences(s),
         "metrics": _metrics(s),
@@ -203,37 +193,6 @@ def _conditioning(done: Finished) -> Data:
         "steps": count(len(done.curves["stroke_m"])),
         "peak": uncertain(s["peak_real_N"], s["peak_real_sd_N"], "N"),
     }
-
-
-def _left_open(name: str, n: Data) -> list[str]:
-    """What was known of one thing that the measurement leaves open, what the fit says of it, and whether they agree."""
-    unit = "fraction" if n["unit"] == "-" else n["unit"]
-    before = f"0 ± {quantity(n['prior_sd'], unit, digits=2)}"
-    said = "yes" if not n["outside"] else "no"
-    return [capital(words(name)), LEFT_OPEN.get(name, ""), before, uncertain(n["value"], n["sd"], unit), said]
-
-
-def _errors(s: Data, points: int) -> list[str]:
-    """How the errors of the fit hang together, and how large they are."""
-    said = []
-    length, reduced = s.get("correlation_length_m"), s.get("reduced_chi2")
-    if length is not None and length > 0.0:
-        independent = max(round(s["stroke_m"] / length), 1)
-        said.append(
-            f"The residuals hang together over {quantity(length, 'm', digits=2)} of stroke, so that the {count(points)} "
-            f"points of the curve count as about {count(independent)} independent readings."
-        )
-    if reduced is not None and reduced > 1.0:
-        said.append(
-            f"Reduced chi-square {plain(reduced)}: what is left is {plain(math.sqrt(reduced), 2)} times as large as the "
-            "stated errors of trace and simulation explain, and all intervals were widened by that."
-        )
-    elif reduced is not None:
-        said.append(
-            f"Reduced chi-square {plain(reduced)}: what is left is no larger than the stated errors of trace and "
-            "simulation explain; no interval was widened or narrowed for it."
-        )
-    return said
 
 
 def _sentence(s: Data) -> str:
