@@ -20,7 +20,7 @@ from reports.words import capital, meaning, words
 
 PREDICTED: dict[str, Any] = {"color": BLUE, "lw": 1.8, "dashes": (1.4, 1.2)}
 #: Height of the figure of a trace [mm].
-HEIGHT = 72.0
+HEIGHT = 60.0
 
 _NUM, _OPT, _TEXT, _MAYBE = (int, float), (int, float, type(None)), (str,), (str, type(None))
 _METRICS: Data = {
@@ -121,14 +121,19 @@ def picture(done: Study, name: str) -> bytes:
             axes.plot(x, curves["predicted_N"], label="predicted from the other cuts", **PREDICTED)
         stroke_axis(axes, x)
         axes.set_ylabel("force on the knife [N]")
-        figure.legend(loc="outside upper left", ncols=2)
+        figure.legend(loc="outside upper left", ncols=3 if len(axes.get_legend_handles_labels()[1]) == 3 else 2)
 
     return svg(draw, HEIGHT)
 
 
 def _label(s: Data, name: str) -> str:
-    trace = s["traces"].get(name)
-    return trace["trace"]["label"] if trace else "measured"
+    return str(_source(s, name).get("label", "trace"))
+
+
+def _source(s: Data, name: str) -> Data:
+    """File, hash and label of a trace; empty where the summary does not say them of one that was only held out."""
+    found: Data = (s["traces"].get(name) or s["hold_out"].get(name) or {}).get("trace") or {}
+    return found
 
 
 def content(done: Study) -> Data:
@@ -152,8 +157,7 @@ def content(done: Study) -> Data:
         "parameters": [_parameter(name, p) for name, p in s["parameters"].items()],
         "checks": [[breakable(name), words(c["name"]), *_change(c)] for name, t in s["traces"].items()
                    for c in t.get("numerical_checks") or []],
-        "traces": [[breakable(name), breakable(t["trace"]["source"]), t["trace"]["label"], t["trace"]["sha256"]]
-                   for name, t in s["traces"].items()],
+        "traces": [[breakable(name), *_origin(_source(s, name))] for name in done.curves],
         "runs": _runs(s),
         "commit": s.get("git") or "",
         "command": [breakable(shlex.quote(word)) for word in s["command"]],
@@ -161,6 +165,12 @@ def content(done: Study) -> Data:
         "limits": [capital(text) for text in s["limits"]],
         "warnings": [capital(text) for text in s["warnings"]],
     }  # fmt: skip
+
+
+def _origin(trace: Data) -> list[str]:
+    """File, kind and the two halves of the hash of a trace."""
+    digest = str(trace.get("sha256", ""))
+    return [breakable(str(trace.get("source", "not recorded"))), str(trace.get("label", "")), digest[:32], digest[32:]]
 
 
 def sentence(s: Data) -> str:
@@ -200,7 +210,7 @@ def _line(name: str, t: Data) -> Data:
 
 def _limits(hold_out: Data) -> str:
     """The limits of the predictions, which are the same for all."""
-    found = next((p["limits"] for p in hold_out.values()), {})
+    found: Data = next((p["limits"] for p in hold_out.values()), {})
     texts = {
         "nrmse": ("NRMSE ≤ ", "fraction"),
         "rating": ("R ≥ ", "-"),

@@ -13,9 +13,9 @@ from tests.reports.sample import pages, spaced
 
 
 def test_a_study_becomes_a_pdf_that_is_stable(tmp_path: Path) -> None:
-    """Verdicts, curves, what was fitted and the limits on four pages; the same files give the same bytes."""
+    """Verdicts, curves, what was fitted and the limits on three pages; the same files give the same bytes."""
     first = write_report(sample.write_study(tmp_path / "a")).read_bytes()
-    assert first.startswith(b"%PDF") and pages(first) == 4
+    assert first.startswith(b"%PDF") and pages(first) == 3
     assert write_report(sample.write_study(tmp_path / "b")).read_bytes() == first
 
 
@@ -42,9 +42,23 @@ def test_sentence_names_what_was_not_predicted(tmp_path: Path) -> None:
     assert (
         said == "0 of 1 held-out cuts were predicted within the limits; not third. In-sample lines that failed: first."
     )
+    check = {"name": "cells of two thirds", "reason": "inverted", "peak_change": None, "work_change": None}
+    s["traces"]["first"]["numerical_checks"] = [check]
+    got = content(read_study(sample.write_study(tmp_path, traces=s["traces"])))
+    assert got["checks"][0] == ["first", "cells of two thirds", "broke down: inverted", ""]
     alone = content(read_study(sample.write_study(tmp_path, hold_out={})))
     assert "nothing here is a prediction" in alone["sentence"]
     assert pages(write_report(tmp_path).read_bytes()) >= 3
+
+
+def test_a_cut_that_was_only_held_out_has_an_origin_where_it_was_recorded(tmp_path: Path) -> None:
+    """Its file and hash stand with the others'; a summary that does not say them is no error."""
+    got = content(read_study(sample.write_study(tmp_path)))["traces"]
+    assert [r[:3] for r in got][0] == ["third", "third.csv", "measured"] and got[0][3] + got[0][4] == "c0ffee00" * 8
+    hold_out = sample.summary()["hold_out"]
+    del hold_out["third"]["trace"]
+    older = content(read_study(sample.write_study(tmp_path, hold_out=hold_out)))["traces"]
+    assert older[0] == ["third", "not recorded", "", "", ""]
 
 
 def test_ranking_puts_the_closest_first_and_marks_its_own(tmp_path: Path) -> None:
