@@ -1,4 +1,5 @@
-"""From a force trace to calibrated food properties: ``from calib import Calibration, Food, Trace``.
+"""From a force trace to calibrated food properties: ``from calib import Calibration, Food, Study,
+Trace``.
 
 Importing it imports no Taichi, no plotting and no pandas; each name is loaded when it is first used.
 """
@@ -10,15 +11,17 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from calib.calibration import Calibration
+    from calib.config import Study
     from calib.materials import FoodSpec as Food
     from calib.trace import Trace
 
-__all__ = ["Calibration", "Food", "Trace"]
+__all__ = ["Calibration", "Food", "Study", "Trace"]
 __version__ = "0.1.0"
 
 _PLACES = {
     "Calibration": ("calib.calibration", "Calibration"),
     "Food": ("calib.materials", "FoodSpec"),
+    "Study": ("calib.config", "Study"),
     "Trace": ("calib.trace", "Trace"),
 }
 

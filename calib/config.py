@@ -13,7 +13,7 @@ Paths are taken from the folder of the file.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from typing import Any
 from calib.errors import MaterialError
 from calib.materials import FoodSpec, load_food, load_material_file
 from calib.parameters import OF
+from calib.progress import Progress
 from calib.properties import check_override
 from calib.request import Request
 from calib.scenes import Sizing
@@ -77,6 +78,43 @@ class Study:
     hold_out: tuple[str, ...]
     budget: float
     seed: int
+
+    @staticmethod
+    def read(path: Path | str) -> Study:
+        """The study of a file, as :func:`read_study` reads it."""
+        return read_study(path)
+
+    def run(
+        self,
+        out: Path | str,
+        *,
+        workers: int = 2,
+        resume: bool = False,
+        progress: Callable[[Progress], None] | None = None,
+        say: Callable[[str], None] | None = None,
+    ) -> dict[str, Any]:
+        """Fit and predict, and write what ``calibrate --config`` writes.
+
+        Args:
+            out: Output folder, which is made and never overwritten.
+            workers: Simulations at a time.
+            resume: Go on with the study in ``out``; nothing is simulated twice.
+            progress: Called after each simulation.
+            say: Called with each warning and stage, as one sentence.
+
+        Returns:
+            The content of ``summary.json``.
+
+        Raises:
+            CutcalError: Anything wrong with the input; nothing that was computed is lost.
+        """
+        from calib.calibration import script_hidden
+        from calib.pool import Pool
+        from calib.several import run
+
+        arch = next(iter(self.requests.values())).arch
+        with script_hidden(), Pool(workers, arch) as pool:
+            return run(self, Path(out), pool, resume=resume, progress=progress, say=say)
 
 
 def read_study(path: Path | str) -> Study:

@@ -13,7 +13,7 @@ from typing import Any
 import calib
 
 DATA = "data"  # folder of a package that an installed one has and a checkout has not
-PACKAGES = ("taichi", "numpy", "scipy", "pandas", "h5py", "matplotlib", "typst")
+PACKAGES = ("taichi", "numpy", "scipy", "SALib", "pandas", "h5py", "matplotlib", "typst")
 
 
 def versions() -> dict[str, str]:

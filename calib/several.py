@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Callable, Mapping
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +53,8 @@ def run(
     Raises:
         CutcalError: Anything wrong with the input; nothing that was computed is lost.
     """
+    from reports.study import write_report
+
     say = say or (lambda text: None)
     began = time.monotonic()
     setups = set_ups(study)
@@ -85,6 +88,7 @@ def run(
     }
     dump_material(_food(study, fitted), out / "material.yaml", _provenance(study, summary))
     write_json(out / "summary.json", summary)
+    write_report(out)
     return summary
 
 
@@ -138,11 +142,12 @@ def _summary(
 ) -> dict[str, Any]:
     """Everything but the provenance."""
     traces = {name: _trace(setups[name], fitted, name, checks[name]) for name in fitted.names}
-    predicted = {name: p.as_dict() for name, p in held.items()}
+    predicted = {name: {"trace": _source(setups[name])} | p.as_dict() for name, p in held.items()}
     passed = [t["passed"] for t in traces.values()] + [p.passed for p in held.values()]
     return {
         "food": study.food.name,
         "study": study.source,
+        "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         "status": "done",
         "search": fitted.result.status,
         "passed": all(passed),
@@ -165,7 +170,7 @@ def _trace(setup: Setup, fitted: Fitted, name: str, checks: list[Check]) -> dict
     changes = {c.name: c.change for c in checks}
     steady = all(change is not None and change <= CHANGE_LIMIT for change in changes.values())
     return {
-        "trace": {"source": curve.trace.source, "sha256": curve.trace.sha256, "label": curve.trace.label},
+        "trace": _source(setup),
         "in_sample": True,
         "passed": _agrees(metrics) and steady,
         "metrics": metrics.as_dict(),
@@ -179,6 +184,11 @@ def _trace(setup: Setup, fitted: Fitted, name: str, checks: list[Check]) -> dict
         "dx_m": setup.fine.numerics.dx,
         "knife": setup.fine.knife.name,
     }
+
+
+def _source(setup: Setup) -> dict[str, str]:
+    trace = setup.curve.trace
+    return {"source": trace.source, "sha256": trace.sha256, "label": trace.label}
 
 
 def _nulls(curve: Conditioned) -> dict[str, Any]:

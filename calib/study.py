@@ -25,6 +25,7 @@ from calib.provenance import code_key, key_of
 from calib.records import whole_record
 from calib.request import Request, Setup
 from calib.scenes import place
+from calib.sensitivity import sensitivity
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.summary import add_conditioning, summarise
 from calib.workers import Workers
@@ -121,7 +122,7 @@ def _write(
     metrics = compare(curve.stroke, curve.curve, best.curve)
     nulls = null_models(curve.stroke, curve.curve)
     summary = summarise(request, setup, result, record, metrics, nulls, doubt, checks)
-    summary["wall_s"] = wall
+    summary |= {"sensitivity": sensitivity(setup.objective, result, seed=request.seed), "wall_s": wall}
     write_csv(out / "curves.csv", _curves(curve, best.curve, record, start, nulls, doubt))
     fitted = _fitted_food(request, setup, best.evaluation.parameters)
     keep = ("created", "trace_sha256", "passed", "peak_error", "nrmse", "shape_error", "git", "versions")

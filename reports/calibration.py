@@ -6,27 +6,21 @@ Numbers and the sentences that depend on them are made here; the other words are
 
 from __future__ import annotations
 
-import math
-import shlex
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from calib.errors import CurveError
 from calib.metrics import compare
-from calib.properties import PROPERTIES
-from calib.verdicts import lost, spent
-from reports import figures
-from reports.document import breakable, count, duration, interval, listed, plain, publish, quantity, uncertain
+from reports import breakdowns, figures, fitted, measurement, parameters, soundness
+from reports.document import breakable, count, listed, plain, publish, quantity, uncertain
 from reports.finished import Data, Finished, read_finished
+from reports.words import capital, shown, words
 
-#: Correlations of fitted parameters from here on are worth a sentence: at 0.9 an interval is 2.3 times as
-#: wide as it would be if the other parameter were known, 1 / sqrt(1 - r^2).
-STRONG = 0.9
-#: First page [mm]: what title, sentence and facts leave, a line of the table, a banner; letters in a line of
-#: a note; least and largest height of the main figure.
-PAGE_ROOM, LINE_HEIGHT, BANNER_HEIGHT, NOTE_LETTERS, FIGURE_HEIGHT = 193.0, 5.2, 20.0, 50, (70.0, 125.0)
+#: First page [mm]: what title, a sentence of two lines and facts leave, a line of the table and one more in it, a line of the
+#: sentence, a banner; letters in a line of a name, a note and the sentence; least and largest height of the main figure.
+PAGE_ROOM, LINE_HEIGHT, NEXT_LINE, SENTENCE_LINE, BANNER_HEIGHT = 200.0, 4.9, 3.7, 5.2, 20.0
+NAME_LETTERS, NOTE_LETTERS, SENTENCE_LETTERS, FIGURE_HEIGHT = 42, 47, 92, (60.0, 125.0)
 #: What the null models are compared in: key, label, unit, and whether more is better.
 MEASURES = (
     ("nrmse", "NRMSE", "fraction", False),
@@ -34,19 +28,6 @@ MEASURES = (
     ("R", "rating R", "-", True),
 )
 RELATIONS = {"<=": "≤ ", ">=": "≥ "}
-#: Names of the files in words; what is not here loses its underscores.
-WORDS = {
-    "ramp": "straight ramp (1 number)",
-    "half_sine": "half sine (1 number)",
-    "three_term": "three-term curve (7 numbers)",
-    "weak": "weakly identified",
-    "not_seen": "not seen by this trace",
-    "at_bound": "at its bound",
-    "unknown": "not determined",
-    "paper_table2": "paper, Table 2",
-}
-#: Letters of names and verdicts in the parameter figure.
-LABEL, VERDICT = 20, 30
 
 
 def write_report(run: Path) -> Path:
@@ -80,25 +61,41 @@ def _pictures(done: Finished) -> dict[str, bytes]:
     real = f"{trace}, peak {uncertain(s['peak_real_N'], s['peak_real_sd_N'], 'N')}"
     simulated = f"simulated, peak {quantity(s['peak_sim_N'], 'N')}"
     found = {
-        "forces.svg": figures.forces(curves, real, simulated, _room(s)),
+        "forces.svg": figures.forces(curves, real, simulated, _room(s), _inside(s)),
         "conditioning.svg": figures.conditioning(_record(done), curves),
         "fit.svg": figures.fit(curves, s["noise_sd_N"], trace),
         "nulls.svg": figures.nulls(curves, trace),
     }
-    rows = [_row(name, p) for name, p in s["parameters"].items()]
+    rows = [fitted.row(name, p) for name, p in s["parameters"].items()]
     if rows:
-        found["parameters.svg"] = figures.parameters(rows)
+        found["parameters.svg"] = parameters.ranges(rows)
+    panels = fitted.panels(s.get("profiles") or {}, s["parameters"])
+    if panels:
+        found["profiles.svg"] = parameters.profiles(panels)
+    if s.get("sensitivity"):
+        found["influence.svg"] = parameters.influence(s["sensitivity"], fitted.QUANTITIES)
+    apart = breakdowns.splits(done.runs, s["parameters"])
+    if apart:
+        found["breakdowns.svg"] = breakdowns.picture(done.runs, apart)
     history = [(e[0], e[1]) for e in s["misfit_history"] if len(e) == 2 and None not in e]
     if history:
         found["misfit.svg"] = figures.misfit(history)
     return found
 
 
+def _inside(s: Data) -> str:
+    """What the legend says of the trace within the predictive band."""
+    part = s.get("predictive_inside")
+    return "" if part is None else f" ({quantity(part, 'fraction', digits=2)} of the trace inside)"
+
+
 def _room(s: Data) -> float:
     """Height for the main figure that fills the first page [mm]: what the lines above it leave."""
     banners = (s["trace"]["label"] == "reconstructed") + (s["status"] == "interrupted")
-    lines = sum(1 + len(v["note"] or "") // NOTE_LETTERS for v in s["verdicts"])
-    left = PAGE_ROOM - LINE_HEIGHT * lines - BANNER_HEIGHT * banners
+    table = [(len(v["name"]) // NAME_LETTERS, len(v["note"] or "") // NOTE_LETTERS) for v in s["verdicts"]]
+    said = max(len(_sentence(s)) // SENTENCE_LETTERS - 1, 0)
+    left = PAGE_ROOM - LINE_HEIGHT * len(table) - NEXT_LINE * sum(map(max, table))
+    left -= SENTENCE_LINE * said + BANNER_HEIGHT * banners
     return min(max(left, FIGURE_HEIGHT[0]), FIGURE_HEIGHT[1])
 
 
@@ -120,22 +117,6 @@ def _record(done: Finished) -> figures.Record:
     )
 
 
-def _row(name: str, p: Data) -> figures.Row:
-    """A parameter over the middle of its literature range."""
-    middle = _middle(p)
-    over = [None if p[k] is None else p[k] / middle for k in ("low95", "high95", "prior_low", "prior_high")]
-    note = f"{quantity(p['value'], p['unit'])}\n{_short(_words(p['verdict']), VERDICT)}"
-    return figures.Row(_short(name, LABEL), note, p["value"] / middle, *over)
-
-
-def _middle(p: Data) -> float:
-    """Geometric middle of the literature range; arithmetic if it starts at 0, the value if there is none."""
-    low, high = p["prior_low"], p["prior_high"]
-    if low is None or high is None or not low + high > 0.0:
-        return abs(p["value"]) or 1.0
-    return math.sqrt(low * high) if low > 0.0 else 0.5 * (low + high)
-
-
 def _content(done: Finished) -> Data:
     """Everything the template prints, as text."""
     s = done.summary
@@ -152,23 +133,28 @@ def _content(done: Finished) -> Data:
         "specimen": _specimen(s["shape"]),
         "knife": _knife(s["knife"]),
         "conditioning": _conditioning(done),
+        "left_open": [measurement.left_open(name, n) for name, n in (s.get("nuisances") or {}).items()],
+        "errors": measurement.errors(s, len(done.curves["stroke_m"])),
         "null_rows": _null_rows(done),
         "null_sentences": _null_sentences(s),
         "metrics": _metrics(s),
-        "parameters": [_parameter(name, p) for name, p in s["parameters"].items()],
-        "correlations": _correlations(s["correlations"]) if s["correlations"] else None,
-        "fixed": [_fixed(name, p) for name, p in s["fixed_parameters"].items()],
-        "numerics": _numerics(s),
-        "failures": _failures(s["failures"]),
-        "provenance": _provenance(s),
-        "limits": [_capital(text) for text in s["limits"]],
-        "warnings": [_capital(text) for text in s["warnings"]],
+        "parameters": [fitted.parameter(name, p) for name, p in s["parameters"].items()],
+        "legend": fitted.legend(s["parameters"]),
+        "influences": fitted.influences(s.get("sensitivity") or {}),
+        "correlations": fitted.correlations(s["correlations"]) if s["correlations"] else None,
+        "fixed": [fitted.fixed(name, p) for name, p in s["fixed_parameters"].items()],
+        "numerics": soundness.numerics(s),
+        "broke_down": breakdowns.sentence(done.runs, breakdowns.splits(done.runs, s["parameters"])),
+        "failures": soundness.failures(s["failures"]),
+        "provenance": soundness.provenance(s),
+        "limits": [capital(text) for text in s["limits"]],
+        "warnings": [capital(text) for text in s["warnings"]],
     }
 
 
 def _specimen(shape: Data) -> str:
     sizes = " × ".join(plain(1e3 * shape[k]) for k in ("length", "width", "height"))
-    return f"{_words(shape['kind'])}, {sizes} mm (across the blade, along it, height)"
+    return f"{words(shape['kind'])}, {sizes} mm (across the blade, along it, height)"
 
 
 def _knife(knife: Data) -> Data:
@@ -238,21 +224,10 @@ def _verdict_line(v: Data) -> Data:
         relation = "≤ " if (abs(value) < limit) == passed else "≥ "
     mark = "none" if value is None or passed is None else "yes" if passed else "no"
     return {
-        "name": breakable(v["name"]), "value": "not run" if value is None else _shown(value, unit, 3),
-        "limit": relation + _shown(limit, unit, None), "mark": mark,
+        "name": breakable(v["name"]), "value": "not run" if value is None else shown(value, unit, 3),
+        "limit": relation + shown(limit, unit, None), "mark": mark,
         "note": "" if v["note"] in (None, "not run") else v["note"],
     }  # fmt: skip
-
-
-def _shown(x: Any, unit: str, digits: int | None) -> str:
-    """A value or limit of any type as text."""
-    if isinstance(x, bool):
-        return "yes" if x else "no"
-    if isinstance(x, int) and unit == "-":
-        return count(x)
-    if x is None or isinstance(x, (int, float)):
-        return quantity(x, unit, digits=digits)
-    return breakable(listed([str(i) for i in x]) if isinstance(x, list) else str(x))
 
 
 def _null_rows(done: Finished) -> list[list[str]]:
@@ -261,7 +236,7 @@ def _null_rows(done: Finished) -> list[list[str]]:
     keys = ("nrmse", "shape_error", "peak_error", "work_error")
     rows: list[tuple[str, Data]] = [
         ("simulation, fitted", {**{k: s[k] for k in keys}, "R": s["iso18571"]["R"]}),
-        *((_words(name), model) for name, model in s["null_models"].items()),
+        *((words(name), model) for name, model in s["null_models"].items()),
     ]
     curves = done.curves
     if np.all(np.isfinite(curves["start_N"])):
@@ -290,7 +265,7 @@ def _null_sentences(s: Data) -> list[str]:
             if a is not None and b is not None and (a > b if more else a < b):
                 better.append(f"{label} ({quantity(a, unit)} against {quantity(b, unit)})")
         if better:
-            said.append(f"The {_words(name)} is closer to the trace than the simulation in {listed(better)}.")
+            said.append(f"The {words(name)} is closer to the trace than the simulation in {listed(better)}.")
     names = listed([label for _, label, _, _ in MEASURES])
     return said or [f"No null model is closer to the trace than the simulation in {names}."]
 
@@ -310,98 +285,3 @@ def _metrics(s: Data) -> Data:
         "shift": count(iso["shift"]),
         "at_bound": bool(iso["at_bound"]),
     }  # fmt: skip
-
-
-def _parameter(name: str, p: Data) -> Data:
-    low, high, value, unit = p["prior_low"], p["prior_high"], p["value"], p["unit"]
-    return {
-        "name": breakable(name),
-        "meaning": _meaning(name),
-        "value": quantity(value, unit),
-        "interval": interval(p["low95"], p["high95"], unit),
-        "literature": interval(low, high, unit),
-        "verdict": _words(p["verdict"]),
-        "outside": (low is not None and value < low) or (high is not None and value > high),
-        "status": _words(p["status"]),
-        "source": p["source"] or "",
-    }
-
-
-def _fixed(name: str, p: Data) -> list[str]:
-    value = "none" if p["value"] is None else quantity(p["value"], p["unit"])
-    return [breakable(name), _meaning(name), value, _words(p["status"]), p["source"] or ""]
-
-
-def _correlations(correlations: Data) -> list[str]:
-    """Pairs that one force curve cannot tell apart, the strongest first."""
-    strong = [(names, r) for names, r in correlations.items() if r is not None and abs(r) >= STRONG]
-    means = {True: "raising both together", False: "raising one and lowering the other"}
-    return [f"{listed(names.split(','))}, r = {plain(r, 2)}: {means[r > 0.0]} hardly changes the force."
-            for names, r in sorted(strong, key=lambda item: -abs(item[1]))]  # fmt: skip
-
-
-def _numerics(s: Data) -> Data:
-    """Numerical settings and audits by name; the template labels them."""
-    images, ripple = s["mirror_images"], s["ripple_N"]
-    part = None if ripple is None or not s["peak_sim_N"] > 0.0 else ripple / s["peak_sim_N"]
-    return {
-        "dx": quantity(s["dx_m"], "m"), "cells": plain(s["shape"]["height"] / s["dx_m"], 2),
-        "particles": count(s["particles"]),
-        "images": "none" if images in (None, False, 1) else "yes" if images is True else str(images),
-        "mach": quantity(s["mach"], "-"), "momentum": quantity(s["momentum_residual"], "fraction"),
-        "kinetic": quantity(s["ke_over_ie"], "fraction"), "ripple": quantity(ripple, "N"),
-        "ripple_part": quantity(part, "fraction", digits=2), "wall": duration(s["wall_s"]),
-        **_energy(s.get("energy_J") or {}),
-        "simulations": count(s["simulations"]), "failed": count(s["failed_simulations"]),
-        "coarse": count(s["coarse_simulations"]) if s.get("coarse_simulations") else None,
-        "counters": s.get("counters"),
-    }  # fmt: skip
-
-
-def _energy(energy: Data) -> Data:
-    """Part of the work that no law has taken, and where the rest has gone; None where it was not recorded."""
-    part = lost(energy)
-    return {"loss": None if part is None else quantity(part, "fraction", digits=2), "spent": spent(energy)}
-
-
-def _failures(failures: list[Data]) -> list[list[str]]:
-    """Failed simulations by reason: number, completed parts of the stroke, parameter values of the first."""
-    rows = []
-    for reason in sorted({f["reason"] for f in failures}):
-        same = [f for f in failures if f["reason"] == reason]
-        parts = [f["fraction"] for f in same if f["fraction"] is not None]
-        span = interval(min(parts), max(parts), "fraction") if parts else ""
-        first = [f"{k} = {_shown(v, PROPERTIES[k].unit if k in PROPERTIES else '-', 3)}"
-                 for k, v in same[0]["parameters"].items()]  # fmt: skip
-        rows.append([breakable(_words(reason)), str(len(same)), span, "; ".join(first)])
-    return rows
-
-
-def _provenance(s: Data) -> Data:
-    return {
-        "trace": s["trace_sha256"],
-        "air": str(s["air"].get("sha256", "not recorded")) if s["air"] else "",
-        "commit": s["git"] or "",
-        "seed": str(s["seed"]),
-        "device": breakable(s["device"] or "not recorded"),
-        "command": [breakable(shlex.quote(word)) for word in s["command"]],
-        "versions": ", ".join(f"{name}\u00a0{s['versions'][name]}" for name in sorted(s["versions"])),
-    }
-
-
-def _meaning(name: str) -> str:
-    return PROPERTIES[name].meaning if name in PROPERTIES else ""
-
-
-def _capital(text: str) -> str:
-    """A sentence with a capital, unless it begins with a name: of a property, a file or a column."""
-    first = text.split(" ", 1)[0]
-    return text[:1].upper() + text[1:] if first.isalpha() and first not in PROPERTIES else text
-
-
-def _words(name: str) -> str:
-    return WORDS.get(name, name.replace("_", " "))
-
-
-def _short(text: str, letters: int) -> str:
-    return text if len(text) <= letters else text[: letters - 1] + "…"

@@ -105,7 +105,7 @@ def quantity(value: float | None, unit: str, *, digits: int | None = 3, signed: 
     """
     if value is None or not math.isfinite(value):
         return DASH
-    factor, name = _rung(unit, abs(value))
+    factor, name = rung(unit, abs(value))
     x = value / factor
     few = name == "%" and digits is not None and 0.0 < abs(x) < 10.0 ** (digits - PERCENT_PLACES)
     text = _grouped(x, PERCENT_PLACES) if few else plain(x, digits)
@@ -125,8 +125,8 @@ def interval(low: float | None, high: float | None, unit: str) -> str:
     own = ["" if x is None else quantity(x, unit, digits=None) for x in ends]
     if not all(own):
         return f"above {own[0]}" if own[0] else f"below {own[1]}"
-    factor, name = _rung(unit, max(known))
-    if 0.0 < min(known) < SMALL_END * factor and _rung(unit, min(known))[1] != name:
+    factor, name = rung(unit, max(known))
+    if 0.0 < min(known) < SMALL_END * factor and rung(unit, min(known))[1] != name:
         return f"{own[0]} to {own[1]}"
     texts = [plain(x / factor, None) for x in ends if x is not None]
     return _with_unit(" to ".join(texts if texts[0] != texts[1] else texts[:1]), name)
@@ -140,13 +140,26 @@ def uncertain(value: float | None, sd: float | None, unit: str) -> str:
     """
     if value is None or sd is None or not (math.isfinite(value) and math.isfinite(sd) and sd > 0.0):
         return quantity(value, unit)
-    factor, name = _rung(unit, max(abs(value), sd))
+    factor, name = rung(unit, max(abs(value), sd))
     x, s = value / factor, sd / factor
     places = max(0, 1 - math.floor(math.log10(s)))
     if places > MOST_PLACES:
         return f"{quantity(value, unit)}{NBSP}±{NBSP}{quantity(sd, unit, digits=2)}"
     text = f"{_grouped(x, places)}{NBSP}±{NBSP}{_grouped(s, places)}"
     return _with_unit(f"({text})" if name in ("%", "°") else text, name)
+
+
+def rung(unit: str, size: float) -> tuple[float, str]:
+    """Factor and text of the unit for a value of this size [SI unit].
+
+    >>> rung("Pa", 3.2e5)
+    (1000.0, 'kPa')
+    """
+    ladder = LADDERS.get(unit, ((0.0, 1.0, unit.replace("^2", "²").replace("^3", "³")),))
+    if size == 0.0:
+        return next(((factor, name) for _, factor, name in ladder if factor == 1.0), ladder[0][1:])
+    size = _three(size)
+    return [(factor, name) for start, factor, name in ladder if size >= start * (1.0 - ROUNDING)][-1]
 
 
 def duration(seconds: float | None) -> str:
@@ -225,15 +238,6 @@ def _typeset(template: str, content: Mapping[str, Any], figures: Mapping[str, by
             font_paths=[Path(matplotlib.get_data_path()) / "fonts" / "ttf"],
         )
         return bytes(typst.compile(folder / template, root=folder, font_paths=fonts, format="pdf"))
-
-
-def _rung(unit: str, size: float) -> tuple[float, str]:
-    """Factor and text of the unit for a value of this size [SI unit]."""
-    ladder = LADDERS.get(unit, ((0.0, 1.0, unit.replace("^2", "²").replace("^3", "³")),))
-    if size == 0.0:
-        return next(((factor, name) for _, factor, name in ladder if factor == 1.0), ladder[0][1:])
-    size = _three(size)
-    return [(factor, name) for start, factor, name in ladder if size >= start * (1.0 - ROUNDING)][-1]
 
 
 def _three(x: float) -> float:

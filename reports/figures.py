@@ -25,8 +25,6 @@ MM = 1.0 / 25.4
 WIDTH = 170.0
 #: A record is drawn with its extremes in this many columns: more than a printer resolves on the page.
 COLUMNS = 900
-#: Axis of the parameter figure: at most this factor either side of the middle of the literature's range.
-LARGEST_FACTOR = 1e3
 #: Ratio of the ends of a log axis up to which 1, 2 and 5 of each decade have room for their numbers.
 FEW_DECADES = 1e3
 
@@ -67,6 +65,7 @@ SIMULATED: dict[str, Any] = {"color": RED, "lw": 1.8, "dashes": (4.5, 1.4)}
 EDGE: dict[str, Any] = {"color": BLUE, "lw": 1.1, "dashes": (1.2, 1.2)}
 FACE: dict[str, Any] = {"color": GREEN, "lw": 1.1, "dashes": (7.0, 1.6, 1.2, 1.6)}
 BAND: dict[str, Any] = {"facecolor": LIGHT, "edgecolor": GREY, "hatch": "////", "lw": 0.0}
+PREDICTIVE: dict[str, Any] = {"facecolor": "#ebebeb", "edgecolor": "#a8a8a8", "lw": 0.5}
 NULLS: dict[str, dict[str, Any]] = {
     "ramp_N": {"label": "ramp", "color": BLUE, "lw": 0.8, "dashes": (1.5, 1.5)},
     "half_sine_N": {"label": "half sine", "color": GREEN, "lw": 0.8, "dashes": (8.0, 2.0)},
@@ -108,40 +107,21 @@ class Record:
     peak_sd: float | None
 
 
-@dataclass(frozen=True)
-class Row:
-    """One fitted parameter of the parameter figure; numbers over the middle of the literature's range [-].
-
-    Attributes:
-        name: Name as in ``materials.yaml``.
-        note: Text at the right: value and verdict.
-        value: Fitted value.
-        low, high: Its 95 % interval, None where there is none.
-        prior_low, prior_high: The literature's range, None where there is none.
-    """
-
-    name: str
-    note: str
-    value: float
-    low: float | None
-    high: float | None
-    prior_low: float | None
-    prior_high: float | None
-
-
-def forces(curves: Curves, measured: str, simulated: str, height: float) -> bytes:
-    """Measured and simulated force over stroke, with the parts of the simulation.
+def forces(curves: Curves, measured: str, simulated: str, height: float, inside: str = "") -> bytes:
+    """Measured and simulated force over stroke, with the parts of the simulation and the predictive band if there is one.
 
     Args:
         curves: Columns of ``curves.csv``: stroke [m] and forces [N], shape (n,).
         measured, simulated: Labels of the two curves in the legend.
         height: Height of the figure [mm].
+        inside: What the legend says of the trace within the band, in brackets.
     """
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
         x = 1e3 * curves["stroke_m"]
         axes.axhline(0.0, color=BLACK, lw=0.5)
+        predictive(axes, x, curves, "band_low_N", "band_high_N", f"95 % predictive band{inside}")
         axes.plot(x, curves["edge_N"], label="edge part of the simulation", **EDGE)
         axes.plot(x, curves["face_N"], label="face part of the simulation", **FACE)
         axes.plot(x, curves["real_N"], label=measured, **MEASURED)
@@ -149,10 +129,16 @@ def forces(curves: Curves, measured: str, simulated: str, height: float) -> byte
         stroke_axis(axes, x)
         axes.set_ylabel("force on the knife [N]")
         handles, labels = axes.get_legend_handles_labels()
-        handles, labels = ([items[i] for i in (2, 3, 0, 1)] for items in (handles, labels))
+        handles, labels = ([*items[-2:], *items[:-2]] for items in (handles, labels))
         figure.legend(handles, labels, loc="outside upper left", ncols=2)
 
     return svg(draw, height)
+
+
+def predictive(axes: Axes, x: np.ndarray, curves: Curves, low: str, high: str, label: str) -> None:
+    """A predictive band behind the curves, nothing where the columns are absent or empty."""
+    if low in curves and high in curves and np.any(np.isfinite(curves[low])):
+        axes.fill_between(x, curves[low], curves[high], label=label, zorder=0.5, **PREDICTIVE)
 
 
 def conditioning(record: Record, curves: Curves) -> bytes:
@@ -166,7 +152,7 @@ def conditioning(record: Record, curves: Curves) -> bytes:
         handles, labels = panels["raw"].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper left", ncols=4 if len(labels) < 5 else 3)
 
-    return svg(draw, 138.0)
+    return svg(draw, 102.0)
 
 
 def fit(curves: Curves, noise_sd: float, trace: str) -> bytes:
@@ -226,37 +212,6 @@ def nulls(curves: Curves, trace: str) -> bytes:
     return svg(draw, 57.0)
 
 
-def parameters(rows: Sequence[Row]) -> bytes:
-    """Fitted values with their intervals against the literature's ranges, one row each, on a log axis."""
-
-    def draw(figure: Figure) -> None:
-        axes = figure.subplots()
-        low, high = _factors(rows)
-        axes.set_xscale("log")
-        axes.set_xlim(low, high)
-        _log_ticks(axes.xaxis, low, high)
-        for i, row in enumerate(rows):
-            if row.prior_low is not None and row.prior_high is not None:
-                ends = np.clip([row.prior_low, row.prior_high], low, high)
-                axes.barh(i, ends[1] - ends[0], left=ends[0], height=0.46, facecolor=LIGHT, edgecolor=GREY,
-                          lw=0.7)  # fmt: skip
-            x = float(np.clip(row.value, low, high))
-            axes.plot(x, i, marker="o", ms=5.0, color=BLACK, ls="none", zorder=3)
-            _interval(axes, i, row)
-            axes.annotate(row.note, (1.0, i), xycoords=axes.get_yaxis_transform(), xytext=(9, 0),
-                          textcoords="offset points", va="center", linespacing=1.15,
-                          annotation_clip=False)  # fmt: skip
-        axes.axvline(1.0, color=GREY, lw=0.6)
-        axes.set_ylim(len(rows) - 0.5, -0.5)
-        axes.set_yticks(range(len(rows)), [row.name for row in rows])
-        axes.tick_params(axis="y", length=0, pad=7.0)
-        axes.grid(visible=False, axis="y")
-        axes.spines["left"].set_visible(False)
-        axes.set_xlabel("value / middle of the literature's range")
-
-    return svg(draw, 20.0 + 8.5 * max(len(rows), 2))
-
-
 def misfit(history: Sequence[tuple[float, float]]) -> bytes:
     """Best misfit so far over the number of simulations.
 
@@ -271,13 +226,13 @@ def misfit(history: Sequence[tuple[float, float]]) -> bytes:
         axes.plot(x[-1], y[-1], marker="o", ms=4.0, color=BLACK)
         if np.all(y > 0.0) and np.max(y) > 10.0 * np.min(y):
             axes.set_yscale("log")
-            _log_ticks(axes.yaxis, float(np.min(y)), float(np.max(y)))
+            log_ticks(axes.yaxis, float(np.min(y)), float(np.max(y)))
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.margins(x=0.02, y=0.08)
         axes.set_xlabel("simulation number")
         axes.set_ylabel("best chi-square so far")
 
-    return svg(draw, 48.0)
+    return svg(draw, 42.0)
 
 
 def envelope(x: np.ndarray, y: np.ndarray, columns: int = COLUMNS) -> tuple[np.ndarray, np.ndarray]:
@@ -315,26 +270,12 @@ def stroke_axis(axes: Axes, x: np.ndarray) -> None:
     axes.set_xlabel("stroke from contact [mm]")
 
 
-def _log_ticks(axis: Axis, low: float, high: float) -> None:
+def log_ticks(axis: Axis, low: float, high: float, few: float = FEW_DECADES) -> None:
     """Plain numbers at 1, 2 and 5 of each decade, or at 1 only where there are many decades."""
-    subs = (1.0, 2.0, 5.0) if high / low < FEW_DECADES else (1.0,)
+    subs = (1.0, 2.0, 5.0) if high / low < few else (1.0,)
     axis.set_major_locator(LogLocator(subs=subs))
     axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
     axis.set_minor_formatter(NullFormatter())
-
-
-def _interval(axes: Axes, i: int, row: Row) -> None:
-    """The 95 % interval in row ``i``; an arrow where it leaves the axis or has no end."""
-    if row.low is None and row.high is None:
-        return
-    low, high = axes.get_xlim()
-    ends = (row.low if row.low is not None else 0.0, row.high if row.high is not None else np.inf)
-    span = np.clip(ends, low, high)
-    axes.plot(span, [i, i], color=BLACK, lw=1.6, zorder=3, solid_capstyle="butt")
-    for at, end, arrow in zip(span, ends, ("<", ">"), strict=True):
-        inside = low < end < high
-        axes.plot(at, i, marker="|" if inside else arrow, ms=7.0 if inside else 5.0, color=BLACK, ls="none",
-                  zorder=3, clip_on=False)  # fmt: skip
 
 
 def _raw(axes: Axes, r: Record) -> None:
@@ -390,12 +331,3 @@ def _filtered(axes: Axes, r: Record, curves: Curves) -> None:
     stroke_axis(axes, x)
     axes.set_title("c  filtered, over stroke (circle: peak ± 1 sd)")
     axes.set_ylabel("force [N]")
-
-
-def _factors(rows: Sequence[Row]) -> tuple[float, float]:
-    """Limits of the axis that hold all positive numbers: a factor 3 to LARGEST_FACTOR either side."""
-    numbers = [x for r in rows for x in (r.value, r.low, r.high, r.prior_low, r.prior_high)]
-    positive = [x for x in numbers if x is not None and x > 0.0]
-    low = max(min([1 / 3.0, *positive]) / 1.3, 1.0 / LARGEST_FACTOR)
-    high = min(max([3.0, *positive]) * 1.3, LARGEST_FACTOR)
-    return low, high

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,8 @@ COLUMNS = ("stroke_m", "real_N", "sim_N", "residual_N", "edge_N", "face_N", "sta
            "half_sine_N", "three_term_N")  # fmt: skip
 #: These must be finite; a part of the simulation or a null model may be missing (NaN).
 COMPLETE = COLUMNS[:4]
+#: These may be left out, by an interrupted run and by older versions.
+BAND = ("band_low_N", "band_high_N")
 STATUS = ("done", "interrupted")
 LABELS = ("measured", "reconstructed")
 RECORD = ("time_s", "raw_N", "tared_N")
@@ -64,7 +67,24 @@ EXTRA: Data = {
     "counters": {"*": (int,)},
     "energy_J": {"*": _NUM},
     "coarse_simulations": (int,),
+    "nuisances": {"*": {"value sd prior_sd": _NUM, "unit": _TEXT, "outside": (bool,)}},
+    "profiles": {"*": {"value rise trace_alone": [_NUM]}},
+    "sensitivity": {"*": {"*": {"first total total_conf": _OPT}}},
+    "reduced_chi2 correlation_length_m predictive_inside": _OPT,
 }
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """The simulations of a fit that ended by themselves, m of them.
+
+    Attributes:
+        parameters: Values [SI] by name, each (m,), NaN where a run has none.
+        failed: Whether a run broke down (m,).
+    """
+
+    parameters: dict[str, np.ndarray] = field(default_factory=dict)
+    failed: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
 
 @dataclass(frozen=True)
@@ -74,10 +94,11 @@ class Finished:
     Attributes:
         summary: ``summary.json``, checked against SCHEMA; numbers that are not finite are None.
         created: When the run was made.
-        curves: Columns of ``curves.csv`` by name: stroke [m] and forces [N], shape (n,).
+        curves: Columns of ``curves.csv`` by name: stroke [m] and forces [N], shape (n,); BAND only where the file has it.
         time: Time of the whole record [s], shape (k,).
         raw: Force as recorded [N], shape (k,).
         tared: Force less its baseline [N], shape (k,).
+        runs: The simulations, none where the store has no table of them.
     """
 
     summary: Data
@@ -86,6 +107,7 @@ class Finished:
     time: np.ndarray
     raw: np.ndarray
     tared: np.ndarray
+    runs: Runs
 
 
 def read_finished(run: Path) -> Finished:
@@ -101,35 +123,62 @@ def read_finished(run: Path) -> Finished:
         raise ReportError(f"{run}: no such folder; give the output folder of a calibration")
     summary, created = _read_summary(run / "summary.json")
     curves = _read_curves(run / "curves.csv")
-    return Finished(summary, created, curves, *_read_record(run / "evaluations.h5"))
+    store = run / "evaluations.h5"
+    return Finished(summary, created, curves, *_read_record(store), _read_runs(store))
 
 
 def _read_summary(path: Path) -> tuple[Data, datetime]:
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"), parse_constant=lambda _: None)
-    except OSError as e:
-        raise _unreadable(path, e) from None
-    except ValueError as e:
-        raise ReportError(f"{path}: damaged, not JSON ({e}); {REMEDY}") from None
-    _check(path, "", data, SCHEMA)
-    for name, kind in EXTRA.items():
-        if data.get(name) is not None:
-            _check(path, name, data[name], kind)
+    data = read_json(path)
+    check_kind(path, "", data, SCHEMA)
+    for names, kind in EXTRA.items():
+        for name in names.split():
+            if data.get(name) is not None:
+                check_kind(path, name, data[name], kind)
+    for name, p in (data.get("profiles") or {}).items():
+        if len({len(p[key]) for key in ("value", "rise", "trace_alone")}) != 1:
+            raise ReportError(f"{path}: profiles.{name} has lists of unequal length; {REMEDY}")
     if len(data.get("baseline_window_s") or (0.0, 0.0)) != 2:
         raise ReportError(f"{path}: baseline_window_s is not a pair of times; {REMEDY}")
     if data["trace"]["label"] not in LABELS:
         raise ReportError(f"{path}: trace.label is not {' or '.join(LABELS)}; {REMEDY}")
     if data["status"] not in STATUS:
         raise ReportError(f"{path}: status is {data['status']!r}, not {' or '.join(STATUS)}; {REMEDY}")
+    return data, read_date(path, data)
+
+
+def read_json(path: Path) -> Any:
+    """A JSON document in which numbers that are not finite are None.
+
+    Raises:
+        ReportError: It is missing or damaged.
+    """
+    try:
+        return json.loads(path.read_text(encoding="utf-8"), parse_constant=lambda _: None)
+    except OSError as e:
+        raise unreadable(path, e) from None
+    except ValueError as e:
+        raise ReportError(f"{path}: damaged, not JSON ({e}); {REMEDY}") from None
+
+
+def read_date(path: Path, data: Data) -> datetime:
+    """When a run was made: ``created`` of its summary.
+
+    Raises:
+        ReportError: It is no date.
+    """
     try:
         # Python 3.10 does not read the letter Z as a time zone.
-        return data, datetime.fromisoformat(re.sub(r"[zZ]$", "+00:00", data["created"]))
+        return datetime.fromisoformat(re.sub(r"[zZ]$", "+00:00", data["created"]))
     except ValueError:
         raise ReportError(f"{path}: created is {data['created']!r}, not an ISO date; {REMEDY}") from None
 
 
-def _check(path: Path, place: str, value: Any, kind: Any) -> None:
-    """Refuse a value of another kind than SCHEMA says, and name its place."""
+def check_kind(path: Path, place: str, value: Any, kind: Any) -> None:
+    """Refuse a value of another kind than a schema says, and name its place.
+
+    Raises:
+        ReportError: It is of another kind, or something is missing in it.
+    """
     if isinstance(kind, tuple):
         flag_as_number = isinstance(value, bool) and bool not in kind and object not in kind
         if flag_as_number or not isinstance(value, kind):
@@ -140,7 +189,7 @@ def _check(path: Path, place: str, value: Any, kind: Any) -> None:
         raise ReportError(f"{path}: {place or 'the top level'} is not {wanted}; {REMEDY}")
     if isinstance(kind, list):
         for i, item in enumerate(value):
-            _check(path, f"{place}[{i}]", item, kind[0])
+            check_kind(path, f"{place}[{i}]", item, kind[0])
         return
     for names, inner in kind.items():
         for name in value if names == "*" else names.split():
@@ -149,27 +198,45 @@ def _check(path: Path, place: str, value: Any, kind: Any) -> None:
                 raise ReportError(
                     f"{path}: {where} is missing; the file is incomplete or of another version of cutcal: {REMEDY}"
                 )
-            _check(path, where, value[name], inner)
+            check_kind(path, where, value[name], inner)
 
 
 def _read_curves(path: Path) -> dict[str, np.ndarray]:
+    columns = read_columns(path, COLUMNS, COMPLETE)
+    return {name: x for name, x in columns.items() if name in COLUMNS or set(BAND) <= set(columns)}
+
+
+def read_columns(path: Path, needed: Sequence[str], complete: Sequence[str]) -> dict[str, np.ndarray]:
+    """Curves over a stroke that rises.
+
+    Args:
+        path: A table with a line of names; an empty cell is NaN.
+        needed: Columns that must be there, ``stroke_m`` and ``real_N`` among them.
+        complete: Those that must be finite.
+
+    Returns:
+        All its columns by name, each (n,).
+
+    Raises:
+        ReportError: It is missing or damaged.
+    """
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
         header = [name.strip() for name in lines[0].split(",")] if lines else []
         cells = [line.split(",") for line in lines[1:] if line.strip()]
         rows = np.array([[float(x or "nan") for x in row] for row in cells if len(row) == len(header)])
     except OSError as e:
-        raise _unreadable(path, e) from None
+        raise unreadable(path, e) from None
     except ValueError as e:
         raise ReportError(f"{path}: damaged, not a table of numbers ({e}); {REMEDY}") from None
-    missing = [name for name in COLUMNS if name not in header]
+    missing = [name for name in needed if name not in header]
     if missing:
         raise ReportError(f"{path}: column {', '.join(missing)} is missing; {REMEDY}")
     if len(rows) < 2 or len(rows) < len(cells):
         bad_row = next((i for i, row in enumerate(cells) if len(row) != len(header)), len(cells)) + 2
         raise ReportError(f"{path}: row {bad_row} is cut off or missing; {REMEDY}")
-    curves = {name: rows[:, header.index(name)] for name in COLUMNS}
-    gaps = [name for name in COMPLETE if not np.all(np.isfinite(curves[name]))]
+    curves = {name: rows[:, k] for k, name in enumerate(header)}
+    gaps = [name for name in complete if not np.all(np.isfinite(curves[name]))]
     if gaps:
         raise ReportError(f"{path}: column {gaps[0]} has a value that is not finite; {REMEDY}")
     if np.any(np.diff(curves["stroke_m"]) <= 0.0) or not np.max(curves["real_N"]) > 0.0:
@@ -180,7 +247,7 @@ def _read_curves(path: Path) -> dict[str, np.ndarray]:
 def _read_record(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Time, raw and tared force of the trace in evaluations.h5."""
     if not path.is_file():
-        raise _unreadable(path, FileNotFoundError())
+        raise unreadable(path, FileNotFoundError())
     try:
         with h5py.File(path, "r") as store:
             group = store["conditioning"]
@@ -197,6 +264,25 @@ def _read_record(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return time, raw, tared
 
 
-def _unreadable(path: Path, e: OSError) -> ReportError:
+def _read_runs(path: Path) -> Runs:
+    """The simulations in evaluations.h5 that finished or failed and have parameters."""
+    try:
+        with h5py.File(path, "r") as store:
+            if "status" not in store or "parameters" not in store:
+                return Runs()
+            status = np.asarray(store["status"].asstr()[()], dtype=str)
+            columns = {name: np.asarray(values[()], dtype=float) for name, values in store["parameters"].items()}
+    except (OSError, TypeError, AttributeError) as e:
+        raise ReportError(f"{path}: its table of simulations is damaged ({e}); {REMEDY}") from None
+    if any(x.shape != status.shape for x in columns.values()):
+        raise ReportError(f"{path}: its table of simulations has columns of unequal length; {REMEDY}")
+    ended = np.isin(status, ("ok", "failed"))
+    if columns:
+        ended &= np.any(np.isfinite(np.array(list(columns.values()))), axis=0)
+    return Runs({name: x[ended] for name, x in columns.items()}, status[ended] == "failed")
+
+
+def unreadable(path: Path, e: OSError) -> ReportError:
+    """The error of a file that is not there or cannot be read."""
     what = "no such file" if isinstance(e, FileNotFoundError) else f"cannot be read ({e.strerror})"
     return ReportError(f"{path}: {what}; a report needs it: {REMEDY}")

@@ -100,8 +100,10 @@ def test_summary_holds_the_contract(finished):
     s = json.loads((finished[0] / "summary.json").read_text())
     keys = """food trace_sha256 baseline_N baseline_sd_N onset_s peak_real_N peak_sim_N peak_error shape_error nrmse
     work_error sprague_geers iso18571 null_models parameters simulations failed_simulations wall_s dx_m particles
-    momentum_residual versions git""".split()
+    momentum_residual versions git sensitivity""".split()
     assert not [k for k in keys if k not in s]
+    assert all(set(rows) == set(s["parameters"]) for rows in s["sensitivity"].values())
+    assert set(s["sensitivity"]) == {"peak", "work", "initial_slope"}
     assert set(s["parameters"]["R"]) >= {"value", "unit", "low95", "high95", "prior_low", "prior_high", "verdict"}
     c = pd.read_csv(finished[0] / "curves.csv")
     again = compare(c["stroke_m"].to_numpy(), c["real_N"].to_numpy(), c["sim_N"].to_numpy())

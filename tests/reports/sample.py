@@ -35,7 +35,18 @@ FITTED = {
     "yield_stress": (3.1e4, 1.1e4, 9.0e4, 5e3, 2e5, "Pa", "weak", "ripe pulp, a tenth of E"),
     "R": (287.0, 262.0, 314.0, 100.0, 1200.0, "J/m^2", "identified", "half of the energy for green pulp"),
     "mu": (0.21, 0.02, 0.41, 0.0, 0.6, "-", "only_as_product", "between tomato 0.18 and cucumber 0.5"),
-    "R_skin": (455.0, 390.0, 530.0, 100.0, 1600.0, "N/m", "identified", "a little above R"),
+    "R_skin": (455.0, 390.0, 730.0, 100.0, 1600.0, "N/m", "one_sided", "a little above R"),
+}
+SENSITIVITY = {
+    quantity: {
+        name: {"first": first, "first_conf": 0.08, "total": first + more, "total_conf": 0.06}
+        for name, first, more in zip(FITTED, parts, (0.06, 0.02, 0.05, 0.03, 0.01), strict=True)
+    }
+    for quantity, parts in (
+        ("peak", (0.16, 0.02, 0.48, 0.21, 0.03)),
+        ("work", (0.11, 0.03, 0.57, 0.18, 0.01)),
+        ("initial_slope", (0.61, 0.01, 0.07, 0.0, 0.22)),
+    )
 }
 
 
@@ -49,7 +60,11 @@ def curves(kind: str = "good") -> dict[str, np.ndarray]:
     start = three_term(s, 6.4, 1.0e-3, 1.4, 3.0e-3, 1.5e-3, 90.0, 0.03)
     out = {"stroke_m": s, "real_N": real, "sim_N": edge + face, "residual_N": edge + face - real,
            "edge_N": edge, "face_N": face, "start_N": start}  # fmt: skip
-    return out | {f"{name}_N": model.curve for name, model in _nulls().items()}
+    out |= {f"{name}_N": model.curve for name, model in _nulls().items()}
+    if kind == "interrupted":
+        return out
+    half = (0.25 + 0.035 * out["sim_N"]) * (3.3 if kind == "failed" else 1.0)
+    return out | {"band_low_N": out["sim_N"] - half, "band_high_N": out["sim_N"] + half}
 
 
 def summary(kind: str = "good") -> dict[str, Any]:
@@ -58,13 +73,15 @@ def summary(kind: str = "good") -> dict[str, Any]:
     changes = {"reconstructed": _reconstruct, "failed": _fail, "interrupted": _interrupt}
     if kind != "good":
         changes[kind](data)
+    data["profiles"] = {} if kind == "interrupted" else profiles(data["parameters"])
     return data
 
 
 def write_run(folder: Path, kind: str = "good", **changes: Any) -> Path:
     """Write the folder of a calibration of a kind, with top-level entries of the summary replaced."""
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "summary.json").write_text(json.dumps(summary(kind) | changes, indent=1))
+    data = summary(kind)
+    (folder / "summary.json").write_text(json.dumps(data | changes, indent=1))
     columns = curves(kind)
     table = np.column_stack(list(columns.values()))
     np.savetxt(folder / "curves.csv", table, delimiter=",", header=",".join(columns), comments="", fmt="%.8g")
@@ -72,7 +89,22 @@ def write_run(folder: Path, kind: str = "good", **changes: Any) -> Path:
     with h5py.File(folder / "evaluations.h5", "w") as store:
         for name, values in (("time_s", time), ("raw_N", raw), ("tared_N", tared)):
             store.create_dataset(f"conditioning/{name}", data=values)
+        status, columns = runs(data)
+        store.create_dataset("status", data=status, dtype=h5py.string_dtype())
+        for name, values in columns.items():
+            store.create_dataset(f"parameters/{name}", data=values)
     return folder
+
+
+def runs(data: dict[str, Any]) -> tuple[list[str], dict[str, np.ndarray]]:
+    """Status and parameter values of the simulations of a summary: spread about the fit, then those that failed."""
+    whole = data["simulations"] - data["failed_simulations"]
+    random = np.random.default_rng(3)
+    columns = {}
+    for name, p in data["parameters"].items():
+        good = p["value"] * np.exp(0.3 * random.standard_normal(whole))
+        columns[name] = np.append(good, [f["parameters"].get(name, np.nan) for f in data["failures"]])
+    return ["ok"] * whole + ["failed"] * len(data["failures"]), columns
 
 
 def pages(pdf: bytes) -> int:
@@ -136,6 +168,8 @@ def _base(kind: str) -> dict[str, Any]:
         "correlations": {"E,yield_stress": -0.62, "E,mu": -0.94, "R,R_skin": 0.11, "E,R": -0.31},
         "fixed_parameters": {name: dict(zip(("value", "unit", "status", "source"), row, strict=True))
                              for name, row in FIXED.items()},
+        "nuisances": _nuisances(), "reduced_chi2": 1.3, "correlation_length_m": 2.1e-3,
+        "predictive_inside": _inside(columns), "sensitivity": SENSITIVITY,
         "simulations": 61, "failed_simulations": 2, "failures": _failures(2),
         "misfit_history": [[1, 412.0], [3, 160.0], [9, 71.0], [14, 30.2], [22, 21.0], [31, 18.7], [58, 18.5]],
         "wall_s": 2531.0, "dx_m": 1.5e-3, "particles": 118344, "mirror_images": 2, "mach": 0.0086,
@@ -182,7 +216,51 @@ def _verdicts(m: dict[str, Any]) -> list[dict[str, Any]]:
 def _failures(n: int) -> list[dict[str, Any]]:
     reasons = ("inverted", "not_finite", "stopped")
     values = {"E": 5.1e4, "R": 1180.0, "mu": 0.58, "yield_stress": 5.2e3}
-    return [{"reason": reasons[i % 3], "fraction": 0.2 + 0.03 * i, "parameters": values} for i in range(n)]
+    return [
+        {
+            "reason": reasons[i % 3],
+            "fraction": 0.2 + 0.03 * i,
+            "parameters": {name: x * (1.0 + 0.08 * ((i * k) % 7)) for k, (name, x) in enumerate(values.items())},
+        }
+        for i in range(n)
+    ]
+
+
+def _inside(columns: dict[str, np.ndarray]) -> float | None:
+    """Part of the measured curve within the band."""
+    if "band_low_N" not in columns:
+        return None
+    real = columns["real_N"]
+    return float(np.mean((real >= columns["band_low_N"]) & (real <= columns["band_high_N"])))
+
+
+def _nuisances() -> dict[str, Any]:
+    """What the fit says of the measurement; the lag is that of the contact at the speed of the cut."""
+    rows = {"tare": (-0.0007, 0.0042, 0.0043, "N"), "drift": (0.021, 0.033, 0.039, "N"),
+            "lag": (3.1e-5, 4.4e-5, 0.0061 * SPEED, "m"), "gain": (-0.003, 0.019, 0.02, "-"),
+            "width": (0.06, 0.11, 0.15, "-")}  # fmt: skip
+    names = ("value", "sd", "prior_sd", "unit")
+    return {
+        name: dict(zip(names, row, strict=True)) | {"outside": abs(row[0]) > 3.0 * row[2]} for name, row in rows.items()
+    }
+
+
+def profiles(parameters: dict[str, Any]) -> dict[str, Any]:
+    """Profiles that rise by 3.84 at the ends of the intervals; the trace alone sees as much as the verdict says."""
+    alone = {"identified": (0.95, 0.95), "weak": (0.7, 0.75), "only_as_product": (0.7, 0.7), "one_sided": (0.9, 0.02)}
+    out = {}
+    for name, p in parameters.items():
+        log = p["unit"] != "-"
+        z, low, high = (np.log(x) if log and x else x for x in (p["value"], p["low95"], p["high95"]))
+        high = z + 3.0 if high is None else high
+        parts = np.linspace(-1.5, 1.5, 15)
+        at = z + np.where(parts < 0.0, parts * (z - low), parts * (high - z))
+        rise = 3.84 * parts**2
+        share = np.where(parts < 0.0, *alone.get(p["verdict"], (0.03, 0.03)))
+        value = np.exp(at) if log else at
+        columns = {"value": value, "rise": rise, "trace_alone": share * rise}
+        out[name] = {key: column[value >= 0.0].tolist() for key, column in columns.items()}
+    return out
 
 
 def _reconstruct(data: dict[str, Any]) -> None:
@@ -195,8 +273,10 @@ def _reconstruct(data: dict[str, Any]) -> None:
 def _fail(data: dict[str, Any]) -> None:
     data |= {"passed": False, "simulations": 70, "failed_simulations": 21, "failures": _failures(21),
              "air": {"source": "air_run01.csv", "sha256": "c0ffee00" * 8}, "baseline_kind": "air",
-             "baseline_sd_N": 0.031, "momentum_residual": 0.034,
+             "baseline_sd_N": 0.031, "reduced_chi2": 14.2, "momentum_residual": 0.034,
              "counters": {"inverted": 12, "left_grid": 3}}  # fmt: skip
+    data["nuisances"]["tare"] |= {"value": -0.012, "sd": 0.03, "prior_sd": 0.031}
+    data["nuisances"]["gain"] |= {"value": 0.083, "sd": 0.017, "outside": True}
     for line in data["verdicts"]:
         if line["name"] in ("Momentum residual", "Parameters at a bound"):
             line |= {"passed": False, "value": 0.034 if line["unit"] == "fraction" else 1}
@@ -215,6 +295,7 @@ def _fail(data: dict[str, Any]) -> None:
 
 def _interrupt(data: dict[str, Any]) -> None:
     data |= {"status": "interrupted", "passed": False, "simulations": 17, "failed_simulations": 0}
+    data |= {"nuisances": {}, "reduced_chi2": None, "correlation_length_m": None, "sensitivity": {}}
     data |= {"failures": [], "misfit_history": data["misfit_history"][:4], "correlations": {}, "warnings": []}
     for p in data["parameters"].values():
         p |= {"low95": None, "high95": None, "verdict": "not_determined"}

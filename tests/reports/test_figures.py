@@ -6,9 +6,11 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+import pytest
 
-from reports import figures
+from reports import breakdowns, figures, fitted, parameters
 from reports.calibration import write_report
+from reports.finished import Runs
 from tests.reports import sample
 from tests.reports.sample import pages
 
@@ -55,4 +57,53 @@ def test_marks_of_the_conditioning_are_drawn_when_known(tmp_path: Path) -> None:
     full = figures.conditioning(figures.Record(**draw, window=(0.1, 0.7), end_sd=0.02), sample.curves())
     assert len(full) > len(bare)
     run = sample.write_run(tmp_path, baseline_window_s=[0.1, 0.7], end_sd_s=0.02)
-    assert pages(write_report(run).read_bytes()) == 5
+    assert pages(write_report(run).read_bytes()) == 6
+
+
+def test_the_predictive_band_is_drawn_where_there_is_one() -> None:
+    """With the columns the figure has a patch more; without them, or with empty ones, it has none."""
+    whole, bare = sample.curves(), sample.curves("interrupted")
+    empty = whole | {name: np.full(240, np.nan) for name in ("band_low_N", "band_high_N")}
+    with_band, without, none = (figures.forces(c, "a", "b", 80.0, " (98 %)") for c in (whole, bare, empty))
+    assert b"FillBetween" in with_band and b"FillBetween" not in without
+    assert none == without
+
+
+def test_profiles_are_in_the_units_that_people_use() -> None:
+    """Pascals become kilopascals, the literature too; a friction has a linear axis; a profile of one point is left out."""
+    s = sample.summary()
+    s["profiles"]["E"] = {key: value[:1] for key, value in s["profiles"]["E"].items()}
+    panels = {p.title: p for p in fitted.panels(s["profiles"], s["parameters"])}
+    assert list(panels) == ["yield_stress [kPa]", "R [J/m²]", "mu", "R_skin [N/m]"]
+    panel = panels["yield_stress [kPa]"]
+    assert panel.prior == (5.0, 200.0) and panel.value == 31.0 and panel.log and not panels["mu"].log
+    assert panel.x[np.argmin(panel.rise)] == pytest.approx(31.0)
+    assert parameters.profiles(list(panels.values())).startswith(b"<?xml")
+
+
+def test_profiles_and_indices_differ_without_colour() -> None:
+    """With and without the literature have different dashes; the two bars differ by a hatch."""
+    assert parameters.WITH_PRIOR.get("dashes") != parameters.TRACE_ALONE.get("dashes")
+    drawn = parameters.influence(sample.SENSITIVITY, fitted.QUANTITIES)
+    assert b"hatch" in drawn.lower() or b"<pattern" in drawn
+
+
+def test_failures_are_split_by_what_separates_them() -> None:
+    """Of three parameters the two that differ come first, in logarithms; too few failures have no region."""
+    random = np.random.default_rng(0)
+    failed = np.arange(40) < 8
+    values = {
+        "mu": random.uniform(0.1, 0.5, 40),
+        "E": np.where(failed, 2e4, 6e5) * np.exp(0.2 * random.standard_normal(40)),
+        "R": np.where(failed, 900.0, 300.0) * np.exp(0.4 * random.standard_normal(40)),
+        "other": np.arange(40.0),
+    }
+    known = sample.summary()["parameters"]
+    found = breakdowns.splits(Runs(values, failed), known)
+    assert [s.name for s in found] == ["E", "R", "mu"] and found[0].apart < 0.0 < found[1].apart
+    assert breakdowns.sentence(Runs(values, failed), found).startswith("Simulations failed at low E (median ")
+    assert breakdowns.splits(Runs(values, np.arange(40) < 2), known) == []
+    same = breakdowns.splits(Runs({"mu": values["mu"]}, failed), known)
+    assert breakdowns.sentence(Runs({"mu": values["mu"]}, failed), same).startswith("No parameter separates")
+    for split in (found, same):
+        assert breakdowns.picture(Runs(values, failed), split).startswith(b"<?xml")

@@ -44,9 +44,9 @@ def content(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Content:
 # ---- the document
 
 
-@pytest.mark.parametrize(("kind", "count"), [("good", 5), ("reconstructed", 5), ("failed", 6), ("interrupted", 5)])
+@pytest.mark.parametrize(("kind", "count"), [("good", 6), ("reconstructed", 6), ("failed", 7), ("interrupted", 5)])
 def test_every_outcome_gives_a_pdf_of_the_planned_length(tmp_path: Path, kind: str, count: int) -> None:
-    """Each section keeps to its page; only the failed run's twelve warnings need a sixth."""
+    """Each section keeps to its page; the parameters to two, and the failed run's twelve warnings need one more."""
     path = write_report(sample.write_run(tmp_path, kind))
     pdf = path.read_bytes()
     assert path == tmp_path / "report.pdf"
@@ -102,8 +102,9 @@ def test_unknown_numbers_and_empty_lists_leave_no_hole(tmp_path: Path) -> None:
     s = sample.summary()
     unknown = ("baseline_sd_N", "onset_sd_s", "peak_real_sd_N", "peak_error", "shape_error", "nrmse",
                "work_error", "wall_s", "particles", "mach", "momentum_residual", "ke_over_ie", "ripple_N",
-               "git", "device")  # fmt: skip
+               "git", "device", "reduced_chi2", "correlation_length_m", "predictive_inside")  # fmt: skip
     mappings = ("parameters", "correlations", "fixed_parameters", "null_models", "metrics", "versions")
+    mappings += ("nuisances", "profiles", "sensitivity")
     lists = ("verdicts", "failures", "misfit_history", "warnings", "limits", "command")
     empty: dict[str, Any] = {name: {} for name in mappings} | {name: [] for name in lists}
     empty |= dict.fromkeys(unknown) | {"counters": None}
@@ -120,10 +121,77 @@ def test_missing_parts_of_a_simulation_are_not_drawn(tmp_path: Path) -> None:
     blank = [header.index(name) for name in ("edge_N", "start_N")]
     rows = [["" if i in blank else x for i, x in enumerate(line.split(","))] for line in lines[1:]]
     (run / "curves.csv").write_text("\n".join([lines[0], *(",".join(row) for row in rows)]))
+    assert pages(write_report(run).read_bytes()) == 6
+
+
+def test_an_older_folder_still_gives_a_report(tmp_path: Path) -> None:
+    """Without band, table of simulations and what later versions compute, the report has its five pages."""
+    run = sample.write_run(tmp_path, "interrupted")
+    data = json.loads((run / "summary.json").read_text())
+    for key in ("nuisances", "profiles", "sensitivity", "reduced_chi2", "correlation_length_m", "predictive_inside"):
+        del data[key]
+    (run / "summary.json").write_text(json.dumps(data))
+    with h5py.File(run / "evaluations.h5", "a") as store:
+        del store["status"]
     assert pages(write_report(run).read_bytes()) == 5
 
 
+def test_a_long_table_keeps_the_figure_on_the_first_page(tmp_path: Path) -> None:
+    """Eighteen lines, some with names or notes of two lines, leave the main figure its least height, not a page of its own."""
+    verdicts = sample.summary()["verdicts"]
+    verdicts += [{**verdicts[0], "name": f"{i} a name that is longer than its own column"} for i in range(3)]
+    verdicts += [{**verdicts[0], "note": "a note of more letters than its column has room for"} for _ in range(4)]
+    run = sample.write_run(tmp_path, "reconstructed", verdicts=verdicts)
+    assert pages(write_report(run).read_bytes()) == 6
+
+
 # ---- what it says
+
+
+def test_what_the_measurement_leaves_open_is_said_in_units_and_marked(content: Content) -> None:
+    """Prior and posterior with their units; a gain four prior standard deviations off is marked, a good one is not."""
+    rows = {r[0]: [spaced(x) for x in r[2:]] for r in content()["left_open"]}
+    assert list(rows) == ["Tare", "Drift", "Lag", "Gain", "Width"]
+    assert rows["Lag"] == ["0 ± 67 µm", "31 ± 44 µm", "yes"]
+    assert rows["Gain"] == ["0 ± 2.0 %", "(−0.3 ± 1.9) %", "yes"]
+    marks = {r[0]: r[4] for r in content("failed")["left_open"]}
+    assert [name for name, mark in marks.items() if mark == "no"] == ["Gain"]
+    assert content("interrupted")["left_open"] == []
+
+
+def test_errors_are_counted_and_sized_in_words(content: Content) -> None:
+    """33 mm over a correlation length of 2.1 mm are 16 readings; chi-square 14.2 is 3.8 times; below one nothing widens."""
+    length, size = (spaced(text) for text in content("failed")["errors"])
+    assert "over 2.1 mm of stroke" in length and "240 points" in length and "about 16 independent" in length
+    assert "14.2" in size and "3.8 times" in size and "were widened" in size
+    assert "no interval was widened" in content(reduced_chi2=0.7)["errors"][1]
+    assert content("interrupted")["errors"] == []
+
+
+def test_verdicts_that_occur_are_explained(content: Content) -> None:
+    """Each verdict in the table has one explanation, in words, and no other is explained."""
+    words = [w for w, _ in content()["legend"]]
+    assert words == ["identified", "weakly identified", "one-sided", "only as a product with the width"]
+    assert {p["verdict"] for p in content()["parameters"]} == set(words)
+
+
+def test_what_moves_the_curve_names_the_strong_ones_first(content: Content) -> None:
+    """Parameters with a tenth of the variance, strongest first; an index that is not known names none."""
+    said = [spaced(text) for text in content()["influences"]]
+    assert said[0] == "Peak: R (53 %), mu (24 %) and E (22 %)."
+    assert said[2].startswith("Initial slope: E (67 %), R_skin (23 %)")
+    unknown = {"peak": {"E": {"first": None, "total": None, "total_conf": None}}}
+    assert content(sensitivity=unknown)["influences"] == []
+
+
+def test_region_of_failures_is_named(content: Content) -> None:
+    """Failed runs at high R and low yield stress are said to be there, with medians; two failures are no region."""
+    said = spaced(content("failed")["broke_down"])
+    assert (
+        said.startswith("Simulations failed at high R (median 1460 J/m² against ")
+        and "low yield_stress (median" in said
+    )
+    assert content()["broke_down"] == ""
 
 
 def test_verdict_names_the_lines_that_failed_and_those_not_run(content: Content) -> None:
@@ -250,7 +318,9 @@ def test_missing_key_is_named_by_its_place(tmp_path: Path, place: str) -> None:
         ("onset_s", "0.8"), ("onset_s", None), ("onset_s", math.nan), ("simulations", True), ("passed", 1),
         ("parameters", []), ("warnings", "one"), ("status", "running"), ("created", "yesterday"),
         ("misfit_history", [1, 2.0]), ("baseline_window_s", [0.1]), ("baseline_window_s", "0 to 1"),
-        ("trace", {}),
+        ("trace", {}), ("nuisances", {"gain": 1.0}), ("profiles", {"E": {"value": [1.0, 2.0]}}),
+        ("profiles", {"E": {"value": [1.0, 2.0], "rise": [0.0], "trace_alone": [0.0, 1.0]}}),
+        ("sensitivity", {"peak": {"E": 1.0}}), ("reduced_chi2", "1"),
     ],
 )  # fmt: skip
 def test_value_of_a_wrong_kind_is_refused(tmp_path: Path, key: str, value: Any) -> None:

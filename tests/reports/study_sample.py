@@ -1,0 +1,98 @@
+"""A synthetic folder of a finished study of three cuts, one of which was held out."""
+
+from __future__ import annotations
+
+import json
+from copy import deepcopy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calib.metrics import Metrics, compare
+from calib.nulls import null_models, three_term
+from tests.reports import sample
+
+STROKE = np.linspace(0.0, 0.033, 240)
+#: By cut: strength of its specimen, height of its skin peak [N], and the error of its simulation.
+CUTS = {"first": (1.0, 2.4, 0.02), "second": (1.15, 2.0, -0.03), "third": (0.9, 2.9, 0.06)}
+HELD = "third"
+
+
+def curves(name: str) -> dict[str, np.ndarray]:
+    """Columns of curves-NAME.csv."""
+    strength, skin, error = CUTS[name]
+    real = strength * three_term(STROKE, 5.2, 1.8e-3, skin, 4.5e-3, 1.4e-3, 260.0, 0.021)
+    sim = real * (1.0 + error * np.cos(2.0 * np.pi * STROKE / 0.02))
+    half = 0.3 + 0.04 * sim
+    out = {"stroke_m": STROKE, "real_N": real}
+    if name == HELD:
+        return out | {"predicted_N": sim, "predicted_low_N": sim - half, "predicted_high_N": sim + half}
+    return out | {"sim_N": sim, "band_low_N": sim - half, "band_high_N": sim + half}
+
+
+def summary() -> dict[str, Any]:
+    """Its summary; the figures are those of the curves."""
+    traces = {name: _fitted(name) for name in CUTS if name != HELD}
+    parameters = deepcopy(sample.summary()["parameters"])
+    own = {f"R_skin@{name}": parameters["R_skin"] | {"shared": False} for name in traces}
+    shared = {name: p | {"shared": True} for name, p in parameters.items() if name != "R_skin"}
+    base = sample.summary()
+    return {
+        "food": "banana", "study": "cuts.yaml", "created": "2026-03-14T15:09:26+00:00", "status": "done",
+        "passed": True, "held_out": [HELD], "hold_out": {HELD: _predicted()}, "traces": traces,
+        "parameters": shared | own, "reduced_chi2": 1.2, "failed_simulations": 3, "simulations": 240, "wall_s": 5421.0,
+        "limits": ["3 cuts say little of the scatter between specimens."],
+        "warnings": ["first: no position and no speed"],
+        "command": ["calibrate", "--config", "cuts.yaml", "--out", "out"],
+        "versions": base["versions"], "git": base["git"], "seed": 0, "device": "cpu", "presses": {},
+    }  # fmt: skip
+
+
+def write_study(folder: Path, **changes: Any) -> Path:
+    """Write the folder, with top-level entries of the summary replaced."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "summary.json").write_text(json.dumps(summary() | changes, indent=1))
+    for name in CUTS:
+        columns = curves(name)
+        table = np.column_stack(list(columns.values()))
+        np.savetxt(
+            folder / f"curves-{name}.csv", table, delimiter=",", header=",".join(columns), comments="", fmt="%.8g"
+        )
+    return folder
+
+
+def _compared(name: str) -> Metrics:
+    columns = curves(name)
+    return compare(STROKE, columns["real_N"], columns["predicted_N" if name == HELD else "sim_N"])
+
+
+def _nulls(name: str) -> dict[str, Any]:
+    found = null_models(STROKE, curves(name)["real_N"])
+    return {
+        n: {"R": m.metrics.iso18571.R, "nrmse": m.metrics.nrmse, "shape_error": m.metrics.shape_error}
+        for n, m in found.items()
+    }
+
+
+def _fitted(name: str) -> dict[str, Any]:
+    return {
+        "trace": {"source": f"{name}.csv", "sha256": "3b5d5c3712955042212316173ccf37be" * 2, "label": "measured"},
+        "in_sample": True, "passed": True, "metrics": _compared(name).as_dict(), "factor": 1.04, "predictive_inside": 1.0,
+        "nuisances": {"tare": {"value": 0.01, "sd": 0.02, "prior_sd": 0.03, "unit": "N", "outside": False},
+                      "scale": {"value": 0.04, "sd": 0.06, "prior_sd": 0.15, "unit": "-", "outside": False}},
+        "null_models": {n: {k: m[k] for k in ("R", "nrmse")} for n, m in _nulls(name).items()},
+        "numerical_checks": [{"name": "half the simulated speed", "reason": None, "peak_change": 0.004, "work_change": -0.002},
+                             {"name": "cells of two thirds", "reason": None, "peak_change": -0.012, "work_change": 0.006}],
+    }  # fmt: skip
+
+
+def _predicted() -> dict[str, Any]:
+    others = {"mean of the others": {"R": 0.91, "nrmse": 0.06, "shape_error": 0.05}}
+    return {
+        "trace": {"source": f"{HELD}.csv", "sha256": "c0ffee00" * 8, "label": "measured"},
+        "trained_on": [name for name in CUTS if name != HELD], "passed": True, "metrics": _compared(HELD).as_dict(),
+        "factor": 0.91, "fitted": {"R_skin": 510.0}, "predictive_inside": 1.0,
+        "limits": {"nrmse": 0.1, "rating": 0.8, "inside": 0.9}, "null_models": _nulls(HELD) | others,
+        "beats": ["ramp", "half_sine"], "simulations": 31,
+    }  # fmt: skip
