@@ -42,6 +42,10 @@ class Aim:
         """Distances from target and prior in standard deviations, (n + p,)."""
         return np.concatenate([(y - self.target) / self.sd, self.parameters.prior_residual(z)])
 
+    def half(self, z: FloatArray, y: FloatArray | None) -> float:
+        """Half chi-square at a point (p,) with its values (n,); infinite without values."""
+        return float("inf") if y is None else 0.5 * float(np.sum(self.residual(z, y) ** 2))
+
     def slope(self, jacobian: FloatArray) -> FloatArray:
         """Derivative of the residual, (n + p, p)."""
         return np.vstack([jacobian / self.sd[:, None], self.parameters.prior_jacobian()])
@@ -76,11 +80,6 @@ class _Place:
     jacobian: FloatArray
     radius: float = field(default=REACH)
 
-    @property
-    def half(self) -> float:
-        """Half chi-square."""
-        return 0.5 * float(np.sum(self.aim.residual(self.z, self.y) ** 2))
-
     def step(self) -> tuple[FloatArray, float]:
         """The best step (p,) within bounds and radius, and the fall of half chi-square that is expected of it."""
         p = self.aim.parameters
@@ -91,7 +90,7 @@ class _Place:
         step = np.zeros_like(self.z)
         if free.any():
             step[free] = lsq_linear(slope[:, free], -residual, (low[free], high[free])).x
-        return step, self.half - 0.5 * float(np.sum((residual + slope @ step) ** 2))
+        return step, self.aim.half(self.z, self.y) - 0.5 * float(np.sum((residual + slope @ step) ** 2))
 
     def learn(self, step: FloatArray, y: FloatArray | None) -> None:
         """Go on to the new point if it is better; the Jacobian takes up what the step showed (Broyden 1965)."""
@@ -101,9 +100,8 @@ class _Place:
         scaled = step / self.aim.parameters.prior_sd**2
         missed = y - self.y - self.jacobian @ step
         self.jacobian = self.jacobian + np.outer(missed, scaled) / float(step @ scaled)
-        new = _Place(self.aim, self.z + step, y, self.jacobian)
-        if new.half < self.half:
-            self.z, self.y, self.radius = new.z, new.y, 2.0 * self.radius
+        if self.aim.half(self.z + step, y) < self.aim.half(self.z, self.y):
+            self.z, self.y, self.radius = self.z + step, y, 2.0 * self.radius
         else:
             self.radius = 0.5 * float(np.max(np.abs(step) / self.aim.parameters.prior_sd))
 

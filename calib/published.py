@@ -112,8 +112,6 @@ class Published:
             raise PublishedError(f"{', '.join(twice)}: is fitted and drawn from its prior; leave it out of one of both")
         if not self.given:
             raise PublishedError("specimens: no number is given, so there is nothing to fit to; move one to 'given'")
-        if not any(cut.predicted for cut in self.cuts):
-            raise PublishedError("specimens: no number is predicted; move one to 'predicted'")
         if len(self.fit) > len(self.given):
             raise PublishedError(
                 f"fit: {len(self.given)} given numbers do not determine {', '.join(self.fit)}; fit at most {len(self.given)}"
@@ -145,6 +143,11 @@ class Published:
         """
         vary = tuple(n for n in dict.fromkeys((*self.vary, *self.fit)) if n not in names)
         return replace(self, fit=names, vary=vary)
+
+    def together(self) -> Published:
+        """The same with all numbers given: whether any values of the fitted properties meet all of them."""
+        cuts = (replace(cut, given=(*cut.given, *cut.predicted), predicted=()) for cut in self.cuts)
+        return replace(self, cuts=tuple(cuts))
 
 
 def load_published(path: Path | str) -> Published:

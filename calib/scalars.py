@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from calib.descent import Aim, Minimum, descent, together
 from calib.errors import PublishedError
 from calib.objective import Evaluation
 from calib.outputs import prepare, write_json
+from calib.parameters import ParameterSet
 from calib.pool import Pool
 from calib.prior import draw
 from calib.properties import rule_of
@@ -34,6 +36,8 @@ FloatArray = npt.NDArray[np.float64]
 Values = Mapping[str, float]
 
 DRAWS = 32
+STRIDE = 1.0  # standard deviations of the prior to either side of a first fit, where further fits start: a peak where the cut begins
+# and one in its middle are two minima
 ROUNDS = 4  # fits, each corrected by the default grid at the end of the one before, at most
 STANDS = 0.005  # change of the corrections below which they stand, in logarithms
 MET = 2.0  # standard deviations within which a given number is met
@@ -54,8 +58,9 @@ class Bench:
         published: The cuts.
         evaluators: By fidelity and name of the cut.
         say: Called with a line after each batch.
-        runs: Simulations that were asked for.
+        runs: Simulations that were asked for, known ones included.
         broken: Those of them that broke down.
+        correction: Logarithm of default over coarse grid, by cut and quantity [-].
     """
 
     published: Published
@@ -64,7 +69,6 @@ class Bench:
     runs: int = 0
     broken: int = 0
     correction: dict[tuple[str, str], float] = field(default_factory=dict)
-    """Logarithm of default over coarse grid, by cut and quantity [-]."""
 
     def cut(self, cut: Cut, batch: Sequence[Values], fidelity: str = COARSE) -> list[dict[str, float] | None]:
         """Logarithms by quantity of each candidate, corrected where the grid is the coarse one; None for a breakdown."""
@@ -179,7 +183,7 @@ def run(
         found = {cut.name: bench.cut(cut, [_values(published, best)], FINE)[0] or {} for cut in published.cuts}
         drawn = band(bench, best, draws, seed)
     document = conclude(published, best, found, drawn)
-    document |= {"draws_asked": draws, "seed": seed, "simulations": bench.runs, "failed_simulations": bench.broken}
+    document |= {"draws_asked": draws, "seed": seed, "evaluations": bench.runs, "failed_evaluations": bench.broken}
     document |= {"dx_m": {name: scene.numerics.dx for name, scene in scenes[FINE].items()}, "device": arch}
     document |= {"cutcal": calib.__version__, "commit": git_commit()}
     write_json(out / "scalars.json", document)
@@ -208,16 +212,17 @@ def fit(bench: Bench) -> Minimum:
         PublishedError: The cut at the start or at the end breaks down.
     """
     published = bench.published
-    parameters = published.fitted
-    z, jacobian = parameters.start, None
+    parameters, aim = published.fitted, _aim(published)
+
+    values = partial(_given, bench, parameters, [{}] * (1 + 2 * len(parameters)))
+    ends = together([descent(aim, parameters.start)], values)
+    strides = STRIDE * np.diag(parameters.prior_sd)
+    ends += together([descent(aim, ends[0].z + stride) for stride in (*strides, *-strides)], values)
     for _ in range(ROUNDS):
-        end = together(
-            [descent(_aim(published), z, jacobian)],
-            lambda asked: bench.given([parameters.to_dict(z) for _, z in asked]),
-        )[0]
-        z, jacobian = end.z, end.jacobian
-        if bench.correct(_values(published, end)) < STANDS:
+        end = min(ends, key=lambda one: aim.half(one.z, one.y))
+        if bench.correct(parameters.to_dict(end.z)) < STANDS:
             break
+        ends = together([descent(aim, end.z, end.jacobian)], values)
     return end
 
 
@@ -238,12 +243,20 @@ def band(bench: Bench, best: Minimum, draws: int, seed: int) -> Drawn:
     sample = qmc.Sobol(len(published.given), scramble=True, seed=seed + 1).random_base2(math.ceil(math.log2(draws)))
     noise = norm.ppf(sample[:draws])
     aims = [_aim(published, row) for row in noise]
-    ends = together(
-        [descent(aim, best.z, best.jacobian) for aim in aims],
-        lambda asked: bench.given([fixed[k] | parameters.to_dict(z) for k, z in asked]),
-    )
-    whole = [k for k, end in enumerate(ends) if end.y is not None]
-    kept = [k for k in whole if np.max(np.abs(ends[k].y - aims[k].target) / aims[k].sd) <= MET]
+    ends: dict[int, Minimum] = {}
+    places = [best.z] * draws
+    for again in (False, True):
+        late = [k for k in range(draws) if not _met(aims[k], ends.get(k))]
+        retried = together(
+            [descent(aims[k], places[k], None if again else best.jacobian) for k in late],
+            partial(_given, bench, parameters, [fixed[k] for k in late]),
+        )
+        for k, end in zip(late, retried, strict=True):
+            if k not in ends or aims[k].half(end.z, end.y) < aims[k].half(ends[k].z, ends[k].y):
+                ends[k] = end
+        places = [parameters.to_vector(x) for x in draw(parameters, draws, seed + 2)]
+    whole = [k for k in range(draws) if ends[k].y is not None]
+    kept = [k for k in whole if _met(aims[k], ends[k])]
     values = [fixed[k] | parameters.to_dict(ends[k].z) for k in kept]
     rows: list[dict[tuple[str, str], float]] = [{} for _ in kept]
     for cut in published.cuts:
@@ -256,6 +269,18 @@ def band(bench: Bench, best: Minimum, draws: int, seed: int) -> Drawn:
         unmet=len(whole) - len(kept),
         broken=draws - len(whole) + len(kept) - len(good),
     )
+
+
+def _given(
+    bench: Bench, parameters: ParameterSet, fixed: Sequence[Values], asked: list[tuple[int, FloatArray]]
+) -> list[FloatArray | None]:
+    """What descents ask for, each with the values that are fixed in it."""
+    return bench.given([{**fixed[k], **parameters.to_dict(z)} for k, z in asked])
+
+
+def _met(aim: Aim, end: Minimum | None) -> bool:
+    """Whether a fit meets all given numbers."""
+    return end is not None and end.y is not None and bool(np.max(np.abs(end.y - aim.target) / aim.sd) <= MET)
 
 
 def conclude(
@@ -321,11 +346,9 @@ def _fullness(cut: Cut, found: Mapping[str, float]) -> dict[str, Any]:
 
 def _parameters(published: Published, best: Minimum, drawn: Drawn) -> dict[str, Any]:
     """Each fitted and drawn property: best value, where the draws that met the given numbers have it, and its prior."""
-    rows = {}
-    for name, x in {n: published.food.value(n) for n in published.vary}.items():
-        rows[name] = {"role": "drawn", "value": x}
-    for name, x in _values(published, best).items():
-        rows[name] = {"role": "fitted", "value": x}
+    fitted = _values(published, best)
+    rows: dict[str, dict[str, Any]] = {n: {"role": "fitted", "value": x} for n, x in fitted.items()}
+    rows |= {n: {"role": "drawn", "value": published.food.value(n)} for n in published.vary}
     for name, row in rows.items():
         draws = [values[name] for values in drawn.values]
         low, high = np.quantile(draws, BAND) if draws else (math.nan, math.nan)

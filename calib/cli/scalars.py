@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from calib.errors import CurveError
+from calib.knives import load_knife
 
 HELP = "fit properties to published peaks and energies of some cuts, and predict those of others"
 DESCRIPTION = """Fit properties (R and mu, or those of the file) to the given numbers of FILE, a
@@ -17,11 +19,11 @@ priors of materials.yaml. Writes scalars.json to --out."""
 EPILOG = """examples:
   cutcal scalars force_data/kachru1995.yaml
   cutcal scalars force_data/kachru1995.yaml --fit R,R_initiation --draws 16
+  cutcal scalars FILE --together --fit R,mu,R_initiation
 
 Ctrl-C keeps what was computed; the same command with --resume goes on.
 Exit codes: 0 the given numbers are met within two of their standard deviations and
 the predicted ones within the limit of the file, 1 error in input or run, 2 not."""
-ROLES = {"given": "given", "predicted": "predicted"}
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
@@ -30,6 +32,8 @@ def add_args(p: argparse.ArgumentParser) -> None:
 
     p.add_argument("file", metavar="FILE", help="YAML file of published numbers (docs/published-scalars.md)")
     p.add_argument("--fit", metavar="NAMES", help="properties to fit, separated by commas, in place of the file's")
+    p.add_argument("--knife", metavar="NAME", help="knife of knives.yaml, or a YAML file, in place of the file's")
+    p.add_argument("--together", action="store_true", help="fit to all numbers: can any values meet all of them?")
     p.add_argument("--draws", type=int, default=32, help="draws from the priors of what is not fitted (default 32)")
     p.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
     p.add_argument("--resume", action="store_true", help="go on with the runs in --out; nothing is simulated twice")
@@ -47,6 +51,10 @@ def run(args: argparse.Namespace) -> int:
     if args.workers < 1 or min(args.draws, args.seed) < 0:
         raise CurveError("--workers must be at least 1, --draws and --seed at least 0")
     published = load_published(args.file)
+    if args.knife is not None:
+        published = replace(published, knife=load_knife(args.knife))
+    if args.together:
+        published = published.together()
     if args.fit is not None:
         published = published.fitting(tuple(name.strip() for name in args.fit.split(",")))
     out = Path(args.out or f"cutcal-scalars-{Path(args.file).stem}")
@@ -89,8 +97,11 @@ def table(document: dict[str, Any]) -> str:
         "",
         f"draws: {draws['met']} met the given numbers, {draws['unmet']} could not, {draws['broke_down']} broke down",
     ]
-    if not document["consistent"]:
+    if document["consistent"]:
+        lines.append("ok   given numbers met within two of their standard deviations")
+    else:
         lines.append("FAIL the given numbers contradict each other: no values within the bounds meet all of them")
-    word = "ok  " if document["predicted"] else "FAIL"
-    lines.append(f"{word} predicted numbers within {document['limit']:.0%}")
+    if any(row["role"] == "predicted" for row in document["numbers"]):
+        word = "ok  " if document["predicted"] else "FAIL"
+        lines.append(f"{word} predicted numbers within {document['limit']:.0%}")
     return "\n".join(lines)
