@@ -16,6 +16,7 @@ from calib.knives import load_knife
 from calib.materials import FoodSpec, load_food, read_property
 from calib.parameters import ParameterSet
 from calib.preparation import fit_parameters
+from calib.properties import DIMENSIONS, Rule
 from calib.scenes import LENGTH_PER_HEIGHT
 from calib.validation import Place, check_keys, choice, mapping, number, read_yaml, text
 from mpm.errors import CutcalError, SceneError
@@ -212,7 +213,7 @@ def _cut(place: Place, name: str, raw: Any) -> Cut:
     given = mapping(place, raw)
     check_keys(place, given, ("shape", "width_m", "height_m"), ("length_m", "given", "predicted"), _SYNONYMS)
     kind = choice(place.at("shape"), given["shape"], SHAPE_KINDS)
-    size = {n: number(place.at(key), given[key]) for n, key in SIZES.items() if key in given}
+    size = {n: _size(place.at(key), given[key], DIMENSIONS[n]) for n, key in SIZES.items() if key in given}
     size.setdefault("length", LENGTH_PER_HEIGHT * size["height"])
     try:
         shape = Shape(kind, **size)
@@ -243,6 +244,14 @@ def _scalars(place: Place, raw: Any) -> tuple[Scalar, ...]:
             text(here.at("source"), one["source"])
         found.append(Scalar(quantity, value, _within(here.at("relative_sd"), one["relative_sd"], LARGEST_SD)))
     return tuple(found)
+
+
+def _size(place: Place, raw: Any, rule: Rule) -> float:
+    """A size of a specimen [m]."""
+    value = number(place, raw)
+    if not rule.low <= value <= rule.high:
+        raise place.error(f"is {value:g} m, but must lie between {rule.low:g} and {rule.high:g} m; write metres")
+    return value
 
 
 def _within(place: Place, raw: Any, high: float) -> float:
