@@ -223,9 +223,9 @@ def document(published, grid=1.0, draws=0):
 
 
 def starting(published, high):
-    """The same with a cut that may start at a force of up to ``high`` [N/m]; 300 N/m, less than R, by default."""
+    """The same with a cut that may start at a force of up to ``high`` [N/m], its prior around less than R."""
     food = published.food
-    start = replace(food.properties["R_initiation"], value=300.0, low=100.0, high=high)
+    start = replace(food.properties["R_initiation"], value=200.0, low=50.0, high=high)
     return replace(published, food=replace(food, properties=dict(food.properties) | {"R_initiation": start}))
 
 
@@ -251,7 +251,7 @@ def test_numbers_that_contradict_each_other_are_told(prism):
     assert alone["numbers"][1]["error"] == pytest.approx(1 / 0.7 - 1, rel=0.02)
     assert not both["consistent"] and not both["passed"]
     assert both["parameters"]["R"]["value"] == pytest.approx(R * math.sqrt(0.7), rel=0.02)
-    blamed = document(replace(starting(wrong, high=3600.0).together(), fit=("R", "R_initiation"), vary=()))
+    blamed = document(replace(starting(wrong, high=1600.0).together(), fit=("R", "R_initiation"), vary=()))
     assert blamed["consistent"], "a start of 1.4 R explains it, and is found from a first minimum without one"
 
 
