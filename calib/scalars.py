@@ -31,6 +31,7 @@ from calib.provenance import code_key, git_commit
 from calib.published import ENERGY, PEAK, QUANTITIES, Cut, Published, Scalar
 from calib.scenes import cut_scene
 from calib.store import CachedEvaluator, EvaluationStore, Header
+from mpm.scene import Scene
 
 FloatArray = npt.NDArray[np.float64]
 Values = Mapping[str, float]
@@ -169,15 +170,7 @@ def run(
         EvaluationStore(out / "evaluations.h5", Header("", "published scalars"), resume=resume) as store,
         Pool(workers, arch) as pool,
     ):
-        evaluators = {
-            fidelity: {
-                name: CachedEvaluator(
-                    pool.evaluator(scene), store, scene=scene.as_dict(), code=code_key(), fidelity=f"{name} {fidelity}"
-                )
-                for name, scene in named.items()
-            }
-            for fidelity, named in scenes.items()
-        }
+        evaluators = {fidelity: _evaluators(named, pool, store, fidelity) for fidelity, named in scenes.items()}
         bench = Bench(published, evaluators, say)
         best = fit(bench)
         found = {cut.name: bench.cut(cut, [_values(published, best)], FINE)[0] or {} for cut in published.cuts}
@@ -188,6 +181,18 @@ def run(
     document |= {"cutcal": calib.__version__, "commit": git_commit()}
     write_json(out / "scalars.json", document)
     return document
+
+
+def _evaluators(
+    scenes: Mapping[str, Scene], pool: Pool, store: EvaluationStore, fidelity: str
+) -> dict[str, CachedEvaluator]:
+    """Evaluators of candidates of each cut's scene, through the store."""
+    return {
+        name: CachedEvaluator(
+            pool.evaluator(scene), store, scene=scene.as_dict(), code=code_key(), fidelity=f"{name} {fidelity}"
+        )
+        for name, scene in scenes.items()
+    }
 
 
 def _values(published: Published, end: Minimum) -> dict[str, float]:

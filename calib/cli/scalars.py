@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -79,11 +80,11 @@ def table(document: dict[str, Any]) -> str:
     """What the terminal shows at the end."""
     lines = [f"{'':18s} {'value':>10s} {'95 % of the draws':>22s} {'prior':>22s}"]
     for name, row in document["parameters"].items():
-        span, prior = (f"{row[a]:.3g} to {row[b]:.3g}" for a, b in (("low95", "high95"), ("prior_low", "prior_high")))
+        span, prior = (_span(row[a], row[b]) for a, b in (("low95", "high95"), ("prior_low", "prior_high")))
         lines.append(f"{name:18s} {row['value']:10.4g} {span:>22s} {prior:>22s}  {row['unit']}, {row['role']}")
     lines += ["", f"{'':18s} {'':12s} {'published':>10s} {'simulated':>10s} {'error':>8s} {'95 % of the draws':>22s}"]
     for row in document["numbers"]:
-        span = f"{row['low95']:.3g} to {row['high95']:.3g}"
+        span = _span(row["low95"], row["high95"])
         lines.append(
             f"{row['specimen']:18s} {row['quantity']:12s} {row['published']:10.4g} {row['simulated']:10.4g} "
             f"{row['error']:+8.1%} {span:>22s}  {row['role']}"
@@ -105,3 +106,8 @@ def table(document: dict[str, Any]) -> str:
         word = "ok  " if document["predicted"] else "FAIL"
         lines.append(f"{word} predicted numbers within {document['limit']:.0%}")
     return "\n".join(lines)
+
+
+def _span(low: float, high: float) -> str:
+    """Two ends; a dash where there are none."""
+    return "-" if math.isnan(low) else f"{low:.3g} to {high:.3g}"
