@@ -32,15 +32,19 @@ class Aim:
         parameters: Coordinates, bounds and priors.
         target: Values (n,).
         sd: Their standard deviations (n,).
+        centre: Centre of the priors (p,), None for their own.
     """
 
     parameters: ParameterSet
     target: FloatArray
     sd: FloatArray
+    centre: FloatArray | None = None
 
     def residual(self, z: FloatArray, y: FloatArray) -> FloatArray:
         """Distances from target and prior in standard deviations, (n + p,)."""
-        return np.concatenate([(y - self.target) / self.sd, self.parameters.prior_residual(z)])
+        p = self.parameters
+        centre = p.prior_mean if self.centre is None else self.centre
+        return np.concatenate([(y - self.target) / self.sd, (z - centre) / p.prior_sd])
 
     def half(self, z: FloatArray, y: FloatArray | None) -> float:
         """Half chi-square at a point (p,) with its values (n,); infinite without values."""

@@ -2,7 +2,9 @@
 
 The fit runs on the coarse grid that a calibration screens with; a run on the default grid at its end corrects each number, and
 the fit goes on until that correction stands. What is not fitted is drawn from its prior for the band: for each draw the fit is
-made again, to given numbers that are scattered by their own uncertainty, and draws that cannot meet these are left out.
+made again, to given numbers that are scattered by their own uncertainty and with priors centred on a draw from them, so that what
+the numbers leave open stays open (randomised maximum likelihood: Oliver, He and Reynolds 1996). Draws that cannot meet the numbers are
+left out.
 """
 
 from __future__ import annotations
@@ -203,11 +205,11 @@ def _shown(values: Values) -> str:
     return ", ".join(f"{name} = {x:.4g} {rule_of(name).unit}" for name, x in values.items())
 
 
-def _aim(published: Published, noise: FloatArray | None = None) -> Aim:
-    """The given numbers, scattered by ``noise`` (n,) standard deviations."""
+def _aim(published: Published, noise: FloatArray | None = None, centre: FloatArray | None = None) -> Aim:
+    """The given numbers, scattered by ``noise`` (n,) standard deviations, with priors about ``centre`` (p,)."""
     target = np.array([math.log(scalar.value) for _, scalar in published.given])
     sd = np.array([scalar.relative_sd for _, scalar in published.given])
-    return Aim(published.fitted, target if noise is None else target + noise * sd, sd)
+    return Aim(published.fitted, target if noise is None else target + noise * sd, sd, centre)
 
 
 def fit(bench: Bench) -> Minimum:
@@ -247,7 +249,8 @@ def band(bench: Bench, best: Minimum, draws: int, seed: int) -> Drawn:
     fixed: list[dict[str, float]] = draw(varied, draws, seed) if varied is not None else [{}] * draws
     sample = qmc.Sobol(len(published.given), scramble=True, seed=seed + 1).random_base2(math.ceil(math.log2(draws)))
     noise = norm.ppf(sample[:draws])
-    aims = [_aim(published, row) for row in noise]
+    centres = [parameters.to_vector(x) for x in draw(parameters, draws, seed + 2)]
+    aims = [_aim(published, *both) for both in zip(noise, centres, strict=True)]
     ends: dict[int, Minimum] = {}
     places = [best.z] * draws
     for again in (False, True):
@@ -259,7 +262,7 @@ def band(bench: Bench, best: Minimum, draws: int, seed: int) -> Drawn:
         for k, end in zip(late, retried, strict=True):
             if k not in ends or aims[k].half(end.z, end.y) < aims[k].half(ends[k].z, ends[k].y):
                 ends[k] = end
-        places = [parameters.to_vector(x) for x in draw(parameters, draws, seed + 2)]
+        places = centres
     whole = [k for k in range(draws) if ends[k].y is not None]
     kept = [k for k in whole if _met(aims[k], ends[k])]
     values = [fixed[k] | parameters.to_dict(ends[k].z) for k in kept]

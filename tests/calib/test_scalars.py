@@ -268,6 +268,23 @@ def test_band_is_of_what_is_drawn_and_of_the_given_numbers(prism):
     assert row["high95"] == pytest.approx(R, rel=0.1)
 
 
+def test_band_keeps_open_what_the_numbers_leave_open(prism):
+    """Peak and energy are both R (1 + mu): its band is that of the numbers, and mu keeps the width of its prior."""
+    published = load_published(prism).together()
+    food = published.food
+    mu = replace(food.properties["mu"], value=0.3, low=0.1, high=0.5)
+    wide = replace(
+        published, food=replace(food, properties=dict(food.properties) | {"mu": mu}), fit=("R", "mu"), vary=()
+    )
+    where = bench(wide)
+    best = fit(where)
+    drawn = band(where, best, 64, 0)
+    values = np.array([[v["R"] * (1 + v["mu"]), v["mu"]] for v in drawn.values])
+    assert len(values) > 60
+    assert values[:, 0].std() / values[:, 0].mean() == pytest.approx(0.02 / math.sqrt(2), rel=0.3)
+    assert values[:, 1].std() == pytest.approx(0.4 / (2 * 1.96), rel=0.2)
+
+
 # The command --------------------------------------------------------------------------------------
 
 
