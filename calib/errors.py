@@ -17,6 +17,10 @@ class MaterialError(CutcalError):
     """A food or a material property that is unknown, incomplete or out of its range."""
 
 
+class PublishedError(CutcalError):
+    """A file of published numbers that is incomplete, contradicts itself or cannot be fitted as asked."""
+
+
 class OutputError(CutcalError):
     """An output folder or file that cannot be written, or that belongs to another calibration."""
 

@@ -289,16 +289,26 @@ def _read_food(place: Place, raw: Any) -> FoodSpec:
     given = mapping(place.at("properties"), food["properties"])
     check_keys(place.at("shape"), shape, ("kind", *DIMENSIONS), synonyms=SYNONYMS)
     check_keys(place.at("properties"), given, PROPERTIES, synonyms=SYNONYMS)
-    dims = {n: _read_property(place.at("shape"), n, shape[n]) for n in DIMENSIONS}
+    dims = {n: read_property(place.at("shape"), n, shape[n]) for n in DIMENSIONS}
     have = [n for n in PROPERTIES if given[n] is not None or n not in _NULLABLE]
-    properties = {n: _read_property(place.at("properties"), n, given[n]) for n in have}
+    properties = {n: read_property(place.at("properties"), n, given[n]) for n in have}
     try:
         return FoodSpec(place.path[-1], shape["kind"], dims, properties, not_modelled=said)
     except MaterialError as e:
         raise replace(place, path=()).error(str(e)) from None
 
 
-def _read_property(parent: Place, name: str, raw: Any) -> Property:
+def read_property(parent: Place, name: str, raw: Any) -> Property:
+    """A property in the layout of ``materials.yaml``.
+
+    Args:
+        parent: The place that it stands in, for errors.
+        name: Its name.
+        raw: What YAML has there.
+
+    Raises:
+        CutcalError: Of the class of ``parent``: unknown name or key, wrong unit or status, a number out of its limits.
+    """
     place = parent.at(name)
     given = mapping(place, raw)
     check_keys(place, given, REQUIRED, OPTIONAL)

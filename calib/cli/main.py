@@ -17,6 +17,7 @@ from calib.cli import (
     predict,
     prior,
     report,
+    scalars,
     simulate,
     stress,
     verify,
@@ -36,6 +37,7 @@ COMMANDS = {
     "report": report,
     "foods": foods,
     "prior": prior,
+    "scalars": scalars,
 }
 INTERRUPTED = 130  # what a shell reports for a program ended by Ctrl-C
 

@@ -131,7 +131,7 @@ def test_numbers_are_checked_by_the_parser(value, capsys):
 
 def test_help_fits_a_screen_and_shows_an_example(capsys):
     """The help of each command has an example and at most 80 lines."""
-    for command in ("calibrate", "compress", "simulate", "report", "foods", "prior"):
+    for command in ("calibrate", "compress", "simulate", "report", "foods", "prior", "scalars"):
         with pytest.raises(SystemExit):
             main([command, "--help"])
         text = capsys.readouterr().out
