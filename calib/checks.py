@@ -25,6 +25,11 @@ def _finer(scene: Scene) -> Scene:
     return replace(scene, numerics=replace(scene.numerics, dx=FINER * scene.numerics.dx))
 
 
+def otherwise(scene: Scene) -> Scene:
+    """The scene at half the speed, with other particles and the grid elsewhere: what an answer should not depend on."""
+    return elsewhere(_slower(scene), 2)
+
+
 VARIANTS: Mapping[str, Callable[[Scene], Scene]] = {
     "half the simulated speed": _slower,
     "grid and particles elsewhere": lambda scene: elsewhere(scene, 1),

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from calib.checks import otherwise
 from calib.doubt import doubt_of
 from calib.errors import OutputError
 from calib.fit import FitOptions, calibrate
@@ -173,15 +174,16 @@ def _one(
             CachedEvaluator(
                 pool.evaluator(scene, setup.kept), store, scene=scene.as_dict(), code=code_key(), fidelity=name
             )
-            for name, scene in (("fine", setup.fine), ("coarse", setup.coarse))
+            for name, scene in (("fine", setup.fine), ("coarse", setup.coarse), ("again", otherwise(setup.fine)))
         ]
         options = FitOptions(budget=request.budget, batch=pool.workers, seed=k)
-        result = calibrate(setup.objective, evaluators[0], coarse=evaluators[1], options=options)
+        fine, coarse, again = evaluators
+        result = calibrate(setup.objective, fine, coarse=coarse, replicate=again, options=options)
     except CutcalError as e:
         return row | {"error": str(e)}
     if result.status == "interrupted":
         raise KeyboardInterrupt
-    doubt = doubt_of(setup.objective, result, scout=evaluators[1], seed=k)
+    doubt = doubt_of(setup.objective, result, scout=coarse, seed=k)
     if doubt is None:
         return row | {"error": "the search ended before there were intervals"}
     return row | {

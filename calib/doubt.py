@@ -21,7 +21,7 @@ from calib.uncertainty import Uncertainty, evidence, uncertainty
 
 FloatArray = npt.NDArray[np.float64]
 
-ROUNDS = 2
+ROUNDS = 1
 """How often the ends that the profiles claim are simulated and the profiles walked again."""
 CLOSE = 0.05
 

@@ -59,19 +59,13 @@ class Profile:
     points: FloatArray
 
     def frontier(self) -> list[FloatArray]:
-        """Points (p,) at which an end of the interval, or a bound that the trace alone sets, is claimed or missed.
-
-        To the others' optimum, which is the surrogate's word, comes the point where they have their best values.
-        """
+        """Points (p,), one on each side, where the trace alone is claimed to end the parameter, or where the walk ended without."""
         best = int(np.argmin(np.abs(self.z - self.best)))
-        found: list[FloatArray] = []
-        for side in (range(best, -1, -1), range(best, len(self.z))):
-            ends = [next((k for k in side if rise[k] >= RISE), side[-1]) for rise in (self.rise, self.data)]
-            for k in dict.fromkeys(ends):
-                if k != best:
-                    beside = np.where(self.points[k] == self.z[k], self.points[k], self.points[best])
-                    found += [self.points[k], beside]
-        return found
+        ends = [
+            next((k for k in side if self.data[k] >= RISE), side[-1])
+            for side in (range(best, -1, -1), range(best, len(self.z)))
+        ]
+        return [self.points[k] for k in ends if k != best]
 
     def end(self, side: int, rise: FloatArray) -> float | None:
         """Internal coordinate where ``rise`` reaches :data:`RISE` below (-1) or above (+1) the best value, None if never."""

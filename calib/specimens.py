@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from calib.checks import otherwise
 from calib.compression import UnitCurve, area, fit, homogeneous, read_repeats, strain_grid
 from calib.config import Press, Study
 from calib.doubt import Doubt, doubt_of
@@ -167,13 +168,18 @@ class Specimens:
         }
         present = {p.name for o in objectives.values() for p in o.parameters}
         joint = JointObjective.of(objectives, sorted(present - set(self.study.own)))
-        fine, coarse = (
+        fine, coarse, again = (
             JointEvaluator(joint, [self.evaluator(scene(s), name, fidelity) for name, s in setups.items()])
-            for fidelity, scene in (("fine", lambda s: s.fine), ("coarse", lambda s: s.coarse))
+            for fidelity, scene in (
+                ("fine", lambda s: s.fine),
+                ("coarse", lambda s: s.coarse),
+                ("again", lambda s: otherwise(s.fine)),
+            )
         )
         options = FitOptions(budget=self.study.budget, batch=self.pool.workers, seed=self.study.seed)
         words = f"fit of {', '.join(names)}"
-        result = calibrate(joint, fine, coarse=coarse, options=options, progress=self.staged(words))
+        staged = self.staged(words)
+        result = calibrate(joint, fine, coarse=coarse, replicate=again, options=options, progress=staged)
         if result.status == "interrupted":
             raise KeyboardInterrupt
         return Fitted(

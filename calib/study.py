@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from calib.checks import Check, check
+from calib.checks import Check, check, otherwise
 from calib.conditioning import Conditioned
 from calib.doubt import Doubt, doubt_of
 from calib.filters import filter_simulated
@@ -67,7 +67,7 @@ def run(
     prepare(out, resume=resume)
     header = Header(setup.curve.trace.sha256, key_of(setup.fine.as_dict()))
     with EvaluationStore(out / "evaluations.h5", header, resume=resume) as store:
-        fine, coarse = (
+        fine, coarse, again = (
             CachedEvaluator(
                 pool.evaluator(scene, setup.kept),
                 store,
@@ -75,9 +75,9 @@ def run(
                 code=code_key(),
                 fidelity=name,
             )
-            for name, scene in (("fine", setup.fine), ("coarse", setup.coarse))
+            for name, scene in (("fine", setup.fine), ("coarse", setup.coarse), ("again", otherwise(setup.fine)))
         )
-        result = calibrate(setup.objective, fine, coarse=coarse, options=options, progress=progress)
+        result = calibrate(setup.objective, fine, coarse=coarse, replicate=again, options=options, progress=progress)
         doubt = doubt_of(setup.objective, result, scout=coarse, seed=request.seed, sample=request.sample, say=say)
         if doubt is not None:
             result = replace(result, history=(*result.history, *doubt.runs))

@@ -210,6 +210,12 @@ class Surrogate:
         """Largest standard deviation of one simulated curve about its process, part of the peak [-]."""
         return max(process.noise for process in self.each)
 
+    @property
+    def luck(self) -> float:
+        """Chi-square of the difference that the noise of one simulated curve makes, all traces together [-]."""
+        parts = zip(self.each, (c.objective for c in self.objective.cases), strict=True)
+        return math.fsum(goal.effective_points * (p.noise * p.peak / goal.sigma) ** 2 for p, goal in parts)
+
     def _predicted(self, z: FloatArray) -> list[tuple[FloatArray, float, float]]:
         cases = self.objective.cases
         return [process.predict(z[c.index]) for process, c in zip(self.each, cases, strict=True)]

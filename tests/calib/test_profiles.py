@@ -61,7 +61,7 @@ def one_sided() -> tuple[Objective, FitResult, Doubt]:
     curve = np.interp(GRID, STROKE, elastic(truth))
     objective = Objective(Target(GRID, curve, 0.05, 0.05, np.interp), ONE_SIDED)
     simulator = Fake(elastic, noisy=0.004)
-    result = calibrate(objective, simulator, options=FitOptions(budget=60))
+    result = calibrate(objective, simulator, options=FitOptions(budget=60, design=15))
     doubt = doubt_of(objective, result, scout=simulator)
     assert doubt is not None
     return objective, result, doubt
