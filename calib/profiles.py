@@ -59,13 +59,17 @@ class Profile:
     points: FloatArray
 
     def frontier(self) -> list[FloatArray]:
-        """Points (p,), one on each side, where the trace alone is claimed to end the parameter, or where the walk ended without."""
+        """Points (p,) where the trace alone is claimed to end the parameter, or where the walk ended without, on both sides.
+
+        On each side two: at the others' optimum, which is the surrogate's word, and with the others at their best values.
+        """
         best = int(np.argmin(np.abs(self.z - self.best)))
-        ends = [
-            next((k for k in side if self.data[k] >= RISE), side[-1])
-            for side in (range(best, -1, -1), range(best, len(self.z)))
-        ]
-        return [self.points[k] for k in ends if k != best]
+        found: list[FloatArray] = []
+        for side in (range(best, -1, -1), range(best, len(self.z))):
+            k = next((k for k in side if self.data[k] >= RISE), side[-1])
+            if k != best:
+                found += [self.points[k], np.where(self.points[k] == self.z[k], self.points[k], self.points[best])]
+        return found
 
     def end(self, side: int, rise: FloatArray) -> float | None:
         """Internal coordinate where ``rise`` reaches :data:`RISE` below (-1) or above (+1) the best value, None if never."""
