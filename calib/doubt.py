@@ -84,7 +84,7 @@ def doubt_of(
             )
             if not asked:
                 break
-            say(f"simulating {len(asked)} ends of intervals on coarse cells")
+            say(f"intervals: {len(asked)} of their ends on coarse cells")
             runs += _run(objective, scout, asked)
             surrogate = Surrogate(objective, runs, result.best, surrogate.hyper)
             jacobian = surrogate.jacobian(result.best.z)

@@ -18,8 +18,8 @@ import pytest
 import calib
 from calib import Calibration, Food, Trace
 from calib.materials import FoodSpec, load_food
+from calib.preparation import conditioned
 from calib.request import Request
-from calib.study import conditioned
 from mpm.errors import CutcalError
 from tests.data_dir import ROOT
 
