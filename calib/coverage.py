@@ -43,7 +43,9 @@ MIDDLE = 0.8
 TRIES = 8
 """Truths drawn until one's cut reaches the end of its stroke."""
 COVERED = (0.90, 0.99)
-"""Part of the intervals that must hold the truth, where they are 95 % intervals and there are a hundred."""
+"""Part of the intervals that must hold the truth, where they are 95 % intervals. The upper limit needs a hundred of them: of 25, all
+hold it in one study of four that is right."""
+HUNDRED = 100
 MEDIAN = 0.10
 """Largest median error of a parameter that is called identified [-]."""
 FEWEST = 20
@@ -228,7 +230,9 @@ def summarise(rows: list[dict[str, Any]]) -> dict[str, Any]:
     by_name = {name: _parameter(sound, name) for name in names}
     judged = [p for p in by_name.values() if p["identified"] >= FEWEST]
     passed = bool(judged) and all(
-        COVERED[0] <= p["covered_identified"] <= 1.0 and p["median_error_identified"] <= MEDIAN for p in judged
+        COVERED[0] <= p["covered_identified"] <= (COVERED[1] if p["identified"] >= HUNDRED else 1.0)
+        and p["median_error_identified"] <= MEDIAN
+        for p in judged
     )
     return {
         "traces": len(rows),

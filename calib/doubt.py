@@ -24,6 +24,7 @@ FloatArray = npt.NDArray[np.float64]
 ROUNDS = 1
 """How often the ends that the profiles claim are simulated and the profiles walked again."""
 CLOSE = 0.05
+"""Points this near to a run, in prior standard deviations of every parameter, are not run."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +97,7 @@ def doubt_of(
 
 
 def _new(objective: Objective | JointObjective, points: list[FloatArray], runs: list[Trial]) -> list[FloatArray]:
-    """Points that are not close to each other or to a run: further than a twentieth of a prior standard deviation."""
+    """Points that are not close to each other or to a run."""
     sd = objective.parameters.prior_sd
     chosen: list[FloatArray] = []
     for z in points:

@@ -16,11 +16,12 @@ from calib.filters import filter_simulated
 from calib.fit import FitOptions, calibrate
 from calib.metrics import Metrics, compare
 from calib.nulls import null_models
-from calib.objective import Objective
+from calib.objective import Evaluation, Objective
 from calib.parameters import ParameterSet
 from calib.prediction import NRMSE_LIMIT, RATING_LIMIT
 from calib.predictive import Band, band_of, errors
 from calib.specimens import Fitted, Specimens
+from calib.verdicts import Verdict, balances
 from mpm.errors import SimulationError
 
 FloatArray = np.ndarray
@@ -50,6 +51,7 @@ class Prediction:
         nulls: Curves that explain nothing against it, by name.
         band: 95 % band.
         simulations: Number of simulations.
+        balances: Momentum and kinetic energy of the predicted cut.
     """
 
     name: str
@@ -62,11 +64,14 @@ class Prediction:
     nulls: dict[str, Metrics]
     band: Band
     simulations: int
+    balances: tuple[Verdict, ...]
 
     @property
     def passed(self) -> bool:
-        """Whether curve, rating and band are within their limits."""
+        """Whether curve, rating and band are within their limits, and the simulation's balances close."""
         m = self.metrics
+        if any(v.passed is False for v in self.balances):
+            return False
         return m.nrmse <= NRMSE_LIMIT and m.iso18571.R >= RATING_LIMIT and self.band.inside >= INSIDE_LIMIT
 
     @property
@@ -90,6 +95,7 @@ class Prediction:
             },
             "beats": list(self.beaten),
             "simulations": self.simulations,
+            "verdicts": [v.as_dict() for v in self.balances],
         }
 
 
@@ -104,14 +110,15 @@ def predict(specimens: Specimens, fitted: Fitted, name: str) -> Prediction:
     best, count = _specimen(specimens, fitted.flesh(), name)
     values = {**fitted.flesh(), **best}
     drawn = _drawn(fitted, specimens.study.seed)
-    curves = _curves(specimens, name, [values, *({**flesh, **best} for flesh in drawn)])
-    own_curve = curves[0]
-    if own_curve is None:
+    runs = _runs(specimens, name, [values, *({**flesh, **best} for flesh in drawn)])
+    if not runs[0].ok:
         raise SimulationError(
             f"{name}: the predicted cut did not reach the end of its stroke with {values}; give its height if you measured it",
             reason="held out",
             fraction=0.0,
         )
+    own_curve, *curves = (filter_simulated(goal.target.stroke, e.stroke, e.force) for e in runs if e.ok)
+    scalars = runs[0].scalars
     k = goal.factor(own_curve)
     real, stroke = goal.target.curve, goal.target.stroke
     nulls = {n: m.metrics for n, m in null_models(stroke, real).items()}
@@ -125,8 +132,9 @@ def predict(specimens: Specimens, fitted: Fitted, name: str) -> Prediction:
         factor=k,
         metrics=compare(stroke, real, k * own_curve),
         nulls=nulls,
-        band=_band(goal, [c for c in curves if c is not None], fitted, specimens.study.seed),
-        simulations=count + len(curves),
+        band=_band(goal, [own_curve, *curves], fitted, specimens.study.seed),
+        simulations=count + len(runs),
+        balances=tuple(balances(scalars["momentum_residual"], scalars["ke_over_ie"])),
     )
 
 
@@ -149,14 +157,9 @@ def _specimen(specimens: Specimens, flesh: Mapping[str, float], name: str) -> tu
     return dict(result.best.evaluation.parameters), len(result.history)
 
 
-def _curves(specimens: Specimens, name: str, batch: list[dict[str, float]]) -> list[FloatArray | None]:
-    """Smoothed force of simulations on the trace's stroke [N]; None for one that broke down."""
-    setup = specimens.setups[name]
-    out: list[FloatArray | None] = [None] * len(batch)
-    for e in specimens.evaluator(setup.fine, name, "fine").evaluate(batch):
-        if e.ok:
-            out[e.index] = filter_simulated(setup.curve.stroke, e.stroke, e.force)
-    return out
+def _runs(specimens: Specimens, name: str, batch: list[dict[str, float]]) -> list[Evaluation]:
+    """Simulations of a trace's cut, in their order."""
+    return sorted(specimens.evaluator(specimens.setups[name].fine, name, "fine").evaluate(batch), key=lambda e: e.index)
 
 
 def _drawn(fitted: Fitted, seed: int) -> list[dict[str, float]]:

@@ -24,8 +24,8 @@ from calib.errors import TraceError
 
 FloatArray = npt.NDArray[np.float64]
 
-#: Relative standard deviation of the gain of a calibrated force sensor: the class limit of a commercial
-#: force/torque cell after its own calibration; a gain fitted beyond three of them fails.
+#: Relative standard deviation of the gain of a calibrated force sensor, where nothing is said of it.  Assumed: no source was found
+#: that holds for all; give --gain-sd from the sensor's own calibration.
 GAIN_SD = 0.02
 #: The same for a wrench that a robot estimates from its joint torques: masses hung on such an arm in three poses read 1, 17
 #: and 25 % too little, presses on a scale 6 and 8 % too much (panda-force, static calibration), which is 0.15 about their mean.

@@ -301,7 +301,7 @@ class Objective:
         """Length of :meth:`data_residual`: grid points, peak, factor where there is one, failure."""
         return self.target.stroke.size + 2 + (self.scale_sd > 0.0)
 
-    @property
+    @cached_property
     def failure_weight(self) -> float:
         """Penalty P of a run that computed nothing: the misfit of predicting no force at all [-]."""
         return float(np.linalg.norm(self._whiten(self._bare(np.zeros_like(self.target.curve)))))
@@ -369,7 +369,7 @@ class Objective:
         return math.exp(log)
 
     def unsearched(self) -> FloatArray:
-        """Residual by one standard deviation of each nuisance that the search may not use (n + 2, k)."""
+        """Residual by one standard deviation of each nuisance that the search may not use (data_rows, k)."""
         columns = self._columns([n for n in self.nuisances if not n.searched])
         return np.vstack([self._whiten(columns), np.zeros((self.data_rows - len(columns), columns.shape[1]))])
 

@@ -23,7 +23,7 @@ from scipy.optimize import least_squares
 
 from calib.parameters import Z95, Parameter, ParameterSet
 from calib.posterior import Posterior
-from calib.surrogate import Surrogate
+from calib.surrogate import STEP, Surrogate
 from calib.uncertainty import IDENTIFIED, NOT_SEEN, Interval, Uncertainty, Verdict
 
 FloatArray = npt.NDArray[np.float64]
@@ -50,6 +50,7 @@ class Profile:
         rise: Rise of the whole chi-square above its least (k,).
         data: Rise without the parameter's own prior (k,).
         points: Internal coordinates of all parameters along it (k, p).
+        index: Place of the parameter among them.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Profile:
     rise: FloatArray
     data: FloatArray
     points: FloatArray
+    index: int
 
     def frontier(self) -> list[FloatArray]:
         """Points (p,) where the trace alone is claimed to end the parameter, or where the walk ended without, on both sides.
@@ -68,7 +70,9 @@ class Profile:
         for side in (range(best, -1, -1), range(best, len(self.z))):
             k = next((k for k in side if self.data[k] >= RISE), side[-1])
             if k != best:
-                found += [self.points[k], np.where(self.points[k] == self.z[k], self.points[k], self.points[best])]
+                beside = self.points[best].copy()
+                beside[self.index] = self.z[k]
+                found += [self.points[k], beside]
         return found
 
     def end(self, side: int, rise: FloatArray) -> float | None:
@@ -161,7 +165,7 @@ class _Walker:
         prior = (along - self.parameters.prior_mean[self.i]) ** 2 / self.parameters.prior_sd[self.i] ** 2
         alone = np.maximum(alone - alone.min() - feigned, 0.0)
         whole = np.maximum(alone + prior - (alone + prior).min(), 0.0)
-        return Profile(self.parameters.names[self.i], along, whole, alone, np.array([points[k] for k in order]))
+        return Profile(self.parameters.names[self.i], along, whole, alone, np.array([points[k] for k in order]), self.i)
 
     def cost(self, z: FloatArray) -> tuple[float, float]:
         """Chi-square with all priors, and without this parameter's own."""
@@ -180,17 +184,13 @@ class _Walker:
 
     def one_run(self) -> float:
         """Chi-square of the difference that the noise of one simulated curve makes [-]."""
-        parts = zip(self.surrogate.each, self.surrogate.objective.cases, self.found.data.lengths, strict=True)
-        sizes = [
-            (process.noise * process.peak / case.objective.sigma) ** 2 / (length * self.found.widened)
-            for process, case, length in parts
-        ]
-        return math.fsum(sizes)
+        parts = zip(self.surrogate.each, self.found.data.lengths, strict=True)
+        return math.fsum(process.luck / (length * self.found.widened) for process, length in parts)
 
     @property
     def steps(self) -> FloatArray:
         """Small steps along each parameter (p, p), diagonal."""
-        return np.diag(1e-3 * self.surrogate.unit)
+        return np.diag(STEP * self.surrogate.unit)
 
 
 def with_profiles(found: Uncertainty, walked: Sequence[Profile]) -> Uncertainty:

@@ -14,7 +14,7 @@ from calib.conditioning import Conditioned
 from calib.config import Study
 from calib.heldout import Prediction, predict
 from calib.materials import FoodSpec, dump_material
-from calib.metrics import Metrics, compare
+from calib.metrics import compare
 from calib.nulls import null_models
 from calib.outputs import prepare, write_csv, write_json
 from calib.parameters import plain
@@ -24,7 +24,7 @@ from calib.request import Setup
 from calib.scenes import place
 from calib.specimens import Fitted, Specimens, pressed, set_ups
 from calib.store import EvaluationStore, Header
-from calib.verdicts import CHANGE_LIMIT, NRMSE_LIMIT, PEAK_LIMIT, SHAPE_LIMIT
+from calib.verdicts import agreement, balances, changes
 from calib.workers import Workers
 
 
@@ -167,19 +167,20 @@ def _trace(setup: Setup, fitted: Fitted, name: str, checks: list[Check]) -> dict
     trial, curve = fitted.result.best.each[k], setup.curve
     scale = setup.objective.factor(trial.curve)
     metrics = compare(curve.stroke, curve.curve, scale * trial.curve)
-    changes = {c.name: c.change for c in checks}
-    steady = all(change is not None and change <= CHANGE_LIMIT for change in changes.values())
+    scalars = trial.evaluation.scalars
+    lines = [*agreement(metrics), *balances(scalars["momentum_residual"], scalars["ke_over_ie"]), *changes(checks)]
     return {
         "trace": _source(setup),
         "in_sample": True,
-        "passed": _agrees(metrics) and steady,
+        "passed": all(v.passed is not False for v in lines),
+        "verdicts": [v.as_dict() for v in lines],
         "metrics": metrics.as_dict(),
         "factor": scale,
         "nuisances": {e.name: e.as_dict() for e in setup.objective.nuisance_estimates(trial.curve)},
         "predictive_inside": None if fitted.doubt is None else fitted.doubt.bands[k].inside,
         "null_models": {n: {"R": m.metrics.iso18571.R, "nrmse": m.metrics.nrmse} for n, m in _nulls(curve).items()},
         "numerical_checks": [c.as_dict() for c in checks],
-        "scalars": trial.evaluation.scalars,
+        "scalars": scalars,
         "values": fitted.values(name),
         "dx_m": setup.fine.numerics.dx,
         "knife": setup.fine.knife.name,
@@ -193,10 +194,6 @@ def _source(setup: Setup) -> dict[str, str]:
 
 def _nulls(curve: Conditioned) -> dict[str, Any]:
     return dict(null_models(curve.stroke, curve.curve))
-
-
-def _agrees(m: Metrics) -> bool:
-    return abs(m.peak_error) <= PEAK_LIMIT and m.nrmse <= NRMSE_LIMIT and m.shape_error <= SHAPE_LIMIT
 
 
 def _parameters(study: Study, fitted: Fitted) -> dict[str, Any]:

@@ -203,9 +203,9 @@ def _runs(result: FitResult) -> dict[str, Any]:
             best = trial.misfit
         if math.isfinite(best):
             history.append([number, best])
-    failed = [t.evaluation for t in result.history if not t.ok]
+    failed = [t.evaluation for t in (*result.history, *result.replicates) if not t.ok]
     return {
-        "simulations": len(result.history),
+        "simulations": result.simulations + result.coarse_simulations,
         "fine_simulations": result.simulations,
         "coarse_simulations": result.coarse_simulations,
         "failed_simulations": len(failed),

@@ -89,6 +89,12 @@ class CurveProcess:
         """Standard deviation of one simulated curve about the process, part of the peak [-]."""
         return math.exp(self.hyper[-1])
 
+    @property
+    def luck(self) -> float:
+        """Chi-square that the noise of one simulated curve makes in an independent point [-]."""
+        goal = self.objective
+        return (goal.factor(self.best.curve) * self.noise * self.peak / goal.sigma) ** 2
+
     def _scale(self, z: FloatArray) -> float:
         return float(self._law @ (z - self.best.z))
 
@@ -213,8 +219,7 @@ class Surrogate:
     @property
     def luck(self) -> float:
         """Chi-square of the difference that the noise of one simulated curve makes, all traces together [-]."""
-        parts = zip(self.each, (c.objective for c in self.objective.cases), strict=True)
-        return math.fsum(goal.effective_points * (p.noise * p.peak / goal.sigma) ** 2 for p, goal in parts)
+        return math.fsum(p.luck * p.objective.effective_points for p in self.each)
 
     def _predicted(self, z: FloatArray) -> list[tuple[FloatArray, float, float]]:
         cases = self.objective.cases

@@ -46,6 +46,11 @@ def _below(name: str, value: float, limit: float, unit: str = "fraction", note: 
     return Verdict(name, value, limit, unit, bool(abs(value) <= limit), note)
 
 
+def changes(checks: Sequence[Check]) -> list[Verdict]:
+    """Lines of what numerical choices change."""
+    return [_change(c) for c in checks]
+
+
 def _change(check: Check) -> Verdict:
     change = check.change
     if change is None:
@@ -99,6 +104,28 @@ def _loss(energy: Mapping[str, float]) -> Verdict:
     return _below(name, part, LOSS_LIMIT, note="of the work; " + spent(energy))
 
 
+def balances(momentum_residual: float, ke_over_ie: float) -> list[Verdict]:
+    """Lines of the balances that every evaluation keeps: momentum, and kinetic energy.
+
+    Args:
+        momentum_residual: Momentum balance that does not close, part of the peak [-].
+        ke_over_ie: Kinetic over internal energy [-].
+    """
+    return [
+        _below("momentum balance residual", momentum_residual, MOMENTUM_LIMIT, note="part of the peak force"),
+        _below("kinetic over internal energy", ke_over_ie, KINETIC_LIMIT),
+    ]
+
+
+def agreement(metrics: Metrics) -> list[Verdict]:
+    """Lines of the agreement with the trace: peak, curve, shape."""
+    return [
+        _below("peak force error", metrics.peak_error, PEAK_LIMIT),
+        _below("curve error (NRMSE)", metrics.nrmse, NRMSE_LIMIT),
+        _below("normalised-shape error", metrics.shape_error, SHAPE_LIMIT),
+    ]
+
+
 def judge(
     metrics: Metrics,
     nulls: Mapping[str, Metrics],
@@ -125,11 +152,7 @@ def judge(
     Returns:
         All lines; those with ``passed`` None were not run and decide nothing.
     """
-    lines = [
-        _below("peak force error", metrics.peak_error, PEAK_LIMIT),
-        _below("curve error (NRMSE)", metrics.nrmse, NRMSE_LIMIT),
-        _below("normalised-shape error", metrics.shape_error, SHAPE_LIMIT),
-    ]
+    lines = agreement(metrics)
     simple = {n: m for n, m in nulls.items() if n in ("ramp", "half_sine")}
     best = min(simple, key=lambda n: simple[n].shape_error)
     lines.append(
@@ -142,10 +165,8 @@ def judge(
             f"best null model: {best.replace('_', ' ')}",
         )
     )
-    lines.append(_below("momentum balance residual", momentum_residual, MOMENTUM_LIMIT, note="part of the peak force"))
-    lines.append(_below("kinetic over internal energy", ke_over_ie, KINETIC_LIMIT))
-    lines.append(_loss(energy))
-    lines += [_change(c) for c in checks]
+    lines += [*balances(momentum_residual, ke_over_ie), _loss(energy)]
+    lines += changes(checks)
     lines += [_nuisance(name, n) for name, n in (nuisances or {}).items() if name in JUDGED]
     on = [n for n, p in parameters.items() if p["verdict"] == "at_bound"]
     stuck = [n for n in on if n != SIZE and parameters[n]["value"] != NATURAL_LIMITS.get(n)]

@@ -21,7 +21,7 @@ EPILOG = """example:
 
 Ctrl-C keeps what was computed; the same command with --resume goes on.
 Exit codes: 0 intervals of identified properties hold the truth in 90 % or more
-and their median error is at most 10 %, 1 error, 2 not so."""
+(of a hundred in 90 to 99) and their median error is at most 10 %, 1 error, 2 not so."""
 
 
 def add_args(p: argparse.ArgumentParser) -> None:

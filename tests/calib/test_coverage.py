@@ -55,12 +55,19 @@ def test_coverage_is_counted_where_it_is_claimed() -> None:
         [row(104.0, 90.0, 110.0)] * 22 + [row(130.0, 120.0, 140.0)] * 3,
         [row(115.0, 90.0, 130.0)] * 25,
         [row(104.0, 90.0, 110.0)] * 10,
+        [row(104.0, 90.0, 110.0)] * 100,
         [row(104.0, 90.0, 110.0)] * 25 + [{"error": "no contact"}],
     ],
-    ids=["intervals too narrow", "median too far off", "too few to tell", "one not calibrated"],
+    ids=[
+        "intervals too narrow",
+        "median too far off",
+        "too few to tell",
+        "too wide: all of a hundred",
+        "one not calibrated",
+    ],
 )
 def test_it_does_not_pass_by_chance(rows: list[dict[str, Any]]) -> None:
-    """88 % coverage, a median error of 15 %, ten intervals, a trace that was lost: none passes."""
+    """88 % coverage, a median error of 15 %, ten intervals, all of a hundred, a trace that was lost: none passes."""
     assert not summarise(rows)["passed"]
 
 

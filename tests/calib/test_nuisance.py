@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from calib.conditioning import Conditioned, condition
 from calib.errors import TraceError
+from calib.knives import load_knife
+from calib.materials import load_food
 from calib.nuisance import GAIN_SD, TORQUE_GAIN_SD, Nuisance, Sensor, Whitening, nuisances, sensor_of
 from calib.objective import Objective, Target
 from calib.parameters import Parameter, ParameterSet
+from calib.preparation import numerical
+from calib.scenes import Sizing, cut_scene, specimen
 from calib.trace import Trace
+from mpm.errors import CutcalError
 
 ONE = ParameterSet((Parameter("E", 1e5, 1e3, 1e7, "Pa", 5e4, 2e5),))
 
@@ -105,3 +114,49 @@ def test_a_drift_is_not_extrapolated_without_end() -> None:
     curve = replace(cut(), drift_sd_N_per_s=50.0)
     drift = next(n for n in nuisances(curve, Sensor()) if n.name == "drift")
     assert drift.sd == pytest.approx(0.05 * float(curve.curve.max()))
+
+
+def study_of(folder: Path, **changes: Any) -> Path:
+    """What cutcal converge leaves: two grids, 0.2 N of 10 N uncertain on the coarser one, growing to 0.4 N."""
+    document = {"food": "banana", "knife": "kitchen", "grids": [{"dx_m": 3e-3}, {"dx_m": 2e-3}]} | changes
+    (folder / "converge.json").write_text(json.dumps(document))
+    stroke = np.linspace(0.0, 0.033, 240)
+    columns = {
+        "stroke_m": stroke,
+        "force_dx_0.003_N": 10.0 * stroke / 0.033,
+        "u_num_coarsest_N": 0.2 + 0.2 * stroke / 0.033,
+    }
+    pd.DataFrame(columns).to_csv(folder / "curves.csv", index=False)
+    return folder
+
+
+def test_numerical_uncertainty_enters_at_equal_parts_of_stroke_and_peak(tmp_path: Path) -> None:
+    """2 to 4 % of the study's peak become 2 to 4 % of the trace's, and add to the errors of each point in squares."""
+    curve, food = cut(), load_food("banana")
+    scene = cut_scene(food, specimen(food, None, Sizing())[0], load_knife("kitchen"), dx=3e-3)
+    found = numerical(study_of(tmp_path), "banana", scene, curve)
+    peak = float(curve.curve.max())
+    assert found[[0, -1]] == pytest.approx([0.02 * peak, 0.04 * peak], rel=1e-6)
+    plain = Objective(Target(curve.stroke, curve.curve, 0.0, 0.1, np.interp), ONE)
+    wide = Objective(Target(curve.stroke, curve.curve, 0.0, 0.1, np.interp, found), ONE)
+    assert wide.sigmas[-1] == pytest.approx(np.hypot(plain.sigmas[-1], 0.04 * peak))
+    assert np.linalg.norm(wide.data_residual(0.8 * curve.curve)) < np.linalg.norm(
+        plain.data_residual(0.8 * curve.curve)
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"food": "apple"}, "its food is apple, that of this calibration banana"),
+        ({"knife": "edc"}, "its knife is edc"),
+        ({"grids": [{"dx_m": 4e-3}]}, "force_dx_0.004_N"),
+        ({"grids": []}, "no finished study"),
+    ],
+)
+def test_a_study_of_something_else_is_refused(tmp_path: Path, changes: dict[str, Any], said: str) -> None:
+    """Another food, knife or cell, or no study: one line that says so."""
+    food = load_food("banana")
+    scene = cut_scene(food, specimen(food, None, Sizing())[0], load_knife("kitchen"), dx=3e-3)
+    with pytest.raises(CutcalError, match=said):
+        numerical(study_of(tmp_path, **changes), "banana", scene, cut())

@@ -20,7 +20,7 @@ def parabola(centre: float, sd: float, share: float) -> Profile:
     """A profile with the given standard deviation, to which the trace contributes a share of the curvature."""
     z = centre + sd * np.linspace(-4.0, 4.0, 33)
     rise = ((z - centre) / sd) ** 2
-    return Profile("E", z, rise, share * rise, z[:, None])
+    return Profile("E", z, rise, share * rise, z[:, None], 0)
 
 
 def test_ends_of_a_parabola_are_at_1_96_standard_deviations() -> None:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -39,6 +39,7 @@ class FakePool(Workers):
     """A pool without processes: the analytic cut at each scene's size, with its material where nothing is fitted."""
 
     runs = 0
+    balances: ClassVar = {"momentum_residual": 1e-12, "ke_over_ie": 0.001}
 
     def __init__(self) -> None:
         super().__init__(2, "cpu", 1)
@@ -47,8 +48,8 @@ class FakePool(Workers):
         """Nothing to end."""
 
     def each(self, work: Any, jobs: Any) -> Any:
-        """Nothing else is asked for."""
-        raise NotImplementedError
+        """A study asks for runs alone; anything else would need a process."""
+        raise AssertionError(f"{work} was asked of a pool without processes")
 
     def run(self, jobs: Sequence[tuple[Scene, Mapping[str, float]]]) -> Iterator[Evaluation]:
         """Each cut at once, with half a per cent of repeatable waviness."""
@@ -59,7 +60,7 @@ class FakePool(Workers):
             stroke = np.linspace(0.0, scene.motion.stroke, 400)[1:]
             wave = 1.0 + 0.005 * np.sin(40.0 * stroke / shape.height + p["E"] / 1e4)
             curve = force(stroke, shape.height, shape.width, p) * wave
-            scalars = {"peak_N": float(curve.max()), "work_J": float(np.trapezoid(curve, stroke))}
+            scalars = {"peak_N": float(curve.max()), "work_J": float(np.trapezoid(curve, stroke)), **FakePool.balances}
             yield Evaluation(index, dict(values), "ok", "", 1.0, stroke, curve, scalars, 0.01)
 
 
@@ -164,6 +165,15 @@ def test_one_cut_is_held_out_for_good(study: Path, tmp_path: Path) -> None:
     _, summary = ran(study, tmp_path / "out")
     assert list(summary["traces"]) == ["a", "c"] and summary["hold_out"]["b"]["trained_on"] == ["a", "c"]
     assert "R_skin@b" not in summary["parameters"]
+
+
+def test_a_force_without_balance_does_not_pass(study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Curves as good as before, but 2 % of the momentum is missing: neither the fit nor the prediction passes."""
+    monkeypatch.setattr(FakePool, "balances", {"momentum_residual": 0.02, "ke_over_ie": 0.001})
+    study.write_text(study.read_text().replace("hold_out: each", "hold_out: [b]"))
+    code, summary = ran(study, tmp_path / "out")
+    assert code == 2 and summary["hold_out"]["b"]["metrics"]["nrmse"] < 0.03
+    assert not any(t["passed"] for t in (*summary["traces"].values(), *summary["hold_out"].values()))
 
 
 def test_a_study_and_the_options_of_one_trace_exclude_each_other(
