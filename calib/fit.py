@@ -10,7 +10,7 @@
    part of a curve is wrong) proposes one batch: the point of least *expected* chi-square near the best one,
    the most promising point elsewhere if that is another one, and probes inside the present 95 % region.  Where
    there is a coarse evaluator, the latter two are run on it first, and only points near the best one on the fine
-   one: of 16 synthetic cuts this needed 16 fine and 58 coarse runs, where 24 and 40 led to the same chi-square.
+   one: 16 synthetic cuts took 14 fine and 54 coarse runs each, where 24 and 40 led to the same chi-square.
 4. When neither the process nor the runs give a gain worth its noise: if the curve is still not explained
    (chi-square above its 99 % quantile), strides along each parameter to both ends of its prior range (one
    that is not felt here, such as a yield stress that nothing reaches, may be felt there), after those

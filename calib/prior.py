@@ -25,12 +25,12 @@ from calib.materials import FoodSpec
 from calib.objective import Evaluation
 from calib.outputs import prepare, write_csv, write_json
 from calib.parameters import ParameterSet
-from calib.pool import Pool
 from calib.preparation import fit_parameters
 from calib.progress import Countdown
 from calib.provenance import code_key, git_commit, key_of
 from calib.scenes import Sizing, cut_scene, specimen
 from calib.store import EvaluationStore, Header, content_key
+from calib.workers import Workers
 from mpm.scene import Knife, Scene
 from mpm.shapes import volume
 
@@ -52,6 +52,7 @@ class Plan:
     Attributes:
         food: The food.
         knife: The knife.
+        pool: Where the simulations run.
         scene: Its default cut on the coarse grid.
         parameters: The default fit parameters with their priors.
         candidates: Values [SI] by name: the food's own first, then the draws.
@@ -90,6 +91,7 @@ def plan(food: FoodSpec, knife: Knife, draws: int = DRAWS, seed: int = 0) -> Pla
     Args:
         food: The food.
         knife: The knife.
+        pool: Where the simulations run.
         draws: How many draws from the priors.
         seed: Seed of the draws and of the particles.
 
@@ -124,11 +126,10 @@ def run(
     foods: Sequence[FoodSpec],
     out: Path,
     knife: Knife,
+    pool: Workers,
     *,
     draws: int = DRAWS,
     seed: int = 0,
-    workers: int = 2,
-    arch: str = "cpu",
     resume: bool = False,
     say: Callable[[str], None],
 ) -> dict[str, Any]:
@@ -140,10 +141,9 @@ def run(
         foods: The foods.
         out: Output folder.
         knife: The knife.
+        pool: Where the simulations run.
         draws: Draws from the priors of each food.
         seed: Seed of the draws and of the particles.
-        workers: Simulations at a time.
-        arch: Device.
         resume: Go on with the runs in ``out``.
         say: Called with a line after each run.
 
@@ -156,8 +156,8 @@ def run(
     plans = [plan(food, knife, draws, seed) for food in foods]
     prepare(out, resume=resume)
     with EvaluationStore(out / "evaluations.h5", Header("", "prior predictive"), resume=resume) as store:
-        results = evaluate(plans, store, workers, arch, say)
-    about = {"knife": knife.name, "draws": draws, "seed": seed, "device": arch}
+        results = evaluate(plans, store, pool, say)
+    about = {"knife": knife.name, "draws": draws, "seed": seed, "device": pool.arch}
     about |= {"cutcal": calib.__version__, "commit": git_commit(), "solver": code_key()[:KEY_LENGTH]}
     rows = _before(out)
     for one, runs in zip(plans, results, strict=True):
@@ -185,7 +185,7 @@ def _before(out: Path) -> dict[str, Any]:
 
 
 def evaluate(
-    plans: Sequence[Plan], store: EvaluationStore, workers: int, arch: str, say: Callable[[str], None]
+    plans: Sequence[Plan], store: EvaluationStore, pool: Workers, say: Callable[[str], None]
 ) -> list[list[Evaluation]]:
     """Results of all candidates of all plans, in their order; what the store knows is not run again."""
     code = code_key()
@@ -197,16 +197,15 @@ def evaluate(
         say(f"{len(found)} of {len(places)} runs are known already")
     rest = Countdown(sum(plans[i].cost for i, _ in new))
     if new:
-        with Pool(workers, arch) as pool:
-            for done in pool.run([(plans[i].scene, plans[i].candidates[k]) for i, k in new]):
-                place = new[done.index]
-                store.append(keys[place], done, "coarse")
-                found[place] = done
-                one = plans[place[0]]
-                what = "default values" if place[1] == 0 else f"draw {place[1]}"
-                state = f"{done.scalars['peak_N']:.4g} N" if done.ok else f"{done.reason} at {done.fraction:.0%}"
-                left = rest.left(one.cost)
-                say(f"{one.food.name}, {what}: {state}; {len(found)} of {len(places)} runs, {left}")
+        for done in pool.run([(plans[i].scene, plans[i].candidates[k]) for i, k in new]):
+            place = new[done.index]
+            store.append(keys[place], done, "coarse")
+            found[place] = done
+            one = plans[place[0]]
+            what = "default values" if place[1] == 0 else f"draw {place[1]}"
+            state = f"{done.scalars['peak_N']:.4g} N" if done.ok else f"{done.reason} at {done.fraction:.0%}"
+            left = rest.left(one.cost)
+            say(f"{one.food.name}, {what}: {state}; {len(found)} of {len(places)} runs, {left}")
     return [[found[i, k] for k in range(len(one.candidates))] for i, one in enumerate(plans)]
 
 

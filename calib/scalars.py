@@ -26,13 +26,13 @@ from calib.errors import PublishedError
 from calib.objective import Evaluation
 from calib.outputs import prepare, write_json
 from calib.parameters import ParameterSet
-from calib.pool import Pool
 from calib.prior import draw
 from calib.properties import rule_of
 from calib.provenance import code_key, git_commit
 from calib.published import ENERGY, PEAK, QUANTITIES, Cut, Published, Scalar
 from calib.scenes import cut_scene
 from calib.store import CachedEvaluator, EvaluationStore, Header
+from calib.workers import Workers
 from mpm.scene import Scene
 
 FloatArray = npt.NDArray[np.float64]
@@ -134,11 +134,10 @@ class Drawn:
 def run(
     published: Published,
     out: Path,
+    pool: Workers,
     *,
     draws: int = DRAWS,
     seed: int = 0,
-    workers: int = 2,
-    arch: str = "cpu",
     resume: bool = False,
     say: Callable[[str], None] = lambda text: None,
 ) -> dict[str, Any]:
@@ -147,10 +146,9 @@ def run(
     Args:
         published: What was published.
         out: Output folder.
+        pool: Where the simulations run.
         draws: Draws from the priors of what is not fitted; 0 for no band.
         seed: Seed of the draws and of the particles.
-        workers: Simulations at a time.
-        arch: Device.
         resume: Go on with the runs in ``out``.
         say: Called with a line after each batch.
 
@@ -168,10 +166,7 @@ def run(
         for fidelity in (COARSE, FINE)
     }
     prepare(out, resume=resume)
-    with (
-        EvaluationStore(out / "evaluations.h5", Header("", "published scalars"), resume=resume) as store,
-        Pool(workers, arch) as pool,
-    ):
+    with EvaluationStore(out / "evaluations.h5", Header("", "published scalars"), resume=resume) as store:
         evaluators = {fidelity: _evaluators(named, pool, store, fidelity) for fidelity, named in scenes.items()}
         bench = Bench(published, evaluators, say)
         best = fit(bench)
@@ -179,14 +174,14 @@ def run(
         drawn = band(bench, best, draws, seed)
     document = conclude(published, best, found, drawn)
     document |= {"draws_asked": draws, "seed": seed, "evaluations": bench.runs, "failed_evaluations": bench.broken}
-    document |= {"dx_m": {name: scene.numerics.dx for name, scene in scenes[FINE].items()}, "device": arch}
+    document |= {"dx_m": {name: scene.numerics.dx for name, scene in scenes[FINE].items()}, "device": pool.arch}
     document |= {"cutcal": calib.__version__, "commit": git_commit()}
     write_json(out / "scalars.json", document)
     return document
 
 
 def _evaluators(
-    scenes: Mapping[str, Scene], pool: Pool, store: EvaluationStore, fidelity: str
+    scenes: Mapping[str, Scene], pool: Workers, store: EvaluationStore, fidelity: str
 ) -> dict[str, CachedEvaluator]:
     """Evaluators of candidates of each cut's scene, through the store."""
     return {

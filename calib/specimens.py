@@ -33,7 +33,7 @@ PRESS_STRAIN = 0.2
 """Strain up to which a compression test is fitted [-]: flesh yields beyond."""
 PLATES = 0.13
 """Relative standard deviation of a modulus from plates whose friction is not known: half of what lies between frictionless plates
-and bonded ones, which give 26 % less for specimens of 30 by 50 mm (docs/compression.md)."""
+and bonded ones, which give 26 % less for thirteen silicones (docs/compression.md)."""
 
 
 @dataclass(frozen=True)

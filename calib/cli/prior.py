@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from calib.cli.options import add_workers, workers_of
 from calib.errors import CurveError
 from calib.knives import load_knife
 from calib.materials import load_food, load_foods
@@ -33,7 +34,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     p.add_argument("names", nargs="*", metavar="FOOD", help="foods of materials.yaml; all of them by default")
     p.add_argument("--draws", type=int, default=32, help="draws from the priors of each food (default 32)")
     p.add_argument("--knife", default="kitchen", metavar="NAME", help="knife of knives.yaml, or a YAML file")
-    p.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
+    add_workers(p, "simulations")
     p.add_argument("--resume", action="store_true", help="go on with the runs in --out; nothing is simulated twice")
     p.add_argument("--out", metavar="DIR", help="folder of the results; never overwritten")
     p.add_argument("--seed", type=int, default=0, help="seed of the draws and of the particles")
@@ -45,21 +46,25 @@ def run(args: argparse.Namespace) -> int:
     """Simulate; prints the table, or prior.json."""
     from calib.prior import run as study
 
-    if min(args.workers, args.draws) < 1 or args.seed < 0:
-        raise CurveError("--workers and --draws must be at least 1 and --seed at least 0")
+    if args.draws < 1 or args.seed < 0:
+        raise CurveError("--draws must be at least 1 and --seed at least 0")
     foods = [load_food(name) for name in dict.fromkeys(args.names)] or list(load_foods().values())
     out = Path(args.out or "cutcal-prior")
-    document = study(
-        foods,
-        out,
-        load_knife(args.knife),
-        draws=args.draws,
-        seed=args.seed,
-        workers=args.workers,
-        arch=args.arch,
-        resume=args.resume,
-        say=lambda text: print(text, file=sys.stderr, flush=True),
-    )
+
+    def say(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
+    with workers_of(args, say) as pool:
+        document = study(
+            foods,
+            out,
+            load_knife(args.knife),
+            pool,
+            draws=args.draws,
+            seed=args.seed,
+            resume=args.resume,
+            say=say,
+        )
     if args.json:
         print((out / "prior.json").read_text(encoding="utf-8"), end="")
         return 0 if document["passed"] else 2

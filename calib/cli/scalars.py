@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from calib.cli.options import add_workers, workers_of
 from calib.errors import CurveError
 from calib.knives import load_knife
 
@@ -36,7 +37,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     p.add_argument("--knife", metavar="NAME", help="knife of knives.yaml, or a YAML file, in place of the file's")
     p.add_argument("--together", action="store_true", help="fit to all numbers: can any values meet all of them?")
     p.add_argument("--draws", type=int, default=32, help="draws from the priors of what is not fitted (default 32)")
-    p.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
+    add_workers(p, "simulations")
     p.add_argument("--resume", action="store_true", help="go on with the runs in --out; nothing is simulated twice")
     p.add_argument("--out", metavar="DIR", help="folder of the results; never overwritten")
     p.add_argument("--seed", type=int, default=0, help="seed of the draws and of the particles")
@@ -49,8 +50,8 @@ def run(args: argparse.Namespace) -> int:
     from calib.published import load_published
     from calib.scalars import run as study
 
-    if args.workers < 1 or min(args.draws, args.seed) < 0:
-        raise CurveError("--workers must be at least 1, --draws and --seed at least 0")
+    if min(args.draws, args.seed) < 0:
+        raise CurveError("--draws and --seed must be at least 0")
     published = load_published(args.file)
     if args.knife is not None:
         published = replace(published, knife=load_knife(args.knife))
@@ -59,16 +60,20 @@ def run(args: argparse.Namespace) -> int:
     if args.fit is not None:
         published = published.fitting(tuple(name.strip() for name in args.fit.split(",")))
     out = Path(args.out or f"cutcal-scalars-{Path(args.file).stem}")
-    document = study(
-        published,
-        out,
-        draws=args.draws,
-        seed=args.seed,
-        workers=args.workers,
-        arch=args.arch,
-        resume=args.resume,
-        say=lambda text: print(text, file=sys.stderr, flush=True),
-    )
+
+    def say(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
+    with workers_of(args, say) as pool:
+        document = study(
+            published,
+            out,
+            pool,
+            draws=args.draws,
+            seed=args.seed,
+            resume=args.resume,
+            say=say,
+        )
     if args.json:
         print((out / "scalars.json").read_text(encoding="utf-8"), end="")
     else:
