@@ -360,9 +360,10 @@ class _Search:
         self._follow_lines(first)
 
     def _follow_lines(self, first: int) -> None:
-        """Run the best points of the best lines through the trials from ``first`` on."""
+        """Run the best points of the best lines through the trials from ``first`` on: on fine cells where there is no run yet."""
         lines = sorted((self._scaled(t) for t in self.trials[first:] if t.ok), key=lambda line: line[0])
-        self._evaluate([z for _, z in lines[: self.options.batch]], "scaled")
+        coarse = self.coarse is not None and bool(self.finished) and any(t.coarse for t in self.trials[first:])
+        self._evaluate([z for _, z in lines[: self.options.batch]], "scaled", coarse=coarse)
 
     def _nothing(self) -> SimulationError:
         """The error that no run reached the end of its stroke."""

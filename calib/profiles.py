@@ -205,10 +205,12 @@ def with_profiles(found: Uncertainty, walked: Sequence[Profile]) -> Uncertainty:
 
 
 def _interval(interval: Interval, profile: Profile) -> Interval:
+    """The interval of a profile; the best run's value is in it, even where the surrogate puts the optimum beside it."""
     parameter = interval.parameter
     low, high = parameter.to_internal(parameter.low), parameter.to_internal(parameter.high)
     ends = [profile.end(side, profile.rise) for side in (-1, 1)]
-    bottom, top = (low if ends[0] is None else ends[0]), (high if ends[1] is None else ends[1])
+    at = parameter.to_internal(parameter.value)
+    bottom, top = min(low if ends[0] is None else ends[0], at), max(high if ends[1] is None else ends[1], at)
     bounded = [_bounds(profile.end(side, profile.data), side, parameter) for side in (-1, 1)]
     width = (top - bottom) / (2.0 * Z95 * parameter.prior_sd)
     verdict: Verdict = "not_seen"

@@ -49,7 +49,7 @@ def truth(stroke: np.ndarray) -> np.ndarray:
     return PEAK * np.clip(2.0 * stroke / (SPEED * CUT), 0.0, 1.0)
 
 
-@pytest.mark.parametrize("power", [1.0, 1.5])
+@pytest.mark.parametrize("power", [1.0, 1.5, 2.0])
 @pytest.mark.parametrize("rate", [60.0, 200.0])
 def test_onset_and_tare_are_within_their_uncertainty(power: float, rate: float) -> None:
     """Over 40 noisy cuts, onset and baseline errors are as large as stated, and not far smaller."""
@@ -61,7 +61,10 @@ def test_onset_and_tare_are_within_their_uncertainty(power: float, rate: float) 
     assert 0.15 < np.sqrt(np.mean(onset**2)) < 1.2
     assert 0.5 < np.sqrt(np.mean(tare**2)) < 1.4
     assert np.mean([c.noise_sd_N for c in cuts]) == pytest.approx(0.1, rel=0.1)
-    assert np.mean([abs(c.onset_s - CONTACT) for c in cuts]) < 0.02  # 0.4 mm of stroke
+    late = (
+        0.02 if power < 2.0 else 0.045
+    )  # [s], 0.4 and 0.9 mm of stroke: the square has risen by 0.4 of the noise there
+    assert np.mean([abs(c.onset_s - CONTACT) for c in cuts]) < late
 
 
 def test_onset_does_not_wait_for_a_threshold() -> None:
@@ -500,10 +503,13 @@ def measured(cut: str, air: str) -> Conditioned:
 
 @pytest.mark.parametrize(("cut", "air", "contact", "travel", "peak", "work"), PUBLISHED)
 def test_robot_logs(cut: str, air: str, contact: float, travel: float, peak: float, work: float) -> None:
-    """Contact comes just before a 1 N threshold trips, work agrees, peaks lose little to the filter."""
+    """Contact comes just before a 1 N threshold trips, work agrees, peaks lose little to the filter.
+
+    The force of the second potato leaves its noise some 2 mm before it trips the threshold, that of the others less.
+    """
     done = measured(cut, air)
     assert contact - 0.1 < done.onset_s < contact
-    assert travel < 1e3 * done.stroke_length_m < travel + 1.6
+    assert travel < 1e3 * done.stroke_length_m < travel + 2.0
     assert 0.95 * peak < done.peak_N < 1.01 * peak
     integral = float(np.sum(0.5 * np.diff(done.stroke) * (done.curve[1:] + done.curve[:-1])))
     assert integral == pytest.approx(work, rel=0.025)
