@@ -21,7 +21,7 @@ import pandas as pd
 from calib.checks import otherwise
 from calib.doubt import doubt_of
 from calib.errors import OutputError
-from calib.fit import FitOptions, calibrate
+from calib.fit import calibrate
 from calib.knives import load_knife
 from calib.materials import FoodSpec
 from calib.objective import ErrorModel
@@ -31,6 +31,7 @@ from calib.progress import Countdown
 from calib.provenance import code_key, git_commit, key_of, versions
 from calib.request import Request
 from calib.scenes import Sizing, cut_scene, specimen
+from calib.search import FitOptions
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.workers import Workers
 from mpm.errors import CutcalError

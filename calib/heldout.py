@@ -13,13 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib.filters import filter_simulated
-from calib.fit import FitOptions, calibrate
+from calib.fit import calibrate
 from calib.metrics import Metrics, compare
 from calib.nulls import null_models
 from calib.objective import Evaluation, Objective
 from calib.parameters import ParameterSet
 from calib.prediction import NRMSE_LIMIT, RATING_LIMIT
 from calib.predictive import Band, band_of, errors
+from calib.search import FitOptions
 from calib.specimens import Fitted, Specimens
 from calib.verdicts import Verdict, balances
 from mpm.errors import SimulationError

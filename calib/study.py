@@ -14,7 +14,7 @@ from calib.checks import Check, check, otherwise
 from calib.conditioning import Conditioned
 from calib.doubt import Doubt, doubt_of
 from calib.filters import filter_simulated
-from calib.fit import FitOptions, FitResult, calibrate
+from calib.fit import FitResult, calibrate
 from calib.materials import FoodSpec, dump_material
 from calib.metrics import compare
 from calib.nulls import NullModel, null_models
@@ -25,6 +25,7 @@ from calib.provenance import code_key, key_of
 from calib.records import whole_record
 from calib.request import Request, Setup
 from calib.scenes import place
+from calib.search import FitOptions
 from calib.sensitivity import sensitivity
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.summary import add_conditioning, summarise

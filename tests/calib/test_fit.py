@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from calib.errors import MaterialError
-from calib.fit import SCREENING, FitOptions, FitResult, calibrate
+from calib.fit import FitResult, calibrate
 from calib.objective import Evaluation, Evaluator, Objective, Target
 from calib.parameters import Parameter, ParameterSet
 from calib.progress import Progress
+from calib.search import SCREENING, FitOptions
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.uncertainty import evidence, uncertainty
 from mpm.errors import SimulationError

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from calib.doubt import Doubt, doubt_of
-from calib.fit import FitOptions, FitResult, calibrate
+from calib.fit import FitResult, calibrate
 from calib.objective import Evaluation, Objective, Target
 from calib.parameters import Z95, Parameter, ParameterSet
 from calib.predictive import band_of, errors
 from calib.profiles import RISE, Profile
+from calib.search import FitOptions
 from tests.calib.fake import GRID, NOISE, STROKE, Fake, goal, noise, three_terms
 
 

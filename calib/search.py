@@ -1,0 +1,403 @@
+"""The search for the material: few, noisy, expensive simulations, run two or more at a time.
+
+0. Screening, where there is a coarse evaluator: steps 1 to 3 with it alone, within a part of the budget.  Its
+   curves stay in the process, with an offset of their own, and the fine search starts at its best points.
+1. Design: the given values, the centre of the prior and a scrambled Sobol sample of its 95 % box.
+   Quasi-static forces scale with the stress-like parameters, so every run of the design stands for a whole
+   line of materials; the best points of the best lines are run next.
+2. Differences: one wide step along each parameter from the best point.
+3. Rounds: a Gaussian process through all smoothed curves so far (not through the misfit, which hides which
+   part of a curve is wrong) proposes one batch: the point of least *expected* chi-square near the best one,
+   the most promising point elsewhere if that is another one, and probes inside the present 95 % region.  Where
+   there is a coarse evaluator, the latter two are run on it first, and only points near the best one on the fine
+   one: 16 synthetic cuts took 14 fine and 54 coarse runs each, where 24 and 40 led to the same chi-square.
+4. When neither the process nor the runs give a gain worth its noise: if the curve is still not explained
+   (chi-square above its 99 % quantile), strides along each parameter to both ends of its prior range (one
+   that is not felt here, such as a yield stress that nothing reaches, may be felt there), after those another design;
+   else differences about the best point; and again 3 if that brings or promises a gain.  The Jacobian there is that of the
+   process, in which the noise of single runs is averaged out; plain differences of noisy curves would make every
+   parameter look well identified.
+
+Sources: composite objectives, Astudillo & Frazier (2019), Proc. ICML 97; regression models for noisy least
+squares, Cartis et al. (2019), ACM TOMS 45:32, doi 10.1145/3338517.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import minimize_scalar
+from scipy.stats import chi2, qmc
+
+from calib.errors import MaterialError
+from calib.joint import JointObjective, residual
+from calib.objective import Evaluation, Evaluator, Objective, Trial
+from calib.progress import Progress
+from calib.surrogate import Surrogate, coordinate_unit
+from mpm.errors import SimulationError
+
+FloatArray = npt.NDArray[np.float64]
+
+#: Points are rounded to this part of a coordinate unit (0.1 % of a log parameter): far below the noise of a
+#: run, and a resumed fit asks for exactly the points that are in the store.
+LATTICE = 1e-3
+#: The process is trusted this far from the best point: a factor e of a log parameter.
+RADIUS = 1.0
+#: A promising point elsewhere must be this far from the one nearby [coordinate units].
+ELSEWHERE = 0.2
+#: Weight of not knowing the curve in the expected chi-square: 1 is the expectation; less elsewhere, for the
+#: sake of basins that are unexplored but promising.
+CAUTION_NEAR, CAUTION_FAR = 1.0, 0.3
+#: The same with which a second fine run beside the most promising one is chosen: nearly the process's word.
+CAUTION_BOLD = 0.1
+#: Coarse runs of a round, for each worker.
+SCOUTS = 1
+#: Part of the chi-square that the noise of one run makes which a round must bring: with a quarter one of 16 synthetic cuts
+#: ended 11 above its truth, with a tenth none more than 4.4.
+LUCK = 0.1
+#: Random points from which, besides all runs, the most promising one is sought; how many are followed.
+STARTS, FOLLOWED = 16, 3
+#: Probes are drawn from the normal approximation of the posterior, this much wider (on 24 synthetic cuts this
+#: left a quarter of the excess chi-square that isotropic probes left), and may cost this much more than the
+#: best run: about a 90 % region of one parameter, where curvature matters for the intervals.
+PROBE_SPREAD, PROBE_COST, PROBES = 1.5, 3.0, 200
+#: A curve counts as explained when the right material would leave a larger chi-square than its in one of a hundred cuts:
+#: side minima leave three times as much, and a false alarm costs half as many simulations again.
+EXPLAINED = 0.99
+#: Rounds without promise and gain after which the search has converged; rounds without gain: stalled.
+CALM_ROUNDS, STALLED_ROUNDS = 2, 4
+#: Designs at most: further ones while every run breaks down, and where the search ends with a chi-square
+#: above the number of independent data.  Of 96 synthetic cuts one stayed in a side minimum (excess
+#: chi-square 100) with a single design, none (excess at most 2.1) with three.
+DESIGNS = 3
+#: Part of the budget that the coarse evaluator may spend on the screening: 60 runs of the default budget.  On
+#: two synthetic and two real cuts it ended by itself after 32 to 50.
+SCREENING = 0.15
+#: Largest joint scaling of the design's materials, as a logarithm: a factor 20 either way.
+LARGEST_SCALE = 3.0
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """How much to spend on a fit.
+
+    Attributes:
+        budget: Largest number of simulations, coarse ones counted by their cost.
+        batch: Simulations that run at the same time (worker processes).
+        design: Space-filling runs at the start, besides the given values and the prior centre.
+        coarse_cost: Cost of a coarse simulation in fine ones [-]; half the resolution costs about a quarter
+            or less.
+        tolerance: Gain in chi-square that is worth a round [-], times the reduced chi-square where that
+            exceeds 1. 0.2 is a twentieth of what bounds a 95 % interval (3.84).
+        seed: Seed of the design and of the probes.
+
+    Raises:
+        ValueError: A number that is not positive.
+    """
+
+    budget: float = 100.0
+    batch: int = 2
+    design: int = 7
+    coarse_cost: float = 0.25
+    tolerance: float = 0.2
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if min(self.budget, self.batch, self.design, self.coarse_cost, self.tolerance) <= 0 or self.seed < 0:
+            raise ValueError(f"{self} has a number that is not positive; give positive ones.")
+
+    def check(self, parameters: int) -> None:
+        """Raise MaterialError when the budget is too small for this number of parameters."""
+        least = 2 * parameters + self.design + 2
+        if self.budget < least:
+            raise MaterialError(
+                f"a budget of {self.budget:g} simulations is too small for {parameters} parameters; give at least "
+                f"{least}, or fit fewer."
+            )
+
+
+class Search:
+    """The rounds of one fit and all their runs."""
+
+    def __init__(
+        self,
+        objective: Objective | JointObjective,
+        evaluator: Evaluator,
+        coarse: Evaluator | None,
+        options: FitOptions,
+        progress: Callable[[Progress], None] | None,
+    ) -> None:
+        self.objective, self.options, self.progress = objective, options, progress
+        self.parameters = objective.parameters
+        self.fine, self.coarse = evaluator, coarse
+        self.trials: list[Trial] = []
+        self.random = np.random.default_rng(options.seed)
+        self.unit = coordinate_unit(self.parameters)
+        self.hyper: list[FloatArray] | None = None
+        self.centre: FloatArray | None = None
+        self.strode: list[FloatArray] = []
+        self.screening = False
+        self.luck = 0.0
+        low, high = self.parameters.box
+        sobol = qmc.Sobol(len(low), scramble=True, seed=options.seed)
+        count = DESIGNS * options.design
+        sample = low + (high - low) * (0.1 + 0.8 * sobol.random_base2(math.ceil(math.log2(count)))[:count])
+        self.designs = np.split(sample, DESIGNS)
+
+    @property
+    def finished(self) -> list[Trial]:
+        """Finished runs on the fine evaluator, while screening those on the coarse one."""
+        return [t for t in self.trials if t.ok and t.coarse == self.screening]
+
+    @property
+    def best(self) -> Trial:
+        """Best of ``finished``; there is one after the design."""
+        return min(self.finished, key=lambda t: t.misfit)
+
+    @property
+    def spent(self) -> float:
+        """Budget spent [fine simulations]."""
+        return sum(self.options.coarse_cost if t.coarse else 1.0 for t in self.trials)
+
+    @property
+    def scouting(self) -> float:
+        """Cost of a run far from the best point [fine simulations]: those are coarse where they can be."""
+        return self.options.coarse_cost if self.coarse is not None else 1.0
+
+    @property
+    def worth(self) -> float:
+        """Gain in chi-square that is worth a round [-]: not what the noise of a run gives by chance."""
+        gain = self.options.tolerance * max(1.0, self.best.misfit / self.objective.effective_rows)
+        return max(gain, LUCK * self.luck)
+
+    def run(self) -> str:
+        """Search until there is nothing to gain or to spend; return the status."""
+        first = [self.parameters.start, self.parameters.prior_mean]
+        if self.coarse is not None:
+            self._screen(first)
+            first = []
+        if not self.finished:
+            self._design(first)
+        while not self.finished and self._unseen():
+            self._design([])
+        if not self.finished:
+            raise self._nothing()
+        if self.coarse is None:
+            self._differences()
+        while True:
+            status, best = self._rounds(), self.best
+            if status == "budget":
+                return status
+            unexplained = best.misfit > chi2.ppf(EXPLAINED, self.objective.effective_rows)
+            if unexplained and self._strides():
+                continue
+            if unexplained and self._unseen():
+                self._design([])
+            elif self._differences():
+                process = self.process()
+                unkept = status == "stalled" or _promise(process, _near(process)) < self.worth
+                if self.best is best and unkept:
+                    return status
+            else:
+                return status
+
+    def _screen(self, given: list[FloatArray]) -> None:
+        """Search on the coarse evaluator, and run its best point and where its process expects the best one."""
+        self.screening = True
+        points: list[FloatArray] = []
+        try:
+            self._design(given)
+            if self.finished:
+                self._differences()
+                self._rounds()
+                points = [_near(self.process()), *(t.z for t in sorted(self.finished, key=lambda t: t.misfit))]
+        finally:
+            self.screening, self.centre, self.hyper = False, None, None
+        first = len(self.trials)
+        self._evaluate(points[: max(2, self.options.batch)], "screened")
+        self._follow_lines(first)
+
+    def _unseen(self) -> bool:
+        """Whether there is another design that can be paid together with the rounds it may call for."""
+        return len(self.designs) > 0 and self._room() > self.scouting * self.options.design + 2 * self.options.batch
+
+    def _design(self, points: list[FloatArray]) -> None:
+        """Run ``points`` and the next part of the sample, then the best of the lines they stand for."""
+        first = len(self.trials)
+        self._evaluate(points + list(self.designs.pop(0)), "design", coarse=self.coarse is not None)
+        self._follow_lines(first)
+
+    def _follow_lines(self, first: int) -> None:
+        """Run the best points of the best lines through the trials from ``first`` on: on fine cells where there is no run yet."""
+        lines = sorted((self._scaled(t) for t in self.trials[first:] if t.ok), key=lambda line: line[0])
+        coarse = bool(self.finished) and any(t.coarse for t in self.trials[first:])
+        self._evaluate([z for _, z in lines[: self.options.batch]], "scaled", coarse=coarse)
+
+    def _nothing(self) -> SimulationError:
+        """The error that no run reached the end of its stroke."""
+        furthest = max((t.evaluation for t in self.trials), key=lambda e: e.fraction)
+        return SimulationError(
+            f"none of {len(self.trials)} simulations led to one that ends its stroke; the furthest got to "
+            f"{furthest.fraction:.0%} ({furthest.reason}) at {furthest.parameters}; check the scene, or "
+            "narrow the prior ranges.",
+            reason=furthest.reason,
+            fraction=furthest.fraction,
+        )
+
+    def _scaled(self, trial: Trial) -> tuple[float, FloatArray]:
+        """Least chi-square that jointly scaled stress-like parameters would give, and the point of it."""
+        along = self.parameters.stress_like()
+        curves = [t.curve for t in trial.each]
+        ones = [1.0] * len(curves)
+
+        def cost(log_k: float) -> float:
+            z = self.parameters.clip(trial.z + log_k * along)
+            rows = residual(self.objective, [math.exp(log_k) * curve for curve in curves], ones, z)
+            return float(rows @ rows)
+
+        found = minimize_scalar(cost, bounds=(-LARGEST_SCALE, LARGEST_SCALE), method="bounded")
+        return float(found.fun), trial.z + float(found.x) * along
+
+    def _strides(self) -> bool:
+        """Along each parameter from the best point as far as its prior range goes; False where that was done or cannot
+        be paid."""
+        z, sd, ends = self.best.z, self.parameters.prior_sd, self.parameters.box
+        done = any(np.all(np.abs(z - other) < 0.5 * sd) for other in self.strode)
+        if done or self._room() < 2 * len(z) * self.scouting + 2 * self.options.batch:
+            return False
+        self.strode.append(z)
+        first = len(self.trials)
+        star = [np.where(np.arange(len(z)) == i, end, z) for i in range(len(z)) for end in ends]
+        self._evaluate(star, "stride", coarse=self.coarse is not None)
+        self._follow_lines(first)
+        return True
+
+    def _differences(self) -> bool:
+        """Step along each parameter from the best point; False where that was done or cannot be paid."""
+        z, steps = self.best.z, self.parameters.steps
+        done = self.centre is not None and bool(np.all(np.abs(z - self.centre) < steps))
+        if done or self._room() < len(steps):
+            return False
+        self.centre = z
+        inwards = np.where(z > self.parameters.prior_mean, -1.0, 1.0)
+        self._evaluate([z + d for d in np.diag(inwards * steps)], "difference", coarse=self.coarse is not None)
+        return True
+
+    def _rounds(self) -> str:
+        """Rounds of one batch each, until they are calm or the budget is spent."""
+        calm = stalled = 0
+        while self._room() > 0:
+            before, worth, process = self.best.misfit, self.worth, self.process()
+            near = _near(process)
+            promise, far = _promise(process, near), self._far(process)
+            elsewhere = [far] if np.abs((far - near) / self.unit).max() > ELSEWHERE else []
+            if self.coarse is None or self.screening:
+                points = [near, *elsewhere]
+                points += self._probes(process, near, self.options.batch - len(points))
+                self._evaluate(points[: self.options.batch], "round")
+            else:
+                scouts = [*elsewhere, *self._probes(process, near, SCOUTS * self.options.batch - len(elsewhere))]
+                self._evaluate(scouts, "scouting", coarse=True)
+                process = self.process()
+                near = _near(process)
+                self._evaluate([near, *self._beside(process, near)][: self.options.batch], "round")
+            gained = before - self.best.misfit >= worth
+            stalled = 0 if gained else stalled + 1
+            calm = 0 if gained or promise >= worth else calm + 1
+            if calm >= CALM_ROUNDS or stalled >= STALLED_ROUNDS:
+                return "converged" if calm >= CALM_ROUNDS else "stalled"
+        return "budget"
+
+    def _beside(self, process: Surrogate, near: FloatArray) -> list[FloatArray]:
+        """Points for a second fine run: of least chi-square if the process is believed, and a probe where that is the same."""
+        bold, probes = process.least(near, RADIUS, CAUTION_BOLD), self._probes(process, near, 1)
+        return [bold, *probes] if np.abs((bold - near) / self.unit).max() > LATTICE else probes
+
+    def _far(self, process: Surrogate) -> FloatArray:
+        """The most promising point within the bounds, sought from random points and all runs."""
+        low, high = self.parameters.box
+        starts = list(self.random.uniform(low, high, (STARTS, len(low)))) + [t.z for t in self.trials]
+        starts.sort(key=lambda z: process.expected(z, CAUTION_FAR))
+        found = [process.least(z, math.inf, CAUTION_FAR) for z in starts[:FOLLOWED]]
+        return min(found, key=lambda z: process.expected(z, CAUTION_FAR))
+
+    def _probes(self, process: Surrogate, near: FloatArray, count: int) -> list[FloatArray]:
+        """Of points drawn from the posterior about ``near`` the ``count`` least known good ones."""
+        if count < 1:
+            return []
+        rows = process.jacobian(near)
+        spread = PROBE_SPREAD * np.linalg.inv(np.linalg.cholesky(rows.T @ rows))
+        points = self.parameters.clip(near + self.random.standard_normal((PROBES, len(near))) @ spread)
+        cost = np.array([process.expected(z, 0.0) for z in points])
+        doubt = np.array([process.doubt(z) for z in points])
+        good = cost < max(process.best.misfit, cost.min()) + PROBE_COST
+        return [points[i] for i in np.argsort(np.where(good, -doubt, 0.0))[:count]]
+
+    def process(self, best: Trial | None = None) -> Surrogate:
+        """The process through all runs so far, about the best one or another."""
+        trials = [t.as_fine() for t in self.trials] if self.screening else self.trials  # one evaluator: no offset
+        process = Surrogate(self.objective, trials, best or self.best, self.hyper)
+        self.hyper, self.luck = process.hyper, process.luck
+        return process
+
+    def _room(self) -> int:
+        """Simulations that the budget, while screening its part of it, still holds."""
+        if self.screening:
+            return int((SCREENING * self.options.budget - self.spent) / self.options.coarse_cost + 1e-9)
+        return int(self.options.budget - self.spent + 1e-9)
+
+    def _evaluate(self, points: Sequence[FloatArray], stage: str, *, coarse: bool = False) -> None:
+        """Run those points that are new and can be paid; the history keeps the order of the points."""
+        coarse = coarse or self.screening
+        cost = self.options.coarse_cost if coarse else 1.0
+        grid = LATTICE * self.unit
+        known = [t.z for t in self.trials if t.coarse == coarse]
+        batch: list[FloatArray] = []
+        for point in points:
+            z = self.parameters.clip(np.round(point / grid) * grid)
+            new = all(np.any(np.abs(z - other) > 0.5 * grid) for other in known + batch)
+            if new and self.spent + (len(batch) + 1) * cost <= self.options.budget + 1e-9:
+                batch.append(z)
+        first, order = len(self.trials), []
+        for evaluation in self._simulate([self.parameters.to_dict(z) for z in batch], coarse):
+            self.trials.append(self.objective.trial(evaluation, coarse=coarse, stage=stage))
+            order.append(evaluation.index)
+            self._report(stage)
+        self.trials[first:] = [self.trials[first + i] for i in np.argsort(order)]
+
+    def _simulate(self, batch: list[dict[str, float]], coarse: bool) -> Iterator[Evaluation]:
+        evaluator = self.coarse if coarse and self.coarse is not None else self.fine
+        return evaluator.evaluate(batch) if batch else iter(())
+
+    def _report(self, stage: str) -> None:
+        """Call the progress callback."""
+        if self.progress is None:
+            return
+        seconds = [t.evaluation.seconds / (self.options.coarse_cost if t.coarse else 1.0) for t in self.trials]
+        rest = self.options.budget - self.spent
+        misfit = self.best.misfit if self.finished else math.inf
+        self.progress(
+            Progress(
+                done=len(self.trials),
+                spent=self.spent,
+                budget=self.options.budget,
+                failed=sum(not t.ok for t in self.trials),
+                misfit=misfit,
+                eta_s=float(np.mean(seconds)) * rest / self.options.batch,
+                stage=f"{stage} on coarse cells" if self.trials[-1].coarse else stage,
+            )
+        )
+
+
+def _near(process: Surrogate) -> FloatArray:
+    """Point of least expected chi-square near the best one."""
+    return process.least(process.best.z, RADIUS, CAUTION_NEAR)
+
+
+def _promise(process: Surrogate, z: FloatArray) -> float:
+    """Gain in chi-square that the process expects of z over the best point [-]."""
+    return process.expected(process.best.z, CAUTION_NEAR) - process.expected(z, CAUTION_NEAR)
