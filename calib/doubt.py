@@ -9,10 +9,11 @@ import numpy as np
 import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
+from calib.evaluation import Evaluator
 from calib.fit import FitResult
 from calib.joint import JointObjective
 from calib.nuisance import NuisanceEstimate
-from calib.objective import Evaluator, Objective, Trial
+from calib.objective import Objective, Trial
 from calib.posterior import Posterior, sampled
 from calib.predictive import Band, bands
 from calib.profiles import Profile, profiles, with_profiles

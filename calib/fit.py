@@ -15,8 +15,9 @@ import numpy as np
 import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
+from calib.evaluation import Evaluator
 from calib.joint import JointObjective
-from calib.objective import Evaluator, Objective, Trial
+from calib.objective import Objective, Trial
 from calib.parameters import ParameterSet
 from calib.progress import Progress
 from calib.search import CAUTION_NEAR, ELSEWHERE, FitOptions, Search

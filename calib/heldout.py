@@ -12,11 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from calib.evaluation import Evaluation
 from calib.filters import filter_simulated
 from calib.fit import calibrate
 from calib.metrics import Metrics, compare
 from calib.nulls import null_models
-from calib.objective import Evaluation, Objective
+from calib.objective import Objective
 from calib.parameters import ParameterSet
 from calib.prediction import NRMSE_LIMIT, RATING_LIMIT
 from calib.predictive import Band, band_of, errors

@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from calib.objective import Case, Evaluation, Evaluator, Objective, Trial
+from calib.evaluation import Evaluation, Evaluator
+from calib.objective import Case, Objective, Trial
 from calib.parameters import Parameter, ParameterSet, own, plain
 
 FloatArray = npt.NDArray[np.float64]

@@ -20,9 +20,9 @@ from scipy.stats import qmc, truncnorm
 
 import calib
 from calib.errors import CurveError
+from calib.evaluation import Evaluation
 from calib.filters import N_STROKE, filter_simulated
 from calib.materials import FoodSpec
-from calib.objective import Evaluation
 from calib.outputs import prepare, write_csv, write_json
 from calib.parameters import ParameterSet
 from calib.preparation import fit_parameters

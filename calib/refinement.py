@@ -12,8 +12,8 @@ import numpy as np
 
 from calib.convergence import CurveEstimate, Estimate, curve_estimate, estimate
 from calib.errors import CurveError
+from calib.evaluation import Evaluation
 from calib.filters import filter_simulated
-from calib.objective import Evaluation
 from calib.outputs import prepare, write_csv, write_json
 from calib.progress import Countdown
 from calib.provenance import code_key, git_commit, key_of, versions

@@ -23,7 +23,7 @@ from scipy.stats import norm, qmc
 import calib
 from calib.descent import Aim, Minimum, descent, together
 from calib.errors import PublishedError
-from calib.objective import Evaluation
+from calib.evaluation import Evaluation
 from calib.outputs import prepare, write_json
 from calib.parameters import ParameterSet
 from calib.prior import draw

@@ -34,8 +34,9 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import chi2, qmc
 
 from calib.errors import MaterialError
+from calib.evaluation import Evaluation, Evaluator
 from calib.joint import JointObjective, residual
-from calib.objective import Evaluation, Evaluator, Objective, Trial
+from calib.objective import Objective, Trial
 from calib.progress import Progress
 from calib.surrogate import Surrogate, coordinate_unit
 from mpm.errors import SimulationError

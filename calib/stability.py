@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from calib.evaluation import Evaluation
 from calib.hazards import SOUND_STEP, Cell
-from calib.objective import Evaluation
 from calib.outputs import prepare, write_json
 from calib.progress import Countdown
 from calib.provenance import code_key, git_commit, key_of, versions

@@ -40,7 +40,7 @@ import numpy as np
 import numpy.typing as npt
 
 from calib.errors import OutputError
-from calib.objective import Evaluation, Evaluator
+from calib.evaluation import Evaluation, Evaluator
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from calib.objective import Evaluation
+from calib.evaluation import Evaluation
 from calib.scenes import place
 from mpm.errors import SimulationError
 from mpm.material import Material

@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from calib.objective import Evaluation, Objective, Target
+from calib.evaluation import Evaluation
+from calib.objective import Objective, Target
 from calib.parameters import Parameter, ParameterSet
 
 LENGTH, WIDTH = 0.04, 0.03

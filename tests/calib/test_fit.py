@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from calib.errors import MaterialError
+from calib.evaluation import Evaluation, Evaluator
 from calib.fit import FitResult, calibrate
-from calib.objective import Evaluation, Evaluator, Objective, Target
+from calib.objective import Objective, Target
 from calib.parameters import Parameter, ParameterSet
 from calib.progress import Progress
 from calib.search import SCREENING, FitOptions

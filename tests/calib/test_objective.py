@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from calib.errors import TraceError
+from calib.evaluation import Evaluation
 from calib.filters import filter_simulated
-from calib.objective import ErrorModel, Evaluation, Objective, Target
+from calib.objective import ErrorModel, Objective, Target
 from calib.parameters import Parameter, ParameterSet
 
 LENGTH = 0.04

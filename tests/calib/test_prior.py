@@ -16,9 +16,9 @@ import pytest
 
 from calib.cli.main import main
 from calib.errors import CurveError
+from calib.evaluation import Evaluation
 from calib.knives import load_knife
 from calib.materials import load_food, load_foods
-from calib.objective import Evaluation
 from calib.parameters import Z95
 from calib.preparation import fit_parameters
 from calib.prior import QUANTILES, conclude, draw, plan

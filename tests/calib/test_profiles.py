@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from calib.doubt import Doubt, doubt_of
+from calib.evaluation import Evaluation
 from calib.fit import FitResult, calibrate
-from calib.objective import Evaluation, Objective, Target
+from calib.objective import Objective, Target
 from calib.parameters import Z95, Parameter, ParameterSet
 from calib.predictive import band_of, errors
 from calib.profiles import RISE, Profile

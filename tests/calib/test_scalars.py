@@ -16,7 +16,7 @@ import pytest
 from calib.cli.main import main
 from calib.descent import Aim, descent, together
 from calib.errors import PublishedError
-from calib.objective import Evaluation
+from calib.evaluation import Evaluation
 from calib.parameters import Parameter, ParameterSet
 from calib.published import ENERGY, PEAK, load_published
 from calib.scalars import Bench, band, conclude, fit

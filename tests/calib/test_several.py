@@ -14,8 +14,8 @@ import pytest
 
 import calib.cli.calibrate
 from calib.cli.main import main
+from calib.evaluation import Evaluation
 from calib.materials import load_material_file
-from calib.objective import Evaluation
 from calib.scenes import place
 from calib.workers import Workers
 from mpm.scene import Scene

@@ -15,7 +15,7 @@ import pandas as pd
 import pytest
 
 from calib.errors import OutputError
-from calib.objective import Evaluation
+from calib.evaluation import Evaluation
 from calib.store import CachedEvaluator, EvaluationStore, Header, content_key
 
 HEADER = Header(trace_sha256="ab" * 32, scene_key="banana-2mm")
@@ -27,7 +27,7 @@ ROOT = Path(__file__).parents[2]
 WRITER = """
 import sys
 import numpy as np
-from calib.objective import Evaluation
+from calib.evaluation import Evaluation
 from calib.store import EvaluationStore, Header
 path, reopen = sys.argv[1], len(sys.argv) > 2
 header = Header(trace_sha256="ab" * 32, scene_key="banana-2mm")

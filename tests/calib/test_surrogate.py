@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from calib.objective import Evaluation, Objective, Target, Trial
+from calib.evaluation import Evaluation
+from calib.objective import Objective, Target, Trial
 from calib.parameters import Parameter, ParameterSet
 from calib.surrogate import Surrogate
 from calib.uncertainty import evidence, uncertainty

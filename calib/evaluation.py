@@ -1,0 +1,67 @@
+"""One simulation as it came back, and whatever makes them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """One simulation as it came back.
+
+    Attributes:
+        index: Place in the batch that asked for it.
+        parameters: Values [SI] by name.
+        status: ``ok`` or the kind of failure (``failed``, ``crashed``, ``timeout``...).
+        reason: Typed reason of a failure, empty when ok.
+        fraction: Part of the stroke that was completed [-], 0 to 1.
+        stroke: Knife path from first contact [m] (k,), rising; may be empty after a failure.
+        force: Force of the food on the knife, upwards positive [N] (k,).
+        scalars: Named results: momentum_residual, ke_over_ie, wall_s, ...
+        seconds: Wall time of the run [s].
+        parts: The runs of a joint evaluation, one per trace; empty for a single one.
+
+    Raises:
+        ValueError: A fraction outside [0, 1], or stroke and force that are not vectors of one length.
+    """
+
+    index: int
+    parameters: dict[str, float]
+    status: str
+    reason: str
+    fraction: float
+    stroke: FloatArray
+    force: FloatArray
+    scalars: dict[str, float] = field(default_factory=dict)
+    seconds: float = 0.0
+    parts: tuple[Evaluation, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.fraction <= 1.0:
+            raise ValueError(
+                f"evaluation {self.index} completed the fraction {self.fraction} of its stroke; it must be in [0, 1]."
+            )
+        if self.stroke.ndim != 1 or self.stroke.shape != self.force.shape:
+            raise ValueError(
+                f"evaluation {self.index} has {self.stroke.shape} strokes and {self.force.shape} forces; "
+                "they must be two vectors of equal length."
+            )
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run reached the end of its stroke."""
+        return self.status == "ok"
+
+
+class Evaluator(Protocol):
+    """Whatever runs simulations: a pool of processes, a cache before it, or a fake."""
+
+    def evaluate(self, batch: Sequence[Mapping[str, float]]) -> Iterator[Evaluation]:
+        """Run each set of ``batch``; yield in order of completion, ``index`` = place in the batch."""
