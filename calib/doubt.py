@@ -22,7 +22,7 @@ from calib.uncertainty import Uncertainty, evidence, uncertainty
 
 FloatArray = npt.NDArray[np.float64]
 
-ROUNDS = 1
+ROUNDS = 2
 """How often the ends that the profiles claim are simulated and the profiles walked again."""
 CLOSE = 0.05
 """Points this near to a run, in prior standard deviations of every parameter, are not run."""

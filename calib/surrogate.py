@@ -1,7 +1,8 @@
 """The curve between the simulated ones: a Gaussian process through all runs of a fit, which proposes points and gives the
 Jacobian.
 
-Source: Rasmussen & Williams (2006), Gaussian Processes for Machine Learning, MIT Press, chapters 2 and 5.
+Sources: Rasmussen & Williams (2006), Gaussian Processes for Machine Learning, MIT Press, chapters 2 and 5; coarse runs as fine
+ones plus a process of their own, Kennedy & O'Hagan (2000), Biometrika 87:1.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ BROKEN_SD, COARSE_SD, COARSE_OFFSET, OFFSET = 0.3, 0.02, 0.2, 0.05
 AMPLITUDE_PRIOR = (math.log(0.4), 1.0, math.log(0.08), math.log(2.0))
 LENGTH_PRIOR = (math.log(1.5), 0.7, math.log(0.3), math.log(8.0))
 NOISE_PRIOR = (math.log(0.012), 0.4, math.log(0.004), math.log(0.04))
+#: The same for how much the difference between coarse and fine curves changes with the parameters, beside its common offset.
+DIFFERENCE_PRIOR = (math.log(0.007), 1.2, math.log(0.003), math.log(0.5))
 
 #: 95 % point of chi-square with 20 degrees of freedom over 20: how much more than its mean the information
 #: that noise feigns along one direction may be in 20 independent points of a curve.
@@ -60,7 +63,7 @@ class CurveProcess:
         objective: That of the trace.
         trials: Its runs so far.
         best: The run about which the process is written.
-        guess: Hyperparameters of an earlier process to start from (p + 3,).
+        guess: Hyperparameters of an earlier process to start from (p + 4,).
     """
 
     def __init__(
@@ -100,19 +103,26 @@ class CurveProcess:
 
     def _kernel(self, a: FloatArray, b: FloatArray, h: FloatArray) -> FloatArray:
         """Covariance (k, l) of g between points (k, p) and (l, p): offset + linear + squared exponential."""
-        gap = ((a[:, None] - b[None]) / np.exp(h[2:-1])) ** 2
+        gap = ((a[:, None] - b[None]) / np.exp(h[2:-2])) ** 2
         out: FloatArray = OFFSET**2 + np.exp(2.0 * h[1]) * (a @ b.T) + np.exp(2.0 * h[0] - 0.5 * gap.sum(axis=2))
         return out
 
     def _covariance(self, h: FloatArray) -> FloatArray:
-        """Covariance of the runs (m, m) with their noise."""
+        """Covariance of the runs (m, m) with their noise; coarse ones share the process of their difference to fine ones."""
         own = self._kernel(self._x, self._x, h) + np.diag(self._extra + math.exp(2.0 * h[-1]))
-        out: FloatArray = own + COARSE_OFFSET**2 * np.outer(self._coarse, self._coarse)
+        gap = ((self._x[:, None] - self._x[None]) / np.exp(h[2:-2])) ** 2
+        difference = COARSE_OFFSET**2 + self._change(gap, h)
+        out: FloatArray = own + difference * np.outer(self._coarse, self._coarse)
+        return out
+
+    def _change(self, gap: FloatArray, h: FloatArray) -> FloatArray:
+        """Covariance of the part of coarse runs' difference that changes with the parameters (m, m): linear + curved."""
+        out: FloatArray = math.exp(2.0 * h[-2]) * (self._x @ self._x.T + np.exp(-0.5 * gap.sum(axis=2)))
         return out
 
     def _learn(self, y: FloatArray, guess: FloatArray | None) -> FloatArray:
-        """Hyperparameters (p + 3,), logarithms, of largest posterior."""
-        priors = [AMPLITUDE_PRIOR, AMPLITUDE_PRIOR, *[LENGTH_PRIOR] * len(self.unit), NOISE_PRIOR]
+        """Hyperparameters (p + 4,), logarithms, of largest posterior."""
+        priors = [AMPLITUDE_PRIOR, AMPLITUDE_PRIOR, *[LENGTH_PRIOR] * len(self.unit), DIFFERENCE_PRIOR, NOISE_PRIOR]
         mean, sd, low, high = np.array(priors).T
         count = self.objective.effective_points
         gram = y @ y.T * (count / y.shape[1])
@@ -134,11 +144,14 @@ class CurveProcess:
 
     def _derivatives(self, h: FloatArray) -> list[FloatArray]:
         """Derivatives of the covariance of the runs (m, m) by each hyperparameter."""
-        gap = ((self._x[:, None] - self._x[None]) / np.exp(h[2:-1])) ** 2
-        curved = np.exp(2.0 * h[0] - 0.5 * gap.sum(axis=2))
+        gap = ((self._x[:, None] - self._x[None]) / np.exp(h[2:-2])) ** 2
+        shape, both = np.exp(-0.5 * gap.sum(axis=2)), np.outer(self._coarse, self._coarse)
+        curved = math.exp(2.0 * h[0]) * shape
         linear = math.exp(2.0 * h[1]) * (self._x @ self._x.T)
+        stretched = curved + math.exp(2.0 * h[-2]) * shape * both
         noise = math.exp(2.0 * h[-1]) * np.eye(len(self._x))
-        return [2.0 * curved, 2.0 * linear, *(curved * g for g in np.moveaxis(gap, 2, 0)), 2.0 * noise]
+        lengths = (stretched * g for g in np.moveaxis(gap, 2, 0))
+        return [2.0 * curved, 2.0 * linear, *lengths, 2.0 * self._change(gap, h) * both, 2.0 * noise]
 
     def predict(self, z: FloatArray) -> tuple[FloatArray, float, float]:
         """Expected curve [N] (n,), its standard deviation [N] and the completed part of the stroke at z."""

@@ -63,7 +63,7 @@ def one_sided() -> tuple[Objective, FitResult, Doubt]:
     curve = np.interp(GRID, STROKE, elastic(truth))
     objective = Objective(Target(GRID, curve, 0.05, 0.05, np.interp), ONE_SIDED)
     simulator = Fake(elastic, noisy=0.004)
-    result = calibrate(objective, simulator, options=FitOptions(budget=60, design=15))
+    result = calibrate(objective, simulator, coarse=simulator, options=FitOptions(budget=60))
     doubt = doubt_of(objective, result, scout=simulator)
     assert doubt is not None
     return objective, result, doubt
@@ -134,10 +134,11 @@ def test_fake_and_noise_are_repeatable() -> None:
 def test_a_sample_agrees_with_the_profile(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
     """R by the ensemble of walkers and by its profile: the ends within a quarter of the interval."""
     objective, result, _ = one_sided
-    doubt = doubt_of(objective, result, sample=True)
+    scout = Fake(elastic, noisy=0.004)
+    doubt = doubt_of(objective, result, scout=scout, sample=True)
     assert doubt is not None
     interval = next(i for i in doubt.uncertainty.intervals if i.parameter.name == "R")
     width = interval.high95 - interval.low95
     assert doubt.sampled["R"] == pytest.approx((interval.low95, interval.high95), abs=0.25 * width)
-    again = doubt_of(objective, result, sample=True)
+    again = doubt_of(objective, result, scout=scout, sample=True)
     assert again is not None and again.sampled == doubt.sampled
