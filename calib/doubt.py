@@ -22,7 +22,7 @@ from calib.uncertainty import Uncertainty, evidence, uncertainty
 
 FloatArray = npt.NDArray[np.float64]
 
-ROUNDS = 2
+ROUNDS = 1
 """How often the ends that the profiles claim are simulated and the profiles walked again."""
 CLOSE = 0.05
 """Points this near to a run, in prior standard deviations of every parameter, are not run."""
@@ -37,7 +37,7 @@ class Doubt:
         profiles: Profile likelihood of each parameter.
         nuisances: What the best curves say of the measurement, trace by trace.
         bands: Posterior predictive band of each trace.
-        runs: Coarse simulations made to confirm the ends of the intervals.
+        runs: Simulations made to confirm the ends of the intervals.
         sampled: 95 % intervals [unit] from a sample of the posterior by name, where one was asked for.
     """
 
@@ -54,6 +54,7 @@ def doubt_of(
     result: FitResult,
     *,
     scout: Evaluator | None = None,
+    judge: Evaluator | None = None,
     seed: int = 0,
     sample: bool = False,
     say: Callable[[str], None] = lambda text: None,
@@ -65,6 +66,8 @@ def doubt_of(
         result: How.
         scout: Runs cheap simulations at the ends that the profiles claim, which are then walked again; without it they rest on
             the runs of the search alone.
+        judge: Runs simulations as they count at both ends of each parameter that would be called identified; the profiles are
+            walked once more with them.
         seed: Seed of the predictive draws.
         sample: Whether the posterior is sampled as well.
         say: Called before each round of simulations, with one sentence.
@@ -76,25 +79,32 @@ def doubt_of(
         return None
     with threadpool_limits(1, "blas"):
         surrogate, jacobian, runs = result.surrogate, result.jacobian, list(result.history)
-        for remaining in range(ROUNDS, -1, -1):
+        rounds = [(scout, True)] * ROUNDS + [(judge, False)]
+        for evaluator, coarse in [*rounds, (None, False)]:
             found = uncertainty(result.parameters, evidence(objective, result.best, jacobian))
             walked = profiles(surrogate, result.parameters, found)
-            asked = (
-                []
-                if scout is None or not remaining
-                else _new(objective, [z for p in walked for z in p.frontier()], runs)
-            )
-            if not asked:
-                break
-            say(f"intervals: {len(asked)} of their ends on coarse cells")
-            runs += _run(objective, scout, asked)
-            surrogate = Surrogate(objective, runs, result.best, surrogate.hyper)
-            jacobian = surrogate.jacobian(result.best.z)
+            if evaluator is None:
+                continue
+            known = runs if coarse else [t for t in runs if not t.coarse]
+            asked = _new(objective, _ends(found, walked, claimed=not coarse), known)
+            if asked:
+                say(f"intervals: {len(asked)} of their ends{' on coarse cells' if coarse else ''}")
+                runs += _run(objective, evaluator, asked, coarse)
+                surrogate = Surrogate(objective, runs, result.best, surrogate.hyper)
+                jacobian = surrogate.jacobian(result.best.z)
         drawn = bands(surrogate, result.best.z, found, seed)
         posterior = Posterior(surrogate, result.parameters, found)
         own = sampled(posterior, result.best.z, seed) if sample else {}
     added = tuple(runs[len(result.history) :])
     return Doubt(with_profiles(found, walked), walked, _nuisances(objective, result, found), drawn, added, own)
+
+
+def _ends(found: Uncertainty, walked: tuple[Profile, ...], claimed: bool) -> list[FloatArray]:
+    """Points (p,) at the ends of profiles; where ``claimed``, only of identified parameters, with the others at their optimum."""
+    if not claimed:
+        return [z for p in walked for z in p.frontier()]
+    intervals = with_profiles(found, walked).intervals
+    return [z for i, p in zip(intervals, walked, strict=True) if i.verdict == "identified" for z in p.frontier()[::2]]
 
 
 def _new(objective: Objective | JointObjective, points: list[FloatArray], runs: list[Trial]) -> list[FloatArray]:
@@ -108,12 +118,13 @@ def _new(objective: Objective | JointObjective, points: list[FloatArray], runs: 
     return chosen
 
 
-def _run(objective: Objective | JointObjective, scout: Evaluator | None, points: list[FloatArray]) -> list[Trial]:
-    """Coarse trials at some points, in their order."""
-    assert scout is not None
+def _run(
+    objective: Objective | JointObjective, evaluator: Evaluator, points: list[FloatArray], coarse: bool
+) -> list[Trial]:
+    """Trials at some points, in their order."""
     batch = [objective.parameters.to_dict(z) for z in points]
-    found = sorted(scout.evaluate(batch), key=lambda e: e.index)
-    return [objective.trial(e, coarse=True, stage="profile") for e in found]
+    found = sorted(evaluator.evaluate(batch), key=lambda e: e.index)
+    return [objective.trial(e, coarse=coarse, stage="profile") for e in found]
 
 
 def _nuisances(

@@ -184,7 +184,10 @@ class Specimens:
         if result.status == "interrupted":
             raise KeyboardInterrupt
         return Fitted(
-            tuple(names), joint, result, doubt_of(joint, result, scout=coarse, seed=self.study.seed, say=self.say)
+            tuple(names),
+            joint,
+            result,
+            doubt_of(joint, result, scout=coarse, judge=fine, seed=self.study.seed, say=self.say),
         )
 
     def staged(self, words: str) -> Callable[[Progress], None] | None:

@@ -79,7 +79,9 @@ def run(
             for name, scene in (("fine", setup.fine), ("coarse", setup.coarse), ("again", otherwise(setup.fine)))
         )
         result = calibrate(setup.objective, fine, coarse=coarse, replicate=again, options=options, progress=progress)
-        doubt = doubt_of(setup.objective, result, scout=coarse, seed=request.seed, sample=request.sample, say=say)
+        doubt = doubt_of(
+            setup.objective, result, scout=coarse, judge=fine, seed=request.seed, sample=request.sample, say=say
+        )
         if doubt is not None:
             result = replace(result, history=(*result.history, *doubt.runs))
         start = _start_curve(setup, result, fine)
