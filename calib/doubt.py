@@ -22,8 +22,6 @@ from calib.uncertainty import Uncertainty, evidence, uncertainty
 
 FloatArray = npt.NDArray[np.float64]
 
-ROUNDS = 1
-"""How often the ends that the profiles claim are simulated and the profiles walked again."""
 CLOSE = 0.05
 """Points this near to a run, in prior standard deviations of every parameter, are not run."""
 
@@ -79,14 +77,21 @@ def doubt_of(
         return None
     with threadpool_limits(1, "blas"):
         surrogate, jacobian, runs = result.surrogate, result.jacobian, list(result.history)
-        rounds = [(scout, True)] * ROUNDS + [(judge, False)]
-        for evaluator, coarse in [*rounds, (None, False)]:
+        # profiles are walked, their ends simulated, and so on: with the others at their best values, then at their optimum, as
+        # they count where a parameter would be called identified; of made-up fits whose profile is known the root of the rise
+        # was off by up to 1.5 after one round and 0.9 after these
+        for evaluator, coarse, alone in (
+            (scout, True, True),
+            (scout, True, False),
+            (judge, False, False),
+            (None, False, False),
+        ):
             found = uncertainty(result.parameters, evidence(objective, result.best, jacobian))
             walked = profiles(surrogate, result.parameters, found)
             if evaluator is None:
                 continue
             known = runs if coarse else [t for t in runs if not t.coarse]
-            asked = _new(objective, _ends(found, walked, claimed=not coarse), known)
+            asked = _new(objective, _ends(found, walked, claimed=not coarse, alone=alone), known)
             if asked:
                 say(f"intervals: {len(asked)} of their ends{' on coarse cells' if coarse else ''}")
                 runs += _run(objective, evaluator, asked, coarse)
@@ -99,12 +104,11 @@ def doubt_of(
     return Doubt(with_profiles(found, walked), walked, _nuisances(objective, result, found), drawn, added, own)
 
 
-def _ends(found: Uncertainty, walked: tuple[Profile, ...], claimed: bool) -> list[FloatArray]:
-    """Points (p,) at the ends of profiles; where ``claimed``, only of identified parameters, with the others at their optimum."""
-    if not claimed:
-        return [z for p in walked for z in p.frontier()]
+def _ends(found: Uncertainty, walked: tuple[Profile, ...], claimed: bool, alone: bool) -> list[FloatArray]:
+    """Points (p,) at the ends of profiles; where ``claimed``, only of identified parameters."""
     intervals = with_profiles(found, walked).intervals
-    return [z for i, p in zip(intervals, walked, strict=True) if i.verdict == "identified" for z in p.frontier()[::2]]
+    chosen = [p for i, p in zip(intervals, walked, strict=True) if not claimed or i.verdict == "identified"]
+    return [z for p in chosen for z in p.frontier(alone)]
 
 
 def _new(objective: Objective | JointObjective, points: list[FloatArray], runs: list[Trial]) -> list[FloatArray]:

@@ -141,7 +141,7 @@ def _choose(search: Search, replicate: Evaluator) -> tuple[Trial, list[Trial]]:
 def _result(search: Search, status: str, best: Trial, replicates: list[Trial]) -> FitResult:
     """What was found, with a Jacobian if there are runs enough for one."""
     jacobian, repeatability, process = None, math.nan, None
-    if len(search.finished) > len(search.parameters):
+    if sum(t.ok for t in search.trials) > len(search.parameters):
         process = search.process(best)
         jacobian, repeatability = process.jacobian(best.z), process.noise
     parameters = search.parameters.with_values(best.evaluation.parameters)

@@ -60,19 +60,20 @@ class Profile:
     points: FloatArray
     index: int
 
-    def frontier(self) -> list[FloatArray]:
+    def frontier(self, alone: bool = False) -> list[FloatArray]:
         """Points (p,) where the trace alone is claimed to end the parameter, or where the walk ended without, on both sides.
 
-        On each side two: at the others' optimum, which is the surrogate's word, and with the others at their best values.
+        Args:
+            alone: Whether the other parameters stay at their best values; else they are at their optimum, as the surrogate sees it.
         """
         best = int(np.argmin(np.abs(self.z - self.best)))
         found: list[FloatArray] = []
         for side in (range(best, -1, -1), range(best, len(self.z))):
             k = next((k for k in side if self.data[k] >= RISE), side[-1])
             if k != best:
-                beside = self.points[best].copy()
-                beside[self.index] = self.z[k]
-                found += [self.points[k], beside]
+                z = self.points[best if alone else k].copy()
+                z[self.index] = self.z[k]
+                found.append(z)
         return found
 
     def end(self, side: int, rise: FloatArray) -> float | None:

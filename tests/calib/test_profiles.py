@@ -64,7 +64,7 @@ def one_sided() -> tuple[Objective, FitResult, Doubt]:
     objective = Objective(Target(GRID, curve, 0.05, 0.05, np.interp), ONE_SIDED)
     simulator = Fake(elastic, noisy=0.004)
     result = calibrate(objective, simulator, coarse=simulator, options=FitOptions(budget=60))
-    doubt = doubt_of(objective, result, scout=simulator)
+    doubt = doubt_of(objective, result, scout=simulator, judge=simulator)
     assert doubt is not None
     return objective, result, doubt
 
