@@ -51,6 +51,9 @@ class Pool(Workers):
         self._executor.shutdown(wait=False, cancel_futures=True)
         for process in processes:
             process.terminate()
+        self._executor.shutdown(
+            wait=True
+        )  # its thread ends with the processes; left alone it may trip over Python's own end
 
     def each(self, work: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Result | None]]:
         """Call ``work(*job, arch, threads)`` for each job; yields (place among the jobs, result) in order of completion.

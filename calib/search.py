@@ -69,7 +69,8 @@ PROBE_SPREAD, PROBE_COST, PROBES = 1.5, 3.0, 200
 #: A curve counts as explained when the right material would leave a larger chi-square than its in one of a hundred cuts:
 #: side minima leave three times as much, and a false alarm costs half as many simulations again.
 EXPLAINED = 0.99
-#: Rounds without promise and gain after which the search has converged; rounds without gain: stalled.
+#: Rounds without promise and gain after which the search has converged; rounds without gain: stalled.  Half of either after
+#: strides and further designs: what they did not bring at once they have not brought.
 CALM_ROUNDS, STALLED_ROUNDS = 2, 4
 #: Designs at most: further ones while every run breaks down, and where the search ends with a chi-square
 #: above the number of independent data.  Of 96 synthetic cuts one stayed in a side minimum (excess
@@ -189,8 +190,10 @@ class Search:
             raise self._nothing()
         if self.coarse is None:
             self._differences()
+        patience = 1.0
         while True:
-            status, best = self._rounds(), self.best
+            status, best = self._rounds(patience), self.best
+            patience = 0.5
             if status == "budget":
                 return status
             unexplained = best.misfit > chi2.ppf(EXPLAINED, self.objective.effective_rows)
@@ -288,8 +291,8 @@ class Search:
         self._evaluate([z + d for d in np.diag(inwards * steps)], "difference", coarse=self.coarse is not None)
         return True
 
-    def _rounds(self) -> str:
-        """Rounds of one batch each, until they are calm or the budget is spent."""
+    def _rounds(self, patience: float = 1.0) -> str:
+        """Rounds of one batch each, until they are calm or the budget is spent; ``patience`` shortens the wait for gain."""
         calm = stalled = 0
         while self._room() > 0:
             before, worth, process = self.best.misfit, self.worth, self.process()
@@ -309,8 +312,8 @@ class Search:
             gained = before - self.best.misfit >= worth
             stalled = 0 if gained else stalled + 1
             calm = 0 if gained or promise >= worth else calm + 1
-            if calm >= CALM_ROUNDS or stalled >= STALLED_ROUNDS:
-                return "converged" if calm >= CALM_ROUNDS else "stalled"
+            if calm >= patience * CALM_ROUNDS or stalled >= patience * STALLED_ROUNDS:
+                return "converged" if calm >= patience * CALM_ROUNDS else "stalled"
         return "budget"
 
     def _beside(self, process: Surrogate, near: FloatArray) -> list[FloatArray]:

@@ -17,7 +17,7 @@ calibrate each, and count how often the 95 % intervals hold the truth. It also
 says, before a knife is lifted, which properties such a measurement could tell.
 Writes coverage.json and a line for each trace to --out."""
 EPILOG = """example:
-  cutcal coverage --food banana --traces 100 --dx 4e-3 --out runs/coverage
+  cutcal coverage --food banana --traces 100 --out runs/coverage
 
 Ctrl-C keeps what was computed; the same command with --resume goes on.
 Exit codes: 0 intervals of identified properties hold the truth in 90 % or more
