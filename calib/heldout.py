@@ -1,8 +1,8 @@
 """A held-out cut predicted with the flesh of the others.
 
 Fitted to it is only what its own specimen has for itself: its skin, its size, one factor for width and sensor.  The band comes
-from simulating materials drawn from the posterior of the flesh, each with its own factor, and from errors of the size and
-correlation that the fit of the others showed.
+from simulating materials drawn from the posterior of the flesh, each with its own factor and with what the specimen has for itself
+drawn about its best values, and from errors of the size and correlation that the fit of the others showed.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ from calib.nulls import null_models
 from calib.objective import Objective
 from calib.parameters import ParameterSet
 from calib.prediction import NRMSE_LIMIT, RATING_LIMIT
-from calib.predictive import Band, band_of, errors
+from calib.predictive import Band, band_of, errors, materials
 from calib.search import FitOptions
 from calib.specimens import Fitted, Specimens
+from calib.uncertainty import evidence, uncertainty
 from calib.verdicts import Verdict, balances
 from mpm.errors import SimulationError
 
@@ -109,10 +110,10 @@ def predict(specimens: Specimens, fitted: Fitted, name: str) -> Prediction:
     """
     setup = specimens.setups[name]
     goal = setup.objective
-    best, count = _specimen(specimens, fitted.flesh(), name)
+    best, others, count = _specimen(specimens, fitted.flesh(), name)
     values = {**fitted.flesh(), **best}
-    drawn = _drawn(fitted, specimens.study.seed)
-    runs = _runs(specimens, name, [values, *({**flesh, **best} for flesh in drawn)])
+    drawn = zip(_drawn(fitted, specimens.study.seed), others, strict=False)
+    runs = _runs(specimens, name, [values, *({**flesh, **own} for flesh, own in drawn)])
     if not runs[0].ok:
         raise SimulationError(
             f"{name}: the predicted cut did not reach the end of its stroke with {values}; give its height if you measured it",
@@ -140,11 +141,13 @@ def predict(specimens: Specimens, fitted: Fitted, name: str) -> Prediction:
     )
 
 
-def _specimen(specimens: Specimens, flesh: Mapping[str, float], name: str) -> tuple[dict[str, float], int]:
-    """The specimen's own values with the flesh held, and the number of simulations that it took."""
+def _specimen(
+    specimens: Specimens, flesh: Mapping[str, float], name: str
+) -> tuple[dict[str, float], list[dict[str, float]], int]:
+    """The specimen's own values with the flesh held, draws about them, and the number of simulations that it took."""
     setup, chosen = specimens.setups[name], specimens.own_parameters(name)
     if not chosen:
-        return {}, 0
+        return {}, [{}] * DRAWS, 0
     goal = replace(setup.objective, parameters=ParameterSet(chosen))
     fine, coarse = (
         specimens.evaluator(scene.with_material(**flesh), name, fidelity)
@@ -156,7 +159,14 @@ def _specimen(specimens: Specimens, flesh: Mapping[str, float], name: str) -> tu
     )
     if result.status == "interrupted":
         raise KeyboardInterrupt
-    return dict(result.best.evaluation.parameters), len(result.history)
+    best = dict(result.best.evaluation.parameters)
+    if result.jacobian is None:
+        return best, [best] * DRAWS, len(result.history)
+    found = uncertainty(result.parameters, evidence(goal, result.best, result.jacobian))
+    random = np.random.default_rng(specimens.study.seed)
+    steps = random.standard_normal((DRAWS, len(chosen))) @ np.linalg.cholesky(found.alone).T
+    drawn = [goal.parameters.to_dict(goal.parameters.clip(result.best.z + step)) for step in steps]
+    return best, drawn, len(result.history)
 
 
 def _runs(specimens: Specimens, name: str, batch: list[dict[str, float]]) -> list[Evaluation]:
@@ -165,14 +175,12 @@ def _runs(specimens: Specimens, name: str, batch: list[dict[str, float]]) -> lis
 
 
 def _drawn(fitted: Fitted, seed: int) -> list[dict[str, float]]:
-    """Materials from the normal approximation of the posterior of the flesh."""
-    if fitted.doubt is None:
+    """Flesh of materials from the posterior of the fit, as its own band draws them."""
+    if fitted.doubt is None or fitted.result.surrogate is None:
         return []
     random = np.random.default_rng(seed)
-    root = np.linalg.cholesky(fitted.doubt.uncertainty.covariance)
-    z = fitted.result.best.z
-    parameters = fitted.objective.parameters
-    return [fitted.flesh(parameters.clip(z + root @ random.standard_normal(len(z)))) for _ in range(DRAWS)]
+    points = materials(fitted.result.surrogate, fitted.result.best.z, fitted.doubt.uncertainty, random)
+    return [fitted.flesh(z) for z in points[:DRAWS]]
 
 
 def _mean(specimens: Specimens, names: tuple[str, ...], held: str) -> FloatArray:

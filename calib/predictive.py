@@ -50,7 +50,7 @@ def bands(surrogate: Surrogate, z: FloatArray, found: Uncertainty, seed: int = 0
         seed: Seed of the draws.
     """
     random = np.random.default_rng(seed)
-    drawn = _materials(surrogate, z, found, random)
+    drawn = materials(surrogate, z, found, random)
     out = []
     for process, case, length in zip(surrogate.each, surrogate.objective.cases, found.data.lengths, strict=True):
         goal = case.objective
@@ -71,8 +71,15 @@ def band_of(curves: FloatArray, measured: FloatArray) -> Band:
     return Band(low, high, float(np.mean((measured >= low) & (measured <= high))))
 
 
-def _materials(surrogate: Surrogate, z: FloatArray, found: Uncertainty, random: np.random.Generator) -> FloatArray:
-    """Internal coordinates of materials from the posterior (DRAWS, p)."""
+def materials(surrogate: Surrogate, z: FloatArray, found: Uncertainty, random: np.random.Generator) -> FloatArray:
+    """Internal coordinates of materials from the posterior (DRAWS, p), in random order.
+
+    Args:
+        surrogate: The process of the fit.
+        z: Internal coordinates of the best values (p,).
+        found: Their uncertainty.
+        random: Source of randomness.
+    """
     parameters = surrogate.objective.parameters
     root = np.linalg.cholesky(found.alone)
     normal = random.standard_normal((DRAWS, len(z)))
