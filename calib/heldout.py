@@ -32,8 +32,9 @@ FloatArray = np.ndarray
 BUDGET = 40.0
 """Simulations at most for the few parameters of a specimen."""
 DESIGN = 5
-DRAWS = 16
-"""Materials of the posterior that are simulated for the band; errors are drawn for each a hundred times."""
+DRAWS = 32
+"""Materials of the posterior that are simulated for the band; errors are drawn for each a hundred times. With 16 the part of a potato's
+points within it was 88 or 91 %, as they were drawn."""
 REPEATED = 100
 INSIDE_LIMIT = 0.90
 """Least part of the measured points within their 95 % band."""
