@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from calib.fit import FitResult, calibrate
 from calib.objective import Objective, Target
 from calib.parameters import Z95, Parameter, ParameterSet
 from calib.predictive import band_of, errors
-from calib.profiles import RISE, Profile
+from calib.profiles import RISE, Profile, with_profiles
 from calib.search import FitOptions
 from tests.calib.fake import GRID, NOISE, STROKE, Fake, goal, noise, three_terms
 
@@ -79,6 +80,27 @@ def test_verdicts_say_what_the_trace_bounds(one_sided: tuple[Objective, FitResul
     walked = {p.name: p for p in doubt.profiles}
     above = walked["yield_stress"].end(1, walked["yield_stress"].data)
     assert above is None or math.exp(above) > 3e6
+
+
+def test_what_is_called_identified_was_tried_at_both_ends(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+    """Runs that count are made where R would end, and for nothing else; coarse ones at the ends of all."""
+    objective, result, doubt = one_sided
+    judged = [t.z - result.best.z for t in doubt.runs if not t.coarse]
+    r = objective.parameters.names.index("R")
+    assert len(judged) == 2 and judged[0][r] < 0.0 < judged[1][r]
+    assert sum(t.coarse for t in doubt.runs) > 2 * len(objective.parameters)
+
+
+def test_an_interval_holds_the_best_value(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+    """Where the surrogate puts the optimum beside the best run, the interval reaches to that run's value."""
+    doubt = one_sided[2]
+    moved = tuple(
+        replace(i, parameter=replace(i.parameter, value=1.1 * i.high95)) if i.parameter.name == "R" else i
+        for i in doubt.uncertainty.intervals
+    )
+    found = with_profiles(replace(doubt.uncertainty, intervals=moved), doubt.profiles).intervals
+    for i in found:
+        assert i.low95 * (1.0 - 1e-9) <= i.parameter.value <= i.high95 * (1.0 + 1e-9)
 
 
 def test_profile_of_a_known_parameter_is_that_of_the_curvature(one_sided: tuple[Objective, FitResult, Doubt]) -> None:

@@ -151,3 +151,24 @@ def test_least_stays_within_bounds_and_radius() -> None:
     close = process.least(best.z, 0.01, 1.0)
     assert np.abs(close - best.z).max() <= 0.01 + 1e-6
     assert np.all(z >= THREE.lower) and np.all(z <= THREE.upper)
+
+
+def coarse_trials(count: int, slope: float) -> list[Trial]:
+    """Coarse runs about the values: 5 % too much, and ``slope`` more for each unit by which the depth grows."""
+    random, objective = np.random.default_rng(5), goal()
+    out = []
+    for step in 0.5 * random.standard_normal((count, 3)):
+        z = THREE.start + step
+        evaluation = Evaluation(0, THREE.to_dict(z), "ok", "", 1.0, 0.04 * X, cut(z) * (1.05 + slope * step[1]))
+        out.append(objective.trial(evaluation, coarse=True))
+    return out
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.3])
+def test_coarse_runs_say_what_they_share_with_fine_ones(slope: float) -> None:
+    """With ten fine runs, 40 coarse ones whose error changes with a parameter leave the slope of a fine curve where it is."""
+    runs = trials(10, noise=0.003) + coarse_trials(40, slope)
+    process = Surrogate(goal(), runs, runs[0]).each[0]
+    up, down = (THREE.start + np.array([0.0, side * 0.2, 0.0]) for side in (1.0, -1.0))
+    found, true = process.predict(up)[0] - process.predict(down)[0], cut(up) - cut(down)
+    assert np.abs(found - true).max() < 0.02 * PEAK
