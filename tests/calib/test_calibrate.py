@@ -108,7 +108,7 @@ def test_summary_holds_the_contract(finished):
     c = pd.read_csv(finished[0] / "curves.csv")
     again = compare(c["stroke_m"].to_numpy(), c["real_N"].to_numpy(), c["sim_N"].to_numpy())
     assert s["nrmse"] == pytest.approx(again.nrmse, rel=1e-6)
-    assert s["peak_error"] == pytest.approx(again.peak_error, rel=1e-6)
+    assert s["peak_error"] == pytest.approx(again.peak_error, abs=1e-6)  # parts of the peak; the file has seven digits
     assert s["momentum_residual"] < 1e-9
     np.testing.assert_allclose(c["edge_N"] + c["face_N"], c["sim_N"], atol=1e-6)
 
