@@ -271,12 +271,14 @@ def test_workers_that_join_are_used_and_others_refused(two, jobs, tmp_path):
 def test_ctrl_c_cancels_and_leaves_the_cluster(two, jobs):
     """What was asked for is forgotten by the scheduler, the workers live, and the next study gets them."""
     with full(two) as there:
-        runs = there.each(jobs.sleep, [(k, 2.0 * (k > 0)) for k in range(50)])
+        runs = there.each(jobs.sleep, [(k, 2.0 * (k > 0)) for k in range(500)])
         next(runs)
         assert wait_for(lambda: any(there._client.processing().values()))
         with pytest.raises(KeyboardInterrupt):
             runs.throw(KeyboardInterrupt)
-        assert not any(there._client.processing().values())
+        assert wait_for(
+            lambda: not any(there._client.processing().values())
+        )  # the scheduler hears of it a little later
         assert len(dict(there.each(jobs.sleep, [(k, 0.0) for k in range(4)]))) == 4
 
 
