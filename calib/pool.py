@@ -48,12 +48,10 @@ class Pool(Workers):
     def close(self) -> None:
         """End the processes at once; runs that have not finished are lost."""
         processes = list((getattr(self._executor, "_processes", None) or {}).values())
-        self._executor.shutdown(wait=False, cancel_futures=True)
         for process in processes:
             process.terminate()
-        self._executor.shutdown(
-            wait=True
-        )  # its thread ends with the processes; left alone it may trip over Python's own end
+        # waited for: the executor's thread ends with its processes, and left alone it may trip over Python's own end
+        self._executor.shutdown(wait=True, cancel_futures=True)
 
     def each(self, work: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Result | None]]:
         """Call ``work(*job, arch, threads)`` for each job; yields (place among the jobs, result) in order of completion.

@@ -52,7 +52,6 @@ class Plan:
     Attributes:
         food: The food.
         knife: The knife.
-        pool: Where the simulations run.
         scene: Its default cut on the coarse grid.
         parameters: The default fit parameters with their priors.
         candidates: Values [SI] by name: the food's own first, then the draws.
@@ -91,7 +90,6 @@ def plan(food: FoodSpec, knife: Knife, draws: int = DRAWS, seed: int = 0) -> Pla
     Args:
         food: The food.
         knife: The knife.
-        pool: Where the simulations run.
         draws: How many draws from the priors.
         seed: Seed of the draws and of the particles.
 
