@@ -76,7 +76,8 @@ def doubt_of(
     if result.jacobian is None or result.surrogate is None:
         return None
     with threadpool_limits(1, "blas"):
-        surrogate, jacobian, runs = result.surrogate, result.jacobian, list(result.history)
+        surrogate, runs = result.surrogate, list(result.history)
+        found, walked = _walk(objective, result, surrogate, result.jacobian)
         # profiles are walked, their ends simulated, and so on: with the others at their best values, then at their optimum, as
         # they count where a parameter would be called identified; of made-up fits whose profile is known the root of the rise
         # was off by up to 1.5 after one round and 0.9 after these
@@ -84,10 +85,7 @@ def doubt_of(
             (scout, True, True),
             (scout, True, False),
             (judge, False, False),
-            (None, False, False),
         ):
-            found = uncertainty(result.parameters, evidence(objective, result.best, jacobian))
-            walked = profiles(surrogate, result.parameters, found)
             if evaluator is None:
                 continue
             known = runs if coarse else [t for t in runs if not t.coarse]
@@ -96,12 +94,20 @@ def doubt_of(
                 say(f"intervals: {len(asked)} of their ends{' on coarse cells' if coarse else ''}")
                 runs += _run(objective, evaluator, asked, coarse)
                 surrogate = Surrogate(objective, runs, result.best, surrogate.hyper)
-                jacobian = surrogate.jacobian(result.best.z)
+                found, walked = _walk(objective, result, surrogate, surrogate.jacobian(result.best.z))
         drawn = bands(surrogate, result.best.z, found, seed)
         posterior = Posterior(surrogate, result.parameters, found)
         own = sampled(posterior, result.best.z, seed) if sample else {}
     added = tuple(runs[len(result.history) :])
     return Doubt(with_profiles(found, walked), walked, _nuisances(objective, result, found), drawn, added, own)
+
+
+def _walk(
+    objective: Objective | JointObjective, result: FitResult, surrogate: Surrogate, jacobian: FloatArray
+) -> tuple[Uncertainty, tuple[Profile, ...]]:
+    """The normal approximation about the best run, and the profiles."""
+    found = uncertainty(result.parameters, evidence(objective, result.best, jacobian))
+    return found, profiles(surrogate, result.parameters, found)
 
 
 def _ends(found: Uncertainty, walked: tuple[Profile, ...], claimed: bool, alone: bool) -> list[FloatArray]:
