@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_food, add_run, add_workers, food_of, number, sizing_of, workers_of
+from calib.cli.options import add_food, add_run, add_workers, food_of, note, number, sizing_of, workers_of
 from calib.objective import ErrorModel
 from calib.progress import ProgressBar
 from calib.request import Request
@@ -156,11 +156,8 @@ def run(args: argparse.Namespace) -> int:
     request = request_of(args, command)
     out = Path(args.out or f"cutcal-{request.food.name}-{request.stem}")
 
-    def say(text: str) -> None:
-        print(f"note: {text}", file=sys.stderr, flush=True)
-
-    with workers_of(args, say) as pool, ProgressBar() as bar:
-        summary = calibrate(request, out, pool, resume=args.resume, progress=bar, say=say)
+    with workers_of(args, note) as pool, ProgressBar() as bar:
+        summary = calibrate(request, out, pool, resume=args.resume, progress=bar, say=note)
     if args.json:
         print((out / "summary.json").read_text(encoding="utf-8"), end="")
     else:
@@ -180,11 +177,8 @@ def run_study(args: argparse.Namespace, command: Sequence[str]) -> int:
     study = overridden(read, budget=args.budget, arch=args.arch, command=tuple(command))
     out = Path(args.out or f"cutcal-{Path(args.config).stem}")
 
-    def say(text: str) -> None:
-        print(f"note: {text}", file=sys.stderr, flush=True)
-
-    with workers_of(args, say) as pool, ProgressBar() as bar:
-        summary = study_run(study, out, pool, resume=args.resume, progress=bar, say=say)
+    with workers_of(args, note) as pool, ProgressBar() as bar:
+        summary = study_run(study, out, pool, resume=args.resume, progress=bar, say=note)
     if args.json:
         print((out / "summary.json").read_text(encoding="utf-8"), end="")
     else:

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_food, add_run, add_workers, food_of, number, numbers, sizing_of, workers_of
+from calib.cli.options import add_food, add_run, add_workers, food_of, number, numbers, say, sizing_of, workers_of
 from calib.errors import CurveError
 from calib.knives import load_knife
 from calib.scenes import cut_scene, specimen
@@ -89,9 +89,6 @@ def run(args: argparse.Namespace) -> int:
         "command": ["converge", *(a for a in sys.argv[1:] if a != "converge")],
         "warnings": [*food.warnings(), *assumed],
     }
-
-    def say(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
 
     for text in about["warnings"]:
         say(f"note: {text}")

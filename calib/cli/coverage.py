@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_food, add_run, add_workers, food_of, workers_of
+from calib.cli.options import add_food, add_run, add_workers, food_of, say, workers_of
 from calib.errors import CurveError
 
 HELP = "calibrate made-up traces of known truth: do the intervals hold it?"
@@ -41,9 +41,6 @@ def run(args: argparse.Namespace) -> int:
         raise CurveError("--traces must be at least 1, --seed at least 0")
     food = food_of(args)
     out = Path(args.out or f"cutcal-coverage-{food.name}")
-
-    def say(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
 
     with workers_of(args, say) as pool:
         document = study(

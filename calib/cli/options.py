@@ -1,9 +1,10 @@
-"""Options that several sub-commands share, and the checks of their values."""
+"""Options that several sub-commands share, the checks of their values, and how all of them speak beside their results."""
 
 from __future__ import annotations
 
 import argparse
 import math
+import sys
 from collections.abc import Callable
 
 from calib.cluster import Cluster
@@ -16,6 +17,16 @@ from mpm.runtime import ARCHES
 from mpm.shapes import SHAPE_KINDS
 
 LOCAL_WORKERS = 2  # simulations at a time on this machine: a process each
+
+
+def say(text: str) -> None:
+    """One line beside the results, which are on stdout."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def note(text: str) -> None:
+    """One line about the input or the run that a reader of the results should know."""
+    say(f"note: {text}")
 
 
 def number(low: float, high: float, unit: str) -> Callable[[str], float]:

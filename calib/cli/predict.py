@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from calib.cli.calibrate import add_trace, measured
-from calib.cli.options import add_food, add_run
+from calib.cli.options import add_food, add_run, note
 from calib.errors import MaterialError
 
 HELP = "predict a measured cut with a food that was calibrated on another one"
@@ -41,10 +41,7 @@ def run(args: argparse.Namespace) -> int:
     request = measured(args, ["predict", *(a for a in sys.argv[1:] if a != "predict")])
     out = Path(args.out or f"cutcal-predict-{request.food.name}-{request.stem}")
 
-    def say(text: str) -> None:
-        print(f"note: {text}", file=sys.stderr, flush=True)
-
-    summary = predict(request, out, scale_width=args.scale_width, say=say)
+    summary = predict(request, out, scale_width=args.scale_width, say=note)
     if args.json:
         print((out / "summary.json").read_text(encoding="utf-8"), end="")
     else:

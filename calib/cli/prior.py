@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_workers, workers_of
+from calib.cli.options import add_workers, say, workers_of
 from calib.errors import CurveError
 from calib.knives import load_knife
 from calib.materials import load_food, load_foods
@@ -50,9 +50,6 @@ def run(args: argparse.Namespace) -> int:
         raise CurveError("--draws must be at least 1 and --seed at least 0")
     foods = [load_food(name) for name in dict.fromkeys(args.names)] or list(load_foods().values())
     out = Path(args.out or "cutcal-prior")
-
-    def say(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
 
     with workers_of(args, say) as pool:
         document = study(

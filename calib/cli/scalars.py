@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_workers, workers_of
+from calib.cli.options import add_workers, say, workers_of
 from calib.errors import CurveError
 from calib.knives import load_knife
 
@@ -60,9 +59,6 @@ def run(args: argparse.Namespace) -> int:
     if args.fit is not None:
         published = published.fitting(tuple(name.strip() for name in args.fit.split(",")))
     out = Path(args.out or f"cutcal-scalars-{Path(args.file).stem}")
-
-    def say(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
 
     with workers_of(args, say) as pool:
         document = study(

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_workers, workers_of
+from calib.cli.options import add_workers, say, workers_of
 from calib.errors import CurveError
 
 HELP = "stability map: stiffness, Poisson's ratio, time step, cell, speed, resistance and odd starts"
@@ -49,9 +49,6 @@ def run(args: argparse.Namespace) -> int:
         raise CurveError(f"--seed {args.seed}: at least 0")
     out = Path(args.out or "cutcal-stress")
     about = {"command": ["stress", *(a for a in sys.argv[1:] if a != "stress")], "seed": args.seed}
-
-    def say(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
 
     with workers_of(args, say) as pool:
         todo = (quick_cells if args.quick else cells)(args.seed)

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_run, add_workers, workers_of
+from calib.cli.options import add_run, add_workers, say, workers_of
 from calib.errors import CurveError
 
 HELP = "compare the solver with closed forms and finite elements"
@@ -43,9 +43,6 @@ def run(args: argparse.Namespace) -> int:
         raise CurveError(f"--seed {args.seed}: at least 0")
     out = Path(args.out or "cutcal-verify")
     about = {"command": ["verify", *(a for a in sys.argv[1:] if a != "verify")]}
-
-    def say(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
 
     with workers_of(args, say) as pool:
         how = How(args.quick, args.seed, args.arch)
