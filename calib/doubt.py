@@ -64,8 +64,8 @@ def doubt_of(
         result: How.
         scout: Runs cheap simulations at the ends that the profiles claim, which are then walked again; without it they rest on
             the runs of the search alone.
-        judge: Runs simulations as they count at both ends of each parameter that would be called identified; the profiles are
-            walked once more with them.
+        judge: Runs simulations as they count at both ends of each parameter that would be called identified or weak; the profiles
+            are walked once more with them.
         seed: Seed of the predictive draws.
         sample: Whether the posterior is sampled as well.
         say: Called before each round of simulations, with one sentence.
@@ -78,8 +78,8 @@ def doubt_of(
     with threadpool_limits(1, "blas"):
         surrogate, runs = result.surrogate, list(result.history)
         found, walked = _walk(objective, result, surrogate, result.jacobian)
-        # profiles are walked, their ends simulated, and so on: with the others at their best values, then at their optimum, as
-        # they count where a parameter would be called identified; of made-up fits whose profile is known the root of the rise
+        # profiles are walked, their ends simulated, and so on: with the others at their best values, then at their optimum where
+        # the trace is claimed to end them, then as they count where it would end both sides; of made-up fits whose profile is known the root of the rise
         # was off by up to 1.5 after one round and 0.9 after these
         for evaluator, coarse, alone in (
             (scout, True, True),
@@ -89,7 +89,7 @@ def doubt_of(
             if evaluator is None:
                 continue
             known = runs if coarse else [t for t in runs if not t.coarse]
-            asked = _new(objective, _ends(found, walked, claimed=not coarse, alone=alone), known)
+            asked = _new(objective, _ends(found, walked, bounded=not coarse, alone=alone), known)
             if asked:
                 say(f"intervals: {len(asked)} of their ends{' on coarse cells' if coarse else ''}")
                 runs += _run(objective, evaluator, asked, coarse)
@@ -110,10 +110,10 @@ def _walk(
     return found, profiles(surrogate, result.parameters, found)
 
 
-def _ends(found: Uncertainty, walked: tuple[Profile, ...], claimed: bool, alone: bool) -> list[FloatArray]:
-    """Points (p,) at the ends of profiles; where ``claimed``, only of identified parameters."""
+def _ends(found: Uncertainty, walked: tuple[Profile, ...], bounded: bool, alone: bool) -> list[FloatArray]:
+    """Points (p,) at the ends of profiles; where ``bounded``, only of parameters that have an interval on both sides."""
     intervals = with_profiles(found, walked).intervals
-    chosen = [p for i, p in zip(intervals, walked, strict=True) if not claimed or i.verdict == "identified"]
+    chosen = [p for i, p in zip(intervals, walked, strict=True) if not bounded or i.verdict in ("identified", "weak")]
     return [z for p in chosen for z in p.frontier(alone)]
 
 

@@ -61,15 +61,16 @@ class Profile:
     index: int
 
     def frontier(self, alone: bool = False) -> list[FloatArray]:
-        """Points (p,) where the trace alone is claimed to end the parameter, or where the walk ended without, on both sides.
+        """Points (p,) where the trace alone is claimed to end the parameter, on both sides.
 
         Args:
-            alone: Whether the other parameters stay at their best values; else they are at their optimum, as the surrogate sees it.
+            alone: Whether the other parameters stay at their best values, and a walk that met no end counts with where it stopped;
+                else they are at their optimum, as the surrogate sees it, and an open side stays open.
         """
         best = int(np.argmin(np.abs(self.z - self.best)))
         found: list[FloatArray] = []
         for side in (range(best, -1, -1), range(best, len(self.z))):
-            k = next((k for k in side if self.data[k] >= RISE), side[-1])
+            k = next((k for k in side if self.data[k] >= RISE), side[-1] if alone else best)
             if k != best:
                 z = self.points[best if alone else k].copy()
                 z[self.index] = self.z[k]

@@ -13,7 +13,8 @@
    one: 16 synthetic cuts took 14 fine and 54 coarse runs each, where 24 and 40 led to the same chi-square.
 4. When neither the process nor the runs give a gain worth its noise: if the curve is still not explained
    (chi-square above its 99 % quantile), strides along each parameter to both ends of its prior range (one
-   that is not felt here, such as a yield stress that nothing reaches, may be felt there), after those another design;
+   that is not felt here, such as a yield stress that nothing reaches, may be felt there), after those another design,
+   and rounds whose fine runs are made only where the coarse ones promise a gain;
    else differences about the best point; and again 3 if that brings or promises a gain.  The Jacobian there is that of the
    process, in which the noise of single runs is averaged out; plain differences of noisy curves would make every
    parameter look well identified.
@@ -292,7 +293,11 @@ class Search:
         return True
 
     def _rounds(self, patience: float = 1.0) -> str:
-        """Rounds of one batch each, until they are calm or the budget is spent; ``patience`` shortens the wait for gain."""
+        """Rounds of one batch each, until they are calm or the budget is spent.
+
+        ``patience`` shortens the wait for gain; where it is short, only what still promises a gain after the coarse runs of a
+        round is run on fine cells, also far from the best point, and nothing ends the rounds.
+        """
         calm = stalled = 0
         while self._room() > 0:
             before, worth, process = self.best.misfit, self.worth, self.process()
@@ -308,7 +313,12 @@ class Search:
                 self._evaluate(scouts, "scouting", coarse=True)
                 process = self.process()
                 near = _near(process)
-                self._evaluate([near, *self._beside(process, near)][: self.options.batch], "round")
+                points = [near, *self._beside(process, near)]
+                if patience < 1.0:
+                    points = [z for z in (near, self._far(process)) if _promise(process, z) >= worth]
+                    if not points:
+                        return "converged"
+                self._evaluate(points[: self.options.batch], "round")
             gained = before - self.best.misfit >= worth
             stalled = 0 if gained else stalled + 1
             calm = 0 if gained or promise >= worth else calm + 1
