@@ -23,6 +23,8 @@ Places = Callable[[np.ndarray], np.ndarray]
 class FreeBody:
     """Particles with velocities of their own, free or above the board.
 
+    Another simulation of about this size takes over its fields: one is followed to its end before the next is made.
+
     Args:
         shape: Outline.
         material: Its constants.
@@ -63,11 +65,11 @@ class FreeBody:
         self._simulation._set_pose(FAR)
         if board is None:
             self._k.foot.fill(-FAR)
-        seeds = self._k.x.to_numpy()
+        seeds = self._k.of_particles(self._k.x)
         self.start = (place(seeds) if place else seeds) + [0.0, 0.0, lift]
-        self._k.x.from_numpy(self.start)
+        self._k.fill(self._k.x, self.start)
         if velocity is not None:
-            self._k.v.from_numpy(velocity(self.start).astype(self.start.dtype))
+            self._k.fill(self._k.v, velocity(self.start).astype(self.start.dtype))
         if slope is not None:
             self._k.set_gradient(slope(self.start))
         self.dt, self.time = self._simulation._time_step(material), 0.0
@@ -78,12 +80,12 @@ class FreeBody:
     @property
     def x(self) -> np.ndarray:
         """Places [m], shape (n, 3)."""
-        return self._k.x.to_numpy()
+        return self._k.of_particles(self._k.x)
 
     @property
     def v(self) -> np.ndarray:
         """Velocities [m/s], shape (n, 3)."""
-        return self._k.v.to_numpy()
+        return self._k.of_particles(self._k.v)
 
     @property
     def gradient(self) -> np.ndarray:
@@ -108,7 +110,7 @@ class FreeBody:
 
     def kick(self, velocity: np.ndarray) -> None:
         """Add a velocity to all particles [m/s], shape (3,)."""
-        self._k.v.from_numpy(self.v + velocity)
+        self._k.fill(self._k.v, self.v + velocity)
 
     def step(
         self, count: int = 1, *, dt: float | None = None, pull: Callable[[float], np.ndarray] | None = None
@@ -126,7 +128,7 @@ class FreeBody:
         span = dt or self.dt
         for _ in range(count if pull else 1):
             if pull:
-                self._k.v.from_numpy(self.v + span * pull(self.time))
+                self._k.fill(self._k.v, self.v + span * pull(self.time))
             n = 1 if pull else count
             row = self._simulation._advance(n, n, span, 0.0, 0.0)[0]
             sums, self._state, _ = np.split(row, (kn.N_SUMS, kn.N_SUMS + kn.N_STATE))

@@ -11,12 +11,14 @@ from mpm.fields import (
     FULL,
     HALF_LENGTH,
     INV,
+    NODES,
     OX,
     OY,
     OZ,
     PARTED,
     R_FLESH,
     R_START,
+    SECOND,
     SLIP,
     TILT_COS,
     TILT_SIN,
@@ -53,7 +55,7 @@ class Edge(Nodes):
         out = ti.Vector([0, 0, 0, 0, 0, 0])
         for d in ti.static(range(3)):
             out[d] = ti.max(0, ti.ceil(r[d] - h[d], ti.i32))
-            out[d + 3] = ti.min(ti.static(self.nodes[d]), ti.floor(r[d] + h[d], ti.i32) + 1)
+            out[d + 3] = ti.min(self.size[NODES + d], ti.floor(r[d] + h[d], ti.i32) + 1)
         return out
 
     @ti.func
@@ -177,9 +179,9 @@ class Edge(Nodes):
         """Momentum and mass of both fields of a node."""
         q = self.u[a, j, k]
         out = q[3] * ti.Vector([q[0], q[1], q[2], 1.0])
-        if ti.static(self.b1 > self.b0):
-            if self.b0 <= j < self.b1:
-                other = self.u[a, self.second + j, k]
+        if ti.static(self.twins):
+            if self.twin(j):
+                other = self.u[a, self.size[SECOND] + j, k]
                 out += other[3] * ti.Vector([other[0], other[1], other[2], 1.0])
         return out
 
@@ -205,7 +207,7 @@ class Edge(Nodes):
         """Change the velocity of both fields of a node."""
         for d in ti.static(range(3)):
             self.u[a, j, k][d] += dv[d]
-        if ti.static(self.b1 > self.b0):
-            if self.b0 <= j < self.b1:
+        if ti.static(self.twins):
+            if self.twin(j):
                 for d in ti.static(range(3)):
-                    self.u[a, self.second + j, k][d] += dv[d]
+                    self.u[a, self.size[SECOND] + j, k][d] += dv[d]

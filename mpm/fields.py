@@ -11,6 +11,10 @@ TILT_COS, TILT_SIN, YAW_COS, YAW_SIN, TACK, TACK_GAP = range(24, 30)
 ARM_K, ARM_C, ARM_MASS, ARM_LIMIT = range(30, 34)
 DX, INV, OX, OY, OZ, FIRST = range(34, 40)
 N_PARAMETERS = 40
+# Rows of the table of sizes: particles, blocks of them, nodes along x, y, z, slices along the edge, the mirror plane across y, the
+# first and last + 1 node plane along y whose nodes have a second field, and how far behind the first that is stored.
+COUNT, BLOCKS, NODES, STATIONS, PLANE, TWIN, TWIN_END, SECOND = 0, 1, 2, 5, 6, 7, 8, 9
+N_SIZES = 10
 # Rows of the accumulator table, cleared by the host at each output interval.
 EDGE, FACE, BOARD = 0, 3, 6
 PLASTIC, DAMAGE, VISCOUS, INVERTED, OUTSIDE, RUBBED, PARTED = range(9, 16)
@@ -23,16 +27,37 @@ N_POSE = 6
 N_STATE = 5
 N_REPORT = N_SUMS + N_STATE + N_POSE
 
+MIRROR = 2  # index of the node plane that mirrors across x
 FAR = 1 << 20  # a node that no grid has
 BESIDE = 3  # cells on either side of the cut plane whose nodes may carry both halves
 REGISTER = 32  # bytes of a register of a CPU: as many particles as fill it have their elastic stress found at once
 CPU_BLOCK = 512  # Taichi runs CPU loops shorter than this on one thread, so one iteration in 512 works for a thread
+LEAST_PARTICLES, LEAST_NODES = 4096, 24  # capacities of the smallest fields
+MOST_PARTICLES, MOST_NODES = 65_536, 96  # beyond these capacities grow by as much, not by factors
 CRACK_LEAD = 0.5  # cells by which the split of the nodes lags the crack it makes; see Fields.split
+
+
+def capacity(size, least, most, factor):
+    """The size that fields have in whose place one of ``size`` fits: so scenes of many sizes share what is compiled once."""
+    out = least
+    while out < min(size, most):
+        out *= factor
+    return out if size <= out else -(-size // most) * most
+
+
+def particle_capacity(n):
+    """Particles that fields for n of them have room for."""
+    return capacity(n, LEAST_PARTICLES, MOST_PARTICLES, 4)
+
+
+def node_capacity(nodes):
+    """Nodes along an axis that a grid of so many has room for; odd, or neighbours along it would share the cache's sets."""
+    return capacity(nodes, LEAST_NODES, MOST_NODES, 2) + 1
 
 
 @ti.data_oriented
 class Fields:
-    """Particles, grid, edge and tables.
+    """Particles, grid, edge and tables, with room for a class of scenes; :meth:`lay_out` fits them to one.
 
     Deformation gradients are stored entry by entry for ``lanes`` particles, [block, 3 row + column, lane], so that the
     same operation on all of them is one instruction; velocity gradients column by column, each filled up to four.
@@ -41,11 +66,10 @@ class Fields:
     have, at ``[i, second + j, k]``.
 
     Args:
-        n: Number of particles.
-        nodes: Grid nodes along x, y, z.
-        middle: Index of the node plane along y that is nearest to y = 0.
-        planes: Node index of the mirror planes (x, y), -1 where there is none.
-        stations: Number of slices along the edge.
+        room: Most particles.
+        nodes: Most grid nodes along x, y, z.
+        mirrors: Whether there are mirror planes (x, y).
+        stations: Most slices along the edge.
         threads: CPU threads, 0 on a GPU.
         nodal: Plain nodal projection instead of the cohesive edge and particle contact.
         press: The tool presses on the food's surface instead of cutting.
@@ -54,42 +78,39 @@ class Fields:
         branches: Number of Prony branches.
     """
 
-    def __init__(self, n, nodes, middle, planes, stations, threads, nodal, press, damage, turned=False, branches=0):
-        self.n, self.nodes = n, nodes
-        self.i0, self.j0 = planes
-        self.mx, self.my = self.i0 >= 0, self.j0 >= 0
+    def __init__(self, room, nodes, mirrors, stations, threads, nodal, press, damage, turned=False, branches=0):
+        self.mx, self.my = mirrors
+        self.i0 = MIRROR if self.mx else -1
         self.threads, self.nodal, self.damage, self.turned = max(threads, 1), nodal, damage, turned
         self.press, self.cuts = press, not (nodal or press)
         self.atomic = threads == 0
         self.alone = not self.atomic  # short loops run where the kernel was launched
-        self.parts = n if self.atomic else 1 if self.threads == 1 else self.threads * CPU_BLOCK
-        self.stations, self.branches = stations, branches
-        self.b0 = 0 if turned else max(middle - BESIDE, 0)
-        self.b1 = 0 if nodal else nodes[1] if turned else min(middle + BESIDE + 1, nodes[1])
-        self.second = nodes[1] - self.b0
-        deep = nodes[1] + max(self.b1 - self.b0, 0)
+        self.parts = 1 if self.threads == 1 else self.threads * CPU_BLOCK
+        self.branches, self.twins = branches, not nodal
+        self.user = None  # whose state the fields hold
+        deep = nodes[1] + (0 if nodal else nodes[1] if turned else 2 * BESIDE + 1)
         real = ti.lang.impl.get_runtime().default_fp
         vec3, vec4 = ti.types.vector(3, real), ti.types.vector(4, real)
         mat3 = ti.types.matrix(3, 3, real)
-        self.x, self.v = vec3.field(shape=n), vec3.field(shape=n)
         self.lanes = 1 if self.atomic else REGISTER // (8 if real == ti.f64 else 4)
-        self.blocks = -(-n // self.lanes)
-        room = self.blocks * self.lanes
-        self.C, self.F = vec4.field(shape=(room, 3)), ti.Vector.field(self.lanes, real, (self.blocks, 9))
+        blocks = -(-room // self.lanes)
+        room = blocks * self.lanes
+        self.x, self.v = vec3.field(shape=room), vec3.field(shape=room)
+        self.C, self.F = vec4.field(shape=(room, 3)), ti.Vector.field(self.lanes, real, (blocks, 9))
         # Kirchhoff stress (6), viscous and plastic loss, and whether the particle must be done by itself
-        self.tau = ti.Vector.field(self.lanes, real, (self.blocks, 9))
-        self.side, self.gap = ti.field(ti.i32, n), ti.field(real, n)
-        self.foot = ti.field(real, n)
+        self.tau = ti.Vector.field(self.lanes, real, (blocks, 9))
+        self.side, self.gap = ti.field(ti.i32, room), ti.field(real, room)
+        self.foot = ti.field(real, room)
         # reference volume between a particle of the first layer and the board, and the tool; 0 behind the first layer
-        self.shell = ti.Vector.field(2, real, n)
+        self.shell = ti.Vector.field(2, real, room)
         # moment of the contact's last impulse as a gradient of the velocity: upwards, and across the blade; the fourth
         # entry upwards is the kinetic energy per mass that this impulse gave
         self.lever = vec4.field(shape=(room, 2))
         self.kappa, self.strain = (ti.field(real, room if damage else 1) for _ in range(2))
-        self.stick = vec3.field(shape=(2, n))  # board, blade
-        self.tacky, self.layers = ti.field(ti.i32, n), ti.field(ti.i32, n)
-        self.memory = mat3.field(shape=(max(branches, 1), n if branches else 1))
-        self.before = mat3.field(shape=n if branches else 1)
+        self.stick = vec3.field(shape=(2, room))  # board, blade
+        self.tacky, self.layers = ti.field(ti.i32, room), ti.field(ti.i32, room)
+        self.memory = mat3.field(shape=(max(branches, 1), room if branches else 1))
+        self.before = mat3.field(shape=room if branches else 1)
         self.share_of, self.relax = ti.field(real, max(branches, 1)), ti.field(real, max(branches, 1))
         self.g = vec4.field(shape=(self.threads, nodes[0], deep, nodes[2]))
         self.u = vec4.field(shape=(nodes[0], deep, nodes[2]))
@@ -103,11 +124,37 @@ class Fields:
         self.top, self.low, self.width = (ti.field(real, stations) for _ in range(3))
         self.floor_top, self.floor_low = ti.field(real, stations), ti.field(real, stations)
         self.par = ti.field(real, N_PARAMETERS)
+        self.size = ti.field(ti.i32, N_SIZES)
         self.pose = ti.field(ti.f64, N_POSE)
         self.sums = ti.field(ti.f64, N_SUMS)
         self.state = ti.field(ti.f64, N_STATE)
         self.window = ti.field(ti.i32, 6)  # nodes that particles can reach before it is renewed: first, last + 1
         ti.sync()  # lays these fields out by themselves; Taichi does not manage those of eight scenes at once
+
+    def lay_out(self, n, nodes, middle, stations):
+        """Fit the fields to a scene.
+
+        Args:
+            n: Number of particles.
+            nodes: Grid nodes along x, y, z.
+            middle: Index of the node plane along y that is nearest to y = 0: the mirror plane across y where there is one.
+            stations: Number of slices along the edge.
+        """
+        self.n, self.nodes = n, nodes
+        first = 0 if self.turned else max(middle - BESIDE, 0)
+        end = nodes[1] if self.turned else min(middle + BESIDE + 1, nodes[1])
+        sizes = [n, -(-n // self.lanes), *nodes, stations, middle, first, end, nodes[1] - first]
+        self.size.from_numpy(np.array(sizes, np.int32))
+
+    def fill(self, field, values):
+        """Set the first entries of a field of particles or slices, the others to zero."""
+        out = np.zeros((*field.shape, *values.shape[1:]), values.dtype)
+        out[: len(values)] = values
+        field.from_numpy(out)
+
+    def of_particles(self, field):
+        """A field's entries of the scene's particles as NumPy (n, ...)."""
+        return field.to_numpy()[: self.n]
 
     @ti.kernel
     def reset(self):
@@ -182,11 +229,21 @@ class Fields:
         if ti.static(self.atomic):
             first, last = part, part + 1
         elif ti.static(self.threads == 1):
-            last = self.blocks
+            last = self.size[BLOCKS]
         elif part % CPU_BLOCK == 0:
-            thread = part // CPU_BLOCK
-            first, last = self.blocks * thread // self.threads, self.blocks * (thread + 1) // self.threads
+            thread, blocks = part // CPU_BLOCK, self.size[BLOCKS]
+            first, last = blocks * thread // self.threads, blocks * (thread + 1) // self.threads
         return first, last, thread
+
+    @ti.func
+    def shares(self):
+        """Number of iterations of a parallel loop over blocks of particles."""
+        return self.size[BLOCKS] if ti.static(self.atomic) else self.parts
+
+    @ti.func
+    def twin(self, j):
+        """Whether the nodes of plane j along y have a second field."""
+        return self.size[TWIN] <= j < self.size[TWIN_END]
 
     @ti.func
     def rows(self, w):
@@ -276,7 +333,7 @@ class Fields:
     def front_at(self, s):
         """Height of the crack front at a place along the cut [m], between the slices; far up where nothing is cut."""
         r = (s - self.par[FIRST]) * self.par[INV]
-        i = ti.math.clamp(ti.floor(r, ti.i32), 0, self.stations - 2)
+        i = ti.math.clamp(ti.floor(r, ti.i32), 0, self.size[STATIONS] - 2)
         t = ti.math.clamp(r - i, 0.0, 1.0)
         out = 1e3
         if ti.max(self.front[i], self.front[i + 1]) < 1e2:
@@ -370,7 +427,8 @@ class Fields:
         """How many mirror images a node stands for."""
         out = self.images_x(i)
         if ti.static(self.my):
-            out *= 0.0 if j > self.j0 else (1.0 if j == self.j0 else 2.0)
+            plane = self.size[PLANE]
+            out *= 0.0 if j > plane else (1.0 if j == plane else 2.0)
         return out
 
     @ti.func

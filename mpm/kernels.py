@@ -1,4 +1,4 @@
-"""The time step as Taichi kernels. One Kernels object belongs to one grid; material and tool are run-time data."""
+"""The time step as Taichi kernels. One Kernels object serves a class of scenes; sizes, material and tool are run-time data."""
 
 import taichi as ti
 
@@ -15,6 +15,7 @@ from mpm.fields import (
     BOOKED,
     COMMAND,
     COS,
+    COUNT,
     DX,
     EDGE,
     FACE,
@@ -25,8 +26,10 @@ from mpm.fields import (
     PLASTIC,
     RADIUS,
     RUBBED,
+    SECOND,
     SIN,
     SPINE,
+    STATIONS,
     TACK,
     TACK_GAP,
     TILT_COS,
@@ -65,11 +68,11 @@ class Kernels(Survey):
     @ti.func
     def columns(self, base, i, code):
         """Where the fields of the nodes of a particle are stored along y, (j, k): its own side's or the other one's."""
-        at = ti.Matrix.zero(ti.i32, 3, 3)
+        at, second = ti.Matrix.zero(ti.i32, 3, 3), self.size[SECOND]
         for j, k in ti.static(ti.ndrange(3, 3)):
             at[j, k] = base[1] + j
             if ti.static(self.cuts):
-                at[j, k] += 0 if k < self.layer(code, i, j) else self.second
+                at[j, k] += 0 if k < self.layer(code, i, j) else second
         return at
 
     @ti.func
@@ -80,7 +83,7 @@ class Kernels(Survey):
             self.elastic(block, dt)
         for lane in range(self.lanes):
             p = block * self.lanes + lane
-            if p < self.n:
+            if p < self.size[COUNT]:
                 total += self.scatter(p, block, lane, thread, dt, window)
         return total
 
@@ -365,19 +368,19 @@ class Kernels(Survey):
                     self.hot[d], self.hot[d + 3] = FAR, -FAR
         if ti.static(self.cuts):
             ti.loop_config(serialize=self.alone)
-            for i in range(self.stations):
+            for i in range(self.size[STATIONS]):
                 self.lead(i)
         for c in range(self.rows(w)):
             i, j, low, high = self.row(c, w)
             for k in range(low, high):
                 for s in ti.static(range(self.threads)):
                     self.g[s, i, j, k] = ti.Vector.zero(float, 4)
-            if ti.static(self.b1 > self.b0):
-                if self.b0 <= j < self.b1:
+            if ti.static(self.twins):
+                if self.twin(j):
                     for k in range(low, high):
                         for s in ti.static(range(self.threads)):
-                            self.g[s, i, self.second + j, k] = ti.Vector.zero(float, 4)
-        for part in range(self.parts):
+                            self.g[s, i, self.size[SECOND] + j, k] = ti.Vector.zero(float, 4)
+        for part in range(self.shares()):
             first, last, thread = self.share(part)
             if first < last:
                 total = ti.Vector.zero(float, 5)
@@ -390,44 +393,44 @@ class Kernels(Survey):
                 i, j, low, high = self.row(c, w)
                 for k in range(low, high):
                     self.add_threads(i, j, k)
-                if ti.static(self.b1 > self.b0):
-                    if self.b0 <= j < self.b1:
+                if ti.static(self.twins):
+                    if self.twin(j):
                         for k in range(low, high):
-                            self.add_threads(i, self.second + j, k)
+                            self.add_threads(i, self.size[SECOND] + j, k)
         if ti.static(self.mx):
             for j, k in ti.ndrange((w[1], w[4]), (w[2], w[5])):
                 self.fold_x(j, k)
-                if ti.static(self.b1 > self.b0):
-                    if self.b0 <= j < self.b1:
-                        self.fold_x(self.second + j, k)
+                if ti.static(self.twins):
+                    if self.twin(j):
+                        self.fold_x(self.size[SECOND] + j, k)
         for c in range(self.rows(w)):
             i, j, low, high = self.row(c, w)
             for k in range(low, high):
                 self.update_node(i, j, k, dt)
         if ti.static(self.cuts):
             ti.loop_config(serialize=self.alone)
-            for i in range(self.stations):
+            for i in range(self.size[STATIONS]):
                 self.near[i] = 0
                 for d in ti.static((-1, 1)):
-                    if 0 <= i + d < self.stations:
+                    if 0 <= i + d < self.size[STATIONS]:
                         self.near[i] += ti.cast(self.start[i + d] > 0, ti.i32)
             ti.loop_config(serialize=self.alone)
-            for i in range(self.stations):
+            for i in range(self.size[STATIONS]):
                 if i >= self.i0:
                     self.feel(i, dt)
             ti.loop_config(serialize=self.alone)
-            for i in range(self.stations):
+            for i in range(self.size[STATIONS]):
                 if i >= self.i0:
                     self.react(i)
             ti.loop_config(serialize=self.alone)
-            for i in range(self.stations):
+            for i in range(self.size[STATIONS]):
                 if i >= self.i0:
                     self.follow(i)
         ti.loop_config(serialize=self.alone)
         for _ in range(1):
             self.pose[Z] += self.pose[VZ] * dt
             self.pose[S] += self.pose[VS] * dt
-        for p in range(self.n):
+        for p in range(self.size[COUNT]):
             self.gather(p, dt, w)
         if ti.static(self.damage):
             self.smooth_strain(w)

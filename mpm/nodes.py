@@ -3,7 +3,24 @@
 import taichi as ti
 
 from mpm.contact import blade_distance, coulomb
-from mpm.fields import BLADE, BOARD, BOARD_MU, COS, DX, FACE, FRICTION, GRAVITY, RADIUS, SIN, SPINE, VS, VZ, Fields
+from mpm.fields import (
+    BLADE,
+    BOARD,
+    BOARD_MU,
+    COS,
+    DX,
+    FACE,
+    FRICTION,
+    GRAVITY,
+    PLANE,
+    RADIUS,
+    SECOND,
+    SIN,
+    SPINE,
+    VS,
+    VZ,
+    Fields,
+)
 
 
 @ti.data_oriented
@@ -64,16 +81,17 @@ class Nodes(Fields):
     def both(self, i, j, k):
         """Momentum and mass of the first and the second field at a node, mirror images across y included."""
         a, b = self.g[0, i, j, k], ti.Vector.zero(float, 4)
-        if ti.static(self.b1 > self.b0):
-            if self.b0 <= j < self.b1:
-                b = self.g[0, i, self.second + j, k]
+        if ti.static(self.twins):
+            if self.twin(j):
+                second = self.size[SECOND]
+                b = self.g[0, i, second + j, k]
                 if ti.static(self.my):
-                    m = 2 * self.j0 - j
-                    if self.b0 <= m < self.b1:
+                    m = 2 * self.size[PLANE] - j
+                    if self.twin(m):
                         flip = ti.Vector([1.0, -1.0, 1.0, 1.0])
                         a += flip * self.g[0, i, m, k]
-                        if j != self.j0:
-                            b += flip * self.g[0, i, self.second + m, k]
+                        if j != self.size[PLANE]:
+                            b += flip * self.g[0, i, second + m, k]
         return a, b
 
     @ti.func
@@ -86,13 +104,14 @@ class Nodes(Fields):
             va = ti.Vector([a[0], a[1], a[2]]) / a[3] + fall
             if ti.static(self.nodal):
                 va = self.nodal_contact(i, j, k, a, va)
-        if ti.static(self.b1 > self.b0):
+        if ti.static(self.twins):
             if b[3] > 0:
                 vb = ti.Vector([b[0], b[1], b[2]]) / b[3] + fall
                 va, vb = self.keep_apart(i, j, k, a, b, va, vb)
-            if self.b0 <= j < self.b1:
+            if self.twin(j):
                 # velocity of all that shares the field, mass of what was scattered here
-                self.u[i, self.second + j, k] = ti.Vector([vb[0], vb[1], vb[2], self.g[0, i, self.second + j, k][3]])
+                at = self.size[SECOND] + j
+                self.u[i, at, k] = ti.Vector([vb[0], vb[1], vb[2], self.g[0, i, at, k][3]])
         self.u[i, j, k] = ti.Vector([va[0], va[1], va[2], self.g[0, i, j, k][3]])
 
     @ti.func
@@ -106,7 +125,7 @@ class Nodes(Fields):
             na, nb = va.dot(n), vb.dot(n)
             on_mirror = False
             if ti.static(self.my):
-                on_mirror = j == self.j0
+                on_mirror = j == self.size[PLANE]
             if on_mirror:  # the other half is the image of the second field
                 if nb > 0:
                     vb -= nb * n

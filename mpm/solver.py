@@ -69,16 +69,15 @@ class Simulation:
     def _kernels(self, threads: int) -> Kernels:
         """Fields and kernels of the scene for so many CPU threads, 0 for a GPU, in the runtime of ``serial``.
 
-        Those of a scene with as many nodes and particles are used again, so the fields are those of the simulation that
-        ran last; every run loads them anew.
+        Those that a scene of about this size has left are used again, so the fields are those of the simulation that ran last;
+        every run loads them anew.
         """
         scene = self.scene
         key = (
-            len(self.seeds.x),
-            self.nodes,
-            round(-self.origin[1] / scene.numerics.dx),
-            self.planes,
-            len(self.stations),
+            kn.particle_capacity(len(self.seeds.x)),
+            tuple(kn.node_capacity(n) for n in self.nodes),
+            scene.mirrors,
+            kn.node_capacity(len(self.stations)),
             threads,
             scene.numerics.contact == "nodal",
             not scene.cuts,
@@ -105,7 +104,7 @@ class Simulation:
             bottom = -PAD if axis == 2 else -math.ceil(size / 2 / dx) - room
             top = math.ceil(size / dx) + PAD if axis == 2 else math.ceil(size / 2 / dx) + room
             if mirror[axis] and axis == 0:
-                bottom = -2
+                bottom = -kn.MIRROR
             if mirror[axis] and axis == 1:
                 top = 2
             low.append(bottom)
@@ -113,7 +112,6 @@ class Simulation:
             zero.append(shift)
         self.nodes = tuple(h - b + 1 for b, h in zip(low, high, strict=True))
         self.origin = np.array([(b - z) * dx for b, z in zip(low, zero, strict=True)])
-        self.planes = (-low[0] if mirror[0] else -1, -low[1] if mirror[1] else -1)
         self.images = (2 if mirror[0] else 1) * (2 if mirror[1] else 1)
         if num.grid_turn:
             half = math.ceil(shape.width / 2 / dx) + PAD
@@ -152,16 +150,18 @@ class Simulation:
     def _load(self, material: Material) -> None:
         """Write seeds and constants into the fields."""
         k, scene, num, edge = self.k, self.scene, self.scene.numerics, self.scene.edge
+        k.user = self
         real = np.float64 if num.precision == "f64" else np.float32
-        k.x.from_numpy(self._turn(self.seeds.x).astype(real))
-        k.foot.from_numpy(self.seeds.foot.astype(real))
+        k.lay_out(len(self.seeds.x), self.nodes, round(-self.origin[1] / num.dx), len(self.stations))
+        k.fill(k.x, self._turn(self.seeds.x).astype(real))
+        k.fill(k.foot, self.seeds.foot.astype(real))
         gap, outer = (self.seeds.gap, self.seeds.beside) if scene.cuts else (self.seeds.head, self.seeds.top)
-        k.gap.from_numpy(gap.astype(real))
+        k.fill(k.gap, gap.astype(real))
         shell = np.stack([self.seeds.foot * self.seeds.bottom, gap * outer], axis=1) * self.seeds.spacing**2
-        k.shell.from_numpy(shell.astype(real))
+        k.fill(k.shell, shell.astype(real))
         k.reset()
         sticky = self.seeds.beside & (material.adhesion > 0)
-        k.tacky.from_numpy(np.where(sticky, 0, -1).astype(np.int32))
+        k.fill(k.tacky, np.where(sticky, 0, -1).astype(np.int32))
         table = np.zeros(kn.N_PARAMETERS)
         table[kn.DX], table[kn.INV], table[kn.FIRST] = num.dx, 1 / num.dx, self.stations[0]
         table[kn.OX], table[kn.OY], table[kn.OZ] = self.origin
@@ -204,8 +204,8 @@ class Simulation:
         for field, values in zip(
             (k.top, k.low, k.width, k.floor_top, k.floor_low), slices(scene.food.shape, xs, num.dx), strict=True
         ):
-            field.from_numpy(values.astype(real))
-        k.soften.from_numpy((edge.slip + path).astype(real))
+            k.fill(field, values.astype(real))
+        k.fill(k.soften, (edge.slip + path).astype(real))
         self._set_pose(scene.food.shape.height + self._gap())
 
     def _set_pose(self, z: float) -> None:
@@ -292,6 +292,8 @@ class Simulation:
     def _advance(self, count: int, every: int, dt: float, down: float, along: float) -> np.ndarray:
         """Some time steps with the tool commanded at these velocities [m/s]; one row of the report after ``every``."""
         k, rows = self.k, math.ceil(count / every)
+        if k.user is not self:
+            raise RuntimeError("another simulation has taken over these fields; load this one again before it goes on")
         out = np.zeros((rows, kn.N_REPORT))
         if k.threads == 1 and not k.atomic:
             k.steps(rows, every, count, dt, down, along, out)
@@ -319,13 +321,13 @@ class Simulation:
     def _topology(self) -> Any:
         """Pieces of the food now."""
         k, mirrors = self.k, self.scene.mirrors
-        side, f = k.side.to_numpy(), k.deformation()
-        across = self._turn(k.x.to_numpy(), -1.0)[:, 1]
+        side, f = k.of_particles(k.side), k.deformation()
+        across = self._turn(k.of_particles(k.x), -1.0)[:, 1]
         half = np.where(side > 0, side - 1, 0 if mirrors[1] else across >= 0)
         damage = np.zeros(len(side))
         if k.damage:
             table = k.par.to_numpy()
-            kappa = np.maximum(k.kappa.to_numpy()[: k.n], table[kn.EPS0])
+            kappa = np.maximum(k.of_particles(k.kappa), table[kn.EPS0])
             damage = 1 - table[kn.EPS0] / kappa * np.exp(-(kappa - table[kn.EPS0]) / (table[kn.EPSF] - table[kn.EPS0]))
         return topology(self.seeds, mirrors, half.astype(int), side > 0, np.linalg.det(f), damage)
 

@@ -28,7 +28,7 @@ from mpm.constitutive import (
     upper,
 )
 from mpm.edge import Edge
-from mpm.fields import EPS0, EPSF, ETA_B, ETA_S, LAM, MU, YIELD
+from mpm.fields import COUNT, EPS0, EPSF, ETA_B, ETA_S, LAM, MU, YIELD
 
 
 @ti.data_oriented
@@ -257,11 +257,11 @@ class Stress(Edge):
             for k in range(low, high):
                 for s in ti.static(range(self.threads)):
                     self.g[s, i, j, k] = ti.Vector.zero(float, 4)
-        for part in range(self.parts * on):
+        for part in range(self.shares() * on):
             first, last, thread = self.share(part)
-            for p in range(first * self.lanes, ti.min(last * self.lanes, self.n)):
+            for p in range(first * self.lanes, ti.min(last * self.lanes, self.size[COUNT])):
                 self.spread_strain(p, thread, window)
-        for p in range(self.n * on):
+        for p in range(self.size[COUNT] * on):
             base, fx = self.local(self.x[p])
             if self.near_hot(base, 2) and self.inside(base, window) > 0:
                 w = self.weights(fx)

@@ -3,7 +3,25 @@
 import taichi as ti
 
 from mpm.constitutive import damage_of, deviatoric_energy, left_cauchy_green, left_stretch, unit
-from mpm.fields import BOOKED, DX, EDGE, EPS0, EPSF, FACE, FAR, LAM, MASS, MU, N_POSE, N_STATE, N_SUMS, VOL
+from mpm.fields import (
+    BOOKED,
+    COUNT,
+    DX,
+    EDGE,
+    EPS0,
+    EPSF,
+    FACE,
+    FAR,
+    LAM,
+    MASS,
+    MU,
+    N_POSE,
+    N_STATE,
+    N_SUMS,
+    NODES,
+    PLANE,
+    VOL,
+)
 from mpm.stress import Stress
 
 MARGIN = 3  # cells by which the window exceeds the particles; it is renewed at every output
@@ -52,11 +70,11 @@ class Survey(Stress):
         """
         for r in range(N_STATE):
             self.state[r] = 0.0
-        for part in range(self.parts):
+        for part in range(self.shares()):
             first, last, _ = self.share(part)
             if first < last:
                 total = ti.Vector.zero(ti.f64, N_STATE)
-                for p in range(first * self.lanes, ti.min(last * self.lanes, self.n)):
+                for p in range(first * self.lanes, ti.min(last * self.lanes, self.size[COUNT])):
                     total += self.measured(p)
                 for r in ti.static(range(N_STATE)):
                     self.state[r] += total[r]
@@ -76,11 +94,11 @@ class Survey(Stress):
         for _ in range(1):
             for d in ti.static(range(3)):
                 self.window[d], self.window[d + 3] = FAR, -FAR
-        for part in range(self.parts):
+        for part in range(self.shares()):
             first, last, _ = self.share(part)
             if first < last:
                 low, high = ti.Vector([FAR, FAR, FAR]), ti.Vector([-FAR, -FAR, -FAR])
-                for p in range(first * self.lanes, ti.min(last * self.lanes, self.n)):
+                for p in range(first * self.lanes, ti.min(last * self.lanes, self.size[COUNT])):
                     base, fx = self.local(self.x[p])
                     for d in ti.static(range(3)):
                         place = ti.min(ti.max(base[d], -FAR // 2), FAR // 2)
@@ -91,8 +109,8 @@ class Survey(Stress):
         for _ in range(1):
             for d in ti.static(range(3)):
                 low, high = self.window[d] - MARGIN, self.window[d + 3] + MARGIN + 3
-                plane = ti.static((self.i0, self.j0, -1)[d])
-                if ti.static(plane >= 0):
+                if ti.static((self.mx, self.my, False)[d]):
+                    plane = self.i0 if ti.static(d == 0) else self.size[PLANE]
                     low, high = ti.min(low, plane - 2), ti.max(high, plane + 3)
                 self.window[d] = ti.max(low, 0)
-                self.window[d + 3] = ti.min(high, self.nodes[d])
+                self.window[d + 3] = ti.min(high, self.size[NODES + d])

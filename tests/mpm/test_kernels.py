@@ -8,6 +8,7 @@ import taichi as ti
 from scipy.linalg import polar
 
 from mpm import fields as kn
+from mpm.kernels import Kernels
 from mpm.material import Material
 from mpm.runtime import Runtime
 from mpm.scene import EdgeLaw, Food, Motion, Numerics, Scene
@@ -41,8 +42,15 @@ BRITTLE = Scene(
 @ti.kernel
 def elastic(k: ti.template(), dt: float):
     """The elastic pass alone."""
-    for block in range(k.blocks):
+    for block in range(k.size[kn.BLOCKS]):
         k.elastic(block, dt)
+
+
+def padded(k, f):
+    """Deformation gradients (n, 3, 3) as the fields store them, with room for more particles."""
+    whole = np.zeros((k.F.shape[0] * k.lanes, 3, 3))
+    whole[: len(f)] = f
+    return whole.reshape(-1, k.lanes, 9).swapaxes(1, 2)
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +64,7 @@ def strained():
     f = np.eye(3) + rng.uniform(-0.2, 0.2, (k.n, 3, 3)) * rng.uniform(0, 1, (k.n, 1, 1))
     f[:5] = np.diag([-0.5, 1.0, 1.0])
     slope = rng.uniform(-1, 1, (k.n, 3, 3))
-    k.F.from_numpy(np.pad(f, ((0, k.blocks * k.lanes - k.n), (0, 0), (0, 0))).reshape(-1, k.lanes, 9).swapaxes(1, 2))
+    k.F.from_numpy(padded(k, f))
     k.set_gradient(slope)
     np.testing.assert_array_equal(k.deformation(), f)
     np.testing.assert_array_equal(k.gradient(), slope)
@@ -109,13 +117,13 @@ def test_strain_is_smoothed_wherever_it_can_matter():
     k, par = sim.k, sim.k.par.to_numpy()
     calm = np.random.default_rng(0).uniform(0, 0.9 * par[kn.EPS0], (k.n, 1, 1))
     f = (1 + calm) * np.eye(3)
-    f[np.linalg.norm(k.x.to_numpy() - [0.002, 0.004, 0.008], axis=1) < 1.5e-3] += 9.0 * np.eye(
+    f[np.linalg.norm(k.of_particles(k.x) - [0.002, 0.004, 0.008], axis=1) < 1.5e-3] += 9.0 * np.eye(
         3
     )  # far beyond what food bears, so that it is felt two cells away
-    k.F.from_numpy(f.reshape(-1, k.lanes, 9).swapaxes(1, 2))
+    k.F.from_numpy(padded(k, f))
     k.v.fill(1.0)  # what the grid carried before must be gone
     k.steps(1, 1, 1, 1e-12, 0.0, 0.0, np.zeros((1, kn.N_REPORT)))
-    x = (k.x.to_numpy() - sim.origin) / sim.scene.numerics.dx
+    x = (k.of_particles(k.x) - sim.origin) / sim.scene.numerics.dx
     base = np.floor(x - 0.5).astype(int)
     strain = np.array([np.linalg.eigvalsh(polar(f, side="left")[1])[-1] - 1 for f in k.deformation()])
     weight, total = np.zeros(k.nodes), np.zeros(k.nodes)
@@ -128,7 +136,7 @@ def test_strain_is_smoothed_wherever_it_can_matter():
     smooth = sum(w * mean[tuple((base + d).T)] for d, w in zip(near, shape, strict=True))
     hit = smooth > par[kn.EPS0]
     assert 100 < hit.sum() < 0.2 * k.n
-    ours = k.strain.to_numpy()[: k.n]
+    ours = k.of_particles(k.strain)
     np.testing.assert_allclose(ours[hit], smooth[hit], rtol=1e-9)
     assert (ours[~hit] <= par[kn.EPS0]).all()
     assert (ours == 0).sum() > 0.5 * k.n
@@ -173,6 +181,25 @@ def test_many_simulations_wait_side_by_side():
     scenes = [replace(BRITTLE, food=replace(food, shape=replace(food.shape, length=x))) for x in lengths]
     made = [Simulation(replace(s, motion=replace(s.motion, stroke=3e-4)), Runtime(threads=1)) for s in scenes]
     assert made[0].run().status == "done"
+
+
+def test_scenes_of_a_class_share_kernels_and_keep_their_force():
+    """Two sizes of food run with what was compiled once; the force of the first is the same before and after the second, and to
+    1e-9 that of fields without room to spare."""
+    small = replace(PRISM, motion=replace(PRISM.motion, stroke=2e-3))
+    shape = replace(PRISM.food.shape, width=1.3 * PRISM.food.shape.width, height=1.2 * PRISM.food.shape.height)
+    one = Simulation(small, Runtime(threads=1))
+    other = Simulation(replace(small, food=replace(PRISM.food, shape=shape)), Runtime(threads=1))
+    assert one.nodes != other.nodes
+    assert one.k is other.k
+    force = one.run().resolved
+    assert other.run().resolved.max() > 1.1 * force.max()
+    with pytest.raises(RuntimeError, match="another simulation"):
+        one._advance(1, 1, 1e-6, 0.0, 0.0)
+    np.testing.assert_array_equal(one.run().resolved, force)
+    tight = (len(one.seeds.x), one.nodes, small.mirrors, len(one.stations))
+    one.k = Kernels(*tight, threads=1, nodal=False, press=False, damage=False)
+    np.testing.assert_allclose(one.run().resolved, force, atol=1e-9 * force.max())
 
 
 def test_a_run_does_not_feel_the_one_before():
