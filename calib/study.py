@@ -24,6 +24,7 @@ from calib.progress import Progress
 from calib.provenance import code_key, key_of
 from calib.records import whole_record
 from calib.request import Request, Setup
+from calib.roughness import words
 from calib.scenes import place
 from calib.search import FitOptions
 from calib.sensitivity import sensitivity
@@ -61,7 +62,8 @@ def run(
     say = say or (lambda text: None)
     began = time.monotonic()
     setup = set_up(request)
-    for text in [*request.food.warnings(), *setup.curve.warnings, *setup.assumed]:
+    known = setup.assumed
+    for text in [*request.food.warnings(), *setup.curve.warnings, *known]:
         say(text)
     options = FitOptions(budget=request.budget, batch=pool.workers, seed=request.seed)
     options.check(len(setup.objective.parameters))
@@ -79,9 +81,10 @@ def run(
             for name, scene in (("fine", setup.fine), ("coarse", setup.coarse), ("again", otherwise(setup.fine)))
         )
         result = calibrate(setup.objective, fine, coarse=coarse, replicate=again, options=options, progress=progress)
-        doubt = doubt_of(
-            setup.objective, result, scout=coarse, judge=fine, seed=request.seed, sample=request.sample, say=say
-        )
+        setup = replace(setup, assumed=[*setup.assumed, *words(result.objective.cases[0].objective)])
+        for text in setup.assumed[len(known) :]:
+            say(text)
+        doubt = doubt_of(result, scout=coarse, judge=fine, seed=request.seed, sample=request.sample, say=say)
         if doubt is not None:
             result = replace(result, history=(*result.history, *doubt.runs))
         start = _start_curve(setup, result, fine)
@@ -125,7 +128,7 @@ def _write(
     metrics = compare(curve.stroke, curve.curve, best.curve)
     nulls = null_models(curve.stroke, curve.curve)
     summary = summarise(request, setup, result, record, metrics, nulls, doubt, checks)
-    summary |= {"sensitivity": sensitivity(setup.objective, result, seed=request.seed), "wall_s": wall}
+    summary |= {"sensitivity": sensitivity(result, seed=request.seed), "wall_s": wall}
     write_csv(out / "curves.csv", _curves(curve, best.curve, record, start, nulls, doubt))
     fitted = _fitted_food(request, setup, best.evaluation.parameters)
     keep = ("created", "trace_sha256", "passed", "peak_error", "nrmse", "shape_error", "git", "versions")
