@@ -12,7 +12,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from calib.checks import otherwise
-from calib.compression import UnitCurve, area, fit, homogeneous, read_repeats, strain_grid
+from calib.compression.measured import area, read_repeats, strain_grid
+from calib.compression.modulus import fit
+from calib.compression.press import UnitCurve, homogeneous
 from calib.config import Press, Study
 from calib.doubt import Doubt, doubt_of
 from calib.fit import FitResult, calibrate

@@ -55,7 +55,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate; prints the result, or compress.json."""
-    from calib.compression import run as calibrate
+    from calib.compression.study import run as calibrate
 
     shape = shape_of(args)
     if args.nu is None:

@@ -13,20 +13,10 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from calib.cli.main import main
-from calib.compression import (
-    Measured,
-    UnitCurve,
-    fit,
-    homogeneous,
-    judge,
-    press_scene,
-    read_repeats,
-    sensitivity,
-    slope,
-    solver_error,
-    strain_grid,
-    unit_curve,
-)
+from calib.compression.measured import Measured, read_repeats, slope, strain_grid
+from calib.compression.modulus import fit, sensitivity
+from calib.compression.press import UnitCurve, homogeneous, press_scene, solver_error, unit_curve
+from calib.compression.study import judge
 from mpm.runtime import Runtime
 from mpm.shapes import Shape
 from mpm.solver import Simulation
@@ -209,7 +199,7 @@ def test_a_curve_that_does_not_fit_is_exit_code_2(tmp_path, capsys, monkeypatch)
     assert {"curve error (NRMSE)", "modulus 0-5 %, fitted against measured"} <= failed
     assert document["E"]["sd_Pa"] is None and not document["passed"]
     good = synthetic(tmp_path / "good.csv", (5e4,))
-    monkeypatch.setattr("calib.compression.SOLVER_LIMIT", 1e-6)
+    monkeypatch.setattr("calib.compression.study.SOLVER_LIMIT", 1e-6)
     assert main(["compress", "--trace", str(good), *FAST, "--out", str(tmp_path / "b")]) == 2
     assert "raise --cells" in capsys.readouterr().out
 
@@ -220,7 +210,7 @@ def test_bonded_plates_are_judged_by_a_coarser_grid(tmp_path, capsys, monkeypatc
     command = ["compress", "--trace", str(trace), *FAST, "--bonded", "--out", str(tmp_path / "a")]
     assert main([*command, "--cells", "5"]) == 1
     assert "--cells 5" in capsys.readouterr().err
-    monkeypatch.setattr("calib.compression.SOLVER_LIMIT", 1e-6)
+    monkeypatch.setattr("calib.compression.study.SOLVER_LIMIT", 1e-6)
     assert main([*command, "--json"]) == 2
     document = json.loads(capsys.readouterr().out)
     assert document["solver_error"] is None and document["sensitivity"] is None

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calib.compression import read_repeats
+from calib.compression.measured import read_repeats
 from calib.conditioning import condition
 from calib.errors import TraceError
 from calib.trace import Trace, read_trace

@@ -1,0 +1,189 @@
+"""Repeats of a measured compression test: files to engineering stress over engineering strain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calib.columns import candidates, choose, numbers
+from calib.errors import CurveError, TraceError
+from calib.tables import Table, read_table
+from calib.trace import MIN_SAMPLES
+from mpm.shapes import Shape, volume
+
+STEP = 0.001
+"""Step of the common strain grid, about [-]."""
+SMALL = 0.05
+"""Strain up to which the slope of the stress is the small-strain modulus [-]: the window of published moduli."""
+REPLICATE = "replicate"
+"""Column that splits a file into repeats."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Repeats of one compression test on a common strain grid.
+
+    Attributes:
+        strain: Engineering strain, compression positive [-], shape (n,).
+        stress: Engineering stress of each repeat [Pa], shape (repeats, n).
+        slope: Slope of the stress over 0 to 5 % strain of each repeat [Pa], shape (repeats,).
+        names: Name of each repeat.
+        files: Name, SHA-256 and columns of each file.
+    """
+
+    strain: np.ndarray
+    stress: np.ndarray
+    slope: np.ndarray
+    names: list[str]
+    files: list[dict[str, Any]]
+
+    @property
+    def mean(self) -> np.ndarray:
+        """Mean stress of the repeats [Pa], shape (n,)."""
+        return self.stress.mean(axis=0)
+
+
+def area(shape: Shape) -> float:
+    """Area under the plate [m^2]."""
+    return volume(shape) / shape.height
+
+
+def strain_grid(strain: float) -> np.ndarray:
+    """Strains from 0 to ``strain`` [-].
+
+    Raises:
+        CurveError: It ends before the window of the small-strain modulus.
+    """
+    if strain < SMALL:
+        raise CurveError(
+            f"--strain {strain:g}: the modulus over 0 to {SMALL:g} is part of the result; give {SMALL:g} or more"
+        )
+    return np.linspace(0.0, strain, round(strain / STEP) + 1)
+
+
+def slope(strain: np.ndarray, stress: np.ndarray) -> float:
+    """Slope of the least-squares line through stress over 0 to 5 % strain; its offset is free [Pa]."""
+    on = strain <= SMALL * (1 + 1e-9)
+    return float(np.polyfit(strain[on], stress[on], 1)[0])
+
+
+def read_repeats(
+    paths: Sequence[str | Path],
+    shape: Shape,
+    strain: float,
+    *,
+    compression_col: str | None = None,
+    force_col: str | None = None,
+) -> Measured:
+    """Read the repeats of a compression test.
+
+    The first sample of a repeat is its zero of compression and of load; no toe is corrected. Of each repeat the first
+    loading is used, up to ``strain``.
+
+    Args:
+        paths: CSV, JSON or HDF5 files, each one repeat or several with a column ``replicate``; all of one material.
+        shape: The specimen.
+        strain: Largest engineering strain [-].
+        compression_col: Column of the way of the plate; metres if its name has no unit.
+        force_col: Column of the load; newtons if its name has no unit.
+
+    Raises:
+        TraceError: A file, a column or a repeat cannot be used; the message says which and why.
+        CurveError: ``strain`` is too small.
+    """
+    grid = strain_grid(strain)
+    names: list[str] = []
+    rows, slopes, files = [], [], []
+    for path in map(Path, paths):
+        table = read_table(path)
+        compression = choose(table, "compression", compression_col)
+        force = choose(table, "force", force_col)
+        if compression.name in candidates(table, "force") or force.name in candidates(table, "compression"):
+            raise TraceError(
+                f"{table.source}: columns {compression.name} (compression) and {force.name} (load) look swapped; "
+                "exchange --compression-col and --force-col"
+            )
+        way, load = numbers(table, compression), numbers(table, force)
+        for name, on in _repeats(table):
+            label = name if len(paths) == 1 else f"{path.stem} {name}".strip()
+            label = label or path.stem
+            if label in names:
+                raise TraceError(
+                    f"{table.source}: a second repeat is called {label!r}; give each file once, by its own name"
+                )
+            names.append(label)
+            e, s = _loading(f"{table.source}{f', repeat {name}' if name else ''}", way[on], load[on], shape, strain)
+            rows.append(np.interp(grid, e, s))
+            slopes.append(slope(e, s))
+        files.append(
+            {"name": table.source, "sha256": table.sha256, "compression": compression.name, "force": force.name}
+        )
+    return Measured(grid, np.array(rows), np.array(slopes), names, files)
+
+
+def _repeats(table: Table) -> list[tuple[str, np.ndarray]]:
+    """Name and rows of each repeat of a file; one without a name where there is no such column."""
+    column = next((cells for name, cells in table.columns.items() if name.lower() == REPLICATE), None)
+    if column is None:
+        return [("", np.arange(len(table.rows)))]
+    of = np.array([str(cell).strip() for cell in column])
+    return [(name, np.flatnonzero(of == name)) for name in dict.fromkeys(of.tolist())]
+
+
+def _loading(
+    where: str, way: np.ndarray, load: np.ndarray, shape: Shape, strain: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Strain and stress of the first loading of a repeat, strain increasing and reaching ``strain``.
+
+    Args:
+        where: Name of the file and of the repeat.
+        way: Way of the plate [m], shape (n,).
+        load: Force on it [N], shape (n,).
+        shape: The specimen.
+        strain: Largest engineering strain [-].
+
+    Raises:
+        TraceError: The repeat cannot be used.
+    """
+    way, load = way - way[0], load - load[0]
+    last = int(np.argmax(way))
+    if way[last] <= 0 or -way.min() > way[last]:
+        raise TraceError(f"{where}: the compression is negative; count it positive when the plates approach each other")
+    if way[last] >= shape.height:
+        raise TraceError(
+            f"{where}: a compression of {way[last]:g} m is more than the height of {shape.height:g} m; if it is in "
+            "millimetres call the column compression_mm, and check that --compression-col and --force-col are not swapped"
+        )
+    if way[last] < strain * shape.height * (1 - 1e-9):
+        raise TraceError(
+            f"{where}: the compression reaches a strain of {way[last] / shape.height:.3g}, not {strain:g}; "
+            "give a smaller --strain, or check --height"
+        )
+    e = way / shape.height
+    ahead = np.r_[True, e[1:] > np.maximum.accumulate(e)[:-1]]
+    ahead[int(np.argmax(e >= strain * (1 - 1e-9))) + 1 :] = False
+    if np.count_nonzero(ahead) < MIN_SAMPLES:
+        raise TraceError(
+            f"{where}: {np.count_nonzero(ahead)} samples of loading up to a strain of {strain:g}, at least {MIN_SAMPLES} "
+            "are needed; record at a higher rate"
+        )
+    e, s = e[ahead], load[ahead] / area(shape)
+    part = len(s) // 10 + 1
+    rise = s[-part:].mean() - s[:part].mean()
+    if abs(rise) <= 3 * np.std(np.diff(s)):
+        raise TraceError(f"{where}: there is no load on the plate beyond noise; check --force-col")
+    if rise < 0:
+        raise TraceError(
+            f"{where}: the load falls with compression; count it positive in compression, or exchange "
+            "--compression-col and --force-col if they are swapped"
+        )
+    if np.count_nonzero(e <= SMALL) < 3:
+        raise TraceError(
+            f"{where}: fewer than 3 samples up to a strain of {SMALL:g}, where the small-strain modulus is taken; "
+            "record at a higher rate"
+        )
+    return e, s

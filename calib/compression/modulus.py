@@ -1,0 +1,95 @@
+"""Young's modulus of measured repeats from a unit curve, and what it hangs on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from calib.compression.measured import Measured, slope
+from calib.compression.press import UnitCurve, homogeneous, largest_error
+
+NU_STEP = 0.05
+"""Change of Poisson's ratio whose effect on the modulus is reported [-]."""
+NU_TOP = 0.499
+"""Largest Poisson's ratio of the closed form [-]."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Young's modulus and how well its curve fits.
+
+    Attributes:
+        E: Modulus of each repeat [Pa], shape (repeats,).
+        mean: Mean modulus [Pa].
+        sd: Standard deviation between the repeats [Pa], NaN for one.
+        low, high: Ends of the 95 % interval of the mean (Student's t) [Pa], NaN for one repeat.
+        stress: Fitted stress [Pa], shape (n,).
+        slope: Its slope over 0 to 5 % strain [Pa].
+        slope_error: That slope over the measured one, less 1 [-].
+        nrmse: Root mean square of the difference from the mean measured stress over the largest of that [-].
+        force_error: Largest relative error of the force beyond 2 % strain, with its sign [-].
+        force_error_at: Strain where it is [-].
+    """
+
+    E: np.ndarray
+    mean: float
+    sd: float
+    low: float
+    high: float
+    stress: np.ndarray
+    slope: float
+    slope_error: float
+    nrmse: float
+    force_error: float
+    force_error_at: float
+
+
+def scale(unit: np.ndarray, stress: np.ndarray) -> np.ndarray:
+    """Least-squares modulus of one or several stresses, shapes (n,) and (..., n) [Pa]."""
+    return stress @ unit / (unit @ unit)
+
+
+def fit(measured: Measured, unit: UnitCurve) -> Fit:
+    """Fit Young's modulus to each repeat."""
+    moduli = scale(unit.stress, measured.stress)
+    n, mean = len(moduli), float(moduli.mean())
+    sd = float(moduli.std(ddof=1)) if n > 1 else math.nan
+    half = float(student.ppf(0.975, n - 1)) * sd / math.sqrt(n) if n > 1 else math.nan
+    fitted, want = mean * unit.stress, measured.mean
+    error, at = largest_error(measured.strain, fitted, want)
+    small = slope(unit.strain, fitted)
+    return Fit(
+        E=moduli,
+        mean=mean,
+        sd=sd,
+        low=mean - half,
+        high=mean + half,
+        stress=fitted,
+        slope=small,
+        slope_error=small / float(measured.slope.mean()) - 1,
+        nrmse=float(np.sqrt(np.mean((fitted - want) ** 2)) / want.max()),
+        force_error=error,
+        force_error_at=at,
+    )
+
+
+def sensitivity(measured: Measured, nu: float, modulus: float) -> list[dict[str, float]]:
+    """Modulus that the same curve gives at other Poisson's ratios, between frictionless plates, by the closed form.
+
+    Args:
+        measured: The repeats.
+        nu: Poisson's ratio of the fit [-].
+        modulus: Fitted modulus [Pa].
+
+    Returns:
+        Poisson's ratio [-] and modulus [Pa] below and above.
+    """
+    base = float(scale(homogeneous(nu, measured.strain), measured.mean))
+    out = []
+    for other in (nu - NU_STEP, min(nu + NU_STEP, NU_TOP)):
+        refitted = float(scale(homogeneous(other, measured.strain), measured.mean))
+        out.append({"nu": other, "E_Pa": modulus * refitted / base})
+    return out
