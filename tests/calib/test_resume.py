@@ -47,6 +47,8 @@ if __name__ == "__main__":
 class Study:
     """A calibration with a formula in place of the solver, in a process of its own with workers of its own.
 
+    A run is known by its peak: no two have the same.
+
     Args:
         folder: Where its log, script and results are.
         name: What they are called.
@@ -84,7 +86,7 @@ class Study:
         return self.stored()
 
     def stored(self) -> set[str]:
-        """Names of the runs on disk, in the file and in the journal beside it, which may end in a torn line."""
+        """Peaks of the runs on disk, in the file and in the journal beside it, which may end in a torn line."""
         found: set[str] = set()
         path = self.out / "evaluations.h5"
         if path.exists():
@@ -96,10 +98,10 @@ class Study:
                 found.add(repr(json.loads(line[9:])["scalars"]["peak_N"]))
             except (ValueError, KeyError):
                 continue
-        return {f"run:{peak}" for peak in found} | self.whole()
+        return found | self.whole()
 
     def whole(self) -> set[str]:
-        """Name of the run whose whole record is on disk."""
+        """Peak of the run whose whole record is on disk."""
         path = self.out / "record.h5"
         if not path.exists():
             return set()
@@ -107,12 +109,12 @@ class Study:
             key = f.attrs["key"]
         record = records._read(path, key)
         assert record is not None
-        return {f"whole:{record.peak!r}"}
+        return {repr(record.peak)}
 
     def begun(self) -> list[str]:
-        """Names of all runs in the order in which they were begun."""
+        """Peaks of all runs in the order in which they were begun."""
         lines = [line.split() for line in self.log.read_text().splitlines()]
-        return [line[1] for line in lines if line[0] == "begin"]
+        return [line[1].partition(":")[2] for line in lines if line[0] == "begin"]
 
     def results(self) -> dict[str, Any]:
         """What the study found, less when and how long."""
