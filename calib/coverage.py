@@ -188,7 +188,7 @@ def _one(
         return row | {"error": str(e)}
     if result.status == "interrupted":
         raise KeyboardInterrupt
-    doubt = doubt_of(result, scout=coarse, judge=fine, seed=k)
+    doubt = doubt_of(setup.objective, result, scout=coarse, judge=fine, seed=k)
     if doubt is None:
         return row | {"error": "the search ended before there were intervals"}
     return row | {

@@ -48,6 +48,7 @@ class Doubt:
 
 
 def doubt_of(
+    objective: Objective | JointObjective,
     result: FitResult,
     *,
     scout: Evaluator | None = None,
@@ -59,7 +60,8 @@ def doubt_of(
     """What a fit does not know; None where it ended before there were runs enough to tell.
 
     Args:
-        result: The fit.
+        objective: What was fitted.
+        result: How.
         scout: Runs cheap simulations at the ends that the profiles claim, which are then walked again; without it they rest on
             the runs of the search alone.
         judge: Runs simulations as they count at both ends of each parameter that would be called identified or weak; the profiles
@@ -73,7 +75,6 @@ def doubt_of(
     """
     if result.jacobian is None or result.surrogate is None:
         return None
-    objective = result.objective
     with threadpool_limits(1, "blas"):
         surrogate, runs = result.surrogate, list(result.history)
         found, walked = _walk(objective, result, surrogate, result.jacobian)

@@ -37,7 +37,6 @@ class FitResult:
     Attributes:
         status: ``converged`` (no gain in sight), ``stalled`` (gains promised, none realised), ``budget``
             (spent) or ``interrupted``.
-        objective: What was fitted, with the roughness of its traces.
         best: Best finished run on the fine evaluator.
         parameters: The fitted parameters with the best values [SI].
         jacobian: Derivative of the residual vector at the best point by internal coordinates (n + 2 + p, p);
@@ -50,7 +49,6 @@ class FitResult:
     """
 
     status: str
-    objective: Objective | JointObjective
     best: Trial
     parameters: ParameterSet
     jacobian: FloatArray | None
@@ -148,13 +146,5 @@ def _result(search: Search, status: str, best: Trial, replicates: list[Trial]) -
         jacobian, repeatability = process.jacobian(best.z), process.noise
     parameters = search.parameters.with_values(best.evaluation.parameters)
     return FitResult(
-        status,
-        search.objective,
-        best,
-        parameters,
-        jacobian,
-        repeatability,
-        tuple(search.trials),
-        tuple(replicates),
-        process,
+        status, best, parameters, jacobian, repeatability, tuple(search.trials), tuple(replicates), process
     )

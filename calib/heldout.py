@@ -163,7 +163,7 @@ def _specimen(
     best = dict(result.best.evaluation.parameters)
     if result.jacobian is None:
         return best, [best] * DRAWS, len(result.history)
-    found = uncertainty(result.parameters, evidence(result.objective, result.best, result.jacobian))
+    found = uncertainty(result.parameters, evidence(goal, result.best, result.jacobian))
     random = np.random.default_rng(specimens.study.seed)
     steps = random.standard_normal((DRAWS, len(chosen))) @ np.linalg.cholesky(found.alone).T
     drawn = [goal.parameters.to_dict(goal.parameters.clip(result.best.z + step)) for step in steps]
@@ -198,10 +198,6 @@ def _band(goal: Objective, curves: list[FloatArray], fitted: Fitted, seed: int) 
     random = np.random.default_rng(seed)
     doubt = fitted.doubt
     widened = 1.0 if doubt is None else float(np.sqrt(doubt.uncertainty.widened))
-    shown = [
-        c.objective.sigma / c.objective.target.peak for c in fitted.result.objective.cases
-    ]  # their roughness included
-    widened *= max(float(np.sqrt(np.mean(np.square(shown)))) * goal.target.peak / goal.sigma, 1.0)
     length = goal.errors.correlation if doubt is None else float(np.mean(doubt.uncertainty.data.lengths))
     drawn = [goal.factor(c) * c + error for c in curves for error in errors(goal, length, widened, REPEATED, random)]
     return band_of(np.array(drawn), goal.target.curve)

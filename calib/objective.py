@@ -10,7 +10,7 @@ Rows of the vector (n grid points, p parameters; all without dimension, one stan
 Where a study has several specimens, m is k times the simulated force; k is the factor of width and sensor, the best one for
 each curve, with a lognormal prior whose row ln k / sd_k stands before that of the failure.
 
-    sigma^2  = noise_sd^2 + max(discrepancy * max r, roughness)^2 + u_num^2     roughness: calib/roughness.py
+    sigma^2  = noise_sd^2 + (discrepancy * max r)^2 + u_num^2
     s_peak^2 = peak_sd^2 + (peak * max r)^2 + what the drift may do to it
     w        = sqrt(n_eff / n),   n_eff = stroke length / correlation length
 
@@ -207,8 +207,6 @@ class Objective:
         errors: The error model.
         nuisances: What the measurement leaves open.
         scale_sd: Standard deviation of the logarithm of the factor of width and sensor [-]; 0: there is none.
-        rough: What no simulated curve follows of the real one, root mean square [N], one for all or (n,); see
-            :mod:`calib.roughness`.
     """
 
     target: Target
@@ -216,14 +214,12 @@ class Objective:
     errors: ErrorModel = field(default_factory=ErrorModel)
     nuisances: tuple[Nuisance, ...] = ()
     scale_sd: float = 0.0
-    rough: float | FloatArray = 0.0
 
     @cached_property
     def sigmas(self) -> FloatArray:
         """Standard deviation of each point of the curve [N] (n,)."""
-        off = np.maximum(self.errors.discrepancy * self.target.peak, self.rough)
-        own = np.broadcast_to(np.hypot(self.target.noise_sd, off), self.target.curve.shape)
-        return np.asarray(np.hypot(own, self.target.u_num))
+        own = math.hypot(self.target.noise_sd, self.errors.discrepancy * self.target.peak)
+        return np.hypot(own, np.broadcast_to(self.target.u_num, self.target.curve.shape))
 
     @property
     def sigma(self) -> float:

@@ -2,7 +2,6 @@
 
 0. Screening, where there is a coarse evaluator: steps 1 to 3 with it alone, within a part of the budget.  Its
    curves stay in the process, with an offset of their own, and the fine search starts at its best points.
-   What no combination of its curves follows of the traces widens the tolerance there (:mod:`calib.roughness`).
 1. Design: the given values, the centre of the prior and a scrambled Sobol sample of its 95 % box.
    Quasi-static forces scale with the stress-like parameters, so every run of the design stands for a whole
    line of materials; the best points of the best lines are run next.
@@ -40,7 +39,6 @@ from calib.evaluation import Evaluation, Evaluator
 from calib.joint import JointObjective, residual
 from calib.objective import Objective, Trial
 from calib.progress import Progress
-from calib.roughness import roughened
 from calib.surrogate import Surrogate, coordinate_unit
 from mpm.errors import SimulationError
 
@@ -224,15 +222,9 @@ class Search:
                 points = [_near(self.process()), *(t.z for t in sorted(self.finished, key=lambda t: t.misfit))]
         finally:
             self.screening, self.centre, self.hyper = False, None, None
-        self._roughen()
         first = len(self.trials)
         self._evaluate(points[: max(2, self.options.batch)], "screened")
         self._follow_lines(first)
-
-    def _roughen(self) -> None:
-        """See all runs with the tolerance that what they cannot follow of the traces asks for."""
-        self.objective = roughened(self.objective, self.trials)
-        self.trials = [self.objective.trial(t.evaluation, coarse=t.coarse, stage=t.stage) for t in self.trials]
 
     def _unseen(self) -> bool:
         """Whether there is another design that can be paid together with the rounds it may call for."""

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from calib.fit import FitResult
+from calib.objective import Objective
 
 FloatArray = npt.NDArray[np.float64]
 Indices = dict[str, dict[str, dict[str, float]]]
@@ -24,11 +25,12 @@ START = 0.2
 """Part of the stroke whose mean slope is the initial one [-]."""
 
 
-def sensitivity(result: FitResult, *, seed: int = 0) -> Indices:
+def sensitivity(objective: Objective, result: FitResult, *, seed: int = 0) -> Indices:
     """Sobol indices of a fit on one trace, empty where it ended before it had a surrogate.
 
     Args:
-        result: The fit.
+        objective: What was fitted.
+        result: How.
         seed: Seed of the samples and of the confidence intervals.
 
     Returns:
@@ -37,8 +39,8 @@ def sensitivity(result: FitResult, *, seed: int = 0) -> Indices:
     """
     if result.surrogate is None:
         return {}
-    process, chosen = result.surrogate.each[0], result.objective.parameters
-    stroke = result.objective.cases[0].objective.target.stroke
+    process, chosen = result.surrogate.each[0], objective.parameters
+    stroke = objective.target.stroke
 
     def model(points: FloatArray) -> dict[str, FloatArray]:
         return quantities(stroke, np.array([process.predict(z)[0] for z in points]))

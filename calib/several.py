@@ -21,7 +21,6 @@ from calib.parameters import plain
 from calib.progress import Progress
 from calib.provenance import git_commit, key_of, versions
 from calib.request import Setup
-from calib.roughness import words
 from calib.scenes import place
 from calib.specimens import Fitted, Specimens, pressed, set_ups
 from calib.store import EvaluationStore, Header
@@ -166,8 +165,7 @@ def _trace(setup: Setup, fitted: Fitted, name: str, checks: list[Check]) -> dict
     """One fitted trace: in-sample figures with the specimen's factor, what the measurement left open, numerical checks."""
     k = fitted.names.index(name)
     trial, curve = fitted.result.best.each[k], setup.curve
-    goal = fitted.result.objective.cases[k].objective
-    scale = goal.factor(trial.curve)
+    scale = setup.objective.factor(trial.curve)
     metrics = compare(curve.stroke, curve.curve, scale * trial.curve)
     scalars = trial.evaluation.scalars
     lines = [*agreement(metrics), *balances(scalars["momentum_residual"], scalars["ke_over_ie"]), *changes(checks)]
@@ -178,8 +176,7 @@ def _trace(setup: Setup, fitted: Fitted, name: str, checks: list[Check]) -> dict
         "verdicts": [v.as_dict() for v in lines],
         "metrics": metrics.as_dict(),
         "factor": scale,
-        "nuisances": {e.name: e.as_dict() for e in goal.nuisance_estimates(trial.curve)},
-        "warnings": words(goal),
+        "nuisances": {e.name: e.as_dict() for e in setup.objective.nuisance_estimates(trial.curve)},
         "predictive_inside": None if fitted.doubt is None else fitted.doubt.bands[k].inside,
         "null_models": {n: {"R": m.metrics.iso18571.R, "nrmse": m.metrics.nrmse} for n, m in _nulls(curve).items()},
         "numerical_checks": [c.as_dict() for c in checks],
@@ -236,7 +233,7 @@ def _curves(setup: Setup, fitted: Fitted, held: Prediction | None, name: str) ->
     if name in fitted.names:
         k = fitted.names.index(name)
         curve = fitted.result.best.each[k].curve
-        columns["sim_N"] = fitted.result.objective.cases[k].objective.factor(curve) * curve
+        columns["sim_N"] = setup.objective.factor(curve) * curve
         if fitted.doubt is not None:
             columns |= {"band_low_N": fitted.doubt.bands[k].low, "band_high_N": fitted.doubt.bands[k].high}
     if held is not None:

@@ -99,17 +99,19 @@ class Fitted:
 
     Attributes:
         names: Its traces.
-        result: How they were fitted.
+        objective: What was fitted.
+        result: How.
         doubt: What it does not know, None where it ended too early.
     """
 
     names: tuple[str, ...]
+    objective: JointObjective
     result: FitResult
     doubt: Doubt | None
 
     def flesh(self, z: FloatArray | None = None) -> dict[str, float]:
         """Shared values [SI] by property: the best ones, or those at internal coordinates ``z`` (p,)."""
-        values = self.result.best.evaluation.parameters if z is None else self.result.objective.parameters.to_dict(z)
+        values = self.result.best.evaluation.parameters if z is None else self.objective.parameters.to_dict(z)
         return {name: x for name, x in values.items() if name == plain(name)}
 
     def values(self, name: str) -> dict[str, float]:
@@ -185,8 +187,9 @@ class Specimens:
             raise KeyboardInterrupt
         return Fitted(
             tuple(names),
+            joint,
             result,
-            doubt_of(result, scout=coarse, judge=fine, seed=self.study.seed, say=self.say),
+            doubt_of(joint, result, scout=coarse, judge=fine, seed=self.study.seed, say=self.say),
         )
 
     def staged(self, words: str) -> Callable[[Progress], None] | None:

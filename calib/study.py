@@ -23,7 +23,6 @@ from calib.preparation import set_up
 from calib.progress import Progress
 from calib.provenance import code_key, key_of
 from calib.request import Request, Setup
-from calib.roughness import words
 from calib.scenes import place
 from calib.search import FitOptions
 from calib.sensitivity import sensitivity
@@ -61,8 +60,7 @@ def run(
     say = say or (lambda text: None)
     began = time.monotonic()
     setup = set_up(request)
-    known = setup.assumed
-    for text in [*request.food.warnings(), *setup.curve.warnings, *known]:
+    for text in [*request.food.warnings(), *setup.curve.warnings, *setup.assumed]:
         say(text)
     options = FitOptions(budget=request.budget, batch=pool.workers, seed=request.seed)
     options.check(len(setup.objective.parameters))
@@ -80,10 +78,9 @@ def run(
             for name, scene in (("fine", setup.fine), ("coarse", setup.coarse), ("again", otherwise(setup.fine)))
         )
         result = calibrate(setup.objective, fine, coarse=coarse, replicate=again, options=options, progress=progress)
-        setup = replace(setup, assumed=[*setup.assumed, *words(result.objective.cases[0].objective)])
-        for text in setup.assumed[len(known) :]:
-            say(text)
-        doubt = doubt_of(result, scout=coarse, judge=fine, seed=request.seed, sample=request.sample, say=say)
+        doubt = doubt_of(
+            setup.objective, result, scout=coarse, judge=fine, seed=request.seed, sample=request.sample, say=say
+        )
         if doubt is not None:
             result = replace(result, history=(*result.history, *doubt.runs))
         start = _start_curve(setup, result, fine)
@@ -133,7 +130,7 @@ def _write(
     metrics = compare(curve.stroke, curve.curve, shown)
     nulls = null_models(curve.stroke, curve.curve)
     summary = summarise(request, setup, result, record, metrics, nulls, doubt, checks)
-    summary |= {"sensitivity": sensitivity(result, seed=request.seed), "wall_s": wall}
+    summary |= {"sensitivity": sensitivity(setup.objective, result, seed=request.seed), "wall_s": wall}
     write_csv(out / "curves.csv", _curves(curve, shown, record, start, nulls, doubt))
     fitted = _fitted_food(request, setup, best.evaluation.parameters)
     keep = ("created", "trace_sha256", "passed", "peak_error", "nrmse", "shape_error", "git", "versions")

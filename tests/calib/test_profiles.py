@@ -65,7 +65,7 @@ def one_sided() -> tuple[Objective, FitResult, Doubt]:
     objective = Objective(Target(GRID, curve, 0.05, 0.05, np.interp), ONE_SIDED)
     simulator = Fake(elastic, noisy=0.004)
     result = calibrate(objective, simulator, coarse=simulator, options=FitOptions(budget=60))
-    doubt = doubt_of(result, scout=simulator, judge=simulator)
+    doubt = doubt_of(objective, result, scout=simulator, judge=simulator)
     assert doubt is not None
     return objective, result, doubt
 
@@ -141,7 +141,7 @@ def test_an_interrupted_search_has_no_doubt() -> None:
     """Fewer runs than parameters: nothing is said instead of something wrong."""
     objective = goal({"E": 3e5, "yield_stress": 4e4, "R": 500.0, "R_skin": 200.0, "mu": 0.2})
     result = calibrate(objective, Fake(interrupt_after=3), options=FitOptions(budget=60))
-    assert result.status == "interrupted" and doubt_of(result) is None
+    assert result.status == "interrupted" and doubt_of(objective, result) is None
 
 
 def test_fake_and_noise_are_repeatable() -> None:
@@ -157,10 +157,10 @@ def test_a_sample_agrees_with_the_profile(one_sided: tuple[Objective, FitResult,
     """R by the ensemble of walkers and by its profile: the ends within a quarter of the interval."""
     objective, result, _ = one_sided
     scout = Fake(elastic, noisy=0.004)
-    doubt = doubt_of(result, scout=scout, sample=True)
+    doubt = doubt_of(objective, result, scout=scout, sample=True)
     assert doubt is not None
     interval = next(i for i in doubt.uncertainty.intervals if i.parameter.name == "R")
     width = interval.high95 - interval.low95
     assert doubt.sampled["R"] == pytest.approx((interval.low95, interval.high95), abs=0.25 * width)
-    again = doubt_of(result, scout=scout, sample=True)
+    again = doubt_of(objective, result, scout=scout, sample=True)
     assert again is not None and again.sampled == doubt.sampled

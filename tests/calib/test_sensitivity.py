@@ -72,9 +72,8 @@ def test_indices_of_a_surrogate_that_is_known() -> None:
         late = np.where(parts > 0.5, 100.0 + 3.0 * a + b, 0.0)
         return np.where(parts <= 0.2, (10.0 + c) * parts, late), 0.0, 1.0
 
-    process = SimpleNamespace(predict=predict)
-    result = SimpleNamespace(objective=objective, surrogate=SimpleNamespace(each=[process]))
-    got = sensitivity(result)
+    result = SimpleNamespace(surrogate=SimpleNamespace(each=[SimpleNamespace(predict=predict)]))
+    got = sensitivity(objective, result)
     first, second, third = FIVE.names[:3]
     assert got["peak"][first]["total"] == pytest.approx(0.9, abs=0.05)
     assert got["peak"][second]["total"] == pytest.approx(0.1, abs=0.03)
@@ -86,11 +85,11 @@ def test_a_fit_says_what_moved_it_and_a_constant_says_nothing() -> None:
     """A surrogate of real runs gives finite indices, repeatably; without one there are none; a constant has none."""
     objective = goal({p.name: p.value for p in FIVE})
     result = calibrate(objective, Fake(), options=FitOptions(budget=30, batch=1, seed=0))
-    got = sensitivity(result)
+    got = sensitivity(objective, result)
     assert list(got) == ["peak", "work", "initial_slope"] and list(got["work"]) == list(FIVE.names)
-    assert got == sensitivity(result)
+    assert got == sensitivity(objective, result)
     assert got["initial_slope"]["E"]["total"] > got["initial_slope"]["mu"]["total"]
-    assert sensitivity(SimpleNamespace(surrogate=None)) == {}
+    assert sensitivity(objective, SimpleNamespace(surrogate=None)) == {}
     assert math.isnan(indices(("x", "y"), PI3[:, :2], lambda x: {"f": np.ones(len(x))})["f"]["x"]["total"])
 
 
