@@ -199,26 +199,32 @@ def with_profiles(found: Uncertainty, walked: Sequence[Profile]) -> Uncertainty:
     """The same uncertainty with the intervals and verdicts of the profiles.
 
     A side is bounded by the trace where the trace alone ends it within the literature's range. A parameter is ``identified``
-    where both sides are, its interval is narrower than half the prior's, and it is known to 15 % (one standard deviation);
-    ``weak`` where the interval is wider; ``one_sided`` where the trace bounds one side and leaves the other to the prior or to
+    where both sides are, its interval is narrower than half the prior's, it is known to 15 % (one standard deviation), and the
+    curve is explained; ``weak`` where one of these is not so; ``one_sided`` where the trace bounds one side and leaves the other to the prior or to
     what is possible; ``not_seen`` where it bounds neither.
     """
-    return replace(found, intervals=tuple(_interval(i, p) for i, p in zip(found.intervals, walked, strict=True)))
+    intervals = (_interval(i, p, found.explained) for i, p in zip(found.intervals, walked, strict=True))
+    return replace(found, intervals=tuple(intervals))
 
 
-def _interval(interval: Interval, profile: Profile) -> Interval:
-    """The interval of a profile; the best run's value is in it, even where the surrogate puts the optimum beside it."""
+def _interval(interval: Interval, profile: Profile, explained: bool) -> Interval:
+    """The interval of a profile: what is not worse than the best run's value by more than the limit.
+
+    The surrogate may put the optimum beside that value, and the unknown width and gain, which the search leaves alone, too. An
+    interval about the optimum would end at the value that is reported, or before it.
+    """
     parameter = interval.parameter
     low, high = parameter.to_internal(parameter.low), parameter.to_internal(parameter.high)
-    ends = [profile.end(side, profile.rise) for side in (-1, 1)]
     at = parameter.to_internal(parameter.value)
+    above = np.maximum(profile.rise - float(np.interp(at, profile.z, profile.rise)), 0.0)
+    ends = [profile.end(side, above) for side in (-1, 1)]
     bottom, top = min(low if ends[0] is None else ends[0], at), max(high if ends[1] is None else ends[1], at)
     bounded = [_bounds(profile.end(side, profile.data), side, parameter) for side in (-1, 1)]
     width = (top - bottom) / (2.0 * Z95 * parameter.prior_sd)
     verdict: Verdict = "not_seen"
     if all(bounded) and width <= NOT_SEEN:
         sd = width * parameter.prior_sd / (1.0 if parameter.log else max(abs(parameter.value), 1e-12))
-        verdict = "identified" if width < IDENTIFIED and sd <= KNOWN else "weak"
+        verdict = "identified" if width < IDENTIFIED and sd <= KNOWN and explained else "weak"
     elif any(bounded):
         verdict = "one_sided"
     if interval.verdict == "at_bound":

@@ -40,6 +40,7 @@ from calib.joint import JointObjective, residual
 from calib.objective import Objective, Trial
 from calib.progress import Progress
 from calib.surrogate import Surrogate, coordinate_unit
+from calib.uncertainty import EXPLAINED
 from mpm.errors import SimulationError
 
 FloatArray = npt.NDArray[np.float64]
@@ -67,9 +68,6 @@ STARTS, FOLLOWED = 16, 3
 #: left a quarter of the excess chi-square that isotropic probes left), and may cost this much more than the
 #: best run: about a 90 % region of one parameter, where curvature matters for the intervals.
 PROBE_SPREAD, PROBE_COST, PROBES = 1.5, 3.0, 200
-#: A curve counts as explained when the right material would leave a larger chi-square than its in one of a hundred cuts:
-#: side minima leave three times as much, and a false alarm costs half as many simulations again.
-EXPLAINED = 0.99
 #: Rounds without promise and gain after which the search has converged; rounds without gain: stalled.  Half of either after
 #: strides and further designs: what they did not bring at once they have not brought.
 CALM_ROUNDS, STALLED_ROUNDS = 2, 4

@@ -22,6 +22,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import block_diag
+from scipy.stats import chi2
 from scipy.stats import t as student
 
 from calib.joint import JointObjective
@@ -38,6 +39,10 @@ IDENTIFIED, NOT_SEEN = 0.5, 0.9
 ON_BOUND = 0.1
 #: Two parameters that correlate more are only known together.
 TIED = 0.95
+#: A curve counts as explained when the right material would leave a larger chi-square than its in one of a hundred cuts. In one
+#: that is not, the model or the search is wrong, and nothing is called identified: of 33 made-up cuts whose model was right, five
+#: searches ended so, at up to twenty times the chi-square of the truth.
+EXPLAINED = 0.99
 #: Part of the posterior within an interval.
 COVERED = 0.95
 #: Residuals that keep their sign over more than this part of the stroke are a wrong model, not noise.
@@ -127,6 +132,7 @@ class Uncertainty:
         correlation: Its correlation matrix (p, p).
         only_as_product: Pairs with a correlation beyond 0.95 either way.
         reduced_chi2: Chi-square of the data per degree of freedom [-].
+        freedom: Degrees of freedom [-].
         widened: Factor on the variance of the data's errors [-]: ``reduced_chi2`` but at least 1, times Student's where it
             is more.
         data: What the data say at the best values.
@@ -140,10 +146,16 @@ class Uncertainty:
     correlation: FloatArray
     only_as_product: tuple[Tie, ...]
     reduced_chi2: float
+    freedom: float
     widened: float
     data: Evidence
     alone: FloatArray
     unsearched: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def explained(self) -> bool:
+        """Whether the best curve follows the data as the right one would."""
+        return self.reduced_chi2 * self.freedom <= chi2.ppf(EXPLAINED, self.freedom)
 
     def known_width(self) -> dict[str, float]:
         """Width of each parameter's interval if gain and width were known, over what it is [-], by name."""
@@ -232,7 +244,7 @@ def uncertainty(parameters: ParameterSet, data: Evidence) -> Uncertainty:
     beside = _beside(data, own, prior.T @ parameters.prior_residual(parameters.start), size)
     ties = _ties(parameters.names, correlation)
     alone: FloatArray = np.asarray(np.linalg.inv(information / widened + own), dtype=np.float64)
-    return Uncertainty(intervals, covariance, correlation, ties, reduced, widened, data, alone, beside)
+    return Uncertainty(intervals, covariance, correlation, ties, reduced, freedom, widened, data, alone, beside)
 
 
 def _beside(data: Evidence, own: FloatArray, pull: FloatArray, size: float) -> tuple[tuple[float, float], ...]:
