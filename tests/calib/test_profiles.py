@@ -82,8 +82,8 @@ def test_verdicts_say_what_the_trace_bounds(one_sided: tuple[Objective, FitResul
     assert above is None or math.exp(above) > 3e6
 
 
-def test_what_is_called_identified_was_tried_at_both_ends(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
-    """Runs that count are made where R would end, and for nothing else; coarse ones at the ends of all."""
+def test_what_would_have_an_interval_was_tried_at_both_ends(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+    """Runs that count are made where R would end, and for nothing that is open; coarse ones at the ends of all."""
     objective, result, doubt = one_sided
     judged = [t.z - result.best.z for t in doubt.runs if not t.coarse]
     r = objective.parameters.names.index("R")
@@ -101,6 +101,29 @@ def test_an_interval_holds_the_best_value(one_sided: tuple[Objective, FitResult,
     found = with_profiles(replace(doubt.uncertainty, intervals=moved), doubt.profiles).intervals
     for i in found:
         assert i.low95 * (1.0 - 1e-9) <= i.parameter.value <= i.high95 * (1.0 + 1e-9)
+
+
+def test_an_interval_is_about_the_value_that_is_reported(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+    """A value where the profile has risen by 1 belongs to the interval of what has risen by 3.84 more: it ends at 2.2 standard
+    deviations from the optimum on both sides, not at 1.96."""
+    uncertainty = one_sided[2].uncertainty
+    found = uncertainty.intervals[0]
+    p = found.parameter
+    profile = parabola(math.log(p.value), 0.1, 1.0)
+    beside = replace(found, parameter=replace(p, value=p.value * math.exp(0.1)))
+    (interval,) = with_profiles(replace(uncertainty, intervals=(beside,)), [profile]).intervals
+    ends = np.log([interval.low95, interval.high95]) - math.log(p.value)
+    assert ends == pytest.approx([-0.1 * math.sqrt(RISE + 1.0), 0.1 * math.sqrt(RISE + 1.0)], abs=2e-3)
+
+
+def test_nothing_is_identified_where_the_curve_is_not_explained(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+    """The same profiles with a chi-square of three for each degree of freedom: R, which was identified, is weak."""
+    doubt = one_sided[2]
+    assert doubt.uncertainty.explained
+    off = replace(doubt.uncertainty, reduced_chi2=3.0)
+    assert not off.explained
+    assert [i.verdict for i in doubt.uncertainty.intervals].count("identified") == 1
+    assert [i.verdict for i in with_profiles(off, doubt.profiles).intervals][-1] == "weak"
 
 
 def test_profile_of_a_known_parameter_is_that_of_the_curvature(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
