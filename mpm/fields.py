@@ -32,27 +32,28 @@ FAR = 1 << 20  # a node that no grid has
 BESIDE = 3  # cells on either side of the cut plane whose nodes may carry both halves
 REGISTER = 32  # bytes of a register of a CPU: as many particles as fill it have their elastic stress found at once
 CPU_BLOCK = 512  # Taichi runs CPU loops shorter than this on one thread, so one iteration in 512 works for a thread
-LEAST_PARTICLES, LEAST_NODES = 4096, 24  # capacities of the smallest fields
-MOST_PARTICLES, MOST_NODES = 65_536, 96  # beyond these capacities grow by as much, not by factors
+# Capacities: the smallest one, the factor by which they grow, up to where, and the step by which they grow beyond.
+PARTICLE_ROOM = (4096, 4, 65_536, 65_536)
+NODE_ROOM = (24, 2, 96, 32)
 CRACK_LEAD = 0.5  # cells by which the split of the nodes lags the crack it makes; see Fields.split
 
 
-def capacity(size, least, most, factor):
-    """The size that fields have in whose place one of ``size`` fits: so scenes of many sizes share what is compiled once."""
-    out = least
+def capacity(size, room):
+    """The size of fields that hold ``size`` entries: few sizes, so that scenes of many sizes share what is compiled once."""
+    out, factor, most, step = room
     while out < min(size, most):
         out *= factor
-    return out if size <= out else -(-size // most) * most
+    return out if size <= out else out + -(-(size - out) // step) * step
 
 
 def particle_capacity(n):
     """Particles that fields for n of them have room for."""
-    return capacity(n, LEAST_PARTICLES, MOST_PARTICLES, 4)
+    return capacity(n, PARTICLE_ROOM)
 
 
 def node_capacity(nodes):
     """Nodes along an axis that a grid of so many has room for; odd, or neighbours along it would share the cache's sets."""
-    return capacity(nodes, LEAST_NODES, MOST_NODES, 2) + 1
+    return capacity(nodes, NODE_ROOM) + 1
 
 
 @ti.data_oriented

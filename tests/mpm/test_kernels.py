@@ -183,6 +183,18 @@ def test_many_simulations_wait_side_by_side():
     assert made[0].run().status == "done"
 
 
+def test_fields_have_room_for_what_they_hold_and_come_in_few_sizes():
+    """Up to 65,536 particles and 96 nodes there are three sizes each; beyond, no more than one step is empty."""
+    particles, nodes = range(1, 300_000, 501), range(3, 400)
+    for of, sizes, whole, step in (
+        (kn.particle_capacity, particles, 65_536, 65_536),
+        (kn.node_capacity, nodes, 96, 32),
+    ):
+        assert all(of(n) >= n for n in sizes)
+        assert len({of(n) for n in sizes if n <= whole}) == 3
+        assert all(of(n) <= n + step for n in sizes if n > whole)
+
+
 def test_scenes_of_a_class_share_kernels_and_keep_their_force():
     """Two sizes of food run with what was compiled once; the force of the first is the same before and after the second, and to
     1e-9 that of fields without room to spare."""
