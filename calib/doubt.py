@@ -79,7 +79,8 @@ def doubt_of(
         surrogate, runs = result.surrogate, list(result.history)
         found, walked = _walk(objective, result, surrogate, result.jacobian)
         # profiles are walked, their ends simulated, and so on: with the others at their best values, then at their optimum where
-        # the trace is claimed to end them, then as they count where it would end both sides; of made-up fits whose profile is known the root of the rise
+        # the trace is claimed to end them, then as they count where it would end both sides; of made-up fits whose profile is
+        # known the root of the rise
         # was off by up to 1.5 after one round and 0.9 after these
         for evaluator, coarse, alone in (
             (scout, True, True),

@@ -200,8 +200,8 @@ def with_profiles(found: Uncertainty, walked: Sequence[Profile]) -> Uncertainty:
 
     A side is bounded by the trace where the trace alone ends it within the literature's range. A parameter is ``identified``
     where both sides are, its interval is narrower than half the prior's, it is known to 15 % (one standard deviation), and the
-    curve is explained; ``weak`` where one of these is not so; ``one_sided`` where the trace bounds one side and leaves the other to the prior or to
-    what is possible; ``not_seen`` where it bounds neither.
+    curve is explained; ``weak`` where one of these is not so; ``one_sided`` where the trace bounds one side and leaves the other to
+    the prior or to what is possible; ``not_seen`` where it bounds neither.
     """
     intervals = (_interval(i, p, found.explained) for i, p in zip(found.intervals, walked, strict=True))
     return replace(found, intervals=tuple(intervals))

@@ -2,57 +2,38 @@
 
 import taichi as ti
 
-from mpm.constitutive import full, unit
-from mpm.contact import blade_distance, stick_slip, tack
+from mpm.constitutive import unit
 from mpm.fields import (
     ARM_C,
     ARM_K,
     ARM_LIMIT,
     ARM_MASS,
-    BLADE,
-    BOARD,
-    BOARD_MU,
     BOOKED,
     COMMAND,
-    COS,
     COUNT,
     DX,
     EDGE,
     FACE,
     FAR,
-    FRICTION,
     INV,
     MASS,
     PLASTIC,
-    RADIUS,
-    RUBBED,
     SECOND,
-    SIN,
-    SPINE,
     STATIONS,
-    TACK,
-    TACK_GAP,
-    TILT_COS,
-    TILT_SIN,
     VOL,
     VS,
     VZ,
     S,
     Z,
 )
-from mpm.survey import Survey
-
-# Stiffness of the contact over mass / dt^2 of a particle. The stiffest sound one is 4 for a lone particle on a hard surface,
-# over 1 + 4 arm^2 / dx^2 when the impulse has an arm, which is half a cell at most.
-CONTACT = 2.0
-FLAT = 0.02  # least distance between a particle's centre and the surface that squeezing leaves, over the cell
+from mpm.touch import Touch
 
 TABLE = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
 
 @ti.data_oriented
-class Kernels(Survey):
-    """Transfers, contact of particles, and the loops of a time step."""
+class Kernels(Touch):
+    """Transfers, and the loops of a time step."""
 
     @ti.func
     def sever(self, p, q):
@@ -137,155 +118,6 @@ class Kernels(Survey):
                     for k in ti.static(range(3)):
                         self.add(thread, base[0] + i, at[j, k], base[2] + k, w[k][2] * (low + k * rise))
         return ti.Vector([loss[0], loss[1], loss[2], loss[3], outside])
-
-    @ti.func
-    def touch(self, p, dt, u, at):
-        """Contact of one particle with board and tool; returns its corrected velocity.
-
-        What touches is the food's surface, not the particle's centre. Its distance from the centre stretches with the
-        food, it moves with the food's velocity there, and the impulse has the moment that belongs to it, so that the work
-        of the contact is that of the surface. At the centre a food of n cells would be 1 / n stiffer.
-
-        The force is the food's own traction on the surface and, for what is missing, a stiff spring (Nitsche's method:
-        Chouly and Hild 2013, SIAM J. Numer. Anal. 51:1295). The spring alone, as stiff as the time step allows, would
-        give way as much as a fifth of a cell of food does.
-        """
-        m = self.par[MASS] * ti.static((2 if self.mx else 1) * (2 if self.my else 1))
-        c = self.gradient_of(p)
-        up = self.blade_axes(c @ ti.Vector([0.0, 0.0, 1.0]))  # gradient of the velocity, upwards and across the blade
-        across = self.blade_axes(c @ self.grid_axes(ti.Vector([0.0, 1.0, 0.0])))
-        there, v = self.blade_axes(at), self.blade_axes(u)
-        least, most = FLAT * self.par[DX], 0.5 * self.par[DX]
-        kick, high, wide = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
-        if 0 < self.foot[p] and there[2] < 2 * self.par[DX]:  # a free body has none
-            self.foot[p] = ti.math.clamp(self.foot[p] * (1 + dt * up[2]), least, most)
-            kick = self.touch_board(p, m, dt, v - self.foot[p] * up, there)
-            high -= self.foot[p] * kick
-        arm, push = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
-        if ti.static(self.press):
-            if there[2] > ti.cast(self.pose[Z], float) - 2 * self.par[DX]:
-                self.gap[p] = ti.math.clamp(self.gap[p] * (1 + dt * up[2]), least, most)
-                arm = ti.Vector([0.0, 0.0, self.gap[p]])
-                push = self.touch_press(p, m, dt, v + kick + self.gap[p] * up, there + arm)
-        else:
-            if ti.abs(there[1]) < 2 * self.par[DX]:
-                self.gap[p] = ti.math.clamp(self.gap[p] * (1 + dt * across[1]), least, most)
-            push, arm = self.touch_blade(p, m, dt, v + kick, up, across, there)
-        high += arm[2] * push
-        wide += arm[1] * push
-        scale = 4 * self.par[INV] * self.par[INV]
-        high, wide = self.grid_axes(high), self.grid_axes(wide)
-        new = v + kick + push
-        gift = 0.5 * (new.norm_sqr() - v.norm_sqr())
-        self.lever[p, 0] = ti.Vector([scale * high[0], scale * high[1], scale * high[2], gift])
-        self.lever[p, 1] = scale * ti.Vector([wide[0], wide[1], wide[2], 0.0])
-        return self.grid_axes(new)
-
-    @ti.func
-    def traction(self, p, shell, depth, n, dt):
-        """Force that the food's own stress asks of a board or tool with outward normal n, over the contact's stiffness [m].
-
-        Of the first layer only: ``shell`` is the reference volume between centre and surface, ``depth`` their distance.
-        """
-        out = ti.Vector.zero(float, 3)
-        if shell > 0:
-            block = p // self.lanes
-            lane = p - block * self.lanes
-            t = ti.Vector([self.tau[block, r][lane] for r in range(6)])
-            out = self.blade_axes(full(t) @ self.grid_axes(n))
-            out *= -shell / depth * dt * dt / (CONTACT * self.par[MASS])
-        return out
-
-    @ti.func
-    def touch_board(self, p, m, dt, u, at):
-        """Contact of one particle with the board; returns the change of its velocity. ``u`` is that of its surface."""
-        dv = ti.Vector.zero(float, 3)
-        own = self.traction(p, self.shell[p][0], self.foot[p], ti.Vector([0.0, 0.0, 1.0]), dt)
-        force = self.foot[p] - at[2] + own[2]
-        own[2] = 0.0
-        if force > 0:
-            slide = dt * ti.Vector([u[0], u[1], 0.0])
-            hold = stick_slip(self.stick[0, p], slide, own, force, self.par[BOARD_MU])
-            self.stick[0, p] = own - hold
-            dv = CONTACT / dt * ti.Vector([hold[0], hold[1], force])
-            self.tool(BOARD, -m * dv)
-            self.sums[RUBBED] -= m / dt * dv.dot(slide)
-        else:
-            self.stick[0, p] = ti.Vector.zero(float, 3)
-        return dv
-
-    @ti.func
-    def touch_blade(self, p, m, dt, u, up, across, at):
-        """Contact of one severed particle with the blade's faces; returns the change of its velocity, and its lever arm.
-
-        A particle meets the blade as far from its centre as it was from the cut plane when the food was whole, so
-        that the faces displace the food by the true half thickness of the blade.
-        """
-        cos_t, sin_t = self.par[TILT_COS], self.par[TILT_SIN]
-        above = (at[2] - self.edge_height(at[0])) * cos_t
-        touching = False
-        dv, arm = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
-        if self.side[p] != 0 and 0 < above < self.par[BLADE] and self.under_blade(at[0]):
-            sign = 1.0 if self.side[p] == 2 else -1.0
-            d, n = blade_distance(sign * at[1], above, self.par[SPINE], self.par[COS], self.par[SIN], self.par[RADIUS])
-            n = ti.Vector([-sin_t * n[2], sign * n[1], cos_t * n[2]])
-            own = self.traction(p, self.shell[p][1], self.gap[p], n, dt)
-            opening = d - self.gap[p]
-            force = own.dot(n) - opening
-            press = ti.max(force, 0.0)
-            own -= own.dot(n) * n
-            if force > 0 and self.tacky[p] == 0:
-                self.tacky[p] = 1
-            if force <= 0 and self.tacky[p] == 1:
-                if opening < self.par[TACK_GAP]:
-                    opening = ti.max(opening, 0.0)
-                    force = -self.par[TACK] * tack(opening, self.par[TACK_GAP]) * dt * dt / CONTACT
-                    press = -force
-                else:
-                    self.tacky[p] = 0
-            if press > 0:
-                touching = True
-                arm = -self.gap[p] * n
-                tool = ti.Vector([ti.cast(self.pose[VS], float), 0.0, ti.cast(self.pose[VZ], float)])
-                rel = u + arm[2] * up + arm[1] * across - tool
-                slide = rel - rel.dot(n) * n
-                stick = self.stick[1, p] - self.stick[1, p].dot(n) * n
-                hold = stick_slip(stick, dt * slide, own, press, self.par[FRICTION])
-                self.stick[1, p] = own - hold
-                dv = CONTACT / dt * (force * n + hold)
-                self.tool(FACE, -m * dv)
-                self.sums[RUBBED] -= m * dv.dot(slide if force > 0 else rel)
-        if not touching:
-            self.stick[1, p] = ti.Vector.zero(float, 3)
-        return dv, arm
-
-    @ti.func
-    def touch_press(self, p, m, dt, u, at):
-        """Contact of one particle with a plate or wedge that presses from above; returns the change of its velocity.
-
-        ``at`` and ``u`` are place and velocity of the food's surface above the particle.
-        """
-        sign = 1.0 if at[1] >= 0 else -1.0
-        above = at[2] - ti.cast(self.pose[Z], float)
-        d, n = blade_distance(sign * at[1], above, self.par[SPINE], self.par[COS], self.par[SIN], self.par[RADIUS])
-        n = ti.Vector([0.0, sign * n[1], n[2]])
-        own = self.traction(p, self.shell[p][1], self.gap[p], n, dt)
-        force = own.dot(n) - d
-        own -= own.dot(n) * n
-        dv = ti.Vector.zero(float, 3)
-        if force > 0:
-            tool = ti.Vector([ti.cast(self.pose[VS], float), 0.0, ti.cast(self.pose[VZ], float)])
-            stick = self.stick[1, p] - self.stick[1, p].dot(n) * n
-            slide = u - tool
-            slide -= slide.dot(n) * n
-            hold = stick_slip(stick, dt * slide, own, force, self.par[FRICTION])
-            self.stick[1, p] = own - hold
-            dv = CONTACT / dt * (force * n + hold)
-            self.tool(FACE, -m * dv)
-            self.sums[RUBBED] -= m * dv.dot(slide)
-        else:
-            self.stick[1, p] = ti.Vector.zero(float, 3)
-        return dv
 
     @ti.func
     def gather(self, p, dt, window):

@@ -11,7 +11,7 @@ import numpy as np
 
 from mpm import fields as kn
 from mpm.errors import SimulationError
-from mpm.kernels import CONTACT, Kernels
+from mpm.kernels import Kernels
 from mpm.material import Material
 from mpm.record import ForceRecord
 from mpm.runtime import Runtime, start
@@ -19,6 +19,7 @@ from mpm.scene import BAND_CELLS, Press, Scene
 from mpm.seeding import seed
 from mpm.shapes import section_area, skin_path, slices
 from mpm.topology import topology
+from mpm.touch import CONTACT
 
 PAD = 3  # empty cells around the food: a quadratic kernel reaches 1.5 cells, the rest is room to move
 # Particles for which another thread pays.  On two cores the second thread gains nothing for 8,000 particles, 10 to 25 % for
