@@ -19,7 +19,7 @@ from calib.objective import Objective, Target
 from calib.parameters import Z95, Parameter, ParameterSet
 from calib.properties import rule_of
 from calib.request import Request, Setup
-from calib.scenes import SEARCH_MACH, cut_scene, height_range, specimen
+from calib.scenes import cut_scene, height_range, specimen
 from mpm.scene import Scene
 
 # Hard bounds reach this factor beyond the literature's range, so that a trace may contradict the literature.
@@ -87,16 +87,7 @@ def set_up(request: Request) -> Setup:
     shape, assumed = specimen(food, curve, request.sizing)
     knife = load_knife(request.knife)
     fine, coarse = (
-        cut_scene(
-            food,
-            shape,
-            knife,
-            stroke=curve.stroke_length_m,
-            dx=request.dx,
-            mach=SEARCH_MACH,
-            seed=request.seed,
-            coarse=screening,
-        )
+        cut_scene(food, shape, knife, stroke=curve.stroke_length_m, dx=request.dx, seed=request.seed, coarse=screening)
         for screening in (False, True)
     )
     sensor, said = sensor_of(curve, request.gain_sd, request.lag_sd)

@@ -40,26 +40,13 @@ def whole_record(scene: Scene, pool: Workers, path: Path, say: Callable[[str], N
         OutputError: The file cannot be written.
         SimulationError: The process of the simulation was killed twice.
     """
-    record = kept_record(scene, path)
+    key = content_key(scene.as_dict(), {}, code_key())
+    record = _read(path, key)
     if record is None:
         say("simulating the best values once more for their full record")
         record = pool.record(scene)
-        keep_record(scene, record, path)
+        _write(path, key, record)
     return record
-
-
-def kept_record(scene: Scene, path: Path) -> ForceRecord | None:
-    """The record of a scene from a file; None where the file is missing, damaged, or holds another one."""
-    return _read(path, content_key(scene.as_dict(), {}, code_key()))
-
-
-def keep_record(scene: Scene, record: ForceRecord, path: Path) -> None:
-    """Write the record of a scene, as :func:`whole_record` finds it.
-
-    Raises:
-        OutputError: The file cannot be written.
-    """
-    _write(path, content_key(scene.as_dict(), {}, code_key()), record)
 
 
 def _write(path: Path, key: str, record: ForceRecord) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from calib.checks import Check, otherwise, report
+from calib.checks import Check, check, otherwise
 from calib.conditioning import Conditioned
 from calib.doubt import Doubt, doubt_of
 from calib.filters import filter_simulated
@@ -22,6 +22,7 @@ from calib.outputs import prepare, write_csv, write_json
 from calib.preparation import set_up
 from calib.progress import Progress
 from calib.provenance import code_key, key_of
+from calib.records import whole_record
 from calib.request import Request, Setup
 from calib.scenes import place
 from calib.search import FitOptions
@@ -85,17 +86,12 @@ def run(
             result = replace(result, history=(*result.history, *doubt.runs))
         start = _start_curve(setup, result, fine)
         scene, values = place(setup.fine, result.best.evaluation.parameters, setup.kept)
-        scene, record, checks = report(
-            scene.with_material(**values),
-            result.best.evaluation.scalars["peak_N"],
-            result.best.evaluation.scalars["work_J"],
-            pool,
-            store,
-            out / "record.h5",
-            say,
-            checked=result.status != "interrupted",
-        )
         setup = replace(setup, fine=scene)
+        scene = scene.with_material(**values)
+        record = whole_record(scene, pool, out / "record.h5", say)
+        checks: list[Check] = []
+        if result.status != "interrupted":
+            checks = check(scene, record.peak, record.work, pool, store, say)
     add_conditioning(out / "evaluations.h5", setup.curve)
     return _write(request, setup, result, doubt, record, checks, start, out, time.monotonic() - began)
 
@@ -126,12 +122,11 @@ def _write(
     from reports.calibration import write_report
 
     curve, best = setup.curve, result.best
-    shown = filter_simulated(curve.stroke, record.stroke, record.resolved)
-    metrics = compare(curve.stroke, curve.curve, shown)
+    metrics = compare(curve.stroke, curve.curve, best.curve)
     nulls = null_models(curve.stroke, curve.curve)
     summary = summarise(request, setup, result, record, metrics, nulls, doubt, checks)
     summary |= {"sensitivity": sensitivity(setup.objective, result, seed=request.seed), "wall_s": wall}
-    write_csv(out / "curves.csv", _curves(curve, shown, record, start, nulls, doubt))
+    write_csv(out / "curves.csv", _curves(curve, best.curve, record, start, nulls, doubt))
     fitted = _fitted_food(request, setup, best.evaluation.parameters)
     keep = ("created", "trace_sha256", "passed", "peak_error", "nrmse", "shape_error", "git", "versions")
     dump_material(fitted, out / "material.yaml", {k: summary[k] for k in keep} | {"trace": curve.trace.label})
@@ -154,7 +149,7 @@ def _fitted_food(request: Request, setup: Setup, parameters: Mapping[str, float]
 
 def _curves(
     curve: Conditioned,
-    shown: np.ndarray,
+    best: np.ndarray,
     record: ForceRecord,
     start: np.ndarray,
     nulls: Mapping[str, NullModel],
@@ -165,6 +160,6 @@ def _curves(
         "edge_N": filter_simulated(curve.stroke, record.stroke, record.edge[:, 2]),
         "face_N": filter_simulated(curve.stroke, record.stroke, record.resolved_face),
     }
-    columns = {"stroke_m": curve.stroke, "real_N": curve.curve, "sim_N": shown, "residual_N": shown - curve.curve}
+    columns = {"stroke_m": curve.stroke, "real_N": curve.curve, "sim_N": best, "residual_N": best - curve.curve}
     band = {} if doubt is None else {"band_low_N": doubt.bands[0].low, "band_high_N": doubt.bands[0].high}
     return columns | parts | {"start_N": start} | {f"{name}_N": n.curve for name, n in nulls.items()} | band

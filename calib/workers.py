@@ -104,17 +104,13 @@ class Workers(ABC):
             else:
                 yield Evaluation(index=index, parameters=values, **result)
 
-    def records(self, scenes: Sequence[Scene]) -> Iterator[tuple[int, ForceRecord | None]]:
-        """The whole record of each scene, with its place among them, in order of completion; None as for :meth:`each`."""
-        return self.each(_whole, [(scene,) for scene in scenes])
-
     def record(self, scene: Scene) -> ForceRecord:
         """The whole record of one scene.
 
         Raises:
             SimulationError: Its process was killed twice.
         """
-        ((_, record),) = self.records([scene])
+        ((_, record),) = self.each(_whole, [(scene,)])
         if record is None:
             raise SimulationError(
                 "the process of the last simulation was killed twice, perhaps for lack of memory; every run before it is "

@@ -47,8 +47,6 @@ if __name__ == "__main__":
 class Study:
     """A calibration with a formula in place of the solver, in a process of its own with workers of its own.
 
-    A run is known by its peak: no two have the same.
-
     Args:
         folder: Where its log, script and results are.
         name: What they are called.
@@ -86,7 +84,7 @@ class Study:
         return self.stored()
 
     def stored(self) -> set[str]:
-        """Peaks of the runs on disk, in the file and in the journal beside it, which may end in a torn line."""
+        """Names of the runs on disk, in the file and in the journal beside it, which may end in a torn line."""
         found: set[str] = set()
         path = self.out / "evaluations.h5"
         if path.exists():
@@ -98,10 +96,10 @@ class Study:
                 found.add(repr(json.loads(line[9:])["scalars"]["peak_N"]))
             except (ValueError, KeyError):
                 continue
-        return found | self.whole()
+        return {f"run:{peak}" for peak in found} | self.whole()
 
     def whole(self) -> set[str]:
-        """Peak of the run whose whole record is on disk."""
+        """Name of the run whose whole record is on disk."""
         path = self.out / "record.h5"
         if not path.exists():
             return set()
@@ -109,12 +107,12 @@ class Study:
             key = f.attrs["key"]
         record = records._read(path, key)
         assert record is not None
-        return {repr(record.peak)}
+        return {f"whole:{record.peak!r}"}
 
     def begun(self) -> list[str]:
-        """Peaks of all runs in the order in which they were begun."""
+        """Names of all runs in the order in which they were begun."""
         lines = [line.split() for line in self.log.read_text().splitlines()]
-        return [line[1].partition(":")[2] for line in lines if line[0] == "begin"]
+        return [line[1] for line in lines if line[0] == "begin"]
 
     def results(self) -> dict[str, Any]:
         """What the study found, less when and how long."""
