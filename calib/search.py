@@ -13,7 +13,7 @@
    one: 16 synthetic cuts took 14 fine and 54 coarse runs each, where 24 and 40 led to the same chi-square.
 4. When neither the process nor the runs give a gain worth its noise: if the curve is still not explained
    (chi-square above its 99 % quantile), strides along each parameter to both ends of its prior range (one
-   that is not felt here, such as a yield stress that nothing reaches, may be felt there), after those another design,
+   that is not felt here, such as a yield stress that nothing reaches, may be felt there), after those another design or more,
    and rounds whose fine runs are made only where the coarse ones promise a gain;
    else differences about the best point; and again 3 if that brings or promises a gain.  The Jacobian there is that of the
    process, in which the noise of single runs is averaged out; plain differences of noisy curves would make every
@@ -75,6 +75,9 @@ CALM_ROUNDS, STALLED_ROUNDS = 2, 4
 #: above the number of independent data.  Of 96 synthetic cuts one stayed in a side minimum (excess
 #: chi-square 100) with a single design, none (excess at most 2.1) with three.
 DESIGNS = 3
+#: The same where the best curve is off by more than twice its tolerance (the chi-square exceeds so many times the number of
+#: independent data): no model's error explains that, and what is left of the budget is spent on looking elsewhere.
+MORE_DESIGNS, FAR_OFF = 12, 4.0
 #: Part of the budget that the coarse evaluator may spend on the screening: 60 runs of the default budget.  On
 #: two synthetic and two real cuts it ended by itself after 32 to 50.
 SCREENING = 0.15
@@ -145,9 +148,9 @@ class Search:
         self.luck = 0.0
         low, high = self.parameters.box
         sobol = qmc.Sobol(len(low), scramble=True, seed=options.seed)
-        count = DESIGNS * options.design
+        count = MORE_DESIGNS * options.design
         sample = low + (high - low) * (0.1 + 0.8 * sobol.random_base2(math.ceil(math.log2(count)))[:count])
-        self.designs = np.split(sample, DESIGNS)
+        self.designs = np.split(sample, MORE_DESIGNS)
 
     @property
     def finished(self) -> list[Trial]:
@@ -226,7 +229,9 @@ class Search:
 
     def _unseen(self) -> bool:
         """Whether there is another design that can be paid together with the rounds it may call for."""
-        return len(self.designs) > 0 and self._room() > self.scouting * self.options.design + 2 * self.options.batch
+        far_off = bool(self.finished) and self.best.misfit > FAR_OFF * self.objective.effective_rows
+        left = len(self.designs) - (0 if far_off else MORE_DESIGNS - DESIGNS)
+        return left > 0 and self._room() > self.scouting * self.options.design + 2 * self.options.batch
 
     def _design(self, points: list[FloatArray]) -> None:
         """Run ``points`` and the next part of the sample, then the best of the lines they stand for."""

@@ -15,7 +15,7 @@ from calib.fit import FitResult, calibrate
 from calib.objective import Objective, Target
 from calib.parameters import Parameter, ParameterSet
 from calib.progress import Progress
-from calib.search import SCREENING, FitOptions
+from calib.search import DESIGNS, FAR_OFF, SCREENING, FitOptions
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.uncertainty import evidence, uncertainty
 from mpm.errors import SimulationError
@@ -212,6 +212,22 @@ def test_only_a_curve_beyond_chance_is_strode_for(size: float, strode: bool) -> 
     excess = result.best.misfit / objective.effective_rows
     assert 1.0 < excess and (excess > 1.56) is strode  # chi-square over 21 rows: 95 % quantile 32.7
     assert any(t.stage == "stride" for t in result.history) is strode
+
+
+@pytest.mark.parametrize(("size", "spent"), [(0.075, False), (0.3, True)])
+def test_a_curve_far_off_is_sought_as_long_as_the_budget_holds(size: float, spent: bool) -> None:
+    """Off by more than twice its tolerance, it gets one design after the other; off by less, three at most."""
+
+    def with_wiggle(p: Mapping[str, float]) -> np.ndarray:
+        force = two_terms(p)
+        return force + size * force.max() * np.sin(16.0 * np.pi * STROKE / LENGTH)
+
+    objective = goal(TWO_TRUTH, TWO, with_wiggle)
+    options = FitOptions(budget=150)
+    result = calibrate(objective, Fake(two_terms), options=options)
+    assert (result.best.misfit > FAR_OFF * objective.effective_rows) is spent
+    designed = sum(t.stage == "design" for t in result.history) - 2  # less the given values and the centre
+    assert (designed > DESIGNS * options.design) is spent
 
 
 def test_single_linear_parameter() -> None:
