@@ -199,15 +199,21 @@ def test_strides_find_what_is_not_felt_at_the_best_point() -> None:
     assert values(result)["yield_stress"] < 3.3e4
 
 
+def wiggly(size: float) -> Objective:
+    """A cut with a wiggle of this part of its peak, which no material explains."""
+
+    def force(p: Mapping[str, float]) -> np.ndarray:
+        plain = two_terms(p)
+        return plain + size * plain.max() * np.sin(16.0 * np.pi * STROKE / LENGTH)
+
+    return goal(TWO_TRUTH, TWO, force)
+
+
 @pytest.mark.parametrize(("size", "strode"), [(0.045, False), (0.075, True)])
 def test_only_a_curve_beyond_chance_is_strode_for(size: float, strode: bool) -> None:
     """A wiggle that nothing explains calls for strides where one cut in twenty would not show it, not before."""
 
-    def with_wiggle(p: Mapping[str, float]) -> np.ndarray:
-        force = two_terms(p)
-        return force + size * force.max() * np.sin(16.0 * np.pi * STROKE / LENGTH)
-
-    objective = goal(TWO_TRUTH, TWO, with_wiggle)
+    objective = wiggly(size)
     result = calibrate(objective, Fake(two_terms), options=FitOptions(budget=60))
     excess = result.best.misfit / objective.effective_rows
     assert 1.0 < excess and (excess > 1.56) is strode  # chi-square over 21 rows: 95 % quantile 32.7
@@ -218,11 +224,7 @@ def test_only_a_curve_beyond_chance_is_strode_for(size: float, strode: bool) -> 
 def test_a_curve_far_off_is_sought_as_long_as_the_budget_holds(size: float, spent: bool) -> None:
     """Off by more than twice its tolerance, it gets one design after the other; off by less, three at most."""
 
-    def with_wiggle(p: Mapping[str, float]) -> np.ndarray:
-        force = two_terms(p)
-        return force + size * force.max() * np.sin(16.0 * np.pi * STROKE / LENGTH)
-
-    objective = goal(TWO_TRUTH, TWO, with_wiggle)
+    objective = wiggly(size)
     options = FitOptions(budget=150)
     result = calibrate(objective, Fake(two_terms), options=options)
     assert (result.best.misfit > FAR_OFF * objective.effective_rows) is spent
