@@ -22,6 +22,9 @@ from calib.uncertainty import Uncertainty, evidence, uncertainty
 
 FloatArray = npt.NDArray[np.float64]
 
+JUDGED, FURTHER = 3, 0.1
+"""Times that the ends of intervals are simulated as they count, and how much further out an end must lie to be simulated again, part
+of its distance from the best value: each run may show that the other parameters make up for more than the surrogate knew."""
 CLOSE = 0.05
 """Points this near to a run, in prior standard deviations of every parameter, are not run."""
 
@@ -77,6 +80,7 @@ def doubt_of(
         return None
     with threadpool_limits(1, "blas"):
         surrogate, runs = result.surrogate, list(result.history)
+        judged: dict[tuple[int, bool], float] = {}
         found, walked = _walk(objective, result, surrogate, result.jacobian)
         # profiles are walked, their ends simulated, and so on: with the others at their best values, then at their optimum where
         # the trace is claimed to end them, then as they count where it would end both sides; of made-up fits whose profile is
@@ -85,12 +89,15 @@ def doubt_of(
         for evaluator, coarse, alone in (
             (scout, True, True),
             (scout, True, False),
-            (judge, False, False),
+            *[(judge, False, False)] * JUDGED,
         ):
             if evaluator is None:
                 continue
             known = runs if coarse else [t for t in runs if not t.coarse]
-            asked = _new(objective, _ends(found, walked, bounded=not coarse, alone=alone), known)
+            ends = _ends(found, walked, bounded=not coarse, alone=alone)
+            if not coarse:
+                ends = _further(ends, result.best.z, judged)
+            asked = _new(objective, [z for _, z in ends], known)
             if asked:
                 say(f"intervals: {len(asked)} of their ends{' on coarse cells' if coarse else ''}")
                 runs += _run(objective, evaluator, asked, coarse)
@@ -111,11 +118,24 @@ def _walk(
     return found, profiles(surrogate, result.parameters, found)
 
 
-def _ends(found: Uncertainty, walked: tuple[Profile, ...], bounded: bool, alone: bool) -> list[FloatArray]:
-    """Points (p,) at the ends of profiles; where ``bounded``, only of parameters that have an interval on both sides."""
+def _ends(found: Uncertainty, walked: tuple[Profile, ...], bounded: bool, alone: bool) -> list[tuple[int, FloatArray]]:
+    """Parameters and points (p,) at the ends of their profiles; where ``bounded``, only of those with an interval on both sides."""
     intervals = with_profiles(found, walked).intervals
     chosen = [p for i, p in zip(intervals, walked, strict=True) if not bounded or i.verdict in ("identified", "weak")]
-    return [z for p in chosen for z in p.frontier(alone)]
+    return [(p.index, z) for p in chosen for z in p.frontier(alone)]
+
+
+def _further(
+    ends: list[tuple[int, FloatArray]], best: FloatArray, judged: dict[tuple[int, bool], float]
+) -> list[tuple[int, FloatArray]]:
+    """Ends that lie further from the best values (p,) than those judged before, which are noted."""
+    out = []
+    for i, z in ends:
+        way, side = float(abs(z[i] - best[i])), (i, bool(z[i] > best[i]))
+        if way > (1.0 + FURTHER) * judged.get(side, 0.0):
+            judged[side] = way
+            out.append((i, z))
+    return out
 
 
 def _new(objective: Objective | JointObjective, points: list[FloatArray], runs: list[Trial]) -> list[FloatArray]:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib.doubt import Doubt, doubt_of
+from calib.doubt import FURTHER, JUDGED, Doubt, doubt_of
 from calib.evaluation import Evaluation
 from calib.fit import FitResult, calibrate
 from calib.objective import Objective, Target
@@ -83,11 +83,15 @@ def test_verdicts_say_what_the_trace_bounds(one_sided: tuple[Objective, FitResul
 
 
 def test_what_would_have_an_interval_was_tried_at_both_ends(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
-    """Runs that count are made where R would end, and for nothing that is open; coarse ones at the ends of all."""
+    """Runs that count are made where R would end, and again where that turns out to lie further out, and for nothing that is open;
+    coarse ones at the ends of all."""
     objective, result, doubt = one_sided
     judged = [t.z - result.best.z for t in doubt.runs if not t.coarse]
     r = objective.parameters.names.index("R")
-    assert len(judged) == 2 and judged[0][r] < 0.0 < judged[1][r]
+    below, above = ([abs(d[r]) for d in judged if (d[r] > 0.0) == up] for up in (False, True))
+    assert 1 <= len(below) <= JUDGED and 1 <= len(above) <= JUDGED
+    for ways in (below, above):
+        assert all(b > (1.0 + FURTHER) * a for a, b in zip(ways, ways[1:], strict=False))
     assert sum(t.coarse for t in doubt.runs) > 2 * len(objective.parameters)
 
 
