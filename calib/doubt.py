@@ -68,7 +68,7 @@ def doubt_of(
         scout: Runs cheap simulations at the ends that the profiles claim, which are then walked again; without it they rest on
             the runs of the search alone.
         judge: Runs simulations as they count at both ends of each parameter that would be called identified or weak; the profiles
-            are walked once more with them.
+            are walked again with them, and ends that lie further out then are simulated again.
         seed: Seed of the predictive draws.
         sample: Whether the posterior is sampled as well.
         say: Called before each round of simulations, with one sentence.
