@@ -22,9 +22,9 @@ from calib.uncertainty import Uncertainty, evidence, uncertainty
 
 FloatArray = npt.NDArray[np.float64]
 
-JUDGED, FURTHER = 3, 0.1
-"""Times that the ends of intervals are simulated as they count, and how much further out an end must lie to be simulated again, part
-of its distance from the best value: each run may show that the other parameters make up for more than the surrogate knew."""
+JUDGED = 3
+"""Times that the ends of intervals are simulated as they count: each run may move them, as the other parameters make up for more or
+less than the surrogate knew."""
 CLOSE = 0.05
 """Points this near to a run, in prior standard deviations of every parameter, are not run."""
 
@@ -68,7 +68,7 @@ def doubt_of(
         scout: Runs cheap simulations at the ends that the profiles claim, which are then walked again; without it they rest on
             the runs of the search alone.
         judge: Runs simulations as they count at both ends of each parameter that would be called identified or weak; the profiles
-            are walked again with them, and ends that lie further out then are simulated again.
+            are walked again with them, and ends that have moved are simulated again.
         seed: Seed of the predictive draws.
         sample: Whether the posterior is sampled as well.
         say: Called before each round of simulations, with one sentence.
@@ -80,12 +80,10 @@ def doubt_of(
         return None
     with threadpool_limits(1, "blas"):
         surrogate, runs = result.surrogate, list(result.history)
-        judged: dict[tuple[int, bool], float] = {}
         found, walked = _walk(objective, result, surrogate, result.jacobian)
         # profiles are walked, their ends simulated, and so on: with the others at their best values, then at their optimum where
         # the trace is claimed to end them, then as they count where it would end both sides; of made-up fits whose profile is
-        # known the root of the rise
-        # was off by up to 1.5 after one round and 0.9 after these
+        # known the root of the rise was off by up to 1.5 after one round and 0.9 after these
         for evaluator, coarse, alone in (
             (scout, True, True),
             (scout, True, False),
@@ -95,9 +93,7 @@ def doubt_of(
                 continue
             known = runs if coarse else [t for t in runs if not t.coarse]
             ends = _ends(found, walked, bounded=not coarse, alone=alone)
-            if not coarse:
-                ends = _further(ends, result.best.z, judged)
-            asked = _new(objective, [z for _, z in ends], known)
+            asked = _new(objective, ends, known)
             if asked:
                 say(f"intervals: {len(asked)} of their ends{' on coarse cells' if coarse else ''}")
                 runs += _run(objective, evaluator, asked, coarse)
@@ -118,24 +114,11 @@ def _walk(
     return found, profiles(surrogate, result.parameters, found)
 
 
-def _ends(found: Uncertainty, walked: tuple[Profile, ...], bounded: bool, alone: bool) -> list[tuple[int, FloatArray]]:
-    """Parameters and points (p,) at the ends of their profiles; where ``bounded``, only of those with an interval on both sides."""
+def _ends(found: Uncertainty, walked: tuple[Profile, ...], bounded: bool, alone: bool) -> list[FloatArray]:
+    """Points (p,) at the ends of profiles; where ``bounded``, only of parameters with an interval on both sides."""
     intervals = with_profiles(found, walked).intervals
     chosen = [p for i, p in zip(intervals, walked, strict=True) if not bounded or i.verdict in ("identified", "weak")]
-    return [(p.index, z) for p in chosen for z in p.frontier(alone)]
-
-
-def _further(
-    ends: list[tuple[int, FloatArray]], best: FloatArray, judged: dict[tuple[int, bool], float]
-) -> list[tuple[int, FloatArray]]:
-    """Ends that lie further from the best values (p,) than those judged before, which are noted."""
-    out = []
-    for i, z in ends:
-        way, side = float(abs(z[i] - best[i])), (i, bool(z[i] > best[i]))
-        if way > (1.0 + FURTHER) * judged.get(side, 0.0):
-            judged[side] = way
-            out.append((i, z))
-    return out
+    return [z for p in chosen for z in p.frontier(alone)]
 
 
 def _new(objective: Objective | JointObjective, points: list[FloatArray], runs: list[Trial]) -> list[FloatArray]:
