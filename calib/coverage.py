@@ -191,6 +191,7 @@ def _one(
     doubt = doubt_of(setup.objective, result, scout=coarse, judge=fine, seed=k)
     if doubt is None:
         return row | {"error": "the search ended before there were intervals"}
+    result = doubt.result
     return row | {
         "parameters": {i.parameter.name: i.as_dict() for i in doubt.uncertainty.intervals},
         "inside": doubt.bands[0].inside,

@@ -34,19 +34,19 @@ class Doubt:
     """What a fit does not know.
 
     Attributes:
+        result: The fit with the runs made here, among which the best one may be, and the process through them all.
         uncertainty: Intervals, correlations and verdicts.
         profiles: Profile likelihood of each parameter.
         nuisances: What the best curves say of the measurement, trace by trace.
         bands: Posterior predictive band of each trace.
-        runs: Simulations made to confirm the ends of the intervals.
         sampled: 95 % intervals [unit] from a sample of the posterior by name, where one was asked for.
     """
 
+    result: FitResult
     uncertainty: Uncertainty
     profiles: tuple[Profile, ...]
     nuisances: tuple[NuisanceEstimate, ...]
     bands: tuple[Band, ...]
-    runs: tuple[Trial, ...] = ()
     sampled: dict[str, tuple[float, float]] = field(default_factory=dict)
 
 
@@ -99,11 +99,25 @@ def doubt_of(
                 runs += _run(objective, evaluator, asked, coarse)
                 surrogate = Surrogate(objective, runs, result.best, surrogate.hyper)
                 found, walked = _walk(objective, result, surrogate, surrogate.jacobian(result.best.z))
+        better = _better(result, runs, surrogate.luck)
+        if better is not None:
+            result = replace(result, best=better, parameters=result.parameters.with_values(better.evaluation.parameters))
+            surrogate = Surrogate(objective, runs, better, surrogate.hyper)
+            found, walked = _walk(objective, result, surrogate, surrogate.jacobian(better.z))
+        result = replace(
+            result, history=tuple(runs), surrogate=surrogate, jacobian=surrogate.jacobian(result.best.z)
+        )
         drawn = bands(surrogate, result.best.z, found, seed)
         posterior = Posterior(surrogate, result.parameters, found)
         own = sampled(posterior, result.best.z, seed) if sample else {}
-    added = tuple(runs[len(result.history) :])
-    return Doubt(with_profiles(found, walked), walked, _nuisances(objective, result, found), drawn, added, own)
+    return Doubt(result, with_profiles(found, walked), walked, _nuisances(objective, result, found), drawn, own)
+
+
+def _better(result: FitResult, runs: list[Trial], luck: float) -> Trial | None:
+    """A run at the end of an interval that is better than the answer of the search by more than the noise of a run, ``luck``."""
+    judged = (t for t in runs[len(result.history) :] if t.ok and not t.coarse)
+    best = min(judged, key=lambda t: t.misfit, default=None)
+    return best if best is not None and best.misfit < result.best.misfit - luck else None
 
 
 def _walk(

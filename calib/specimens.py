@@ -185,12 +185,8 @@ class Specimens:
         result = calibrate(joint, fine, coarse=coarse, replicate=again, options=options, progress=staged)
         if result.status == "interrupted":
             raise KeyboardInterrupt
-        return Fitted(
-            tuple(names),
-            joint,
-            result,
-            doubt_of(joint, result, scout=coarse, judge=fine, seed=self.study.seed, say=self.say),
-        )
+        doubt = doubt_of(joint, result, scout=coarse, judge=fine, seed=self.study.seed, say=self.say)
+        return Fitted(tuple(names), joint, result if doubt is None else doubt.result, doubt)
 
     def staged(self, words: str) -> Callable[[Progress], None] | None:
         """The progress callback with what is being fitted before each stage."""

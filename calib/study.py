@@ -83,7 +83,7 @@ def run(
             setup.objective, result, scout=coarse, judge=fine, seed=request.seed, sample=request.sample, say=say
         )
         if doubt is not None:
-            result = replace(result, history=(*result.history, *doubt.runs))
+            result = doubt.result
         start = _start_curve(setup, result, fine)
         scene, values = place(setup.fine, result.best.evaluation.parameters, setup.kept)
         setup = replace(setup, fine=scene)

@@ -17,6 +17,7 @@ from calib.parameters import Z95, Parameter, ParameterSet
 from calib.predictive import band_of, errors
 from calib.profiles import RISE, Profile, with_profiles
 from calib.search import FitOptions
+from calib.surrogate import Surrogate
 from tests.calib.fake import GRID, NOISE, STROKE, Fake, goal, noise, three_terms
 
 
@@ -87,14 +88,31 @@ def test_what_would_have_an_interval_was_tried_at_both_ends(one_sided: tuple[Obj
     """Runs that count are made where R would end, and again where that turns out to lie elsewhere, and for nothing that is open;
     coarse ones at the ends of all."""
     objective, result, doubt = one_sided
-    judged = [t.z - result.best.z for t in doubt.runs if not t.coarse]
+    runs = doubt.result.history[len(result.history) :]
+    judged = [t.z - result.best.z for t in runs if not t.coarse]
     r = objective.parameters.names.index("R")
     below, above = ([abs(d[r]) for d in judged if (d[r] > 0.0) == up] for up in (False, True))
     assert 1 <= len(below) <= JUDGED and 1 <= len(above) <= JUDGED
     sd = objective.parameters.prior_sd
     for a, b in combinations(judged, 2):
         assert np.any(np.abs(a - b) > CLOSE * sd)
-    assert sum(t.coarse for t in doubt.runs) > 2 * len(objective.parameters)
+    assert sum(t.coarse for t in runs) > 2 * len(objective.parameters)
+
+
+def test_a_better_run_at_the_end_of_an_interval_becomes_the_best(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+    """Where the process was wrong and a run at an end is better than the answer of the search, values and intervals are about it."""
+    objective, result, _ = one_sided
+    values = dict(result.best.evaluation.parameters)
+    poor = objective.trial(next(iter(Fake(elastic).evaluate([values | {"R": 1.15 * values["R"]}]))), stage="round")
+    history = (*result.history, poor)
+    assert result.surrogate is not None and poor.misfit > result.best.misfit + 10.0
+    before = replace(result, best=poor, history=history, surrogate=Surrogate(objective, history, poor))
+    after = doubt_of(objective, before, judge=Fake(lambda _: elastic(values)))
+    assert after is not None
+    best = after.result.best
+    assert best.stage == "profile" and best.misfit < poor.misfit - 5.0
+    assert [i.parameter.value for i in after.uncertainty.intervals] == list(best.evaluation.parameters.values())
+    assert after.result.surrogate is not None and after.result.surrogate.best is best
 
 
 def test_an_interval_holds_the_best_value(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
