@@ -69,7 +69,7 @@ class Textbook:
     def __init__(self, scene: Scene, *, dx: float, dt: float, speed: float, nodes: int, runtime: Runtime) -> None:
         start(runtime, scene.numerics.precision)
         real = ti.f64 if scene.numerics.precision == "f64" else ti.f32
-        whole = replace(scene, numerics=replace(scene.numerics, dx=dx, mirror=False))
+        whole = replace(scene, numerics=replace(scene.numerics, dx=dx, far=None, mirror=False))
         seeds = seed(whole)
         if max(vars(scene.food.shape)[side] for side in ("length", "width", "height")) > (nodes - 2 * BOTTOM) * dx:
             raise SceneError(f"the food does not fit into {nodes} nodes of {dx * 1e3:g} mm; take a larger cell")

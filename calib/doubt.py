@@ -101,12 +101,12 @@ def doubt_of(
                 found, walked = _walk(objective, result, surrogate, surrogate.jacobian(result.best.z))
         better = _better(result, runs, surrogate.luck)
         if better is not None:
-            result = replace(result, best=better, parameters=result.parameters.with_values(better.evaluation.parameters))
+            result = replace(
+                result, best=better, parameters=result.parameters.with_values(better.evaluation.parameters)
+            )
             surrogate = Surrogate(objective, runs, better, surrogate.hyper)
             found, walked = _walk(objective, result, surrogate, surrogate.jacobian(better.z))
-        result = replace(
-            result, history=tuple(runs), surrogate=surrogate, jacobian=surrogate.jacobian(result.best.z)
-        )
+        result = replace(result, history=tuple(runs), surrogate=surrogate, jacobian=surrogate.jacobian(result.best.z))
         drawn = bands(surrogate, result.best.z, found, seed)
         posterior = Posterior(surrogate, result.parameters, found)
         own = sampled(posterior, result.best.z, seed) if sample else {}

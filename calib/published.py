@@ -17,7 +17,7 @@ from calib.materials import FoodSpec, load_food, read_property
 from calib.parameters import ParameterSet
 from calib.preparation import fit_parameters
 from calib.properties import DIMENSIONS, Rule
-from calib.scenes import LENGTH_PER_HEIGHT
+from calib.scenes import LENGTH_PER_HEIGHT, PRISMS
 from calib.validation import Place, check_keys, choice, mapping, number, read_yaml, text
 from mpm.errors import CutcalError, SceneError
 from mpm.scene import Knife
@@ -214,7 +214,7 @@ def _cut(place: Place, name: str, raw: Any) -> Cut:
     check_keys(place, given, ("shape", "width_m", "height_m"), ("length_m", "given", "predicted"), _SYNONYMS)
     kind = choice(place.at("shape"), given["shape"], SHAPE_KINDS)
     size = {n: _size(place.at(key), given[key], DIMENSIONS[n]) for n, key in SIZES.items() if key in given}
-    size.setdefault("length", LENGTH_PER_HEIGHT * size["height"])
+    size.setdefault("length", (LENGTH_PER_HEIGHT if kind in PRISMS else 1.0) * size["height"])
     try:
         shape = Shape(kind, **size)
     except SceneError as e:

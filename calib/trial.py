@@ -54,7 +54,7 @@ class Trial(Simulation):
         start, m = self.cell.start, self.scene.food.material
         s = start.squeeze if start.strained else 1.0
         density = 3 * m.shear * (s - 1) ** 2 + 0.5 * m.lame * (s**3 - 1) ** 2
-        return self.images * len(self.seeds.x) * self.seeds.volume * density
+        return self.images * self.seeds.total * density
 
     def go(self, longest: float) -> tuple[ForceRecord, Audit]:
         """Run and audit.
@@ -69,7 +69,7 @@ class Trial(Simulation):
                 raise TooLong(fraction)
 
         record = self.run(progress=watch)
-        n, volume = self.scene.numerics, self.images * len(self.seeds.x) * self.seeds.volume
+        n, volume = self.scene.numerics, self.images * self.seeds.total
         return record, audit(
             record,
             precision=n.precision,

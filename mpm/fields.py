@@ -102,6 +102,7 @@ class Fields:
         self.tau = ti.Vector.field(self.lanes, real, (blocks, 9))
         self.side, self.gap = ti.field(ti.i32, room), ti.field(real, room)
         self.foot = ti.field(real, room)
+        self.bulk = ti.field(real, room)  # volume over that of a particle beside the cut
         # reference volume between a particle of the first layer and the board, and the tool; 0 behind the first layer
         self.shell = ti.Vector.field(2, real, room)
         # moment of the contact's last impulse as a gradient of the velocity: upwards, and across the blade; the fourth

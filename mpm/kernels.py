@@ -58,7 +58,7 @@ class Kernels(Touch):
 
     @ti.func
     def scatter_block(self, block, thread, dt, window):
-        """Particles of a block to grid; returns (plastic, damage, viscous loss per volume, inverted, outside)."""
+        """Particles of a block to grid; returns (plastic, damage, viscous loss over ``VOL``, inverted, outside)."""
         total = ti.Vector.zero(float, 5)
         if ti.static(self.branches == 0):
             self.elastic(block, dt)
@@ -89,8 +89,8 @@ class Kernels(Touch):
         outside = 1.0 - self.inside(base, window)
         if outside == 0.0:
             w = self.weights(fx)
-            m = self.par[MASS]
-            pull = -dt * self.par[VOL] * 4 * self.par[INV]
+            m = self.par[MASS] * self.bulk[p]
+            pull = -dt * self.par[VOL] * self.bulk[p] * 4 * self.par[INV]
             carry = m * self.par[DX] * ti.Vector([1.0, 1.0, 1.0, 0.0])
             ax = pull * ti.Vector([tau[0], tau[5], tau[4], 0.0]) + carry * self.C[p, 0]
             ay = pull * ti.Vector([tau[5], tau[1], tau[3], 0.0]) + carry * self.C[p, 1]
@@ -117,6 +117,7 @@ class Kernels(Touch):
                     rise = wij * az
                     for k in ti.static(range(3)):
                         self.add(thread, base[0] + i, at[j, k], base[2] + k, w[k][2] * (low + k * rise))
+        loss *= self.bulk[p]
         return ti.Vector([loss[0], loss[1], loss[2], loss[3], outside])
 
     @ti.func

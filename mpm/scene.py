@@ -170,6 +170,8 @@ class Numerics:
     Attributes:
         dx: Cell size [m].
         ppc: Particles per cell and direction, at least 2.
+        far: Distance from the cut plane beyond which there is one particle a cell across the blade, and within the food one a cell
+            altogether [m]; None: nowhere. Only the outline needs as many there as elsewhere.
         contact: ``cohesive`` (edge law and particle contact) or ``nodal`` (the plain projection of grid velocities).
         grid_shift: Position of the grid against the scene along x, y, z [cells].
         grid_turn: Angle of food and blade against the grid [rad].
@@ -184,6 +186,7 @@ class Numerics:
 
     dx: float = 2.5e-3
     ppc: int = 2
+    far: float | None = None
     contact: str = "cohesive"
     grid_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
     grid_turn: float = 0.0
@@ -204,6 +207,8 @@ class Numerics:
                 "numerics: ppc 1: one particle a cell does not integrate the grid's functions, and where a cut starts energy "
                 "comes from nothing; use 2 (8 particles a cell) or 3"
             )
+        if self.far is not None:
+            check_number(w, "far", self.far, 0.0, 1.0, "m")
         check_number(w, "room", self.room, 0.0, 100.0, "of half the food's size")
         check_number(w, "safety", self.safety, 0.0, 0.9001, "of the stability limit")
         check_number(w, "output", self.output, 0.0, 0.1, "m")

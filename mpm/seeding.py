@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import minimum_filter
 
 from mpm.errors import SceneError
-from mpm.scene import Scene
+from mpm.scene import Numerics, Scene
 from mpm.shapes import inside, surface, volume
 
 MAX_PARTICLES = 20_000_000
@@ -24,25 +25,38 @@ class Seeds:
 
     Attributes:
         x: Positions [m], shape (n, 3); only the modelled half or quarter when mirrors are on.
-        volume: Volume of one particle [m^3]; the particles of all mirror images add up to the shape's volume.
+        volume: Volume of a lattice cell [m^3]; the particles of all mirror images add up to the shape's volume.
         spacing: Lattice spacing [m].
+        bulk: Lattice cells that each particle stands for, shape (n,): 1 but far from the cut.
         foot: Distance at which each particle meets the board [m], shape (n,): its own from the lower surface in the first
             layer, half a spacing behind it.
         head: The same from the upper surface.
         bottom: Whether a particle is in the first layer above the lower surface, shape (n,).
         top: The same below the upper surface.
-        cells: Lattice cell of each particle, counted from the cut plane along y (-1, 0 on either side of it), shape
-            (n, 3).
+        cells: Lattice cells, counted from the cut plane along y (-1, 0 on either side of it), shape (m, 3).
+        owner: The particle that stands for each of them, shape (m,).
     """
 
     x: np.ndarray
     volume: float
     spacing: float
+    bulk: np.ndarray
     foot: np.ndarray
     head: np.ndarray
     bottom: np.ndarray
     top: np.ndarray
     cells: np.ndarray
+    owner: np.ndarray
+
+    @property
+    def total(self) -> float:
+        """Volume of all particles [m^3], mirror images not counted."""
+        return self.volume * float(self.bulk.sum())
+
+    @property
+    def areas(self) -> np.ndarray:
+        """Area of each particle of the first or last layer seen from above [m^2], shape (n,); those of several cells lie along y."""
+        return self.spacing**2 * self.bulk
 
     @property
     def gap(self) -> np.ndarray:
@@ -52,7 +66,9 @@ class Seeds:
     @property
     def beside(self) -> np.ndarray:
         """Whether a particle is in the first layer beside the cut plane, shape (n,)."""
-        return np.isin(self.cells[:, 1], (-1, 0))
+        out = np.zeros(len(self.x), bool)
+        out[self.owner[np.isin(self.cells[:, 1], (-1, 0))]] = True
+        return out
 
 
 def seed(scene: Scene) -> Seeds:
@@ -81,11 +97,40 @@ def seed(scene: Scene) -> Seeds:
     points = origin + (cells + 0.5 + JITTER * rng.uniform(-0.5, 0.5, cells.shape)) * h
     there = inside(shape, points)
     points, cells = points[there], cells[there] - [0, counts[1] - right, 0]
+    lattice = volume(shape) / (2 if mirror_x else 1) / (2 if mirror_y else 1) / len(points)
+    owner, bulk = _thin(cells, num, mirror_x)
+    points = np.stack([np.bincount(owner, axis) for axis in points.T], axis=1) / bulk[:, None]
     floor, roof = surface(shape, points[:, 0], points[:, 1])
-    images = (2 if mirror_x else 1) * (2 if mirror_y else 1)
     below, above = points[:, 2] - floor, roof - points[:, 2]
     foot, head = _depth(below, h), _depth(above, h)
-    return Seeds(points, volume(shape) / images / len(points), h, foot, head, below < h, above < h, cells)
+    return Seeds(points, lattice, h, bulk, foot, head, below < h, above < h, cells, owner)
+
+
+def _thin(cells: np.ndarray, num: Numerics, mirrored: bool) -> tuple[np.ndarray, np.ndarray]:
+    """The particle that stands for each lattice cell (m, 3), and how many each stands for.
+
+    Beyond ``num.far`` the lattice cells of a grid cell that lie side by side across the blade share one, and all of them where it and
+    all grid cells around it are full: nothing touches the food there, and its outline stays as fine as elsewhere.
+    """
+    if num.far is None:
+        return np.arange(len(cells)), np.ones(len(cells))
+    near = num.ppc * max(1, round(num.far / num.dx))
+    layer = np.where(cells[:, 1] >= 0, cells[:, 1], -1 - cells[:, 1])
+    depth = np.where(layer < near, layer, near + (layer - near) // num.ppc)
+    depth = np.where(cells[:, 1] >= 0, depth, -1 - depth)
+    block = np.stack([cells[:, 0] // num.ppc, depth, cells[:, 2] // num.ppc], axis=1)
+    margin = np.array([0 if mirrored else 1, 1, 1])  # the food goes on beyond a mirror plane
+    at = tuple((block - block.min(axis=0) + margin).T)
+    count = np.zeros([a.max() + 2 for a in at], int)
+    np.add.at(count, at, 1)
+    inner = minimum_filter(count == num.ppc**3, size=3, mode="nearest")[at]
+    key = np.stack([cells[:, 0], depth, cells[:, 2]], axis=1)
+    key[inner] = [-1, 0, -1] + block[inner] * [-1, 1, -1]  # apart from those of single cells, which are not negative
+    _, first, owner, bulk = np.unique(key, axis=0, return_index=True, return_inverse=True, return_counts=True)
+    order = np.argsort(np.argsort(first))  # particles keep the order of the lattice
+    out = np.empty(len(bulk))
+    out[order] = bulk
+    return order[owner.ravel()], out
 
 
 def _depth(distance: np.ndarray, spacing: float) -> np.ndarray:

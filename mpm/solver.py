@@ -158,7 +158,8 @@ class Simulation:
         k.fill(k.foot, self.seeds.foot.astype(real))
         gap, outer = (self.seeds.gap, self.seeds.beside) if scene.cuts else (self.seeds.head, self.seeds.top)
         k.fill(k.gap, gap.astype(real))
-        shell = np.stack([self.seeds.foot * self.seeds.bottom, gap * outer], axis=1) * self.seeds.spacing**2
+        shell = np.stack([self.seeds.foot * self.seeds.bottom, gap * outer], axis=1) * self.seeds.areas[:, None]
+        k.fill(k.bulk, self.seeds.bulk.astype(real))
         k.fill(k.shell, shell.astype(real))
         k.reset()
         sticky = self.seeds.beside & (material.adhesion > 0)
@@ -313,7 +314,7 @@ class Simulation:
         mirror = np.array([0.0 if m else 1.0 for m in (*self.scene.mirrors, False)])
         momentum = self._turn(state[None, :3], -1.0)[0] * self.images * mirror
         edge, face, board = (sums[r : r + 3] / span for r in (kn.EDGE, kn.FACE, kn.BOARD))
-        weight = np.array([0.0, 0.0, -material.rho * self.seeds.volume * len(self.seeds.x) * self.images * gravity])
+        weight = np.array([0.0, 0.0, -material.rho * self.seeds.total * self.images * gravity])
         residual = (momentum - last) / span - weight + edge + face + board
         lost = [self.images * self.seeds.volume * sums[r] for r in (kn.PLASTIC, kn.DAMAGE, kn.VISCOUS)]
         energy = [state[3] * self.images, state[4] * self.images, *lost, sums[kn.RUBBED], sums[kn.PARTED]]
@@ -368,7 +369,7 @@ class Simulation:
             viscous=viscous,
             friction=friction,
             parting=parting,
-            mass=material.rho * self.seeds.volume * len(self.seeds.x) * self.images,
+            mass=material.rho * self.seeds.total * self.images,
             lagging=self.scene.numerics.contact != "nodal",
             cell=self.scene.numerics.dx,
             speed=speed,

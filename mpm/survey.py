@@ -38,7 +38,7 @@ class Survey(Stress):
         The kinetic energy is that of the motion, without what contact has just given, as the stress that will balance it has
         not acted yet: food at rest on a board would else have the energy of the fall that the board stops in every step.
         """
-        m, u = self.par[MASS], self.v[p]
+        m, u = self.par[MASS] * self.bulk[p], self.v[p]
         spin = self.C[p, 0].norm_sqr() + self.C[p, 1].norm_sqr() + self.C[p, 2].norm_sqr()
         f = self.deformation_of(p)
         j = f.determinant()
@@ -59,7 +59,7 @@ class Survey(Stress):
             dev = held * dev + stored
         keep = 1.0 - d
         kinetic = m * (0.5 * u.norm_sqr() - self.lever[p, 0][3] + 0.125 * self.par[DX] * self.par[DX] * spin)
-        energy = self.par[VOL] * (keep * dev + (keep if j > 1 else 1.0) * vol)
+        energy = self.par[VOL] * self.bulk[p] * (keep * dev + (keep if j > 1 else 1.0) * vol)
         return ti.Vector([m * u[0], m * u[1], m * u[2], kinetic, energy])
 
     @ti.func

@@ -72,7 +72,7 @@ def topology(
         swell: Volume over volume at rest, shape (n,).
         damage: Bulk damage, shape (n,).
     """
-    cells, image = seeds.cells, np.arange(len(half))
+    cells, image, half = seeds.cells, seeds.owner, half[seeds.owner]
     if mirrors[1]:
         cells = np.concatenate([cells, cells * [1, -1, 1] - [0, 1, 0]])
         half, image = np.concatenate([half, 1 - half]), np.concatenate([image, image])

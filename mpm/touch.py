@@ -50,7 +50,7 @@ class Touch(Survey):
         Chouly and Hild 2013, SIAM J. Numer. Anal. 51:1295). The spring alone, as stiff as the time step allows, would
         give way as much as a fifth of a cell of food does.
         """
-        m = self.par[MASS] * ti.static((2 if self.mx else 1) * (2 if self.my else 1))
+        m = self.par[MASS] * self.bulk[p] * ti.static((2 if self.mx else 1) * (2 if self.my else 1))
         c = self.gradient_of(p)
         up = self.blade_axes(c @ ti.Vector([0.0, 0.0, 1.0]))  # gradient of the velocity, upwards and across the blade
         across = self.blade_axes(c @ self.grid_axes(ti.Vector([0.0, 1.0, 0.0])))
@@ -93,7 +93,7 @@ class Touch(Survey):
             lane = p - block * self.lanes
             t = ti.Vector([self.tau[block, r][lane] for r in range(6)])
             out = self.blade_axes(full(t) @ self.grid_axes(n))
-            out *= -shell / depth * dt * dt / (CONTACT * self.par[MASS])
+            out *= -shell / depth * dt * dt / (CONTACT * self.par[MASS] * self.bulk[p])
         return out
 
     @ti.func

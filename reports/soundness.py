@@ -18,6 +18,7 @@ def numerics(s: Data) -> Data:
     return {
         "dx": quantity(s["dx_m"], "m"), "cells": plain(s["shape"]["height"] / s["dx_m"], 2),
         "particles": count(s["particles"]),
+        "far": _far(s),
         "images": "none" if images in (None, False, 1) else "yes" if images is True else str(images),
         "mach": quantity(s["mach"], "-"), "momentum": quantity(s["momentum_residual"], "fraction"),
         "kinetic": quantity(s["ke_over_ie"], "fraction"), "ripple": quantity(ripple, "N"),
@@ -27,6 +28,12 @@ def numerics(s: Data) -> Data:
         "coarse": count(s["coarse_simulations"]) if s.get("coarse_simulations") else None,
         "counters": s.get("counters"),
     }  # fmt: skip
+
+
+def _far(s: Data) -> str | None:
+    """Distance from the cut beyond which particles are fewer; None where they are not, or it was not recorded."""
+    far = s.get("scene", {}).get("numerics", {}).get("far")
+    return None if far is None else quantity(far, "m", digits=2)
 
 
 def _energy(energy: Data) -> Data:

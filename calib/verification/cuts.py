@@ -136,42 +136,42 @@ def invariance(how: How) -> Iterator[Row]:
 def slit(how: How) -> Iterator[Row]:
     """A wedge without friction in a slit that leads its edge: the force on the faces against finite elements.
 
-    The blade lies on a plane of nodes, as in every scene whose grid is not turned; half-way between two planes the
+    A block of three heights needs 1.4 times the force of one, as its halves bend less. The blade lies on a plane of nodes, as in every scene whose grid is not turned; half-way between two planes the
     particles need 9, 6, 3 and 1 % more than finite elements on cells of 3, 2, 1.5 and 1 mm.
     """
-    block, lead, stroke = Shape("block", 0.024, 0.016, 0.024), 1.5e-3, 9e-3
+    lead, stroke = 1.5e-3, 9e-3
     food = Material(E=1e6, nu=0.35, rho=1000, loss_factor=0.05, R=1.0, R_initiation=1.0)
-    want = cleave(block, food, WEDGE, lead, stroke)
-    source = f"finite elements of the same law, {want.unknowns} unknowns"
+    blocks = {length: Shape("block", length, 0.016, 0.024) for length in (0.024, 0.072)}
+    wanted = {length: cleave(block, food, WEDGE, lead, stroke) for length, block in blocks.items()}
 
     def mean(stroke: np.ndarray, force: np.ndarray) -> float:
         at = np.linspace(5e-3, 8.5e-3, 50)
         return float(np.interp(at, stroke, force).mean())
 
-    for dx, shift in ((3e-3, 0.0), (1.5e-3, 0.0), (1.5e-3, 0.5)):
+    for length, dx, shift in ((0.024, 3e-3, 0.0), (0.024, 1.5e-3, 0.0), (0.024, 1.5e-3, 0.5), (0.072, 3e-3, 0.0)):
         scene = Scene(
-            Food(block, food),
+            Food(blocks[length], food),
             WEDGE,
             Motion(stroke + lead, 0.005),
             Board(0.0),
             EdgeLaw(zone=2 * lead),
-            Numerics(dx=dx, gravity=0.0, grid_shift=(0.0, shift, 0.0)),
+            Numerics(dx=dx, far=6e-3, gravity=0.0, grid_shift=(0.0, shift, 0.0)),
         )
-        record = how.simulate(scene)
+        record, want = how.simulate(scene), wanted[length]
         where = ", blade between planes of nodes" if shift else ""
         yield Row(
-            f"wedge in a slit, dx {1e3 * dx:g} mm{where}",
+            f"wedge in a slit, {1e3 * length:g} mm long, dx {1e3 * dx:g} mm{where}",
             "mean force on the faces, 5 to 8.5 mm deep [N]",
             mean(want.stroke, want.force),
             mean(record.stroke, record.resolved_face),
             0.05,
-            source,
+            f"finite elements of the same law, {want.unknowns} unknowns",
         )
 
 
 CASES = [
     Case("cutting resistance", resistance, cost=50),
     Case("slicing", slicing, fast=False, cost=22),
-    Case("wedge in a slit", slit, fast=False, cost=60),
+    Case("wedge in a slit", slit, fast=False, cost=120),
     Case("invariance of the cut", invariance, fast=False, cost=25),
 ]

@@ -72,6 +72,18 @@ def test_given_sizes_are_taken_and_not_assumed():
     assert said == []
 
 
+def test_a_food_is_simulated_as_long_as_it_matters():
+    """Parallel sides end after four heights, a round food where it does; what nobody measured is said."""
+    lengths = {"banana": 4 * 0.033, "cucumber": 0.15, "apple": 0.075, "pear": 0.085}
+    for name, length in lengths.items():
+        food = load_food(name)
+        shape, said = specimen(food, None, Sizing())
+        assert shape.length == pytest.approx(length, rel=0.01)
+        assert any(f"{1e3 * shape.length:.0f} mm" in text and "--length" in text for text in said)
+    _, said = specimen(load_food("banana"), None, Sizing(length=0.02))
+    assert not any("--length" in text for text in said)
+
+
 def test_fitted_height_takes_the_other_sizes_along():
     """A candidate's height scales width and length with it, except what was measured; the rest is the material's."""
     food = load_food("cucumber")
@@ -82,7 +94,8 @@ def test_fitted_height_takes_the_other_sizes_along():
     assert values == {"E": 1e6}
     assert (grown.height, grown.length) == pytest.approx((1.2 * shape.height, 1.2 * shape.length))
     assert grown.width == shape.width
-    assert higher.numerics == replace(scene.numerics, dx=1.2 * scene.numerics.dx)
+    assert scene.numerics.far is not None
+    assert higher.numerics == replace(scene.numerics, dx=1.2 * scene.numerics.dx, far=1.2 * scene.numerics.far)
     assert (higher.motion, higher.edge) == (scene.motion, scene.edge)
     free, _ = place(scene, {"height": 1.2 * shape.height})
     assert len(seed(free).x) == len(seed(scene).x)

@@ -9,9 +9,9 @@ import pytest
 
 from mpm.material import Material
 from mpm.record import ForceRecord
-from mpm.scene import EdgeLaw, Food, Knife, Motion, Numerics, Scene
+from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
 from mpm.shapes import Shape
-from tests.mpm.scenes import THIN, cut
+from tests.mpm.scenes import THIN, WEDGE, cut
 
 # a ripe banana under a kitchen knife, the defaults of that food
 PULP = Material(
@@ -68,6 +68,7 @@ def reference() -> ForceRecord:
         {"grid_turn": np.deg2rad(45.0)},
         {"mirror": False},
         {"ppc": 3},
+        {"far": 8e-3},
         *({"seed": s} for s in (1, 2, 3, 4)),
     ],
     ids=str,
@@ -94,6 +95,29 @@ def test_force_of_the_faces_belongs_to_the_food(stiff, change):
     record = cut(replace(POTATO, numerics=replace(POTATO.numerics, **change)))
     assert stiff.work > 3 * stiff.edge[:, 2] @ np.diff(stiff.stroke, prepend=0.0)
     assert record.work == pytest.approx(stiff.work, rel=0.03 if "dx" in change else 0.02)
+
+
+def test_longer_halves_are_bent_apart_with_more_force():
+    """Like arms of a double cantilever beam: four heights of a stiff food need half as much again on the faces of the blade, and
+    it does not matter that few particles are far from the cut. The force itself is compared with finite elements by ``verify``."""
+    flesh = Material(E=1e6, nu=0.35, rho=1000, loss_factor=0.05, R=1.0, R_initiation=1.0)
+
+    def opened(length: float, far: float | None = None) -> ForceRecord:
+        food = Food(Shape("block", length, 0.016, 0.024), flesh)
+        numerics = Numerics(dx=3e-3, far=far, gravity=0.0)
+        return cut(Scene(food, WEDGE, Motion(0.0105, 0.005), Board(0.0), EdgeLaw(zone=3e-3), numerics))
+
+    def force(record: ForceRecord) -> float:
+        return float(np.interp(np.linspace(5e-3, 8.5e-3, 50), record.stroke, record.resolved_face).mean())
+
+    long, thinned = opened(0.096), opened(0.096, far=6e-3)
+    assert force(long) > 1.4 * force(opened(0.024))
+    assert thinned.particles < 0.6 * long.particles
+    assert force(thinned) == pytest.approx(force(long), rel=0.01)
+    assert thinned.mass == pytest.approx(long.mass, rel=1e-12)
+    assert thinned.pieces is not None and long.pieces is not None and not thinned.pieces.complete
+    assert thinned.pieces.volumes == pytest.approx(long.pieces.volumes, rel=1e-3)
+    assert thinned.pieces.uncut_area == long.pieces.uncut_area
 
 
 def test_finer_cells_do_not_change_the_force(reference):

@@ -47,12 +47,31 @@ def test_particles_add_up_to_the_food(kind, mirror):
     sc = scene(kind, mirror=mirror)
     seeds = seed(sc)
     images = 4 if mirror else 1
-    assert seeds.volume * len(seeds.x) * images == pytest.approx(volume(sc.food.shape), rel=1e-12)
+    assert seeds.total * images == pytest.approx(volume(sc.food.shape), rel=1e-12)
     assert inside(sc.food.shape, seeds.x).all()
     assert seeds.volume == pytest.approx(seeds.spacing**3, rel=0.06)
     assert (seeds.foot >= 0).all() and seeds.foot.max() <= seeds.spacing
     if mirror:
         assert seeds.x[:, 0].min() >= 0 and seeds.x[:, 1].max() <= 0
+
+
+@pytest.mark.parametrize("kind", SHAPE_KINDS)
+@pytest.mark.parametrize("mirror", [True, False])
+def test_far_from_the_cut_a_particle_stands_for_a_cell_across_the_blade(kind, mirror):
+    """Half as many, within the food an eighth; those beside the cut, the mass and its middle are the same, and so is the outline."""
+    far, sc = 6e-3, scene(kind, mirror=mirror)
+    all_, some = seed(sc), seed(replace(sc, numerics=replace(sc.numerics, far=far)))
+    assert some.total == pytest.approx(all_.total, rel=1e-12) and set(some.bulk) <= {1.0, 2.0, 8.0}
+    np.testing.assert_allclose(some.bulk @ some.x, all_.bulk @ all_.x, atol=1e-9)
+    a, b = (s.x[np.abs(s.x[:, 1]) < far] for s in (all_, some))
+    np.testing.assert_allclose(a, b, atol=1e-15)
+    assert len(some.x) - len(b) < 0.7 * (len(all_.x) - len(a))
+    outer = some.bottom | some.top
+    assert some.bulk[outer].max() == 2.0 and some.areas @ some.bottom == pytest.approx(
+        all_.areas @ all_.bottom, rel=0.03
+    )
+    assert (some.beside == (np.abs(some.x[:, 1]) < some.spacing)).all()
+    np.testing.assert_array_equal(np.bincount(some.owner), some.bulk)
 
 
 def test_seeds_repeat_and_differ():
