@@ -117,8 +117,8 @@ class Kernels(Touch):
                     rise = wij * az
                     for k in ti.static(range(3)):
                         self.add(thread, base[0] + i, at[j, k], base[2] + k, w[k][2] * (low + k * rise))
-        loss *= self.bulk[p]
-        return ti.Vector([loss[0], loss[1], loss[2], loss[3], outside])
+        bulk = self.bulk[p]
+        return ti.Vector([bulk * loss[0], bulk * loss[1], bulk * loss[2], loss[3], outside])
 
     @ti.func
     def gather(self, p, dt, window):
