@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -23,8 +23,8 @@ from calib.uncertainty import Uncertainty, evidence, uncertainty
 FloatArray = npt.NDArray[np.float64]
 
 JUDGED = 3
-"""Times that the ends of intervals are simulated as they count: each run may move them, as the other parameters make up for more or
-less than the surrogate knew."""
+"""Times that the ends of intervals are simulated as they count, after the first those of what is called identified alone: each run may
+move them, as the other parameters make up for more or less than the surrogate knew."""
 CLOSE = 0.05
 """Points this near to a run, in prior standard deviations of every parameter, are not run."""
 
@@ -68,7 +68,7 @@ def doubt_of(
         scout: Runs cheap simulations at the ends that the profiles claim, which are then walked again; without it they rest on
             the runs of the search alone.
         judge: Runs simulations as they count at both ends of each parameter that would be called identified or weak; the profiles
-            are walked again with them, and ends that have moved are simulated again.
+            are walked again with them, and ends of identified ones that have moved are simulated again.
         seed: Seed of the predictive draws.
         sample: Whether the posterior is sampled as well.
         say: Called before each round of simulations, with one sentence.
@@ -84,15 +84,17 @@ def doubt_of(
         # profiles are walked, their ends simulated, and so on: with the others at their best values, then at their optimum where
         # the trace is claimed to end them, then as they count where it would end both sides; of made-up fits whose profile is
         # known the root of the rise was off by up to 1.5 after one round and 0.9 after these
-        for evaluator, coarse, alone in (
-            (scout, True, True),
-            (scout, True, False),
-            *[(judge, False, False)] * JUDGED,
+        for evaluator, verdicts, alone in (
+            (scout, None, True),
+            (scout, None, False),
+            (judge, ("identified", "weak"), False),
+            *[(judge, ("identified",), False)] * (JUDGED - 1),
         ):
             if evaluator is None:
                 continue
+            coarse = verdicts is None
             known = runs if coarse else [t for t in runs if not t.coarse]
-            ends = _ends(found, walked, bounded=not coarse, alone=alone)
+            ends = _ends(found, walked, verdicts, alone=alone)
             asked = _new(objective, ends, known)
             if asked:
                 say(f"intervals: {len(asked)} of their ends{' on coarse cells' if coarse else ''}")
@@ -128,10 +130,12 @@ def _walk(
     return found, profiles(surrogate, result.parameters, found)
 
 
-def _ends(found: Uncertainty, walked: tuple[Profile, ...], bounded: bool, alone: bool) -> list[FloatArray]:
-    """Points (p,) at the ends of profiles; where ``bounded``, only of parameters with an interval on both sides."""
+def _ends(
+    found: Uncertainty, walked: tuple[Profile, ...], verdicts: Collection[str] | None, alone: bool
+) -> list[FloatArray]:
+    """Points (p,) at the ends of the profiles of parameters with one of these verdicts, of all with None."""
     intervals = with_profiles(found, walked).intervals
-    chosen = [p for i, p in zip(intervals, walked, strict=True) if not bounded or i.verdict in ("identified", "weak")]
+    chosen = [p for i, p in zip(intervals, walked, strict=True) if verdicts is None or i.verdict in verdicts]
     return [z for p in chosen for z in p.frontier(alone)]
 
 
