@@ -27,7 +27,7 @@ cantilever beam (Gurney and Hunt 1967), so the force on its faces grows with the
 work of one of five, two heights need 0.77, three 0.93, four 0.99; for a banana, which flows, two are enough."""
 PRISMS = ("block", "cylinder", "half_cylinder", "capsule")
 FAR = 0.25
-"""Distance from the cut from which on there are fewer particles, over the height: peak and work of banana, cucumber, potato and pear
+"""Distance from the cut from which on there are fewer particles, over the height: peak and work of banana, cucumber and pear
 change by 0.3 % at most, their curves by 0.4 % of the peak, and long foods take half the time."""
 
 
