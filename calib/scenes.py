@@ -145,10 +145,13 @@ def elsewhere(scene: Scene, k: int) -> Scene:
     """The scene with other particles and the grid shifted along the blade and upwards, for k = 1, 2, ...
 
     Across the blade the grid stays: the blade lies on a plane of nodes in every run that is compared, and what leaving it
-    changes is no scatter (see ``numerics.grid_shift`` and ``cutcal converge --offset``).
+    changes is no scatter (see ``numerics.grid_shift`` and ``cutcal converge --offset``). A scene whose grid is mirrored along the
+    blade is shifted by half a cell there and stays so: for a banana a quarter and three quarters give the same work to 0.05 %, at
+    twice the cost.
     """
     x, z = (float(part) for part in np.round(k * PLACES % 1.0, 4))
-    moved = (x, scene.numerics.grid_shift[1], z)
+    along, across, _ = scene.numerics.grid_shift
+    moved = ((along + 0.5) % 1.0 if scene.mirrors[0] else x, across, z)
     return replace(scene, numerics=replace(scene.numerics, seed=scene.numerics.seed + k, grid_shift=moved))
 
 

@@ -15,6 +15,7 @@ from mpm.fields import (
     OX,
     OY,
     OZ,
+    PAIR,
     PARTED,
     R_FLESH,
     R_START,
@@ -198,8 +199,8 @@ class Edge(Nodes):
                         if w > 0:
                             self.give(a, j, k, w * dv)
                             if ti.static(self.mx):
-                                image = 2 * self.i0 - a
-                                if a > self.i0 and image >= 0:
+                                image = self.size[PAIR] - a
+                                if a > image >= 0:
                                     self.give(image, j, k, w * ti.Vector([-dv[0], dv[1], dv[2]]))
 
     @ti.func

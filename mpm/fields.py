@@ -12,9 +12,10 @@ ARM_K, ARM_C, ARM_MASS, ARM_LIMIT = range(30, 34)
 DX, INV, OX, OY, OZ, FIRST = range(34, 40)
 N_PARAMETERS = 40
 # Rows of the table of sizes: particles, blocks of them, nodes along x, y, z, slices along the edge, the mirror plane across y, the
-# first and last + 1 node plane along y whose nodes have a second field, and how far behind the first that is stored.
-COUNT, BLOCKS, NODES, STATIONS, PLANE, TWIN, TWIN_END, SECOND = 0, 1, 2, 5, 6, 7, 8, 9
-N_SIZES = 10
+# first and last + 1 node plane along y whose nodes have a second field, how far behind the first that is stored, and the sum of the
+# indices of two nodes that are mirror images across x.
+COUNT, BLOCKS, NODES, STATIONS, PLANE, TWIN, TWIN_END, SECOND, PAIR = 0, 1, 2, 5, 6, 7, 8, 9, 10
+N_SIZES = 11
 # Rows of the accumulator table, cleared by the host at each output interval.
 EDGE, FACE, BOARD = 0, 3, 6
 PLASTIC, DAMAGE, VISCOUS, INVERTED, OUTSIDE, RUBBED, PARTED = range(9, 16)
@@ -27,7 +28,7 @@ N_POSE = 6
 N_STATE = 5
 N_REPORT = N_SUMS + N_STATE + N_POSE
 
-MIRROR = 2  # index of the node plane that mirrors across x
+MIRROR = 2  # index of the first node plane that is no mirror image across x
 FAR = 1 << 20  # a node that no grid has
 BESIDE = 3  # cells on either side of the cut plane whose nodes may carry both halves
 REGISTER = 32  # bytes of a register of a CPU: as many particles as fill it have their elastic stress found at once
@@ -82,6 +83,7 @@ class Fields:
     def __init__(self, room, nodes, mirrors, stations, threads, nodal, press, damage, turned=False, branches=0):
         self.mx, self.my = mirrors
         self.i0 = MIRROR if self.mx else -1
+        self.first = max(self.i0, 0)  # slice that is no mirror image
         self.threads, self.nodal, self.damage, self.turned = max(threads, 1), nodal, damage, turned
         self.press, self.cuts = press, not (nodal or press)
         self.atomic = threads == 0
@@ -133,7 +135,7 @@ class Fields:
         self.window = ti.field(ti.i32, 6)  # nodes that particles can reach before it is renewed: first, last + 1
         ti.sync()  # lays these fields out by themselves; Taichi does not manage those of eight scenes at once
 
-    def lay_out(self, n, nodes, middle, stations):
+    def lay_out(self, n, nodes, middle, stations, between=False):
         """Fit the fields to a scene.
 
         Args:
@@ -141,11 +143,13 @@ class Fields:
             nodes: Grid nodes along x, y, z.
             middle: Index of the node plane along y that is nearest to y = 0: the mirror plane across y where there is one.
             stations: Number of slices along the edge.
+            between: The mirror plane across x lies half-way between the first nodes and their images, not on the first nodes.
         """
         self.n, self.nodes = n, nodes
         first = 0 if self.turned else max(middle - BESIDE, 0)
         end = nodes[1] if self.turned else min(middle + BESIDE + 1, nodes[1])
         sizes = [n, -(-n // self.lanes), *nodes, stations, middle, first, end, nodes[1] - first]
+        sizes.append(2 * self.i0 - between)
         self.size.from_numpy(np.array(sizes, np.int32))
 
     def fill(self, field, values):
@@ -335,7 +339,7 @@ class Fields:
     def front_at(self, s):
         """Height of the crack front at a place along the cut [m], between the slices; far up where nothing is cut."""
         r = (s - self.par[FIRST]) * self.par[INV]
-        i = ti.math.clamp(ti.floor(r, ti.i32), 0, self.size[STATIONS] - 2)
+        i = ti.math.clamp(ti.floor(r, ti.i32), self.first, self.size[STATIONS] - 2)
         t = ti.math.clamp(r - i, 0.0, 1.0)
         out = 1e3
         if ti.max(self.front[i], self.front[i + 1]) < 1e2:
@@ -421,7 +425,8 @@ class Fields:
         """How many mirror images across x = 0 a node stands for: 0 for ghosts, 1 on the plane, else 2."""
         out = 1.0
         if ti.static(self.mx):
-            out = 0.0 if i < self.i0 else (1.0 if i == self.i0 else 2.0)
+            image = self.size[PAIR] - i
+            out = 0.0 if i < image else (1.0 if i == image else 2.0)
         return out
 
     @ti.func

@@ -12,6 +12,7 @@ from mpm.fields import (
     FACE,
     FRICTION,
     GRAVITY,
+    PAIR,
     PLANE,
     RADIUS,
     SECOND,
@@ -39,13 +40,13 @@ class Nodes(Fields):
 
     @ti.func
     def fold_x(self, j, k):
-        """Add the mirror image across the node plane i0 to one line of nodes."""
-        for h in ti.static(range(1, 3)):
-            if ti.static(self.i0 - h >= 0):
-                self.add_mirrored(self.i0 + h, self.i0 - h, j, k)
-        c = 2.0 * self.g[0, self.i0, j, k]
-        c[0] = 0.0
-        self.g[0, self.i0, j, k] = c
+        """Add the mirror images across x = 0 to one line of nodes."""
+        for m in ti.static(range(self.i0)):
+            self.add_mirrored(self.size[PAIR] - m, m, j, k)
+        if self.size[PAIR] == 2 * self.i0:
+            c = 2.0 * self.g[0, self.i0, j, k]
+            c[0] = 0.0
+            self.g[0, self.i0, j, k] = c
 
     @ti.func
     def nodal_contact(self, i, j, k, q, u):

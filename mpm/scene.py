@@ -175,7 +175,7 @@ class Numerics:
         contact: ``cohesive`` (edge law and particle contact) or ``nodal`` (the plain projection of grid velocities).
         grid_shift: Position of the grid against the scene along x, y, z [cells].
         grid_turn: Angle of food and blade against the grid [rad].
-        mirror: Use the mirror planes x = 0 and y = 0 where the grid lies on them.
+        mirror: Use the mirror planes x = 0 and y = 0 where they are mirrors of the grid.
         room: Empty grid on either side of the food, for it to widen in while it is pressed, part of half its size.
         seed: Seed of the particle positions.
         safety: dt over the stability limit of a lone particle [-].
@@ -293,12 +293,20 @@ class Scene:
 
     @property
     def mirrors(self) -> tuple[bool, bool]:
-        """Whether the planes x = 0 and y = 0 are used as mirrors: only when nodes lie on them and the motion allows."""
+        """Whether the planes x = 0 and y = 0 are used as mirrors: only where the motion allows and they mirror the grid.
+
+        They do with nodes on them, and x = 0 also half-way between nodes.
+        """
         sx, sy, _ = self.numerics.grid_shift
         cohesive = self.numerics.contact == "cohesive"
         on = self.numerics.mirror and self.numerics.grid_turn == 0
         straight = self.motion.slice_ratio == 0 and self.motion.tilt == 0
-        return on and straight and float(sx).is_integer(), on and cohesive and float(sy).is_integer()
+        return on and straight and float(2 * sx).is_integer(), on and cohesive and float(sy).is_integer()
+
+    @property
+    def mirrored_between(self) -> bool:
+        """Whether x = 0 is a mirror that lies half-way between nodes."""
+        return self.mirrors[0] and not float(self.numerics.grid_shift[0]).is_integer()
 
     def with_material(self, **values: Any) -> Scene:
         """The same scene with other material constants."""

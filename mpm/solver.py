@@ -105,7 +105,7 @@ class Simulation:
             bottom = -PAD if axis == 2 else -math.ceil(size / 2 / dx) - room
             top = math.ceil(size / dx) + PAD if axis == 2 else math.ceil(size / 2 / dx) + room
             if mirror[axis] and axis == 0:
-                bottom = -kn.MIRROR
+                bottom, shift = -kn.MIRROR, -shift  # by nothing or half a cell, so that there are as many images
             if mirror[axis] and axis == 1:
                 top = 2
             low.append(bottom)
@@ -153,7 +153,7 @@ class Simulation:
         k, scene, num, edge = self.k, self.scene, self.scene.numerics, self.scene.edge
         k.user = self
         real = np.float64 if num.precision == "f64" else np.float32
-        k.lay_out(len(self.seeds.x), self.nodes, round(-self.origin[1] / num.dx), len(self.stations))
+        k.lay_out(len(self.seeds.x), self.nodes, round(-self.origin[1] / num.dx), len(self.stations), scene.mirrored_between)
         k.fill(k.x, self._turn(self.seeds.x).astype(real))
         k.fill(k.foot, self.seeds.foot.astype(real))
         gap, outer = (self.seeds.gap, self.seeds.beside) if scene.cuts else (self.seeds.head, self.seeds.top)

@@ -134,16 +134,22 @@ def test_fit_takes_any_property_and_refuses_others():
 
 
 def test_elsewhere_moves_the_grid_but_not_the_blades_plane():
-    """Other particles, the grid shifted along the blade and upwards by less than a cell, each time by something else."""
+    """Other particles, the grid shifted along the blade and upwards by less than a cell, each time by something else.
+
+    A quarter stays a quarter: the grid is shifted by half a cell along the blade; what is no mirror image, by any part.
+    """
     food = load_food("banana")
     scene = cut_scene(food, specimen(food, None, Sizing())[0], load_knife("kitchen"))
     moved = [elsewhere(scene, k) for k in (1, 2, 3)]
     for one in moved:
         x, y, z = one.numerics.grid_shift
         assert 0 < x < 1 and y == 0 and 0 < z < 1
-        assert one.mirrors == (False, True)
+        assert one.mirrors == (True, True) and one.mirrored_between
         assert replace(one, numerics=scene.numerics) == scene
     assert len({one.numerics.grid_shift for one in moved}) == len({one.numerics.seed for one in moved}) == 3
+    assert elsewhere(moved[0], 1).numerics.grid_shift[0] == 0.0
+    sliced = replace(scene, motion=replace(scene.motion, slice_ratio=1.0))
+    assert len({elsewhere(sliced, k).numerics.grid_shift[0] for k in (1, 2, 3)} - {0.0, 0.5}) == 3
 
 
 def test_verdicts_fail_what_fails():

@@ -11,6 +11,7 @@ from mpm.errors import SceneError
 from mpm.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import Board, Food, Motion, Numerics, Scene
+from mpm.seeding import Seeds
 from mpm.shapes import Shape
 from mpm.solver import Simulation
 from tests.mpm.scenes import FLESH, PRISM, WEDGE
@@ -91,6 +92,31 @@ def test_mirrored_quarter_equals_the_whole(whole, quarter):
     assert quarter.images == 4 and quarter.particles < whole.particles / 3
     assert quarter.peak == pytest.approx(whole.peak, rel=0.04)
     assert quarter.work == pytest.approx(whole.work, rel=0.04)
+
+
+def test_mirror_between_the_nodes_is_the_whole_on_the_same_grid(quarter):
+    """With x = 0 half-way between nodes a quarter gives the force of the whole made of its particles and their images, to rounding."""
+    scene = replace(PRISM, knife=WEDGE, numerics=replace(PRISM.numerics, grid_shift=(0.5, 0.0, 0.0)))
+    part = Simulation(scene, Runtime(threads=1))
+    whole = Simulation(replace(scene, numerics=replace(scene.numerics, mirror=False)), Runtime(threads=1))
+    whole.seeds = with_images(part.seeds)
+    a, b = (simulation.run(replace(FLESH, mu=0.3)) for simulation in (part, whole))
+    assert (a.images, b.images) == (4, 1)
+    np.testing.assert_allclose(a.knife[:, 2], b.knife[:, 2], atol=1e-8 * b.peak)
+    assert a.momentum_residual < 1e-10
+    assert a.peak == pytest.approx(quarter.peak, rel=0.02)
+
+
+def with_images(seeds: Seeds) -> Seeds:
+    """The particles of a quarter and their mirror images."""
+    signs = np.array([[1, 1, 1], [-1, 1, 1], [1, -1, 1], [-1, -1, 1]])
+    return replace(
+        seeds,
+        x=np.concatenate([seeds.x * sign for sign in signs]),
+        cells=np.concatenate([np.where(sign > 0, seeds.cells, -1 - seeds.cells) for sign in signs]),
+        owner=np.concatenate([seeds.owner + k * len(seeds.x) for k in range(4)]),
+        **{name: np.tile(getattr(seeds, name), 4) for name in ("bulk", "foot", "head", "bottom", "top")},
+    )
 
 
 def test_the_work_is_accounted_for(whole, quarter):

@@ -103,10 +103,12 @@ def test_first_layer_meets_a_surface_at_its_own_distance():
 
 
 def test_mirrors_follow_the_grid():
-    """Mirrors are used where nodes lie on their planes, and not by the nodal rule across the blade."""
+    """Mirrors are used where they mirror the grid, along the blade also between nodes; not by the nodal rule across the blade."""
     assert scene("block").mirrors == (True, True)
     assert scene("block", grid_shift=(0.0, 0.5, 0.3)).mirrors == (True, False)
     assert scene("block", grid_shift=(0.25, 0.0, 0.0)).mirrors == (False, True)
+    assert scene("block", grid_shift=(0.5, 0.0, 0.0)).mirrors == (True, True)
+    assert scene("block", grid_shift=(-1.5, 0.0, 0.0)).mirrored_between and not scene("block").mirrored_between
     assert scene("block", contact="nodal").mirrors == (True, False)
     assert scene("block", mirror=False).mirrors == (False, False)
 
