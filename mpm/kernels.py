@@ -73,7 +73,7 @@ class Kernels(Touch):
         """One particle to grid; returns as :meth:`scatter_block`."""
         q = self.blade_axes(self.x[p])
         self.sever(p, q)
-        loss, tau = ti.Vector.zero(float, 4), 0.0 * unit()
+        bulk, loss, tau = self.bulk[p], ti.Vector.zero(float, 4), 0.0 * unit()
         one_by_one = True
         if ti.static(self.branches == 0):
             one_by_one = self.tau[block, 8][lane] > 0
@@ -89,8 +89,8 @@ class Kernels(Touch):
         outside = 1.0 - self.inside(base, window)
         if outside == 0.0:
             w = self.weights(fx)
-            m = self.par[MASS] * self.bulk[p]
-            pull = -dt * self.par[VOL] * self.bulk[p] * 4 * self.par[INV]
+            m = self.par[MASS] * bulk
+            pull = -dt * self.par[VOL] * bulk * 4 * self.par[INV]
             carry = m * self.par[DX] * ti.Vector([1.0, 1.0, 1.0, 0.0])
             ax = pull * ti.Vector([tau[0], tau[5], tau[4], 0.0]) + carry * self.C[p, 0]
             ay = pull * ti.Vector([tau[5], tau[1], tau[3], 0.0]) + carry * self.C[p, 1]
@@ -117,7 +117,6 @@ class Kernels(Touch):
                     rise = wij * az
                     for k in ti.static(range(3)):
                         self.add(thread, base[0] + i, at[j, k], base[2] + k, w[k][2] * (low + k * rise))
-        bulk = self.bulk[p]
         return ti.Vector([bulk * loss[0], bulk * loss[1], bulk * loss[2], loss[3], outside])
 
     @ti.func
@@ -165,7 +164,11 @@ class Kernels(Touch):
         self.C[p, 2] = (4 * self.par[INV]) * (mz - fx[2] * whole)
         at = self.x[p] + dt * u
         if ti.static(not self.nodal):
-            u = self.touch(p, dt, u, at)
+            if self.may_touch(p, at):
+                u = self.touch(p, dt, u, at)
+            else:
+                self.lever[p, 0] = zero
+                self.lever[p, 1] = zero
         self.v[p] = u
         self.x[p] = at
 

@@ -153,7 +153,9 @@ class Simulation:
         k, scene, num, edge = self.k, self.scene, self.scene.numerics, self.scene.edge
         k.user = self
         real = np.float64 if num.precision == "f64" else np.float32
-        k.lay_out(len(self.seeds.x), self.nodes, round(-self.origin[1] / num.dx), len(self.stations), scene.mirrored_between)
+        k.lay_out(
+            len(self.seeds.x), self.nodes, round(-self.origin[1] / num.dx), len(self.stations), scene.mirrored_between
+        )
         k.fill(k.x, self._turn(self.seeds.x).astype(real))
         k.fill(k.foot, self.seeds.foot.astype(real))
         gap, outer = (self.seeds.gap, self.seeds.beside) if scene.cuts else (self.seeds.head, self.seeds.top)

@@ -39,6 +39,16 @@ class Touch(Survey):
     """What a particle of the surface feels of the tools, and they of it."""
 
     @ti.func
+    def may_touch(self, p, at):
+        """Whether a particle is so near to the board or the blade that contact is worth a look."""
+        out = True
+        if ti.static(not self.press):
+            there, near = self.blade_axes(at), 2 * self.par[DX]
+            out = (0 < self.foot[p] and there[2] < near) or ti.abs(there[1]) < 0.5 * self.par[SPINE] + near
+            out = out or self.shell[p][1] > 0 or self.tacky[p] > 0
+        return out
+
+    @ti.func
     def touch(self, p, dt, u, at):
         """Contact of one particle with board and tool; returns its corrected velocity.
 
