@@ -67,7 +67,7 @@ def energy_gain(record: ForceRecord, *, stored: float = 0.0, least: float = 0.0)
     put = stored + record.work_done + record.weighing
     most = float(np.abs(put).max()) + weight * float(np.ptp(record.stroke))
     so_far = np.maximum.accumulate(np.abs(put)) + EARLY * most + least
-    gain = -(record.numerical + stored) / np.maximum(so_far, np.finfo(float).tiny)
+    gain = -(record.unbooked + stored) / np.maximum(so_far, np.finfo(float).tiny)
     rows = min(LASTING, len(gain))
     return float(np.lib.stride_tricks.sliding_window_view(gain, rows).min(axis=1).max())
 

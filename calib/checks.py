@@ -30,10 +30,11 @@ def otherwise(scene: Scene) -> Scene:
     return elsewhere(_slower(scene), 2)
 
 
+FINER_GRID = "cells of two thirds"
 VARIANTS: Mapping[str, Callable[[Scene], Scene]] = {
     "half the simulated speed": _slower,
     "grid and particles elsewhere": lambda scene: elsewhere(scene, 1),
-    "cells of two thirds": _finer,
+    FINER_GRID: _finer,
 }
 """What should not matter, by name. The order of convergence, and an uncertainty, are the business of a convergence study."""
 
@@ -42,13 +43,15 @@ VARIANTS: Mapping[str, Callable[[Scene], Scene]] = {
 class Check:
     """A repeated simulation against the one that is reported.
 
-    Attributes: name; reason why it broke down, or None; changes of peak and work, as fractions, None where it broke down.
+    Attributes: name; reason why it broke down, or None; changes of peak and work, as fractions, and of the part of the work that
+    no law has taken, None where it broke down.
     """
 
     name: str
     reason: str | None
     peak_change: float | None
     work_change: float | None
+    unbooked_change: float | None = None
 
     @property
     def change(self) -> float | None:
@@ -63,14 +66,13 @@ class Check:
 
 
 def check(
-    scene: Scene, peak: float, work: float, pool: Workers, store: EvaluationStore, say: Callable[[str], None]
+    scene: Scene, own: Mapping[str, float], pool: Workers, store: EvaluationStore, say: Callable[[str], None]
 ) -> list[Check]:
     """Simulate the variants of a scene; what the store knows is not simulated again.
 
     Args:
         scene: The scene with its calibrated material.
-        peak: Its peak force [N].
-        work: Its work [J].
+        own: Its ``peak_N``, ``work_J`` and ``unbooked_J``.
         pool: Where they run.
         store: Where they are kept.
         say: Told when they are simulated.
@@ -88,8 +90,10 @@ def check(
     out = []
     for k, name in enumerate(VARIANTS):
         run = found[k]
-        if run.ok and peak > 0 and work > 0:
-            out.append(Check(name, None, run.scalars["peak_N"] / peak - 1, run.scalars["work_J"] / work - 1))
+        if run.ok and own["peak_N"] > 0 and own["work_J"] > 0:
+            peak, work = (run.scalars[q] / own[q] - 1 for q in ("peak_N", "work_J"))
+            unbooked = run.scalars["unbooked_J"] / run.scalars["work_J"] - own["unbooked_J"] / own["work_J"]
+            out.append(Check(name, None, peak, work, unbooked))
         else:
             out.append(Check(name, run.reason or "no force", None, None))
     return out

@@ -125,8 +125,7 @@ def _checks(specimens: Specimens, fitted: Fitted, name: str) -> list[Check]:
     own = fitted.result.best.evaluation.parts[fitted.names.index(name)]
     return check(
         scene.with_material(**values),
-        own.scalars["peak_N"],
-        own.scalars["work_J"],
+        own.scalars,
         specimens.pool,
         specimens.store,
         lambda text: specimens.say(f"{name}: {text}"),

@@ -29,7 +29,7 @@ from calib.search import FitOptions
 from calib.sensitivity import sensitivity
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.summary import add_conditioning, summarise
-from calib.workers import Workers
+from calib.workers import Workers, plain
 from mpm.record import ForceRecord
 
 
@@ -91,7 +91,7 @@ def run(
         record = whole_record(scene, pool, out / "record.h5", say)
         checks: list[Check] = []
         if result.status != "interrupted":
-            checks = check(scene, record.peak, record.work, pool, store, say)
+            checks = check(scene, plain(record)["scalars"], pool, store, say)
     add_conditioning(out / "evaluations.h5", setup.curve)
     return _write(request, setup, result, doubt, record, checks, start, out, time.monotonic() - began)
 

@@ -61,7 +61,6 @@ def summarise(
         {n: m.metrics for n, m in nulls.items()},
         momentum_residual=record.momentum_residual,
         ke_over_ie=record.ke_over_ie,
-        energy=record.budget,
         parameters=parameters,
         checks=checks,
         nuisances=open_ends,
@@ -69,7 +68,13 @@ def summarise(
     trace = setup.curve.trace
     stopped = result.status == "interrupted"
     said = limits(
-        trace.label, setup.curve.stroke_source, setup.curve.baseline_kind, verdicts, parameters, setup.assumed
+        trace.label,
+        setup.curve.stroke_source,
+        setup.curve.baseline_kind,
+        verdicts,
+        parameters,
+        setup.assumed,
+        record.fracture,
     )
     return {
         "food": request.food.name,
@@ -227,6 +232,7 @@ def _numerics(request: Request, setup: Setup, record: ForceRecord) -> dict[str, 
         "ke_over_ie": record.ke_over_ie,
         "ripple_N": record.ripple,
         "energy_J": record.budget,
+        "fracture": record.fracture,
         "counters": dict(record.counters),
         "shape": vars(scene.food.shape),
         "knife": vars(scene.knife),

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from calib.checks import Check
+from calib.checks import FINER, FINER_GRID, Check
 from calib.metrics import Metrics
 from calib.nuisance import OUTSIDE
 
@@ -18,7 +18,7 @@ NRMSE_LIMIT = 0.08
 SHAPE_LIMIT = 0.08
 MOMENTUM_LIMIT = 0.01
 CHANGE_LIMIT = 0.05  # of peak and work by numerical choices: as much as the peak may miss the trace
-LOSS_LIMIT = 0.05  # energy that no law has taken, of all work: the force is too large by about that
+LOSS_LIMIT = 0.05  # energy lost by the discretisation, of all work: the force is too large by about that
 KINETIC_LIMIT = 0.10  # explicit quasi-static practice: kinetic energy below 5 to 10 % of internal energy
 # Ends of what is physically possible: a fit that ends there found a one-sided answer (the cut shows no friction, say),
 # whereas one that ends on a bound of ours asks for a value that it was not allowed.
@@ -47,8 +47,8 @@ def _below(name: str, value: float, limit: float, unit: str = "fraction", note: 
 
 
 def changes(checks: Sequence[Check]) -> list[Verdict]:
-    """Lines of what numerical choices change."""
-    return [_change(c) for c in checks]
+    """Lines of what numerical choices change, and of what the finer grid says of the energy that is lost."""
+    return [*(_change(c) for c in checks), *(_loss(c) for c in checks if c.name == FINER_GRID)]
 
 
 def _change(check: Check) -> Verdict:
@@ -80,6 +80,7 @@ SPENT = {
     "kinetic": "kinetic",
 }
 """Where the work of a cut goes, in words."""
+WORTH_SAYING = 0.1  # energy released ahead of the edge, over that spent at it
 LEAST = 0.005  # part of the work that is named
 
 
@@ -91,17 +92,19 @@ def spent(energy: Mapping[str, float]) -> str:
     return ", ".join(f"{words} {part:.0%}" for part, words in reversed(large))
 
 
-def lost(energy: Mapping[str, float]) -> float | None:
+def unbooked(energy: Mapping[str, float]) -> float | None:
     """Part of the work of a cut that no law has taken [-]; None where no work was done."""
     total = sum(energy.values())
-    return energy["numerical"] / total if total > 0 else None
+    return energy["unbooked"] / total if total > 0 and "unbooked" in energy else None
 
 
-def _loss(energy: Mapping[str, float]) -> Verdict:
-    name, part = "energy lost by the discretisation", lost(energy)
-    if part is None:
-        return Verdict(name, None, LOSS_LIMIT, "fraction", False, "the knife did no work")
-    return _below(name, part, LOSS_LIMIT, note="of the work; " + spent(energy))
+def _loss(finer: Check) -> Verdict:
+    """What of the energy that no law has taken follows the grid, as a first-order error; the rest is released by the crack."""
+    name, change = "energy lost by the discretisation", finer.unbooked_change
+    if change is None:
+        return Verdict(name, None, LOSS_LIMIT, "fraction", False, f"{finer.name} broke down")
+    note = f"of the work; what no law took changes by {change:+.1%} on {finer.name}"
+    return _below(name, abs(change) / (1 - FINER), LOSS_LIMIT, note=note)
 
 
 def balances(momentum_residual: float, ke_over_ie: float) -> list[Verdict]:
@@ -132,7 +135,6 @@ def judge(
     *,
     momentum_residual: float,
     ke_over_ie: float,
-    energy: Mapping[str, float],
     parameters: Mapping[str, Mapping[str, Any]],
     checks: Sequence[Check] = (),
     nuisances: Mapping[str, Mapping[str, Any]] | None = None,
@@ -144,7 +146,6 @@ def judge(
         nulls: Null models against trace.
         momentum_residual: Momentum balance that does not close, part of the peak [-].
         ke_over_ie: Kinetic over internal energy [-].
-        energy: Where the work of the cut has gone [J], by the names of :data:`mpm.record.ENERGIES`.
         parameters: Fitted parameters with their verdicts.
         checks: What numerical choices change; none were made where the fit was interrupted.
         nuisances: What the fit says of the measurement: value, sd, prior_sd, unit and outside, by name.
@@ -165,8 +166,7 @@ def judge(
             f"best null model: {best.replace('_', ' ')}",
         )
     )
-    lines += [*balances(momentum_residual, ke_over_ie), _loss(energy)]
-    lines += changes(checks)
+    lines += [*balances(momentum_residual, ke_over_ie), *changes(checks)]
     lines += [_nuisance(name, n) for name, n in (nuisances or {}).items() if name in JUDGED]
     on = [n for n, p in parameters.items() if p["verdict"] == "at_bound"]
     stuck = [n for n in on if n != SIZE and parameters[n]["value"] != NATURAL_LIMITS.get(n)]
@@ -184,6 +184,7 @@ def limits(
     verdicts: list[Verdict],
     parameters: Mapping[str, Mapping[str, Any]],
     assumptions: list[str],
+    fracture: Mapping[str, float] | None = None,
 ) -> list[str]:
     """What the calibration does not show, one sentence each."""
     said = []
@@ -204,6 +205,12 @@ def limits(
     if baseline_kind == "constant":
         said.append("A constant baseline was subtracted: drift of the sensor along the stroke is in the force.")
     said += [a[0].upper() + a[1:] + "." for a in assumptions]
+    if fracture is not None and fracture["released_J_m2"] > WORTH_SAYING * fracture["edge_J_m2"]:
+        edge, released = fracture["edge_J_m2"], fracture["released_J_m2"]
+        said.append(
+            f"R is the resistance at the edge, not all that new surface costs: {edge:.3g} J/m² went there and {released:.3g} J/m² were "
+            "released where the blade bends the halves apart ahead of it. Compare their sum with published works of fracture."
+        )
     said.append("One cut of one specimen says nothing about the scatter between specimens.")
     said.append(
         "The laws are independent of rate; relaxation, adhesion and moisture were not simulated, and the lower skin of a "

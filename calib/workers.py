@@ -37,6 +37,7 @@ def plain(record: ForceRecord) -> dict[str, Any]:
     scalars = {
         "peak_N": record.peak,
         "work_J": record.work,
+        "unbooked_J": record.budget["unbooked"],
         "momentum_residual": record.momentum_residual,
         "ke_over_ie": record.ke_over_ie,
         "ripple_N": record.ripple,

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem_reference.contact import Contact, Plane, Wedge
+from fem_reference.laws import Corotated
 from fem_reference.meshes import box, surface
-from fem_reference.press import SHARP, STIFF, law_of
+from fem_reference.press import SHARP, STIFF
 from fem_reference.solid import EquilibriumError, Solid
 from mpm.material import Material
 from mpm.scene import Knife
@@ -24,19 +25,27 @@ SETTLED = 1e-2  # change of that rise that is small enough, over the height of a
 
 @dataclass(frozen=True, eq=False)
 class Opening:
-    """Force over stroke.
+    """Force and energy over stroke.
 
     Attributes:
         stroke: Way of the edge below the top [m], shape (n,).
         force: Force upwards on both faces of the blade [N], shape (n,).
         rise: How far the end of the slit has risen [m], shape (n,).
+        stored: Elastic energy of the block [J], shape (n,).
         unknowns: Number of unknown displacements.
     """
 
     stroke: np.ndarray
     force: np.ndarray
     rise: np.ndarray
+    stored: np.ndarray
     unknowns: int
+
+    @property
+    def released(self) -> np.ndarray:
+        """Energy that the parting of the halves at the end of the slit has released so far [J], shape (n,): work less what is stored."""
+        steps = np.diff(self.stroke, prepend=0.0)
+        return np.cumsum(steps * (self.force + np.append(0.0, self.force[:-1])) / 2) - self.stored
 
 
 def cleave(block: Shape, material: Material, knife: Knife, lead: float, stroke: float, *, cells: int = 2) -> Opening:
@@ -48,7 +57,7 @@ def cleave(block: Shape, material: Material, knife: Knife, lead: float, stroke: 
 
     Args:
         block: Outline, a block.
-        material: Its constants.
+        material: Its elastic constants.
         knife: A sharp blade.
         lead: Way of the slit's end ahead of the edge [m].
         stroke: Way of the edge into the block [m]; the last that ends the slit at a node is less.
@@ -61,7 +70,8 @@ def cleave(block: Shape, material: Material, knife: Knife, lead: float, stroke: 
     rows = round(h / size)
     across = block.length / 2 * np.linspace(0, 1, ACROSS + 1) ** GRADE
     mesh = box(np.linspace(0, block.width / 2, LAYERS + 1), across, np.linspace(0, h, rows + 1))
-    solid = Solid(mesh, law_of(material))
+    law = Corotated(material.shear, material.lame)
+    solid = Solid(mesh, law)
     x, y, z = solid.nodes.T
     near = 1e-6 * h
     solid.hold(np.flatnonzero(x < near), [0])
@@ -74,7 +84,7 @@ def cleave(block: Shape, material: Material, knife: Knife, lead: float, stroke: 
     solid.contacts += [blade, Contact(Plane((0, 0, 0), (0, 0, 1)), floor, under, penalty, tolerance)]
     middle = np.flatnonzero(y < near)
     whole = {3 * int(k) + 1: z[k] for k in middle}
-    strokes, forces, rises = [], [], []
+    strokes, forces, rises, stored = [], [], [], []
     for end in h - lead - size * np.arange(1, math.floor(stroke / size + 1e-9) + 1):
         for unknown, height in whole.items():
             if height <= end + near:
@@ -93,4 +103,5 @@ def cleave(block: Shape, material: Material, knife: Knife, lead: float, stroke: 
         strokes.append(h - wedge.height)
         rises.append(risen)
         forces.append(-4 * float(blade.force(solid.nodes + solid.u)[:, 2].sum()))
-    return Opening(np.array(strokes), np.array(forces), np.array(rises), solid.u.size)
+        stored.append(4 * float((law.energy(solid.deformation(solid.u)) * solid.weights).sum()))
+    return Opening(np.array(strokes), np.array(forces), np.array(rises), np.array(stored), solid.u.size)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 
 from calib.properties import PROPERTIES
-from calib.verdicts import lost, spent
+from calib.verdicts import spent, unbooked
 from reports.document import breakable, count, duration, interval, plain, quantity
 from reports.finished import Data
 from reports.words import shown, words
@@ -23,7 +23,7 @@ def numerics(s: Data) -> Data:
         "mach": quantity(s["mach"], "-"), "momentum": quantity(s["momentum_residual"], "fraction"),
         "kinetic": quantity(s["ke_over_ie"], "fraction"), "ripple": quantity(ripple, "N"),
         "ripple_part": quantity(part, "fraction", digits=2), "wall": duration(s["wall_s"]),
-        **_energy(s.get("energy_J") or {}),
+        **_energy(s.get("energy_J") or {}, s.get("fracture")),
         "simulations": count(s["simulations"]), "failed": count(s["failed_simulations"]),
         "coarse": count(s["coarse_simulations"]) if s.get("coarse_simulations") else None,
         "counters": s.get("counters"),
@@ -36,10 +36,17 @@ def _far(s: Data) -> str | None:
     return None if far is None else quantity(far, "m", digits=2)
 
 
-def _energy(energy: Data) -> Data:
-    """Part of the work that no law has taken, and where the rest has gone; None where it was not recorded."""
-    part = lost(energy)
-    return {"loss": None if part is None else quantity(part, "fraction", digits=2), "spent": spent(energy)}
+def _energy(energy: Data, fracture: Data | None) -> Data:
+    """Part of the work that no law has taken, where the rest has gone, and both parts of the work of fracture; None where it
+    was not recorded."""
+    part = unbooked(energy)
+    per_area = fracture or {"edge_J_m2": None, "released_J_m2": None}
+    return {
+        "unbooked": None if part is None else quantity(part, "fraction", digits=2),
+        "spent": spent(energy),
+        "released": None if fracture is None else quantity(per_area["released_J_m2"], "J/m^2", digits=3),
+        "parted": None if fracture is None else quantity(per_area["edge_J_m2"], "J/m^2", digits=3),
+    }
 
 
 def failures(failures: list[Data]) -> list[list[str]]:

@@ -14,7 +14,7 @@ from calib.outputs import prepare, write_csv, write_json
 from calib.progress import clock
 from calib.provenance import git_commit, versions
 from calib.scenes import cut_scene, specimen
-from calib.verdicts import lost, spent
+from calib.verdicts import spent, unbooked
 from mpm.scene import CONTACTS, Arm
 
 HELP = "simulate one cut"
@@ -116,9 +116,13 @@ def run(args: argparse.Namespace) -> int:
             f"{food.name}: peak {record.peak:.2f} N, work {record.work:.3f} J, {record.status}; "
             f"momentum balance closes to {record.momentum_residual:.1e} of the peak; wrote {out}"
         )
-        part = lost(record.budget)
+        part, fracture = unbooked(record.budget), record.fracture
         if part is not None:
-            print(f"where the work went: {spent(record.budget)}; lost by the discretisation {part:.1%}")
+            rate = "" if fracture is None else f" ({fracture['released_J_m2']:.3g} J/m^2)"
+            print(
+                f"where the work went: {spent(record.budget)}; released at the front of the crack or lost by the discretisation "
+                f"{part:.1%}{rate}"
+            )
         if record.pieces is not None:
             print(record.pieces.words())
     return 0 if record.status == "done" else 1

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from calib.verdicts import lost
+from calib.verdicts import unbooked
 from calib.verification.rows import Case, How, Row
 from fem_reference.slit import cleave
 from mpm.material import Material
@@ -46,8 +46,8 @@ def _plateau(record: ForceRecord, low: float = 8e-3, high: float = 16e-3) -> flo
     return float(record.resolved[on].mean())
 
 
-def _loss(record: ForceRecord) -> float:
-    part = lost(record.budget)
+def _unbooked(record: ForceRecord) -> float:
+    part = unbooked(record.budget)
     return math.nan if part is None else part
 
 
@@ -79,11 +79,11 @@ def resistance(how: How) -> Iterator[Row]:
     yield Row("thin blade", "energy of parting over the new area [J/m^2]", FLESH.R, parted / area, 0.01, "R")
     yield Row(
         "thin blade",
-        "energy lost by the discretisation, of the work [-]",
+        "energy that no law took, of the work [-]",
         0.0,
-        _loss(base),
+        _unbooked(base),
         0.02,
-        "conservation of energy",
+        "conservation of energy: a blade this thin opens nothing ahead of its edge",
     )
     balance = float(np.abs(base.residual).max() / base.peak)
     yield Row(
@@ -117,13 +117,14 @@ def invariance(how: How) -> Iterator[Row]:
         ("other particles", replace(how, seed=how.seed + 1), {}),
     )
     base = cut(how, knife=WEDGE, material=food)
+    finer = cut(how, knife=WEDGE, material=food, dx=2e-3)
     yield Row(
         "wedge with friction",
         "energy lost by the discretisation, of the work [-]",
         0.0,
-        _loss(base),
-        0.04,
-        "conservation of energy",
+        3 * abs(_unbooked(finer) - _unbooked(base)),
+        0.02,
+        "first-order error of what no law took, from cells of 3 and 2 mm",
     )
     for name, so, change in changes[:1] if how.quick else changes:
         other = cut(so, knife=WEDGE, material=food, **change)
@@ -134,11 +135,15 @@ def invariance(how: How) -> Iterator[Row]:
 
 
 def slit(how: How) -> Iterator[Row]:
-    """A wedge without friction in a slit that leads its edge: the force on the faces against finite elements.
+    """A wedge without friction in a slit that leads its edge: the force on the faces, and the energy that the halves release
+    where they part, against finite elements.
 
     A block of three heights, with few particles far from the blade as in a food, needs 1.4 times the force of one: its
     halves bend less. The blade lies on a plane of nodes, as in every scene whose grid is not turned; half-way between two planes the
     particles need 9, 6, 3 and 1 % more than finite elements on cells of 3, 2, 1.5 and 1 mm.
+
+    No law of the solver knows the energy that is released: it is what its books leave open, with what viscosity takes of the waves.
+    On cells as wide as the process zone it is 15 and 34 % too small (24 and 72 mm long).
     """
     lead, stroke = 1.5e-3, 9e-3
     food = Material(E=1e6, nu=0.35, rho=1000, loss_factor=0.05, R=1.0, R_initiation=1.0)
@@ -149,11 +154,16 @@ def slit(how: How) -> Iterator[Row]:
         at = np.linspace(5e-3, 8.5e-3, 50)
         return float(np.interp(at, stroke, force).mean())
 
+    def rate(stroke: np.ndarray, energy: np.ndarray) -> float:
+        low, high = np.interp([4e-3, 8.5e-3], stroke, energy)
+        return float(high - low) / (0.016 * 4.5e-3)
+
     shapes = (
         (0.024, 3e-3, 0.0, None),
         (0.024, 1.5e-3, 0.0, None),
         (0.024, 1.5e-3, 0.5, None),
         (0.072, 3e-3, 0.0, 6e-3),
+        (0.072, 1.5e-3, 0.0, 6e-3),
     )
     for length, dx, shift, far in shapes:
         scene = Scene(
@@ -174,11 +184,20 @@ def slit(how: How) -> Iterator[Row]:
             0.05,
             f"finite elements of the same law, {want.unknowns} unknowns",
         )
+        if dx < 2 * lead and not shift:
+            yield Row(
+                f"wedge in a slit, {1e3 * length:g} mm long, dx {1e3 * dx:g} mm",
+                "energy released where the halves part, over the area, 4 to 8.5 mm deep [J/m^2]",
+                rate(want.stroke, want.released),
+                rate(record.stroke, record.unbooked + record.viscous),
+                0.10,
+                "finite elements: work less stored energy",
+            )
 
 
 CASES = [
     Case("cutting resistance", resistance, cost=50),
     Case("slicing", slicing, fast=False, cost=22),
-    Case("wedge in a slit", slit, fast=False, cost=120),
+    Case("wedge in a slit", slit, fast=False, cost=140),
     Case("invariance of the cut", invariance, fast=False, cost=25),
 ]

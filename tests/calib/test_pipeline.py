@@ -29,7 +29,7 @@ from calib.preparation import fit_parameters
 from calib.provenance import code_key, key_of, versions
 from calib.scenes import Sizing, cut_scene, elsewhere, height_range, place, specimen
 from calib.trace import Trace
-from calib.verdicts import judge, limits
+from calib.verdicts import judge, limits, spent, unbooked
 from calib.workers import DIED, SceneEvaluator
 from mpm.errors import SimulationError
 from mpm.record import ENERGIES
@@ -168,13 +168,13 @@ def test_verdicts_fail_what_fails():
         Check("slower", None, 0.01, -0.06),
         Check("aside", None, 0.02, -0.02),
         Check("broken", "inverted", None, None),
+        Check("cells of two thirds", None, 0.01, 0.01, -0.03),
     ]
     lines = judge(
         compare(s, real, 1.2 * real),
         nulls,
         momentum_residual=0.02,
         ke_over_ie=0.2,
-        energy={**dict.fromkeys(ENERGIES, 0.0), "parting": 0.7, "friction": 0.2, "damage": 0.004, "numerical": 0.096},
         parameters=parameters,
         checks=checks,
     )
@@ -192,14 +192,35 @@ def test_verdicts_fail_what_fails():
     notes = {v.name: (v.value, v.note) for v in lines}
     assert notes["slower"] == (0.06, "peak +1.0%, work -6.0%")
     value, words = notes["energy lost by the discretisation"]
-    assert value == pytest.approx(0.096) and words == "of the work; parting the food 70%, friction 20%"
+    assert (
+        value == pytest.approx(0.09)
+        and words == "of the work; what no law took changes by -3.0% on cells of two thirds"
+    )
     assert notes["broken"] == (None, "broke down: inverted")
     assert sum(v.passed is None for v in lines) == 3
     bounds = next(v for v in lines if v.name == "parameters at a bound")
     assert bounds.value == 1 and "mu at its natural limit" in bounds.note
-    said = limits("measured", "speed", "constant", lines, parameters, ["the width is assumed"])
-    for word in ("peak force error", "no position", "constant baseline", "The width is assumed.", "in-sample"):
+    fracture = {"edge_J_m2": 97.0, "released_J_m2": 52.0}
+    said = limits("measured", "speed", "constant", lines, parameters, ["the width is assumed"], fracture)
+    for word in (
+        "peak force error",
+        "no position",
+        "constant baseline",
+        "The width is assumed.",
+        "in-sample",
+        "52 J/m²",
+    ):
         assert any(word in text for text in said)
+    small = limits("measured", "speed", "constant", lines, parameters, [], {"edge_J_m2": 97.0, "released_J_m2": 9.0})
+    assert not any("J/m²" in text for text in small)
+
+
+def test_where_the_work_went_is_said_largest_first():
+    """Parts above half a per cent by name; the part that no law took apart, and none where older results lack it."""
+    energy = {**dict.fromkeys(ENERGIES, 0.0), "parting": 0.7, "friction": 0.2, "damage": 0.004, "unbooked": 0.096}
+    assert spent(energy) == "parting the food 70%, friction 20%"
+    assert unbooked(energy) == pytest.approx(0.096)
+    assert unbooked({"parting": 1.0}) is None and unbooked({}) is None
 
 
 def test_keys_follow_the_content():

@@ -127,7 +127,10 @@ def test_the_work_is_accounted_for(whole, quarter):
     for record in (whole, quarter):
         total = record.work_done[-1] + record.weighing[-1]
         assert sum(record.budget.values()) == pytest.approx(total, rel=1e-12)
-        assert -0.005 < record.budget["numerical"] / total < 0.04
+        assert -0.005 < record.budget["unbooked"] / total < 0.04
+        assert record.fracture is not None
+        assert record.fracture["edge_J_m2"] == pytest.approx(FLESH.R, rel=0.1)  # the first millimetres need a start
+        assert 0 < record.fracture["released_J_m2"] < 0.1 * FLESH.R
         inside = [int(np.searchsorted(record.stroke, at)) for at in (8e-3, 15e-3)]
         parted, way = np.diff(record.parting[inside])[0], np.diff(record.stroke[inside])[0]
         assert parted == pytest.approx(FLESH.R * 0.024 * way, rel=0.03)  # the food rises towards the wedge

@@ -174,7 +174,7 @@ def _base(kind: str) -> dict[str, Any]:
         "misfit_history": [[1, 412.0], [3, 160.0], [9, 71.0], [14, 30.2], [22, 21.0], [31, 18.7], [58, 18.5]],
         "wall_s": 2531.0, "dx_m": 1.5e-3, "particles": 118344, "mirror_images": 2, "mach": 0.0086,
         "energy_J": {"kinetic": 0.001, "elastic": 0.002, "plastic": 0.02, "damage": 0.0, "viscous": 0.001,
-                     "friction": 0.03, "parting": 0.24, "numerical": 0.006},
+                     "friction": 0.03, "parting": 0.24, "unbooked": 0.006},
         "counters": {"inverted": 0, "left_grid": 0}, "coarse_simulations": 9,
         "momentum_residual": 0.0021, "ke_over_ie": 0.013, "ripple_N": 0.11,
         "shape": {"kind": "cylinder", "length": 0.1, "width": 0.033, "height": 0.033},
