@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +39,37 @@ _SYNONYMS = {
     "thickness": "spine", "width": "spine", "bevel": "angle", "included_angle": "angle", "wedge": "angle",
     "blade_height": "height", "blade_length": "length",
 }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Field:
+    """One number of a knife as its file has it. Attributes: value; unit; status; source."""
+
+    value: float
+    unit: str
+    status: str
+    source: str
+
+
+def knife_fields(path: Path | str | None = None) -> dict[str, dict[str, Field]]:
+    """Every number of all knives of a file with its source, by knife and field.
+
+    Args:
+        path: As :func:`load_knives`.
+
+    Raises:
+        SceneError: As :func:`load_knives`.
+    """
+    top, content = read_yaml(data_path("knives.yaml") if path is None else path, kind=SceneError)
+    out = {}
+    for name, raw in content.items():
+        _read_knife(top.at(name), raw)
+        out[name] = {n: _field(float(raw[n]["value"]), n, raw[n]) for n in UNITS}
+    return out
+
+
+def _field(value: float, name: str, raw: dict[str, Any]) -> Field:
+    return Field(value, UNITS[name], raw.get("status", "given"), raw.get("source", "no source"))
 
 
 def load_knives(path: Path | str | None = None) -> dict[str, Knife]:

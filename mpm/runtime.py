@@ -77,20 +77,30 @@ def start(runtime: Runtime, precision: str) -> int:
         return _state["serial"]
     arch = getattr(ti, runtime.arch)
     real = ti.f64 if precision == "f64" else ti.f32
-    with contextlib.redirect_stdout(io.StringIO()):
-        ti.init(
-            arch=arch,
-            default_fp=real,
-            cpu_max_num_threads=runtime.cpu_threads,
-            offline_cache=True,
-            # LLVM does the same work again: a cut's kernel compiles in 5 instead of 38 s and runs as fast
-            advanced_optimization=runtime.arch != "cpu",
-            log_level=ti.ERROR,
-            random_seed=0,
-            enable_fallback=False,
-        )
+    _state["key"] = None
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):
+            ti.init(
+                arch=arch,
+                default_fp=real,
+                cpu_max_num_threads=runtime.cpu_threads,
+                offline_cache=True,
+                # LLVM does the same work again: a cut's kernel compiles in 5 instead of 38 s and runs as fast
+                advanced_optimization=runtime.arch != "cpu",
+                log_level=ti.ERROR,
+                random_seed=0,
+                enable_fallback=False,
+            )
+    except RuntimeError:  # Taichi: "Arch=... is not supported"
+        if runtime.arch == "cpu":
+            raise
+        raise _missing(runtime.arch) from None
     if runtime.arch != "cpu" and ti.lang.impl.current_cfg().arch == ti.cpu:
-        raise SceneError(f"arch: {runtime.arch} is not available on this machine; use --arch cpu")
+        raise _missing(runtime.arch)
     _state["key"] = key
     _state["serial"] += 1
     return _state["serial"]
+
+
+def _missing(arch: str) -> SceneError:
+    return SceneError(f"arch: {arch} is not available on this machine; use --arch cpu")

@@ -13,7 +13,9 @@ from calib.cli import (
     compress,
     converge,
     coverage,
+    doctor,
     foods,
+    knives,
     predict,
     prior,
     report,
@@ -36,6 +38,8 @@ COMMANDS = {
     "verify": verify,
     "report": report,
     "foods": foods,
+    "knives": knives,
+    "doctor": doctor,
     "prior": prior,
     "scalars": scalars,
 }

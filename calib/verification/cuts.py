@@ -148,7 +148,9 @@ def slit(how: How) -> Iterator[Row]:
     lead, stroke = 1.5e-3, 9e-3
     food = Material(E=1e6, nu=0.35, rho=1000, loss_factor=0.05, R=1.0, R_initiation=1.0)
     blocks = {length: Shape("block", length, 0.016, 0.024) for length in (0.024, 0.072)}
-    wanted = {length: cleave(block, food, WEDGE, lead, stroke + lead) for length, block in blocks.items()}  # their middle rises
+    wanted = {
+        length: cleave(block, food, WEDGE, lead, stroke + lead) for length, block in blocks.items()
+    }  # their middle rises
 
     def mean(stroke: np.ndarray, force: np.ndarray) -> float:
         at = np.linspace(5e-3, 8.5e-3, 50)

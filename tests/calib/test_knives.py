@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 
 import pytest
 import yaml
 
+from calib.cli.main import main
 from calib.knives import TOLERANCE, load_knife, load_knives, wedge_height
 from calib.validation import data_path
 from mpm.errors import SceneError
@@ -135,3 +137,25 @@ def test_no_such_file(tmp_path: Path) -> None:
     """A path that does not exist is an error of the path, not an unknown name."""
     with pytest.raises(SceneError, match=r"none\.yaml: no such file"):
         load_knife(str(tmp_path / "none.yaml"))
+
+
+def test_knives_are_listed_with_their_sources(capsys, tmp_path):
+    """The list has every knife; one knife has source and status of every size, as a table and as JSON; a file too."""
+    assert main(["knives"]) == 0
+    listed = capsys.readouterr().out
+    assert all(name in listed for name in load_knives())
+    assert main(["knives", "edc"]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("edc: a wedge of 11°") and out.count("DiSECt") == 3
+    assert main(["knives", "edc", "--json"]) == 0
+    spine = json.loads(capsys.readouterr().out)["edc"]["spine"]
+    assert spine["value"] == load_knife("edc").spine and spine["unit"] == "m" and spine["status"] == "proxy"
+    mine = tmp_path / "mine.yaml"
+    mine.write_text(
+        "thin: {spine: {value: 1e-3, unit: m}, angle: {value: 2, unit: deg}, height: {value: 0.03, unit: m}, "
+        "length: {value: 0.1, unit: m}}"
+    )
+    assert main(["knives", str(mine)]) == 0
+    assert "no source" in capsys.readouterr().out
+    assert main(["knives", "ecd"]) == 1
+    assert "edc" in capsys.readouterr().err
