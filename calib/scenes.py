@@ -175,7 +175,8 @@ def cut_scene(
         shape: Specimen.
         knife: Blade.
         stroke: Way of the edge [m]; the whole height by default.
-        dx: Cell [m]; by default three quarters of the process zone.
+        dx: Cell [m]; by default three quarters of the process zone, which grows with larger ones: a screening version has the
+            same edge.
         mach: Blade speed over the P-wave speed.
         coarse: Screening version of the scene: one cell to the process zone, twice the speed.
         contact: ``cohesive`` or ``nodal``.
@@ -187,10 +188,9 @@ def cut_scene(
     """
     zone = min(ZONE_M, min(shape.height, shape.width) / ZONE_PARTS)
     cell = dx if dx is not None else CELL_PER_ZONE * zone
-    zone = max(zone, cell)
+    zone = max(zone, cell / CELL_PER_ZONE)
     if coarse:
         cell, mach = cell / CELL_PER_ZONE, 2 * mach
-        zone = max(zone, cell)
     filled = food.to_scene_food()
     return Scene(
         food=type(filled)(shape, filled.material),

@@ -73,11 +73,12 @@ def run(args: argparse.Namespace) -> int:
     food, knife = food_of(args), load_knife(args.knife)
     shape, assumed = specimen(food, None, sizing_of(args))
     scene = cut_scene(food, shape, knife, stroke=args.stroke, dx=max(args.dx) if args.dx else None, seed=args.seed)
-    zone = cut_scene(food, shape, knife).edge.zone
+    default = cut_scene(food, shape, knife)
+    zone, cell = default.edge.zone, default.numerics.dx
     if scene.edge.zone > zone:
         assumed.append(
-            f"the coarsest cell is larger than the process zone of {zone * 1e3:g} mm, so all grids have one of "
-            f"{scene.edge.zone * 1e3:g} mm: this is not the cut of the other commands; start from {zone * 1e3:g} mm or less"
+            f"the coarsest cell is larger than three quarters of the process zone of {zone * 1e3:g} mm, so all grids have one of "
+            f"{scene.edge.zone * 1e3:.3g} mm: this is not the cut of the other commands; start from {cell * 1e3:g} mm or less"
         )
     axes = {"dx": args.dx or tuple(math.floor(scene.numerics.dx * part * 1e7 + 1e-3) / 1e7 for part in REFINED)}
     axes |= {name: getattr(args, name) for name in ("safety", "mach", "ppc", "offset") if getattr(args, name)}

@@ -121,7 +121,11 @@ def test_every_food_makes_a_scene_that_can_run(name):
     fine = cut_scene(food, shape, load_knife("kitchen"))
     coarse = cut_scene(food, shape, load_knife("kitchen"), coarse=True)
     assert coarse.numerics.dx > fine.numerics.dx
-    assert fine.edge.zone >= fine.numerics.dx
+    assert fine.edge == coarse.edge and fine.edge.zone >= coarse.numerics.dx
+    for part in (2 / 3, 4 / 3):  # and so it is on any other cell
+        dx = part * cut_scene(food, shape, load_knife("kitchen")).numerics.dx
+        fine, coarse = (cut_scene(food, shape, load_knife("kitchen"), dx=dx, coarse=one) for one in (False, True))
+        assert fine.edge == coarse.edge and fine.edge.zone >= coarse.numerics.dx > fine.numerics.dx
     assert fit_parameters(food, food.default_fit).names == food.default_fit
 
 
