@@ -22,8 +22,10 @@ from calib.store import content_key
 from calib.workers import Workers
 from mpm.record import ForceRecord
 from mpm.scene import Scene
+from mpm.section import Section
 from mpm.topology import Topology
 
+SECTION = "section"
 JSON = ("counters", "pieces")  # parts of a record that are neither arrays nor numbers
 
 
@@ -58,6 +60,9 @@ def _write(path: Path, key: str, record: ForceRecord) -> None:
             for name, value in asdict(record).items():
                 if isinstance(value, np.ndarray):
                     file[name] = value
+                elif name == SECTION:
+                    for part, content in (value or {}).items():
+                        file[f"{SECTION}/{part}"] = content
                 else:
                     file.attrs[name] = json.dumps(value) if name in JSON else value
         os.replace(draft, path)
@@ -71,8 +76,10 @@ def _read(path: Path, key: str) -> ForceRecord | None:
         with h5py.File(path) as file:
             if file.attrs["key"] != key:
                 return None
-            found = {name: values[()] for name, values in file.items()}
+            section = {name: part[()] for name, part in file.get(SECTION, {}).items()}
+            found = {name: values[()] for name, values in file.items() if name != SECTION}
             found |= {name: v.item() if isinstance(v, np.generic) else v for name, v in file.attrs.items()}
+            found[SECTION] = Section(**section) if section else None
             values = {f.name: found[f.name] for f in fields(ForceRecord)}
             values |= {name: json.loads(values[name]) for name in JSON}
     except (OSError, KeyError, ValueError):

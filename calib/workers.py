@@ -19,6 +19,7 @@ from mpm.scene import Scene
 Result = TypeVar("Result")
 Kind = TypeVar("Kind", bound="Workers")
 
+SECTIONS = 24  # looks at the food in a whole record, of which a report shows three
 DIED = "worker_died"  # reason of a run whose process was killed, for instance for lack of memory
 
 
@@ -60,7 +61,7 @@ def _whole(scene: Scene, arch: str, threads: int) -> ForceRecord:
     from mpm.runtime import Runtime
     from mpm.solver import Simulation
 
-    return Simulation(scene, Runtime(arch, threads)).run()
+    return Simulation(scene, Runtime(arch, threads)).run(sections=SECTIONS)
 
 
 class Workers(ABC):

@@ -203,6 +203,10 @@ class Fields:
         """Deformation gradients (n, 3, 3) as NumPy."""
         return self.F.to_numpy().transpose(0, 2, 1).reshape(-1, 3, 3)[: self.n]
 
+    def stresses(self):
+        """Kirchhoff stresses (n, 6) [Pa] of the last step as NumPy: xx, yy, zz, yz, xz, xy."""
+        return self.tau.to_numpy()[:, :6].transpose(0, 2, 1).reshape(-1, 6)[: self.n]
+
     def gradient(self):
         """Velocity gradients (n, 3, 3) [1/s] as NumPy."""
         return self.C.to_numpy()[: self.n, :, :3].transpose(0, 2, 1)

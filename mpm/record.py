@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mpm.section import Section
 from mpm.topology import Topology
 
 ENERGIES = ("kinetic", "elastic", "plastic", "damage", "viscous", "friction", "parting", "unbooked")
@@ -53,6 +54,7 @@ class ForceRecord:
         wall: Run time of the time loop [s].
         status: ``done``, or the reason why the run stopped early.
         fraction: Part of the stroke completed [-].
+        section: The food across the blade's middle, where it was asked for.
     """
 
     stroke: np.ndarray
@@ -87,6 +89,7 @@ class ForceRecord:
     wall: float
     status: str = "done"
     fraction: float = 1.0
+    section: Section | None = None
 
     @property
     def knife(self) -> np.ndarray:

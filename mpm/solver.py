@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time as clock
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from mpm.material import Material
 from mpm.record import ForceRecord
 from mpm.runtime import Runtime, start
 from mpm.scene import BAND_CELLS, Press, Scene
+from mpm.section import Looks
 from mpm.seeding import seed
 from mpm.shapes import section_area, skin_path, slices
 from mpm.topology import topology
@@ -232,12 +234,15 @@ class Simulation:
         layer = material.rho * 2 * self.scene.numerics.dx * section_area(shape)
         return max(stiffness * (period / (2 * math.pi)) ** 2, layer)
 
-    def run(self, material: Material | None = None, progress: Progress | None = None) -> ForceRecord:
+    def run(
+        self, material: Material | None = None, progress: Progress | None = None, *, sections: int = 0
+    ) -> ForceRecord:
         """Simulate the cut.
 
         Args:
             material: Other constants than the scene's; the kernels are not recompiled.
             progress: Called after each output interval with (part of the stroke done, knife force [N]).
+            sections: How often to keep the food across the blade's middle, at even parts of the run and at its end.
 
         Returns:
             The record. A run that breaks down returns what it had, with its reason in ``status``.
@@ -249,7 +254,7 @@ class Simulation:
         scene = self.scene.with_material(**vars(material)) if material is not None else self.scene
         material = scene.food.material
         self._load(material)
-        num, motion = scene.numerics, scene.motion
+        k, num, motion = self.k, scene.numerics, scene.motion
         dt = self._time_step(material)
         speed = motion.mach * material.p_wave
         every = max(1, round(num.output / (speed * dt)))
@@ -264,11 +269,15 @@ class Simulation:
         rows: list[list[float]] = []
         began = clock.perf_counter()
         status, done, last, batch = "done", 0, np.zeros(3), 1
+        looks = Looks(self.seeds, scene.mirrors)
         self.counters = {"inverted": 0, "outside": 0}
         for steps, down, along in phases:
             left = steps
             while left > 0 and status == "done":
                 count = min(every * batch, left)
+                if sections:
+                    next_look = math.ceil((len(looks) + 1) * total / sections) - done
+                    count = min(count, every * math.ceil(max(next_look, 1) / every))
                 asked = clock.perf_counter()
                 for row in self._advance(count, every, dt, down, along):
                     sums, state, pose = np.split(row, (kn.N_SUMS, kn.N_SUMS + kn.N_STATE))
@@ -286,7 +295,11 @@ class Simulation:
                     batch *= 2
                 if progress is not None and status == "done":
                     progress(done / total, parts[1][2] + parts[2][2])
-        return self._record(rows, material, status, done / total, dt, done, speed, clock.perf_counter() - began)
+                if status == "done" and done * sections >= (len(looks) + 1) * total:
+                    looks.take(rows[-1][0], k, self._turn(k.of_particles(k.x), -1.0))
+        wall = clock.perf_counter() - began
+        record = self._record(rows, material, status, done / total, dt, done, speed, wall)
+        return replace(record, section=looks.section())
 
     def _place(self, pose: np.ndarray) -> list[float]:
         """Stroke, commanded stroke and way along the blade [m]."""

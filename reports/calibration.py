@@ -12,7 +12,7 @@ import numpy as np
 
 from calib.errors import CurveError
 from calib.metrics import compare
-from reports import breakdowns, figures, fitted, measurement, parameters, soundness
+from reports import breakdowns, figures, fitted, measurement, parameters, section, soundness
 from reports.document import breakable, count, listed, plain, publish, quantity, uncertain
 from reports.finished import Data, Finished, read_finished
 from reports.words import capital, shown, words
@@ -66,6 +66,9 @@ def _pictures(done: Finished) -> dict[str, bytes]:
         "fit.svg": figures.fit(curves, s["noise_sd_N"], trace),
         "nulls.svg": figures.nulls(curves, trace),
     }
+    if done.section is not None:
+        k = s["knife"]
+        found["cut.svg"] = section.cut(done.section, k, s["shape"]["height"], curves["stroke_m"], curves["sim_N"])
     rows = [fitted.row(name, p) for name, p in s["parameters"].items()]
     if rows:
         found["parameters.svg"] = parameters.ranges(rows)

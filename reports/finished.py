@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from mpm.section import Section
 from reports import ReportError
 
 Data = dict[str, Any]
@@ -99,6 +100,7 @@ class Finished:
         raw: Force as recorded [N], shape (k,).
         tared: Force less its baseline [N], shape (k,).
         runs: The simulations, none where the store has no table of them.
+        section: The food across the blade's middle; None where the record has none.
     """
 
     summary: Data
@@ -108,6 +110,7 @@ class Finished:
     raw: np.ndarray
     tared: np.ndarray
     runs: Runs
+    section: Section | None = None
 
 
 def read_finished(run: Path) -> Finished:
@@ -124,7 +127,8 @@ def read_finished(run: Path) -> Finished:
     summary, created = _read_summary(run / "summary.json")
     curves = _read_curves(run / "curves.csv")
     store = run / "evaluations.h5"
-    return Finished(summary, created, curves, *_read_record(store), _read_runs(store))
+    section = _read_section(run / "record.h5")
+    return Finished(summary, created, curves, *_read_record(store), _read_runs(store), section)
 
 
 def _read_summary(path: Path) -> tuple[Data, datetime]:
@@ -262,6 +266,15 @@ def _read_record(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     if time.ndim != 1 or len(time) < 2 or not time.shape == raw.shape == tared.shape or not finite:
         raise ReportError(f"{path}: conditioning holds records of unequal length or with gaps; {REMEDY}")
     return time, raw, tared
+
+
+def _read_section(path: Path) -> Section | None:
+    """The section in record.h5; older runs have none, and a report does without it."""
+    try:
+        with h5py.File(path, "r") as file:
+            return Section(**{f.name: file[f"section/{f.name}"][()] for f in fields(Section)})
+    except (OSError, KeyError):
+        return None
 
 
 def _read_runs(path: Path) -> Runs:

@@ -274,3 +274,22 @@ def test_edge_leaves_the_food_at_its_lower_outline():
     np.testing.assert_allclose(record.edge[late, 2], 300 * chord[late], rtol=0.08)
     area = np.pi / 4 * 0.03**2
     assert record.edge[:, 2] @ np.diff(record.stroke, prepend=0.0) == pytest.approx(300 * area, rel=0.05)
+
+
+@pytest.mark.parametrize("mirror", [True, False])
+def test_section_has_all_food_across_the_blade(mirror):
+    """Pieces of the section fill length times height, near the cut and far from it; looks are even and the last is the end."""
+    numerics = replace(PRISM.numerics, mirror=mirror, far=4.5e-3)
+    simulation = Simulation(replace(PRISM, numerics=numerics), Runtime(threads=1))
+    record = simulation.run(sections=4)
+    section = record.section
+    assert section is not None and section.mirrored is mirror
+    wide, high = section.size
+    assert (wide * high).sum() * (2 if mirror else 1) == pytest.approx(0.03 * 0.024, rel=1e-9)
+    assert len(set(np.round(wide * high / simulation.seeds.spacing**2))) > 1  # of one cell and of several
+    assert section.y.shape == section.z.shape == section.mises.shape == (4, len(wide))
+    np.testing.assert_allclose(section.stroke, 0.018 * np.arange(1, 5) / 4, atol=1e-3)
+    assert section.stroke[-1] == record.stroke[-1]
+    assert (section.y <= 1e-3).all() if mirror else abs(section.y.mean()) < 1e-4
+    assert section.z.min() > 0 and section.z.max() < 0.03
+    assert simulation.run().section is None

@@ -114,3 +114,16 @@ def test_what_a_press_cannot_do():
         replace(SCENE, numerics=replace(SCENE.numerics, contact="nodal"))
     with pytest.raises(SceneError, match="press tool: half_angle"):
         Press("tool", 2.0)
+
+
+def test_section_stands_under_the_stress_of_uniaxial_compression():
+    """Between slippery plates the von Mises stress of a section is that of the law, over the area as it is then (1 %)."""
+    numerics = replace(SCENE.numerics, gravity=0.0)
+    scene = replace(SCENE, knife=Press(mu=0.0), board=Board(0.0), motion=Motion(2e-3, 2e-3), numerics=numerics)
+    section = Simulation(scene, Runtime(threads=1)).run(sections=2).section
+    assert section is not None
+    np.testing.assert_allclose(section.stroke, [1e-3, 2e-3], atol=0.1e-3)
+    for stroke, mises in zip(section.stroke, section.mises, strict=True):
+        stretch = 1 - stroke / 0.016
+        area = (1 + SOFT.nu * (1 - stretch)) ** 2
+        assert np.median(mises) == pytest.approx(uniaxial(stretch, SOFT) / area, rel=0.01)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import h5py
 import matplotlib
 import numpy as np
 import pytest
 
+from mpm.section import Section
 from reports import breakdowns, figures, fitted, parameters
+from reports import section as pictures
 from reports.calibration import write_report
 from reports.finished import Runs
 from tests.reports import sample
@@ -107,3 +110,41 @@ def test_failures_are_split_by_what_separates_them() -> None:
     assert breakdowns.sentence(Runs({"mu": values["mu"]}, failed), same).startswith("No parameter separates")
     for split in (found, same):
         assert breakdowns.picture(Runs(values, failed), split).startswith(b"<?xml")
+
+
+KNIFE = {"spine": 2e-3, "angle": 0.04, "height": 0.05}
+
+
+def looked_at(width: float = 0.1, height: float = 0.03) -> Section:
+    """A block that sinks a little from look to look, in pieces of 2 mm."""
+    y, z = (a.ravel() for a in np.meshgrid(np.arange(-width / 2, 0, 2e-3) + 1e-3, np.arange(0, height, 2e-3) + 1e-3))
+    sunk = 1 - 0.01 * np.arange(10)[:, None]
+    return Section(
+        np.linspace(2e-3, 0.02, 10), y / sunk, z * sunk, 1e4 * (1 + 0 * z / sunk), 2e-3 + np.zeros((2, y.size)), True
+    )
+
+
+def test_three_moments_of_the_cut_are_shown() -> None:
+    """Early, at the largest force, at the end; a force that is largest at the end makes two."""
+    stroke = np.linspace(0, 0.02, 50)
+    section = looked_at()
+    shown = pictures.moments(section, stroke, np.sin(np.pi * stroke / 0.024))
+    assert [name for _, name in shown] == ["", "largest force", "at the end"]
+    assert section.stroke[shown[0][0]] == pytest.approx(4e-3) and section.stroke[shown[1][0]] == pytest.approx(12e-3)
+    assert len(pictures.moments(section, stroke, stroke)) == 2
+
+
+def test_the_picture_of_the_cut_is_stable_and_fits_its_page(tmp_path: Path) -> None:
+    """The same section gives the same bytes, flat foods and tall ones; the report has one page more with it, and none without."""
+    stroke = np.linspace(0, 0.02, 50)
+    for section in (looked_at(), looked_at(0.03, 0.09)):
+        made = [pictures.cut(section, KNIFE, 0.03, stroke, np.sin(np.pi * stroke / 0.024)) for _ in range(2)]
+        assert made[0] == made[1] and b"<image" in made[0] and b"<text" not in made[0]
+    run = sample.write_run(tmp_path)
+    without = pages(write_report(run).read_bytes())
+    with h5py.File(run / "record.h5", "w") as file:
+        for name, values in vars(looked_at(0.03, 0.09)).items():
+            file[f"section/{name}"] = values
+    assert pages(write_report(run).read_bytes()) == without + 1
+    (run / "record.h5").write_bytes(b"damaged")
+    assert pages(write_report(run).read_bytes()) == without
