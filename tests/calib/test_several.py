@@ -60,7 +60,12 @@ class FakePool(Workers):
             stroke = np.linspace(0.0, scene.motion.stroke, 400)[1:]
             wave = 1.0 + 0.005 * np.sin(40.0 * stroke / shape.height + p["E"] / 1e4)
             curve = force(stroke, shape.height, shape.width, p) * wave
-            scalars = {"peak_N": float(curve.max()), "work_J": float(np.trapezoid(curve, stroke)), **FakePool.balances}
+            scalars = {
+                "peak_N": float(curve.max()),
+                "work_J": float(np.trapezoid(curve, stroke)),
+                "unbooked_J": 0.0,
+                **FakePool.balances,
+            }
             yield Evaluation(index, dict(values), "ok", "", 1.0, stroke, curve, scalars, 0.01)
 
 
