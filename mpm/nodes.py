@@ -20,12 +20,12 @@ from mpm.fields import (
     SPINE,
     VS,
     VZ,
-    Fields,
 )
+from mpm.split import Split
 
 
 @ti.data_oriented
-class Nodes(Fields):
+class Nodes(Split):
     """Updates of the grid between the two transfers."""
 
     @ti.func
