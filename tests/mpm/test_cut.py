@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import taichi as ti
 
 from mpm.errors import SceneError
 from mpm.record import ForceRecord
@@ -95,8 +96,10 @@ def test_mirrored_quarter_equals_the_whole(whole, quarter):
 
 
 def test_mirror_between_the_nodes_is_the_whole_on_the_same_grid(quarter):
-    """With x = 0 half-way between nodes a quarter gives the force of the whole made of its particles and their images, to rounding."""
-    scene = replace(PRISM, knife=WEDGE, numerics=replace(PRISM.numerics, grid_shift=(0.5, 0.0, 0.0)))
+    """With x = 0 half-way between nodes a quarter gives the force of the whole made of its particles and their images, to rounding,
+    also while the blade goes up again and the crack stays in the food."""
+    motion = replace(PRISM.motion, retract=6e-3)
+    scene = replace(PRISM, knife=WEDGE, motion=motion, numerics=replace(PRISM.numerics, grid_shift=(0.5, 0.0, 0.0)))
     part = Simulation(scene, Runtime(threads=1))
     whole = Simulation(replace(scene, numerics=replace(scene.numerics, mirror=False)), Runtime(threads=1))
     whole.seeds = with_images(part.seeds)
@@ -105,6 +108,29 @@ def test_mirror_between_the_nodes_is_the_whole_on_the_same_grid(quarter):
     np.testing.assert_allclose(a.knife[:, 2], b.knife[:, 2], atol=1e-8 * b.peak)
     assert a.momentum_residual < 1e-10
     assert a.peak == pytest.approx(quarter.peak, rel=0.02)
+
+
+def test_front_beside_the_mirror_is_that_of_the_first_slice():
+    """Slices that are mirror images take no part: between the mirror and the first slice the front is the first slice's."""
+    scene = replace(PRISM, numerics=replace(PRISM.numerics, grid_shift=(0.5, 0.0, 0.0)))
+    simulation = Simulation(scene, Runtime(threads=1))
+    simulation._load(FLESH)
+    k = simulation.k
+    fronts = np.full(k.front.shape, 0.02)
+    fronts[: k.i0] = 0.01
+    k.front.from_numpy(fronts)
+
+    assert simulation.stations[k.i0] == pytest.approx(0.5 * scene.numerics.dx)
+    places = ti.field(ti.f64, 4)
+    places.from_numpy(scene.numerics.dx * np.array([0.0, 0.2, 0.49, 0.7]))
+
+    @ti.kernel
+    def look():
+        for n in range(4):
+            places[n] = k.front_at(places[n])
+
+    look()
+    np.testing.assert_allclose(places.to_numpy(), 0.02, rtol=1e-12)
 
 
 def with_images(seeds: Seeds) -> Seeds:
