@@ -44,7 +44,8 @@ DEVICES = {"cuda": "CUDA", "vulkan": "Vulkan", "metal": "Metal"}
 EXTRAS = {"cluster": "--scheduler", "sample": "--sample"}
 """What the optional packages are for."""
 SMALL = 1.5e9
-"""Free memory under which two workers may not fit beside each other [byte]."""
+"""Free memory under which a calibration may not fit [byte]: a worker takes 0.2 GB (resident, of the small cut), and there are two of
+them, the main process with its report, and other programs."""
 
 
 @dataclass(frozen=True)

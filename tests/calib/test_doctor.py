@@ -100,10 +100,10 @@ def test_failures_count(monkeypatch, capsys):
     assert "1 of 2 failed" in capsys.readouterr().out
 
 
-@pytest.mark.skipif(sys.platform == "darwin", reason="Macs have Metal")
 def test_a_device_that_is_missing_is_one_line(capsys, tmp_path: Path):
-    """``--arch metal`` elsewhere than on a Mac: an error that names the device, in the solver and on the command line."""
-    with pytest.raises(SceneError, match="metal is not available"):
-        start(Runtime("metal"), "f64")
-    assert main(["simulate", "--food", "banana", "--arch", "metal", "--out", str(tmp_path / "x")]) == 1
-    assert capsys.readouterr().err.strip().splitlines()[-1].startswith("cutcal: arch: metal is not available")
+    """CUDA on a Mac, Metal elsewhere: an error that names the device, in the solver and on the command line."""
+    arch = "cuda" if sys.platform == "darwin" else "metal"
+    with pytest.raises(SceneError, match=f"{arch} is not available"):
+        start(Runtime(arch), "f64")
+    assert main(["simulate", "--food", "banana", "--arch", arch, "--out", str(tmp_path / "x")]) == 1
+    assert capsys.readouterr().err.strip().splitlines()[-1].startswith(f"cutcal: arch: {arch} is not available")
