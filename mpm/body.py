@@ -9,11 +9,12 @@ import numpy as np
 
 from mpm import fields as kn
 from mpm.errors import SimulationError
+from mpm.health import health
 from mpm.material import Material
 from mpm.runtime import Runtime
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
 from mpm.shapes import Shape
-from mpm.solver import Simulation, _health
+from mpm.solver import Simulation
 
 FAR = 1.0  # distance of what must not touch [m]
 
@@ -135,7 +136,7 @@ class FreeBody:
             self.time += n * span
             self.impulse += sums[kn.BOARD : kn.BOARD + 3]
             self.friction += float(sums[kn.RUBBED])
-            reason = _health(sums, self._state)
+            reason = health(sums, self._state)
             if reason != "done":
                 raise SimulationError(
                     f"the free body stopped at {self.time:.3g} s: {reason}", reason=reason, fraction=0.0

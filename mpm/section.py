@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from mpm.seeding import Seeds
+from mpm.watch import Snapshot, Watch
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,52 +31,40 @@ class Section:
     mirrored: bool
 
 
-class Looks:
-    """Looks at the section of a run as it goes on.
+class Looks(Watch):
+    """Looks at the section of a run.
 
     Args:
         seeds: Particles of the run.
         mirrors: Whether x = 0 and y = 0 are mirrors.
+        times: How often to look.
     """
 
-    def __init__(self, seeds: Seeds, mirrors: tuple[bool, bool]) -> None:
-        self._seeds, self._mirrors = seeds, mirrors
-        self._taken: list[tuple[float, np.ndarray]] = []
-        self._which: np.ndarray | None = None
+    def __init__(self, seeds: Seeds, mirrors: tuple[bool, bool], times: int) -> None:
+        super().__init__(times)
+        self._mirrored = mirrors[1]
+        self._which, self._size = _pieces(seeds, mirrors[0])
 
-    def __len__(self) -> int:
-        return len(self._taken)
-
-    def take(self, stroke: float, fields: Any, x: np.ndarray) -> None:
-        """Look now.
-
-        Args:
-            stroke: Way of the edge below the food's top [m].
-            fields: The fields of the run.
-            x: Places of its particles in the scene's axes [m], shape (n, 3).
-        """
-        if self._which is None:
-            self._which, self._size = self._pieces()
+    def take(self, now: Snapshot) -> None:
+        """Look, and keep what is in the section."""
         which = self._which
-        tau = fields.stresses()[which] / np.linalg.det(fields.deformation()[which])[:, None]
-        xx, yy, zz, yz, xz, xy = tau.T
-        mises = np.sqrt(((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2 + 3 * (yz**2 + xz**2 + xy**2))
-        self._taken.append((stroke, np.stack([x[which, 1], x[which, 2], mises])))
+        super().take(replace(now, x=now.x[which], mises=now.mises[which], severed=now.severed[which]))
 
     def section(self) -> Section | None:
         """All looks; None where there was none."""
-        if not self._taken:
+        if not self.taken:
             return None
-        y, z, mises = np.stack([look for _, look in self._taken], axis=1)
-        return Section(np.array([stroke for stroke, _ in self._taken]), y, z, mises, self._size, self._mirrors[1])
+        y, z, mises = np.stack([(*look.x.T[1:], look.mises) for look in self.taken], axis=1)
+        return Section(np.array([look.stroke for look in self.taken]), y, z, mises, self._size, self._mirrored)
 
-    def _pieces(self) -> tuple[np.ndarray, np.ndarray]:
-        """Particles that stand for food beside the plane across the blade's middle, and how much of it each stands for."""
-        cells, owner = self._seeds.cells, self._seeds.owner
-        on = cells[:, 0] == (0 if self._mirrors[0] else (cells[:, 0].max() + 1) // 2)
-        which, first = np.unique(owner[on], return_inverse=True)
-        low, high = np.full((2, len(which)), np.iinfo(int).max), np.full((2, len(which)), np.iinfo(int).min)
-        for axis in (0, 1):
-            np.minimum.at(low[axis], first, cells[on, 1 + axis])
-            np.maximum.at(high[axis], first, cells[on, 1 + axis])
-        return which, self._seeds.spacing * (high - low + 1)
+
+def _pieces(seeds: Seeds, mirrored: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Particles that stand for food beside the plane across the blade's middle, and how much of it each stands for."""
+    cells, owner = seeds.cells, seeds.owner
+    on = cells[:, 0] == (0 if mirrored else (cells[:, 0].max() + 1) // 2)
+    which, first = np.unique(owner[on], return_inverse=True)
+    low, high = np.full((2, len(which)), np.iinfo(int).max), np.full((2, len(which)), np.iinfo(int).min)
+    for axis in (0, 1):
+        np.minimum.at(low[axis], first, cells[on, 1 + axis])
+        np.maximum.at(high[axis], first, cells[on, 1 + axis])
+    return which, seeds.spacing * (high - low + 1)

@@ -12,7 +12,9 @@ import numpy as np
 
 from mpm import fields as kn
 from mpm.errors import SimulationError
+from mpm.health import health
 from mpm.kernels import Kernels
+from mpm.layout import lay_out
 from mpm.material import Material
 from mpm.record import ForceRecord
 from mpm.runtime import Runtime, start
@@ -22,8 +24,8 @@ from mpm.seeding import seed
 from mpm.shapes import section_area, skin_path, slices
 from mpm.topology import topology
 from mpm.touch import CONTACT
+from mpm.watch import Watch, snapshot
 
-PAD = 3  # empty cells around the food: a quadratic kernel reaches 1.5 cells, the rest is room to move
 # Particles for which another thread pays.  On two cores the second thread gains nothing for 8,000 particles, 10 to 25 % for
 # 38,000 and 20 to 40 % for 128,000; processes share the cores better, which is how a calibration uses them.
 WORTH_A_THREAD = 20_000
@@ -34,11 +36,8 @@ EDGE_STEP = 0.5  # dt times the frequency of the edge's cohesive spring, 2 is un
 # at 1.4 a food of nu = 0 at rest keeps its energy, at 1.0 it gains. Only foods of nu < 0.2 ask for a shorter step than waves do.
 COERCIVE = 1.5
 TACK_STEP = 0.5  # the same for the rising part of the adhesive traction
-
 ENDLESS = 1e3  # thickness of a wedge that never becomes a plate with parallel faces [m]
-
 KEPT = 3  # kernels that a process keeps: of the default cells, of coarse ones and of one scene more
-
 _kept: dict[tuple[int, tuple[Any, ...]], Kernels] = {}
 
 Progress = Callable[[float, float], None]
@@ -59,7 +58,8 @@ class Simulation:
         self.scene = scene
         self.runtime = runtime or Runtime()
         self.seeds = seed(scene)
-        self._layout()
+        grid = lay_out(scene)
+        self.nodes, self.origin, self.images, self.stations = grid.nodes, grid.origin, grid.images, grid.stations
         self.serial = start(self.runtime, scene.numerics.precision)
         self.k: Any = self._kernels(self._threads())
 
@@ -93,34 +93,6 @@ class Simulation:
         while len(_kept) > KEPT:
             del _kept[next(iter(_kept))]
         return kept
-
-    def _layout(self) -> None:
-        """Place the grid: around the food with room to widen, nodes on the mirror planes."""
-        shape, num = self.scene.food.shape, self.scene.numerics
-        dx, mirror = num.dx, (*self.scene.mirrors, False)
-        c, s = abs(math.cos(num.grid_turn)), abs(math.sin(num.grid_turn))
-        wide, deep = c * shape.width + s * shape.length, s * shape.width + c * shape.length
-        low, high, zero = [], [], []
-        for axis, size in enumerate((wide, deep, shape.height)):
-            shift = num.grid_shift[axis] % 1.0
-            room = PAD + math.ceil(num.room * size / 2 / dx)
-            bottom = -PAD if axis == 2 else -math.ceil(size / 2 / dx) - room
-            top = math.ceil(size / dx) + PAD if axis == 2 else math.ceil(size / 2 / dx) + room
-            if mirror[axis] and axis == 0:
-                bottom, shift = -kn.MIRROR, -shift  # by nothing or half a cell, so that there are as many images
-            if mirror[axis] and axis == 1:
-                top = 2
-            low.append(bottom)
-            high.append(top + 1)
-            zero.append(shift)
-        self.nodes = tuple(h - b + 1 for b, h in zip(low, high, strict=True))
-        self.origin = np.array([(b - z) * dx for b, z in zip(low, zero, strict=True)])
-        self.images = (2 if mirror[0] else 1) * (2 if mirror[1] else 1)
-        if num.grid_turn:
-            half = math.ceil(shape.width / 2 / dx) + PAD
-            self.stations = dx * np.arange(-half, half + 1)
-        else:
-            self.stations = self.origin[0] + dx * np.arange(self.nodes[0])
 
     def _turn(self, vectors: np.ndarray, sign: float = 1.0) -> np.ndarray:
         """Vectors (n, 3) of the scene's axes in the grid's, or back with ``sign`` -1."""
@@ -235,7 +207,12 @@ class Simulation:
         return max(stiffness * (period / (2 * math.pi)) ** 2, layer)
 
     def run(
-        self, material: Material | None = None, progress: Progress | None = None, *, sections: int = 0
+        self,
+        material: Material | None = None,
+        progress: Progress | None = None,
+        *,
+        sections: int = 0,
+        watch: Watch | None = None,
     ) -> ForceRecord:
         """Simulate the cut.
 
@@ -243,6 +220,7 @@ class Simulation:
             material: Other constants than the scene's; the kernels are not recompiled.
             progress: Called after each output interval with (part of the stroke done, knife force [N]).
             sections: How often to keep the food across the blade's middle, at even parts of the run and at its end.
+            watch: Who else looks at it.
 
         Returns:
             The record. A run that breaks down returns what it had, with its reason in ``status``.
@@ -269,15 +247,15 @@ class Simulation:
         rows: list[list[float]] = []
         began = clock.perf_counter()
         status, done, last, batch = "done", 0, np.zeros(3), 1
-        looks = Looks(self.seeds, scene.mirrors)
+        looks = Looks(self.seeds, scene.mirrors, sections)
+        watches = [one for one in (looks, watch) if one is not None and one.times > 0]
         self.counters = {"inverted": 0, "outside": 0}
         for steps, down, along in phases:
             left = steps
             while left > 0 and status == "done":
                 count = min(every * batch, left)
-                if sections:
-                    next_look = math.ceil((len(looks) + 1) * total / sections) - done
-                    count = min(count, every * math.ceil(max(next_look, 1) / every))
+                for one in watches:
+                    count = min(count, every * math.ceil(max(one.due(total) - done, 1) / every))
                 asked = clock.perf_counter()
                 for row in self._advance(count, every, dt, down, along):
                     sums, state, pose = np.split(row, (kn.N_SUMS, kn.N_SUMS + kn.N_STATE))
@@ -288,15 +266,19 @@ class Simulation:
                     parts = self._row(sums, state, last, n * dt, material, num.gravity)
                     last = np.array(parts[0])
                     rows.append([*self._place(pose), dt * done, *(v for part in parts for v in part)])
-                    status = _health(sums, state)
+                    status = health(sums, state)
                     if status != "done":
                         break
                 if clock.perf_counter() - asked < PATIENCE / 2:
                     batch *= 2
                 if progress is not None and status == "done":
                     progress(done / total, parts[1][2] + parts[2][2])
-                if status == "done" and done * sections >= (len(looks) + 1) * total:
-                    looks.take(rows[-1][0], k, self._turn(k.of_particles(k.x), -1.0))
+                due = [one for one in watches if status == "done" and done >= one.due(total)]
+                if due:
+                    stroke, _, slide = rows[-1][:3]
+                    now = snapshot(stroke, slide, k, self._turn(k.of_particles(k.x), -1.0))
+                    for one in due:
+                        one.take(now)
         wall = clock.perf_counter() - began
         record = self._record(rows, material, status, done / total, dt, done, speed, wall)
         return replace(record, section=looks.section())
@@ -400,17 +382,6 @@ class Simulation:
             status=status,
             fraction=fraction,
         )
-
-
-def _health(sums: np.ndarray, state: np.ndarray) -> str:
-    """``done`` for a sound interval, else the typed reason why the run cannot go on."""
-    if not np.isfinite(state).all() or not np.isfinite(sums).all():
-        return "not_finite"
-    if sums[kn.OUTSIDE] > 0:
-        return "left_grid"
-    if sums[kn.INVERTED] > 0:
-        return "inverted"
-    return "done"
 
 
 def simulate(scene: Scene, *, runtime: Runtime | None = None, progress: Progress | None = None) -> ForceRecord:
