@@ -41,7 +41,7 @@ CLOSE = 0.05
 PATIENCE = 180.0
 """Seconds after which a device that has not answered is given up: compiling for the first time takes a twentieth of that."""
 DEVICES = {"cuda": "CUDA", "vulkan": "Vulkan", "metal": "Metal"}
-EXTRAS = {"cluster": "--scheduler", "sample": "--sample"}
+EXTRAS = {"cluster": "--scheduler", "sample": "--sample", "view": "--video and --page"}
 """What the optional packages are for."""
 SMALL = 1.5e9
 """Free memory under which a calibration may not fit [byte]: a worker takes 0.2 GB (resident, of the small cut), and there are two of
@@ -83,6 +83,7 @@ def examine(folder: Path) -> Iterator[Finding]:
             yield device(arch, name)[0]
     yield kernels(cache)
     yield _tried("report", _typeset, "pip install --force-reinstall typst matplotlib")
+    yield pictures()
     yield memory()
     yield writable("folder for results", folder)
 
@@ -138,6 +139,20 @@ def _typeset() -> str:
     picture = svg(lambda figure: figure.add_subplot().plot([0.0, 1.0]), 40.0)
     size = len(typst.compile(b"= cutcal", format="pdf"))
     return f"a picture of {len(picture) / 1e3:.0f} kB was drawn and a page of {size / 1e3:.0f} kB typeset"
+
+
+def pictures() -> Finding:
+    """Whether a picture is drawn without a screen, in a process that may crash or hang."""
+    name, remedy = "pictures of simulate", "everything else works; on Linux the package libegl1 or libosmesa6 is needed"
+    command = [sys.executable, "-c", "from reports.picture import attempt; print(attempt())"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    except subprocess.TimeoutExpired:
+        return Finding(name, "absent", f"no answer within {PATIENCE:g} s; {remedy}")
+    if done.returncode != 0:
+        why = _last_line(done.stderr) or f"its process ended with {done.returncode}"
+        return Finding(name, "absent", f"{why}; {remedy}")
+    return Finding(name, "ok", _last_line(done.stdout))
 
 
 def device(arch: str, name: str) -> tuple[Finding, Path | None]:

@@ -20,7 +20,7 @@ SHAPE_KINDS = (
     "capsule",
 )
 _FLAT_DOWN = ("half_cylinder", "hemisphere")
-_FLAT_TOP = ("block", "upright_cylinder")
+FLAT_TOP = ("block", "upright_cylinder")
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,14 @@ def _radius2(shape: Shape, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         cap = min(a, b)
         return (x / a) ** 2 + (np.maximum(np.abs(y) - (b - cap), 0.0) / cap) ** 2
     return (x / a) ** 2 + (y / b) ** 2
+
+
+def half_width(shape: Shape, y: float) -> float:
+    """Half of the width of the section at y [m], 0 where there is none."""
+    if shape.kind == "block":
+        return shape.width / 2 if abs(y) <= shape.length / 2 else 0.0
+    r2 = float(_radius2(shape, np.zeros(1), np.array([y]))[0])
+    return shape.width / 2 * math.sqrt(max(1.0 - r2, 0.0))
 
 
 def surface(shape: Shape, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -102,7 +110,7 @@ def volume(shape: Shape) -> float:
 def section_area(shape: Shape) -> float:
     """Area of the section in the blade plane y = 0 [m^2]: what a complete cut severs."""
     box = shape.width * shape.height
-    return box if shape.kind in _FLAT_TOP else math.pi / 4 * box
+    return box if shape.kind in FLAT_TOP else math.pi / 4 * box
 
 
 def skin_path(shape: Shape, x: np.ndarray, thickness: float) -> np.ndarray:
@@ -122,9 +130,9 @@ def skin_path(shape: Shape, x: np.ndarray, thickness: float) -> np.ndarray:
     x = np.asarray(x, float)
     bottom, top = surface(shape, x, np.zeros_like(x))
     inner_width = max(shape.width - 2 * thickness, 1e-9)
-    lift = 0.0 if shape.kind in (*_FLAT_DOWN, *_FLAT_TOP) else thickness
+    lift = 0.0 if shape.kind in (*_FLAT_DOWN, *FLAT_TOP) else thickness
     inner_height = max(shape.height - thickness - lift, 1e-9)
-    if shape.kind in _FLAT_TOP:
+    if shape.kind in FLAT_TOP:
         inner_top = np.where(np.abs(x) <= inner_width / 2, inner_height, bottom)
     else:
         rise = np.sqrt(np.maximum(1 - (2 * x / inner_width) ** 2, 0.0))

@@ -275,8 +275,8 @@ class Simulation:
                     progress(done / total, parts[1][2] + parts[2][2])
                 due = [one for one in watches if status == "done" and done >= one.due(total)]
                 if due:
-                    stroke, _, slide = rows[-1][:3]
-                    now = snapshot(stroke, slide, k, self._turn(k.of_particles(k.x), -1.0))
+                    stroke, _, slide, at = rows[-1][:4]
+                    now = snapshot(at, stroke, slide, k, self._turn(k.of_particles(k.x), -1.0))
                     for one in due:
                         one.take(now)
         wall = clock.perf_counter() - began

@@ -14,6 +14,7 @@ class Snapshot:
     """The particles of a run at one moment, in the scene's axes.
 
     Attributes:
+        time: Simulated time [s].
         stroke: Way of the edge below the food's top [m].
         slide: Way of the blade along its edge [m].
         x: Places of the particles [m], shape (n, 3); mirror images are not among them.
@@ -21,6 +22,7 @@ class Snapshot:
         severed: Whether the cut has passed a particle, shape (n,).
     """
 
+    time: float
     stroke: float
     slide: float
     x: np.ndarray
@@ -28,10 +30,11 @@ class Snapshot:
     severed: np.ndarray
 
 
-def snapshot(stroke: float, slide: float, fields: Any, x: np.ndarray) -> Snapshot:
+def snapshot(time: float, stroke: float, slide: float, fields: Any, x: np.ndarray) -> Snapshot:
     """What there is to see now.
 
     Args:
+        time: Simulated time [s].
         stroke: Way of the edge below the food's top [m].
         slide: Way of the blade along its edge [m].
         fields: The fields of the run.
@@ -40,7 +43,7 @@ def snapshot(stroke: float, slide: float, fields: Any, x: np.ndarray) -> Snapsho
     cauchy = fields.stresses() / np.linalg.det(fields.deformation())[:, None]
     xx, yy, zz, yz, xz, xy = cauchy.T
     mises = np.sqrt(((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2 + 3 * (yz**2 + xz**2 + xy**2))
-    return Snapshot(stroke, slide, x, mises, fields.of_particles(fields.side) > 0)
+    return Snapshot(time, stroke, slide, x, mises, fields.of_particles(fields.side) > 0)
 
 
 class Watch:

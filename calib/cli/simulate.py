@@ -7,18 +7,24 @@ import math
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from calib.cli.options import add_food, add_run, food_of, number, sizing_of
+from calib.cli.options import add_food, add_run, food_of, number, say, sizing_of
 from calib.knives import load_knife
 from calib.outputs import prepare, write_csv, write_json
-from calib.progress import clock
+from calib.progress import Countdown, clock
 from calib.provenance import git_commit, versions
 from calib.scenes import cut_scene, specimen
 from calib.verdicts import spent, unbooked
+from mpm.record import ForceRecord
 from mpm.scene import CONTACTS, Arm
+from mpm.watch import Watch
 
 HELP = "simulate one cut"
 DESCRIPTION = "Simulate one cut and write force.csv and summary.json."
+LOOKS = 72  # at the cut, of a video: five seconds
+PAGES = 2  # looks of which a page has one
+TOLD = 12  # pictures of a video after which a line says how many there are
 EPILOG = "example:\n  cutcal simulate --food cucumber --knife edc --out runs/cucumber"
 
 
@@ -46,6 +52,9 @@ def add_args(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("--force-limit", type=number(0, 1e6, "N"), metavar="N", help="most force the arm can give")
     p.add_argument("--threads", type=int, default=0, help="CPU threads, 0 = all cores")
+    p.add_argument("--pictures", action="store_true", help="draw the cut at contact, largest force and end (PNG)")
+    p.add_argument("--video", action="store_true", help="and as a film, cut.mp4")
+    p.add_argument("--page", action="store_true", help="and as a page to turn it around in a browser, cut.html")
     add_run(p)
 
 
@@ -89,7 +98,9 @@ def run(args: argparse.Namespace) -> int:
         left = (time.monotonic() - began) * (1 - done) / done
         print(f"\r{done:5.0%}  {force:8.2f} N  {clock(left)} left ", end="", file=sys.stderr, flush=True)
 
-    record = Simulation(scene, Runtime(args.arch, args.threads)).run(progress=show if sys.stderr.isatty() else None)
+    simulation = Simulation(scene, Runtime(args.arch, args.threads))
+    watch = Watch(LOOKS) if args.pictures or args.video or args.page else None
+    record = simulation.run(progress=show if sys.stderr.isatty() else None, watch=watch)
     if sys.stderr.isatty():
         print(file=sys.stderr)
     write_csv(out / "force.csv", record.columns())
@@ -109,6 +120,8 @@ def run(args: argparse.Namespace) -> int:
         "warnings": [*food.warnings(), *assumed],
     }
     write_json(out / "summary.json", summary)
+    if watch is not None:
+        _draw(args, out, simulation, record, watch, f"{food.name}, {knife.name} knife")
     if args.json:
         print((out / "summary.json").read_text(), end="")
     else:
@@ -126,3 +139,33 @@ def run(args: argparse.Namespace) -> int:
         if record.pieces is not None:
             print(record.pieces.words())
     return 0 if record.status == "done" else 1
+
+
+def _draw(args: argparse.Namespace, out: Path, simulation: Any, record: ForceRecord, watch: Watch, title: str) -> None:
+    """Pictures, video and page, whatever was asked for; force.csv and summary.json are written before."""
+    if not watch.taken:
+        say("nothing to draw: the run broke down before the first look")
+        return
+    from mpm.surface import Surface
+    from reports.page import page
+    from reports.picture import Film, stills, video
+
+    scene = simulation.scene
+    surface = Surface(scene.food.shape, simulation.seeds, scene.mirrors)
+    film = Film(scene, surface, watch.taken, record.time, record.stroke, record.resolved)
+    if args.pictures:
+        say("drawing contact, largest force and end")
+        stills(film, out)
+    if args.page:
+        say("writing cut.html")
+        page(replace(film, looks=watch.taken[PAGES - 1 :: PAGES]), out / "cut.html", title)
+    if args.video:
+        rest = Countdown(len(watch.taken))
+
+        def told(done: int) -> None:
+            left = rest.left(1.0)
+            if done % TOLD == 0:
+                say(f"drawing cut.mp4: {done} of {len(watch.taken)} pictures, {left}")
+
+        say("drawing cut.mp4")
+        video(film, out / "cut.mp4", told)

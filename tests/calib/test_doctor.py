@@ -107,3 +107,18 @@ def test_a_device_that_is_missing_is_one_line(capsys, tmp_path: Path):
         start(Runtime(arch), "f64")
     assert main(["simulate", "--food", "banana", "--arch", arch, "--out", str(tmp_path / "x")]) == 1
     assert capsys.readouterr().err.strip().splitlines()[-1].startswith(f"cutcal: arch: {arch} is not available")
+
+
+@pytest.mark.parametrize(
+    ("code", "stdout", "stderr", "state", "said"),
+    [
+        (0, "drawn without a screen by X\n", "", "ok", "drawn without"),
+        (1, "", "Traceback\nRuntimeError: no OpenGL", "absent", "no OpenGL; everything else works"),
+        (-11, "", "", "absent", "ended with -11"),
+    ],
+)
+def test_pictures_may_be_missing(monkeypatch, code, stdout, stderr, state, said):
+    """Drawing in a process of its own: whatever it dies of is said, and nothing else needs it."""
+    monkeypatch.setattr(subprocess, "run", lambda *a, **k: subprocess.CompletedProcess([], code, stdout, stderr))
+    found = doctor.pictures()
+    assert found.state == state and said in found.words

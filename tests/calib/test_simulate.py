@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -29,3 +30,16 @@ def test_simulate_writes_a_force_record_that_reads_back(tmp_path: Path, capsys):
     np.testing.assert_allclose(back.force, c["knife_fz_N"])
     assert main([*argv, "--out", str(out)]) == 1
     assert "never overwritten" in capsys.readouterr().err
+
+
+def test_simulate_draws_what_is_asked_for(tmp_path: Path, capsys, monkeypatch):
+    """Three pictures and a page beside the record; what cannot be drawn is one line, and the record is there."""
+    argv = ["simulate", "--food", "strawberry", "--knife", "edc", "--stroke", "0.004", "--threads", "1"]
+    assert main([*argv, "--pictures", "--page", "--out", str(tmp_path / "cut")]) == 0
+    names = {p.name for p in (tmp_path / "cut").iterdir()}
+    assert names == {"force.csv", "summary.json", "contact.png", "peak.png", "end.png", "cut.html"}
+    assert "drawing contact" in capsys.readouterr().err
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    assert main([*argv, "--video", "--out", str(tmp_path / "film")]) == 1
+    assert "pip install 'cutcal[view]'" in capsys.readouterr().err
+    assert {p.name for p in (tmp_path / "film").iterdir()} == {"force.csv", "summary.json"}
