@@ -60,15 +60,18 @@ def _pictures(done: Finished) -> dict[str, bytes]:
     trace = s["trace"]["label"]
     real = f"{trace}, peak {uncertain(s['peak_real_N'], s['peak_real_sd_N'], 'N')}"
     simulated = f"simulated, peak {quantity(s['peak_sim_N'], 'N')}"
+    look = None
+    if done.section is not None:
+        of_cut = (done.section, s["knife"], s["shape"]["height"], curves["stroke_m"], curves["sim_N"])
+        look = section.glance(*of_cut)
     found = {
-        "forces.svg": figures.forces(curves, real, simulated, _room(s), _inside(s)),
+        "forces.svg": figures.forces(curves, real, simulated, _room(s), _inside(s), look),
         "conditioning.svg": figures.conditioning(_record(done), curves),
         "fit.svg": figures.fit(curves, s["noise_sd_N"], trace),
         "nulls.svg": figures.nulls(curves, trace),
     }
     if done.section is not None:
-        k = s["knife"]
-        found["cut.svg"] = section.cut(done.section, k, s["shape"]["height"], curves["stroke_m"], curves["sim_N"])
+        found["cut.svg"] = section.cut(*of_cut)
     rows = [fitted.row(name, p) for name, p in s["parameters"].items()]
     if rows:
         found["parameters.svg"] = parameters.ranges(rows)

@@ -8,7 +8,7 @@ Letters are drawn as paths: no font is needed to show a figure.
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +23,8 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 MM = 1.0 / 25.4
 #: Width of a figure [mm]: the text width of the report, so that letters keep their size in print.
 WIDTH = 170.0
+#: Widths of forces and picture of the cut where they stand side by side, as a ratio.
+BESIDE = (2.0, 1.0)
 #: A record is drawn with its extremes in this many columns: more than a printer resolves on the page.
 COLUMNS = 900
 #: Ratio of the ends of a log axis up to which 1, 2 and 5 of each decade have room for their numbers.
@@ -107,7 +109,14 @@ class Record:
     peak_sd: float | None
 
 
-def forces(curves: Curves, measured: str, simulated: str, height: float, inside: str = "") -> bytes:
+def forces(
+    curves: Curves,
+    measured: str,
+    simulated: str,
+    height: float,
+    inside: str = "",
+    beside: Callable[[Axes], None] | None = None,
+) -> bytes:
     """Measured and simulated force over stroke, with the parts of the simulation and the predictive band if there is one.
 
     Args:
@@ -115,10 +124,15 @@ def forces(curves: Curves, measured: str, simulated: str, height: float, inside:
         measured, simulated: Labels of the two curves in the legend.
         height: Height of the figure [mm].
         inside: What the legend says of the trace within the band, in brackets.
+        beside: Draws a picture of the cut beside the forces.
     """
 
     def draw(figure: Figure) -> None:
-        axes = figure.subplots()
+        if beside is None:
+            axes = figure.subplots()
+        else:
+            axes, picture = figure.subplots(1, 2, width_ratios=BESIDE)
+            beside(picture)
         x = 1e3 * curves["stroke_m"]
         axes.axhline(0.0, color=BLACK, lw=0.5)
         predictive(axes, x, curves, "band_low_N", "band_high_N", f"95 % predictive band{inside}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -23,9 +23,14 @@ BRIGHT = 99.0
 """Percentile of the stress at which the colours end: few particles at the edge would darken all others."""
 COLOURS = "cividis_r"  # as light as grey in print, and the same to readers who are colour-blind
 DOTS = 220  # dots per inch of the particles, which are no vector graphics: some ten thousand of them
+ABOUT = 0.8  # distance from the blade to which a glance goes, in heights of the food
 MARGIN = 0.12  # room around the food, of its height
+FILLING = 1.2  # of a particle's square, so that there are no gaps where the food is stretched
 TALLEST = 52.0  # of one picture [mm]
 BESIDE = 26.0  # axes, labels and the scale of colours, of the figure's height [mm]
+
+
+Glance = Callable[[Axes], None]
 
 
 def moments(section: Section, stroke: np.ndarray, force: np.ndarray) -> list[tuple[int, str]]:
@@ -79,8 +84,39 @@ def cut(section: Section, knife: Mapping[str, Any], height: float, stroke: np.nd
     return svg(draw, len(shown) * (tall + 9.0) + BESIDE)
 
 
+def glance(section: Section, knife: Mapping[str, Any], height: float, stroke: np.ndarray, force: np.ndarray) -> Glance:
+    """What draws the food about the blade at the largest force into given axes.
+
+    Args:
+        section: The food across the blade's middle.
+        knife: ``spine`` [m], ``angle`` [rad] and ``height`` [m] of the blade.
+        height: Height of the food [m].
+        stroke, force: The simulated curve [m], [N].
+    """
+    k = int(np.argmin(np.abs(section.stroke - float(stroke[int(np.argmax(force))]))))
+    half = min(float(np.abs(section.y[k]).max()) + MARGIN * height, ABOUT * height)
+    near = np.abs(section.y[k]) < half
+
+    def draw(axes: Axes) -> None:
+        colour = ScalarMappable(
+            Normalize(0.0, (float(np.percentile(section.mises[k][near], BRIGHT)) or 1.0) / 1e3), COLOURS
+        )
+        top = height * (1 + 3 * MARGIN)
+        _food(axes, section, k, colour)
+        _tools(axes, knife, height - float(section.stroke[k]), top, half)
+        axes.set(xlim=(-1e3 * half, 1e3 * half), ylim=(-1e3 * MARGIN * height, 1e3 * top), aspect="equal")
+        axes.set(xlabel="across the blade [mm]", ylabel="height [mm]")
+        axes.set_title(f"largest force, {1e3 * float(section.stroke[k]):.1f} mm deep")
+        axes.grid(visible=False)
+        axes.figure.colorbar(
+            colour, ax=axes, location="bottom", shrink=0.9, aspect=25, extend="max", label="von Mises stress [kPa]"
+        )
+
+    return draw
+
+
 def _food(axes: Axes, section: Section, k: int, colour: ScalarMappable) -> None:
-    y, z, half = 1e3 * section.y[k], 1e3 * section.z[k], 1e3 * section.size.T / 2
+    y, z, half = 1e3 * section.y[k], 1e3 * section.z[k], FILLING * 1e3 * section.size.T / 2
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     shades = colour.to_rgba(section.mises[k] / 1e3)
     for sign in (1.0, -1.0) if section.mirrored else (1.0,):

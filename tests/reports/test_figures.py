@@ -8,6 +8,7 @@ import h5py
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from mpm.section import Section
 from reports import breakdowns, figures, fitted, parameters
@@ -148,3 +149,20 @@ def test_the_picture_of_the_cut_is_stable_and_fits_its_page(tmp_path: Path) -> N
     assert pages(write_report(run).read_bytes()) == without + 1
     (run / "record.h5").write_bytes(b"damaged")
     assert pages(write_report(run).read_bytes()) == without
+
+
+@pytest.mark.parametrize(("height", "length"), [(0.024, 0.1), (0.03, 0.02)])
+def test_the_glance_on_the_first_page_is_the_food_about_the_blade_at_the_largest_force(
+    height: float, length: float
+) -> None:
+    """A long food is shown to 0.8 heights from the blade, a short one whole; the blade stands at the stroke of the largest force."""
+    stroke = np.linspace(0.0, 0.02, 50)
+    section = looked_at(length, height)
+    axes = Figure().subplots()
+    pictures.glance(section, KNIFE, height, stroke, np.sin(np.pi * stroke / 0.024))(axes)
+    deep = section.stroke[np.argmin(np.abs(section.stroke - 0.012))]
+    assert axes.get_title() == f"largest force, {1e3 * deep:.1f} mm deep"
+    edge = axes.patches[0].get_xy()[0]
+    np.testing.assert_allclose(edge, [0.0, 1e3 * (height - deep)])
+    reach = min(np.abs(section.y).max() + 0.12 * height, 0.8 * height)
+    np.testing.assert_allclose(axes.get_xlim(), [-1e3 * reach, 1e3 * reach], rtol=0.05)
