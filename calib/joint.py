@@ -32,8 +32,22 @@ def residual(
         fractions: Part of its stroke that each completed [-].
         z: Internal coordinates (p,).
     """
-    data = [c.objective.data_residual(m, f) for c, m, f in zip(objective.cases, curves, fractions, strict=True)]
-    return np.concatenate([*data, objective.parameters.prior_residual(z)])
+    return residuals(objective, [m[None] for m in curves], np.array(fractions)[:, None], z[None])[0]
+
+
+def residuals(
+    objective: JointObjective | Objective, curves: Sequence[FloatArray], fractions: FloatArray, z: FloatArray
+) -> FloatArray:
+    """The same of q materials at once (q, rows).
+
+    Args:
+        objective: The objective.
+        curves: Smoothed force of each trace's simulations [N], each (q, n).
+        fractions: Part of its stroke that each completed [-], by trace (t, q).
+        z: Internal coordinates (q, p).
+    """
+    data = [c.objective.data_residuals(m, f) for c, m, f in zip(objective.cases, curves, fractions, strict=True)]
+    return np.concatenate([*data, objective.parameters.prior_residual(z)], axis=1)
 
 
 @dataclass(frozen=True)

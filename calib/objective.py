@@ -221,12 +221,12 @@ class Objective:
         own = math.hypot(self.target.noise_sd, self.errors.discrepancy * self.target.peak)
         return np.hypot(own, np.broadcast_to(self.target.u_num, self.target.curve.shape))
 
-    @property
+    @cached_property
     def sigma(self) -> float:
         """Standard deviation of one point of the curve, root of the mean square [N]."""
         return float(np.sqrt(np.mean(self.sigmas**2)))
 
-    @property
+    @cached_property
     def sigma_peak(self) -> float:
         """Standard deviation of the peak [N]."""
         open_ended = (n.sd * n.peak for n in self.nuisances if n.searched)
@@ -274,13 +274,18 @@ class Objective:
 
     def data_residual(self, curve: FloatArray, fraction: float = 1.0) -> FloatArray:
         """Rows of curve, peak, factor and failure (n + 2 or n + 3,) of a curve [N] (n,) that completed ``fraction``."""
-        return np.append(self._compare(curve), self.failure_weight * (1.0 - fraction))
+        return self.data_residuals(curve[None], np.array([fraction]))[0]
+
+    def data_residuals(self, curves: FloatArray, fractions: FloatArray) -> FloatArray:
+        """The same of several curves [N] (q, n) that completed their ``fractions`` (q,): (q, n + 2 or n + 3)."""
+        penalty = self.failure_weight * (1.0 - fractions)
+        return np.column_stack([self._compare(curves), penalty])
 
     def residual(self, curve: FloatArray, fraction: float, z: FloatArray) -> FloatArray:
         """All rows (n + 2 + p,) of a curve [N] (n,) from a run at ``z`` (p,) that completed ``fraction``."""
         return np.concatenate([self.data_residual(curve, fraction), self.parameters.prior_residual(z)])
 
-    @property
+    @cached_property
     def cases(self) -> tuple[Case, ...]:
         """The one trace, as a joint objective has several."""
         return (Case("", self, np.arange(len(self.parameters))),)
@@ -314,6 +319,10 @@ class Objective:
             log -= min(max(slope / max(curvature, pull), -1.0), 1.0)
         return math.exp(log)
 
+    def factors(self, curves: FloatArray) -> FloatArray:
+        """The same of several curves (q, n): (q,)."""
+        return np.array([self.factor(curve) for curve in curves]) if self.scale_sd > 0.0 else np.ones(len(curves))
+
     def unsearched(self) -> FloatArray:
         """Residual by one standard deviation of each nuisance that the search may not use (data_rows, k)."""
         columns = self._columns([n for n in self.nuisances if not n.searched])
@@ -328,16 +337,17 @@ class Objective:
         out: FloatArray = (own - self.target.curve + explained) / self.sigmas
         return out
 
-    def _compare(self, curve: FloatArray) -> FloatArray:
-        """Rows of curve and peak (n + 1,), whitened, and that of the factor where there is one."""
-        k = self.factor(curve)
-        rows = self._whiten(self._bare(k * curve))
-        return np.append(rows, math.log(k) / self.scale_sd) if self.scale_sd > 0.0 else rows
+    def _compare(self, curves: FloatArray) -> FloatArray:
+        """Rows of curves and peaks (q, n + 1), whitened, and that of the factor where there is one."""
+        if not self.scale_sd > 0.0:
+            return self._whiten(self._bare(curves).T).T
+        k = self.factors(curves)
+        return np.column_stack([self._whiten(self._bare(k[:, None] * curves).T).T, np.log(k) / self.scale_sd])
 
-    def _bare(self, curve: FloatArray) -> FloatArray:
-        """Rows of curve and peak (n + 1,), as if the measurement left nothing open."""
-        peak = (float(curve.max()) - self.target.peak) / self.sigma_peak
-        return np.append(self._weights * (curve - self.target.curve), peak)
+    def _bare(self, curves: FloatArray) -> FloatArray:
+        """Rows of curve and peak (..., n + 1) of curves (..., n), as if the measurement left nothing open."""
+        peak = (curves.max(axis=-1, keepdims=True) - self.target.peak) / self.sigma_peak
+        return np.concatenate([self._weights * (curves - self.target.curve), peak], axis=-1)
 
     @cached_property
     def _measured(self) -> FloatArray:

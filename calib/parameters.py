@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -147,6 +148,12 @@ class Parameter:
         return float(np.max(np.abs(np.subtract(there, back))) / max(abs(self.low), abs(self.high)))
 
 
+def _kept(values: FloatArray) -> FloatArray:
+    """An array that is kept, and so cannot be written to."""
+    values.setflags(write=False)
+    return values
+
+
 @dataclass(frozen=True)
 class ParameterSet:
     """The fitted parameters in a fixed order, as a vector in internal coordinates or as a dictionary [units].
@@ -177,7 +184,7 @@ class ParameterSet:
     def __getitem__(self, name: str) -> Parameter:
         return self.items[self.names.index(name)]
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names in order, (p,)."""
         return tuple(p.name for p in self.items)
@@ -187,36 +194,37 @@ class ParameterSet:
         """Internal coordinates of the present values, (p,)."""
         return self.to_vector({p.name: p.value for p in self.items})
 
-    @property
+    @cached_property
     def lower(self) -> FloatArray:
         """Internal coordinates of the hard lower bounds, (p,)."""
-        return np.array([p.to_internal(p.low) for p in self.items])
+        return _kept(np.array([p.to_internal(p.low) for p in self.items]))
 
-    @property
+    @cached_property
     def upper(self) -> FloatArray:
         """Internal coordinates of the hard upper bounds, (p,)."""
-        return np.array([p.to_internal(p.high) for p in self.items])
+        return _kept(np.array([p.to_internal(p.high) for p in self.items]))
 
-    @property
+    @cached_property
     def prior_mean(self) -> FloatArray:
         """Prior centre in internal coordinates, (p,)."""
-        return np.array([p.prior_mean for p in self.items])
+        return _kept(np.array([p.prior_mean for p in self.items]))
 
-    @property
+    @cached_property
     def prior_sd(self) -> FloatArray:
         """Prior standard deviation in internal coordinates, (p,)."""
-        return np.array([p.prior_sd for p in self.items])
+        return _kept(np.array([p.prior_sd for p in self.items]))
 
-    @property
+    @cached_property
     def steps(self) -> FloatArray:
         """Finite-difference widths in internal coordinates, (p,)."""
-        return np.array([p.step for p in self.items])
+        return _kept(np.array([p.step for p in self.items]))
 
-    @property
+    @cached_property
     def box(self) -> tuple[FloatArray, FloatArray]:
         """The prior's 95 % box inside the hard bounds, in internal coordinates: two arrays (p,)."""
         reach = Z95 * self.prior_sd
-        return np.maximum(self.lower, self.prior_mean - reach), np.minimum(self.upper, self.prior_mean + reach)
+        low = np.maximum(self.lower, self.prior_mean - reach)
+        return _kept(low), _kept(np.minimum(self.upper, self.prior_mean + reach))
 
     def to_vector(self, values: Mapping[str, float]) -> FloatArray:
         """Internal coordinates (p,) of a mapping name -> value [unit].

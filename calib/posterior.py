@@ -38,8 +38,13 @@ class Posterior:
 
     def rows(self, z: FloatArray) -> FloatArray:
         """Rows of data and priors at internal coordinates (p,), the priors last."""
-        rows = self.surrogate.residual(z)
-        return np.concatenate([self._whiten(self._weights * rows[: -self._p]), rows[-self._p :]])
+        return self.rows_all(z[None])[0]
+
+    def rows_all(self, z: FloatArray) -> FloatArray:
+        """The same at many points (q, p): (q, rows)."""
+        rows = self.surrogate.residuals(z)
+        data = self._whiten((self._weights * rows[:, : -self._p]).T).T
+        return np.concatenate([data, rows[:, -self._p :]], axis=1)
 
     def log(self, z: FloatArray) -> float:
         """Logarithm of the posterior density at internal coordinates (p,), up to a constant; minus infinity out of bounds."""

@@ -23,7 +23,7 @@ from scipy.optimize import least_squares
 
 from calib.parameters import Z95, Parameter, ParameterSet
 from calib.posterior import Posterior
-from calib.surrogate import STEP, Surrogate
+from calib.surrogate import STEP, Surrogate, slopes
 from calib.uncertainty import IDENTIFIED, NOT_SEEN, Interval, Uncertainty, Verdict
 
 FloatArray = npt.NDArray[np.float64]
@@ -119,7 +119,8 @@ class _Walker:
         self.others = np.array([k != i for k in range(len(parameters))])
         self.p = len(parameters)
         self.low, self.high = parameters.lower, parameters.upper
-        self.rows = Posterior(surrogate, parameters, found).rows
+        posterior = Posterior(surrogate, parameters, found)
+        self.rows, self.rows_all = posterior.rows, posterior.rows_all
 
     def follow(self, z: FloatArray) -> FloatArray:
         """The others' optimum from ``z`` with this parameter held."""
@@ -127,16 +128,23 @@ class _Walker:
             return z
 
         def rows(free: FloatArray) -> FloatArray:
-            whole = z.copy()
-            whole[self.others] = free
-            return self.rows(whole)
+            whole = np.tile(z, (len(free), 1))
+            whole[:, self.others] = free
+            return self.rows_all(whole)
 
         low, high = self.low[self.others], self.high[self.others]
         edge = 1e-9 * self.surrogate.unit[self.others]
         start = np.clip(z[self.others], low, high)
         scale = self.surrogate.unit[self.others]
         bounds = (low - edge, high + edge)
-        solved = least_squares(rows, start, bounds=bounds, x_scale=scale, max_nfev=EVALUATIONS)
+        solved = least_squares(
+            lambda free: rows(free[None])[0],
+            start,
+            jac=lambda free: slopes(rows, free, scale),
+            bounds=bounds,
+            x_scale=scale,
+            max_nfev=EVALUATIONS,
+        )
         out = z.copy()
         out[self.others] = np.clip(solved.x, low, high)
         return out
@@ -177,10 +185,8 @@ class _Walker:
 
     def feigned(self) -> float:
         """Curvature of the data's rise that the noise of the runs feigns: what the normal approximation leaves out."""
-        raw = np.array(
-            [self.rows(self.parameters.start + d) - self.rows(self.parameters.start - d) for d in self.steps]
-        )
-        raw = raw.T / (2.0 * np.diag(self.steps))
+        beside = self.rows_all(np.concatenate([self.parameters.start + self.steps, self.parameters.start - self.steps]))
+        raw = (beside[: self.p] - beside[self.p :]).T / (2.0 * np.diag(self.steps))
         naive = 1.0 / np.linalg.inv(raw.T @ raw)[self.i, self.i]
         return max(naive - 1.0 / float(self.found.covariance[self.i, self.i]), 0.0)
 

@@ -337,9 +337,9 @@ class Search:
     def _far(self, process: Surrogate) -> FloatArray:
         """The most promising point within the bounds, sought from random points and all runs."""
         low, high = self.parameters.box
-        starts = list(self.random.uniform(low, high, (STARTS, len(low)))) + [t.z for t in self.trials]
-        starts.sort(key=lambda z: process.expected(z, CAUTION_FAR))
-        found = [process.least(z, math.inf, CAUTION_FAR) for z in starts[:FOLLOWED]]
+        starts = np.array([*self.random.uniform(low, high, (STARTS, len(low))), *(t.z for t in self.trials)])
+        order = np.argsort(process.expected_all(starts, CAUTION_FAR), kind="stable")
+        found = [process.least(z, math.inf, CAUTION_FAR) for z in starts[order[:FOLLOWED]]]
         return min(found, key=lambda z: process.expected(z, CAUTION_FAR))
 
     def _probes(self, process: Surrogate, near: FloatArray, count: int) -> list[FloatArray]:
@@ -349,8 +349,8 @@ class Search:
         rows = process.jacobian(near)
         spread = PROBE_SPREAD * np.linalg.inv(np.linalg.cholesky(rows.T @ rows))
         points = self.parameters.clip(near + self.random.standard_normal((PROBES, len(near))) @ spread)
-        cost = np.array([process.expected(z, 0.0) for z in points])
-        doubt = np.array([process.doubt(z) for z in points])
+        cost = process.expected_all(points, 0.0)
+        doubt = process.expected_all(points, 1.0) - cost
         good = cost < max(process.best.misfit, cost.min()) + PROBE_COST
         return [points[i] for i in np.argsort(np.where(good, -doubt, 0.0))[:count]]
 

@@ -8,14 +8,14 @@ ones plus a process of their own, Kennedy & O'Hagan (2000), Biometrika 87:1.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve, eigh
 from scipy.optimize import least_squares, minimize
 
-from calib.joint import JointObjective, residual
+from calib.joint import JointObjective, residuals
 from calib.objective import LARGEST_DIFFERENCE, Objective, Trial
 from calib.parameters import LINEAR_STEP, ParameterSet
 
@@ -39,6 +39,8 @@ NOISE_MARGIN = 1.57
 
 #: Width of the differences of expected curves [coordinate units].
 STEP = 1e-3
+#: The same where a fit follows them downhill.
+DIFFERENCE = 1e-6
 
 #: An expected missing part of the stroke up to this is not held against a point: the process is smooth, the
 #: limit of what can be simulated is not, so that whole runs beside it would be shunned.
@@ -48,6 +50,20 @@ OVERSHOOT = 0.1
 def coordinate_unit(parameters: ParameterSet) -> FloatArray:
     """Unit of the internal coordinates (p,): 1 for a log parameter, the prior's 95 % range for another."""
     return np.array([1.0 if p.log else p.step / LINEAR_STEP for p in parameters])
+
+
+def slopes(rows: Callable[[FloatArray], FloatArray], z: FloatArray, unit: FloatArray) -> FloatArray:
+    """Forward differences (rows, p) about z (p,) of ``rows``, which takes many points (q, p) at once and gives (q, rows).
+
+    Args:
+        rows: The function.
+        z: Where.
+        unit: Unit of each coordinate (p,).
+    """
+    steps = DIFFERENCE * unit
+    found = rows(np.concatenate([z[None], z + np.diag(steps)]))
+    out: FloatArray = (found[1:] - found[0]).T / steps
+    return out
 
 
 class CurveProcess:
@@ -154,26 +170,26 @@ class CurveProcess:
         return [2.0 * curved, 2.0 * linear, *lengths, 2.0 * self._change(gap, h) * both, 2.0 * noise]
 
     def predict(self, z: FloatArray) -> tuple[FloatArray, float, float]:
-        """Expected curve [N] (n,), its standard deviation [N] and the completed part of the stroke at z."""
-        x = ((z - self.best.z) / self.unit)[None]
+        """Expected curve [N] (n,), its standard deviation [N] and the completed part of the stroke at z (p,)."""
+        curves, sds, fractions = self.predict_all(z[None])
+        return curves[0], float(sds[0]), float(fractions[0])
+
+    def predict_all(self, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Expected curves [N] (q, n), their standard deviations [N] (q,) and the completed parts of the stroke (q,) at z (q, p)."""
+        x = (z - self.best.z) / self.unit
         k = self._kernel(x, self._x, self.hyper)
-        own = OFFSET**2 + math.exp(2.0 * self.hyper[1]) * float(x[0] @ x[0]) + math.exp(2.0 * self.hyper[0])
-        variance = own - float(k[0] @ self._inverse @ k[0])
-        out = (k @ self._weights)[0]
-        size = math.exp(self._scale(z))
-        curve = size * (self.best.curve + self.peak * out[:-1])
-        sd = size * self.peak * math.sqrt(max(variance, 0.0))
-        return curve, sd, 1.0 - min(max(float(out[-1]) - OVERSHOOT, 0.0), 1.0)
+        own = OFFSET**2 + math.exp(2.0 * self.hyper[1]) * np.sum(x**2, axis=1) + math.exp(2.0 * self.hyper[0])
+        variance = own - np.sum((k @ self._inverse) * k, axis=1)
+        out = k @ self._weights
+        size = np.exp((z - self.best.z) @ self._law)
+        curves = size[:, None] * (self.best.curve + self.peak * out[:, :-1])
+        sds = size * self.peak * np.sqrt(np.maximum(variance, 0.0))
+        return curves, sds, 1.0 - np.clip(out[:, -1] - OVERSHOOT, 0.0, 1.0)
 
-    def doubt(self, z: FloatArray) -> float:
-        """Square root of the chi-square that not knowing the curve adds at z [-]."""
-        curve, sd, _ = self.predict(z)
-        return self.doubted(curve, sd)
-
-    def doubted(self, curve: FloatArray, sd: float) -> float:
-        """The same for an expected curve [N] (n,) with standard deviation ``sd`` [N]."""
+    def doubted(self, curves: FloatArray, sds: FloatArray) -> FloatArray:
+        """Square root of the chi-square (q,) that not knowing expected curves [N] (q, n) to ``sds`` [N] (q,) adds [-]."""
         goal = self.objective
-        return goal.factor(curve) * sd * math.sqrt(goal.effective_points) / goal.sigma
+        return goal.factors(curves) * sds * math.sqrt(goal.effective_points) / goal.sigma
 
     def feigned(self, z: FloatArray) -> FloatArray:
         """Information (p, p) that the noise of the runs feigns in differences of expected curves at z.
@@ -234,32 +250,38 @@ class Surrogate:
         """Chi-square of the difference that the noise of one simulated curve makes, all traces together [-]."""
         return math.fsum(p.luck * p.objective.effective_points for p in self.each)
 
-    def _predicted(self, z: FloatArray) -> list[tuple[FloatArray, float, float]]:
+    def residuals(self, z: FloatArray, caution: float | None = None) -> FloatArray:
+        """Residual vectors of the expected curves at z (q, p): (q, rows).
+
+        Args:
+            z: Internal coordinates.
+            caution: Weight of not knowing the curves: a row more for each trace; None: none.
+        """
         cases = self.objective.cases
-        return [process.predict(z[c.index]) for process, c in zip(self.each, cases, strict=True)]
+        found = [process.predict_all(z[:, c.index]) for process, c in zip(self.each, cases, strict=True)]
+        curves, sds, fractions = zip(*found, strict=True)
+        rows = residuals(self.objective, curves, np.array(fractions), z)
+        if caution is None:
+            return rows
+        doubts = [process.doubted(curve, sd) for process, curve, sd in zip(self.each, curves, sds, strict=True)]
+        return np.column_stack([rows, *(math.sqrt(caution) * doubt for doubt in doubts)])
 
     def residual(self, z: FloatArray) -> FloatArray:
-        """Residual vector of the expected curves at z."""
-        curves, _, fractions = zip(*self._predicted(z), strict=True)
-        return residual(self.objective, curves, fractions, z)
+        """Residual vector of the expected curves at z (p,)."""
+        return self.residuals(z[None])[0]
 
     def doubt(self, z: FloatArray) -> float:
-        """Square root of the chi-square that not knowing the curves adds at z [-]."""
-        cases = self.objective.cases
-        return math.hypot(*(process.doubt(z[c.index]) for process, c in zip(self.each, cases, strict=True)))
+        """Square root of the chi-square that not knowing the curves adds at z (p,) [-]."""
+        return float(np.linalg.norm(self.residuals(z[None], 1.0)[0, -len(self.each) :]))
 
     def expected(self, z: FloatArray, caution: float) -> float:
-        """Chi-square at z [-], the part from not knowing the curves weighted by ``caution``."""
-        rows = self._cautious(z, caution)
-        return float(rows @ rows)
+        """Chi-square at z (p,) [-], the part from not knowing the curves weighted by ``caution``."""
+        return float(self.expected_all(z[None], caution)[0])
 
-    def _cautious(self, z: FloatArray, caution: float) -> FloatArray:
-        curves, sds, fractions = zip(*self._predicted(z), strict=True)
-        doubts = [
-            math.sqrt(caution) * process.doubted(curve, sd)
-            for process, curve, sd in zip(self.each, curves, sds, strict=True)
-        ]
-        return np.append(residual(self.objective, curves, fractions, z), doubts)
+    def expected_all(self, z: FloatArray, caution: float) -> FloatArray:
+        """The same at many points (q, p): (q,)."""
+        out: FloatArray = np.sum(self.residuals(z, caution) ** 2, axis=1)
+        return out
 
     def least(self, start: FloatArray, radius: float, caution: float) -> FloatArray:
         """Point (p,) of least ``expected`` within the bounds and ``radius`` units of the best run."""
@@ -269,7 +291,12 @@ class Surrogate:
         high = np.minimum(parameters.upper, self.best.z + radius * self.unit) + edge
         inside = np.clip(start, low + 0.5 * edge, high - 0.5 * edge)
         found = least_squares(
-            self._cautious, inside, bounds=(low, high), x_scale=self.unit, max_nfev=15, args=(caution,)
+            lambda z: self.residuals(z[None], caution)[0],
+            inside,
+            jac=lambda z: slopes(lambda points: self.residuals(points, caution), z, self.unit),
+            bounds=(low, high),
+            x_scale=self.unit,
+            max_nfev=15,
         )
         return parameters.clip(np.asarray(found.x))
 
@@ -281,7 +308,8 @@ class Surrogate:
         """
         steps = STEP * self.unit
         moves = np.diag(steps)
-        rows = np.array([self.residual(z + d) - self.residual(z - d) for d in moves]).T / (2.0 * steps)
+        beside = self.residuals(np.concatenate([z + moves, z - moves]))
+        rows = (beside[: len(z)] - beside[len(z) :]).T / (2.0 * steps)
         first = 0
         for process, case in zip(self.each, self.objective.cases, strict=True):
             part = slice(first, first + case.objective.data_rows)
