@@ -80,7 +80,7 @@ def mises(tau: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Corotated:
-    """Fixed-corotated energy mu |F - R|^2 + lambda/2 (J - 1)^2 (Stomakhin et al. 2012), that of the particle solver.
+    """Fixed-corotated energy ``mu |F - R|^2 + lambda/2 (J - 1)^2`` (Stomakhin et al. 2012), that of the particle solver.
 
     Attributes: mu [Pa]; lam, first Lame constant [Pa].
     """

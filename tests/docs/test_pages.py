@@ -1,0 +1,161 @@
+"""The pages of the documentation say nothing that the code does not have: names, commands, limits, files, links."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import re
+import shlex
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import calib
+import mpm
+from calib.checks import VARIANTS, Check
+from calib.cli.main import COMMANDS, parser
+from calib.config import read_study
+from calib.knives import load_knife
+from calib.materials import load_material_file
+from calib.metrics import compare
+from calib.nulls import null_models
+from calib.verdicts import JUDGED, Verdict, judge
+from tests.data_dir import ROOT
+
+DOCS = ROOT / "docs"
+PAGES = sorted(DOCS.glob("*.md"))
+TEXTS = [*PAGES, ROOT / "README.md"]
+
+
+def read(path: Path) -> str:
+    """Text of a page."""
+    return path.read_text(encoding="utf-8")
+
+
+def name_of(path: Path) -> str:
+    """Name of a page in the list of tests."""
+    return path.name
+
+
+def rows(page: str) -> list[list[str]]:
+    """Cells of the tables of a page, without their heads."""
+    lines = [line for line in read(DOCS / page).splitlines() if line.startswith("| ")]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+
+
+def thing(name: str) -> Any:
+    """What a dotted name stands for."""
+    parts = name.split(".")
+    for k in range(len(parts), 0, -1):
+        try:
+            out: Any = importlib.import_module(".".join(parts[:k]))
+        except ModuleNotFoundError:
+            continue
+        for part in parts[k:]:
+            out = getattr(out, part)
+        return out
+    raise AssertionError(f"{name} cannot be imported")
+
+
+DOCUMENTED = re.findall(r"^\.\. auto\w+:: (\S+)", read(DOCS / "api.md"), flags=re.MULTILINE)
+
+
+def test_every_public_name_is_documented() -> None:
+    """What ``calib`` and ``mpm`` offer is on the page of the interface."""
+    offered = {f"{package.__name__}.{name}" for package in (calib, mpm) for name in package.__all__}
+    assert offered - set(DOCUMENTED) == set()
+
+
+@pytest.mark.parametrize("name", DOCUMENTED)
+def test_documented_name_has_docstrings(name: str) -> None:
+    """A name on that page exists, and it and its public methods and properties say what they are."""
+    found = thing(name)
+    members = {n: m for n, m in vars(found).items() if not n.startswith("_")} if inspect.isclass(found) else {}
+    told = {n: m for n, m in members.items() if callable(m) or isinstance(m, (property, classmethod, staticmethod))}
+    silent = [n for n, m in {name: found, **told}.items() if not (inspect.getdoc(m) or "").strip()]
+    assert silent == []
+
+
+def test_every_command_is_listed() -> None:
+    """The table of commands has each command once, and no other."""
+    listed = [cells[0].strip("`") for cells in rows("cli.md") if cells[0].startswith("`")]
+    assert sorted(listed) == sorted(COMMANDS)
+
+
+def commands(text: str) -> list[str]:
+    """Lines of a text's shell blocks that call cutcal or calibrate."""
+    blocks = re.findall(r"^```bash\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
+    lines = "\n".join(blocks).replace("\\\n", " ").splitlines()
+    return [line.partition(" #")[0] for line in lines if re.match(r"(cutcal|calibrate) ", line)]
+
+
+@pytest.mark.parametrize("path", [p for p in TEXTS if commands(read(p))], ids=name_of)
+def test_commands_can_be_typed(path: Path) -> None:
+    """The parsers take every command of a page: its options exist and their values have the right form."""
+    for line in commands(read(path)):
+        words = shlex.split(line)
+        try:
+            parser().parse_args(words[1:] if words[0] == "cutcal" else words)
+        except SystemExit:
+            pytest.fail(f"{path.name}: {line}")
+
+
+@pytest.mark.parametrize("path", TEXTS, ids=name_of)
+def test_links_lead_to_files(path: Path) -> None:
+    """A link to a file of the repository leads to one, as the page is read there."""
+    links = re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", read(path))
+    inside = [link for link in links if "://" not in link]
+    assert [link for link in inside if not (path.parent / link).exists()] == []
+
+
+@pytest.mark.parametrize("page", ["theory.md", "converge.md"])
+def test_named_modules_exist(page: str) -> None:
+    """A module or function that a page names by its full path exists."""
+    named = sorted(set(re.findall(r"`((?:calib|mpm|fem_reference)\.[\w.]+)`", read(DOCS / page))))
+    assert named
+    for name in named:
+        thing(name)
+
+
+def lines_of_a_report() -> list[Verdict]:
+    """Every line that a verdict table can have."""
+    s = np.linspace(0.0, 0.03, 100)
+    real = np.sin(np.pi * s / 0.03)
+    nulls = {name: model.metrics for name, model in null_models(s, real).items()}
+    nuisance = {"value": 0.0, "sd": 1.0, "prior_sd": 1.0, "unit": "-", "outside": False}
+    return judge(
+        compare(s, real, real),
+        nulls,
+        momentum_residual=0.0,
+        ke_over_ie=0.0,
+        parameters={},
+        checks=[Check(name, None, 0.0, 0.0, 0.0) for name in VARIANTS],
+        nuisances=dict.fromkeys(JUDGED, nuisance),
+    )
+
+
+def test_every_line_of_the_report_is_explained() -> None:
+    """The page of the report has each line of the verdict table, with its limit."""
+    table = {cells[0]: cells[1] for cells in rows("report.md")}
+    not_run = next(names for names in table if "held-out" in names).split(", ")
+    for line in lines_of_a_report():
+        if line.passed is None:
+            assert line.name.startswith(tuple(not_run))
+            continue
+        said = re.match(r"([\d.]+)( %)?", table[line.name])
+        if said is not None:
+            assert float(said[1]) * (0.01 if said[2] else 1.0) == line.limit
+
+
+def test_own_files_can_be_read(tmp_path: Path) -> None:
+    """The food, the knife and the study of the page on own data are taken as they stand there."""
+    blocks = re.findall(r"^```yaml\n(.*?)^```", read(DOCS / "own-data.md"), flags=re.MULTILINE | re.DOTALL)
+    files = [tmp_path / f"{k}.yaml" for k in range(len(blocks))]
+    for file, block in zip(files, blocks, strict=True):
+        file.write_text(block, encoding="utf-8")
+    food, knife, study = files
+    assert load_material_file(food).to_scene_food().material.E == 5e4
+    assert load_knife(food.with_name(knife.name)).spine == 1.8e-3
+    assert read_study(study).hold_out == ("first", "second")
