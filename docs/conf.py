@@ -44,7 +44,7 @@ def link_pages(app: Sphinx, name: str, source: list[str]) -> None:
 def keep_colon(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
     """Keep napoleon from taking what stands before a colon in a property's first line for its type."""
     if what == "property":
-        lines.insert(0, "")
+        lines.insert(0, "\\")  # an escaped line end, which is nothing: napoleon looks at the first line alone
 
 
 def setup(app: Sphinx) -> None:
