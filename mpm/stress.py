@@ -67,8 +67,8 @@ class Stress(Edge):
             self.kappa[p] = ti.max(self.kappa[p], self.strain[p])
             self.strain[p] = 0.0
             d = damage_of(self.kappa[p], eps0, eps_f)
-            if d > before and j > 1:
-                lost = (d - before) * (deviatoric_energy(v, mu) + 0.5 * lam * (j - 1) ** 2)
+            if d > before:  # what is compressed keeps its pressure, and so its energy
+                lost = (d - before) * (deviatoric_energy(v, mu) + (0.5 * lam * (j - 1) ** 2 if j > 1 else 0.0))
             e = v - unit()
             if double(e, e) > eps0 * eps0:
                 if largest_eigenvalue(e) > eps0:
@@ -193,6 +193,8 @@ class Stress(Edge):
             if mises2 > self.par[YIELD] ** 2:
                 back = j2_return_one(v, j, mises2, mu, self.par[YIELD])
                 plastic = deviatoric_energy(v, mu) - deviatoric_energy(back, mu)
+                if ti.static(self.damage):  # what is damaged flows under the part of the stress that is left
+                    plastic *= 1.0 - damage_of(self.kappa[p], self.par[EPS0], self.par[EPSF])
                 f = full(back) @ (full(cofactor(v)) @ f) / j
                 v = back
                 txx, tyy, tzz, tyz, txz, txy = deviator_stress(v[0], v[1], v[2], v[3], v[4], v[5], mu)
