@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -82,6 +82,7 @@ class Bench:
         seed: Seed of the particles.
         say: Called with a line after each measurement.
         peers: Interpreter that has the packages of the peers, if they are to be measured.
+        command: Command line, for provenance.
     """
 
     def __init__(
@@ -96,6 +97,7 @@ class Bench:
         seed: int,
         say: Say,
         peers: str | None = None,
+        command: Sequence[str] = (),
     ) -> None:
         shape, _ = specimen(food, None, Sizing())
         self.scene = cut_scene(food, shape, load_knife(knife), seed=seed)
@@ -108,6 +110,7 @@ class Bench:
         self.document: dict[str, Any] = {
             "food": food.name,
             "knife": knife,
+            "command": list(command),
             "complete": False,
             "device": runtime.arch,
             "threads": runtime.cpu_threads,
@@ -388,9 +391,10 @@ def _rate(record: ForceRecord) -> float:
 
 
 def run(food: FoodSpec, knife: str, out: Path, **options: Any) -> dict[str, Any]:
-    """Measure, and write bench.json and bench.svg; the options are those of :class:`Bench`."""
+    """Measure, and write bench.json, bench.svg and report.pdf; the options are those of :class:`Bench`."""
     document = Bench(food, knife, out, **options).run()
-    from reports.bench import write_figure
+    from reports.bench import write_figure, write_report
 
     write_figure(out)
+    write_report(out)
     return document

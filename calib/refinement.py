@@ -96,7 +96,7 @@ def run(
     resume: bool = False,
     say: Callable[[str], None],
 ) -> dict[str, Any]:
-    """Run a study and write converge.json, curves.csv and converge.svg.
+    """Run a study and write converge.json, curves.csv, converge.svg and report.pdf.
 
     Args:
         scene: The cut; its cell size is not used.
@@ -121,9 +121,10 @@ def run(
     document = {**about, **_conclude(todo, results, out)}
     document |= {"device": pool.arch, "versions": versions(), "git": git_commit()}
     write_json(out / "converge.json", document)
-    from reports.convergence import write_figure
+    from reports.convergence import write_figure, write_report
 
     write_figure(out)
+    write_report(out)
     return document
 
 

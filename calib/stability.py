@@ -48,7 +48,7 @@ def run(
     resume: bool = False,
     say: Callable[[str], None],
 ) -> dict[str, Any]:
-    """Run the map and write stress.json and stress.svg.
+    """Run the map and write stress.json, stress.svg and report.pdf.
 
     Args:
         cells: The map.
@@ -70,9 +70,10 @@ def run(
     document = {**about, **conclude(cells, results)}
     document |= {"device": pool.arch, "versions": versions(), "git": git_commit()}
     write_json(out / "stress.json", document)
-    from reports.stability import write_figure
+    from reports.stability import write_figure, write_report
 
     write_figure(out)
+    write_report(out)
     return document
 
 

@@ -1,4 +1,4 @@
-"""The figure of a stability map: four planes of pairs, and a list of all other cells."""
+"""Figure and report of a stability map: four planes of pairs, and a list of all other cells."""
 
 from __future__ import annotations
 
@@ -11,7 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from reports.brief import Brief, Part, Table, write_brief
+from reports.document import breakable, duration, quantity
 from reports.figures import BLACK, BLUE, GREEN, GREY, ORANGE, RED, svg
+from reports.finished import Data
+from reports.words import capital, words
 
 PLANES = {
     "E and nu": ("E_Pa", "nu", "stiffness [Pa]", "Poisson's ratio"),
@@ -31,6 +35,15 @@ LOOKS: dict[str, dict[str, Any]] = {
     "refused": {"marker": "s", "mfc": "none", "mec": GREY, "color": GREY, "ms": 7.5},
     "unexplained": {"marker": "D", "color": BLACK},
 }
+ALT = "Runs over stiffness and Poisson's ratio, stiffness and resistance, time step and cell, time step and Poisson's ratio, and all others"
+MAP = "A mark for each run; marks in a circle should be stable and are not. Framed cells are refused; where a mark is in the frame they were run in spite of that."
+AUDITED = ("momentum_residual", "energy_gain")
+BALANCES = "Momentum that does not balance, over the largest force; energy that came from nothing, over the work that was put in."
+LIMITS = (
+    "Cells are small cuts of simple blocks: a large food of odd shape may break down where none of these does.",
+    "Stable is not accurate: that is the business of cutcal verify and cutcal converge.",
+    "Between the values that were tried nothing is known.",
+)
 COLUMNS = 3
 LINE = 3.4  # height of a line of the list [mm]
 
@@ -38,9 +51,78 @@ LINE = 3.4  # height of a line of the list [mm]
 def write_figure(out: Path) -> None:
     """Draw stress.svg from stress.json in ``out``."""
     cells = json.loads((out / "stress.json").read_text(encoding="utf-8"))["cells"]
+    (out / "stress.svg").write_bytes(_picture(cells))
+
+
+def write_report(out: Path) -> Path:
+    """Write report.pdf from stress.json in ``out``.
+
+    Raises:
+        ReportError: The file is missing, damaged or incomplete, or the report cannot be written.
+    """
+    return write_brief(out / "stress.json", _brief)
+
+
+def _brief(d: Data) -> Brief:
+    """What the report holds."""
+    physical, cells, limits = d["physical"], d["cells"], d["limits"]
+    stable = f"{physical['stable']} of {physical['cells']} cells that are physical and below {limits['dt_over_limit']:g} of the time step's limit are stable"
+    rest = (
+        "all others ended for a named reason" if not d["unexplained"] else f"{d['unexplained']} cells are unexplained"
+    )
+    named = [c for c in cells if c["status"] == "unexplained" or c["name"] in physical["not_stable"]]
+    parts = [
+        Part("How the runs ended", table=_ends(d)),
+        Part("Cells that failed", table=_failed(named)) if named else Part("Cells that failed", "None."),
+        Part("Balances of the stable runs", BALANCES, table=_balances(cells)),
+        Part("The map", MAP, _picture(cells), ALT, apart=True),
+    ]
+    return Brief(
+        kind="Stability of the solver",
+        name="Where the solver is stable",
+        passed=bool(d["passed"]),
+        sentence=f"{capital(stable)}, and {rest}.",
+        facts=[
+            ("Cells", str(len(cells))),
+            ("Seed of the particles", str(d["seed"])),
+            (
+                "A run ends by itself",
+                f"after {limits['particle_steps']:.3g} particle steps or {duration(limits['time_s'])}",
+            ),
+        ],
+        parts=parts,
+        limits=LIMITS,
+    )
+
+
+def _ends(d: Data) -> Table:
+    reasons = {"stable": "reached the end; momentum and energy balance", **d["reasons"]}
+    order = sorted(d["counts"].items(), key=lambda item: -item[1])
+    rows = [[words(reason), reasons.get(reason, ""), str(count)] for reason, count in order]
+    return Table(("End", "Meaning", "Cells"), ("36mm", "1fr", "16mm"), rows, left=2)
+
+
+def _failed(cells: list[Data]) -> Table:
+    rows = [[breakable(c["name"]), words(c["reason"] or c["status"]), capital(str(c["message"]))] for c in cells]
+    return Table(("Cell", "End", "Why"), ("60mm", "30mm", "1fr"), rows, left=3)
+
+
+def _balances(cells: list[Data]) -> Table:
+    """Worst balances of each family's stable runs."""
+    rows = []
+    for family in dict.fromkeys(c["family"] for c in cells):
+        own = [c for c in cells if c["family"] == family and c["status"] == "stable"]
+        if own:
+            worst = [max((abs(c[k]) for c in own if c.get(k) is not None), default=None) for k in AUDITED]
+            rows.append([words(family), str(len(own)), *(quantity(w, "fraction", digits=2) for w in worst)])
+    return Table(
+        ("Family", "Stable runs", "Momentum, largest", "Energy gain, largest"), ("1fr", "auto", "auto", "auto"), rows
+    )
+
+
+def _picture(cells: list[Data]) -> bytes:
     others = [c for c in cells if c["family"] not in PLANES]
     rows = max(math.ceil(len(others) / COLUMNS), 1)
-    height = 118.0 + LINE * rows
 
     def draw(figure: Figure) -> None:
         panels = figure.subplot_mosaic(
@@ -57,7 +139,7 @@ def write_figure(out: Path) -> None:
         )
         figure.legend(handles=marks, loc="outside upper left", ncols=6, handlelength=1.2)
 
-    (out / "stress.svg").write_bytes(svg(draw, height))
+    return svg(draw, 118.0 + LINE * rows)
 
 
 def _look(cell: dict[str, Any]) -> str:

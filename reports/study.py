@@ -79,6 +79,16 @@ def write_report(folder: Path) -> Path:
     return target
 
 
+def is_study(summary: Path) -> bool:
+    """Whether a summary.json is that of a study of several cuts.
+
+    Raises:
+        ReportError: It is missing or damaged.
+    """
+    found = read_json(summary)
+    return isinstance(found, dict) and "study" in found
+
+
 def read_study(folder: Path) -> Study:
     """Read a study's folder.
 

@@ -16,7 +16,8 @@ HELP = "run time against error on this machine"
 DESCRIPTION = """Measure on this machine: the rate of the kernels beside that of a textbook
 solver with the same physics, the time of the default cut beside that of the
 published configuration (120^3 nodes, dt 2e-5 s), and time and error of the
-cut with one thing changed. Writes bench.json and bench.svg to --out.
+cut with one thing changed. Writes bench.json,
+bench.svg and report.pdf to --out.
 
 Only the ratios mean something elsewhere: each is of runs that took turns."""
 EPILOG = """example:
@@ -67,6 +68,7 @@ def run(args: argparse.Namespace) -> int:
         seed=args.seed,
         say=lambda text: print(text, file=sys.stderr, flush=True),
         peers=args.peers,
+        command=["bench", *(a for a in sys.argv[1:] if a != "bench")],
     )
     if args.json:
         print((out / "bench.json").read_text(encoding="utf-8"), end="")

@@ -1,26 +1,54 @@
-"""``cutcal report``: typeset the report of a finished calibration again."""
+"""``cutcal report``: typeset the report of a finished run again."""
 
 from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Callable
 from pathlib import Path
 
-HELP = "write report.pdf of a finished calibration again"
-DESCRIPTION = "Typeset report.pdf from summary.json, curves.csv and evaluations.h5 of a calibration."
+from reports import ReportError
+
+HELP = "write report.pdf of a finished run again"
+DESCRIPTION = """Typeset report.pdf again from the files that a calibration, a study of several
+cuts, converge, verify, stress or bench wrote."""
 EPILOG = "example:\n  cutcal report runs/banana"
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
-    p.add_argument("dir", help="folder that a calibration wrote (--out)")
+    p.add_argument("dir", help="folder of the run (--out)")
     p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the report."""
-    from reports.calibration import write_report
-
-    path = write_report(Path(args.dir))
+    path = writer(Path(args.dir))(Path(args.dir))
     print(json.dumps({"report": str(path)}) if args.json else f"wrote {path}")
     return 0
+
+
+def writer(folder: Path) -> Callable[[Path], Path]:
+    """What writes the report of a folder, by the file that a run of its kind leaves there.
+
+    Raises:
+        ReportError: The folder is missing, or holds no finished run.
+    """
+    from reports import bench, calibration, convergence, stability, study, verification
+
+    found: dict[str, Callable[[Path], Path]] = {
+        "converge.json": convergence.write_report,
+        "verify.json": verification.write_report,
+        "stress.json": stability.write_report,
+        "bench.json": bench.write_report,
+    }
+    for name, write in found.items():
+        if (folder / name).exists():
+            return write
+    if not folder.is_dir():
+        raise ReportError(f"{folder}: no such folder; give the --out of a run")
+    summary = folder / "summary.json"
+    if not summary.exists():
+        names = ", ".join(("summary.json", *found))
+        raise ReportError(f"{folder}: holds none of {names}; give the --out of a finished run")
+    return study.write_report if study.is_study(summary) else calibration.write_report

@@ -15,8 +15,8 @@ DESCRIPTION = """Run some 250 small cuts with one or two things pushed to the en
 range or past it: stiffness, Poisson's ratio, time step, cell, speed, density,
 yield stress, cutting resistance, blades that miss the food, food in the air or
 a hundred times too dense. Each must end stable, or refused or stopped for a
-reason that is named; momentum and energy are audited. Writes stress.json and
-stress.svg to --out."""
+reason that is named; momentum and energy are audited. Writes stress.json,
+stress.svg and report.pdf to --out."""
 EPILOG = """examples:
   cutcal stress --quick
   cutcal stress --out runs/stress --workers 4

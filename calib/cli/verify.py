@@ -16,7 +16,8 @@ HELP = "compare the solver with closed forms and finite elements"
 DESCRIPTION = """Compare the solver with closed forms, and with finite elements of the same law:
 laws at a point, conservation, waves, vibration, friction, impact, a manufactured
 solution, presses, and the cutting force of a thin blade. The finite elements are
-themselves compared with known answers. Writes verify.json and verify.svg to --out."""
+themselves compared with known answers. Writes verify.json, verify.svg and
+report.pdf to --out."""
 EPILOG = """examples:
   cutcal verify --quick
   cutcal verify --only press --out runs/presses

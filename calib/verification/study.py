@@ -72,9 +72,10 @@ def run(
         say(f"{name}: {len(found[name]['rows'])} rows, {state}; {done_now}")
     document |= _table(todo, found)
     write_json(out / "verify.json", document)
-    from reports.verification import write_figure
+    from reports.verification import write_figure, write_report
 
     write_figure(out)
+    write_report(out)
     return document
 
 
