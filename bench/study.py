@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from bench.peers import PEERS, measure
+from calib.documents import tag
 from calib.filters import filter_simulated
 from calib.knives import load_knife
 from calib.materials import FoodSpec
@@ -108,6 +109,7 @@ class Bench:
         self.out, self.runtime, self.repeats, self.finest, self.say = out, runtime, repeats, finest, say
         self.peers = peers
         self.document: dict[str, Any] = {
+            "schema": tag("bench"),
             "food": food.name,
             "knife": knife,
             "command": list(command),

@@ -19,13 +19,14 @@ import numpy as np
 import pandas as pd
 
 from calib.checks import otherwise
+from calib.documents import tag
 from calib.doubt import doubt_of
 from calib.errors import OutputError
 from calib.fit import calibrate
 from calib.knives import load_knife
 from calib.materials import FoodSpec
 from calib.objective import ErrorModel
-from calib.outputs import prepare, write_json
+from calib.outputs import finite, prepare, write_json
 from calib.preparation import fit_parameters, set_up
 from calib.progress import Countdown
 from calib.provenance import code_key, git_commit, key_of, versions
@@ -149,7 +150,7 @@ def run(
                 )
                 _append(lines, done[k])
             say(f"trace {k + 1} of {traces}: {_words(done[k])}; {rest.left(1.0)}")
-    document = summarise([done[k] for k in range(traces)])
+    document = {"schema": tag("coverage"), **summarise([done[k] for k in range(traces)])}
     document |= {
         "food": food.name,
         "knife": knife,
@@ -305,6 +306,6 @@ def _append(path: Path, row: Mapping[str, Any]) -> None:
     """
     try:
         with path.open("a", encoding="utf-8") as stream:
-            stream.write(json.dumps(row) + "\n")
+            stream.write(json.dumps(finite(row), allow_nan=False) + "\n")
     except OSError as e:
         raise OutputError(f"{path}: cannot be written ({e.strerror})") from None

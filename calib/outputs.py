@@ -58,7 +58,7 @@ def prepare(out: Path, *, resume: bool) -> None:
 
 def write_json(path: Path, content: dict[str, Any]) -> None:
     """Write a JSON document atomically; NaN and infinity become null."""
-    _replace(path, json.dumps(_finite(content), indent=2, ensure_ascii=False) + "\n")
+    _replace(path, json.dumps(finite(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 
 def write_csv(path: Path, columns: Mapping[str, Any], *, head: Sequence[str] = (), digits: int = 9) -> None:
@@ -76,11 +76,12 @@ def _replace(path: Path, text: str) -> None:
         raise OutputError(f"{path}: cannot be written ({e.strerror})") from None
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
+    """Plain data that JSON can hold: numbers of NumPy become Python's, NaN and infinity None."""
     if isinstance(value, dict):
-        return {str(k): _finite(v) for k, v in value.items()}
+        return {str(k): finite(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_finite(v) for v in value]
+        return [finite(v) for v in value]
     if hasattr(value, "item"):
         value = value.item()
     if isinstance(value, float) and not math.isfinite(value):

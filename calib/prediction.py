@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from calib.documents import tag
 from calib.filters import filter_simulated
 from calib.knives import load_knife
 from calib.metrics import Metrics, compare
@@ -64,6 +65,7 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
         },
     )
     summary = {
+        "schema": tag("predict"),
         "food": request.food.name,
         "trace": curve.trace.label,
         "trace_sha256": curve.trace.sha256,

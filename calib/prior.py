@@ -19,6 +19,7 @@ import numpy.typing as npt
 from scipy.stats import qmc, truncnorm
 
 import calib
+from calib.documents import tag
 from calib.errors import CurveError
 from calib.evaluation import Evaluation
 from calib.filters import N_STROKE, filter_simulated
@@ -163,7 +164,11 @@ def run(
         name = one.food.name
         rows[name] = about | row
         write_csv(out / f"{name}.csv", columns, head=_head(name, rows[name]), digits=DIGITS)
-    document = {"passed": all(rows[one.food.name]["default_status"] == "ok" for one in plans), "foods": rows}
+    document = {
+        "schema": tag("prior"),
+        "passed": all(rows[one.food.name]["default_status"] == "ok" for one in plans),
+        "foods": rows,
+    }
     write_json(out / "prior.json", document)
     from reports.prior import write_figure
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from calib.convergence import CurveEstimate, Estimate, curve_estimate, estimate
+from calib.documents import tag
 from calib.errors import CurveError
 from calib.evaluation import Evaluation
 from calib.filters import filter_simulated
@@ -118,7 +119,7 @@ def run(
     prepare(out, resume=resume)
     with EvaluationStore(out / "evaluations.h5", Header("", key_of(scene.as_dict())), resume=resume) as store:
         results = _evaluate(todo, store, pool, say)
-    document = {**about, **_conclude(todo, results, out)}
+    document = {"schema": tag("converge"), **about, **_conclude(todo, results, out)}
     document |= {"device": pool.arch, "versions": versions(), "git": git_commit()}
     write_json(out / "converge.json", document)
     from reports.convergence import write_figure, write_report

@@ -22,6 +22,7 @@ from scipy.stats import norm, qmc
 
 import calib
 from calib.descent import Aim, Minimum, descent, together
+from calib.documents import tag
 from calib.errors import PublishedError
 from calib.evaluation import Evaluation
 from calib.outputs import prepare, write_json
@@ -172,7 +173,7 @@ def run(
         best = fit(bench)
         found = {cut.name: bench.cut(cut, [_values(published, best)], FINE)[0] or {} for cut in published.cuts}
         drawn = band(bench, best, draws, seed)
-    document = conclude(published, best, found, drawn)
+    document = {"schema": tag("scalars"), **conclude(published, best, found, drawn)}
     document |= {"draws_asked": draws, "seed": seed, "evaluations": bench.runs, "failed_evaluations": bench.broken}
     document |= {"dx_m": {name: scene.numerics.dx for name, scene in scenes[FINE].items()}, "device": pool.arch}
     document |= {"cutcal": calib.__version__, "commit": git_commit()}

@@ -12,6 +12,7 @@ from typing import Any
 from calib.checks import Check, check
 from calib.conditioning import Conditioned
 from calib.config import Study
+from calib.documents import tag
 from calib.heldout import Prediction, predict
 from calib.materials import FoodSpec, dump_material
 from calib.metrics import compare
@@ -144,6 +145,7 @@ def _summary(
     predicted = {name: {"trace": _source(setups[name])} | p.as_dict() for name, p in held.items()}
     passed = [t["passed"] for t in traces.values()] + [p.passed for p in held.values()]
     return {
+        "schema": tag("study"),
         "food": study.food.name,
         "study": study.source,
         "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from calib.documents import tag
 from calib.evaluation import Evaluation
 from calib.hazards import SOUND_STEP, Cell
 from calib.outputs import prepare, write_json
@@ -67,7 +68,7 @@ def run(
     prepare(out, resume=resume)
     with EvaluationStore(out / "evaluations.h5", Header("", "stability map"), resume=resume) as store:
         results = evaluate(cells, store, pool, say)
-    document = {**about, **conclude(cells, results)}
+    document = {"schema": tag("stress"), **about, **conclude(cells, results)}
     document |= {"device": pool.arch, "versions": versions(), "git": git_commit()}
     write_json(out / "stress.json", document)
     from reports.stability import write_figure, write_report

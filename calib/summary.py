@@ -14,6 +14,7 @@ import h5py
 
 from calib.checks import Check
 from calib.conditioning import Conditioned
+from calib.documents import tag
 from calib.doubt import Doubt
 from calib.errors import OutputError
 from calib.fit import FitResult
@@ -77,6 +78,7 @@ def summarise(
         record.fracture,
     )
     return {
+        "schema": tag("calibrate"),
         "food": request.food.name,
         "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
         "status": "interrupted" if stopped else "done",

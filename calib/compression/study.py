@@ -13,6 +13,7 @@ import numpy as np
 from calib.compression.measured import SMALL, area, read_repeats
 from calib.compression.modulus import Fit, fit, scale, sensitivity
 from calib.compression.press import CONTACT, Say, grid_change, press_scene, solver_error, unit_curve
+from calib.documents import tag
 from calib.errors import CurveError
 from calib.outputs import prepare, write_csv, write_json
 from calib.provenance import git_commit, versions
@@ -145,6 +146,7 @@ def run(
         other = {"plates": _plates(not bonded), "E_Pa": float(modulus)}
     lines = judge(found, error, change)
     document: dict[str, Any] = {
+        "schema": tag("compress"),
         **about,
         "specimen": {**asdict(shape), "area_m2": area(shape)},
         "assumed": {"nu": nu, "plates": _plates(bonded)},

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from calib.documents import tag
 from calib.errors import CurveError
 from calib.outputs import prepare, write_json
 from calib.progress import Countdown
@@ -54,7 +55,7 @@ def run(
     own = {"quick": how.quick, "seed": how.seed, "device": how.arch, "code": code_key()}
     found = _known(out, own) if resume else {}
     new = sorted((c for c in todo if c.name not in found), key=lambda c: -c.cost)
-    document = {**about, **own, "versions": versions(), "git": git_commit()}
+    document = {"schema": tag("verify"), **about, **own, "versions": versions(), "git": git_commit()}
     if len(new) < len(todo):
         say(f"{len(todo) - len(new)} of {len(todo)} cases are known already")
     rest = Countdown(sum(c.cost for c in new))
