@@ -216,7 +216,8 @@ def rule_of(name: str, rules: Mapping[str, Rule] = PROPERTIES) -> Rule:
 
 def _check_limits(place: Place, x: float, rule: Rule) -> None:
     if not rule.low <= x <= rule.high:
+        unit = "" if rule.unit == "-" else f" {rule.unit}"
         raise place.error(
-            f"{x:g} {rule.unit} cannot be the {rule.meaning}; "
-            f"it must lie between {rule.low:g} and {rule.high:g} {rule.unit}: {rule.why}"
+            f"{x:g}{unit} cannot be the {rule.meaning}; "
+            f"it must lie between {rule.low:g} and {rule.high:g}{unit}: {rule.why}"
         )

@@ -135,8 +135,8 @@ def _content(path: Path) -> bytes:
             raise TraceError(f"{path} is a directory; name a CSV, JSON or HDF5 file")
         if not path.is_file():
             near = difflib.get_close_matches(path.name, _names_beside(path), n=3)
-            hint = f"; did you mean {' or '.join(near)}?" if near else ""
-            raise TraceError(f"{path}: no such file{hint}")
+            hint = f"did you mean {' or '.join(near)}?" if near else "check the path"
+            raise TraceError(f"{path}: no such file; {hint}")
         raw = path.read_bytes()
     except OSError as error:
         raise TraceError(f"{path}: cannot be read ({error.strerror})") from None

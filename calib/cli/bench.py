@@ -8,7 +8,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_run, number
+from calib.cli.options import (
+    KNIFE_HELP,
+    add_run,
+    number,
+    print_json,
+    whole,
+)
 from calib.errors import CurveError
 from calib.materials import load_food
 
@@ -30,9 +36,11 @@ there is no --resume. Nothing else should run meanwhile; about ten minutes."""
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
     p.add_argument("--food", default="banana", metavar="NAME", help="food of materials.yaml (default banana)")
-    p.add_argument("--knife", default="kitchen", metavar="NAME", help="knife of knives.yaml, or a YAML file")
-    p.add_argument("--repeats", type=int, default=3, help="turns that each of two runs takes (default 3)")
-    p.add_argument("--threads", type=int, default=0, help="CPU threads, 0 = all cores")
+    p.add_argument("--knife", default="kitchen", metavar="NAME", help=KNIFE_HELP)
+    p.add_argument(
+        "--repeats", type=whole(1), default=3, metavar="N", help="turns that each of two runs takes (default 3)"
+    )
+    p.add_argument("--threads", type=whole(0), default=0, metavar="N", help="CPU threads (default 0: all cores)")
     p.add_argument(
         "--reference-dx",
         type=number(1e-4, 0.02, "m"),
@@ -43,7 +51,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--peers",
         metavar="PYTHON",
-        help="interpreter with warp-lang or genesis-world: measure the elastic block in them too",
+        help="interpreter with warp-lang or genesis-world to measure",
     )
     add_run(p)
 
@@ -53,8 +61,6 @@ def run(args: argparse.Namespace) -> int:
     from bench.study import run as study
     from mpm.runtime import Runtime
 
-    if args.repeats < 1 or args.threads < 0:
-        raise CurveError("--repeats must be at least 1 and --threads at least 0")
     if args.peers is not None and shutil.which(args.peers) is None:
         raise CurveError(f"--peers {args.peers}: no such program; give the Python of an environment with the peers")
     out = Path(args.out or f"cutcal-bench-{args.food}")
@@ -71,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
         command=["bench", *(a for a in sys.argv[1:] if a != "bench")],
     )
     if args.json:
-        print((out / "bench.json").read_text(encoding="utf-8"), end="")
+        print_json(document)
     else:
         print(table(document))
         print(f"  wrote {out}")

@@ -9,24 +9,32 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_food, add_run, add_workers, food_of, note, number, sizing_of, workers_of
+from calib.cli.options import (
+    RESUME_HELP,
+    RUN,
+    add_food,
+    add_run,
+    add_workers,
+    food_of,
+    note,
+    number,
+    print_json,
+    sizing_of,
+    titled,
+    workers_of,
+)
 from calib.objective import ErrorModel
 from calib.progress import ProgressBar
 from calib.request import Request
 from mpm.errors import CutcalError
 
-HELP = "fit a food to a measured knife-force trace and write a report"
-DESCRIPTION = """Fit a food's cutting properties to a knife-force trace.
-
-Writes summary.json, material.yaml, evaluations.h5, curves.csv and report.pdf
-to --out. The trace is a CSV, JSON or HDF5 file (file.h5:/group) with units in its
-column names (time_s, force_N, position_m, ...); robot logs with base_Fz_N and
-ee_z_m, libfranka's fields and CSV exports of ROS messages are known."""
+HELP = "fit a food to a measured knife-force trace, and report"
+DESCRIPTION = """Fit a food's cutting properties to a knife-force trace: CSV, JSON or HDF5 with
+units in its columns' names. Writes summary.json, report.pdf and more to --out."""
 EPILOG = """examples:
   calibrate --food banana --trace force_data/banana_reconstructed.csv
-  calibrate --food potato --trace cut.csv --air air.csv --knife edc --out runs/potato
+  calibrate --food potato --trace cut.csv --air air.csv --out runs/potato
   calibrate --config potatoes.yaml --out runs/potatoes
-  calibrate --food potato --trace cut.csv --scheduler tcp://host:8786
 
 Ctrl-C keeps what was computed; the same command with --resume goes on.
 Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass."""
@@ -34,60 +42,39 @@ Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass."
 
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
-    add_food(p, required=False)
+    p.usage = "%(prog)s --food NAME --trace FILE [options]"
     add_trace(p, required=False)
-    p.add_argument(
-        "--config",
-        metavar="YAML",
-        help="fit several cuts of one food together, some held out; in place of --food, --trace and their options",
-    )
-    p.add_argument(
-        "--fit", metavar="NAMES", help="properties to fit, e.g. E,nu,R,mu (default: those that cutting sees)"
-    )
-    p.add_argument(
-        "--budget", type=number(0, 1e6, ""), help="largest number of simulations (default 100, of each trace)"
-    )
-    add_workers(p, "simulations")
-    p.add_argument(
+    add_food(p, required=False)
+    fit = p.add_argument_group("fit")
+    fit.add_argument("--config", metavar="YAML", help="fit the cuts of this study, in place of --trace")
+    fit.add_argument("--fit", metavar="NAMES", help="properties, e.g. E,nu,R,mu (default: those a cut sees)")
+    fit.add_argument("--budget", type=number(0, 1e6, ""), metavar="N", help="most simulations of a trace (default 100)")
+    fit.add_argument(
         "--discrepancy",
         type=number(0, 1, ""),
         metavar="PART",
-        help="how far a right model may be from the curve, part of its peak (default 0.03)",
+        help="how far a right model may be, of the peak (0.03)",
     )
-    p.add_argument("--sample", action="store_true", help="sample the posterior as well (needs emcee)")
-    p.add_argument(
-        "--u-num",
-        metavar="DIR",
-        help="a cutcal converge study of this food and knife: its numerical uncertainty enters the likelihood",
-    )
-    p.add_argument("--resume", action="store_true", help="go on with the run in --out; nothing is simulated twice")
+    fit.add_argument("--sample", action="store_true", help="sample the posterior as well (needs emcee)")
+    fit.add_argument("--u-num", metavar="DIR", help="a converge study whose uncertainty the fit heeds")
+    add_workers(p, "simulations")
+    titled(p, RUN).add_argument("--resume", action="store_true", help=RESUME_HELP)
     add_run(p)
 
 
 def add_trace(p: argparse.ArgumentParser, *, required: bool = True) -> None:
     """Options that say what was measured."""
-    p.add_argument("--trace", required=required, metavar="FILE", help="record of the cut")
-    p.add_argument("--air", metavar="FILE", help="the same motion without food, subtracted at equal time")
-    p.add_argument("--time-col", metavar="NAME", help="column of the time")
-    p.add_argument("--force-col", metavar="NAME", help="column of the force on the knife")
-    p.add_argument("--position-col", metavar="NAME", help="column of the knife's height ('none': there is none)")
-    p.add_argument("--sign", choices=("+", "-"), help="sign that makes resistance to the knife positive")
-    p.add_argument(
-        "--speed", type=number(0, 10, "m/s"), metavar="M/S", help="knife speed, where the trace has no position"
-    )
-    p.add_argument(
-        "--gain-sd",
-        type=number(0, 1, ""),
-        metavar="PART",
-        help="how well the sensor's gain is known (default 0.02; 0.15 for a wrench estimated from joint torques)",
-    )
-    p.add_argument(
-        "--lag-sd",
-        type=number(0, 1, "s"),
-        metavar="S",
-        help="how well the delay of the force against the position is known, besides the onset's own uncertainty",
-    )
-    p.add_argument("--t-end", type=float, metavar="S", help="ignore the record after this time (board contact)")
+    g = p.add_argument_group("measurement")
+    g.add_argument("--trace", required=required, metavar="FILE", help="record of the cut")
+    g.add_argument("--air", metavar="FILE", help="the same motion without food, to be subtracted")
+    g.add_argument("--time-col", metavar="NAME", help="column of the time")
+    g.add_argument("--force-col", metavar="NAME", help="column of the force on the knife")
+    g.add_argument("--position-col", metavar="NAME", help="column of the knife's height ('none': none)")
+    g.add_argument("--sign", choices=("+", "-"), metavar="+|-", help="sign that makes resistance positive")
+    g.add_argument("--speed", type=number(0, 10, "m/s"), metavar="M/S", help="of the knife, where there is no position")
+    g.add_argument("--gain-sd", type=number(0, 1, ""), metavar="PART", help="doubt of the sensor's gain (default 0.02)")
+    g.add_argument("--lag-sd", type=number(0, 1, "s"), metavar="S", help="doubt of force against position in time [s]")
+    g.add_argument("--t-end", type=float, metavar="S", help="leave out what is later [s] (board contact)")
 
 
 BUDGET = 100.0
@@ -101,6 +88,8 @@ def request_of(args: argparse.Namespace, command: Sequence[str]) -> Request:
         CutcalError: An impossible value, an unknown name, a missing file.
     """
     named = None if args.fit is None else tuple(n.strip() for n in args.fit.split(",") if n.strip())
+    if named == ():
+        raise CutcalError(f"--fit {args.fit!r} names no property; give for instance --fit E,R, or leave it out")
     u_num = None if args.u_num is None else Path(args.u_num)
     errors = ErrorModel() if args.discrepancy is None else ErrorModel(discrepancy=args.discrepancy)
     return replace(
@@ -159,7 +148,7 @@ def run(args: argparse.Namespace) -> int:
     with workers_of(args, note) as pool, ProgressBar() as bar:
         summary = calibrate(request, out, pool, resume=args.resume, progress=bar, say=note)
     if args.json:
-        print((out / "summary.json").read_text(encoding="utf-8"), end="")
+        print_json(summary)
     else:
         print(verdict_text(summary, out))
     return 0 if summary["passed"] else 2
@@ -180,7 +169,7 @@ def run_study(args: argparse.Namespace, command: Sequence[str]) -> int:
     with workers_of(args, note) as pool, ProgressBar() as bar:
         summary = study_run(study, out, pool, resume=args.resume, progress=bar, say=note)
     if args.json:
-        print((out / "summary.json").read_text(encoding="utf-8"), end="")
+        print_json(summary)
     else:
         print(study_text(summary, out))
     return 0 if summary["passed"] else 2

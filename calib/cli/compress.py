@@ -7,27 +7,31 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_run, number
+from calib.cli.options import (
+    add_run,
+    number,
+    print_json,
+    whole,
+)
 from calib.errors import CurveError
 from mpm.shapes import Shape
 
-HELP = "calibrate Young's modulus on a compression test between two plates"
+HELP = "Young's modulus from a compression test between two plates"
 DESCRIPTION = """Calibrate Young's modulus on the force of a specimen that is compressed between
-two plates. One simulation at a reference modulus gives the curve, each repeat is
-fitted by scaling it. Strain is compression / height, stress is force / first area.
-The first sample of a repeat is its zero; no toe is corrected. Writes compress.json,
-curves.csv and compress.svg to --out."""
+two plates. One simulation at a reference modulus gives the curve; each repeat
+is fitted by scaling it. Strain is compression / height, stress force / first
+area. The first sample of a repeat is its zero; no toe is corrected. Writes
+compress.json, curves.csv and compress.svg to --out."""
 EPILOG = """examples:
   cutcal compress --trace gel.csv --height 0.03 --diameter 0.05 --nu 0.49
-  cutcal compress --trace a.csv b.csv --height 0.02 --width 0.02 --length 0.02 --nu 0.4 \\
-      --strain 0.2 --bracket
+  cutcal compress --trace a.csv b.csv --height 0.02 --width 0.02 --length 0.02 \\
+      --nu 0.4 --strain 0.2 --bracket
 
-A trace has a column of compression (compression_mm, displacement_mm, stroke_m, ...), one
-of load (load_N, force_N, load_kN, ...) and may have a column replicate, which splits it.
+A trace has a column of compression (compression_mm, displacement_mm, ...), one
+of load (load_N, force_kN, ...) and may have one of repeats (replicate).
 
-Exit codes: 0 passed, 1 error in input or run, 2 fitted but not within the limits (curve
-error 5 %, modulus over 0-5 % strain 10 %, solver against the closed form 3 %, or with
-bonded plates against a grid of two thirds of the cells)."""
+Exit codes: 0 passed, 1 error in input or run, 2 fitted but not within the
+limits (curve error 5 %, modulus over 0-5 % strain 10 %, solver 3 %)."""
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
@@ -37,7 +41,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     p.add_argument("--diameter", type=number(1e-3, 1.0, "m"), metavar="M", help="diameter of an upright cylinder [m]")
     for name in ("width", "length"):
         p.add_argument(f"--{name}", type=number(1e-3, 1.0, "m"), metavar="M", help=f"{name} of a block [m]")
-    p.add_argument("--nu", type=float, metavar="NU", help="Poisson's ratio, which this test does not tell from E")
+    p.add_argument("--nu", type=float, metavar="NU", help="Poisson's ratio, which the test does not tell")
     p.add_argument(
         "--strain",
         type=number(0.0, 0.8, ""),
@@ -45,11 +49,11 @@ def add_args(p: argparse.ArgumentParser) -> None:
         metavar="E",
         help="largest engineering strain to fit (default 0.4)",
     )
-    p.add_argument("--bonded", action="store_true", help="the food sticks to the plates; they are frictionless else")
+    p.add_argument("--bonded", action="store_true", help="the food sticks to the plates (default: it slides)")
     p.add_argument("--bracket", action="store_true", help="also the modulus if the plates were the other way")
-    p.add_argument("--cells", type=int, help="cells over the height (default 10, 15 between bonded plates)")
-    p.add_argument("--compression-col", metavar="NAME", help="column of the compression; metres without a unit")
-    p.add_argument("--force-col", metavar="NAME", help="column of the load; newtons without a unit")
+    p.add_argument("--cells", type=whole(1), metavar="N", help="cells over the height (default 10, 15 if bonded)")
+    p.add_argument("--compression-col", metavar="C", help="its column; metres without a unit")
+    p.add_argument("--force-col", metavar="C", help="column of the load; newtons without a unit")
     add_run(p)
 
 
@@ -81,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
         say=lambda text: print(text, file=sys.stderr, flush=True),
     )
     if args.json:
-        print((out / "compress.json").read_text(encoding="utf-8"), end="")
+        print_json(document)
     else:
         print(f"{table(document)}\n  wrote {out}")
     return 0 if document["passed"] else 2

@@ -8,24 +8,38 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_food, add_run, add_workers, food_of, number, numbers, say, sizing_of, workers_of
-from calib.errors import CurveError
+from calib.cli.options import (
+    RESUME_HELP,
+    RUN,
+    add_food,
+    add_run,
+    add_workers,
+    food_of,
+    number,
+    numbers,
+    print_json,
+    say,
+    sizing_of,
+    titled,
+    whole,
+    workers_of,
+)
 from calib.knives import load_knife
 from calib.scenes import cut_scene, specimen
 
-HELP = "repeat one cut on finer grids: order, grid convergence index, numerical uncertainty"
+HELP = "repeat a cut on finer grids: order, numerical uncertainty"
 DESCRIPTION = """Repeat one cut on finer grids, and apart from that with other time steps,
 speeds and particles. Writes converge.json, curves.csv (with the standard
 numerical uncertainty over the stroke, u_num_N of the finest grid and
 u_num_coarsest_N of the coarsest), converge.svg and report.pdf to --out."""
 EPILOG = """examples:
   cutcal converge --food banana
-  cutcal converge --food potato --material runs/potato/material.yaml --knife edc \\
-      --dx 3e-3,2e-3,1.5e-3,1e-3 --mach 0.005 --safety 0.35 --ppc 3 --offset 0.25,0.5
+  cutcal converge --food potato --material runs/potato/material.yaml \\
+      --dx 3e-3,2e-3,1.5e-3 --mach 0.005 --safety 0.35 --ppc 3 --offset 0.5
 
 Ctrl-C keeps what was computed; the same command with --resume goes on.
-Exit codes: 0 converged (work within 2 %, peak within 3 % between the two finest
-grids), 1 error in input or run, 2 ran but did not converge."""
+Exit codes: 0 converged (work within 2 %, peak within 3 % between the two
+finest grids), 1 error in input or run, 2 ran but did not converge."""
 WORDS = {"safety": "time step", "mach": "speed", "ppc": "particles", "offset": "offset", "repeat": "repeats"}
 REFINED = (1.0, 2 / 3, 1 / 2, 1 / 3)  # default cells over the scene's own one, which comes first
 
@@ -36,31 +50,35 @@ def add_args(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--dx",
         type=numbers(1e-4, 0.02, "m"),
-        metavar="M,M,...",
-        help="cell sizes [m]; the food's own one, which the other commands use, two thirds, half and a third by default",
+        metavar="M,...",
+        help="cells [m] (default: the food's, 2/3, 1/2, 1/3 of it)",
     )
     p.add_argument(
-        "--safety", type=numbers(0, 0.9, "of the stability limit"), metavar="F,...", help="time steps to try"
+        "--safety",
+        type=numbers(0, 0.9, "of the stability limit"),
+        metavar="F,...",
+        help="time steps to try, over their limit",
     )
     p.add_argument("--mach", type=numbers(0, 0.05, ""), metavar="F,...", help="blade speeds to try, over the P-wave's")
     p.add_argument("--ppc", type=numbers(0.5, 8.5, ""), metavar="N,...", help="particles per cell and direction to try")
     p.add_argument(
         "--offset",
         type=numbers(-1, 1, "cells"),
-        metavar="CELLS,...",
-        help="places of the blade against the grid to try",
+        metavar="C,...",
+        help="places of the blade against the grid",
     )
     p.add_argument(
         "--repeats",
-        type=int,
+        type=whole(0),
         default=3,
-        help="runs with other particles and the grid elsewhere, on the second grid: what is noise (default 3)",
+        metavar="N",
+        help="runs of other particles: what is noise (default 3)",
     )
     p.add_argument(
-        "--stroke", type=number(1e-4, 1, "m"), metavar="M", help="way of the edge; the whole height by default"
+        "--stroke", type=number(1e-4, 1, "m"), metavar="M", help="way of the edge [m] (default: the whole height)"
     )
     add_workers(p, "simulations")
-    p.add_argument("--resume", action="store_true", help="go on with the study in --out; nothing is simulated twice")
+    titled(p, RUN).add_argument("--resume", action="store_true", help=RESUME_HELP)
     add_run(p)
 
 
@@ -68,8 +86,6 @@ def run(args: argparse.Namespace) -> int:
     """Run the study; prints its table, or converge.json."""
     from calib.refinement import run as study
 
-    if args.repeats < 0:
-        raise CurveError(f"--repeats {args.repeats}: at least 0")
     food, knife = food_of(args), load_knife(args.knife)
     shape, assumed = specimen(food, None, sizing_of(args))
     scene = cut_scene(food, shape, knife, stroke=args.stroke, dx=max(args.dx) if args.dx else None, seed=args.seed)
@@ -96,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
     with workers_of(args, say) as pool:
         document = study(scene, axes, out, pool, about=about, repeats=args.repeats, resume=args.resume, say=say)
     if args.json:
-        print((out / "converge.json").read_text(encoding="utf-8"), end="")
+        print_json(document)
     else:
         print(table(document))
         print(f"  wrote {out}")

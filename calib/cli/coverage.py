@@ -7,10 +7,21 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_food, add_run, add_workers, food_of, say, workers_of
-from calib.errors import CurveError
+from calib.cli.options import (
+    RESUME_HELP,
+    RUN,
+    add_food,
+    add_run,
+    add_workers,
+    food_of,
+    print_json,
+    say,
+    titled,
+    whole,
+    workers_of,
+)
 
-HELP = "calibrate made-up traces of known truth: do the intervals hold it?"
+HELP = "calibrate made-up traces: do the intervals hold the truth?"
 DESCRIPTION = """Simulate cuts with values drawn from the food's ranges, measure them with a
 made-up sensor (25 N baseline, drift, gain, noise and ripple like a robot's),
 calibrate each, and count how often the 95 % intervals hold the truth. It also
@@ -21,15 +32,16 @@ EPILOG = """example:
 
 Ctrl-C keeps what was computed; the same command with --resume goes on.
 Exit codes: 0 intervals of identified properties hold the truth in 90 % or more
-(of a hundred in 90 to 99) and their median error is at most 10 %, 1 error, 2 not so."""
+(of a hundred in 90 to 99), with a median error of at most 10 %, 1 error in
+input or run, 2 they do not."""
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
     add_food(p)
-    p.add_argument("--traces", type=int, default=100, help="how many (default 100)")
+    p.add_argument("--traces", type=whole(1), default=100, metavar="N", help="how many (default 100)")
     add_workers(p, "simulations")
-    p.add_argument("--resume", action="store_true", help="go on with the study in --out; nothing is simulated twice")
+    titled(p, RUN).add_argument("--resume", action="store_true", help=RESUME_HELP)
     add_run(p)
 
 
@@ -37,8 +49,6 @@ def run(args: argparse.Namespace) -> int:
     """Run the study; prints its table, or coverage.json."""
     from calib.coverage import run as study
 
-    if args.traces < 1 or args.seed < 0:
-        raise CurveError("--traces must be at least 1, --seed at least 0")
     food = food_of(args)
     out = Path(args.out or f"cutcal-coverage-{food.name}")
 
@@ -56,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
             say=say,
         )
     if args.json:
-        print((out / "coverage.json").read_text(encoding="utf-8"), end="")
+        print_json(document)
     else:
         print(table(document))
         print(f"  wrote {out}")

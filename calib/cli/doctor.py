@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 
+from calib.cli.options import add_json, print_json
 from calib.doctor import examine
+from calib.documents import tag
 
-HELP = "try what cutcal needs of this machine: packages, solver, devices, cache, disk"
-DESCRIPTION = """Try one by one what cutcal needs: its packages, the data it ships, a small cut on the CPU and on every
-graphics device that Taichi knows, the cache of compiled kernels, typesetting, memory, and a folder for results. Each
-failure says what to do about it. Nothing is left behind."""
+HELP = "try what cutcal needs of this machine"
+DESCRIPTION = """Try one by one what cutcal needs: its packages, the data it ships, a small cut
+on the CPU and on every graphics device that Taichi knows, the cache of compiled
+kernels, typesetting, memory, and a folder for results. Each failure says what
+to do about it. Nothing is left behind."""
 EPILOG = """example:
   cutcal doctor
 
@@ -20,8 +22,8 @@ Exit codes: 0 all that is needed is there, 2 something is not."""
 
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
-    p.add_argument("--out", metavar="DIR", default=".", help="folder where results would go (default: the current one)")
-    p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
+    p.add_argument("--out", metavar="DIR", default=".", help="folder for results (default: the current one)")
+    add_json(p)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -33,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
             print(f"  {finding.state:7s} {finding.name:19s} {finding.words}", flush=True)
     failed = sum(f.state == "fail" for f in found)
     if args.json:
-        print(json.dumps({"passed": not failed, "findings": [f.as_dict() for f in found]}, indent=2))
+        print_json({"schema": tag("doctor"), "passed": not failed, "findings": [f.as_dict() for f in found]})
     elif failed:
         print(f"{failed} of {len(found)} failed")
     else:

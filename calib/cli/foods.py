@@ -3,31 +3,38 @@
 from __future__ import annotations
 
 import argparse
-import json
 
+from calib.cli.options import add_json, print_json
+from calib.documents import tag
 from calib.materials import load_food, load_foods
 from calib.properties import PROPERTIES
 
 HELP = "list the foods, or the values of one with their sources"
-DESCRIPTION = "List the foods of materials.yaml, or every value of one with range, status and source."
-EPILOG = "example:\n  cutcal foods banana"
+DESCRIPTION = """List the foods of materials.yaml, or every value of one with range, status and
+source."""
+EPILOG = """examples:
+  cutcal foods
+  cutcal foods banana"""
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
-    p.add_argument("name", nargs="?", help="show one food")
-    p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
+    p.add_argument("name", nargs="?", metavar="FOOD", help="show one food")
+    add_json(p)
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the list or one food."""
     if args.name is None:
         names = list(load_foods())
-        print(json.dumps(names) if args.json else "\n".join(names))
+        if args.json:
+            print_json(names)
+        else:
+            print("\n".join(names))
         return 0
     food = load_food(args.name)
     if args.json:
-        print(json.dumps({food.name: food.as_dict(), "warnings": food.warnings()}, indent=2))
+        print_json({"schema": tag("food"), food.name: food.as_dict(), "warnings": food.warnings()})
         return 0
     size = " x ".join(f"{food.dims[n].value * 1e3:g}" for n in ("length", "width", "height"))
     print(f"{food.name}: {food.shape_kind}, {size} mm (length x width x height)")

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import asdict
 
+from calib.cli.options import add_json, print_json
+from calib.documents import tag
 from calib.knives import knife_fields, load_knife, wedge_height
 
 HELP = "list the knives, or the sizes of one with their sources"
-DESCRIPTION = """List the knives of knives.yaml, or every size of one with its source. A knife of your own is a YAML
-file of the same layout, which --knife takes in place of a name."""
+DESCRIPTION = """List the knives of knives.yaml, or every size of one with its source. A knife of
+your own is a YAML file of the same layout, which --knife takes as well."""
 EPILOG = "examples:\n  cutcal knives\n  cutcal knives edc\n  cutcal knives mine.yaml"
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
-    p.add_argument("name", nargs="?", help="show one knife, or the one of a .yaml file")
-    p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
+    p.add_argument("name", nargs="?", metavar="KNIFE", help="show one knife, or the one of a .yaml file")
+    add_json(p)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -25,7 +26,7 @@ def run(args: argparse.Namespace) -> int:
     if args.name is None:
         known = knife_fields()
         if args.json:
-            print(json.dumps(list(known)))
+            print_json(list(known))
             return 0
         print(f"{'':10s}  spine   angle  height  length")
         for name, size in known.items():
@@ -36,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     from_file = args.name.endswith((".yaml", ".yml"))
     size = knife_fields(args.name if from_file else None)[knife.name]
     if args.json:
-        print(json.dumps({knife.name: {n: asdict(f) for n, f in size.items()}}, indent=2))
+        print_json({"schema": tag("knife"), knife.name: {n: asdict(f) for n, f in size.items()}})
         return 0
     print(
         f"{knife.name}: a wedge of {size['angle'].value:g}° up to {wedge_height(knife) * 1e3:.3g} mm above the edge, parallel above"

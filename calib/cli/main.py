@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import argparse
+import io
+import os
 import sys
 from collections.abc import Sequence
 
@@ -10,6 +11,7 @@ import calib
 from calib.cli import (
     bench,
     calibrate,
+    completion,
     compress,
     converge,
     coverage,
@@ -20,12 +22,20 @@ from calib.cli import (
     prior,
     report,
     scalars,
+    schema,
     simulate,
     stress,
     verify,
 )
+from calib.cli.parsing import Parser, parse
 from mpm.errors import CutcalError
 
+DESCRIPTION = "Calibrate cutting simulations of food against measured knife forces."
+EPILOG = """example:
+  cutcal calibrate --food banana --trace cut.csv --out runs/banana
+
+cutcal COMMAND --help explains a command.
+Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass."""
 COMMANDS = {
     "calibrate": calibrate,
     "compress": compress,
@@ -42,17 +52,16 @@ COMMANDS = {
     "doctor": doctor,
     "prior": prior,
     "scalars": scalars,
+    "schema": schema,
+    "completion": completion,
 }
+CLOSED = 141  # what a shell reports for a program whose reader has gone
 INTERRUPTED = 130  # what a shell reports for a program ended by Ctrl-C
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     """The whole command line."""
-    top = argparse.ArgumentParser(
-        prog="cutcal",
-        description="Calibrate cutting simulations of food against measured knife forces.",
-        epilog="Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass.",
-    )
+    top = Parser(prog="cutcal", description=DESCRIPTION, epilog=EPILOG, add_help=True)
     top.add_argument("--version", action="version", version=f"cutcal {calib.__version__}")
     sub = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, module in COMMANDS.items():
@@ -61,17 +70,25 @@ def parser() -> argparse.ArgumentParser:
             help=module.HELP,
             description=module.DESCRIPTION,
             epilog=module.EPILOG,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
         )
         module.add_args(one)
+        one.finish()
     return top
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; returns its exit code."""
-    args = parser().parse_args(argv)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal or pipe that has no degree sign gets a question mark
     try:
-        return COMMANDS[args.command].run(args)
+        args = parse(parser(), argv)
+        code: int = COMMANDS[args.command].run(args)
+        sys.stdout.flush()
+        return code
+    except BrokenPipeError:  # the reader, such as head, has enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return CLOSED
     except CutcalError as e:
         print(f"cutcal: {e}", file=sys.stderr)
         return 1

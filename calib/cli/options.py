@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import sys
 from collections.abc import Callable
+from typing import Any, TypeAlias
 
 from calib.cluster import Cluster
 from calib.materials import FoodSpec, check_override, load_food, load_material_file
+from calib.outputs import finite
 from calib.pool import Pool
 from calib.scenes import Sizing
 from calib.workers import Workers
@@ -16,6 +19,11 @@ from mpm.errors import CutcalError
 from mpm.runtime import ARCHES
 from mpm.shapes import SHAPE_KINDS
 
+Group: TypeAlias = argparse._ActionsContainer
+"""A parser, or a group of its options."""
+RUN = "run"  # title of the group of options that say where and how
+RESUME_HELP = "go on with the run in --out; nothing is simulated twice"
+KNIFE_HELP = "knife of knives.yaml, or a YAML file (default kitchen)"
 LOCAL_WORKERS = 2  # simulations at a time on this machine: a process each
 
 
@@ -38,7 +46,22 @@ def number(low: float, high: float, unit: str) -> Callable[[str], float]:
         except ValueError:
             raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
         if not (math.isfinite(value) and low < value < high):
-            raise argparse.ArgumentTypeError(f"{text} must lie between {low:g} and {high:g} {unit}")
+            raise argparse.ArgumentTypeError(f"{text} must lie between {low:g} and {high:g} {unit}".rstrip())
+        return value
+
+    return convert
+
+
+def whole(least: int) -> Callable[[str], int]:
+    """Type of an option that takes a whole number of at least so many."""
+
+    def convert(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+        if value < least:
+            raise argparse.ArgumentTypeError(f"{text} must be at least {least}")
         return value
 
     return convert
@@ -57,39 +80,63 @@ def numbers(low: float, high: float, unit: str) -> Callable[[str], tuple[float, 
     return convert
 
 
-def add_food(p: argparse.ArgumentParser, *, cell: bool = True, required: bool = True) -> None:
+def add_food(p: Group, *, cell: bool = True, required: bool = True) -> None:
     """Options that say what is cut with what."""
+    p = p.add_argument_group("food and knife")
     p.add_argument("--food", required=required, metavar="NAME", help="food of materials.yaml (cutcal foods lists them)")
-    p.add_argument(
-        "--material", metavar="YAML", help="take the food from this file, e.g. a calibration's material.yaml"
-    )
+    p.add_argument("--material", metavar="YAML", help="take the food from this file: a material.yaml")
     p.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", help="give a property another value [SI]"
     )
-    p.add_argument("--knife", default="kitchen", metavar="NAME", help="knife of knives.yaml, or a YAML file")
-    p.add_argument("--shape", choices=SHAPE_KINDS, help="outline of the specimen")
-    for name, what in (("height", "height"), ("width", "width along the blade"), ("length", "length across the blade")):
-        p.add_argument(f"--{name}", type=number(1e-3, 1.0, "m"), metavar="M", help=f"{what} of the specimen [m]")
+    p.add_argument("--knife", default="kitchen", metavar="NAME", help=KNIFE_HELP)
+    p.add_argument(
+        "--shape", choices=SHAPE_KINDS, metavar="KIND", help="outline of the specimen, such as half_cylinder"
+    )
+    for name, what in (("height", ""), ("width", ", along the blade"), ("length", ", across the blade")):
+        p.add_argument(f"--{name}", type=number(1e-3, 1.0, "m"), metavar="M", help=f"{name} of the specimen{what} [m]")
     if cell:
-        p.add_argument("--dx", type=number(1e-4, 0.02, "m"), metavar="M", help="cell size [m]")
+        p.add_argument(
+            "--dx", type=number(1e-4, 0.02, "m"), metavar="M", help="cell of the grid [m] (default: by the food)"
+        )
 
 
-def add_run(p: argparse.ArgumentParser) -> None:
+def add_run(p: Group) -> None:
     """Options that say where and how."""
+    p = titled(p, RUN)
     p.add_argument("--out", metavar="DIR", help="folder of the results; never overwritten")
-    p.add_argument("--seed", type=int, default=0, help="seed of the particles and of the search")
-    p.add_argument("--arch", choices=ARCHES, default="cpu", help="device of the simulations")
+    p.add_argument(
+        "--seed", type=whole(0), default=0, metavar="N", help="seed of particles, search and draws (default 0)"
+    )
+    add_arch(p)
+    add_json(p)
+
+
+def titled(p: Group, title: str) -> Group:
+    """The group of a title, made where there is none yet."""
+    own = [g for g in getattr(p, "_action_groups", []) if g.title == title]
+    return own[0] if own else p.add_argument_group(title)
+
+
+def add_arch(p: Group) -> None:
+    """The option that says on which device."""
+    p.add_argument("--arch", choices=ARCHES, default="cpu", metavar="DEVICE", help=f"{', '.join(ARCHES)} (default cpu)")
+
+
+def add_json(p: Group) -> None:
+    """The option that every command with a document has."""
     p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
 
 
-def add_workers(p: argparse.ArgumentParser, what: str) -> None:
+def print_json(document: Any) -> None:
+    """Print a document: JSON, in letters that every terminal and pipe can take."""
+    print(json.dumps(finite(document), indent=2, allow_nan=False))
+
+
+def add_workers(p: Group, what: str) -> None:
     """Options that say how many at a time, and on which machines."""
-    p.add_argument(
-        "--workers", type=int, metavar="N", help=f"{what} at a time (default 2; on a cluster all its workers)"
-    )
-    p.add_argument(
-        "--scheduler", metavar="ADDRESS", help="run them on the Dask cluster of this scheduler, e.g. tcp://host:8786"
-    )
+    p = titled(p, RUN)
+    p.add_argument("--workers", type=int, metavar="N", help=f"{what} at a time (default 2; of a cluster all)")
+    p.add_argument("--scheduler", metavar="ADDRESS", help="Dask cluster that runs them, such as tcp://host:8786")
 
 
 def workers_of(args: argparse.Namespace, say: Callable[[str], None]) -> Workers:

@@ -7,15 +7,15 @@ import sys
 from pathlib import Path
 
 from calib.cli.calibrate import add_trace, measured
-from calib.cli.options import add_food, add_run, note
+from calib.cli.options import add_food, add_run, note, print_json
 from calib.errors import MaterialError
 
-HELP = "predict a measured cut with a food that was calibrated on another one"
+HELP = "predict a measured cut with values calibrated on another"
 DESCRIPTION = """Simulate the cut of a trace with the values of --material, without fitting
 any of them, and compare. Writes summary.json and curves.csv to --out."""
 EPILOG = """example:
-  cutcal predict --food potato --material runs/cut1/material.yaml --scale-width \\
-      --trace cut2.csv --air air.csv --knife edc --out runs/cut2
+  cutcal predict --food potato --material runs/cut1/material.yaml \\
+      --trace cut2.csv --air air.csv --scale-width --out runs/cut2
 
 Exit codes: 0 NRMSE at most 0.10 and rating R at least 0.80, 1 error, 2 worse."""
 
@@ -27,7 +27,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--scale-width",
         action="store_true",
-        help="take the specimen's width from this trace: one factor on the force, the only number that is fitted",
+        help="fit one number: a factor for the specimen's width",
     )
     add_run(p)
 
@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
 
     summary = predict(request, out, scale_width=args.scale_width, say=note)
     if args.json:
-        print((out / "summary.json").read_text(encoding="utf-8"), end="")
+        print_json(summary)
     else:
         m, scale, limits = summary["metrics"], summary["width_scale"], summary["limits"]
         print(

@@ -7,12 +7,22 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_workers, say, workers_of
-from calib.errors import CurveError
+from calib.cli.options import (
+    KNIFE_HELP,
+    RESUME_HELP,
+    RUN,
+    add_run,
+    add_workers,
+    print_json,
+    say,
+    titled,
+    whole,
+    workers_of,
+)
 from calib.knives import load_knife
 from calib.materials import load_food, load_foods
 
-HELP = "forces that the literature predicts before any trace: default values and draws from the priors"
+HELP = "forces that the literature predicts before any trace"
 DESCRIPTION = """Simulate the default cut of a food at its values of materials.yaml and at draws
 from the priors of its default fit, on the coarse grid that a fit screens with.
 Writes the quantiles of the force over stroke (FOOD.csv), of peak and work
@@ -29,25 +39,20 @@ or run, 2 they do not."""
 
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
-    from mpm.runtime import ARCHES
-
     p.add_argument("names", nargs="*", metavar="FOOD", help="foods of materials.yaml; all of them by default")
-    p.add_argument("--draws", type=int, default=32, help="draws from the priors of each food (default 32)")
-    p.add_argument("--knife", default="kitchen", metavar="NAME", help="knife of knives.yaml, or a YAML file")
+    p.add_argument(
+        "--draws", type=whole(1), default=32, metavar="N", help="draws from the priors of each food (default 32)"
+    )
+    p.add_argument("--knife", default="kitchen", metavar="NAME", help=KNIFE_HELP)
     add_workers(p, "simulations")
-    p.add_argument("--resume", action="store_true", help="go on with the runs in --out; nothing is simulated twice")
-    p.add_argument("--out", metavar="DIR", help="folder of the results; never overwritten")
-    p.add_argument("--seed", type=int, default=0, help="seed of the draws and of the particles")
-    p.add_argument("--arch", choices=ARCHES, default="cpu", help="device of the simulations")
-    p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
+    titled(p, RUN).add_argument("--resume", action="store_true", help=RESUME_HELP)
+    add_run(p)
 
 
 def run(args: argparse.Namespace) -> int:
     """Simulate; prints the table, or prior.json."""
     from calib.prior import run as study
 
-    if args.draws < 1 or args.seed < 0:
-        raise CurveError("--draws must be at least 1 and --seed at least 0")
     foods = [load_food(name) for name in dict.fromkeys(args.names)] or list(load_foods().values())
     out = Path(args.out or "cutcal-prior")
 
@@ -63,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
             say=say,
         )
     if args.json:
-        print((out / "prior.json").read_text(encoding="utf-8"), end="")
+        print_json(document)
         return 0 if document["passed"] else 2
     for food in foods:
         for warning in food.warnings():

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Callable
 from pathlib import Path
 
+from calib.cli.options import add_json, print_json
+from calib.documents import tag
 from reports import ReportError
 
 HELP = "write report.pdf of a finished run again"
@@ -17,14 +18,17 @@ EPILOG = "example:\n  cutcal report runs/banana"
 
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
-    p.add_argument("dir", help="folder of the run (--out)")
-    p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
+    p.add_argument("dir", metavar="DIR", help="folder of the run (--out)")
+    add_json(p)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the report."""
     path = writer(Path(args.dir))(Path(args.dir))
-    print(json.dumps({"report": str(path)}) if args.json else f"wrote {path}")
+    if args.json:
+        print_json({"schema": tag("report"), "report": str(path)})
+    else:
+        print(f"wrote {path}")
     return 0
 
 

@@ -8,40 +8,50 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_workers, say, workers_of
-from calib.errors import CurveError
+from calib.cli.options import (
+    RESUME_HELP,
+    RUN,
+    add_run,
+    add_workers,
+    print_json,
+    say,
+    titled,
+    whole,
+    workers_of,
+)
 from calib.knives import load_knife
 
-HELP = "fit properties to published peaks and energies of some cuts, and predict those of others"
+HELP = "fit properties to published peaks and energies"
 DESCRIPTION = """Fit properties (R and mu, or those of the file) to the given numbers of FILE, a
-largest force or an energy per cut area, and predict its other numbers, with a band
-from draws of what is not fitted. The fit is least squares on logarithms, with the
-priors of materials.yaml. Writes scalars.json to --out."""
+largest force or an energy per cut area, and predict its other numbers, with a
+band from draws of what is not fitted. The fit is least squares on logarithms,
+with the priors of materials.yaml. Writes scalars.json to --out."""
 EPILOG = """examples:
   cutcal scalars force_data/kachru1995.yaml
   cutcal scalars force_data/kachru1995.yaml --fit R,R_initiation --draws 16
   cutcal scalars FILE --together --fit R,mu,R_initiation
 
 Ctrl-C keeps what was computed; the same command with --resume goes on.
-Exit codes: 0 the given numbers are met within two of their standard deviations and
-the predicted ones within the limit of the file, 1 error in input or run, 2 not."""
+Exit codes: 0 the given numbers are met within two of their standard deviations
+and the predicted ones within the file's limit, 1 error in input or run, 2 not."""
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
-    from mpm.runtime import ARCHES
-
-    p.add_argument("file", metavar="FILE", help="YAML file of published numbers (docs/published-scalars.md)")
-    p.add_argument("--fit", metavar="NAMES", help="properties to fit, separated by commas, in place of the file's")
-    p.add_argument("--knife", metavar="NAME", help="knife of knives.yaml, or a YAML file, in place of the file's")
+    p.add_argument("file", metavar="FILE", help="published numbers, in YAML")
+    p.add_argument("--fit", metavar="NAMES", help="properties to fit, e.g. R,mu (default: the file's)")
+    p.add_argument("--knife", metavar="NAME", help="another knife than the file's")
     p.add_argument("--together", action="store_true", help="fit to all numbers: can any values meet all of them?")
-    p.add_argument("--draws", type=int, default=32, help="draws from the priors of what is not fitted (default 32)")
+    p.add_argument(
+        "--draws",
+        type=whole(0),
+        default=32,
+        metavar="N",
+        help="draws of what is not fitted (default 32)",
+    )
     add_workers(p, "simulations")
-    p.add_argument("--resume", action="store_true", help="go on with the runs in --out; nothing is simulated twice")
-    p.add_argument("--out", metavar="DIR", help="folder of the results; never overwritten")
-    p.add_argument("--seed", type=int, default=0, help="seed of the draws and of the particles")
-    p.add_argument("--arch", choices=ARCHES, default="cpu", help="device of the simulations")
-    p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
+    titled(p, RUN).add_argument("--resume", action="store_true", help=RESUME_HELP)
+    add_run(p)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -49,8 +59,6 @@ def run(args: argparse.Namespace) -> int:
     from calib.published import load_published
     from calib.scalars import run as study
 
-    if min(args.draws, args.seed) < 0:
-        raise CurveError("--draws and --seed must be at least 0")
     published = load_published(args.file)
     if args.knife is not None:
         published = replace(published, knife=load_knife(args.knife))
@@ -71,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
             say=say,
         )
     if args.json:
-        print((out / "scalars.json").read_text(encoding="utf-8"), end="")
+        print_json(document)
     else:
         print(f"{table(document)}\nwrote {out}")
     return 0 if document["passed"] else 2

@@ -9,7 +9,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_food, add_run, food_of, number, say, sizing_of
+from calib.cli.options import (
+    add_food,
+    add_run,
+    food_of,
+    number,
+    print_json,
+    say,
+    sizing_of,
+    whole,
+)
+from calib.documents import tag
 from calib.knives import load_knife
 from calib.outputs import prepare, write_csv, write_json
 from calib.progress import Countdown, clock
@@ -33,28 +43,56 @@ def add_args(p: argparse.ArgumentParser) -> None:
     add_food(p)
     p.add_argument("--speed", type=number(0, 10, "m/s"), metavar="M/S", help="real speed of the knife, for the record")
     p.add_argument(
-        "--stroke", type=number(1e-4, 1, "m"), metavar="M", help="way of the edge; the whole height by default"
+        "--stroke", type=number(1e-4, 1, "m"), metavar="M", help="way of the edge [m] (default: the whole height)"
     )
     p.add_argument(
-        "--offset", type=number(-10, 10, "cells"), default=0.0, metavar="CELLS", help="blade against the grid"
+        "--offset",
+        type=number(-10, 10, "cells"),
+        default=0.0,
+        metavar="CELLS",
+        help="blade against the grid (default 0)",
     )
-    p.add_argument("--contact", choices=CONTACTS, default="cohesive", help="nodal: plain projection, for comparison")
-    p.add_argument("--mach", type=number(0, 0.05, ""), default=0.01, help="blade speed over the P-wave speed")
-    p.add_argument("--slice-ratio", type=number(-20, 20, ""), default=0.0, help="speed along the edge over speed down")
-    p.add_argument("--tilt", type=number(-60, 60, "degrees"), default=0.0, metavar="DEG", help="edge against the board")
-    p.add_argument("--retract", type=number(0, 1, "m"), default=0.0, metavar="M", help="way back up after the stroke")
-    p.add_argument("--turn", type=number(-90, 90, "degrees"), default=0.0, metavar="DEG", help="scene against the grid")
+    p.add_argument(
+        "--contact",
+        choices=CONTACTS,
+        default="cohesive",
+        metavar="KIND",
+        help="cohesive (default), or nodal for comparison",
+    )
+    p.add_argument(
+        "--mach",
+        type=number(0, 0.05, ""),
+        default=0.01,
+        metavar="PART",
+        help="blade speed over the P-wave's (default 0.01)",
+    )
+    p.add_argument(
+        "--slice-ratio",
+        type=number(-20, 20, ""),
+        default=0.0,
+        metavar="RATIO",
+        help="speed along the edge over speed down",
+    )
+    p.add_argument(
+        "--tilt", type=number(-60, 60, "degrees"), default=0.0, metavar="DEG", help="edge against the board [degrees]"
+    )
+    p.add_argument(
+        "--retract", type=number(0, 1, "m"), default=0.0, metavar="M", help="way back up after the stroke [m]"
+    )
+    p.add_argument(
+        "--turn", type=number(-90, 90, "degrees"), default=0.0, metavar="DEG", help="scene against the grid [degrees]"
+    )
     p.add_argument(
         "--arm-stiffness",
         type=number(1, 1e9, "N/m"),
         metavar="N/M",
-        help="of the robot that holds the knife; rigid if not given",
+        help="of the robot's arm; rigid if not given",
     )
-    p.add_argument("--force-limit", type=number(0, 1e6, "N"), metavar="N", help="most force the arm can give")
-    p.add_argument("--threads", type=int, default=0, help="CPU threads, 0 = all cores")
-    p.add_argument("--pictures", action="store_true", help="draw the cut at contact, largest force and end (PNG)")
-    p.add_argument("--video", action="store_true", help="and as a film, cut.mp4")
-    p.add_argument("--page", action="store_true", help="and as a page to turn it around in a browser, cut.html")
+    p.add_argument("--force-limit", type=number(0, 1e6, "N"), metavar="N", help="most force that the arm can give [N]")
+    p.add_argument("--threads", type=whole(0), default=0, metavar="N", help="CPU threads (default 0: all cores)")
+    p.add_argument("--pictures", action="store_true", help="draw the cut at contact, largest force and end")
+    p.add_argument("--video", action="store_true", help="draw it as a film, cut.mp4")
+    p.add_argument("--page", action="store_true", help="write a page to turn it around, cut.html")
     add_run(p)
 
 
@@ -105,6 +143,7 @@ def run(args: argparse.Namespace) -> int:
         print(file=sys.stderr)
     write_csv(out / "force.csv", record.columns())
     summary = {
+        "schema": tag("simulate"),
         "food": food.name,
         "knife": knife.name,
         **record.summary(),
@@ -123,7 +162,7 @@ def run(args: argparse.Namespace) -> int:
     if watch is not None:
         _draw(args, out, simulation, record, watch, f"{food.name}, {knife.name} knife")
     if args.json:
-        print((out / "summary.json").read_text(), end="")
+        print_json(summary)
     else:
         print(
             f"{food.name}: peak {record.peak:.2f} N, work {record.work:.3f} J, {record.status}; "

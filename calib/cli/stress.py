@@ -7,10 +7,18 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_workers, say, workers_of
-from calib.errors import CurveError
+from calib.cli.options import (
+    RESUME_HELP,
+    RUN,
+    add_run,
+    add_workers,
+    print_json,
+    say,
+    titled,
+    workers_of,
+)
 
-HELP = "stability map: stiffness, Poisson's ratio, time step, cell, speed, resistance and odd starts"
+HELP = "map of where the solver is stable"
 DESCRIPTION = """Run some 250 small cuts with one or two things pushed to the end of their
 range or past it: stiffness, Poisson's ratio, time step, cell, speed, density,
 yield stress, cutting resistance, blades that miss the food, food in the air or
@@ -29,15 +37,10 @@ SHOWN = 12  # cells that the table names
 
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
-    from mpm.runtime import ARCHES
-
     p.add_argument("--quick", action="store_true", help="a dozen coarse cells instead of the whole map")
     add_workers(p, "simulations")
-    p.add_argument("--resume", action="store_true", help="go on with the map in --out; nothing is simulated twice")
-    p.add_argument("--out", metavar="DIR", help="folder of the results; never overwritten")
-    p.add_argument("--seed", type=int, default=0, help="seed of the particles")
-    p.add_argument("--arch", choices=ARCHES, default="cpu", help="device of the simulations")
-    p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
+    titled(p, RUN).add_argument("--resume", action="store_true", help=RESUME_HELP)
+    add_run(p)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -45,8 +48,6 @@ def run(args: argparse.Namespace) -> int:
     from calib.hazards import cells, quick_cells
     from calib.stability import run as study
 
-    if args.seed < 0:
-        raise CurveError(f"--seed {args.seed}: at least 0")
     out = Path(args.out or "cutcal-stress")
     about = {"command": ["stress", *(a for a in sys.argv[1:] if a != "stress")], "seed": args.seed}
 
@@ -54,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
         todo = (quick_cells if args.quick else cells)(args.seed)
         document = study(todo, out, pool, about=about, resume=args.resume, say=say)
     if args.json:
-        print((out / "stress.json").read_text(encoding="utf-8"), end="")
+        print_json(document)
     else:
         print(table(document))
         print(f"  wrote {out}")

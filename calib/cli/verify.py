@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_run, add_workers, say, workers_of
-from calib.errors import CurveError
+from calib.cli.options import (
+    RESUME_HELP,
+    RUN,
+    add_run,
+    add_workers,
+    print_json,
+    say,
+    titled,
+    workers_of,
+)
 
 HELP = "compare the solver with closed forms and finite elements"
 DESCRIPTION = """Compare the solver with closed forms, and with finite elements of the same law:
-laws at a point, conservation, waves, vibration, friction, impact, a manufactured
-solution, presses, and the cutting force of a thin blade. The finite elements are
-themselves compared with known answers. Writes verify.json, verify.svg and
-report.pdf to --out."""
+laws at a point, conservation, waves, vibration, friction, impact, a
+manufactured solution, presses, and the cutting force of a thin blade. The
+finite elements are themselves compared with known answers. Writes verify.json,
+verify.svg and report.pdf to --out."""
 EPILOG = """examples:
   cutcal verify --quick
   cutcal verify --only press --out runs/presses
@@ -28,10 +35,10 @@ Exit codes: 0 all rows pass, 1 error in input or run, 2 a row fails."""
 
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
-    p.add_argument("--quick", action="store_true", help="coarse versions of the fast cases: a minute instead of many")
+    p.add_argument("--quick", action="store_true", help="coarse versions of the fast cases: a minute")
     p.add_argument("--only", metavar="TEXT", help="only cases with this in their name")
     add_workers(p, "cases")
-    p.add_argument("--resume", action="store_true", help="go on with the cases in --out; none that ended is run twice")
+    titled(p, RUN).add_argument("--resume", action="store_true", help=RESUME_HELP)
     add_run(p)
 
 
@@ -40,15 +47,16 @@ def run(args: argparse.Namespace) -> int:
     from calib.verification.rows import How
     from calib.verification.study import run as study
 
-    if args.seed < 0:
-        raise CurveError(f"--seed {args.seed}: at least 0")
     out = Path(args.out or "cutcal-verify")
     about = {"command": ["verify", *(a for a in sys.argv[1:] if a != "verify")]}
 
     with workers_of(args, say) as pool:
         how = How(args.quick, args.seed, args.arch)
         document = study(out, how, pool, only=args.only, about=about, resume=args.resume, say=say)
-    print(json.dumps(document, indent=2) if args.json else f"{table(document)}\n  wrote {out}")
+    if args.json:
+        print_json(document)
+    else:
+        print(f"{table(document)}\n  wrote {out}")
     return 0 if document["passed"] else 2
 
 

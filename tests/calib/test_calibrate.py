@@ -19,6 +19,7 @@ from calib.cli.main import main
 from calib.materials import load_material_file
 from calib.metrics import compare
 from calib.pool import Pool
+from tests.calib.documents import valid
 
 ROOT = Path(__file__).resolve().parents[2]
 TRACE = ROOT / "force_data" / "banana_reconstructed.csv"
@@ -89,7 +90,7 @@ def test_second_run_costs_no_simulation(finished, capsys, monkeypatch):
     with h5py.File(finished[0] / "evaluations.h5") as f:
         before = f["key"][()].tolist()
     code = main(["calibrate", *SMALL, "--out", str(finished[0]), "--resume", "--json"])
-    document = json.loads(capsys.readouterr().out)
+    document = valid(json.loads(capsys.readouterr().out))
     with h5py.File(finished[0] / "evaluations.h5") as f:
         assert f["key"][()].tolist() == before
     assert code == finished[1] == (0 if document["passed"] else 2)

@@ -20,6 +20,7 @@ from calib.compression.study import judge
 from mpm.runtime import Runtime
 from mpm.shapes import Shape
 from mpm.solver import Simulation
+from tests.calib.documents import valid
 from tests.data_dir import data_file
 
 PUCK = Shape("upright_cylinder", 0.05, 0.05, 0.03)
@@ -172,7 +173,7 @@ def test_a_calibration_end_to_end(tmp_path, capsys):
     text = capsys.readouterr().out
     for word in ("kPa over 0-20% strain", "95 % interval", "modulus 0-5 %", "bonded plates", "nu = 0.4 is assumed"):
         assert word in text
-    document = json.loads((out / "compress.json").read_text())
+    document = valid(json.loads((out / "compress.json").read_text()))
     for key in ("command", "specimen", "assumed", "E", "slope", "nrmse", "force_error", "solver_error", "grid_change", "sensitivity",
                 "bracket", "repeats", "verdicts", "passed", "not_shown", "simulation", "files", "versions", "git"):  # fmt: skip
         assert key in document
@@ -212,7 +213,7 @@ def test_bonded_plates_are_judged_by_a_coarser_grid(tmp_path, capsys, monkeypatc
     assert "--cells 5" in capsys.readouterr().err
     monkeypatch.setattr("calib.compression.study.SOLVER_LIMIT", 1e-6)
     assert main([*command, "--json"]) == 2
-    document = json.loads(capsys.readouterr().out)
+    document = valid(json.loads(capsys.readouterr().out))
     assert document["solver_error"] is None and document["sensitivity"] is None
     assert 1e-6 < abs(document["grid_change"]) < 0.1
     assert document["assumed"]["plates"] == "bonded"

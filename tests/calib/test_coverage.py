@@ -14,6 +14,7 @@ from calib.cli.main import main
 from calib.conditioning import condition
 from calib.coverage import MadeUpSensor, summarise
 from calib.trace import read_trace
+from tests.calib.documents import valid
 from tests.calib.test_several import FakePool
 
 STROKE = np.linspace(0.0, 0.033, 300)[1:]
@@ -78,7 +79,7 @@ def test_the_study_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.
     command = ["coverage", "--food", "banana", "--traces", "3", "--out", str(out)]
     assert main(command) in (0, 2)
     lines = (out / "coverage.jsonl").read_text().splitlines()
-    first = json.loads((out / "coverage.json").read_text())
+    first = valid(json.loads((out / "coverage.json").read_text()))
     assert len(lines) == 3 and first["calibrated"] == 3
     assert set(first["parameters"]) == set(json.loads(lines[0])["truth"])
     (out / "coverage.jsonl").write_text("\n".join(lines[:2]) + "\n" + lines[2][:50])

@@ -14,12 +14,13 @@ from calib import doctor
 from calib.cli.main import main
 from mpm.errors import SceneError
 from mpm.runtime import Runtime, start
+from tests.calib.documents import valid
 
 
 def test_a_sound_machine_passes(capsys, tmp_path):
     """Where these tests run all that is needed is there: the small cut needs R times the width, within 5 %."""
     assert main(["doctor", "--json", "--out", str(tmp_path)]) == 0
-    document = json.loads(capsys.readouterr().out)
+    document = valid(json.loads(capsys.readouterr().out))
     found = {f["name"]: f for f in document["findings"]}
     assert document["passed"] and all(f["state"] != "fail" for f in found.values())
     assert "7.2 N" in found["solver"]["words"] and "16 foods" in found["foods and knives"]["words"]

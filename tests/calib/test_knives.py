@@ -11,6 +11,7 @@ from calib.cli.main import main
 from calib.knives import TOLERANCE, load_knife, load_knives, wedge_height
 from calib.validation import data_path
 from mpm.errors import SceneError
+from tests.calib.documents import valid
 
 GOOD = """\
 mine:
@@ -148,7 +149,7 @@ def test_knives_are_listed_with_their_sources(capsys, tmp_path):
     out = capsys.readouterr().out
     assert out.startswith("edc: a wedge of 11°") and out.count("DiSECt") == 3
     assert main(["knives", "edc", "--json"]) == 0
-    spine = json.loads(capsys.readouterr().out)["edc"]["spine"]
+    spine = valid(json.loads(capsys.readouterr().out))["edc"]["spine"]
     assert spine["value"] == load_knife("edc").spine and spine["unit"] == "m" and spine["status"] == "proxy"
     mine = tmp_path / "mine.yaml"
     mine.write_text(

@@ -12,6 +12,7 @@ import pytest
 from calib.cli.main import main
 from calib.materials import dump_material, load_food
 from mpm.solver import Simulation
+from tests.calib.documents import valid
 
 TRACE = ["--trace", "force_data/banana_reconstructed.csv", "--dx", "6e-3"]
 
@@ -30,7 +31,7 @@ def test_prediction_takes_one_number_from_the_trace(material, tmp_path, capsys):
     for name, extra in (("bare", []), ("scaled", ["--scale-width"])):
         command = ["predict", "--food", "banana", "--material", material, *TRACE, *extra, "--out", str(tmp_path / name)]
         code[name] = main(command)
-    bare, scaled = (json.loads((tmp_path / n / "summary.json").read_text()) for n in ("bare", "scaled"))
+    bare, scaled = (valid(json.loads((tmp_path / n / "summary.json").read_text())) for n in ("bare", "scaled"))
     a, b = (pd.read_csv(tmp_path / n / "curves.csv") for n in ("bare", "scaled"))
     k = scaled["width_scale"]
     assert bare["width_scale"] is None and bare["metrics"] == bare["unscaled"] == scaled["unscaled"]

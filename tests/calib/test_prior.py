@@ -24,6 +24,7 @@ from calib.preparation import fit_parameters
 from calib.prior import QUANTILES, conclude, draw, plan
 from calib.validation import data_path
 from reports.prior import write_figure
+from tests.calib.documents import valid
 from tests.data_dir import ROOT
 
 FOODS = tuple(load_foods())
@@ -49,7 +50,7 @@ def recorded(name):
 @pytest.fixture(scope="module")
 def document():
     """The recorded prior.json."""
-    return json.loads((RECORDED / "prior.json").read_text(encoding="utf-8"))
+    return valid(json.loads((RECORDED / "prior.json").read_text(encoding="utf-8")))
 
 
 # Draws --------------------------------------------------------------------------------------------
@@ -159,7 +160,7 @@ def test_kill_and_resume_run_nothing_twice(study, capsys):
     assert "grape: not modelled: seeds" in printed.err
     assert all(name in printed.out for name in CHEAP)
     assert main([*words, "--json"]) == 0
-    assert list(json.loads(capsys.readouterr().out)["foods"]) == list(CHEAP)
+    assert list(valid(json.loads(capsys.readouterr().out))["foods"]) == list(CHEAP)
     assert {p.name: p.read_bytes() for p in out.glob("*.csv")} == before
     assert (out / "prior.svg").read_bytes().startswith(b"<?xml")
     assert main(words[:-1]) == 1

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from calib.cli.main import main
+from tests.calib.documents import valid
 
 SMALL = ["converge", "--food", "banana", "--stroke", "4e-3", "--repeats", "1", "--dx", "6e-3,4.5e-3", "--mach", "0.02"]
 
@@ -22,7 +23,7 @@ def study(tmp_path_factory):
 def test_study_writes_what_it_promises(study):
     """converge.json has the contract's fields, curves.csv a curve for each grid and the uncertainty."""
     out, code = study
-    document = json.loads((out / "converge.json").read_text())
+    document = valid(json.loads((out / "converge.json").read_text()))
     assert code == (0 if document["converged"] else 2)
     assert [g["dx_m"] for g in document["grids"]] == [6e-3, 4.5e-3]
     for grid in document["grids"]:

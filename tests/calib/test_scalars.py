@@ -20,6 +20,7 @@ from calib.evaluation import Evaluation
 from calib.parameters import Parameter, ParameterSet
 from calib.published import ENERGY, PEAK, load_published
 from calib.scalars import Bench, band, conclude, fit
+from tests.calib.documents import valid
 from tests.data_dir import ROOT
 
 KACHRU = ROOT / "force_data" / "kachru1995.yaml"
@@ -311,7 +312,7 @@ def test_solver_recovers_R_of_a_prism_after_a_kill(prism, tmp_path, capsys):
     assert main(words) == 1
     assert "--resume" in capsys.readouterr().err
     assert main([*words, "--resume"]) == 0
-    result = json.loads((out / "scalars.json").read_text())
+    result = valid(json.loads((out / "scalars.json").read_text()))
     assert result["parameters"]["R"]["value"] == pytest.approx(R, rel=0.03)
     assert result["numbers"][1]["error"] == pytest.approx(0.0, abs=0.06)  # the last cell above the board takes less
     assert result["draws"]["met"] == 1

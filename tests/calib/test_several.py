@@ -19,6 +19,7 @@ from calib.materials import load_material_file
 from calib.scenes import place
 from calib.workers import Workers
 from mpm.scene import Scene
+from tests.calib.documents import valid
 
 FLESH = {"E": 4e5, "R": 420.0}
 SPECIMENS = {"a": (300.0, 0.030), "b": (700.0, 0.024), "c": (450.0, 0.034)}
@@ -103,7 +104,7 @@ def made_up(folder: Path) -> Path:
 def ran(study: Path, out: Path, *more: str) -> tuple[int, dict[str, Any]]:
     """Exit code and summary of a study."""
     code = main(["calibrate", "--config", str(study), "--out", str(out), "--budget", "30", *more])
-    return code, json.loads((out / "summary.json").read_text())
+    return code, valid(json.loads((out / "summary.json").read_text()))
 
 
 @pytest.fixture(scope="module")

@@ -11,6 +11,7 @@ import pandas as pd
 
 from calib.cli.main import main
 from calib.trace import read_trace
+from tests.calib.documents import valid
 
 
 def test_simulate_writes_a_force_record_that_reads_back(tmp_path: Path, capsys):
@@ -18,7 +19,7 @@ def test_simulate_writes_a_force_record_that_reads_back(tmp_path: Path, capsys):
     out = tmp_path / "cut"
     argv = ["simulate", "--food", "strawberry", "--knife", "edc", "--stroke", "0.012", "--threads", "1", "--json"]
     assert main([*argv, "--out", str(out)]) == 0
-    summary = json.loads(capsys.readouterr().out)
+    summary = valid(json.loads(capsys.readouterr().out))
     contract = "peak_N work_J work_per_area_J_m2 dx_m particles wall_s momentum_residual ke_over_ie severed components"
     assert not [k for k in contract.split() if k not in summary]
     c = pd.read_csv(out / "force.csv")

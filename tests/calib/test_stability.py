@@ -23,6 +23,7 @@ from calib.pool import Pool
 from calib.stability import REASONS, conclude, evaluate, evaluation, row
 from calib.store import EvaluationStore, Header
 from mpm.record import ForceRecord
+from tests.calib.documents import valid
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE_S = 400.0  # for the first stored runs, kernels compiled by two processes on a loaded machine included
@@ -318,7 +319,7 @@ def quick(tmp_path_factory):
 def test_quick_map_is_explained(quick):
     """Sound foods are stable, a crushed one and a step of three times the limit are stopped, nonsense is refused."""
     out, code, _ = quick
-    document = json.loads((out / "stress.json").read_text())
+    document = valid(json.loads((out / "stress.json").read_text()))
     assert (code, document["passed"], document["unexplained"]) == (0, True, 0)
     named = {c["name"]: c for c in document["cells"]}
     assert {c["status"] for c in document["cells"] if c["physical"]} == {"stable"}

@@ -12,6 +12,7 @@ from calib.pool import Pool
 from calib.verification import rows
 from calib.verification.rows import Case, How, Row, cases
 from mpm.errors import SceneError
+from tests.calib.documents import valid
 
 FAST = [case for case in cases() if case.fast]
 
@@ -98,7 +99,7 @@ def test_a_failed_row_is_exit_code_2(monkeypatch, tmp_path, capsys):
     text = capsys.readouterr().out
     assert "FAIL" in text
     assert "3 rows, 1 failed" in text
-    document = json.loads((tmp_path / "a/verify.json").read_text())
+    document = valid(json.loads((tmp_path / "a/verify.json").read_text()))
     assert [r["passed"] for r in document["rows"]] == [True, True, False]
     figure = (tmp_path / "a/verify.svg").read_bytes()
     assert figure.startswith(b"<?xml")
@@ -110,7 +111,7 @@ def test_a_case_that_breaks_down_fails_and_the_others_run(monkeypatch, tmp_path,
     """Its message is kept; --json prints the document alone."""
     fakes(monkeypatch, Case("broken", broken), Case("good", good))
     assert main(["verify", "--out", str(tmp_path / "a"), "--json"]) == 2
-    document = json.loads(capsys.readouterr().out)
+    document = valid(json.loads(capsys.readouterr().out))
     assert document["broken"] == {"broken": "the knife is bent"}
     assert [r["group"] for r in document["rows"]] == ["broken", "good"]
     assert document["complete"] and not document["passed"]
@@ -145,7 +146,7 @@ def test_resume_runs_what_did_not_end(monkeypatch, tmp_path, capsys):
     again = ["verify", "--out", str(tmp_path / "a"), "--resume"]
     fakes(monkeypatch, counted, Case("broken", broken), Case("killed", good))
     assert main(again) == 2
-    document = json.loads((tmp_path / "a/verify.json").read_text())
+    document = valid(json.loads((tmp_path / "a/verify.json").read_text()))
     assert set(document["broken"]) == {"broken", "killed"}
     assert "killed" in document["broken"]["killed"]
     fakes(monkeypatch, Case("killed", good), counted, Case("broken", good))
@@ -156,7 +157,7 @@ def test_resume_runs_what_did_not_end(monkeypatch, tmp_path, capsys):
     assert main(again) == 0
     assert "1 of 3 cases are known already" in capsys.readouterr().err
     assert seen == ["good"]
-    document = json.loads((tmp_path / "a/verify.json").read_text())
+    document = valid(json.loads((tmp_path / "a/verify.json").read_text()))
     assert [r["group"] for r in document["rows"]] == ["killed", "good", "broken"]
     assert main([*again, "--seed", "1"]) == 1
     assert "seed 0, not 1" in capsys.readouterr().err
