@@ -123,7 +123,7 @@ def condition(
     """
     _check_options(trace, speed, height)
     trace = _cropped(trace, t_end)
-    warnings: list[str] = []
+    warnings = list(trace.notes)
     if trace.label == "reconstructed":
         warnings.append(f"{trace.source} is a reconstruction, not a measurement: nothing fitted to it is validated")
     if trace.start:
@@ -303,7 +303,7 @@ def _stroke_axis(
             raise TraceError(
                 f"{trace.source}, column {trace.columns.get('position')}: the position does not descend "
                 f"after contact at {contact.onset:.4g} s (it changes by {-end:.3g} m); it must be a height, "
-                "or a depth named like stroke_m; name another with --position-col, or none and give --speed"
+                "or a depth (--depth-col); name another with --position-col, or none and give --speed"
             )
         source = "position"
     else:

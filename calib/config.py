@@ -34,7 +34,7 @@ flesh and blade, which are the same."""
 EACH = "each"
 TOP = ("material", "knife", "fit", "own", "hold_out", "budget", "seed", "dx", "set")
 NUMBERS = ("speed", "t_end", "height", "width", "length", "gain_sd", "lag_sd")
-TEXTS = ("time_col", "force_col", "position_col", "sign", "shape", "knife")
+TEXTS = ("time_col", "force_col", "position_col", "depth_col", "sign", "shape", "knife")
 SIZES = ("height", "diameter", "width", "length")
 
 
@@ -189,7 +189,7 @@ def _request(place: Place, given: Mapping[str, Any], folder: Path, base: Request
         base,
         trace=folder / text(place.at("trace"), given["trace"]),
         air=None if air is None else folder / text(place.at("air"), air),
-        columns={n: words[n] for n in ("time_col", "force_col", "position_col", "sign")},
+        columns={n: words[n] for n in ("time_col", "force_col", "position_col", "depth_col", "sign")},
         knife=_knife(words["knife"] or base.knife, folder),
         sizing=Sizing(words["shape"], numbers["height"], numbers["width"], numbers["length"]),
         speed=numbers["speed"],

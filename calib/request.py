@@ -24,7 +24,7 @@ class Request:
         food: The food with its literature ranges.
         trace: The cut, or its file.
         air: The same motion without food, or its file, or None.
-        columns: ``time_col``, ``force_col``, ``position_col``, ``sign`` for reading files.
+        columns: ``time_col``, ``force_col``, ``position_col``, ``depth_col``, ``sign`` for reading files.
         knife: Name or YAML file.
         speed: Knife speed [m/s], or None.
         t_end: End of the record [s], or None.

@@ -1,10 +1,8 @@
-"""Tables of measured columns as a file holds them: CSV here, JSON and HDF5 in their own modules."""
+"""Tables of measured columns as a file holds them; CSV, JSON and HDF5 have modules of their own."""
 
 from __future__ import annotations
 
-import csv
 import difflib
-import hashlib
 import os
 import re
 from collections import Counter
@@ -39,6 +37,7 @@ class Table:
         label: ``measured`` or ``reconstructed``, or what else the file says.
         units: Units that the file states beside the names of columns.
         left_out: Columns that the table cannot hold, and why.
+        notes: What was done to read the file that its reader should know, one sentence each.
     """
 
     source: str
@@ -49,13 +48,14 @@ class Table:
     label: str = LABELS[0]
     units: Mapping[str, str] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 def read_table(path: str | Path) -> Table:
     """Read a table from a file; its content and suffix tell of what kind it is.
 
     Args:
-        path: A CSV file with one header line, a JSON file of lists or records, or an HDF5 file (``file.h5``, or
+        path: A CSV file with a header line, a JSON file of lists or records, or an HDF5 file (``file.h5``, or
             ``file.h5:/group`` for a group or data set in it).
 
     Raises:
@@ -71,7 +71,9 @@ def read_table(path: str | Path) -> Table:
         from calib.logs import table_of_json
 
         return table_of_json(file.name, raw)
-    return _table_of_csv(file.name, raw)
+    from calib.delimited import table_of_csv
+
+    return table_of_csv(file.name, raw)
 
 
 def split_address(path: str | Path) -> tuple[Path, str]:
@@ -148,68 +150,3 @@ def _content(path: Path) -> bytes:
 def _names_beside(path: Path) -> list[str]:
     """File names in the folder where a missing file was looked for."""
     return [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
-
-
-def _table_of_csv(source: str, raw: bytes) -> Table:
-    """Split a CSV file into header and rows; comments and blank lines are dropped, line numbers kept.
-
-    Raises:
-        TraceError: It is no CSV file with a header.
-    """
-    text = decoded(source, raw, "CSV")
-    numbered = [(i, line) for i, line in enumerate(re.split(r"\r\n|\n|\r", text), start=1) if line.strip()]
-    comments = [line for _, line in numbered if line.lstrip().startswith("#")]
-    body = [(i, line) for i, line in numbered if not line.lstrip().startswith("#")]
-    if len(body) < 2:
-        raise TraceError(f"{source}: {'a header but no data' if body else 'nothing but comments'}")
-    (_, header), *rows = _cells(source, body)
-    names = [name.strip() or f"column {i}" for i, name in enumerate(header, start=1)]
-    _check_header(source, names)
-    for line, row in rows:
-        if len(row) != len(names):
-            raise TraceError(f"{source}, row {line}: {len(row)} cells, the header has {len(names)}")
-    return Table(
-        source=source,
-        columns=dict(zip(names, zip(*(row for _, row in rows), strict=True), strict=True)),
-        rows=[line for line, _ in rows],
-        row="row",
-        sha256=hashlib.sha256(raw).hexdigest(),
-        label=_label(comments),
-    )
-
-
-def _cells(source: str, body: list[tuple[int, str]]) -> list[tuple[int, list[str]]]:
-    """Line number and cells of each row; a quoted cell may hold several lines.
-
-    Raises:
-        TraceError: A quote that is not closed, or a cell that is too long.
-    """
-    delimiter = max(",;\t", key=body[0][1].count)
-    reader = csv.reader([line for _, line in body], delimiter=delimiter, strict=True)
-    rows: list[tuple[int, list[str]]] = []
-    begin = 0
-    try:
-        for row in reader:
-            rows.append((body[begin][0], row))
-            begin = reader.line_num
-    except csv.Error as error:
-        raise TraceError(f"{source}, row {body[begin][0]}: not CSV ({error}); check the quotes in this row") from None
-    return rows
-
-
-def _check_header(source: str, names: list[str]) -> None:
-    """Refuse a header with one column, without names, or with a name twice."""
-    if len(names) < 2:
-        raise TraceError(f"{source}: not a CSV file with a force column and one beside it (header: {quoted(names[0])})")
-    if all(as_float(name) is not None for name in names):
-        raise TraceError(f"{source}: the first row holds numbers; add a header such as time_s,force_N")
-    check_names(source, names)
-
-
-def _label(comments: list[str]) -> str:
-    """The label that a ``# label: ...`` comment gives, ``measured`` without one."""
-    for comment in comments:
-        found = re.match(r"\s*#\s*label\s*:\s*(\S+)", comment)
-        if found:
-            return found.group(1).lower()
-    return LABELS[0]

@@ -46,6 +46,7 @@ class Trace:
         columns: The column used for each of ``time``, ``force`` and ``position``.
         label: ``measured`` or ``reconstructed``.
         start: Time of the first sample on the file's clock where that began elsewhere, and was subtracted [s].
+        notes: What was done to read the file that its reader should know, one sentence each.
 
     Raises:
         TraceError: Too few samples, unequal lengths, a number that is not finite, a clock that does not run.
@@ -59,6 +60,7 @@ class Trace:
     columns: dict[str, str] = field(default_factory=dict)
     label: str = LABELS[0]
     start: float = 0.0
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("time", "force", "position"):
@@ -108,7 +110,7 @@ class Trace:
             frame: A row for each sample; an index with a name is a column too.
             source: Name in errors and reports, which say that it was a DataFrame; ``frame.attrs["source"]`` if not given.
             label: ``measured`` or ``reconstructed``; ``frame.attrs["label"]`` or ``measured`` if not given.
-            columns: ``time_col``, ``force_col``, ``position_col`` and ``sign``.
+            columns: ``time_col``, ``force_col``, ``position_col``, ``depth_col`` and ``sign``.
 
         Raises:
             TraceError: As :func:`read_trace`.
@@ -157,6 +159,7 @@ def read_trace(
     time_col: str | None = None,
     force_col: str | None = None,
     position_col: str | None = None,
+    depth_col: str | None = None,
     sign: str | int | None = None,
 ) -> Trace:
     """Read a force trace from a CSV, JSON or HDF5 file, or a pandas DataFrame.
@@ -164,7 +167,8 @@ def read_trace(
     Columns are found by their names, which carry the unit: ``time_s``, ``time_ms``, ``t_s``; ``force_N``, ``fz_N``,
     ``force_kN``; heights ``ee_z_m``, ``position_mm``; depths ``stroke_m``, ``displacement_mm`` (positive downwards,
     turned into heights). ``base_Fz_N`` of a robot log is preferred to a derived ``cut_force_z_N`` and has its sign turned
-    round. In CSV files, lines that start with ``#`` are comments; ``# label: reconstructed`` sets the label.
+    round. In CSV files, lines that start with ``#`` are comments; ``# label: reconstructed`` sets the label. Lines above the
+    header, a row of units below it, and decimals after a comma (where something else separates cells) are understood.
 
     JSON files hold lists by name, or a list of records; HDF5 files data sets of one group (``file.h5:/group``) or a
     structured one, with units in names or attributes. In both, vectors become columns ``_x``, ``_y``, ``_z``, and
@@ -177,6 +181,7 @@ def read_trace(
         time_col: Column to use as time; without a unit in its name it is taken as seconds.
         force_col: Column to use as force; without a unit in its name it is taken as newtons.
         position_col: Column to use as position (metres if its name has no unit); ``none`` uses no position.
+        depth_col: The same where it holds the way down, which grows as the knife descends.
         sign: ``+`` or 1 if positive numbers mean resistance to the knife, ``-`` or -1 if negative ones do.
 
     Returns:
@@ -189,6 +194,7 @@ def read_trace(
         "time_col": time_col,
         "force_col": force_col,
         "position_col": position_col,
+        "depth_col": depth_col,
         "sign": sign,
     }
     if not isinstance(path, (str, Path)):
@@ -202,6 +208,7 @@ def _trace(
     time_col: str | None = None,
     force_col: str | None = None,
     position_col: str | None = None,
+    depth_col: str | None = None,
     sign: str | int | None = None,
 ) -> Trace:
     """The trace in a table.
@@ -213,7 +220,14 @@ def _trace(
         "time": choose(table, "time", time_col),
         "force": choose(table, "force", force_col),
     }
-    if position_col != DISABLED and (position_col is not None or candidates(table, "position")):
+    if depth_col is not None:
+        if position_col is not None:
+            raise TraceError(
+                f"{table.source}: --position-col beside --depth-col; the knife's place is in one column, give one"
+            )
+        column = choose(table, "position", depth_col)
+        columns["position"] = replace(column, factor=-abs(column.factor))
+    elif position_col != DISABLED and (position_col is not None or candidates(table, "position")):
         columns["position"] = choose(table, "position", position_col)
     if sign is not None:
         force = columns["force"]
@@ -233,6 +247,7 @@ def _trace(
         columns={role: column.name for role, column in columns.items()},
         label=table.label,
         start=start,
+        notes=table.notes,
     )
 
 

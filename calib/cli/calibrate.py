@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from calib.cli.check import description
 from calib.cli.options import (
     RESUME_HELP,
     RUN,
@@ -32,11 +33,9 @@ HELP = "fit a food to a measured knife-force trace, and report"
 DESCRIPTION = """Fit a food's cutting properties to a knife-force trace: CSV, JSON or HDF5 with
 units in its columns' names. Writes summary.json, report.pdf and more to --out."""
 EPILOG = """examples:
-  calibrate --food banana --trace force_data/banana_reconstructed.csv
-  calibrate --food potato --trace cut.csv --air air.csv --out runs/potato
+  calibrate --food potato --trace cut.csv --air air.csv --check
   calibrate --config potatoes.yaml --out runs/potatoes
 
-Ctrl-C keeps what was computed; the same command with --resume goes on.
 Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass."""
 
 
@@ -58,6 +57,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     fit.add_argument("--sample", action="store_true", help="sample the posterior as well (needs emcee)")
     fit.add_argument("--u-num", metavar="DIR", help="a converge study whose uncertainty the fit heeds")
     add_workers(p, "simulations")
+    titled(p, RUN).add_argument("--check", action="store_true", help="say how the trace is read, and simulate nothing")
     titled(p, RUN).add_argument("--resume", action="store_true", help=RESUME_HELP)
     add_run(p)
 
@@ -70,6 +70,7 @@ def add_trace(p: argparse.ArgumentParser, *, required: bool = True) -> None:
     g.add_argument("--time-col", metavar="NAME", help="column of the time")
     g.add_argument("--force-col", metavar="NAME", help="column of the force on the knife")
     g.add_argument("--position-col", metavar="NAME", help="column of the knife's height ('none': none)")
+    g.add_argument("--depth-col", metavar="NAME", help="the same where it grows as the knife descends")
     g.add_argument("--sign", choices=("+", "-"), metavar="+|-", help="sign that makes resistance positive")
     g.add_argument("--speed", type=number(0, 10, "m/s"), metavar="M/S", help="of the knife, where there is no position")
     g.add_argument("--gain-sd", type=number(0, 1, ""), metavar="PART", help="doubt of the sensor's gain (default 0.02)")
@@ -112,6 +113,7 @@ def measured(args: argparse.Namespace, command: Sequence[str]) -> Request:
         "time_col": args.time_col,
         "force_col": args.force_col,
         "position_col": args.position_col,
+        "depth_col": args.depth_col,
         "sign": args.sign,
     }
     return Request(
@@ -143,6 +145,9 @@ def run(args: argparse.Namespace) -> int:
     if missing:
         raise CutcalError(f"{' and '.join(missing)} missing: name the food and its trace, or a study with --config")
     request = request_of(args, command)
+    if args.check:
+        print(description(request))
+        return 0
     out = Path(args.out or f"cutcal-{request.food.name}-{request.stem}")
 
     with workers_of(args, note) as pool, ProgressBar() as bar:
@@ -159,6 +164,8 @@ def run_study(args: argparse.Namespace, command: Sequence[str]) -> int:
     from calib.config import overridden, read_study
     from calib.several import run as study_run
 
+    if args.check:
+        raise CutcalError("--check is for one trace: give --food and --trace, and leave --config out")
     taken = [n for n in ("food", "trace", "air", "material", "fit") if getattr(args, n) is not None]
     if taken:
         raise CutcalError(f"--{taken[0]} beside --config: write it into {args.config}, where it belongs to a trace")

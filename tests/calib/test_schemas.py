@@ -210,7 +210,8 @@ def test_lists_and_single_foods_and_knives(printed):
 
 def test_a_written_report_is_a_document(printed, tmp_path, monkeypatch):
     """``report --json`` names the file."""
-    monkeypatch.setattr("reports.calibration.write_report", lambda folder: folder / "report.pdf")
+    monkeypatch.setattr("reports.stability.write_report", lambda folder: folder / "report.pdf")
+    (tmp_path / "stress.json").touch()
     assert valid(printed("report", str(tmp_path)))["report"] == str(tmp_path / "report.pdf")
 
 
