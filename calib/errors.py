@@ -21,6 +21,10 @@ class PublishedError(CutcalError):
     """A file of published numbers that is incomplete, contradicts itself or cannot be fitted as asked."""
 
 
+class RegressionError(CutcalError):
+    """A recorded force curve that is missing or damaged, or that cannot be replaced."""
+
+
 class OutputError(CutcalError):
     """An output folder or file that cannot be written, or that belongs to another calibration."""
 

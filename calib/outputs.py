@@ -24,6 +24,7 @@ MARKS = (
     "coverage.json",
     "coverage.jsonl",
     "prior.json",
+    "regress.json",
     "scalars.json",
     "report.pdf",
     "force.csv",
