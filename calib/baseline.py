@@ -25,7 +25,7 @@ FloatArray = npt.NDArray[np.float64]
 KNIFE = "kitchen"  # of every recorded cut
 MOST_CELLS = 12
 """Cells over the height of a food at most. The screening grid of a melon has 25, and its cut takes 7 to 20 s on a core; with 12 the
-longest takes two, and a changed law shows as well."""
+longest takes three, and a changed law shows as well."""
 POINTS = 60  # of a curve: five to a cell, or more
 SEED = 0  # of the recorded cut
 OTHERS = (1, 2, 3, 4, 5, 6, 7)
@@ -82,8 +82,8 @@ class Case:
     def cost(self) -> float:
         """Seconds of one run, roughly."""
         scene = self.scene()
-        dx = scene.numerics.dx
-        return START + volume(scene.food.shape) / dx**3 * scene.motion.stroke / dx / RATE
+        dx, images = scene.numerics.dx, 2 ** sum(scene.mirrors)
+        return START + volume(scene.food.shape) / dx**3 / images * scene.motion.stroke / dx / RATE
 
     @property
     def inputs(self) -> str:

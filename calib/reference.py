@@ -31,7 +31,7 @@ CHECKED = COLUMNS[1:]
 """Columns with a tolerance; the stroke is given."""
 INDEX = "reference.json"
 SCHEMA = 1  # layout of that file
-DIGITS = 8  # of a recorded number: two more than a run on one machine repeats
+DIGITS = 8  # of a recorded number: a hundredth of what keeps a record (regression.UNCHANGED)
 ABOUT = (
     "Recorded cuts of this project's own solver: a reference for changes of its code, no measurement.",
     "results: peak of the force on the knife [N], its stroke [m], work [J]; tolerances by column of the CSV file of the same name.",
@@ -40,8 +40,16 @@ ABOUT = (
     "and at least a thousandth of the largest force or work, which is what the same seed may differ by between machines.",
     "Written by cutcal regress --update alone: it keeps hash and columns together.",
 )
-ENTRY = ("inputs", "columns_sha256", "repeatability", "tolerances", "solver", "versions")
-"""What each entry of that file must have."""
+ENTRY: Mapping[str, type] = {
+    "inputs": str,
+    "columns_sha256": str,
+    "repeatability": dict,
+    "tolerances": dict,
+    "scene": dict,
+    "solver": str,
+    "versions": dict,
+}
+"""What each entry of that file must have, and as what."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,9 +100,9 @@ class References:
         if entry is None or not (path.exists() or _draft(path).exists()):
             raise RegressionError(f"{name}: no reference is recorded in {self.folder}; record it: {_command(name)}")
         here = f"{INDEX}: {name}"
-        if not isinstance(entry, dict) or any(key not in entry for key in ENTRY):
-            raise RegressionError(f"{here}: misses {_missing(entry)}; {_remedy(name)}")
-        path = self._current(path, str(entry["columns_sha256"]))
+        if missing := _missing(entry):
+            raise RegressionError(f"{here}: misses {missing}, or has something else there; {_remedy(name)}")
+        path = self._current(path, entry["columns_sha256"])
         columns = _columns(path, name)
         if sha256(path) != entry["columns_sha256"]:
             raise RegressionError(f"{path.name}: not the columns that {INDEX} was written with; {_remedy(name)}")
@@ -103,8 +111,10 @@ class References:
             numbers = [*reference.tolerances.values(), *reference.limits.values()]
         except (KeyError, TypeError, ValueError, AttributeError):
             numbers = [math.nan]
-        if not all(math.isfinite(x) and x >= 0 for x in numbers):
-            raise RegressionError(f"{here}: tolerances or limits are missing or no numbers; {_remedy(name)}")
+        if not all(math.isfinite(x) and x > 0 for x in numbers):
+            raise RegressionError(
+                f"{here}: tolerances or limits are missing, or no numbers above zero; {_remedy(name)}"
+            )
         return reference
 
     def write(
@@ -222,7 +232,9 @@ def _columns(path: Path, name: str) -> dict[str, FloatArray]:
 
 
 def _missing(entry: Any) -> str:
-    return ", ".join(key for key in ENTRY if not isinstance(entry, dict) or key not in entry)
+    """Names of what an entry has not, or not as what it must be."""
+    known = entry if isinstance(entry, dict) else {}
+    return ", ".join(key for key, kind in ENTRY.items() if not isinstance(known.get(key), kind))
 
 
 def _remedy(name: str) -> str:
