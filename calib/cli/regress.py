@@ -18,9 +18,9 @@ from mpm.scene import CONTACTS
 HELP = "whether cuts are still those that were recorded, and what changed in peak, work and shape"
 DESCRIPTION = """Simulate the default cut of each food, with each kind of contact, on a coarse grid,
 and compare it with the curves recorded in force_data/reference: same (but for
-rounding), within (no further away than a run with other particles is in 95 of 100)
-or OUTSIDE. With --update, record what has changed and
-say what to argue over: in peak, work and shape, and over what other seeds change."""
+rounding), within (no further away than a run with other particles, in 95 of 100)
+or OUTSIDE. With --update, record what has changed and say what there is to argue
+over: peak, work and shape, beside what other particles change."""
 EPILOG = """examples:
   cutcal regress
   cutcal regress grape cherry --contact cohesive
@@ -44,7 +44,9 @@ def add_args(p: argparse.ArgumentParser) -> None:
     )
     add_workers(p, "simulations")
     p.add_argument(
-        "--out", metavar="DIR", help="folder for regress.json and the new curves; without it nothing is written there"
+        "--out",
+        metavar="DIR",
+        help="folder for regress.json and the curves of this run; never overwritten, none by default",
     )
     p.add_argument("--arch", choices=ARCHES, default="cpu", help="device of the simulations")
     p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
@@ -159,27 +161,19 @@ def line(row: Mapping[str, Any], recording: bool = False) -> str:
 
 def argument(row: Mapping[str, Any]) -> list[str]:
     """Why a reviewer should look: each change beside what another seed changes, and what else is another than it was."""
-    peak, where, work, far = (
-        *(row["results"][name] for name in ("peak_N", "peak_stroke_m", "work_J")), row["largest"],
-    )  # fmt: skip
-    moved = where["change"] * 1e3
-    when = (
-        f"reached {abs(moved):.1f} mm {'later' if moved > 0 else 'earlier'}"
-        if abs(moved) > 0.05
-        else "at the same place"
-    )
-    shape = (
-        "no force to compare the shape of" if row["shape_error"] is None else f"shape error {row['shape_error']:.4f}"
-    )
+    peak, where, work = (row["results"][name] for name in ("peak_N", "peak_stroke_m", "work_J"))
+    far, moved, shape = row["largest"], round(where["change"] * 1e3, 1), row["shape_error"]
+    when = f"reached {abs(moved)} mm {'later' if moved > 0 else 'earlier'}" if moved else "at the same place"
+    form = "no force to compare the shape of" if shape is None else f"shape error {shape:.4f}"
     unit = far["column"].rpartition("_")[2]
-    because = "; ".join(row["because"]) or "nothing that is recorded: same food, knife, scene, solver and libraries"
+    because = "; ".join(row["because"]) or "nothing that a record knows of (food, knife, scene, solver, libraries)"
     return [
         f"{row['food']}, {row['contact']}:",
         f"  peak {peak['before']:.4g} -> {peak['now']:.4g} N ({percent(peak)}, {seeds(peak)}), {when}",
         f"  work {work['before']:.4g} -> {work['now']:.4g} J ({percent(work)}, {seeds(work)})",
-        f"  {shape}; furthest away is {far['column']}, by {far['difference']:.3g} {unit} at {far['stroke_m'] * 1e3:.1f} mm, "
+        f"  {form}; furthest away is {far['column']}, by {far['difference']:.3g} {unit} at {far['stroke_m'] * 1e3:.1f} mm, "
         f"{far['over_tolerance']:.1f} of its tolerance",
-        f"  what is another than when it was recorded: {because}",
+        f"  changed since it was recorded: {because}",
     ]
 
 

@@ -249,6 +249,8 @@ def test_same_is_said_and_kept_to_the_byte(play, capsys):
     """What was recorded is the same when it is simulated again; recording again changes no byte, and repeats no seed."""
     folder, use = play
     before = content(folder)
+    names = [name for name in ORDER if name.startswith(PLAY)]
+    assert list(json.loads(before[INDEX])["references"]) == names  # in whichever order they were simulated
     capsys.readouterr()
     assert main(["regress", *PLAY]) == 0
     printed = capsys.readouterr()
@@ -273,7 +275,7 @@ def test_change_is_outside_and_said_in_terms_of_physics(play, capsys, monkeypatc
     )
     assert "work" in said and "shape error 0.0000" in said
     assert "food.material.R 80.0 -> 88.0" in said
-    assert said.count("what is another") == 1
+    assert said.count("changed since") == 1
 
 
 def test_update_records_the_change_and_nothing_else(play, capsys, monkeypatch):
@@ -309,6 +311,29 @@ def test_value_without_effect_is_recorded(play, capsys, monkeypatch):
     assert "2 recorded" in capsys.readouterr().out
 
 
+def test_value_beside_the_scene_is_recorded(play, capsys, monkeypatch):
+    """So does one that no scene has, such as a strength without a fracture energy: it is in the hash of the inputs alone."""
+    known = load_foods()
+    torn = known["grape"].with_values({"tensile_strength": 1e4})
+    monkeypatch.setattr("calib.cli.regress.load_foods", lambda: known | {"grape": torn})
+    case, reference = replace(ALL["grape-nodal"], food=torn), References(play[0]).read("grape-nodal")
+    assert differences(case, reference) == ["values of the food or the knife that its scene does not show"]
+    capsys.readouterr()
+    assert main(["regress", "grape", "--contact", "nodal", "--update"]) == 0
+    assert "1 recorded" in capsys.readouterr().out
+    assert differences(case, References(play[0]).read("grape-nodal")) == []
+
+
+def test_scene_without_effect_is_recorded(play, capsys, monkeypatch):
+    """So it is with another cell that the cut does not feel."""
+    monkeypatch.setattr("calib.baseline.MOST_CELLS", 4)
+    capsys.readouterr()
+    assert main(["regress", "grape", "--contact", "nodal", "--update"]) == 0
+    assert "1 recorded" in capsys.readouterr().out
+    origin = References(play[0]).read("grape-nodal").origin
+    assert origin["scene"]["numerics"]["dx"] == origin["dx_m"] == pytest.approx(0.02 / 4)
+
+
 def test_height_that_is_another(play, capsys, monkeypatch):
     """A higher food has another stroke; the curves are compared where both have one, and the height is named."""
     known = load_foods()
@@ -334,7 +359,7 @@ def test_other_code_that_moves_the_peak(play, capsys):
     assert main(["regress", "grape", "--contact", "nodal"]) == 2
     said = capsys.readouterr().out
     assert "(+0.0 %, 0.0 times what another seed changes), reached 2.0 mm later" in said
-    assert "nothing that is recorded" in said
+    assert "nothing that a record knows of" in said
     assert main(["regress", "grape", "--contact", "nodal", "--update"]) == 0
     assert "1 recorded" in capsys.readouterr().out
     assert main(["regress", "grape", "--contact", "nodal"]) == 0
@@ -517,7 +542,7 @@ def test_folder_that_cannot_be_written(play, capsys, monkeypatch, tmp_path):
     [
         (["bananna"], "did you mean 'banana'"),
         (["--workers", "0"], "--workers"),
-        (["--update", "--arch", "cuda"], "--arch"),
+        (["--update", "--arch", "cuda"], "recorded on the processor"),
     ],
 )
 def test_bad_options_are_one_clear_error(words, said, capsys):
