@@ -143,7 +143,7 @@ class Here(Workers):
 
 @pytest.mark.parametrize(
     ("name", "change"),
-    [("cherry-cohesive", {"R": 1.1}), ("grape-cohesive", {"R": 1.1}), ("grape-nodal", {"E": 1.2})],
+    [("cherry-cohesive", {"R": 1.1}), ("strawberry-cohesive", {"R": 1.1}), ("grape-nodal", {"E": 1.2})],
 )
 def test_changed_physics_is_outside(name, change):
     """A tenth more resistance of the flesh, or a fifth more stiffness where contact has no edge, is found, and named."""
