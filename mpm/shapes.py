@@ -141,7 +141,9 @@ def skin_path(shape: Shape, x: np.ndarray, thickness: float) -> np.ndarray:
     return np.nan_to_num(np.maximum(top - inner_top, 0.0))
 
 
-SLICE_SAMPLES = 65  # points at which a slice's outline is looked up
+SLICE_SAMPLES = 64
+"""Points at which a slice's outline is looked up: an even number, so that none lies where the rim of a food of whole or half cells does.
+There the last bit would decide whether it counts, and with it 1.8 % of a strawberry's peak."""
 
 
 def slices(shape: Shape, x: np.ndarray, dx: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

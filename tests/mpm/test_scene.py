@@ -13,7 +13,7 @@ from mpm.material import Material
 from mpm.record import _moving_mean
 from mpm.scene import Food, Knife, Motion, Numerics, Scene
 from mpm.seeding import seed
-from mpm.shapes import SHAPE_KINDS, Shape, inside, section_area, skin_path, surface, volume
+from mpm.shapes import SHAPE_KINDS, Shape, inside, section_area, skin_path, slices, surface, volume
 
 MATERIAL = Material(E=1e6, nu=0.35, rho=1000.0)
 KNIFE = Knife("k", 2e-3, 0.1, 0.04, 0.2)
@@ -165,3 +165,17 @@ def test_one_particle_a_cell_is_refused():
     with pytest.raises(SceneError, match="one particle a cell"):
         Numerics(ppc=1)
     assert Numerics(ppc=2).ppc == 2
+
+
+@pytest.mark.parametrize("kind", ["block", "cylinder", "sphere"])
+@pytest.mark.parametrize("cells", [8, 9])
+def test_the_last_bit_of_a_cell_does_not_change_the_outline(kind: str, cells: int) -> None:
+    """A food as wide as whole cells, rim on a node or half-way between two: cells longer or shorter by 1e-12 see the same slices."""
+    shape = Shape(kind, 0.04, 0.024, 0.024)
+    found = []
+    for error in (-1e-12, 0.0, 1e-12):
+        dx = 0.024 / cells * (1 + error)
+        found.append(slices(shape, dx * np.arange(-6, 7), dx))
+    for other in (found[0], found[2]):
+        for exact, moved in zip(found[1], other, strict=True):
+            np.testing.assert_allclose(moved, exact, atol=1e-9)
