@@ -3,31 +3,31 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from calib.cli.options import add_workers, say, workers_of
+from calib.cli.options import RUN, add_arch, add_json, add_workers, print_json, say, titled, workers_of
+from calib.documents import tag
 from calib.errors import RegressionError
 from calib.knives import load_knife
 from calib.materials import load_food, load_foods
 from mpm.scene import CONTACTS
 
-HELP = "whether cuts are still those that were recorded, and what changed in peak, work and shape"
-DESCRIPTION = """Simulate the default cut of each food, with each kind of contact, on a coarse grid,
-and compare it with the curves recorded in force_data/reference: same (but for
-rounding), within (no further away than a run with other particles, in 95 of 100)
-or OUTSIDE. With --update, record what has changed and say what there is to argue
-over: peak, work and shape, beside what other particles change."""
+HELP = "are cuts still those that were recorded, or what changed?"
+DESCRIPTION = """Simulate the default cut of each food, with each kind of contact, on a coarse
+grid, and compare it with the curves recorded in force_data/reference: same (but
+for rounding), within (no further away than a run with other particles, in 95 of
+100) or OUTSIDE. With --update, record what has changed and say what there is to
+argue over: peak, work and shape, beside what other particles change."""
 EPILOG = """examples:
   cutcal regress
   cutcal regress grape cherry --contact cohesive
   cutcal regress banana --update
 
-Ctrl-C keeps the references that were recorded so far and leaves the others as they
-were; the same command goes on, and keeps what is recorded to the byte.
+Ctrl-C keeps the references that were recorded so far and leaves the others as
+they were; the same command goes on, and keeps what is recorded to the byte.
 Exit codes: 0 all same or within (--update: all recorded), 1 error in input or run,
 2 some outside, or a cut that did not reach its end."""
 WIDTHS = "{:13s} {:9s} {:>8s} {:>7s} {:>8s} {:>7s} {:>7s} {:>7s}  {:28s} {}"
@@ -35,21 +35,14 @@ WIDTHS = "{:13s} {:9s} {:>8s} {:>7s} {:>8s} {:>7s} {:>7s} {:>7s}  {:28s} {}"
 
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
-    from mpm.runtime import ARCHES
-
     p.add_argument("names", nargs="*", metavar="FOOD", help="foods of materials.yaml; all of them by default")
-    p.add_argument("--contact", choices=CONTACTS, help="one kind of contact; both by default")
-    p.add_argument(
-        "--update", action="store_true", help="record what has changed in force_data/reference of the checkout"
-    )
+    p.add_argument("--contact", choices=CONTACTS, metavar="KIND", help="cohesive or nodal (default: both)")
+    p.add_argument("--update", action="store_true", help="record what has changed in the checkout's references")
     add_workers(p, "simulations")
-    p.add_argument(
-        "--out",
-        metavar="DIR",
-        help="folder for regress.json and the curves of this run; never overwritten, none by default",
-    )
-    p.add_argument("--arch", choices=ARCHES, default="cpu", help="device of the simulations")
-    p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
+    run = titled(p, RUN)
+    run.add_argument("--out", metavar="DIR", help="folder for the curves and regress.json (default: none)")
+    add_arch(run)
+    add_json(run)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -81,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         write(Path(args.out), rows, document)
     if args.json:
-        print(json.dumps(document, indent=2, ensure_ascii=False))
+        print_json(document)
     else:
         print(table(rows, recording=args.update))
         if args.out is not None:
@@ -95,6 +88,7 @@ def document_of(rows: Sequence[Mapping[str, Any]], args: argparse.Namespace) -> 
 
     bad = {"broke down"} if args.update else {"broke down", "outside"}
     return {
+        "schema": tag("regress"),
         "passed": not any(row["verdict"] in bad for row in rows),
         "update": args.update,
         "counts": dict(Counter(row["verdict"] for row in rows)),

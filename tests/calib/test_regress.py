@@ -32,6 +32,7 @@ from calib.regression import check, differences, update
 from calib.workers import Workers
 from mpm.scene import CONTACTS
 from mpm.solver import Simulation
+from tests.calib.documents import valid
 
 ALL = {case.name: case for case in cases(list(load_foods().values()), load_knife(KNIFE))}
 # By default, those of a second or less, with skin and without, that flow and that do not; nodal kernels take seconds to compile.
@@ -389,7 +390,7 @@ def test_document_on_stdout_and_in_the_folder(play, capsys, monkeypatch, tmp_pat
     out = tmp_path / "out"
     capsys.readouterr()
     assert main(["regress", "grape", "--json", "--out", str(out)]) == 2
-    printed = json.loads(capsys.readouterr().out)
+    printed = valid(json.loads(capsys.readouterr().out))
     assert printed == json.loads((out / "regress.json").read_text(encoding="utf-8"))
     assert printed["passed"] is False and printed["counts"] == {"outside": 2}
     case = printed["cases"][0]
