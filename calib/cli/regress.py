@@ -28,8 +28,8 @@ EPILOG = """examples:
 
 Ctrl-C keeps the references that were recorded so far and leaves the others as
 they were; the same command goes on, and keeps what is recorded to the byte.
-Exit codes: 0 all same or within (--update: all recorded), 1 error in input or run,
-2 some outside, or a cut that did not reach its end."""
+Exit codes: 0 all same or within (--update: all recorded), 1 error in input or
+run, 2 some outside, or a cut that did not reach its end."""
 WIDTHS = "{:13s} {:9s} {:>8s} {:>7s} {:>8s} {:>7s} {:>7s} {:>7s}  {:28s} {}"
 
 
