@@ -50,7 +50,7 @@ def writer(folder: Path) -> Callable[[Path], Path]:
         if (folder / name).exists():
             return write
     if not folder.is_dir():
-        raise ReportError(f"{folder}: no such folder; give the --out of a run")
+        raise ReportError(f"{folder}: no such folder; give the output folder of a calibration, or of another run")
     summary = folder / "summary.json"
     if not summary.exists():
         names = ", ".join(("summary.json", *found))
