@@ -121,21 +121,32 @@ def calibrate(
 
 
 def _choose(search: Search, replicate: Evaluator) -> tuple[Trial, list[Trial]]:
-    """Run the most promising runs once more, slower and with other particles; the one of least mean chi-square, and those runs."""
+    """Run the most promising runs once more, slower and with other particles; the one of least mean chi-square, and those runs.
+
+    A run whose repetition breaks down is not the answer; where all break down, the next ones are repeated, promising or not.
+    """
     process = search.process()
     order = sorted(search.finished, key=lambda t: process.expected(t.z, CAUTION_NEAR))
     limit = process.expected(order[0].z, CAUTION_NEAR) + NOISES * max(process.luck, 1.0)
-    finalists: list[Trial] = []
-    for trial in [search.best, *order]:
-        apart = all(np.abs((trial.z - t.z) / search.unit).max() > ELSEWHERE for t in finalists)
-        if apart and len(finalists) < FINALISTS and process.expected(trial.z, CAUTION_NEAR) <= limit:
-            finalists.append(trial)
-    if not finalists:
-        return search.best, []
-    runs = sorted(replicate.evaluate([t.evaluation.parameters for t in finalists]), key=lambda e: e.index)
-    replicates = [search.objective.trial(e, stage="replicate") for e in runs]
-    scores = [t.misfit + again.misfit for t, again in zip(finalists, replicates, strict=True)]
-    return finalists[int(np.argmin(scores))], replicates
+    tried: list[Trial] = []
+    replicates: list[Trial] = []
+    for bound in (limit, math.inf):
+        finalists: list[Trial] = []
+        for trial in [search.best, *order]:
+            apart = all(np.abs((trial.z - t.z) / search.unit).max() > ELSEWHERE for t in (*tried, *finalists))
+            if apart and len(finalists) < FINALISTS and process.expected(trial.z, CAUTION_NEAR) <= bound:
+                finalists.append(trial)
+        if not finalists:
+            continue
+        runs = sorted(replicate.evaluate([t.evaluation.parameters for t in finalists]), key=lambda e: e.index)
+        tried += finalists
+        replicates += (search.objective.trial(e, stage="replicate") for e in runs)
+        sound = [
+            (t.misfit + again.misfit, k) for k, (t, again) in enumerate(zip(tried, replicates, strict=True)) if again.ok
+        ]
+        if sound:
+            return tried[min(sound)[1]], replicates
+    return search.best, replicates
 
 
 def _result(search: Search, status: str, best: Trial, replicates: list[Trial]) -> FitResult:

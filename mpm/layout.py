@@ -41,7 +41,9 @@ def lay_out(scene: Scene) -> Layout:
         shift = num.grid_shift[axis] % 1.0
         room = PAD + math.ceil(num.room * size / 2 / dx)
         bottom = -PAD if axis == 2 else -math.ceil(size / 2 / dx) - room
-        top = math.ceil(size / dx) + PAD if axis == 2 else math.ceil(size / 2 / dx) + room
+        top = math.ceil(size / 2 / dx) + room
+        if axis == 2:  # the blade tips the halves, and their far ends rise
+            top = math.ceil(size / dx) + PAD + math.ceil(num.room * deep / 2 / dx)
         if mirror[axis] and axis == 0:
             bottom, shift = -MIRROR, -shift  # by nothing or half a cell, so that there are as many images
         if mirror[axis] and axis == 1:

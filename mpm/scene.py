@@ -176,7 +176,8 @@ class Numerics:
         grid_shift: Position of the grid against the scene along x, y, z [cells].
         grid_turn: Angle of food and blade against the grid [rad].
         mirror: Use the mirror planes x = 0 and y = 0 where they are mirrors of the grid.
-        room: Empty grid on either side of the food, for it to widen in while it is pressed, part of half its size.
+        room: Empty grid on either side of the food, for it to widen in while it is pressed, part of half its size, and above it
+            for the ends of halves that tip, part of half its length across the blade.
         seed: Seed of the particle positions.
         safety: dt over the stability limit of a lone particle [-].
         gravity: Acceleration of gravity [m/s^2].

@@ -324,6 +324,23 @@ def test_noise_is_not_fitted() -> None:
     assert statuses[0] == "converged" and "stalled" in statuses
 
 
+def test_an_answer_whose_repetition_breaks_down_is_not_chosen() -> None:
+    """Where the best run and all about it break down when repeated, a worse one that stands is the answer."""
+    plain = calibrate(two_goal(), Fake(two_terms), replicate=Fake(two_terms), options=QUICK)
+    near = values(plain)
+    assert plain.best.misfit < 50
+
+    def about(p: Mapping[str, float]) -> bool:
+        return abs(p["R"] / near["R"] - 1) < 0.1
+
+    result = calibrate(two_goal(), Fake(two_terms), replicate=Fake(two_terms, breaks=about), options=QUICK)
+    assert not about(values(result))
+    assert result.best.misfit > plain.best.misfit and any(t.ok for t in result.replicates)
+    lost = calibrate(two_goal(), Fake(two_terms), replicate=Fake(two_terms, breaks=lambda p: True), options=QUICK)
+    assert lost.best.misfit == min(t.misfit for t in lost.history if t.ok)
+    assert lost.replicates and not any(t.ok for t in lost.replicates)
+
+
 def test_impossible_options_are_refused() -> None:
     """A budget that cannot hold design and differences, and numbers that are not positive, are refused."""
     with pytest.raises(MaterialError, match="budget of 12 simulations is too small for 5 parameters"):

@@ -9,12 +9,14 @@ import pytest
 import taichi as ti
 
 from mpm.errors import SceneError
+from mpm.material import Material
 from mpm.record import ForceRecord
 from mpm.runtime import Runtime
-from mpm.scene import Board, Food, Motion, Numerics, Scene
+from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
 from mpm.seeding import Seeds
 from mpm.shapes import Shape
 from mpm.solver import Simulation
+from mpm.watch import Watch
 from tests.mpm.scenes import FLESH, PRISM, WEDGE
 
 
@@ -47,6 +49,25 @@ def whole() -> ForceRecord:
     """The same cut without mirrors, under a wedge with friction."""
     scene = replace(PRISM, knife=WEDGE, numerics=replace(PRISM.numerics, mirror=False))
     return run(scene, mu=0.3)
+
+
+def test_halves_that_tip_stay_on_the_grid():
+    """The skin under the edge drags the cut faces of a long soft food down and tips its halves; their ends rise by 11 mm."""
+    fruit = Material(
+        E=2.6e5, nu=0.35, rho=960, yield_stress=1.7e4, R=370, R_initiation=525, R_skin=434, skin_thickness=2.5e-3,
+        initiation_depth=1.6e-3, mu=0.18,
+    )  # fmt: skip
+    shape = Shape("cylinder", 0.132, 0.033, 0.033)
+    blade = Knife("flat", 2e-3, np.deg2rad(2.55), 0.045, 0.2)
+    numerics = Numerics(dx=3e-3, far=8e-3, grid_shift=(0.5, 0.0, 0.57), seed=1)
+    simulation = Simulation(
+        Scene(Food(shape, fruit), blade, Motion(0.033, 0.01), edge=EdgeLaw(zone=4e-3), numerics=numerics),
+        Runtime(threads=1),
+    )
+    watch = Watch(10)
+    record = simulation.run(watch=watch)
+    assert record.status == "done" and record.counters["outside"] == 0
+    assert max(now.x[:, 2].max() for now in watch.taken) > 0.033 + 10e-3
 
 
 @pytest.mark.parametrize(("modulus", "R"), [(1e5, 100.0), (1e6, 100.0), (1e7, 100.0), (1e6, 300.0), (1e7, 300.0)])
