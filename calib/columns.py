@@ -60,6 +60,11 @@ LONGEST = 200
 """Letters from which on the name of a column means nothing."""
 
 
+def is_unit(text: str) -> bool:
+    """Whether this is a unit of time, force or length, in brackets or not."""
+    return any(text.strip(" []()") in units for units in _UNITS.values())
+
+
 @dataclass(frozen=True)
 class Column:
     """One chosen column.
@@ -235,6 +240,7 @@ def _did_you_mean(wanted: Sequence[str], table: Table) -> str:
     lower = {name.lower(): name for name in table.columns if len(name) <= LONGEST}
     near = [lower[n] for w in wanted for n in difflib.get_close_matches(w.lower(), lower, n=1, cutoff=0.7)]
     if not near:
-        return f"; the columns are {listed(list(table.columns))}"
+        labels = [f"{name} [{table.units[name]}]" if name in table.units else name for name in table.columns]
+        return f"; the columns are {listed(labels)}"
     stated = table.units.get(near[0])
     return f"; did you mean {quoted(near[0])}{f', whose unit is stated as {quoted(stated)}' if stated else ''}?"

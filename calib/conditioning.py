@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -38,6 +38,8 @@ NOTHING_N = 1e-6
 """Variation of a force below which there is nothing in it but rounding [N]."""
 PEAK_HALF_WIDTH = 2
 """Points on each side of the maximum through which the parabola of the peak is fitted."""
+BEYOND = 0.1
+"""Part of the specimen's height by which a stroke may exceed it: contact is seen late, knife, arm and board give way."""
 MAX_DESCENT_FRACTION = 0.5
 """Part of the position's range that must lie before its lowest point for a record to be a downward stroke."""
 
@@ -105,6 +107,7 @@ def condition(
     speed: float | None = None,
     height: float | None = None,
     t_end: float | None = None,
+    board: float | None = None,
 ) -> Conditioned:
     """Tare a trace, find contact, and put the force on a uniform stroke with a zero-phase filter.
 
@@ -114,6 +117,8 @@ def condition(
         speed: Knife speed [m/s], needed where the trace has no position.
         height: Height of the food [m]; without position and speed, onset to release is taken for this height.
         t_end: End of the record on the trace's clock [s]; what comes later (board contact, say) is dropped.
+        board: Stroke at which the edge is at the board, which is the specimen's height where that was measured [m]; the curve ends
+            there.
 
     Returns:
         The conditioned cut.
@@ -122,7 +127,7 @@ def condition(
         TraceError: No usable cut in the trace; the message says why and what to do.
     """
     _check_options(trace, speed, height)
-    trace = _cropped(trace, t_end)
+    trace = trace if t_end is None else trace.until(t_end)
     warnings = list(trace.notes)
     if trace.label == "reconstructed":
         warnings.append(f"{trace.source} is a reconstruction, not a measurement: nothing fitted to it is validated")
@@ -158,6 +163,17 @@ def condition(
         )
     tared = force - contact.baseline.level
     stroke, end, source = _stroke_axis(trace, tared, contact, last, speed, height, warnings)
+    if board is not None and end > board * (1 + 1e-9):
+        if end > (1 + BEYOND) * board:
+            raise TraceError(
+                f"{trace.source}: the stroke after contact is {1e3 * end:.1f} mm (from {source}), but the specimen is {1e3 * board:.1f} "
+                "mm high; check the height, or the position or speed, or say with --t-end where the cut ends"
+            )
+        warnings.append(
+            f"the stroke of {1e3 * end:.1f} mm goes beyond the specimen's height of {1e3 * board:.1f} mm; what is below the board's "
+            "top is left out"
+        )
+        end = board
     grid, curve = _on_grid(trace, stroke, tared, contact.onset, end)
     noise = _filtered_noise(contact, len(tared[(stroke >= 0.0) & (stroke <= grid[-1])]), grid[-1])
     peak = _peak(curve)
@@ -197,21 +213,6 @@ def _check_options(trace: Trace, speed: float | None, height: float | None) -> N
             f"{trace.source}: no position column, so the stroke is unknown; give the knife speed with "
             "--speed (m/s), or name a position column with --position-col"
         )
-
-
-def _cropped(trace: Trace, t_end: float | None) -> Trace:
-    """The trace up to ``t_end``."""
-    if t_end is None:
-        return trace
-    keep = trace.time <= t_end
-    if np.count_nonzero(keep) < MIN_SAMPLES or not t_end <= trace.time[-1]:
-        raise TraceError(
-            f"{trace.source}: t_end is {t_end:g} s, the record runs from {trace.time[0]:g} to "
-            f"{trace.time[-1]:g} s; choose a time inside it with at least {MIN_SAMPLES} samples before "
-            "(option --t-end)"
-        )
-    position = None if trace.position is None else trace.position[keep]
-    return replace(trace, time=trace.time[keep], force=trace.force[keep], position=position)
 
 
 def _air_force(trace: Trace, air: Trace) -> np.ndarray:

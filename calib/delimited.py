@@ -7,6 +7,7 @@ import hashlib
 import re
 from collections.abc import Sequence
 
+from calib.columns import is_unit
 from calib.errors import TraceError
 from calib.tables import LABELS, Table, as_float, check_names, decoded
 from calib.wording import brief, quoted
@@ -77,33 +78,48 @@ def _were(count: int) -> str:
 def _above(body: Lines) -> tuple[int, str]:
     """How many lines stand above the header, and what separates cells.
 
-    A header as wide as what follows is the first line. Where it is not, the table is the block of lines of one width at the end, if it
-    begins with words and no line above it holds numbers alone: then those are words about the record.
+    The table is the block of lines of one width at the end, from its last line of words on, or from the one before where that has
+    the units. What is above are words about the record, unless one of those lines holds numbers alone: then it is a damaged table,
+    and the header is the first line.
     """
     lines = [line for _, line in body]
     own = max(SEPARATORS, key=lines[0].count)
-    if lines[0].count(own) and lines[1].count(own) == lines[0].count(own):
-        return 0, own
-    for separator in ("\t", ";", ","):
+    for separator in dict.fromkeys((own, "\t", ";", ",")):
         counts = [line.count(separator) for line in lines]
-        wide = counts[-1]
-        first = next((k for k in range(len(counts) - 1, -1, -1) if counts[k] != wide), -1) + 1
-        above = [_numeric(line, separator) for line in lines[: first + 1]]
-        if (
-            wide
-            and 0 < first <= MOST_ABOVE
-            and len(lines) - first > 2
-            and not any(above)
-            and _numeric(lines[-1], separator)
-        ):
+        if not counts[-1] or not _numeric(lines[-1], separator):
+            continue
+        block = next((k for k in range(len(counts) - 1, -1, -1) if counts[k] != counts[-1]), -1) + 1
+        first = block + _header(lines[block : block + MOST_ABOVE], separator)
+        if first == 0 and separator == own:
+            return 0, own
+        sound = not any(_numeric(line, separator) for line in lines[:first]) and _words(lines[first], separator)
+        if 0 < first <= MOST_ABOVE and len(lines) - first > 2 and sound:
             return first, separator
     return 0, own
 
 
+def _header(lines: Sequence[str], separator: str) -> int:
+    """The last line of words, or the one above where most of its cells are units; 0 where there is none."""
+    words = [_words(line, separator) for line in lines]
+    last = max((k for k, yes in enumerate(words) if yes), default=0)
+    cells = [cell for cell in lines[last].split(separator) if cell.strip()]
+    units = 2 * sum(is_unit(cell) for cell in cells) > len(cells)
+    return last - 1 if last and words[last - 1] and units else last
+
+
+def _words(line: str, separator: str) -> bool:
+    """Whether a line could be a header: words in two cells at least, and no number."""
+    cells = line.split(separator)
+    return sum(bool(cell.strip()) for cell in cells) > 1 and not any(_number(cell, separator) for cell in cells)
+
+
 def _numeric(line: str, separator: str) -> bool:
     """Whether a line holds numbers alone."""
-    cells = line.split(separator)
-    return all(as_float(cell) is not None or (separator != "," and COMMA.fullmatch(cell)) for cell in cells)
+    return all(_number(cell, separator) for cell in line.split(separator))
+
+
+def _number(cell: str, separator: str) -> bool:
+    return as_float(cell) is not None or (separator != "," and COMMA.fullmatch(cell) is not None)
 
 
 def _cells(source: str, body: Lines, separator: str) -> Rows:

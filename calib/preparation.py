@@ -72,7 +72,9 @@ def conditioned(request: Request) -> tuple[Conditioned, str | None]:
     """
     trace, air = request.records()
     known = request.sizing.height or request.food.dims["height"].value
-    curve = condition(trace, air=air, speed=request.speed, height=known, t_end=request.t_end)
+    curve = condition(
+        trace, air=air, speed=request.speed, height=known, t_end=request.t_end, board=request.sizing.height
+    )
     return curve, None if air is None else air.sha256
 
 

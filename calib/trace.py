@@ -81,6 +81,21 @@ class Trace:
         if not (np.all(np.isfinite(self.time)) and np.all(np.diff(self.time) > 0.0)):
             raise TraceError(f"{self.source}: time is not strictly increasing")
 
+    def until(self, end: float) -> Trace:
+        """The part up to a time [s].
+
+        Raises:
+            TraceError: A time outside the record, or too near to its beginning.
+        """
+        keep = self.time <= end
+        if np.count_nonzero(keep) < MIN_SAMPLES or not end <= self.time[-1]:
+            raise TraceError(
+                f"{self.source}: t_end is {end:g} s, the record runs from {self.time[0]:g} to {self.time[-1]:g} s; choose a time "
+                f"inside it with at least {MIN_SAMPLES} samples before (option --t-end)"
+            )
+        position = None if self.position is None else self.position[keep]
+        return replace(self, time=self.time[keep], force=self.force[keep], position=position)
+
     def _numbers(self, name: str) -> np.ndarray:
         """A column as an array of numbers.
 

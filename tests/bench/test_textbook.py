@@ -35,6 +35,7 @@ def textbook_force(scene: Scene, dt: float, speed: float, gap: float, times: np.
     return np.array(out)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("yield_stress", [1e11, 5e4])
 def test_fast_kernels_repeat_the_textbook(yield_stress):
     """Windowed, without SVD and atomics the elastic force is the textbook's to 1e-6; J2 returns differ by 5 %."""

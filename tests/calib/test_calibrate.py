@@ -25,6 +25,7 @@ ROOT = Path(__file__).resolve().parents[2]
 TRACE = ROOT / "force_data" / "banana_reconstructed.csv"
 # A coarse grid and two parameters: seconds a simulation, enough to pass through every stage.
 SMALL = ["--food", "banana", "--trace", str(TRACE), "--fit", "E,R", "--dx", "4.1e-3", "--budget", "14"]
+pytestmark = pytest.mark.slow
 PATIENCE_S = 400.0  # for the first stored runs, kernels compiled by two processes on a loaded machine included
 
 

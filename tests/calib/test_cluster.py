@@ -173,6 +173,7 @@ def full(two: Servers) -> Cluster:
     return found[0]
 
 
+@pytest.mark.slow
 def test_the_same_bits_as_on_this_machine(two):
     """Candidates and a whole record of a tiny cut: every number of physics, from either worker and from here."""
     food = load_food("banana")
@@ -191,6 +192,7 @@ def test_the_same_bits_as_on_this_machine(two):
         assert np.array_equal(value, same[name]), name
 
 
+@pytest.mark.slow
 def test_a_killed_worker_costs_one_run(two, tmp_path, monkeypatch, capsys):
     """SIGKILL in the middle of a run: the study ends with the same optimum as one undisturbed, each run stored once."""
     log = two.folder / "log"
@@ -324,6 +326,7 @@ def test_what_cannot_be_used_is_one_clear_error(tmp_path, capsys, monkeypatch):
     assert "pip install 'cutcal[cluster]'" in refused(capsys, out, "--scheduler", made.address)
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_ends_is_said(tmp_path, monkeypatch):
     """Its loss in the middle of a study is one clear error, not an endless wait; so is the loss of all workers."""
     monkeypatch.setattr(cluster, "CONNECT_S", 2.0)

@@ -164,6 +164,7 @@ def test_one_repeat_has_no_interval():
     assert [line.passed for line in judge(found, None, 0.029)] == [True, True, True]
 
 
+@pytest.mark.slow
 def test_a_calibration_end_to_end(tmp_path, capsys):
     """Exit code 0, all keys, plain files; the same folder is refused."""
     trace = synthetic(tmp_path / "gel.csv", (5e4, 5.1e4))
@@ -299,7 +300,7 @@ def test_a_file_twice_is_refused(tmp_path, capsys):
     assert "a second repeat" in capsys.readouterr().err
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_thirteen_silicones():
     """One simulation at nu 0.49 between frictionless plates, fitted over 0 to 40 % strain: the fitted modulus over 0 to 5 %
     is within 10 % of each published one, which is that slope, and within 5 % in the middle; NRMSE up to 5 %."""

@@ -74,6 +74,20 @@ def test_onset_does_not_wait_for_a_threshold() -> None:
     assert cut.onset_sd_s >= 0.005 / np.sqrt(12.0)
 
 
+def test_the_stroke_ends_at_the_board() -> None:
+    """A stroke of 30 mm through a specimen of 29 mm counts for 29 mm, which is said; through one of 20 mm something is wrong."""
+    plain = condition(made(position=True))
+    cut = condition(made(position=True), board=0.029)
+    assert plain.stroke_length_m == pytest.approx(0.030, abs=3e-4)
+    assert cut.stroke_length_m == 0.029 == cut.stroke[-1]
+    assert cut.end_s < plain.end_s and cut.peak_N == pytest.approx(plain.peak_N, rel=0.01)
+    assert any("goes beyond the specimen's height of 29.0 mm" in text for text in cut.warnings)
+    assert condition(made(position=True), board=0.04).stroke_length_m == plain.stroke_length_m
+    for given in ({}, {"speed": SPEED}):
+        with pytest.raises(TraceError, match="but the specimen is 20.0 mm high; check the height"):
+            condition(made(position=not given), board=0.020, **given)
+
+
 def test_robot_start_is_not_taken_for_contact() -> None:
     """A start-up of the arm by 7 N long before contact changes neither onset nor baseline."""
     plain = made()

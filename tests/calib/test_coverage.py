@@ -72,6 +72,7 @@ def test_it_does_not_pass_by_chance(rows: list[dict[str, Any]]) -> None:
     assert not summarise(rows)["passed"]
 
 
+@pytest.mark.slow
 def test_the_study_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Three traces on the analytic simulator; a torn last line is done again from the store, the others are not touched."""
     monkeypatch.setattr(calib.cli.coverage, "workers_of", lambda args, say: FakePool())

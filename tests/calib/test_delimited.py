@@ -43,6 +43,12 @@ AS_WIDE = "Record 4;banana;kitchen knife\nDate;2026-11-01\n"
          ("3 lines above the header were left out", "time_s, force_N, stroke_m follow a comma")),
         ({"above": AS_WIDE, "separator": ";", "header": "time_s;force_N;stroke_m", "comma": True},
          ("2 lines above the header were left out", "follow a comma")),
+        # as wide as each other and narrower than the table; filled up to its width, as spreadsheets do; a number among the words
+        ({"above": "Sample;Gel 7\nDate;12.03.2026\nNumber;7\n", "separator": ";", "header": "time;force;stroke\ns;N;m", "comma": True},
+         ("3 lines above the header", "follow a comma")),
+        ({"above": "Sample;Gel 7;\nDate;12.03.2026;\nNumber;7;\n", "separator": ";", "header": "time_s;force_N;stroke_m", "comma": True},
+         ("3 lines above the header", "follow a comma")),
+        ({"above": "Sample,Gel 7,\nDate,12.03.2026,\n"}, ("2 lines above the header",)),
         ({"header": "time,force,stroke\n[s],[N],[m]"}, ()),
         ({"header": "Time,Force,Stroke\ns,N,m", "above": "x\ny\n"}, ("2 lines above",)),
     ],
@@ -94,6 +100,14 @@ def test_damaged_files_are_refused_with_their_place(tmp_path: Path, change, says
     path.write_text(change(path.read_text()))
     with pytest.raises(TraceError, match=says):
         read_trace(path)
+
+
+def test_names_that_mean_nothing_are_listed_with_their_units(tmp_path: Path) -> None:
+    """Which column is which is not guessed; the units that the file states help to say it."""
+    with pytest.raises(
+        TraceError, match=r"the columns are Zeit \[s\], Kraft \[N\], Weg \[m\]; name one with --time-col"
+    ):
+        read_trace(plain(tmp_path, header="Zeit,Kraft,Weg\ns,N,m"))
 
 
 def test_a_depth_may_be_named_as_one(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from mpm.runtime import Runtime, start
 from tests.calib.documents import valid
 
 
+@pytest.mark.slow
 def test_a_sound_machine_passes(capsys, tmp_path):
     """Where these tests run all that is needed is there: the small cut needs R times the width, within 5 %."""
     assert main(["doctor", "--json", "--out", str(tmp_path)]) == 0

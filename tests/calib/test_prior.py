@@ -147,6 +147,7 @@ def study(tmp_path_factory):
     return out, main([*words, "--resume"]), stored
 
 
+@pytest.mark.slow
 def test_kill_and_resume_run_nothing_twice(study, capsys):
     """What was stored before the kill is known; a second call knows all, shows warnings and table, and changes no file."""
     out, code, stored = study
@@ -185,6 +186,7 @@ def copied(study, tmp_path):
     return shutil.copytree(study[0], tmp_path / "out")
 
 
+@pytest.mark.slow
 def test_another_food_joins_a_folder(copied, monkeypatch):
     """A food that is run into a folder with others, or run again, leaves their entries, and the order, as they were."""
     before = json.loads((copied / "prior.json").read_text())["foods"]
@@ -200,6 +202,7 @@ def test_another_food_joins_a_folder(copied, monkeypatch):
     assert all(after[name] == before[name] for name in CHEAP if name != "grape")
 
 
+@pytest.mark.slow
 def test_default_values_that_do_not_finish_are_exit_code_2(copied, capsys, monkeypatch):
     """A food whose own values break down is named, and the command says that it did not pass."""
     broken = [[result(1.0, 0.01, "inverted"), result(1.0, 0.02)]]
@@ -208,6 +211,7 @@ def test_default_values_that_do_not_finish_are_exit_code_2(copied, capsys, monke
     assert "DEFAULT VALUES: inverted" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_damaged_entries_are_one_clear_error(copied, capsys):
     """A prior.json that is cut off is named, and no result is lost over it."""
     (copied / "prior.json").write_text('{"foods"')
@@ -239,6 +243,7 @@ def test_recorded_band_is_of_these_values(name, document):
     assert curves["default_N"].max() == pytest.approx(row["peak_N"]["default"], rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CHEAP)
 def test_recorded_default_is_what_is_simulated(name, study):
     """The default cut, simulated again, is the recorded one within 1 % of its peak."""

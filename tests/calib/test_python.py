@@ -60,6 +60,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_the_documented_script_runs(folder: Path) -> None:
     """All blocks, without a guard for worker processes: they do not run the script again."""
     assert (folder / "began").read_text() == "began\n"
@@ -67,6 +68,7 @@ def test_the_documented_script_runs(folder: Path) -> None:
     assert "report.pdf" in said and "verdict" in said and "J/m^2" in said
 
 
+@pytest.mark.slow
 def test_results_load_back(folder: Path) -> None:
     """A finished folder gives summary, tables, food and report, and says how it was made."""
     result = Calibration.load(folder / "runs" / "banana")

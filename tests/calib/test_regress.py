@@ -46,7 +46,7 @@ FOLDER = References().folder
 
 def cuts(names=tuple(ALL)):
     """Parameters of a test that simulates: the quick ones by default."""
-    return [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in names]
+    return [pytest.param(name, marks=() if name in QUICK else pytest.mark.long) for name in names]
 
 
 def scaled(food, **factors):

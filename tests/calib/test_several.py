@@ -118,6 +118,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, int]
     return study, folder / "out", code
 
 
+@pytest.mark.slow
 def test_each_cut_is_predicted_from_the_others(finished: tuple[Path, Path, int]) -> None:
     """Held-out NRMSE under 3 %, with the specimen's own skin and width found and the flesh that of the others."""
     _, out, code = finished
@@ -138,6 +139,7 @@ def test_each_cut_is_predicted_from_the_others(finished: tuple[Path, Path, int])
     assert summary["parameters"]["R"]["shared"] and not summary["parameters"]["R_skin@b"]["shared"]
 
 
+@pytest.mark.slow
 def test_what_is_written_can_be_read(finished: tuple[Path, Path, int]) -> None:
     """material.yaml holds the flesh, the curves of each trace the fit and the prediction with their bands."""
     out = finished[1]
@@ -151,6 +153,7 @@ def test_what_is_written_can_be_read(finished: tuple[Path, Path, int]) -> None:
     assert any("hold_out are predictions" in text for text in summary["limits"])
 
 
+@pytest.mark.slow
 def test_resuming_a_finished_study_simulates_nothing(finished: tuple[Path, Path, int]) -> None:
     """The second identical run costs no simulation and gives the same numbers; without --resume it is refused."""
     study, out, _ = finished
@@ -165,6 +168,7 @@ def test_resuming_a_finished_study_simulates_nothing(finished: tuple[Path, Path,
     assert main(["calibrate", "--config", str(study), "--out", str(out)]) == 1
 
 
+@pytest.mark.slow
 def test_one_cut_is_held_out_for_good(study: Path, tmp_path: Path) -> None:
     """Named, not in turn: the final fit leaves it out as well, so nothing of it is in the material."""
     study.write_text(study.read_text().replace("hold_out: each", "hold_out: [b]"))
@@ -173,6 +177,7 @@ def test_one_cut_is_held_out_for_good(study: Path, tmp_path: Path) -> None:
     assert "R_skin@b" not in summary["parameters"]
 
 
+@pytest.mark.slow
 def test_a_force_without_balance_does_not_pass(study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Curves as good as before, but 2 % of the momentum is missing: neither the fit nor the prediction passes."""
     monkeypatch.setattr(FakePool, "balances", {"momentum_residual": 0.02, "ke_over_ie": 0.001})

@@ -281,6 +281,7 @@ def test_contact_makes_no_energy_where_waves_allow_the_longest_step():
     assert found["scalars"]["energy_gain"] < 0.05
 
 
+@pytest.mark.slow
 def test_a_cell_does_not_feel_the_one_before():
     """Food that was drawn together below the edge gives the same work after another cut as before it."""
     from calib.trial import attempt
@@ -316,6 +317,7 @@ def quick(tmp_path_factory):
     return out, main(["stress", "--quick", "--out", str(out), "--resume"]), stored
 
 
+@pytest.mark.slow
 def test_quick_map_is_explained(quick):
     """Sound foods are stable, a crushed one and a step of three times the limit are stopped, nonsense is refused."""
     out, code, _ = quick
@@ -336,6 +338,7 @@ def test_quick_map_is_explained(quick):
     assert (out / "stress.svg").read_bytes().startswith(b"<?xml")
 
 
+@pytest.mark.slow
 def test_kill_and_resume_run_nothing_twice(quick, capsys):
     """What was stored before the kill is known; a third call knows all, and --json prints the document alone."""
     out, code, stored = quick
@@ -350,6 +353,7 @@ def test_kill_and_resume_run_nothing_twice(quick, capsys):
     assert "--resume" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_negative_verdict_is_exit_code_2(quick, capsys, monkeypatch):
     """A physical cell that is not stable, and one that nothing explains, each make the exit code 2 and are named."""
     out, _, _ = quick

@@ -15,6 +15,8 @@ from mpm.errors import SceneError
 from tests.calib.documents import valid
 
 FAST = [case for case in cases() if case.fast]
+# The fast cases that take five seconds and more.
+SECONDS = ("tilted board", "rest and friction", "vortex", "cutting resistance", "press: block, sliding", "ball")
 
 
 def row(expected: float = 2.0, got: float = 2.0, tolerance: float = 0.01, least: bool = False) -> Row:
@@ -49,7 +51,9 @@ def test_there_are_enough_rows_of_every_kind():
     assert sum("press" in name for name in names) >= 6
 
 
-@pytest.mark.parametrize("case", FAST, ids=[case.name for case in FAST])
+@pytest.mark.parametrize(
+    "case", [pytest.param(case, id=case.name, marks=pytest.mark.slow if case.name in SECONDS else ()) for case in FAST]
+)
 def test_the_fast_cases_pass(case):
     """Each row of the quick version."""
     found = list(case.run(How(quick=True)))
@@ -57,7 +61,7 @@ def test_the_fast_cases_pass(case):
     assert not [f"{r.case}, {r.quantity}: {r.got:g} not {r.expected:g}" for r in found if not r.passed]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("case", cases(), ids=[case.name for case in cases()])
 def test_all_cases_pass(case):
     """Each row of the whole table."""
@@ -166,6 +170,7 @@ def test_resume_runs_what_did_not_end(monkeypatch, tmp_path, capsys):
     assert "damaged" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_cases_run_in_processes(tmp_path):
     """The whole path with real workers, on cases that take a moment."""
     out = tmp_path / "a"

@@ -164,6 +164,7 @@ def test_a_bonded_block_flows_in_steps():
     assert flowing[2] < 0.8 * elastic[2]
 
 
+@pytest.mark.slow
 def test_a_blade_in_a_slit():
     """The force on its faces is proportional to the stiffness, grows with its thickness, and comes near on finer elements."""
     block, lead, stroke = Shape("block", 0.024, 0.016, 0.018), 3e-3, 6e-3
@@ -183,6 +184,7 @@ def test_a_blade_in_a_slit():
     np.testing.assert_allclose(once.stroke + once.rise, lead / 2 * np.arange(1, 5), rtol=1e-2)
 
 
+@pytest.mark.slow
 def test_energy_that_the_end_of_a_slit_releases_is_its_virtual_extension():
     """Work less stored energy, over the area, is how much less a block stores whose slit is one element longer (12 %)."""
     block, knife, size = Shape("block", 0.024, 0.016, 0.018), Knife("blade", 2e-3, math.radians(11.0), 0.02, 0.2), 1e-3

@@ -257,6 +257,7 @@ def test_scenes_that_cannot_be_right_are_refused(change, says):
         replace(PRISM, **change)
 
 
+@pytest.mark.slow
 def test_bulk_damage_dissipates_and_weakens():
     """With a tensile strength that the wedge exceeds, bulk damage dissipates energy, the force drops, balance closes."""
     brittle = replace(FLESH, tensile_strength=2e4, fracture_energy=20.0)
@@ -286,6 +287,7 @@ def test_edge_waits_for_the_food_on_a_round_top():
     np.testing.assert_allclose(record.edge[late, 2], 300 * chord[late], rtol=0.05)
 
 
+@pytest.mark.slow
 def test_slip_on_a_round_top_counts_from_where_each_width_is_touched():
     """Before a cut starts the edge is a spring under each width it touches: its force is that of the segment's area.
 
@@ -326,6 +328,7 @@ def test_edge_leaves_the_food_at_its_lower_outline():
     assert record.edge[:, 2] @ np.diff(record.stroke, prepend=0.0) == pytest.approx(300 * area, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mirror", [True, False])
 def test_section_has_all_food_across_the_blade(mirror):
     """Pieces of the section fill length times height, near the cut and far from it; looks are even and the last is the end."""

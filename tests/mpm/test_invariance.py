@@ -58,6 +58,7 @@ def reference() -> ForceRecord:
     return cut(BANANA)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change",
     [
@@ -86,6 +87,7 @@ def stiff() -> ForceRecord:
     return cut(POTATO)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [{"seed": 1}, {"seed": 2}, {"grid_shift": (0.0, 0.0, 0.5)}, {"dx": 3e-3}], ids=str)
 def test_force_of_the_faces_belongs_to_the_food(stiff, change):
     """In a stiff food seeds and the height of the nodes move the work by less than 2 %, cells of 3 for 4 mm by 3 %.
@@ -97,6 +99,7 @@ def test_force_of_the_faces_belongs_to_the_food(stiff, change):
     assert record.work == pytest.approx(stiff.work, rel=0.03 if "dx" in change else 0.02)
 
 
+@pytest.mark.slow
 def test_longer_halves_are_bent_apart_with_more_force():
     """Like arms of a double cantilever beam: four heights of a stiff food need half as much again on the faces of the blade, and
     it does not matter that few particles are far from the cut. The force itself is compared with finite elements by ``verify``."""
@@ -120,6 +123,7 @@ def test_longer_halves_are_bent_apart_with_more_force():
     assert thinned.pieces.uncut_area == long.pieces.uncut_area
 
 
+@pytest.mark.slow
 def test_finer_cells_do_not_change_the_force(reference):
     """From dx = 3 to 2 mm work moves by less than 2 % and the peak by less than 3 %."""
     finer = cut(vary(dx=2e-3))
@@ -139,6 +143,7 @@ def test_work_is_at_least_resistance_times_area(reference):
     assert reference.work >= 350.0 * np.pi / 4 * 0.033**2 * 0.99
 
 
+@pytest.mark.slow
 def test_force_is_proportional_to_the_width():
     """Prisms 10, 20 and 40 mm wide under a thin frictionless blade: force over width within 2 % of R."""
     flesh = Material(E=1e6, nu=0.35, rho=1000, yield_stress=2e5, R=300.0, loss_factor=0.1)
@@ -155,6 +160,7 @@ def test_force_is_proportional_to_the_width():
         assert record.knife[steady, 2].mean() == pytest.approx(300 * width, rel=0.02)
 
 
+@pytest.mark.slow
 def test_halves_are_pressed_apart_alike(reference):
     """With mirrors there is no sideways force; without, random particles left and right leave 1 % of the peak (rms)."""
     assert np.abs(reference.knife[:, 1]).max() == 0.0

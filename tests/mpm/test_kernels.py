@@ -109,6 +109,7 @@ def test_inverted_particles_are_left_to_be_done_one_by_one(strained):
     np.testing.assert_array_equal(new[beyond], f[beyond])
 
 
+@pytest.mark.slow
 def test_strain_is_smoothed_wherever_it_can_matter():
     """About a few strongly strained particles the smoothed strain is the one over all particles, and most are spared."""
     tough = replace(BRITTLE.food.material, yield_stress=np.inf)
@@ -148,6 +149,7 @@ def alone():
     return Simulation(BRITTLE, Runtime(threads=1)).run()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threads", [2, 0])
 def test_many_threads_repeat_one(alone, threads):
     """Split among two threads, or as on a GPU (here on the CPU), a cut with flow, friction, damage and both halves gives
@@ -161,6 +163,7 @@ def test_many_threads_repeat_one(alone, threads):
     np.testing.assert_allclose(record.damage[-1], alone.damage[-1], rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_simulation_outlives_a_restart_of_taichi():
     """Another precision starts Taichi anew, and every field is gone; a simulation made before runs again, and alike."""
     scene = replace(BRITTLE, motion=replace(BRITTLE.motion, stroke=2e-3))
@@ -174,6 +177,7 @@ def test_a_simulation_outlives_a_restart_of_taichi():
     assert (single != first).any()
 
 
+@pytest.mark.slow
 def test_many_simulations_wait_side_by_side():
     """A dozen scenes of different sizes are made before the first one runs."""
     lengths = np.linspace(0.03, 0.06, 12)
@@ -195,6 +199,7 @@ def test_fields_have_room_for_what_they_hold_and_come_in_few_sizes():
         assert all(of(n) <= n + step for n in sizes if n > whole)
 
 
+@pytest.mark.slow
 def test_scenes_of_a_class_share_kernels_and_keep_their_force():
     """Two sizes of food run with what was compiled once; the force of the first is the same before and after the second, and to
     1e-9 that of fields without room to spare."""

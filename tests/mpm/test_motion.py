@@ -36,6 +36,7 @@ def sliding() -> Simulation:
     return Simulation(replace(HELD, motion=replace(PRISM.motion, slice_ratio=1.0)), Runtime(threads=1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("xi", [0.0, 0.5, 1.0, 2.0])
 def test_slicing_lowers_the_push_as_atkins_says(sliding, xi):
     """Frictionless: V/(R w) = 1/(1 + xi^2) and H/(R w) = xi/(1 + xi^2) (Atkins, Xu and Jeronimidis 2004), within 3 %.
@@ -51,6 +52,7 @@ def test_slicing_lowers_the_push_as_atkins_says(sliding, xi):
     assert record.momentum_residual < 1e-10
 
 
+@pytest.mark.slow
 def test_tilted_edge_needs_the_same_work_per_area():
     """A thin edge tilted by 20 degrees and pressed straight down cuts R w per way once all of it is in the food."""
     motion = Motion(0.017, 0.01, tilt=np.deg2rad(20.0))
@@ -59,6 +61,7 @@ def test_tilted_edge_needs_the_same_work_per_area():
     assert record.pieces is not None and not record.severed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn", [15.0, 45.0])
 def test_grid_may_lie_at_any_angle(turn):
     """Food and blade turned against the grid: peak and work as on it, within 2 %."""
@@ -68,6 +71,7 @@ def test_grid_may_lie_at_any_angle(turn):
     assert turned.work == pytest.approx(straight.work, rel=0.02)
 
 
+@pytest.mark.slow
 def test_retracting_blade_is_dragged_by_friction_and_leaves_the_slit_open():
     """On the way up friction drags the faces down, nothing is cut, and the uncut area stays what it was.
 
@@ -113,6 +117,7 @@ def test_arm_that_is_too_weak_does_not_sever_and_says_so():
     assert lag == pytest.approx(7.2 / 3000, rel=0.05)
 
 
+@pytest.mark.slow
 def test_prony_series_needs_the_real_speed_and_softens_a_slow_cut():
     """Without a real speed the scene is refused; a cut slow against the relaxation time opens at the relaxed modulus,
     a fast one at the instantaneous one."""
@@ -133,6 +138,7 @@ def test_prony_series_needs_the_real_speed_and_softens_a_slow_cut():
     assert work["slow"] < 0.75 * work["fast"]
 
 
+@pytest.mark.slow
 def test_dwell_relaxes_the_force_and_needs_a_speed():
     """Holding the blade still lets a viscoelastic food relax; a pause without a real speed is refused."""
     with pytest.raises(SceneError, match="real speed"):

@@ -63,6 +63,7 @@ def test_a_press_cuts_nothing():
     assert not record.severed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("changed", [{}, {"dx": 1e-3}, {"safety": 0.35}])
 def test_a_sliding_block_has_the_force_of_uniaxial_compression(changed):
     """Between slippery plates a block is in uniaxial compression: the law's force within 1 % on 8 cells, on 16, and with half

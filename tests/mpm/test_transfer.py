@@ -114,6 +114,7 @@ def test_free_fall_is_exact():
     np.testing.assert_allclose(fall, [0, 0, 9.81 * body.dt**2 * n * (n + 1) / 2], atol=1e-15)
 
 
+@pytest.mark.slow
 def test_bar_vibrates_with_its_wave_speed():
     """A free bar swings lengthwise with the period 2 L / sqrt(E/rho) (nu = 0), within 2 %."""
     length = 0.12

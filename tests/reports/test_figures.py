@@ -135,6 +135,7 @@ def test_three_moments_of_the_cut_are_shown() -> None:
     assert len(pictures.moments(section, stroke, stroke)) == 2
 
 
+@pytest.mark.slow
 def test_the_picture_of_the_cut_is_stable_and_fits_its_page(tmp_path: Path) -> None:
     """The same section gives the same bytes, flat foods and tall ones; the report has one page more with it, and none without."""
     stroke = np.linspace(0, 0.02, 50)

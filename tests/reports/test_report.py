@@ -61,6 +61,7 @@ def test_all_fonts_are_embedded(tmp_path: Path) -> None:
     assert fonts >= 3 and len(re.findall(rb"/FontFile[23]? ", pdf)) == fonts
 
 
+@pytest.mark.slow
 def test_same_files_give_same_bytes_in_another_process(tmp_path: Path) -> None:
     """Neither the clock, the hash seed, the time zone, the folder nor an existing report changes a byte."""
     first = write_report(sample.write_run(tmp_path / "a")).read_bytes()
