@@ -208,7 +208,7 @@ def _one(
 def _truth(
     k: int, random: np.random.Generator, food: FoodSpec, truth: Scene, store: EvaluationStore, pool: Workers
 ) -> tuple[dict[str, float], tuple[np.ndarray, np.ndarray]]:
-    """Values of a food whose cut reaches the end of its stroke, and that cut: stroke [m] and force [N]."""
+    """Values of a food that is cut to the end of the stroke, and that cut: stroke [m] and force [N]."""
     parameters = fit_parameters(food, food.default_fit)
     low, high = parameters.box
     scene = replace(truth, numerics=replace(truth.numerics, seed=10_000 + k))
@@ -217,7 +217,7 @@ def _truth(
         z = low + (high - low) * (0.5 + MIDDLE * (random.random(len(low)) - 0.5))
         values = parameters.to_dict(z)
         found = next(iter(evaluator.evaluate([values])))
-        if found.ok:
+        if found.completed == 1.0:
             return values, (found.stroke, found.force)
     raise OutputError(
         f"none of {TRIES} foods drawn from the ranges of {food.name} reached the end of its cut; give another --food or --dx"

@@ -117,7 +117,7 @@ def doubt_of(
 
 def _better(result: FitResult, runs: list[Trial], luck: float) -> Trial | None:
     """A run at the end of an interval that is better than the answer of the search by more than the noise of a run, ``luck``."""
-    judged = (t for t in runs[len(result.history) :] if t.ok and not t.coarse)
+    judged = (t for t in runs[len(result.history) :] if t.cut and not t.coarse)
     best = min(judged, key=lambda t: t.misfit, default=None)
     return best if best is not None and best.misfit < result.best.misfit - luck else None
 

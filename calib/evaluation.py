@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -10,6 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
+
+
+PARTED, PUSHED = 0.8, 0.5
+"""Least energy of the edge over R times the new area for a run to be a cut, and where it is none at all [-]. Fifteen foods at literature values have 0.95 to 1.3, a
+banana 0.87. A banana with a tenth of that yield stress has 0.5, and a process zone a quarter wider changes its peak by 7 %; one with
+0.8 and more by 0.3 %."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +60,18 @@ class Evaluation:
                 f"evaluation {self.index} has {self.stroke.shape} strokes and {self.force.shape} forces; "
                 "they must be two vectors of equal length."
             )
+
+    @property
+    def completed(self) -> float:
+        """Part of the stroke that was completed as a cut [-], 0 to 1.
+
+        Less than one also where the food was pressed away rather than parted: from :data:`PARTED` to :data:`PUSHED` it falls to
+        nothing.
+        """
+        if not self.ok:
+            return self.fraction
+        parted = self.scalars.get("parted", math.nan)
+        return max((parted - PUSHED) / (PARTED - PUSHED), 0.0) if parted < PARTED else 1.0
 
     @property
     def ok(self) -> bool:

@@ -95,7 +95,7 @@ class JointObjective:
         parts = tuple(
             c.objective.trial(e, coarse=coarse, stage=stage) for c, e in zip(self.cases, evaluation.parts, strict=True)
         )
-        fractions = [1.0 if e.ok else e.fraction for e in evaluation.parts]
+        fractions = [e.completed for e in evaluation.parts]
         rows = residual(self, [t.curve for t in parts], fractions, z)
         return Trial(z, evaluation, np.concatenate([t.curve for t in parts]), rows, coarse, stage, parts)
 

@@ -4,7 +4,7 @@ Rows of the vector (n grid points, p parameters; all without dimension, one stan
 
     0 .. n-1   w (m_i - r_i) / sigma     m: simulated, r: real force, both smoothed alike, on the trace's
     stroke grid n          (max m - max r) / s_peak  the headline figure, which n correlated points would
-    otherwise outvote n+1        P (1 - fraction)          zero for a run that reached the end of the stroke
+    otherwise outvote n+1        P (1 - fraction)          zero for a run that cut the food to the end of the stroke
     n+2 ..     (z_j - mean_j) / sd_j     literature priors in internal coordinates
 
 Where a study has several specimens, m is k times the simulated force; k is the factor of width and sensor, the best one for
@@ -180,6 +180,11 @@ class Trial:
     def ok(self) -> bool:
         """Whether the run reached the end of its stroke."""
         return self.evaluation.ok
+
+    @property
+    def cut(self) -> bool:
+        """Whether it cut the food all the way, that of each trace."""
+        return all(t.evaluation.completed == 1.0 for t in self.each)
 
 
 @dataclass(frozen=True, eq=False)
@@ -376,7 +381,7 @@ class Objective:
 def _usable(evaluation: Evaluation, target: Target) -> tuple[FloatArray, FloatArray, float]:
     """Finite samples of a rising stroke [m] with their force [N], and the completed part of the stroke."""
     stroke, force = np.asarray(evaluation.stroke, float), np.asarray(evaluation.force, float)
-    fraction = 1.0 if evaluation.ok else evaluation.fraction
+    fraction = evaluation.completed
     bad = ~(np.isfinite(stroke) & np.isfinite(force))
     end = int(np.argmax(bad)) if bad.any() else stroke.size
     advance = np.diff(np.maximum.accumulate(stroke[:end]), prepend=-math.inf) > 0.0

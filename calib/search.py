@@ -154,8 +154,9 @@ class Search:
 
     @property
     def finished(self) -> list[Trial]:
-        """Finished runs on the fine evaluator, while screening those on the coarse one."""
-        return [t for t in self.trials if t.ok and t.coarse == self.screening]
+        """Finished runs on the fine evaluator, while screening those on the coarse one; those that cut the food, if any."""
+        runs = [t for t in self.trials if t.ok and t.coarse == self.screening]
+        return [t for t in runs if t.cut] or runs
 
     @property
     def best(self) -> Trial:

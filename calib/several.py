@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import time
 from collections.abc import Callable, Mapping
 from datetime import datetime, timezone
@@ -169,7 +170,11 @@ def _trace(setup: Setup, fitted: Fitted, name: str, checks: list[Check]) -> dict
     scale = setup.objective.factor(trial.curve)
     metrics = compare(curve.stroke, curve.curve, scale * trial.curve)
     scalars = trial.evaluation.scalars
-    lines = [*agreement(metrics), *balances(scalars["momentum_residual"], scalars["ke_over_ie"]), *changes(checks)]
+    lines = [
+        *agreement(metrics),
+        *balances(scalars["momentum_residual"], scalars["ke_over_ie"], scalars.get("parted", math.nan)),
+        *changes(checks),
+    ]
     return {
         "trace": _source(setup),
         "in_sample": True,

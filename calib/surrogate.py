@@ -96,7 +96,7 @@ class CurveProcess:
         self._coarse = np.array([float(t.coarse) for t in used])
         self._extra = np.array([t.coarse * COARSE_SD**2 + (not t.ok) * BROKEN_SD**2 for t in used])
         curves = np.array([t.curve * math.exp(-self._scale(t.z)) for t in used])
-        missing = np.array([0.0 if t.ok else 1.0 - t.evaluation.fraction for t in used])
+        missing = np.array([1.0 - t.evaluation.completed for t in used])
         y = np.clip((curves - best.curve) / self.peak, -LARGEST_DIFFERENCE, LARGEST_DIFFERENCE)
         self.hyper = self._learn(y, guess)
         self._inverse = cho_solve(cho_factor(self._covariance(self.hyper)), np.eye(len(used)))

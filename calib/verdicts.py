@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from calib.checks import FINER, FINER_GRID, Check
+from calib.evaluation import PARTED
 from calib.metrics import Metrics
 from calib.nuisance import OUTSIDE
 
@@ -19,6 +21,7 @@ SHAPE_LIMIT = 0.08
 MOMENTUM_LIMIT = 0.01
 CHANGE_LIMIT = 0.05  # of peak and work by numerical choices: as much as the peak may miss the trace
 LOSS_LIMIT = 0.05  # energy lost by the discretisation, of all work: the force is too large by about that
+PRESSED = "food pressed away, not parted"
 KINETIC_LIMIT = 0.10  # explicit quasi-static practice: kinetic energy below 5 to 10 % of internal energy
 # Ends of what is physically possible: a fit that ends there found a one-sided answer (the cut shows no friction, say),
 # whereas one that ends on a bound of ours asks for a value that it was not allowed.
@@ -107,14 +110,18 @@ def _loss(finer: Check) -> Verdict:
     return _below(name, abs(change) / (1 - FINER), LOSS_LIMIT, note=note)
 
 
-def balances(momentum_residual: float, ke_over_ie: float) -> list[Verdict]:
-    """Lines of the balances that every evaluation keeps: momentum, and kinetic energy.
+def balances(momentum_residual: float, ke_over_ie: float, parted: float) -> list[Verdict]:
+    """Lines of what every evaluation keeps: momentum, kinetic energy, and whether the food was cut.
 
     Args:
         momentum_residual: Momentum balance that does not close, part of the peak [-].
         ke_over_ie: Kinetic over internal energy [-].
+        parted: Energy of the edge over R times the new area [-]; NaN where there is nothing to judge, and no line.
     """
+    note = f"the edge took {parted:.0%} of R times the new area"
+    cut = [] if math.isnan(parted) else [_below(PRESSED, max(0.0, 1.0 - parted), 1.0 - PARTED, note=note)]
     return [
+        *cut,
         _below("momentum balance residual", momentum_residual, MOMENTUM_LIMIT, note="part of the peak force"),
         _below("kinetic over internal energy", ke_over_ie, KINETIC_LIMIT),
     ]
@@ -135,6 +142,7 @@ def judge(
     *,
     momentum_residual: float,
     ke_over_ie: float,
+    parted: float = math.nan,
     parameters: Mapping[str, Mapping[str, Any]],
     checks: Sequence[Check] = (),
     nuisances: Mapping[str, Mapping[str, Any]] | None = None,
@@ -146,6 +154,7 @@ def judge(
         nulls: Null models against trace.
         momentum_residual: Momentum balance that does not close, part of the peak [-].
         ke_over_ie: Kinetic over internal energy [-].
+        parted: Energy of the edge over R times the new area [-].
         parameters: Fitted parameters with their verdicts.
         checks: What numerical choices change; none were made where the fit was interrupted.
         nuisances: What the fit says of the measurement: value, sd, prior_sd, unit and outside, by name.
@@ -166,7 +175,7 @@ def judge(
             f"best null model: {best.replace('_', ' ')}",
         )
     )
-    lines += [*balances(momentum_residual, ke_over_ie), *changes(checks)]
+    lines += [*balances(momentum_residual, ke_over_ie, parted), *changes(checks)]
     lines += [_nuisance(name, n) for name, n in (nuisances or {}).items() if name in JUDGED]
     on = [n for n, p in parameters.items() if p["verdict"] == "at_bound"]
     stuck = [n for n in on if n != SIZE and parameters[n]["value"] != NATURAL_LIMITS.get(n)]

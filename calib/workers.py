@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -45,6 +46,8 @@ def plain(record: ForceRecord) -> dict[str, Any]:
         "steps": float(record.steps),
         "particles": float(record.particles),
     }
+    if not math.isnan(record.parted):
+        scalars["parted"] = record.parted
     return {
         "status": "ok" if record.status == "done" else "failed",
         "reason": "" if record.status == "done" else record.status,

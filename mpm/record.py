@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,8 @@ from mpm.topology import Topology
 
 ENERGIES = ("kinetic", "elastic", "plastic", "damage", "viscous", "friction", "parting", "unbooked")
 """Where the work of knife and gravity has gone, each a column of a record; together they are that work."""
+LEAST_CUT = 5
+"""Stroke [cells] from which on the new area is known well enough to ask what parting it has cost."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,7 @@ class ForceRecord:
         status: ``done``, or the reason why the run stopped early.
         fraction: Part of the stroke completed [-].
         section: The food across the blade's middle, where it was asked for.
+        resistance: Cutting resistance R of the flesh [J/m^2]; NaN where no edge parts the food.
     """
 
     stroke: np.ndarray
@@ -90,6 +94,7 @@ class ForceRecord:
     status: str = "done"
     fraction: float = 1.0
     section: Section | None = None
+    resistance: float = math.nan
 
     @property
     def knife(self) -> np.ndarray:
@@ -165,6 +170,18 @@ class ForceRecord:
             "edge_J_m2": float(self.parting[-1]) / self.severed_area,
             "released_J_m2": float(self.unbooked[-1]) / self.severed_area,
         }
+
+    @property
+    def parted(self) -> float:
+        """Energy that the edge has taken over R times the new area [-]; NaN where nothing is to be parted, or too little for the grid.
+
+        One, and more with a skin, where the food is cut. Where the edge presses it away, as one that flows, the force is that of
+        the flow within the process zone, which is a width of the method, and R only bounds it.
+        """
+        sound = self.status == "done" and self.resistance > 0 and len(self.stroke) > 0
+        if not sound or self.stroke[-1] < LEAST_CUT * self.cell:
+            return math.nan
+        return float(self.parting[-1]) / (self.resistance * self.severed_area) if self.severed_area > 0 else 0.0
 
     @property
     def weighing(self) -> np.ndarray:

@@ -127,9 +127,8 @@ class Simulation:
         k, scene, num, edge = self.k, self.scene, self.scene.numerics, self.scene.edge
         k.user = self
         real = np.float64 if num.precision == "f64" else np.float32
-        k.lay_out(
-            len(self.seeds.x), self.nodes, round(-self.origin[1] / num.dx), len(self.stations), scene.mirrored_between
-        )
+        middle = round(-self.origin[1] / num.dx)
+        k.lay_out(len(self.seeds.x), self.nodes, middle, len(self.stations), scene.mirrored_between)
         k.fill(k.x, self._turn(self.seeds.x).astype(real))
         k.fill(k.foot, self.seeds.foot.astype(real))
         gap, outer = (self.seeds.gap, self.seeds.beside) if scene.cuts else (self.seeds.head, self.seeds.top)
@@ -381,6 +380,7 @@ class Simulation:
             wall=wall,
             status=status,
             fraction=fraction,
+            resistance=material.R if self.scene.cuts and self.scene.numerics.contact != "nodal" else math.nan,
         )
 
 

@@ -68,8 +68,10 @@ class Fake:
         breaks: Callable[[Mapping[str, float]], bool] = lambda p: False,
         backwards: bool = True,
         interrupt_after: int | None = None,
+        parted: Callable[[Mapping[str, float]], float] = lambda p: 1.0,
     ) -> None:
         self.force, self.noisy, self.breaks, self.backwards = force, noisy, breaks, backwards
+        self.parted = parted
         self.interrupt_after = interrupt_after
         self.runs = 0
         self.batches: list[int] = []
@@ -87,7 +89,17 @@ class Fake:
             if self.breaks(p):
                 yield Evaluation(index, p, "failed", "inverted", 0.4, STROKE[:200], force[:200], {}, 2.0)
             else:
-                yield Evaluation(index, p, "ok", "", 1.0, STROKE, force, {"peak_N": float(force.max())}, 4.0)
+                yield Evaluation(
+                    index,
+                    p,
+                    "ok",
+                    "",
+                    1.0,
+                    STROKE,
+                    force,
+                    {"peak_N": float(force.max()), "parted": self.parted(p)},
+                    4.0,
+                )
 
 
 def unstable(p: Mapping[str, float]) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -339,6 +340,31 @@ def test_an_answer_whose_repetition_breaks_down_is_not_chosen() -> None:
     lost = calibrate(two_goal(), Fake(two_terms), replicate=Fake(two_terms, breaks=lambda p: True), options=QUICK)
     assert lost.best.misfit == min(t.misfit for t in lost.history if t.ok)
     assert lost.replicates and not any(t.ok for t in lost.replicates)
+
+
+def test_a_run_that_presses_the_food_away_counts_as_one_that_broke_down() -> None:
+    """It has completed nothing of the cut where the edge took half of R, all where it took 0.8; in a joint run each trace counts."""
+    run = Evaluation(0, {}, "ok", "", 1.0, STROKE, STROKE)
+    assert run.completed == 1.0
+    for parted, completed in ((1.3, 1.0), (0.8, 1.0), (0.65, 0.5), (0.5, 0.0), (0.1, 0.0), (math.nan, 1.0)):
+        assert replace(run, scalars={"parted": parted}).completed == pytest.approx(completed)
+    assert replace(run, status="failed", fraction=0.3, scalars={"parted": 1.0}).completed == 0.3
+    goal = two_goal()
+    whole = goal.trial(replace(run, parameters=TWO_TRUTH, force=two_terms(TWO_TRUTH)))
+    pressed = goal.trial(replace(whole.evaluation, scalars={"parted": 0.65}))
+    half = goal.residual(whole.curve, 0.5, whole.z)
+    assert whole.cut and not pressed.cut and pressed.ok
+    np.testing.assert_allclose(pressed.residual, half)
+
+
+def test_the_answer_is_a_cut() -> None:
+    """Where the best curve is of a food that is pressed away, the answer is the best of those that are cut."""
+    plain = calibrate(two_goal(), Fake(two_terms), options=QUICK)
+    edge = 1.1 * values(plain)["R"]
+    result = calibrate(two_goal(), Fake(two_terms, parted=lambda p: 0.8 * (p["R"] / edge) ** 2), options=QUICK)
+    assert result.best.cut and edge <= values(result)["R"] < 1.1 * edge
+    assert result.best.misfit > plain.best.misfit
+    assert any(t.ok and not t.cut for t in result.history)
 
 
 def test_impossible_options_are_refused() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import subprocess
@@ -29,7 +30,7 @@ from calib.preparation import fit_parameters
 from calib.provenance import code_key, key_of, versions
 from calib.scenes import Sizing, cut_scene, elsewhere, height_range, place, specimen
 from calib.trace import Trace
-from calib.verdicts import judge, limits, spent, unbooked
+from calib.verdicts import balances, judge, limits, spent, unbooked
 from calib.workers import DIED, SceneEvaluator
 from mpm.errors import SimulationError
 from mpm.record import ENERGIES
@@ -179,6 +180,7 @@ def test_verdicts_fail_what_fails():
         nulls,
         momentum_residual=0.02,
         ke_over_ie=0.2,
+        parted=0.7,
         parameters=parameters,
         checks=checks,
     )
@@ -188,12 +190,16 @@ def test_verdicts_fail_what_fails():
         "curve error (NRMSE)",
         "momentum balance residual",
         "kinetic over internal energy",
+        "food pressed away, not parted",
         "energy lost by the discretisation",
         "parameters at a bound",
         "slower",
         "broken",
     }
     notes = {v.name: (v.value, v.note) for v in lines}
+    assert notes["food pressed away, not parted"] == (pytest.approx(0.3), "the edge took 70% of R times the new area")
+    assert [(v.name, v.passed) for v in balances(0.0, 0.0, 1.2)][0] == ("food pressed away, not parted", True)
+    assert len(balances(0.0, 0.0, math.nan)) == 2  # nothing was to be parted
     assert notes["slower"] == (0.06, "peak +1.0%, work -6.0%")
     value, words = notes["energy lost by the discretisation"]
     assert (

@@ -114,7 +114,7 @@ def calibrated(kind: str) -> dict[str, Any]:
     made = sample.summary(kind)
     more = {
         "schema": tag("calibrate"), "search": "interrupted" if kind == "interrupted" else "converged",
-        "fine_simulations": 52, "repeatability": 0.004, "speed_real_m_s": None, "fracture": None, "scene": {},
+        "fine_simulations": 52, "repeatability": 0.004, "speed_real_m_s": None, "parted": 0.97, "fracture": None, "scene": {},
         "numerical_checks": [], "device": "cpu", "versions": versions(),
     }  # fmt: skip
     for line in made["verdicts"]:

@@ -77,6 +77,19 @@ def test_thin_blade_needs_resistance_times_width(prism, modulus, R):
     assert plateau(record) == pytest.approx(R * 0.024, rel=0.03)
 
 
+def test_food_that_flows_is_pressed_away_not_parted(prism):
+    """The edge takes R from each new area of a food that is cut (5 %), and far less of one whose yield stress over the process
+    zone is a tenth of R: that one flows along with the edge. Where nothing is to be parted there is no such number."""
+    cut, flown = (prism.run(replace(FLESH, yield_stress=y)) for y in (2e5, 1e4))
+    assert cut.parted == pytest.approx(1.0, abs=0.06)
+    assert flown.status == "done" and flown.parted < 0.5
+    assert flown.plastic[-1] > flown.parting[-1]
+    short = replace(cut, stroke=cut.stroke[:5], parting=cut.parting[:5])
+    assert np.isnan(short.parted) and np.isnan(replace(cut, resistance=np.nan).parted)
+    assert replace(cut, severed_area=0.0).parted == 0.0
+    assert np.isnan(replace(cut, status="left_grid").parted)
+
+
 def test_force_scales_with_all_stresses(prism):
     """Ten times E, yield stress and R make ten times the force at every stroke: no scale is hidden in the method."""
     a = prism.run(replace(FLESH, rho=1e3))
