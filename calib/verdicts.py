@@ -21,7 +21,7 @@ SHAPE_LIMIT = 0.08
 MOMENTUM_LIMIT = 0.01
 CHANGE_LIMIT = 0.05  # of peak and work by numerical choices: as much as the peak may miss the trace
 LOSS_LIMIT = 0.05  # energy lost by the discretisation, of all work: the force is too large by about that
-PRESSED = "food pressed away, not parted"
+PRESSED, PRESSED_LIMIT = "food pressed away, not parted", round(1.0 - PARTED, 6)
 KINETIC_LIMIT = 0.10  # explicit quasi-static practice: kinetic energy below 5 to 10 % of internal energy
 # Ends of what is physically possible: a fit that ends there found a one-sided answer (the cut shows no friction, say),
 # whereas one that ends on a bound of ours asks for a value that it was not allowed.
@@ -119,7 +119,7 @@ def balances(momentum_residual: float, ke_over_ie: float, parted: float) -> list
         parted: Energy of the edge over R times the new area [-]; NaN where there is nothing to judge, and no line.
     """
     note = f"the edge took {parted:.0%} of R times the new area"
-    cut = [] if math.isnan(parted) else [_below(PRESSED, max(0.0, 1.0 - parted), 1.0 - PARTED, note=note)]
+    cut = [] if math.isnan(parted) else [_below(PRESSED, max(0.0, 1.0 - parted), PRESSED_LIMIT, note=note)]
     return [
         *cut,
         _below("momentum balance residual", momentum_residual, MOMENTUM_LIMIT, note="part of the peak force"),
