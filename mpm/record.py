@@ -230,6 +230,7 @@ class ForceRecord:
             "ripple_N": self.ripple,
             "work_J": self.work,
             "work_per_area_J_m2": self.work / area if area > 0 else None,
+            "parted": None if math.isnan(self.parted) else self.parted,
             "particles": self.particles,
             "mirror_images": self.images,
             "grid_nodes": self.cells,

@@ -33,6 +33,18 @@ def test_simulate_writes_a_force_record_that_reads_back(tmp_path: Path, capsys):
     assert "never overwritten" in capsys.readouterr().err
 
 
+def test_simulate_says_what_was_not_cut(tmp_path: Path, capsys):
+    """A cherry that parts has nothing said of it; one that yields first is pressed away, which is said and in the document."""
+    argv = ["simulate", "--food", "cherry", "--knife", "edc", "--dx", "2e-3", "--threads", "1", "--json"]
+    for name, more, pressed in (("cut", [], False), ("pressed", ["--set", "yield_stress=2e3"], True)):
+        assert main([*argv, *more, "--out", str(tmp_path / name)]) == 0
+        out, err = capsys.readouterr()
+        summary = valid(json.loads(out))
+        assert (summary["parted"] < 0.8) is pressed
+        assert ("pressed away rather than cut" in err) is pressed
+        assert any("pressed away" in text for text in summary["warnings"]) is pressed
+
+
 def test_simulate_draws_what_is_asked_for(tmp_path: Path, capsys, monkeypatch):
     """Three pictures and a page beside the record; what cannot be drawn is one line, and the record is there."""
     argv = ["simulate", "--food", "strawberry", "--knife", "edc", "--stroke", "0.004", "--threads", "1"]
