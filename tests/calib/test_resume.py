@@ -170,7 +170,9 @@ def test_a_record_comes_back_whole(tmp_path):
     scene = cut_scene(food, specimen(food, None, Sizing())[0], load_knife("kitchen"))
     path, said = tmp_path / "record.h5", []
     for pieces in (None, Topology((2e-5, 1e-5), 1e-9, 0.0, None, 0.0), Topology((3e-5,), 0.0, 1e-4, (0.0, 0.01), 2e-3)):
-        first = replace(cut(scene), pieces=pieces, counters={"inverted": 3}, status="left_grid", fraction=1 / 3)
+        first = replace(
+            cut(scene), pieces=pieces, counters={"inverted": 3}, status="left_grid", fraction=1 / 3, resistance=350.0
+        )
         MADE.append(first)
         path.unlink(missing_ok=True)
         with Once() as pool:
@@ -185,4 +187,6 @@ def test_a_record_comes_back_whole(tmp_path):
     with Once() as pool:
         assert whole_record(other, pool, path, said.append).peak == cut(other).peak
         path.write_bytes(path.read_bytes()[:1000])
-        assert whole_record(scene, pool, path, said.append).peak == cut(scene).peak
+        again = whole_record(scene, pool, path, said.append)
+        assert again.peak == cut(scene).peak
+        assert np.isnan(again.resistance) and np.isnan(whole_record(scene, pool, path, said.append).resistance)
