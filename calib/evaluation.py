@@ -70,8 +70,12 @@ class Evaluation:
         """
         if not self.ok:
             return self.fraction
-        parted = self.scalars.get("parted", math.nan)
-        return max((parted - PUSHED) / (PARTED - PUSHED), 0.0) if parted < PARTED else 1.0
+        return max((self.parted - PUSHED) / (PARTED - PUSHED), 0.0) if self.parted < PARTED else 1.0
+
+    @property
+    def parted(self) -> float:
+        """Energy that the edge has taken over R times the new area [-]; NaN where there is nothing to judge."""
+        return self.scalars.get("parted", math.nan)
 
     @property
     def ok(self) -> bool:

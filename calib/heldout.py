@@ -7,7 +7,6 @@ drawn about its best values, and from errors of the size and correlation that th
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -139,7 +138,7 @@ def predict(specimens: Specimens, fitted: Fitted, name: str) -> Prediction:
         nulls=nulls,
         band=_band(goal, [own_curve, *curves], fitted, specimens.study.seed),
         simulations=count + len(runs),
-        balances=tuple(balances(scalars["momentum_residual"], scalars["ke_over_ie"], scalars.get("parted", math.nan))),
+        balances=tuple(balances(scalars["momentum_residual"], scalars["ke_over_ie"], runs[0].parted)),
     )
 
 

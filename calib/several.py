@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import time
 from collections.abc import Callable, Mapping
 from datetime import datetime, timezone
@@ -170,11 +169,8 @@ def _trace(setup: Setup, fitted: Fitted, name: str, checks: list[Check]) -> dict
     scale = setup.objective.factor(trial.curve)
     metrics = compare(curve.stroke, curve.curve, scale * trial.curve)
     scalars = trial.evaluation.scalars
-    lines = [
-        *agreement(metrics),
-        *balances(scalars["momentum_residual"], scalars["ke_over_ie"], scalars.get("parted", math.nan)),
-        *changes(checks),
-    ]
+    kept = balances(scalars["momentum_residual"], scalars["ke_over_ie"], trial.evaluation.parted)
+    lines = [*agreement(metrics), *kept, *changes(checks)]
     return {
         "trace": _source(setup),
         "in_sample": True,

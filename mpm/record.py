@@ -14,7 +14,7 @@ from mpm.topology import Topology
 ENERGIES = ("kinetic", "elastic", "plastic", "damage", "viscous", "friction", "parting", "unbooked")
 """Where the work of knife and gravity has gone, each a column of a record; together they are that work."""
 LEAST_CUT = 5
-"""Stroke [cells] from which on the new area is known well enough to ask what parting it has cost."""
+"""Stroke [cells] from which on it is asked what parting has cost: the new area is known to a row of cells, here a fifth of it."""
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ class ForceRecord:
         the flow within the process zone, which is a width of the method, and R only bounds it.
         """
         sound = self.status == "done" and self.resistance > 0 and len(self.stroke) > 0
-        if not sound or self.stroke[-1] < LEAST_CUT * self.cell:
+        if not sound or self.stroke.max() < LEAST_CUT * self.cell:
             return math.nan
         return float(self.parting[-1]) / (self.resistance * self.severed_area) if self.severed_area > 0 else 0.0
 

@@ -121,8 +121,8 @@ class Study:
         return s
 
 
-# Only a signal that cannot be caught proves this; where there is none (Windows) test_store covers the states that a kill leaves.
 @pytest.mark.slow
+# Only a signal that cannot be caught proves this; where there is none (Windows) test_store covers the states that a kill leaves.
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="processes cannot be killed without notice here")
 def test_ten_kills_change_nothing(tmp_path):
     """kill -9 at ten random moments: the same summary to the last digit; what was stored is never begun again, and all that

@@ -88,6 +88,8 @@ def test_food_that_flows_is_pressed_away_not_parted(prism):
     assert np.isnan(short.parted) and np.isnan(replace(cut, resistance=np.nan).parted)
     assert replace(cut, severed_area=0.0).parted == 0.0
     assert np.isnan(replace(cut, status="left_grid").parted)
+    back = replace(cut, stroke=np.append(cut.stroke, 0.0), parting=np.append(cut.parting, cut.parting[-1]))
+    assert back.parted == cut.parted  # after the blade has been drawn out
 
 
 def test_force_scales_with_all_stresses(prism):
