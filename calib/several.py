@@ -21,12 +21,14 @@ from calib.outputs import prepare, write_csv, write_json
 from calib.parameters import plain
 from calib.progress import Progress
 from calib.provenance import git_commit, key_of, versions
+from calib.records import whole_record
 from calib.request import Setup
 from calib.scenes import place
 from calib.specimens import Fitted, Specimens, pressed, set_ups
 from calib.store import EvaluationStore, Header
 from calib.verdicts import agreement, balances, changes
 from calib.workers import Workers
+from mpm.scene import Scene
 
 
 def run(
@@ -38,7 +40,7 @@ def run(
     progress: Callable[[Progress], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> dict[str, Any]:
-    """Run a study and write summary.json, material.yaml, curves-NAME.csv and report.pdf.
+    """Run a study and write summary.json, material.yaml, curves-NAME.csv, record-NAME.h5 of each fitted cut, and report.pdf.
 
     Args:
         study: What to fit and what to hold out.
@@ -71,11 +73,14 @@ def run(
         kept = [n for n in setups if n not in study.hold_out] or list(setups)
         say(f"fitting {', '.join(kept)} together")
         fitted = specimens.fit(kept)
-        checks = {name: _checks(specimens, fitted, name) for name in kept}
+        scenes = {name: _scene(specimens, fitted, name) for name in kept}
+        checks = {name: _checks(specimens, fitted, name, scenes[name]) for name in kept}
         runs = len(store)
+        for name, scene in scenes.items():
+            whole_record(scene, pool, out / f"record-{name}.h5", specimens.told(name))
     for name, setup in setups.items():
         write_csv(out / f"curves-{name}.csv", _curves(setup, fitted, held.get(name), name))
-    summary = _summary(study, setups, fitted, held, checks)
+    summary = _summary(study, setups, fitted, held, checks, scenes)
     summary |= {
         "presses": {t.name: vars(t) for t in tests},
         "warnings": _said(study, setups),
@@ -119,17 +124,22 @@ def _always_out(specimens: Specimens) -> tuple[str, ...]:
     return () if set(out) == set(specimens.setups) else out
 
 
-def _checks(specimens: Specimens, fitted: Fitted, name: str) -> list[Check]:
-    """What numerical choices change of one trace's simulation."""
+def _scene(specimens: Specimens, fitted: Fitted, name: str) -> Scene:
+    """One fitted cut at the values of the fit."""
     setup = specimens.setups[name]
     scene, values = place(setup.fine, fitted.values(name), setup.kept)
+    return scene.with_material(**values)
+
+
+def _checks(specimens: Specimens, fitted: Fitted, name: str, scene: Scene) -> list[Check]:
+    """What numerical choices change of one trace's simulation."""
     own = fitted.result.best.evaluation.parts[fitted.names.index(name)]
     return check(
-        scene.with_material(**values),
+        scene,
         own.scalars,
         specimens.pool,
         specimens.store,
-        lambda text: specimens.say(f"{name}: {text}"),
+        specimens.told(name),
     )
 
 
@@ -139,9 +149,10 @@ def _summary(
     fitted: Fitted,
     held: Mapping[str, Prediction],
     checks: Mapping[str, list[Check]],
+    scenes: Mapping[str, Scene],
 ) -> dict[str, Any]:
     """Everything but the provenance."""
-    traces = {name: _trace(setups[name], fitted, name, checks[name]) for name in fitted.names}
+    traces = {name: _trace(setups[name], fitted, name, checks[name], scenes[name]) for name in fitted.names}
     predicted = {name: {"trace": _source(setups[name])} | p.as_dict() for name, p in held.items()}
     passed = [t["passed"] for t in traces.values()] + [p.passed for p in held.values()]
     return {
@@ -162,7 +173,7 @@ def _summary(
     }
 
 
-def _trace(setup: Setup, fitted: Fitted, name: str, checks: list[Check]) -> dict[str, Any]:
+def _trace(setup: Setup, fitted: Fitted, name: str, checks: list[Check], scene: Scene) -> dict[str, Any]:
     """One fitted trace: in-sample figures with the specimen's factor, what the measurement left open, numerical checks."""
     k = fitted.names.index(name)
     trial, curve = fitted.result.best.each[k], setup.curve
@@ -185,7 +196,8 @@ def _trace(setup: Setup, fitted: Fitted, name: str, checks: list[Check]) -> dict
         "scalars": scalars,
         "values": fitted.values(name),
         "dx_m": setup.fine.numerics.dx,
-        "knife": setup.fine.knife.name,
+        "shape": vars(scene.food.shape),
+        "knife": vars(scene.knife),
     }
 
 

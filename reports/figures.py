@@ -128,11 +128,7 @@ def forces(
     """
 
     def draw(figure: Figure) -> None:
-        if beside is None:
-            axes = figure.subplots()
-        else:
-            axes, picture = figure.subplots(1, 2, width_ratios=BESIDE)
-            beside(picture)
+        axes = next_to(figure, beside)
         x = 1e3 * curves["stroke_m"]
         axes.axhline(0.0, color=BLACK, lw=0.5)
         predictive(axes, x, curves, "band_low_N", "band_high_N", f"95 % predictive band{inside}")
@@ -147,6 +143,15 @@ def forces(
         figure.legend(handles, labels, loc="outside upper left", ncols=2)
 
     return svg(draw, height)
+
+
+def next_to(figure: Figure, beside: Callable[[Axes], None] | None) -> Axes:
+    """Axes for a curve, left of a picture if there is one to draw."""
+    if beside is None:
+        return figure.subplots()
+    axes, picture = figure.subplots(1, 2, width_ratios=BESIDE)
+    beside(picture)
+    return axes
 
 
 def predictive(axes: Axes, x: np.ndarray, curves: Curves, low: str, high: str, label: str) -> None:

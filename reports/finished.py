@@ -127,7 +127,7 @@ def read_finished(run: Path) -> Finished:
     summary, created = _read_summary(run / "summary.json")
     curves = _read_curves(run / "curves.csv")
     store = run / "evaluations.h5"
-    section = _read_section(run / "record.h5")
+    section = read_section(run / "record.h5")
     return Finished(summary, created, curves, *_read_record(store), _read_runs(store), section)
 
 
@@ -268,8 +268,8 @@ def _read_record(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return time, raw, tared
 
 
-def _read_section(path: Path) -> Section | None:
-    """The section in record.h5; older runs have none, and a report does without it."""
+def read_section(path: Path) -> Section | None:
+    """The section in the record of a cut; older runs have none, and a report does without it."""
     try:
         with h5py.File(path, "r") as file:
             return Section(**{f.name: file[f"section/{f.name}"][()] for f in fields(Section)})

@@ -12,10 +12,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from calib.parameters import plain as property_of
-from reports import ReportError, measurement
+from mpm.section import Section
+from reports import ReportError, measurement, section
 from reports.document import breakable, count, duration, interval, listed, publish, quantity
-from reports.figures import BLACK, BLUE, MEASURED, SIMULATED, predictive, stroke_axis, svg
-from reports.finished import Data, check_kind, read_columns, read_date, read_json
+from reports.figures import BLACK, BLUE, MEASURED, SIMULATED, next_to, predictive, stroke_axis, svg
+from reports.finished import Data, check_kind, read_columns, read_date, read_json, read_section
 from reports.words import capital, meaning, words
 
 PREDICTED: dict[str, Any] = {"color": BLUE, "lw": 1.8, "dashes": (1.4, 1.2)}
@@ -53,11 +54,13 @@ class Study:
         summary: ``summary.json``, checked against SCHEMA.
         created: When it was made.
         curves: Columns of ``curves-NAME.csv`` by trace: stroke [m] and forces [N].
+        sections: The food across the blade's middle, by trace; those that were fitted have one, but for older runs.
     """
 
     summary: Data
     created: datetime
     curves: dict[str, dict[str, np.ndarray]]
+    sections: dict[str, Section]
 
 
 def write_report(folder: Path) -> Path:
@@ -105,20 +108,33 @@ def read_study(folder: Path) -> Study:
     if not names:
         raise ReportError(f"{path}: traces and hold_out are empty; a report needs at least one cut")
     complete = ("stroke_m", "real_N")
-    return Study(summary, created, {n: read_columns(folder / f"curves-{n}.csv", complete, complete) for n in names})
+    curves = {n: read_columns(folder / f"curves-{n}.csv", complete, complete) for n in names}
+    drawn = [n for n, t in summary["traces"].items() if "shape" in t and "sim_N" in curves[n]]
+    looks = {n: look for n in drawn if (look := read_section(folder / f"record-{n}.h5")) is not None}
+    return Study(summary, created, curves, looks)
 
 
 def _changed(path: Path) -> datetime:
     return datetime.fromtimestamp(int(path.stat().st_mtime), tz=timezone.utc)
 
 
+def first(done: Study) -> str:
+    """The cut of the first page: one that is also seen under the blade, if there is one."""
+    return next((name for name in done.curves if name in done.sections), next(iter(done.curves)))
+
+
 def picture(done: Study, name: str) -> bytes:
-    """Measured, simulated and predicted force of a trace with their bands."""
+    """Measured, simulated and predicted force of a trace with their bands, beside the food about the blade where it was fitted."""
     curves, s = done.curves[name], done.summary
     held, fitted = s["hold_out"].get(name), s["traces"].get(name)
 
+    look = None
+    if fitted and name in done.sections:
+        of_cut = (fitted["knife"], fitted["shape"]["height"], curves["stroke_m"], curves["sim_N"])
+        look = section.glance(done.sections[name], *of_cut)
+
     def draw(figure: Figure) -> None:
-        axes = figure.subplots()
+        axes = next_to(figure, look)
         x = 1e3 * curves["stroke_m"]
         axes.axhline(0.0, color=BLACK, lw=0.5)
         band = ("predicted_low_N", "predicted_high_N") if held else ("band_low_N", "band_high_N")
@@ -161,6 +177,7 @@ def content(done: Study) -> Data:
         "held_limits": _limits(s["hold_out"]),
         "ranking": [[breakable(name), _ranking(s, name)] for name in done.curves],
         "names": [breakable(name) for name in done.curves],
+        "shown": list(done.curves).index(first(done)),
         "captions": [_caption(s, name) for name in done.curves],
         "left_open": [[breakable(name), *measurement.left_open(n, row)] for name, t in s["traces"].items()
                       for n, row in (t.get("nuisances") or {}).items()],

@@ -124,7 +124,6 @@ def calibrated(kind: str) -> dict[str, Any]:
         p["verdict"] = p.get("verdict", "").replace("not_determined", "unknown")
     for p in made["fixed_parameters"].values():
         del p["verdict"]
-    made["knife"]["radius"] = 0.0
     return made | more
 
 
@@ -187,7 +186,7 @@ def test_a_study_is_a_document():
     made |= {"schema": tag("study"), "search": "converged", "versions": versions()}
     for part in made["traces"].values():
         line = {"name": "NRMSE", "value": 0.02, "limit": 0.08, "unit": "fraction", "passed": True, "note": ""}
-        part |= {"verdicts": [line], "scalars": {"peak_N": 12.0}, "values": {"E": 1e5}, "dx_m": 3e-3, "knife": "edc"}
+        part |= {"verdicts": [line], "scalars": {"peak_N": 12.0}, "values": {"E": 1e5}, "dx_m": 3e-3}
         for check in part["numerical_checks"]:
             check["unbooked_change"] = None
     for part in made["hold_out"].values():

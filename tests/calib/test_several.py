@@ -18,7 +18,11 @@ from calib.evaluation import Evaluation
 from calib.materials import load_material_file
 from calib.scenes import place
 from calib.workers import Workers
+from mpm.record import ForceRecord
 from mpm.scene import Scene
+from mpm.section import Section
+from reports.finished import read_section
+from tests.calib.cheap import cut
 from tests.calib.documents import valid
 
 FLESH = {"E": 4e5, "R": 420.0}
@@ -47,6 +51,12 @@ class FakePool(Workers):
 
     def close(self) -> None:
         """Nothing to end."""
+
+    def record(self, scene: Scene) -> ForceRecord:
+        """A record with a look at a food of one particle [mm]."""
+        FakePool.runs += 1
+        mm = np.full((1, 1), 1e-3)
+        return replace(cut(scene), section=Section(mm[0], -mm, mm, mm, np.vstack([mm, mm]), True))
 
     def each(self, work: Any, jobs: Any) -> Any:
         """A study asks for runs alone; anything else would need a process."""
@@ -141,7 +151,7 @@ def test_each_cut_is_predicted_from_the_others(finished: tuple[Path, Path, int])
 
 @pytest.mark.slow
 def test_what_is_written_can_be_read(finished: tuple[Path, Path, int]) -> None:
-    """material.yaml holds the flesh, the curves of each trace the fit and the prediction with their bands."""
+    """material.yaml holds the flesh, the curves of each trace the fit and the prediction with their bands, records the looks."""
     out = finished[1]
     summary = json.loads((out / "summary.json").read_text())
     food = load_material_file(out / "material.yaml")
@@ -150,6 +160,8 @@ def test_what_is_written_can_be_read(finished: tuple[Path, Path, int]) -> None:
     columns = pd.read_csv(out / "curves-b.csv")
     assert {"stroke_m", "real_N", "sim_N", "band_low_N", "predicted_N", "predicted_high_N"} <= set(columns)
     assert (columns["band_low_N"] <= columns["band_high_N"]).all()
+    assert all(read_section(out / f"record-{name}.h5") is not None for name in SPECIMENS)
+    assert summary["traces"]["b"]["shape"]["height"] == HEIGHT and summary["traces"]["b"]["knife"]["name"] == "kitchen"
     assert any("hold_out are predictions" in text for text in summary["limits"])
 
 

@@ -178,7 +178,7 @@ def _base(kind: str) -> dict[str, Any]:
         "counters": {"inverted": 0, "left_grid": 0}, "coarse_simulations": 9,
         "momentum_residual": 0.0021, "ke_over_ie": 0.013, "ripple_N": 0.11,
         "shape": {"kind": "cylinder", "length": 0.1, "width": 0.033, "height": 0.033},
-        "knife": {"name": "kitchen", "spine": 2e-3, "angle": 0.0445, "height": 0.045, "length": 0.2},
+        "knife": {"name": "kitchen", "spine": 2e-3, "angle": 0.0445, "height": 0.045, "length": 0.2, "radius": 0.0},
         "versions": {"cutcal": "0.1.0", "python": "3.11.9", "taichi": "1.7.4", "numpy": "2.4.6",
                      "scipy": "1.17.1", "h5py": "3.16.0"},
         "git": "9f2c1e07d5b84a3396e1f0c2ab47d8e6315c9a70", "seed": 0, "device": "CPU x64, 2 threads, 32 bit",

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import h5py
 import pytest
 
 from reports import ReportError
 from reports.study import content, picture, read_study, write_report
 from tests.reports import study_sample as sample
 from tests.reports.sample import pages, spaced
+from tests.reports.test_figures import looked_at
 
 
 def test_a_study_becomes_a_pdf_that_is_stable(tmp_path: Path) -> None:
-    """Verdicts, curves, what was fitted and the limits on three pages; the same files give the same bytes."""
+    """Verdicts, curves, what was fitted and the limits on four pages; the same files give the same bytes."""
     first = write_report(sample.write_study(tmp_path / "a")).read_bytes()
-    assert first.startswith(b"%PDF") and pages(first) == 3
+    assert first.startswith(b"%PDF") and pages(first) == 4
     assert write_report(sample.write_study(tmp_path / "b")).read_bytes() == first
 
 
@@ -81,6 +83,20 @@ def test_picture_shows_what_there_is(tmp_path: Path) -> None:
         for column in [c for c in done.curves[name] if "_low_" in c]:
             del done.curves[name][column]
         assert b"FillBetween" in drawn and b"FillBetween" not in picture(done, name)
+
+
+def test_a_fitted_cut_is_seen_under_the_blade(tmp_path: Path) -> None:
+    """A cut with a look at the food is on the first page, its picture beside its forces; the others are as they were."""
+    run = sample.write_study(tmp_path)
+    before = read_study(run)
+    with h5py.File(run / "record-second.h5", "w") as file:
+        for name, values in vars(looked_at(0.03, 0.033)).items():
+            file[f"section/{name}"] = values
+    done = read_study(run)
+    assert b"<image" in picture(done, "second") and b"<image" not in picture(before, "second")
+    assert picture(done, "first") == picture(before, "first")
+    assert content(before)["shown"] == 0 and content(done)["names"][content(done)["shown"]] == "second"
+    assert write_report(run).read_bytes().startswith(b"%PDF")
 
 
 @pytest.mark.parametrize(
