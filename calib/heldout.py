@@ -1,12 +1,14 @@
 """A held-out cut predicted with the flesh of the others.
 
 Fitted to it is only what its own specimen has for itself: its skin, its size, one factor for width and sensor.  The band comes
-from simulating materials drawn from the posterior of the flesh, each with its own factor and with what the specimen has for itself
-drawn about its best values, and from errors of the size and correlation that the fit of the others showed.
+from simulating materials drawn from the posterior of the flesh and moved as far as specimens lie apart, each with its own factor and
+with what the specimen has for itself drawn about its best values, and from errors of the size and correlation that the fit of the
+others showed.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -18,7 +20,7 @@ from calib.fit import calibrate
 from calib.metrics import Metrics, compare
 from calib.nulls import null_models
 from calib.objective import Objective
-from calib.parameters import ParameterSet
+from calib.parameters import ParameterSet, plain
 from calib.prediction import NRMSE_LIMIT, RATING_LIMIT
 from calib.predictive import Band, band_of, errors, materials
 from calib.search import FitOptions
@@ -113,7 +115,7 @@ def predict(specimens: Specimens, fitted: Fitted, name: str) -> Prediction:
     goal = setup.objective
     best, others, count = _specimen(specimens, fitted.flesh(), name)
     values = {**fitted.flesh(), **best}
-    drawn = zip(_drawn(fitted, specimens.study.seed), others, strict=False)
+    drawn = zip(_drawn(fitted, specimens.study.scatter, specimens.study.seed), others, strict=False)
     runs = _runs(specimens, name, [values, *({**flesh, **own} for flesh, own in drawn)])
     if not runs[0].ok:
         raise SimulationError(
@@ -175,13 +177,20 @@ def _runs(specimens: Specimens, name: str, batch: list[dict[str, float]]) -> lis
     return sorted(specimens.evaluator(specimens.setups[name].fine, name, "fine").evaluate(batch), key=lambda e: e.index)
 
 
-def _drawn(fitted: Fitted, seed: int) -> list[dict[str, float]]:
-    """Flesh of materials from the posterior of the fit, as its own band draws them."""
+def _drawn(fitted: Fitted, scatter: float, seed: int) -> list[dict[str, float]]:
+    """Flesh of another specimen: materials from the posterior of the fit, as its own band draws them, moved by what specimens differ.
+
+    The fitted flesh is the mean of n specimens, from which another one differs by a variance of 1 + 1/n of theirs.
+    """
     if fitted.doubt is None or fitted.result.surrogate is None:
         return []
     random = np.random.default_rng(seed)
-    points = materials(fitted.result.surrogate, fitted.result.best.z, fitted.doubt.uncertainty, random)
-    return [fitted.flesh(z) for z in points[:DRAWS]]
+    points = materials(fitted.result.surrogate, fitted.result.best.z, fitted.doubt.uncertainty, random)[:DRAWS]
+    parameters = fitted.objective.parameters
+    moved = np.array([p.log and p.name == plain(p.name) for p in parameters])
+    apart = scatter * math.sqrt(1.0 + 1.0 / len(fitted.names))
+    steps = apart * random.standard_normal(points.shape) * moved
+    return [fitted.flesh(parameters.clip(z)) for z in points + steps]
 
 
 def _mean(specimens: Specimens, names: tuple[str, ...], held: str) -> FloatArray:

@@ -20,8 +20,8 @@ from reports.finished import Data, check_kind, read_columns, read_date, read_jso
 from reports.words import capital, meaning, words
 
 PREDICTED: dict[str, Any] = {"color": BLUE, "lw": 1.8, "dashes": (1.4, 1.2)}
-#: Height of the figure of a trace [mm].
-HEIGHT = 60.0
+#: Height of the figure of a trace [mm], with the food under the blade beside it, and what is added on the first page.
+HEIGHT, BESIDE_HEIGHT, MORE = 60.0, 78.0, 22.0
 
 _NUM, _OPT, _TEXT, _MAYBE = (int, float), (int, float, type(None)), (str,), (str, type(None))
 _METRICS: Data = {
@@ -149,7 +149,8 @@ def picture(done: Study, name: str) -> bytes:
         axes.set_ylabel("force on the knife [N]")
         figure.legend(loc="outside upper left", ncols=3 if len(axes.get_legend_handles_labels()[1]) == 3 else 2)
 
-    return svg(draw, HEIGHT)
+    height = HEIGHT if look is None else BESIDE_HEIGHT
+    return svg(draw, height + MORE * (name == first(done)))
 
 
 def _label(s: Data, name: str) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calib.config import OWN, overridden, read_study
+from calib.config import OWN, SCATTER, overridden, read_study
 from calib.specimens import pinned, pressed
 from mpm.errors import CutcalError
 from tests.calib.fake import FIVE, goal
@@ -42,7 +42,7 @@ def test_a_study_is_read_with_paths_from_its_folder(tmp_path: Path) -> None:
     assert (a.knife, b.knife) == ("edc", "kitchen") and (a.sizing.width, b.sizing.width) == (0.03, None)
     assert b.speed == 0.02 and b.gain_sd == 0.1 and b.columns["sign"] == "-"
     assert a.scaled and b.scaled and a.fit == ("E", "R", "R_skin") and a.food.value("nu") == 0.4
-    assert study.hold_out == ("b",) and study.own == OWN and study.budget == 100.0
+    assert study.hold_out == ("b",) and study.own == OWN and study.budget == 100.0 and study.scatter == SCATTER
     assert study.presses[0].traces == (tmp_path / "one.csv", tmp_path / "two.csv")
 
 
@@ -65,6 +65,12 @@ def test_the_command_line_says_how_to_run_it(tmp_path: Path) -> None:
     [
         ("food: banana", "food: bananna", "study.yaml: food: unknown food 'bananna', did you mean 'banana'"),
         ("hold_out: b", "holdout: b", "study.yaml: holdout: unknown key, did you mean 'hold_out'"),
+        (
+            "hold_out: b",
+            "scatter: 20",
+            "study.yaml: scatter: is 20; give 0 to 1, the standard deviation of a logarithm",
+        ),
+        ("hold_out: b", "scatter: -0.1", "scatter: is -0.1; give 0 to 1"),
         ("hold_out: b", "hold_out: c", "'c' is no trace of this study; known: a, b"),
         ("hold_out: b", "hold_out: [a, b]", "nothing would be left to fit"),
         ("width: 0.03", "widht: 0.03", "study.yaml: traces.a.widht: unknown key, did you mean 'width'"),

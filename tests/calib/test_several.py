@@ -182,11 +182,20 @@ def test_resuming_a_finished_study_simulates_nothing(finished: tuple[Path, Path,
 
 @pytest.mark.slow
 def test_one_cut_is_held_out_for_good(study: Path, tmp_path: Path) -> None:
-    """Named, not in turn: the final fit leaves it out as well, so nothing of it is in the material."""
+    """Named, not in turn: the final fit leaves it out as well, so nothing of it is in the material. Its band knows that specimens
+    differ, unless the study says that they do not, and its prediction is the same.
+    """
     study.write_text(study.read_text().replace("hold_out: each", "hold_out: [b]"))
     _, summary = ran(study, tmp_path / "out")
     assert list(summary["traces"]) == ["a", "c"] and summary["hold_out"]["b"]["trained_on"] == ["a", "c"]
     assert "R_skin@b" not in summary["parameters"]
+    study.write_text(study.read_text() + "\nscatter: 0")
+    _, alike = ran(study, tmp_path / "alike")
+    wide, narrow = (pd.read_csv(tmp_path / name / "curves-b.csv") for name in ("out", "alike"))
+    width = [float(np.mean(c["predicted_high_N"] - c["predicted_low_N"])) for c in (wide, narrow)]
+    assert width[0] > 1.2 * width[1] and np.array_equal(wide["predicted_N"], narrow["predicted_N"])
+    assert summary["scatter"] == 0.25 and any("scatter by 25 %" in text for text in summary["limits"])
+    assert alike["scatter"] == 0.0 and not any("scatter by" in text for text in alike["limits"])
 
 
 @pytest.mark.slow

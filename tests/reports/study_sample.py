@@ -40,7 +40,7 @@ def summary() -> dict[str, Any]:
     base = sample.summary()
     return {
         "food": "banana", "study": "cuts.yaml", "created": "2026-03-14T15:09:26+00:00", "status": "done",
-        "passed": True, "held_out": [HELD], "hold_out": {HELD: _predicted()}, "traces": traces,
+        "passed": True, "held_out": [HELD], "scatter": 0.25, "hold_out": {HELD: _predicted()}, "traces": traces,
         "parameters": shared | own, "reduced_chi2": 1.2, "failed_simulations": 3, "simulations": 240, "wall_s": 5421.0,
         "limits": ["3 cuts say little of the scatter between specimens."],
         "warnings": ["first: no position and no speed"],
