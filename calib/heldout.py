@@ -1,9 +1,9 @@
 """A held-out cut predicted with the flesh of the others.
 
 Fitted to it is only what its own specimen has for itself: its skin, its size, one factor for width and sensor.  The band comes
-from simulating materials drawn from the posterior of the flesh and moved as far as specimens lie apart, each with its own factor and
-with what the specimen has for itself drawn about its best values, and from errors of the size and correlation that the fit of the
-others showed.
+from simulating materials drawn from the posterior of the flesh and moved as far as specimens lie apart, and from errors of the size and
+correlation that the fit of the others showed. Each material has its own factor, and what the specimen has for itself is fitted to
+each: by a Gauss-Newton step from the best values, with what the material changes of the curve on coarse cells, and drawn about that.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from calib.evaluation import Evaluation
 from calib.filters import filter_simulated
-from calib.fit import calibrate
+from calib.fit import FitResult, calibrate
 from calib.metrics import Metrics, compare
 from calib.nulls import null_models
 from calib.objective import Objective
@@ -113,10 +113,14 @@ def predict(specimens: Specimens, fitted: Fitted, name: str) -> Prediction:
     """
     setup = specimens.setups[name]
     goal = setup.objective
-    best, others, count = _specimen(specimens, fitted.flesh(), name)
-    values = {**fitted.flesh(), **best}
-    drawn = zip(_drawn(fitted, specimens.study.scatter, specimens.study.seed), others, strict=False)
-    runs = _runs(specimens, name, [values, *({**flesh, **own} for flesh, own in drawn)])
+    flesh = fitted.flesh()
+    found = _specimen(specimens, flesh, name)
+    best = {} if found is None else dict(found.result.best.evaluation.parameters)
+    values = {**flesh, **best}
+    others = _drawn(fitted, specimens.study.scatter, specimens.study.seed)
+    drawn = [{**x, **own} for x, own in zip(others, _adapted(specimens, found, flesh, others, name), strict=True)]
+    runs = _runs(specimens, name, [values, *drawn])
+    count = 0 if found is None else len(found.result.history) + 1 + len(others)
     if not runs[0].ok:
         raise SimulationError(
             f"{name}: the predicted cut did not reach the end of its stroke with {values}; give its height if you measured it",
@@ -144,13 +148,19 @@ def predict(specimens: Specimens, fitted: Fitted, name: str) -> Prediction:
     )
 
 
-def _specimen(
-    specimens: Specimens, flesh: Mapping[str, float], name: str
-) -> tuple[dict[str, float], list[dict[str, float]], int]:
-    """The specimen's own values with the flesh held, draws about them, and the number of simulations that it took."""
+@dataclass(frozen=True, eq=False)
+class _Specimen:
+    """What was fitted to a held-out trace with the flesh of the others."""
+
+    goal: Objective
+    result: FitResult
+
+
+def _specimen(specimens: Specimens, flesh: Mapping[str, float], name: str) -> _Specimen | None:
+    """The specimen's own values with the flesh held; None where it has none."""
     setup, chosen = specimens.setups[name], specimens.own_parameters(name)
     if not chosen:
-        return {}, [{}] * DRAWS, 0
+        return None
     goal = replace(setup.objective, parameters=ParameterSet(chosen))
     fine, coarse = (
         specimens.evaluator(scene.with_material(**flesh), name, fidelity)
@@ -162,14 +172,35 @@ def _specimen(
     )
     if result.status == "interrupted":
         raise KeyboardInterrupt
-    best = dict(result.best.evaluation.parameters)
+    return _Specimen(goal, result)
+
+
+def _adapted(
+    specimens: Specimens, found: _Specimen | None, flesh: Mapping[str, float], others: list[dict[str, float]], name: str
+) -> list[dict[str, float]]:
+    """The specimen's own values for each of some other materials, with what their fit does not know of them.
+
+    A run that breaks down on coarse cells says nothing: the best values stay.
+    """
+    if found is None:
+        return [{}] * len(others)
+    goal, result = found.goal, found.result
+    best = result.best.evaluation.parameters
     if result.jacobian is None:
-        return best, [best] * DRAWS, len(result.history)
-    found = uncertainty(result.parameters, evidence(goal, result.best, result.jacobian))
-    random = np.random.default_rng(specimens.study.seed)
-    steps = random.standard_normal((DRAWS, len(chosen))) @ np.linalg.cholesky(found.alone).T
-    drawn = [goal.parameters.to_dict(goal.parameters.clip(result.best.z + step)) for step in steps]
-    return best, drawn, len(result.history)
+        return [dict(best)] * len(others)
+    evaluator = specimens.evaluator(specimens.setups[name].coarse, name, "coarse")
+    runs = sorted(evaluator.evaluate([{**x, **best} for x in (flesh, *others)]), key=lambda e: e.index)
+    own, *trials = (goal.trial(e, coarse=True) for e in runs)
+    sd = np.linalg.cholesky(uncertainty(result.parameters, evidence(goal, result.best, result.jacobian)).alone)
+    steps = np.random.default_rng(specimens.study.seed).standard_normal((len(others), len(sd))) @ sd.T
+    low, high = goal.parameters.box
+    out = []
+    for trial, step in zip(trials, steps, strict=True):
+        known = trial.ok and own.ok
+        change = np.linalg.lstsq(result.jacobian, own.residual - trial.residual)[0] if known else 0.0
+        z = np.clip(result.best.z + change, np.minimum(low, result.best.z), np.maximum(high, result.best.z))
+        out.append(goal.parameters.to_dict(goal.parameters.clip(z + step)))
+    return out
 
 
 def _runs(specimens: Specimens, name: str, batch: list[dict[str, float]]) -> list[Evaluation]:
