@@ -19,6 +19,18 @@ literature values have 0.96 to 1.27, a banana 0.89. One with a yield stress of 1
 quarter wider changes its peak by 7 %; from 0.8 on another quarter changes it by 0.3 %."""
 
 
+def pressed_away(parted: float) -> str:
+    """What is said of a run whose edge took too little of R times the new area for a cut.
+
+    Args:
+        parted: That part [-].
+    """
+    return (
+        f"the food was pressed away rather than cut: the edge took {parted:.0%} of R times the new area, so the force is "
+        "that of flow and hangs on the width of the process zone; a food that is cut has a larger yield stress or a smaller R"
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Evaluation:
     """One simulation as it came back.

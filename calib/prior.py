@@ -21,7 +21,7 @@ from scipy.stats import qmc, truncnorm
 import calib
 from calib.documents import tag
 from calib.errors import CurveError
-from calib.evaluation import Evaluation
+from calib.evaluation import PARTED, Evaluation
 from calib.filters import N_STROKE, filter_simulated
 from calib.materials import FoodSpec
 from calib.outputs import prepare, write_csv, write_json
@@ -232,6 +232,7 @@ def conclude(one: Plan, runs: Sequence[Evaluation]) -> tuple[dict[str, FloatArra
         "default_status": runs[0].status if runs[0].ok else runs[0].reason,
         "finished": len(kept),
         "failed": dict(Counter(r.reason for r in runs[1:] if not r.ok)),
+        "pressed": sum(r.ok and r.completed < 1.0 for r in runs[1:]),
         "dynamic": sum(r.scalars["ke_over_ie"] > DYNAMIC for r in runs[1:] if r.ok),
         "parameters": list(one.parameters.names),
         "inputs": one.inputs,
@@ -267,6 +268,7 @@ def _head(name: str, row: Mapping[str, Any]) -> list[str]:
         + ", ".join(row["parameters"]),
         "  (95 % ranges of materials.yaml; log-normal, mu normal; cut off at the bounds of a fit); all else as in materials.yaml",
         f"draws: {row['draws']}, broke down: {failed}{left_out}",
+        f"  pressed away, not cut: {row['pressed']} of the others (the edge takes less than {PARTED:g} of R times the new area), in the quantiles",
         f"  not quasi-static: {row['dynamic']} of the others (kinetic energy over {DYNAMIC * 100:g} % of the work: soft, and cut late)",
         *spans,
         f"cutcal {row['cutcal']}, solver {row['solver']}, commit {row['commit'] or 'unknown'}",

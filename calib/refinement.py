@@ -13,7 +13,7 @@ import numpy as np
 from calib.convergence import CurveEstimate, Estimate, curve_estimate, estimate
 from calib.documents import tag
 from calib.errors import CurveError
-from calib.evaluation import Evaluation
+from calib.evaluation import PARTED, Evaluation, pressed_away
 from calib.filters import filter_simulated
 from calib.outputs import prepare, write_csv, write_json
 from calib.progress import Countdown
@@ -120,6 +120,10 @@ def run(
     with EvaluationStore(out / "evaluations.h5", Header("", key_of(scene.as_dict())), resume=resume) as store:
         results = _evaluate(todo, store, pool, say)
     document = {"schema": tag("converge"), **about, **_conclude(todo, results, out)}
+    least = min((r.parted for r in results if r.parted < PARTED), default=None)
+    if least is not None:
+        say(f"note: {pressed_away(least)}")
+        document["warnings"] = [*about["warnings"], pressed_away(least)]
     document |= {"device": pool.arch, "versions": versions(), "git": git_commit()}
     write_json(out / "converge.json", document)
     from reports.convergence import write_figure, write_report
@@ -200,7 +204,7 @@ def _agreement(peak: Estimate, work: Estimate, curve: CurveEstimate) -> dict[str
 
 
 def _row(r: Evaluation) -> dict[str, Any]:
-    names = ("peak_N", "work_J", "particles", "steps", "momentum_residual", "ke_over_ie", "ripple_N")
+    names = ("peak_N", "work_J", "parted", "particles", "steps", "momentum_residual", "ke_over_ie", "ripple_N")
     numbers = {name: r.scalars.get(name) for name in names}
     return {**numbers, "wall_s": r.seconds, "status": r.status, "reason": r.reason, "fraction": r.fraction}
 

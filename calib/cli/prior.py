@@ -80,12 +80,16 @@ def run(args: argparse.Namespace) -> int:
 
 def table(document: dict[str, Any]) -> str:
     """What the terminal shows at the end."""
-    lines = [f"{'food':13s} {'peak [N]':>9s} {'95 % of the draws':>19s} {'work [J]':>9s}  draws that broke down"]
+    lines = [
+        f"{'food':13s} {'peak [N]':>9s} {'95 % of the draws':>19s} {'work [J]':>9s} {'pressed away':>13s}  draws that broke down"
+    ]
     for name, row in document["foods"].items():
         peak, work = row["peak_N"], row["work_J"]
         span = f"{peak['q025']:.3g} to {peak['q975']:.3g}"
         failed = ", ".join(f"{count} {reason}" for reason, count in row["failed"].items()) or "-"
         if row["default_status"] != "ok":
             failed = f"DEFAULT VALUES: {row['default_status']}; {failed}"
-        lines.append(f"{name:13s} {peak['default']:9.3g} {span:>19s} {work['default']:9.3g}  {failed}")
+        lines.append(
+            f"{name:13s} {peak['default']:9.3g} {span:>19s} {work['default']:9.3g} {row['pressed']:>13d}  {failed}"
+        )
     return "\n".join(lines)

@@ -21,7 +21,7 @@ from calib.cli.options import (
     whole,
 )
 from calib.documents import tag
-from calib.evaluation import PARTED
+from calib.evaluation import PARTED, pressed_away
 from calib.knives import load_knife
 from calib.outputs import prepare, write_csv, write_json
 from calib.progress import Countdown, clock
@@ -145,10 +145,7 @@ def run(args: argparse.Namespace) -> int:
         print(file=sys.stderr)
     write_csv(out / "force.csv", record.columns())
     if record.parted < PARTED:
-        assumed.append(
-            f"the food was pressed away rather than cut: the edge took {record.parted:.0%} of R times the new area, so the force is "
-            "that of flow and hangs on the width of the process zone; a food that is cut has a larger yield stress or a smaller R"
-        )
+        assumed.append(pressed_away(record.parted))
         note(assumed[-1])
     summary = {
         "schema": tag("simulate"),

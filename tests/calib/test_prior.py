@@ -91,17 +91,21 @@ def test_fewer_draws_are_the_first_of_more():
 # What becomes of the runs -------------------------------------------------------------------------
 
 
-def result(level, stroke, reason="", ke=0.0):
+def result(level, stroke, reason="", ke=0.0, parted=1.0):
     """A run of constant force [N], or one that broke down for a reason."""
     s = np.linspace(0, stroke, 300)
     status = "failed" if reason else "ok"
-    return Evaluation(0, {}, status, reason, 0.5 if reason else 1.0, s, np.full(300, level), {"ke_over_ie": ke})
+    return Evaluation(
+        0, {}, status, reason, 0.5 if reason else 1.0, s, np.full(300, level), {"ke_over_ie": ke, "parted": parted}
+    )
 
 
 def test_quantiles_are_those_of_the_runs_that_finished():
-    """Eleven levels of force have their quantiles; a run that broke down counts as such and is left out, at any force."""
+    """Eleven levels of force have their quantiles; a run that broke down counts as such and is left out, at any force. Those that are
+    not quasi-static, or not cut but pressed away, are in them and are counted.
+    """
     one = plan(load_food("grape"), load_knife("kitchen"), draws=12)
-    levels = [result(float(k), 0.02, ke=0.02 * k) for k in range(11)]
+    levels = [result(float(k), 0.02, ke=0.02 * k, parted=0.105 * k) for k in range(11)]
     columns, row = conclude(one, [result(100.0, 0.02), *levels, result(1e6, 0.02, "inverted")])
     middle = {name: float(values[120]) for name, values in columns.items()}
     assert middle["default_N"] == pytest.approx(100)
@@ -110,6 +114,7 @@ def test_quantiles_are_those_of_the_runs_that_finished():
         assert row["peak_N"][name] == pytest.approx(10 * q)
         assert row["work_J"][name] == pytest.approx(10 * q * 0.02, rel=0.05)
     assert (row["finished"], row["failed"], row["dynamic"], row["default_status"]) == (11, {"inverted": 1}, 5, "ok")
+    assert row["pressed"] == 8
 
 
 def test_no_run_that_finished_is_no_band(tmp_path):

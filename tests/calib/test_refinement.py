@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from calib.cli.main import main
+from calib.evaluation import Evaluation
 from tests.calib.documents import valid
 
 SMALL = ["converge", "--food", "banana", "--stroke", "4e-3", "--repeats", "1", "--dx", "6e-3,4.5e-3", "--mach", "0.02"]
@@ -55,6 +56,17 @@ def test_resume_simulates_nothing_twice(study, capsys):
     assert "4 of 4 runs are known already" in err
     assert "left" not in err
     assert json.loads((out / "converge.json").read_text())["grids"] == before
+
+
+def test_a_food_that_is_pressed_away_is_said_to_be(study, capsys, monkeypatch):
+    """A study whose edge took too little of R times the new area says so on the terminal, in its document and its report."""
+    out, code = study
+    assert json.loads((out / "converge.json").read_text())["grids"][0]["parted"] is None  # too short a stroke to judge
+    monkeypatch.setattr(Evaluation, "parted", property(lambda self: 0.4))
+    assert main([*SMALL, "--out", str(out), "--resume"]) == code
+    assert "the food was pressed away rather than cut: the edge took 40% of R" in capsys.readouterr().err
+    document = valid(json.loads((out / "converge.json").read_text()))
+    assert [text for text in document["warnings"] if text.startswith("the food was pressed away")]
 
 
 @pytest.mark.parametrize(
