@@ -2,17 +2,19 @@
 
 The best run ever made is returned, not the last one; where simulations can be repeated slower and with other particles, the
 best of the most promising ones run twice, because the luckiest of fifty noisy runs is not the best (selection by replication:
-Bechhofer 1954, Ann. Math. Statist. 25:16), and a force that hangs on the simulated speed is not the food's.
+Bechhofer 1954, Ann. Math. Statist. 25:16), and a force that hangs on the simulated speed is not the food's. A search that has stalled
+above what the right material would leave is begun afresh: multi-start, with the budget as its stopping rule.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
 from calib.evaluation import Evaluator
@@ -22,12 +24,15 @@ from calib.parameters import ParameterSet
 from calib.progress import Progress
 from calib.search import CAUTION_NEAR, ELSEWHERE, FitOptions, Search
 from calib.surrogate import Surrogate
+from mpm.errors import SimulationError
 
 FloatArray = npt.NDArray[np.float64]
 
 #: Runs among which the answer is chosen by a second run of each, slower and with other particles: two batches of two.  They
 #: may be expected to be worse than the best by what the noise of two runs makes.
 FINALISTS, NOISES = 4, 2.0
+#: Added to the seed of a search that is begun afresh.
+AFRESH = 1_000_003
 
 
 @dataclass(frozen=True)
@@ -111,6 +116,8 @@ def calibrate(
     with threadpool_limits(1, "blas"):
         try:
             status = search.run()
+            if status == "stalled":
+                status = _afresh(search, evaluator, coarse)
             if replicate is not None:
                 best, replicates = _choose(search, replicate)
         except KeyboardInterrupt:
@@ -118,6 +125,40 @@ def calibrate(
                 raise
             status = "interrupted"
         return _result(search, status, best or search.best, replicates)
+
+
+def _afresh(search: Search, evaluator: Evaluator, coarse: Evaluator | None) -> str:
+    """Search once more from another design, with nothing of what a stalled search has learnt, for what is left of its budget; the runs
+    of both are then the search's.
+
+    That is where the right material would more likely than not have left a smaller chi-square, and the budget holds a search. Of 18
+    made-up cuts two had stalled in a basin three times as deep as the one that other seeds found.
+
+    Returns:
+        How the better of the two ended.
+    """
+    goal, options = search.objective, search.options
+    least = options.least(len(goal.parameters))
+    rest = options.budget - search.spent
+    if rest < least or search.best.misfit <= chi2.median(goal.effective_rows):
+        return "stalled"
+    first, spent, failed = search.best, search.spent, sum(not t.ok for t in search.trials)
+    report, done = search.progress, len(search.trials)
+
+    def told(p: Progress) -> None:
+        if report is not None:
+            misfit = min(p.misfit, first.misfit)
+            total = replace(p, done=done + p.done, spent=spent + p.spent, budget=options.budget, misfit=misfit)
+            report(replace(total, failed=failed + p.failed))
+
+    other = Search(goal, evaluator, coarse, replace(options, budget=rest, seed=options.seed + AFRESH), told)
+    try:
+        status = other.run()
+    except SimulationError:
+        status = "stalled"  # no run of the other design ended its stroke
+    finally:
+        search.trials += other.trials
+    return status if search.best is not first else "stalled"
 
 
 def _choose(search: Search, replicate: Evaluator) -> tuple[Trial, list[Trial]]:

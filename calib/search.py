@@ -114,9 +114,13 @@ class FitOptions:
         if min(self.budget, self.batch, self.design, self.coarse_cost, self.tolerance) <= 0 or self.seed < 0:
             raise ValueError(f"{self} has a number that is not positive; give positive ones.")
 
+    def least(self, parameters: int) -> int:
+        """Smallest budget of a search for so many parameters."""
+        return 2 * parameters + self.design + 2
+
     def check(self, parameters: int) -> None:
         """Raise MaterialError when the budget is too small for this number of parameters."""
-        least = 2 * parameters + self.design + 2
+        least = self.least(parameters)
         if self.budget < least:
             raise MaterialError(
                 f"a budget of {self.budget:g} simulations is too small for {parameters} parameters; give at least "

@@ -12,11 +12,11 @@ import pytest
 
 from calib.errors import MaterialError
 from calib.evaluation import Evaluation, Evaluator
-from calib.fit import FitResult, calibrate
+from calib.fit import AFRESH, FitResult, calibrate
 from calib.objective import Objective, Target
 from calib.parameters import Parameter, ParameterSet
 from calib.progress import Progress
-from calib.search import DESIGNS, FAR_OFF, SCREENING, FitOptions
+from calib.search import DESIGNS, FAR_OFF, SCREENING, FitOptions, Search
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.uncertainty import evidence, uncertainty
 from mpm.errors import SimulationError
@@ -323,6 +323,59 @@ def test_noise_is_not_fitted() -> None:
         assert fake.runs < 100
         statuses.append(result.status)
     assert statuses[0] == "converged" and "stalled" in statuses
+
+
+def stuck(monkeypatch: pytest.MonkeyPatch, start: Mapping[str, float]) -> None:
+    """Let the first search stall at given values."""
+    whole = Search.run
+
+    def run(search: Search) -> str:
+        if search.options.seed >= AFRESH:
+            return whole(search)
+        search._evaluate([search.parameters.to_vector(start)], "design")
+        return "stalled"
+
+    monkeypatch.setattr(Search, "run", run)
+
+
+def test_a_search_that_stalled_is_begun_afresh(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stalled far from the curve, the rest of the budget goes to another search, which knows nothing of the first, and whose answer is the
+    better one's. Progress counts both.
+    """
+    far = {"R": 200.0, "mu": 0.5}
+    stuck(monkeypatch, far)
+    seen: list[Progress] = []
+    result = calibrate(two_goal(), Fake(two_terms), options=QUICK, progress=seen.append)
+    assert result.status == "converged" and result.best.misfit < 40.0
+    assert result.history[0].evaluation.parameters == pytest.approx(far, rel=1e-2)
+    assert [p.done for p in seen] == list(range(1, len(result.history) + 1))
+    assert all(a.misfit >= b.misfit for a, b in zip(seen, seen[1:], strict=False)) and seen[-1].budget == 30.0
+    other = calibrate(two_goal(), Fake(two_terms), options=FitOptions(budget=29, design=3, seed=AFRESH))
+    assert [t.evaluation.parameters for t in other.history] == [t.evaluation.parameters for t in result.history[1:]]
+
+
+def test_a_search_that_stalled_at_a_curve_that_is_met_is_not_begun_afresh(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A chi-square below the median that the right material leaves needs no second search, and no budget for one is no error."""
+    stuck(monkeypatch, TWO_TRUTH)
+    met = calibrate(two_goal(), Fake(two_terms), options=QUICK)
+    assert met.status == "stalled" and len(met.history) == 1
+    stuck(monkeypatch, {"R": 200.0, "mu": 0.5})
+    least = QUICK.least(2)
+    spent = calibrate(two_goal(), Fake(two_terms), options=replace(QUICK, budget=least))
+    assert spent.status == "stalled" and len(spent.history) == 1
+
+
+def test_what_the_first_search_found_outlives_the_second(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where every run of the second breaks down, or Ctrl-C ends it, the first one's answer and all runs are there."""
+    far = {"R": 200.0, "mu": 0.5}
+    stuck(monkeypatch, far)
+    alone = calibrate(
+        two_goal(), Fake(two_terms, breaks=lambda p: p["R"] != pytest.approx(200.0, rel=1e-2)), options=QUICK
+    )
+    assert alone.status == "stalled" and values(alone) == pytest.approx(far, rel=1e-2)
+    assert alone.failed == len(alone.history) - 1 > 5
+    cut = calibrate(two_goal(), Fake(two_terms, interrupt_after=6), options=QUICK)
+    assert cut.status == "interrupted" and len(cut.history) == 6
 
 
 def test_an_answer_whose_repetition_breaks_down_is_not_chosen() -> None:
