@@ -26,13 +26,13 @@ from calib.fit import calibrate
 from calib.knives import load_knife
 from calib.materials import FoodSpec
 from calib.objective import ErrorModel
+from calib.options import FitOptions
 from calib.outputs import finite, prepare, write_json
 from calib.preparation import fit_parameters, set_up
 from calib.progress import Countdown
 from calib.provenance import code_key, git_commit, key_of, versions
 from calib.request import Request
 from calib.scenes import Sizing, cut_scene, specimen
-from calib.search import FitOptions
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.workers import Workers
 from mpm.errors import CutcalError

@@ -20,9 +20,10 @@ from threadpoolctl import threadpool_limits
 from calib.evaluation import Evaluator
 from calib.joint import JointObjective
 from calib.objective import Objective, Trial
+from calib.options import FitOptions
 from calib.parameters import ParameterSet
 from calib.progress import Progress
-from calib.search import CAUTION_NEAR, ELSEWHERE, FitOptions, Search
+from calib.search import CAUTION_NEAR, ELSEWHERE, Search
 from calib.surrogate import Surrogate
 from mpm.errors import SimulationError
 

@@ -20,10 +20,10 @@ from calib.fit import FitResult, calibrate
 from calib.metrics import Metrics, compare
 from calib.nulls import null_models
 from calib.objective import Objective
+from calib.options import FitOptions
 from calib.parameters import ParameterSet, plain
 from calib.prediction import NRMSE_LIMIT, RATING_LIMIT
 from calib.predictive import Band, band_of, errors, materials
-from calib.search import FitOptions
 from calib.specimens import Fitted, Specimens
 from calib.uncertainty import evidence, uncertainty
 from calib.verdicts import Verdict, balances

@@ -27,17 +27,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize_scalar
 from scipy.stats import chi2, qmc
 
-from calib.errors import MaterialError
 from calib.evaluation import Evaluation, Evaluator
 from calib.joint import JointObjective, residual
 from calib.objective import Objective, Trial
+from calib.options import FitOptions
 from calib.progress import Progress
 from calib.surrogate import Surrogate, coordinate_unit
 from calib.uncertainty import EXPLAINED
@@ -83,49 +82,6 @@ MORE_DESIGNS, FAR_OFF = 12, 4.0
 SCREENING = 0.15
 #: Largest joint scaling of the design's materials, as a logarithm: a factor 20 either way.
 LARGEST_SCALE = 3.0
-
-
-@dataclass(frozen=True)
-class FitOptions:
-    """How much to spend on a fit.
-
-    Attributes:
-        budget: Largest number of simulations, coarse ones counted by their cost.
-        batch: Simulations that run at the same time (worker processes).
-        design: Space-filling runs at the start, besides the given values and the prior centre.
-        coarse_cost: Cost of a coarse simulation in fine ones [-]; half the resolution costs about a quarter
-            or less.
-        tolerance: Gain in chi-square that is worth a round [-], times the reduced chi-square where that
-            exceeds 1. 0.2 is a twentieth of what bounds a 95 % interval (3.84).
-        seed: Seed of the design and of the probes.
-
-    Raises:
-        ValueError: A number that is not positive.
-    """
-
-    budget: float = 100.0
-    batch: int = 2
-    design: int = 7
-    coarse_cost: float = 0.25
-    tolerance: float = 0.2
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        if min(self.budget, self.batch, self.design, self.coarse_cost, self.tolerance) <= 0 or self.seed < 0:
-            raise ValueError(f"{self} has a number that is not positive; give positive ones.")
-
-    def least(self, parameters: int) -> int:
-        """Smallest budget of a search for so many parameters."""
-        return 2 * parameters + self.design + 2
-
-    def check(self, parameters: int) -> None:
-        """Raise MaterialError when the budget is too small for this number of parameters."""
-        least = self.least(parameters)
-        if self.budget < least:
-            raise MaterialError(
-                f"a budget of {self.budget:g} simulations is too small for {parameters} parameters; give at least "
-                f"{least}, or fit fewer."
-            )
 
 
 class Search:

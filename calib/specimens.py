@@ -19,12 +19,12 @@ from calib.config import Press, Study
 from calib.doubt import Doubt, doubt_of
 from calib.fit import FitResult, calibrate
 from calib.joint import JointEvaluator, JointObjective
+from calib.options import FitOptions
 from calib.parameters import Z95, Parameter, ParameterSet, own, plain
 from calib.preparation import set_up
 from calib.progress import Progress
 from calib.provenance import code_key
 from calib.request import Setup
-from calib.search import FitOptions
 from calib.store import CachedEvaluator, EvaluationStore
 from calib.workers import Workers
 from mpm.scene import Scene

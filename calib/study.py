@@ -18,6 +18,7 @@ from calib.fit import FitResult, calibrate
 from calib.materials import FoodSpec, dump_material
 from calib.metrics import compare
 from calib.nulls import NullModel, null_models
+from calib.options import FitOptions
 from calib.outputs import prepare, write_csv, write_json
 from calib.preparation import set_up
 from calib.progress import Progress
@@ -25,7 +26,6 @@ from calib.provenance import code_key, key_of
 from calib.records import whole_record
 from calib.request import Request, Setup
 from calib.scenes import place
-from calib.search import FitOptions
 from calib.sensitivity import sensitivity
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.summary import add_conditioning, summarise

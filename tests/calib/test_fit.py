@@ -14,9 +14,10 @@ from calib.errors import MaterialError
 from calib.evaluation import Evaluation, Evaluator
 from calib.fit import AFRESH, FitResult, calibrate
 from calib.objective import Objective, Target
+from calib.options import FitOptions
 from calib.parameters import Parameter, ParameterSet
 from calib.progress import Progress
-from calib.search import DESIGNS, FAR_OFF, SCREENING, FitOptions, Search
+from calib.search import DESIGNS, FAR_OFF, SCREENING, Search
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.uncertainty import evidence, uncertainty
 from mpm.errors import SimulationError

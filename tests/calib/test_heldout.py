@@ -11,8 +11,8 @@ import pytest
 import calib.heldout
 from calib.fit import calibrate
 from calib.heldout import _adapted, _drawn, _Specimen
+from calib.options import FitOptions
 from calib.parameters import ParameterSet
-from calib.search import FitOptions
 from tests.calib.fake import FIVE, Fake, goal, three_terms
 
 FLESH = {"E": 4e5, "yield_stress": 5e4, "R": 350.0, "mu": 0.25}

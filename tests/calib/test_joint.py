@@ -11,7 +11,7 @@ from calib.evaluation import Evaluation
 from calib.fit import calibrate
 from calib.joint import JointEvaluator, JointObjective
 from calib.objective import Objective
-from calib.search import FitOptions
+from calib.options import FitOptions
 from calib.surrogate import Surrogate
 from tests.calib.fake import FIVE, STROKE, Fake, goal, three_terms
 

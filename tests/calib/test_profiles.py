@@ -13,10 +13,10 @@ from calib.doubt import CLOSE, JUDGED, Doubt, doubt_of
 from calib.evaluation import Evaluation
 from calib.fit import FitResult, calibrate
 from calib.objective import Objective, Target
+from calib.options import FitOptions
 from calib.parameters import Z95, Parameter, ParameterSet
 from calib.predictive import band_of, errors
 from calib.profiles import RISE, Profile, with_profiles
-from calib.search import FitOptions
 from calib.surrogate import Surrogate
 from tests.calib.fake import GRID, NOISE, STROKE, Fake, goal, noise, three_terms
 

@@ -13,7 +13,7 @@ from SALib.analyze import sobol as analysis
 from SALib.sample import sobol as sampling
 
 from calib.fit import calibrate
-from calib.search import FitOptions
+from calib.options import FitOptions
 from calib.sensitivity import indices, quantities, sensitivity
 from tests.calib.fake import FIVE, Fake, goal
 from tests.data_dir import ROOT
