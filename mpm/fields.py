@@ -3,6 +3,8 @@
 import numpy as np
 import taichi as ti
 
+from mpm.runtime import adds_doubles
+
 # Rows of the parameter table that kernels read at run time.
 MU, LAM, YIELD, MASS, VOL, FRICTION, BOARD_MU = range(7)
 R_FLESH, R_START, DEPTH, SLIP, ZONE, FULL, EPS0, EPSF = range(7, 15)
@@ -92,6 +94,8 @@ class Fields:
         self.user = None  # whose state the fields hold
         deep = nodes[1] + (0 if nodal else nodes[1] if turned else 2 * BESIDE + 1)
         real = ti.lang.impl.get_runtime().default_fp
+        self.real = np.float64 if real == ti.f64 else np.float32  # of the entries of fields, to fill them from the host
+        booked = ti.f64 if adds_doubles() else ti.f32
         vec3, vec4 = ti.types.vector(3, real), ti.types.vector(4, real)
         mat3 = ti.types.matrix(3, 3, real)
         self.lanes = 1 if self.atomic else REGISTER // (8 if real == ti.f64 else 4)
@@ -129,8 +133,8 @@ class Fields:
         self.par = ti.field(real, N_PARAMETERS)
         self.size = ti.field(ti.i32, N_SIZES)
         self.pose = ti.field(ti.f64, N_POSE)
-        self.sums = ti.field(ti.f64, N_SUMS)
-        self.state = ti.field(ti.f64, N_STATE)
+        self.sums = ti.field(booked, N_SUMS)
+        self.state = ti.field(booked, N_STATE)
         self.window = ti.field(ti.i32, 6)  # nodes that particles can reach before it is renewed: first, last + 1
         ti.sync()  # lays these fields out by themselves; Taichi does not manage those of eight scenes at once
 

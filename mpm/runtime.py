@@ -6,12 +6,15 @@ import contextlib
 import functools
 import io
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from mpm.errors import SceneError
 
 ARCHES = ("cpu", "cuda", "vulkan", "metal", "gpu")
+SINGLE = ("vulkan",)
+"""Devices whose kernels are in single precision, whatever a scene asks for: Taichi has no exponential of doubles for them, and its
+additions to a double are no atomic ones there, so that impulses are lost (a third of a blade's)."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,7 @@ def start(runtime: Runtime, precision: str) -> int:
         Serial number of the runtime: fields made under another number no longer exist.
 
     Raises:
-        SceneError: The device is not available.
+        SceneError: The device is not available, or cannot do what a cut needs.
     """
     import taichi as ti
 
@@ -76,7 +79,7 @@ def start(runtime: Runtime, precision: str) -> int:
     if _state["key"] == key:
         return _state["serial"]
     arch = getattr(ti, runtime.arch)
-    real = ti.f64 if precision == "f64" else ti.f32
+    real = ti.f64 if precision == "f64" and runtime.arch not in SINGLE else ti.f32
     _state["key"] = None
     try:
         with contextlib.redirect_stdout(io.StringIO()):
@@ -95,11 +98,23 @@ def start(runtime: Runtime, precision: str) -> int:
         if runtime.arch == "cpu":
             raise
         raise _missing(runtime.arch) from None
-    if runtime.arch != "cpu" and ti.lang.impl.current_cfg().arch == ti.cpu:
+    found = ti.lang.impl.current_cfg().arch
+    if runtime.arch != "cpu" and found == ti.cpu:
         raise _missing(runtime.arch)
+    if found == ti.metal:
+        raise SceneError("arch: metal has no double precision, which the way of the blade needs; use --arch cpu")
+    if runtime.arch == "gpu" and found == ti.vulkan:
+        return start(replace(runtime, arch="vulkan"), precision)
     _state["key"] = key
     _state["serial"] += 1
     return _state["serial"]
+
+
+def adds_doubles() -> bool:
+    """Whether kernels of the device that was started may add to a double from many threads."""
+    import taichi as ti
+
+    return ti.lang.impl.current_cfg().arch in (ti.cpu, ti.cuda)
 
 
 def _missing(arch: str) -> SceneError:

@@ -126,7 +126,7 @@ class Simulation:
         """Write seeds and constants into the fields."""
         k, scene, num, edge = self.k, self.scene, self.scene.numerics, self.scene.edge
         k.user = self
-        real = np.float64 if num.precision == "f64" else np.float32
+        real = k.real
         middle = round(-self.origin[1] / num.dx)
         k.lay_out(len(self.seeds.x), self.nodes, middle, len(self.stations), scene.mirrored_between)
         k.fill(k.x, self._turn(self.seeds.x).astype(real))

@@ -1,0 +1,57 @@
+"""The kernels as a GPU runs them: on the CPU's threads with atomic additions, and on what devices there are."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mpm.errors import SceneError
+from mpm.record import ForceRecord
+from mpm.runtime import Runtime
+from mpm.scene import Scene
+from mpm.solver import Simulation
+from tests.mpm.scenes import PRISM, WEDGE
+
+SCENE = replace(PRISM, knife=WEDGE, motion=replace(PRISM.motion, stroke=6e-3))
+"""A wedge that cuts, rubs and lets the food flow."""
+BRITTLE = SCENE.with_material(tensile_strength=1e4, fracture_energy=20.0)
+
+
+def apart(one: ForceRecord, two: ForceRecord) -> float:
+    """Largest difference of the forces of edge, faces and board, over the largest force on the knife [-]."""
+    parts = ("edge", "face", "board")
+    return max(float(np.abs(getattr(one, p) - getattr(two, p)).max()) for p in parts) / one.peak
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", [SCENE, BRITTLE], ids=["flows", "breaks"])
+@pytest.mark.parametrize(("precision", "close"), [("f64", 1e-9), ("f32", 1e-4)])
+def test_the_layout_of_a_gpu_gives_the_same_cut(
+    scene: Scene, precision: str, close: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One grid for all threads, atomic additions, a node for a row and a particle for a block: the same forces, but for the order of
+    sums, and the momentum closes.
+    """
+    scene = replace(scene, numerics=replace(scene.numerics, precision=precision))
+    one = Simulation(scene, Runtime(threads=1)).run()
+    monkeypatch.setattr(Simulation, "_threads", lambda self: 0)
+    other = Simulation(scene, Runtime(threads=2))
+    assert other.k.atomic and other.k.lanes == 1
+    record = other.run()
+    assert record.status == one.status == "done" and len(record.stroke) == len(one.stroke)
+    assert apart(one, record) < close and record.momentum_residual < close
+    assert (one.damage[-1] > 0) == (scene.food.material.tensile_strength is not None)
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("arch", ["cuda", "vulkan"])
+def test_a_device_gives_the_curve_of_the_cpu(arch: str) -> None:
+    """To 1e-4 of the peak, in the precision that the device has, and the momentum closes as well; skipped where it is not there."""
+    one = Simulation(SCENE, Runtime(threads=1)).run()
+    try:
+        record = Simulation(SCENE, Runtime(arch)).run()
+    except SceneError as e:
+        pytest.skip(str(e))
+    assert record.status == "done" and apart(one, record) < 1e-4 and record.momentum_residual < 1e-4
