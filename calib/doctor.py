@@ -40,7 +40,7 @@ CLOSE = 0.05
 """Error of that force that passes; on the few coarse cells it is 1 %."""
 PATIENCE = 180.0
 """Seconds after which a device that has not answered is given up: compiling for the first time takes a twentieth of that."""
-DEVICES = {"cuda": "CUDA", "vulkan": "Vulkan", "metal": "Metal"}
+DEVICES = {"cuda": "CUDA", "vulkan": "Vulkan"}
 EXTRAS = {"cluster": "--scheduler", "sample": "--sample", "view": "--video and --page"}
 """What the optional packages are for."""
 SMALL = 1.5e9
@@ -79,8 +79,7 @@ def examine(folder: Path) -> Iterator[Finding]:
     cpu, cache = device("cpu", "solver")
     yield cpu
     for arch, name in DEVICES.items():
-        if (arch == "metal") == (sys.platform == "darwin"):
-            yield device(arch, name)[0]
+        yield device(arch, name)[0]
     yield kernels(cache)
     yield _tried("report", _typeset, "pip install --force-reinstall typst matplotlib")
     yield pictures()

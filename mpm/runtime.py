@@ -11,7 +11,8 @@ from typing import Any
 
 from mpm.errors import SceneError
 
-ARCHES = ("cpu", "cuda", "vulkan", "metal", "gpu")
+ARCHES = ("cpu", "cuda", "vulkan", "gpu")
+"""Devices; not Metal, which has no doubles: the way of the blade needs them."""
 SINGLE = ("vulkan",)
 """Devices whose kernels are in single precision, whatever a scene asks for: Taichi has no exponential of doubles for them, and its
 additions to a double are no atomic ones there, so that impulses are lost (a third of a blade's)."""
@@ -102,7 +103,7 @@ def start(runtime: Runtime, precision: str) -> int:
     if runtime.arch != "cpu" and found == ti.cpu:
         raise _missing(runtime.arch)
     if found == ti.metal:
-        raise SceneError("arch: metal has no double precision, which the way of the blade needs; use --arch cpu")
+        raise SceneError("arch: the GPU here is Metal's, which has no double precision; use --arch cpu")
     if runtime.arch == "gpu" and found == ti.vulkan:
         return start(replace(runtime, arch="vulkan"), precision)
     _state["key"] = key
