@@ -50,9 +50,9 @@ def elements() -> tuple[np.ndarray, np.ndarray]:
 def particles(how: How, dx: float, ppc: int) -> tuple[float, float]:
     """A section near the end: its place from the middle [m] and its way down against the middle [m].
 
-    The beam lies and bends along x, where the grid has room.
+    The beam lies across the blade and bends along x, where the grid has room; a quarter of a cell takes the mirror across x away.
     """
-    grid = replace(numerics(dx, room=1.5, ppc=ppc), mirror=True, grid_shift=(0.5, 0.0, 0.0))
+    grid = replace(numerics(dx, room=1.5, ppc=ppc), mirror=True, grid_shift=(0.25, 0.0, 0.0))
     body = how.body(Shape("block", 2 * HALF, DEPTH, WIDTH), FOOD, grid)
     y = np.abs(body.start[:, 1])
     stiffness, line = FOOD.E * WIDTH * DEPTH**3 / 12, FOOD.rho * WIDTH * DEPTH
