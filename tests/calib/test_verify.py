@@ -9,7 +9,7 @@ import pytest
 
 from calib.cli.main import main
 from calib.pool import Pool
-from calib.verification import rows
+from calib.verification import bending, rows
 from calib.verification.rows import Case, How, Row, cases
 from mpm.errors import SceneError
 from tests.calib.documents import valid
@@ -183,3 +183,10 @@ def test_cases_run_in_processes(tmp_path):
 def test_parts_are_modules_with_cases():
     """Every part of the table exists."""
     assert len(cases()) > len(rows.PARTS)
+
+
+def test_the_hanging_beam_is_free_to_bend(monkeypatch):
+    """In a fiftieth of the time to rest its ends have begun to fall; a mirror across the way that it bends would hold it straight."""
+    monkeypatch.setattr(bending, "PERIODS", 0.04)
+    place, down = bending.particles(How(), bending.DEPTH / 8, 2)
+    assert bending.HALF - bending.DEPTH / 8 < place < bending.HALF and down > 1e-5
