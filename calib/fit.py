@@ -132,8 +132,8 @@ def _afresh(search: Search, evaluator: Evaluator, coarse: Evaluator | None) -> s
     """Search once more from another design, with nothing of what a stalled search has learnt, for what is left of its budget; the runs
     of both are then the search's.
 
-    That is where the right material would more likely than not have left a smaller chi-square, and the budget holds a search. Of 18
-    made-up cuts two had stalled in a basin three times as deep as the one that other seeds found.
+    That is where the right material would more likely than not have left a smaller chi-square, and the budget holds a search. Of 21
+    made-up cuts two had stalled at two to four times the chi-square that other seeds found.
 
     Returns:
         How the better of the two ended.

@@ -105,7 +105,9 @@ def start(runtime: Runtime, precision: str) -> int:
     if found == ti.metal:
         raise SceneError("arch: the GPU here is Metal's, which has no double precision; use --arch cpu")
     if runtime.arch == "gpu" and found == ti.vulkan:
-        return start(replace(runtime, arch="vulkan"), precision)
+        serial = start(replace(runtime, arch="vulkan"), precision)
+        _state["key"] = key  # asked for again, it keeps running
+        return serial
     _state["key"] = key
     _state["serial"] += 1
     return _state["serial"]

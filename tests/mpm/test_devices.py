@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import taichi as ti
 
+from mpm import runtime
 from mpm.errors import SceneError
 from mpm.record import ForceRecord
 from mpm.runtime import Runtime
@@ -43,6 +46,18 @@ def test_the_layout_of_a_gpu_gives_the_same_cut(
     assert record.status == one.status == "done" and len(record.stroke) == len(one.stroke)
     assert apart(one, record) < close and record.momentum_residual < close
     assert (one.damage[-1] > 0) == (scene.food.material.tensile_strength is not None)
+
+
+def test_a_gpu_that_is_vulkans_is_started_once_and_in_single_precision(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Asked for as ``gpu`` it is started again without doubles, and not a third time for the next run, which would lose all kernels."""
+    begun = []
+    monkeypatch.setitem(runtime._state, "key", None)
+    monkeypatch.setitem(runtime._state, "serial", runtime._state["serial"])
+    monkeypatch.setattr(ti, "init", lambda **options: begun.append(options["default_fp"]))
+    monkeypatch.setattr(ti.lang.impl, "current_cfg", lambda: SimpleNamespace(arch=ti.vulkan))
+    first = runtime.start(Runtime("gpu"), "f64")
+    assert begun == [ti.f64, ti.f32] and not runtime.adds_doubles()
+    assert runtime.start(Runtime("gpu"), "f64") == first and len(begun) == 2
 
 
 @pytest.mark.gpu
