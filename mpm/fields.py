@@ -121,6 +121,7 @@ class Fields:
         self.share_of, self.relax = ti.field(real, max(branches, 1)), ti.field(real, max(branches, 1))
         self.g = vec4.field(shape=(self.threads, nodes[0], deep, nodes[2]))
         self.u = vec4.field(shape=(nodes[0], deep, nodes[2]))
+        self.planes = vec4.field(shape=(self.threads, 16))  # of the nodes of the particle that a thread moves
         self.hot = ti.field(ti.i32, 6)  # box of the lowest nodes of particles whose strain could damage something
         self.slip, self.push = ti.Vector.field(2, real, stations), ti.Vector.field(2, real, stations)
         self.velocity = vec3.field(shape=stations)  # mean velocity of the material at the edge

@@ -120,55 +120,69 @@ class Kernels(Touch):
         return ti.Vector([bulk * loss[0], bulk * loss[1], bulk * loss[2], loss[3], outside])
 
     @ti.func
-    def gather(self, p, dt, window):
+    def gather(self, p, thread, dt, window):
         """Grid to particle, then contact."""
         base, fx = self.local(self.x[p])
         if (
             self.inside(base, window) > 0
         ):  # one that has left the grid stays where it is; the run ends at the next output
-            self.move(p, base, fx, dt)
+            self.move(p, thread, base, fx, dt)
 
     @ti.func
-    def move(self, p, base, fx, dt):
+    def plane(self, i, base, cols, w, d):
+        """Velocity of plane ``i`` of a particle's nodes times their weights across it, and its slopes along y and z."""
+        whole, py, pz = ti.Vector.zero(float, 4), ti.Vector.zero(float, 4), ti.Vector.zero(float, 4)
+        for j in ti.static(range(3)):
+            a = self.u[base[0] + i, cols[j, 0], base[2]]
+            b = self.u[base[0] + i, cols[j, 1], base[2] + 1]
+            c = self.u[base[0] + i, cols[j, 2], base[2] + 2]
+            row = w[0][2] * a + w[1][2] * b + w[2][2] * c
+            whole += w[j][1] * row
+            py += d[j][1] * row
+            pz += w[j][1] * (d[0][2] * a + d[1][2] * b + d[2][2] * c)
+        return whole, py, pz
+
+    @ti.func
+    def move(self, p, thread, base, fx, dt):
         """Velocity, gradient and position of a particle from the 27 nodes above ``base``.
 
         Contact corrects the velocity that the next transfer hands on, not the position: moving the particle as well
         would let the surface slip through the material without straining it.
         """
         w = self.weights(fx)
+        d = [4 * self.par[INV] * (i - fx) * w[i] for i in ti.static(range(3))]  # weights of the velocity gradient
         code = self.layers[p]
         cols = self.columns(base, 0, code)
         zero = ti.Vector.zero(float, 4)
-        whole, mx, my, mz = zero, zero, zero, zero  # of the nodes' velocities and of their first moments about the base
-        for i in ti.static(range(3)):
-            if ti.static(self.turned):
-                cols = self.columns(base, i, code)
-            plane, py, pz = zero, zero, zero
-            for j in ti.static(range(3)):
-                a = self.u[base[0] + i, cols[j, 0], base[2]]
-                b = self.u[base[0] + i, cols[j, 1], base[2] + 1]
-                c = self.u[base[0] + i, cols[j, 2], base[2] + 2]
-                row = w[0][2] * a + w[1][2] * b + w[2][2] * c
-                plane += w[j][1] * row
-                pz += w[j][1] * (w[1][2] * b + 2 * w[2][2] * c)
-                if ti.static(j > 0):
-                    py += j * w[j][1] * row
-            whole += w[i][0] * plane
-            my += w[i][0] * py
-            mz += w[i][0] * pz
-            if ti.static(i > 0):
-                mx += i * w[i][0] * plane
-        u = ti.Vector([whole[0], whole[1], whole[2]])
-        self.C[p, 0] = (4 * self.par[INV]) * (mx - fx[0] * whole)
-        self.C[p, 1] = (4 * self.par[INV]) * (my - fx[1] * whole)
-        self.C[p, 2] = (4 * self.par[INV]) * (mz - fx[2] * whole)
+        u4, cx, cy, cz = zero, zero, zero, zero
+        if ti.static(self.atomic):
+            for i in ti.static(range(3)):
+                if ti.static(self.turned):
+                    cols = self.columns(base, i, code)
+                whole, py, pz = self.plane(i, base, cols, w, d)
+                u4, cx = u4 + w[i][0] * whole, cx + d[i][0] * whole
+                cy, cz = cy + w[i][0] * py, cz + w[i][0] * pz
+        else:
+            # Where the loop is unrolled LLVM does not find the vectors of four, and the whole step takes 8 % longer. So its end
+            # is one that LLVM cannot know, and what it finds goes through memory.
+            for i in range(ti.min(self.size[COUNT], 3)):
+                if ti.static(self.turned):
+                    cols = self.columns(base, i, code)
+                whole, py, pz = self.plane(i, base, cols, w, d)
+                self.planes[thread, i], self.planes[thread, 3 + i], self.planes[thread, 6 + i] = whole, py, pz
+            for i in ti.static(range(3)):
+                whole = self.planes[thread, i]
+                u4, cx = u4 + w[i][0] * whole, cx + d[i][0] * whole
+                cy += w[i][0] * self.planes[thread, 3 + i]
+                cz += w[i][0] * self.planes[thread, 6 + i]
+        u = ti.Vector([u4[0], u4[1], u4[2]])
+        self.C[p, 0], self.C[p, 1], self.C[p, 2] = cx, cy, cz
         at = self.x[p] + dt * u
         if ti.static(not self.nodal):
             if self.may_touch(p, at):
                 u = self.touch(p, dt, u, at)
             else:
-                self.lever[p, 0] = zero
-                self.lever[p, 1] = zero
+                self.lever[p, 0], self.lever[p, 1] = zero, zero
         self.v[p] = u
         self.x[p] = at
 
@@ -266,8 +280,10 @@ class Kernels(Touch):
         for _ in range(1):
             self.pose[Z] += self.pose[VZ] * dt
             self.pose[S] += self.pose[VS] * dt
-        for p in range(self.size[COUNT]):
-            self.gather(p, dt, w)
+        for part in range(self.shares()):
+            first, last, thread = self.share(part)
+            for p in range(first * self.lanes, ti.min(last * self.lanes, self.size[COUNT])):
+                self.gather(p, thread, dt, w)
         if ti.static(self.damage):
             self.smooth_strain(w)
 

@@ -39,7 +39,7 @@ class Survey(Stress):
         not acted yet: food at rest on a board would else have the energy of the fall that the board stops in every step.
         """
         m, u = self.par[MASS] * self.bulk[p], self.v[p]
-        spin = self.C[p, 0].norm_sqr() + self.C[p, 1].norm_sqr() + self.C[p, 2].norm_sqr()
+        spin = self.gradient_of(p).norm_sqr()
         f = self.deformation_of(p)
         j = f.determinant()
         v = unit()
