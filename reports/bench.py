@@ -48,7 +48,7 @@ def _brief(d: Data) -> Brief:
     parts = [
         Part("Run time against error", "Errors against the same cut on cells of " + quantity(cut["reference_dx_m"], "m") + ".",
              _picture(d), "Error over run time of the default cut and of the same with one thing changed", _ablations(d)),
-        Part("Kernels", KERNELS, table=_kernels(rate)),
+        Part("Kernels", KERNELS, table=_kernels(rate, d.get("processes"))),
     ]  # fmt: skip
     if d.get("peers"):
         parts.append(Part("Other codes", PEERS, table=_peers(d["peers"])))
@@ -103,13 +103,17 @@ def _ablations(d: Data) -> Table:
     return Table(head, ("auto", "1fr", *["auto"] * 6), lines, left=2)
 
 
-def _kernels(rate: Data) -> Table:
+def _kernels(rate: Data, processes: Data | None) -> Table:
     rows = [
         ["all physics, block", quantity(rate["full_physics_Mps"], "-")],
+        ["the same in single precision", quantity(rate["single_Mps"], "-")],
         ["all physics, in the default cut", quantity(rate["cut_Mps"], "-")],
         ["textbook kernel with the same physics", quantity(rate["textbook_Mps"], "-")],
         ["what the memory would bear", quantity(rate["memory_bound_Mps"], "-")],
     ]
+    if processes:
+        cuts = f"{processes['processes']} default cuts in as many processes"
+        rows.insert(3, [cuts, quantity(processes["cut_Mps"], "-")])
     return Table(("Kernel", "Million particle steps a second"), ("1fr", "60mm"), rows)
 
 

@@ -122,6 +122,7 @@ def test_ratios_are_those_of_the_times(document):
     assert d["complete"]
     assert d["throughput"]["full_physics_Mps"] == pytest.approx(1.0)
     t = d["throughput"]
+    assert t["single_Mps"] == pytest.approx(1.0)
     assert t["memory_bound_Mps"] == pytest.approx(1e3 * t["bandwidth_GBps"] / t["bytes_per_particle_step"])
     assert d["throughput"]["ratio"] == pytest.approx(10.0)
     assert d["paper_config"]["wall_s_extrapolated"] == pytest.approx(0.01 * d["paper_config"]["steps"], rel=1e-3)
@@ -132,6 +133,7 @@ def test_ratios_are_those_of_the_times(document):
     assert rows["half the time step"]["time_ratio"] == pytest.approx(2.0, rel=0.01)
     assert rows["single precision"]["time_ratio"] == pytest.approx(1.0)  # neither compiles while it is timed
     assert "nrmse" not in rows["ten times as stiff"]
+    assert d["processes"].pop("cut_Mps") > 0
     assert d["processes"] == {"processes": 2, "speed_up": pytest.approx(2.0)}
     empty = next(row for name, row in rows.items() if "empty grid" in name)
     assert empty["time_ratio"] == pytest.approx(1.0) and empty["nodes"] > 2 * d["default_cut"]["nodes"]
