@@ -106,14 +106,15 @@ def _ablations(d: Data) -> Table:
 def _kernels(rate: Data, processes: Data | None) -> Table:
     rows = [
         ["all physics, block", quantity(rate["full_physics_Mps"], "-")],
-        ["the same in single precision", quantity(rate["single_Mps"], "-")],
         ["all physics, in the default cut", quantity(rate["cut_Mps"], "-")],
         ["textbook kernel with the same physics", quantity(rate["textbook_Mps"], "-")],
         ["what the memory would bear", quantity(rate["memory_bound_Mps"], "-")],
     ]
-    if processes:
+    if "single_Mps" in rate:
+        rows.insert(1, ["the same in single precision", quantity(rate["single_Mps"], "-")])
+    if processes and "cut_Mps" in processes:
         cuts = f"{processes['processes']} default cuts in as many processes"
-        rows.insert(3, [cuts, quantity(processes["cut_Mps"], "-")])
+        rows.insert(-2, [cuts, quantity(processes["cut_Mps"], "-")])
     return Table(("Kernel", "Million particle steps a second"), ("1fr", "60mm"), rows)
 
 
