@@ -16,7 +16,7 @@ from calib.errors import OutputError
 from calib.materials import FoodSpec, load_material_file
 from calib.progress import Progress
 from calib.request import Request
-from calib.scenes import Sizing
+from calib.scenes import MIDDLE, Sizing
 from calib.trace import Trace, read_trace
 from calib.wording import brief
 from mpm.errors import CutcalError, check_number
@@ -29,6 +29,7 @@ LIMITS: dict[str, tuple[float, float, str]] = {
     "height": (1e-3, 1.0, "m"),
     "width": (1e-3, 1.0, "m"),
     "length": (1e-3, 1.0, "m"),
+    "at": (0.0, 1.0, ""),
     "dx": (1e-4, 0.02, "m"),
     "budget": (0.0, 1e6, ""),
 }
@@ -50,6 +51,7 @@ class Calibration:
         t_end: Time after which the record is ignored [s], or None.
         shape: Outline of the specimen, one of ``mpm.shapes.SHAPE_KINDS``; None for the food's.
         height, width, length: Sizes of the specimen [m], None where they were not measured.
+        at: Where the blade cuts, as the part of the length on one side [-].
         fit: Names of the fitted properties; None for those that cutting sees.
         dx: Cell size [m], or None.
         budget: Largest number of simulations.
@@ -71,6 +73,7 @@ class Calibration:
     height: float | None = None
     width: float | None = None
     length: float | None = None
+    at: float = MIDDLE
     fit: Sequence[str] | None = None
     dx: float | None = None
     budget: float = 100
@@ -111,7 +114,7 @@ class Calibration:
             knife=str(self.knife),
             speed=self.speed,
             t_end=self.t_end,
-            sizing=Sizing(self.shape, self.height, self.width, self.length),
+            sizing=Sizing(self.shape, self.height, self.width, self.length, self.at),
             fit=None if self.fit is None else tuple(self.fit),
             dx=self.dx,
             budget=self.budget,

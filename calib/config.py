@@ -25,7 +25,7 @@ from calib.parameters import OF
 from calib.progress import Progress
 from calib.properties import check_override
 from calib.request import Request
-from calib.scenes import Sizing
+from calib.scenes import MIDDLE, Sizing
 from calib.validation import Place, check_keys, choice, mapping, number, read_yaml, text
 
 CUT, COMPRESSION = "cut", "compression"
@@ -39,7 +39,7 @@ each of two independent properties. What all of them have in common is in the sp
 MOST_SCATTER = 1.0  # a factor of seven either way
 EACH = "each"
 TOP = ("material", "knife", "fit", "own", "hold_out", "scatter", "budget", "seed", "dx", "set")
-NUMBERS = ("speed", "t_end", "height", "width", "length", "gain_sd", "lag_sd")
+NUMBERS = ("speed", "t_end", "height", "width", "length", "at", "gain_sd", "lag_sd")
 TEXTS = ("time_col", "force_col", "position_col", "depth_col", "sign", "shape", "knife")
 SIZES = ("height", "diameter", "width", "length")
 
@@ -200,7 +200,7 @@ def _request(place: Place, given: Mapping[str, Any], folder: Path, base: Request
         air=None if air is None else folder / text(place.at("air"), air),
         columns={n: words[n] for n in ("time_col", "force_col", "position_col", "depth_col", "sign")},
         knife=_knife(words["knife"] or base.knife, folder),
-        sizing=Sizing(words["shape"], numbers["height"], numbers["width"], numbers["length"]),
+        sizing=Sizing(words["shape"], numbers["height"], numbers["width"], numbers["length"], numbers["at"] or MIDDLE),
         speed=numbers["speed"],
         t_end=numbers["t_end"],
         gain_sd=numbers["gain_sd"],

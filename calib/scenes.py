@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
@@ -26,6 +27,7 @@ LENGTH_PER_HEIGHT = 4.0
 cantilever beam (Gurney and Hunt 1967), so the force on its faces grows with the length: a cucumber of one height needs 0.56 of the
 work of one of five, two heights need 0.77, three 0.93, four 0.99; for a banana, which flows, two are enough."""
 PRISMS = ("block", "cylinder", "half_cylinder", "capsule")
+MIDDLE = 0.5  # place of the blade where nothing else is said, in parts of the length
 FAR = 0.25
 """Distance from the cut from which on there are fewer particles, over the height: peak and work of banana, cucumber and pear
 change by 0.3 % at most, their curves by 0.4 % of the peak, and long foods take half the time."""
@@ -33,12 +35,16 @@ change by 0.3 % at most, their curves by 0.4 % of the peak, and long foods take 
 
 @dataclass(frozen=True)
 class Sizing:
-    """Sizes of the specimen, each given by the user or None. Attributes: shape, height, width, length [m]."""
+    """Sizes of the specimen, each given by the user or None, and where along its length it is cut.
+
+    Attributes: shape; height, width, length [m]; at, part of the length on the left of the blade (y < 0) [-].
+    """
 
     shape: str | None = None
     height: float | None = None
     width: float | None = None
     length: float | None = None
+    at: float = MIDDLE
 
     @property
     def kept(self) -> tuple[str, ...]:
@@ -82,16 +88,19 @@ def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple
             "the specimen's width is not known: it keeps the proportions of the food; resistances are only identified as "
             "their product with it; give --width if you measured it"
         )
-    length = sizing.length
-    if length is None:
-        length = default.length * height / default.height
+    whole, most = sizing.length, math.inf
+    if whole is None:
+        whole = default.length * height / default.height
         if default.kind in PRISMS:
-            length = min(length, LENGTH_PER_HEIGHT * height)
+            most = LENGTH_PER_HEIGHT * height / 2
+    left, right = min(sizing.at * whole, most), min((1 - sizing.at) * whole, most)
+    length = left + right
+    if sizing.length is None:
         said.append(
             f"the specimen's length across the blade is not known: {length * 1e3:.0f} mm keep the proportions of the food; the blade "
             "bends longer halves apart with more force; give --length if you measured it"
         )
-    return Shape(default.kind, length, width, height), said
+    return Shape(default.kind, length, width, height, (left - right) / 2), said
 
 
 def height_range(food: FoodSpec, trace: Conditioned, sizing: Sizing) -> tuple[float, float, float] | None:
@@ -128,7 +137,8 @@ def place(scene: Scene, values: Mapping[str, float], kept: Collection[str] = ())
     shape = scene.food.shape
     k = height / shape.height
     sizes = {name: getattr(shape, name) * (1.0 if name in kept else k) for name in ("width", "length")}
-    food = replace(scene.food, shape=replace(shape, height=height, **sizes))
+    cut = shape.cut * sizes["length"] / shape.length
+    food = replace(scene.food, shape=replace(shape, height=height, cut=cut, **sizes))
     cell, far = k * scene.numerics.dx, scene.numerics.far
     return (
         replace(

@@ -41,8 +41,10 @@ def quarter(shape: Shape, cells: int, grade: float = 1.0, order: int = 1) -> sk.
         order: 1 for straight edges; 2 for elements whose outer faces follow a round outline.
 
     Raises:
-        MeshError: A shape without such a mesh.
+        MeshError: A shape without such a mesh, or one that is not cut in the middle.
     """
+    if shape.cut != 0:
+        raise MeshError("mesh: the finite-element mesh is a quarter of a food that is cut in the middle")
     mesh = _straight(shape, cells, grade)
     return mesh if order == 1 or shape.kind == "block" else _rounded(mesh, shape)
 

@@ -40,8 +40,12 @@ def lay_out(scene: Scene) -> Layout:
     for axis, size in enumerate((wide, deep, shape.height)):
         shift = num.grid_shift[axis] % 1.0
         room = PAD + math.ceil(num.room * size / 2 / dx)
-        bottom = -PAD if axis == 2 else -math.ceil(size / 2 / dx) - room
-        top = math.ceil(size / 2 / dx) + room
+        before = after = size / 2
+        if axis == 1:
+            off = abs(shape.cut) if num.grid_turn else shape.cut
+            before, after = before + off, after + (off if num.grid_turn else -off)
+        bottom = -PAD if axis == 2 else -math.ceil(before / dx) - room
+        top = math.ceil(after / dx) + room
         if axis == 2:  # the blade tips the halves, and their far ends rise
             top = math.ceil(size / dx) + PAD + math.ceil(num.room * deep / 2 / dx)
         if mirror[axis] and axis == 0:

@@ -241,6 +241,12 @@ class Scene:
         thin = min(shape.length, shape.width, shape.height)
         if thin < 4 * dx:
             raise SceneError(f"shape: {thin * 1e3:g} mm is under 4 cells of {dx * 1e3:g} mm; use a smaller dx")
+        least = shape.length / 2 - abs(shape.cut)
+        if shape.cut != 0 and least < 2 * dx:
+            raise SceneError(
+                f"shape: the blade at {shape.cut * 1e3:g} mm from the middle leaves a slice of {least * 1e3:.3g} mm, under 2 cells of "
+                f"{dx * 1e3:g} mm; cut nearer to the middle or use a smaller dx"
+            )
         self._check_motion()
         self._check_band()
 
@@ -302,7 +308,8 @@ class Scene:
         cohesive = self.numerics.contact == "cohesive"
         on = self.numerics.mirror and self.numerics.grid_turn == 0
         straight = self.motion.slice_ratio == 0 and self.motion.tilt == 0
-        return on and straight and float(2 * sx).is_integer(), on and cohesive and float(sy).is_integer()
+        even = self.food.shape.cut == 0
+        return on and straight and float(2 * sx).is_integer(), on and cohesive and even and float(sy).is_integer()
 
     @property
     def mirrored_between(self) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,15 +83,15 @@ def seed(scene: Scene) -> Seeds:
     shape, num = scene.food.shape, scene.numerics
     h = num.dx / num.ppc
     mirror_x, mirror_y = scene.mirrors
-    low = np.array([0.0 if mirror_x else -shape.width / 2, -shape.length / 2, 0.0])
-    high = np.array([shape.width / 2, 0.0 if mirror_y else shape.length / 2, shape.height])
+    near, far = shape.ends
+    low = np.array([0.0 if mirror_x else -shape.width / 2, near, 0.0])
+    high = np.array([shape.width / 2, 0.0 if mirror_y else far, shape.height])
     counts = np.ceil((high - low) / h - 1e-9).astype(int)
-    if not mirror_y:
-        counts[1] += counts[1] % 2  # the cut plane lies between two layers
+    right = 0 if mirror_y else math.ceil(far / h - 1e-9)
+    counts[1] = math.ceil(-near / h - 1e-9) + right  # the cut plane lies between two layers
     if counts.prod() > MAX_PARTICLES:
         raise SceneError(f"numerics: dx = {num.dx * 1e3:g} mm makes {counts.prod():,} particles; use a larger dx")
     # the lattice starts on the mirror planes (x = 0 below, y = 0 above) and on the board
-    right = 0 if mirror_y else counts[1] // 2
     origin = np.array([low[0], (right - counts[1]) * h, 0.0])
     cells = np.stack(np.meshgrid(*[np.arange(n) for n in counts], indexing="ij"), -1).reshape(-1, 3)
     rng = np.random.default_rng(num.seed)

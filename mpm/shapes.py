@@ -25,26 +25,39 @@ FLAT_TOP = ("block", "upright_cylinder")
 
 @dataclass(frozen=True)
 class Shape:
-    """Outline of the food. Attributes: kind, length along y [m], width along x [m], height along z [m].
+    """Outline of the food, standing on z = 0 with the plane of the blade at y = 0.
 
     A cylinder lies along y, an upright one stands on its end.
+
+    Attributes: kind; length along y, width along x, height along z [m]; cut, place of the blade along y from the food's middle [m].
     """
 
     kind: str
     length: float
     width: float
     height: float
+    cut: float = 0.0
 
     def __post_init__(self) -> None:
         if self.kind not in SHAPE_KINDS:
             raise SceneError(f"shape: unknown kind {self.kind!r}; one of {', '.join(SHAPE_KINDS)}")
         for name in ("length", "width", "height"):
             check_number("shape", name, getattr(self, name), 1e-3, 1.0, "m")
+        if not abs(self.cut) < self.length / 2:
+            raise SceneError(
+                f"shape: the blade at {self.cut * 1e3:g} mm from the middle misses a food {self.length * 1e3:g} mm long"
+            )
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Where the food begins and ends along y [m], the blade being at 0."""
+        return -self.length / 2 - self.cut, self.length / 2 - self.cut
 
 
-def _radius2(shape: Shape, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Squared distance from the vertical axis (or plane) in units of the outline: 1 on the rim [-]."""
-    a, b = shape.width / 2, shape.length / 2
+def _radius2(shape: Shape, x: np.ndarray, y: np.ndarray, thinner: float = 0.0) -> np.ndarray:
+    """Squared distance from the vertical axis (or plane) in units of the outline, or of one ``thinner`` [m] on all sides: 1 on the rim [-]."""
+    a, b = (max(size / 2 - thinner, 5e-10) for size in (shape.width, shape.length))
+    y = y + shape.cut
     if shape.kind in ("cylinder", "half_cylinder"):
         return np.where(np.abs(y) <= b, (x / a) ** 2, np.inf)
     if shape.kind == "capsule":
@@ -56,7 +69,7 @@ def _radius2(shape: Shape, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def half_width(shape: Shape, y: float) -> float:
     """Half of the width of the section at y [m], 0 where there is none."""
     if shape.kind == "block":
-        return shape.width / 2 if abs(y) <= shape.length / 2 else 0.0
+        return shape.width / 2 if abs(y + shape.cut) <= shape.length / 2 else 0.0
     r2 = float(_radius2(shape, np.zeros(1), np.array([y]))[0])
     return shape.width / 2 * math.sqrt(max(1.0 - r2, 0.0))
 
@@ -74,7 +87,7 @@ def surface(shape: Shape, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.
     """
     x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
     if shape.kind == "block":
-        inside = (np.abs(x) <= shape.width / 2) & (np.abs(y) <= shape.length / 2)
+        inside = (np.abs(x) <= shape.width / 2) & (np.abs(y + shape.cut) <= shape.length / 2)
         return np.where(inside, 0.0, np.nan), np.where(inside, shape.height, np.nan)
     r2 = _radius2(shape, x, y)
     if shape.kind == "upright_cylinder":
@@ -109,8 +122,10 @@ def volume(shape: Shape) -> float:
 
 def section_area(shape: Shape) -> float:
     """Area of the section in the blade plane y = 0 [m^2]: what a complete cut severs."""
-    box = shape.width * shape.height
-    return box if shape.kind in FLAT_TOP else math.pi / 4 * box
+    width = 2 * half_width(shape, 0.0)
+    if shape.kind in FLAT_TOP:
+        return width * shape.height
+    return math.pi / 4 * width * shape.height * (width / shape.width)
 
 
 def skin_path(shape: Shape, x: np.ndarray, thickness: float) -> np.ndarray:
@@ -130,14 +145,15 @@ def skin_path(shape: Shape, x: np.ndarray, thickness: float) -> np.ndarray:
     x = np.asarray(x, float)
     bottom, top = surface(shape, x, np.zeros_like(x))
     inner_width = max(shape.width - 2 * thickness, 1e-9)
+    r2 = _radius2(shape, x, np.zeros_like(x), thickness)
     lift = 0.0 if shape.kind in (*_FLAT_DOWN, *FLAT_TOP) else thickness
     inner_height = max(shape.height - thickness - lift, 1e-9)
     if shape.kind in FLAT_TOP:
         inner_top = np.where(np.abs(x) <= inner_width / 2, inner_height, bottom)
     else:
-        rise = np.sqrt(np.maximum(1 - (2 * x / inner_width) ** 2, 0.0))
+        rise = np.sqrt(np.maximum(1 - r2, 0.0))
         inner_top = inner_height * rise if shape.kind in _FLAT_DOWN else shape.height / 2 + inner_height / 2 * rise
-        inner_top = np.where(np.abs(x) <= inner_width / 2, inner_top, bottom)
+        inner_top = np.where(r2 <= 1, inner_top, bottom)
     return np.nan_to_num(np.maximum(top - inner_top, 0.0))
 
 

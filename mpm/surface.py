@@ -7,7 +7,7 @@ the particles of its own half that are nearest to it at rest: by a moving least-
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -37,13 +37,13 @@ class Half:
 
 
 def half_of(shape: Shape, spacing: float) -> Half:
-    """The surface of the half at y >= 0, whose cut face is y = 0.
+    """The surface of the part at y >= 0, whose cut face is y = 0.
 
     Args:
         shape: The outline.
         spacing: Distance of the rings beside the cut [m].
     """
-    b = shape.length / 2
+    b = shape.ends[1]
     count = max(int(np.ceil(np.pi / 2 * b / spacing)), 4)
     rings = [_ring(shape, b * float(np.sin(np.pi / 2 * t))) for t in np.linspace(0.0, 1.0, count + 1)]
     middle = [np.array([[0.0, ring[0, 1], ring[:, 2].mean()]]) for ring in (rings[0], rings[-1])]
@@ -99,12 +99,13 @@ class Surface:
     """
 
     def __init__(self, shape: Shape, seeds: Seeds, mirrors: tuple[bool, bool]) -> None:
-        one = half_of(shape, seeds.spacing)
-        sides = (-1.0,) if mirrors[1] else (-1.0, 1.0)
+        left, right = (half_of(replace(shape, cut=side * shape.cut), seeds.spacing) for side in (-1.0, 1.0))
+        places = {-1.0: left.points * [1.0, -1.0, 1.0], 1.0: right.points}
         self._mirrored = mirrors[1]
-        self._carried = [_Carried(one.points * [1.0, side, 1.0], seeds.x, side, mirrors[0]) for side in sides]
-        self.triangles = np.concatenate([one.triangles[:, ::-1], one.triangles + len(one.points)])
-        self.rest = np.concatenate([one.points * [1.0, -1.0, 1.0], one.points])
+        sides = (-1.0,) if self._mirrored else (-1.0, 1.0)
+        self._carried = [_Carried(places[side], seeds.x, side, mirrors[0]) for side in sides]
+        self.triangles = np.concatenate([left.triangles[:, ::-1], right.triangles + len(left.points)])
+        self.rest = np.concatenate(list(places.values()))
 
     def points(self, now: Snapshot) -> np.ndarray:
         """Places of the vertices [m], shape (m, 3)."""

@@ -30,8 +30,7 @@ from calib.request import Request
 from mpm.errors import CutcalError
 
 HELP = "fit a food to a measured knife-force trace, and report"
-DESCRIPTION = """Fit a food's cutting properties to a knife-force trace: CSV, JSON or HDF5 with
-units in its columns' names. Writes summary.json, report.pdf and more to --out."""
+DESCRIPTION = """Fit a food to a knife-force trace (CSV, JSON, HDF5; units in columns' names)."""
 EPILOG = """examples:
   calibrate --food potato --trace cut.csv --air air.csv --check
   calibrate --config potatoes.yaml --out runs/potatoes

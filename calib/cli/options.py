@@ -13,7 +13,7 @@ from calib.cluster import Cluster
 from calib.materials import FoodSpec, check_override, load_food, load_material_file
 from calib.outputs import finite
 from calib.pool import Pool
-from calib.scenes import Sizing
+from calib.scenes import MIDDLE, Sizing
 from calib.workers import Workers
 from mpm.errors import CutcalError
 from mpm.runtime import ARCHES
@@ -94,6 +94,13 @@ def add_food(p: Group, *, cell: bool = True, required: bool = True) -> None:
     )
     for name, what in (("height", ""), ("width", ", along the blade"), ("length", ", across the blade")):
         p.add_argument(f"--{name}", type=number(1e-3, 1.0, "m"), metavar="M", help=f"{name} of the specimen{what} [m]")
+    p.add_argument(
+        "--at",
+        type=number(0, 1, ""),
+        default=MIDDLE,
+        metavar="PART",
+        help="place of the blade, part of the length (default 0.5)",
+    )
     if cell:
         p.add_argument(
             "--dx", type=number(1e-4, 0.02, "m"), metavar="M", help="cell of the grid [m] (default: by the food)"
@@ -177,4 +184,4 @@ def food_of(args: argparse.Namespace) -> FoodSpec:
 
 def sizing_of(args: argparse.Namespace) -> Sizing:
     """Sizes that the user gave."""
-    return Sizing(args.shape, args.height, args.width, args.length)
+    return Sizing(args.shape, args.height, args.width, args.length, args.at)

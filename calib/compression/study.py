@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -148,7 +147,10 @@ def run(
     document: dict[str, Any] = {
         "schema": tag("compress"),
         **about,
-        "specimen": {**asdict(shape), "area_m2": area(shape)},
+        "specimen": {
+            **{name: getattr(shape, name) for name in ("kind", "length", "width", "height")},
+            "area_m2": area(shape),
+        },
         "assumed": {"nu": nu, "plates": _plates(bonded)},
         "E": {
             "window": [0.0, strain],

@@ -85,6 +85,23 @@ def test_a_food_is_simulated_as_long_as_it_matters():
     assert not any("--length" in text for text in said)
 
 
+def test_a_food_is_cut_where_it_is_asked_for():
+    """At a part of its length; of parallel sides no more than two heights on either side, and a fitted height moves the blade along."""
+    cucumber, strawberry = load_food("cucumber"), load_food("strawberry")
+    whole = cucumber.dims["length"].value
+    shape, _ = specimen(cucumber, None, Sizing(at=0.25))
+    most = 2 * shape.height
+    assert whole is not None and whole / 4 < most
+    assert (-shape.ends[0], shape.ends[1]) == pytest.approx((whole / 4, most))
+    berry, _ = specimen(strawberry, None, Sizing(at=0.25))
+    assert berry.cut == pytest.approx(-berry.length / 4)
+    measured, _ = specimen(cucumber, None, Sizing(length=0.4, at=0.75))
+    assert (measured.length, measured.cut) == pytest.approx((0.4, 0.1))
+    scene = cut_scene(strawberry, berry, load_knife("kitchen"))
+    higher, _ = place(scene, {"height": 1.1 * berry.height})
+    assert higher.food.shape.cut == pytest.approx(1.1 * berry.cut)
+
+
 def test_fitted_height_takes_the_other_sizes_along():
     """A candidate's height scales width and length with it, except what was measured; the rest is the material's."""
     food = load_food("cucumber")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pytest
 
 from calib.cli.main import main
 from calib.trace import read_trace
@@ -31,6 +32,17 @@ def test_simulate_writes_a_force_record_that_reads_back(tmp_path: Path, capsys):
     np.testing.assert_allclose(back.force, c["knife_fz_N"])
     assert main([*argv, "--out", str(out)]) == 1
     assert "never overwritten" in capsys.readouterr().err
+
+
+def test_simulate_cuts_where_it_is_told(tmp_path: Path, capsys):
+    """A strawberry at a quarter of its length parts into caps of a quarter's height and the rest (5/32 of an ellipsoid)."""
+    argv = ["simulate", "--food", "strawberry", "--knife", "edc", "--at", "0.25", "--threads", "1", "--json"]
+    assert main([*argv, "--out", str(tmp_path / "cut")]) == 0
+    summary = valid(json.loads(capsys.readouterr().out))
+    large, small = summary["volumes_m3"]
+    assert summary["severed"] and small / (large + small) == pytest.approx(5 / 32, abs=0.01)
+    assert main([*argv[:-3], "--at", "0.99", "--out", str(tmp_path / "end")]) != 0
+    assert "leaves a slice of" in capsys.readouterr().err
 
 
 def test_simulate_says_what_was_not_cut(tmp_path: Path, capsys):

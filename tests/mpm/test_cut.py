@@ -51,6 +51,20 @@ def whole() -> ForceRecord:
     return run(scene, mu=0.3)
 
 
+def test_a_prism_is_cut_alike_wherever_the_blade_is():
+    """A block 72 mm long cut at a third needs the force of one that is cut in the middle, and parts into a third and two."""
+    long = replace(
+        PRISM, food=replace(PRISM.food, shape=Shape("block", 0.072, 0.024, 0.024)), motion=Motion(0.024, 0.01)
+    )
+    middle = run(replace(long, knife=WEDGE))
+    third = run(replace(long, knife=WEDGE, food=replace(long.food, shape=replace(long.food.shape, cut=-0.012))))
+    assert third.status == "done" and third.momentum_residual < 1e-10
+    assert third.peak == pytest.approx(middle.peak, rel=0.01)
+    assert third.work == pytest.approx(middle.work, rel=0.01)
+    assert third.pieces is not None and third.pieces.complete
+    assert np.array(third.pieces.volumes) / sum(third.pieces.volumes) == pytest.approx([2 / 3, 1 / 3], abs=0.01)
+
+
 def test_halves_that_tip_stay_on_the_grid():
     """The skin under the edge drags the cut faces of a long soft food down and tips its halves; their ends rise by 11 mm."""
     fruit = Material(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from mpm.errors import SceneError
+from mpm.layout import lay_out
 from mpm.material import Material
 from mpm.record import _moving_mean
 from mpm.scene import Food, Knife, Motion, Numerics, Scene
@@ -26,13 +27,14 @@ def scene(kind: str, **numerics: object) -> Scene:
     )
 
 
+@pytest.mark.parametrize("cut", [0.0, 0.016, -0.022])
 @pytest.mark.parametrize("kind", SHAPE_KINDS)
-def test_volume_and_section_agree_with_counting(kind):
+def test_volume_and_section_agree_with_counting(kind, cut):
     """The closed forms agree with a count of random points within 3 standard deviations, and the surface with inside."""
-    shape = Shape(kind, 0.06, 0.04, 0.03)
+    shape = Shape(kind, 0.06, 0.04, 0.03, cut)
     rng = np.random.default_rng(0)
     n, box = 200_000, 0.06 * 0.04 * 0.03
-    points = rng.uniform([-0.02, -0.03, 0], [0.02, 0.03, 0.03], (n, 3))
+    points = rng.uniform([-0.02, shape.ends[0], 0], [0.02, shape.ends[1], 0.03], (n, 3))
     share = inside(shape, points).mean()
     assert volume(shape) / box == pytest.approx(share, abs=3 * math.sqrt(0.25 / n))
     x = np.linspace(-0.02, 0.02, 20001)
@@ -41,18 +43,42 @@ def test_volume_and_section_agree_with_counting(kind):
 
 
 @pytest.mark.parametrize("kind", SHAPE_KINDS)
-@pytest.mark.parametrize("mirror", [True, False])
-def test_particles_add_up_to_the_food(kind, mirror):
-    """All images of the particles have the volume of the shape, lie in it, and fill the modelled quarter evenly."""
+@pytest.mark.parametrize(("mirror", "cut"), [(True, 0.0), (False, 0.0), (True, 0.02), (False, -0.015)])
+def test_particles_add_up_to_the_food(kind, mirror, cut):
+    """All images of the particles have the volume of the shape, lie in it, and fill the modelled part evenly.
+
+    A blade that is not in the middle leaves the mirror along it, and has two layers of particles on either side all the same.
+    """
     sc = scene(kind, mirror=mirror)
+    sc = replace(sc, food=replace(sc.food, shape=replace(sc.food.shape, cut=cut)))
     seeds = seed(sc)
-    images = 4 if mirror else 1
+    images = (2 if mirror else 1) * (2 if mirror and cut == 0 else 1)
+    assert sc.mirrors == (mirror, mirror and cut == 0)
     assert seeds.total * images == pytest.approx(volume(sc.food.shape), rel=1e-12)
     assert inside(sc.food.shape, seeds.x).all()
     assert seeds.volume == pytest.approx(seeds.spacing**3, rel=0.06)
     assert (seeds.foot >= 0).all() and seeds.foot.max() <= seeds.spacing
     if mirror:
-        assert seeds.x[:, 0].min() >= 0 and seeds.x[:, 1].max() <= 0
+        assert seeds.x[:, 0].min() >= 0
+    if images == 4:
+        assert seeds.x[:, 1].max() <= 0
+    else:
+        near = np.abs(seeds.x[:, 1]) < seeds.spacing
+        assert (seeds.beside == near).all() and near[seeds.x[:, 1] > 0].any() and near[seeds.x[:, 1] < 0].any()
+    grid = lay_out(sc)
+    low, high = grid.origin, grid.origin + (np.array(grid.nodes) - 1) * sc.numerics.dx
+    assert (seeds.x.min(axis=0) > low + 1.5 * sc.numerics.dx).all() and (
+        seeds.x.max(axis=0) < high - 1.5 * sc.numerics.dx
+    ).all()
+
+
+def test_a_blade_beside_the_food_or_at_its_very_end_is_refused():
+    """Beyond the end, and so near to it that the slice has no two cells."""
+    with pytest.raises(SceneError, match="misses a food 60 mm long"):
+        Shape("block", 0.06, 0.04, 0.03, 0.03)
+    sc = scene("block")
+    with pytest.raises(SceneError, match="leaves a slice of 5 mm, under 2 cells"):
+        replace(sc, food=replace(sc.food, shape=replace(sc.food.shape, cut=-0.025)))
 
 
 @pytest.mark.parametrize("kind", SHAPE_KINDS)

@@ -44,6 +44,16 @@ def test_a_half_is_closed_and_has_half_the_volume(kind: str) -> None:
     assert half.points[:, 1].min() == 0.0 and half.points[:, 1].max() == pytest.approx(0.03)
 
 
+@pytest.mark.parametrize("kind", SHAPE_KINDS)
+def test_parts_of_different_length_make_the_whole_food(kind: str) -> None:
+    """Cut off its middle the food has a closed surface around its whole volume, to 1 % (coarser rings than above)."""
+    shape = Shape(kind, 0.06, 0.03, 0.024, 0.012)
+    scene = replace(PRISM, food=replace(PRISM.food, shape=shape))
+    surface = Surface(shape, seed(scene), scene.mirrors)
+    assert enclosed(surface.rest, surface.triangles) == pytest.approx(volume(shape), rel=1e-2)
+    assert (surface.rest[:, 1].min(), surface.rest[:, 1].max()) == pytest.approx(shape.ends)
+
+
 @pytest.mark.parametrize("mirror", [True, False])
 def test_vertices_follow_an_affine_motion_exactly(mirror: bool) -> None:
     """Stretched, and of the whole food sheared and shifted too, every vertex is where the motion takes it, with thinned particles too."""
