@@ -27,7 +27,7 @@ from mpm.touch import CONTACT
 from mpm.watch import Watch, snapshot
 
 # Particles for which another thread pays.  On two cores the second thread gains nothing for 8,000 particles, 10 to 25 % for
-# 38,000 and 20 to 40 % for 128,000; processes share the cores better, which is how a calibration uses them.
+# 38,000 and 20 to 90 % for 128,000, by the machine; processes share the cores better, which is how a calibration uses them.
 WORTH_A_THREAD = 20_000
 PATIENCE = 0.1  # time after which a run comes back from the device to say how far it is and to be stopped [s]
 APPROACH = 0.1  # way of the blade above the food before contact, in cells
