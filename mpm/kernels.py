@@ -200,6 +200,7 @@ class Kernels(Touch):
                 pull = ti.math.clamp(spring, -limit, limit) - self.par[ARM_C] * self.pose[VZ]
             self.pose[VZ] += (pull * dt + booked - self.pose[BOOKED]) / self.par[ARM_MASS]
             self.pose[BOOKED] = booked
+            self.pose[VZ] = ti.max(self.pose[VZ], -self.pose[Z] / dt)  # the board stops the edge
         else:
             self.pose[VZ] = vz
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mpm import fields as kn
+from mpm.arm import arm_mass, pressed_home
 from mpm.errors import SimulationError
 from mpm.health import health
 from mpm.kernels import Kernels
@@ -171,7 +172,7 @@ class Simulation:
             table[kn.TACK_GAP] = 2 * material.adhesion_energy / material.adhesion
         if scene.arm.stiffness is not None:
             table[kn.ARM_K], table[kn.ARM_LIMIT] = scene.arm.stiffness, scene.arm.force_limit or 1e30
-            table[kn.ARM_MASS] = self._arm_mass(material, scene.arm.stiffness)
+            table[kn.ARM_MASS] = arm_mass(scene, material, scene.arm.stiffness)
             table[kn.ARM_C] = 2 * math.sqrt(scene.arm.stiffness * table[kn.ARM_MASS])
         k.par.from_numpy(table.astype(real))
         for b, (share, time) in enumerate(material.prony):
@@ -194,16 +195,6 @@ class Simulation:
     def _gap(self) -> float:
         """Way of the edge's middle above the food before contact [m]."""
         return APPROACH * self.scene.numerics.dx + self.scene.drop
-
-    def _arm_mass(self, material: Material, stiffness: float) -> float:
-        """Mass of the arm [kg]: as slow as the food's first axial mode, not lighter than the food beside the blade.
-
-        The real mass is immaterial: in a quasi-static cut the arm's inertia has no part in the force.
-        """
-        shape = self.scene.food.shape
-        period = 4 * shape.height / material.p_wave
-        layer = material.rho * 2 * self.scene.numerics.dx * section_area(shape)
-        return max(stiffness * (period / (2 * math.pi)) ** 2, layer)
 
     def run(
         self,
@@ -251,7 +242,7 @@ class Simulation:
         self.counters = {"inverted": 0, "outside": 0}
         for steps, down, along in phases:
             left = steps
-            while left > 0 and status == "done":
+            while left > 0 and status == "done" and not pressed_home(scene, rows):
                 count = min(every * batch, left)
                 for one in watches:
                     count = min(count, every * math.ceil(max(one.due(total) - done, 1) / every))
@@ -266,7 +257,7 @@ class Simulation:
                     last = np.array(parts[0])
                     rows.append([*self._place(pose), dt * done, *(v for part in parts for v in part)])
                     status = health(sums, state)
-                    if status != "done":
+                    if status != "done" or pressed_home(scene, rows):
                         break
                 if clock.perf_counter() - asked < PATIENCE / 2:
                     batch *= 2
@@ -279,7 +270,8 @@ class Simulation:
                     for one in due:
                         one.take(now)
         wall = clock.perf_counter() - began
-        record = self._record(rows, material, status, done / total, dt, done, speed, wall)
+        fraction = 1.0 if pressed_home(scene, rows) and status == "done" else done / total
+        record = self._record(rows, material, status, fraction, dt, done, speed, wall)
         return replace(record, section=looks.section())
 
     def _place(self, pose: np.ndarray) -> list[float]:
