@@ -26,6 +26,8 @@ MARKS = (
     "prior.json",
     "regress.json",
     "scalars.json",
+    "evaluate.json",
+    "evaluate.jsonl",
     "report.pdf",
     "force.csv",
     "evaluations.h5",

@@ -1,0 +1,132 @@
+"""Whether a blade's motion parts the food: the motion's descent in the cutting solver, behind an arm that yields."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from calib.knives import load_knife
+from calib.materials import FoodSpec
+from calib.scenes import Sizing, cut_scene, specimen
+from mpm.errors import SceneError
+from mpm.record import ForceRecord
+from mpm.scene import Arm, Scene
+from mpm.solver import Simulation
+from robot.cuts import Item
+from robot.planner import RATE
+
+ARM = Arm(1 / 0.57e-3)
+"""ManiSkill's Panda with its own gains gives way by 0.57 mm per N of vertical reaction."""
+SLOWEST = 1e-3  # speed of a descent that still is one [m/s]
+LEAST_DRAW = 1e-3  # of the speed along the edge over that down, below which a cut is a press and keeps its mirror plane
+SHORTEST = 1e-3  # way into the food that still is a cut [m]
+
+
+@dataclass(frozen=True)
+class Severed:
+    """What the solver found.
+
+    Attributes:
+        severed: Whether the food is in pieces; None where it was not simulated.
+        uncut: Part of the section that still holds [-].
+        peak: Largest force on the knife [N].
+        short: Height of the edge over the one commanded, at the end [m].
+        why: Reason where it was not simulated, or the finding in words.
+    """
+
+    severed: bool | None
+    uncut: float = 1.0
+    peak: float = 0.0
+    short: float = 0.0
+    why: str = ""
+
+    def as_dict(self) -> dict[str, object]:
+        """As plain data."""
+        return asdict(self)
+
+
+def scene_of(
+    item: Item,
+    along: float,
+    command: np.ndarray,
+    food: FoodSpec,
+    *,
+    knife: str = "kitchen",
+    arm: Arm = ARM,
+    coarse: bool = True,
+) -> Scene | None:
+    """The cut that a commanded motion makes, None where it does not reach into the food.
+
+    Taken from the motion: the way down from the food's top, its mean speed, the draw along the edge, and how long the lowest place is
+    held. A place nearer to the end than two cells asks for finer ones.
+
+    Args:
+        item: The food before the cut, whole.
+        along: Where along its axis [m].
+        command: Commanded poses x, y, z, yaw, pitch (n, 5), one for each step of control.
+        food: Its properties.
+        knife: Name of the knife.
+        arm: What holds it.
+        coarse: Cells and speed of a screening run.
+
+    Raises:
+        SceneError: A cut that the solver cannot make.
+    """
+    z = command[:, 2]
+    shape = item.shape
+    bottom = int(np.argmin(z))
+    depth = shape.height - float(z[bottom])
+    entry = int(np.argmax(z[: bottom + 1] < shape.height)) if depth > 0 else bottom
+    if depth < SHORTEST or bottom == entry:
+        return None
+    first = max(entry - 1, 0)
+    span = (bottom - first) / RATE
+    down = max((float(z[first]) - float(z[bottom])) / span, SLOWEST)
+    yaw = float(command[bottom, 3])
+    edge = np.array([np.cos(yaw), np.sin(yaw)])
+    drawn = float((command[bottom, :2] - command[first, :2]) @ edge) / span
+    held = int((z[bottom:] <= z[bottom] + 1e-4).sum()) - 1
+    at = 0.5 + along / shape.length
+    sizing = Sizing(shape.kind, shape.height, shape.width, None, at)
+    sized, _ = specimen(food, None, sizing)
+    stroke = depth if not arm.rigid else min(depth, shape.height)
+    least = min(-sized.ends[0], sized.ends[1])
+    blade = load_knife(knife)
+    try:
+        scene = cut_scene(food, sized, blade, coarse=coarse)
+    except SceneError:
+        scene = cut_scene(food, sized, blade, dx=least / 2, mach=0.02 if coarse else 0.01)
+    ratio = drawn / down if abs(drawn) > LEAST_DRAW * down else 0.0
+    motion = replace(scene.motion, stroke=stroke, slice_ratio=ratio, speed=down, dwell=held / RATE)
+    return replace(scene, motion=motion, arm=arm)
+
+
+def sever(
+    item: Item,
+    along: float,
+    command: np.ndarray,
+    food: FoodSpec,
+    *,
+    knife: str = "kitchen",
+    arm: Arm = ARM,
+    coarse: bool = True,
+) -> tuple[Severed, ForceRecord | None]:
+    """Simulate a cut; the arguments are those of :func:`scene_of`. Returns the finding, and the record where there is one."""
+    try:
+        scene = scene_of(item, along, command, food, knife=knife, arm=arm, coarse=coarse)
+        if scene is None:
+            return Severed(False, why="the edge does not reach into the food"), None
+        record = Simulation(scene).run()
+    except SceneError as e:
+        return Severed(None, why=str(e)), None
+    if record.status != "done" or record.pieces is None:
+        return Severed(
+            None,
+            peak=record.peak,
+            why=f"the simulation stopped at {record.fraction:.0%} of the motion: {record.status}",
+        ), record
+    whole = record.severed_area + record.pieces.uncut_area
+    short = float(record.command[-1] - record.stroke[-1])
+    found = Severed(record.pieces.complete, record.pieces.uncut_area / whole, record.peak, short, record.pieces.words())
+    return found, record
