@@ -112,6 +112,8 @@ class Evidence:
         rows: Effective number of independent ones among them [-].
         weights: What the rows of the objective were multiplied by for the correlation that their residuals show (k,).
         lengths: Correlation length of each trace's residuals, part of its stroke [-].
+        met: Whether the right material would leave as large a chi-square with the correlation that was assumed, too. A wrong curve is off
+            for long stretches, which looks like few independent rows, and so like a chi-square that is nothing odd.
     """
 
     jacobian: FloatArray
@@ -120,6 +122,7 @@ class Evidence:
     rows: float
     weights: FloatArray
     lengths: tuple[float, ...] = ()
+    met: bool = True
 
 
 @dataclass(frozen=True)
@@ -155,7 +158,7 @@ class Uncertainty:
     @property
     def explained(self) -> bool:
         """Whether the best curve follows the data as the right one would."""
-        return self.reduced_chi2 * self.freedom <= chi2.ppf(EXPLAINED, self.freedom)
+        return self.data.met and self.reduced_chi2 * self.freedom <= chi2.ppf(EXPLAINED, self.freedom)
 
     def known_width(self) -> dict[str, float]:
         """Width of each parameter's interval if gain and width were known, over what it is [-], by name."""
@@ -217,7 +220,9 @@ def evidence(objective: Objective | JointObjective, best: Trial, jacobian: Float
         lengths.append(length)
     scale = np.concatenate(weights)
     slopes = scale[:, None] * jacobian[: len(scale)]
-    return Evidence(slopes, scale * best.residual[: len(scale)], block_diag(*open_ended), rows, scale, tuple(lengths))
+    met = bool(best.misfit <= chi2.ppf(EXPLAINED, objective.effective_rows))
+    left = scale * best.residual[: len(scale)]
+    return Evidence(slopes, left, block_diag(*open_ended), rows, scale, tuple(lengths), met)
 
 
 def uncertainty(parameters: ParameterSet, data: Evidence) -> Uncertainty:

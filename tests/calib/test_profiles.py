@@ -18,6 +18,7 @@ from calib.parameters import Z95, Parameter, ParameterSet
 from calib.predictive import band_of, errors
 from calib.profiles import RISE, Profile, with_profiles
 from calib.surrogate import Surrogate
+from calib.uncertainty import evidence
 from tests.calib.fake import GRID, NOISE, STROKE, Fake, goal, noise, three_terms
 
 
@@ -147,6 +148,19 @@ def test_nothing_is_identified_where_the_curve_is_not_explained(one_sided: tuple
     off = replace(doubt.uncertainty, reduced_chi2=3.0)
     assert not off.explained
     assert [i.verdict for i in doubt.uncertainty.intervals].count("identified") == 1
+    assert [i.verdict for i in with_profiles(off, doubt.profiles).intervals][-1] == "weak"
+
+
+def test_a_curve_that_is_off_for_long_stretches_is_not_explained(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+    """Its residuals look like few independent rows, so that their chi-square is nothing odd; the search's own is, and R is weak."""
+    objective, result, doubt = one_sided
+    assert result.jacobian is not None and evidence(objective, result.best, result.jacobian).met
+    rows = objective.effective_rows
+    for size, met in ((1.5, True), (2.0, False)):  # chi-square over 21 rows: 99 % quantile 38.9
+        best = replace(result.best, residual=result.best.residual * math.sqrt(size * rows / result.best.misfit))
+        assert evidence(objective, best, result.jacobian).met is met
+    off = replace(doubt.uncertainty, data=replace(doubt.uncertainty.data, met=False))
+    assert not off.explained
     assert [i.verdict for i in with_profiles(off, doubt.profiles).intervals][-1] == "weak"
 
 
