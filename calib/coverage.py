@@ -128,7 +128,7 @@ def run(
     prepare(out, resume=resume)
     shape, _ = specimen(food, None, Sizing())
     truth = cut_scene(food, shape, load_knife(knife), dx=dx)
-    began, rest = time.monotonic(), Countdown(traces)
+    began = time.monotonic()
     header = Header("", key_of({"scene": truth.as_dict(), "sensor": vars(sensor), "seed": seed}))
     request = Request(
         food=food,
@@ -142,13 +142,13 @@ def run(
     )
     lines = out / "coverage.jsonl"
     done = _known(lines)
+    todo = [k for k in range(traces) if k not in done]
+    rest = Countdown(len(todo))
     with EvaluationStore(out / "evaluations.h5", header, resume=resume) as store:
-        for k in range(traces):
-            if k not in done:
-                done[k] = _one(
-                    k, seed, replace(request, trace=out / f"trace-{k:03d}.csv", seed=k), truth, sensor, store, pool
-                )
-                _append(lines, done[k])
+        for k in todo:
+            own = replace(request, trace=out / f"trace-{k:03d}.csv", seed=k)
+            done[k] = _one(k, seed, own, truth, sensor, store, pool)
+            _append(lines, done[k])
             say(f"trace {k + 1} of {traces}: {_words(done[k])}; {rest.left(1.0)}")
     document = {"schema": tag("coverage"), **summarise([done[k] for k in range(traces)])}
     document |= {
