@@ -121,7 +121,12 @@ def started(*words: str, **env: str) -> subprocess.Popen[bytes]:
     """The command in a process of its own, its output in pipes."""
     command = [sys.executable, "-m", "calib.cli.main", *words]
     env = os.environ | {"PYTHONPATH": str(ROOT), **env}
-    return subprocess.Popen(command, cwd=ROOT, env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    pipes = {
+        "stdout": subprocess.PIPE,
+        "stderr": subprocess.PIPE,
+        "pipesize": 4096,
+    }  # where it can be set, they hold little
+    return subprocess.Popen(command, cwd=ROOT, env=env, **pipes)
 
 
 def test_letters_that_a_pipe_has_not():
