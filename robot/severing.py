@@ -20,6 +20,8 @@ ARM = Arm(1 / 0.57e-3)
 """ManiSkill's Panda with its own gains gives way by 0.57 mm per N of vertical reaction."""
 SLOWEST = 1e-3  # speed of a descent that still is one [m/s]
 LEAST_DRAW = 1e-3  # of the speed along the edge over that down, below which a cut is a press and keeps its mirror plane
+LEAST_CELLS = 2  # in the thinner part of the food, as mpm.scene asks
+FINEST = 1 / 3  # of the usual cell: finer ones cost more than 81 times as much, and an evaluation has hundreds of cuts
 SHORTEST = 1e-3  # way into the food that still is a cut [m]
 
 
@@ -93,10 +95,14 @@ def scene_of(
     stroke = depth if not arm.rigid else min(depth, shape.height)
     least = min(-sized.ends[0], sized.ends[1])
     blade = load_knife(knife)
-    try:
-        scene = cut_scene(food, sized, blade, coarse=coarse)
-    except SceneError:
-        scene = cut_scene(food, sized, blade, dx=least / 2, mach=0.02 if coarse else 0.01)
+    usual = cut_scene(food, replace(sized, cut=0.0), blade, coarse=coarse)
+    cell = min(usual.numerics.dx, least / LEAST_CELLS)
+    if cell < FINEST * usual.numerics.dx:
+        raise SceneError(
+            f"a slice of {least * 1e3:.2g} mm would need cells of {cell * 1e3:.2g} mm, which take too long"
+        )
+    numerics = replace(usual.numerics, dx=cell)
+    scene = replace(usual, food=replace(usual.food, shape=sized), numerics=numerics)
     ratio = drawn / down if abs(drawn) > LEAST_DRAW * down else 0.0
     motion = replace(scene.motion, stroke=stroke, slice_ratio=ratio, speed=down, dwell=held / RATE)
     return replace(scene, motion=motion, arm=arm)

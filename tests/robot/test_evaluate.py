@@ -18,7 +18,7 @@ from robot.cuts import CutSpec, Item, TaskError, target
 from robot.evaluate import evaluate, expected, roll_out, run_episode
 from robot.judge import TIP, judge, wilson
 from robot.policies import POLICIES, SHORT, make
-from robot.severing import ARM, sever
+from robot.severing import ARM, scene_of, sever
 from robot.suites import FOODS, SUITES, TEST, Episode, draw
 from robot.table import Rollout, Table
 from tests.calib.documents import valid
@@ -119,11 +119,15 @@ def test_a_soft_arm_needs_overdrive():
 
 
 def test_what_the_solver_cannot_cut_counts_as_neither():
-    """A slice of less than a particle has no answer, and says so; an edge that stays above the food has cut nothing."""
-    thin, _ = sever(
-        BERRY, 0.01999, np.array([[0, 0.01999, z, 0, 0] for z in np.linspace(0.05, 0.0, 30)]), ALL["strawberry"]
-    )
-    assert thin.severed is None and thin.why
+    """A slice of a millimetre would take cells too fine, and says so; one of 3 mm gets finer cells under the same edge; an edge that stays
+    above the food has cut nothing."""
+    down = np.array([[0.0, 0.0, z, 0.0, 0.0] for z in np.linspace(0.05, 0.0, 30)])
+    thin, record = sever(BERRY, 0.019, down, ALL["strawberry"])
+    assert thin.severed is None and "slice of 1 mm" in thin.why and record is None
+    usual, finer = (scene_of(BERRY, along, down, ALL["strawberry"]) for along in (0.0, 0.017))
+    assert usual is not None and finer is not None
+    assert finer.numerics.dx == pytest.approx(1.5e-3) and usual.numerics.dx > 2 * finer.numerics.dx
+    assert (finer.edge, finer.motion) == (usual.edge, usual.motion)
     above, record = sever(
         BERRY, 0.0, np.array([[0, 0, z, 0, 0] for z in np.linspace(0.2, 0.05, 30)]), ALL["strawberry"]
     )
