@@ -12,12 +12,12 @@ import pytest
 
 from calib.errors import MaterialError
 from calib.evaluation import Evaluation, Evaluator
-from calib.fit import AFRESH, FitResult, calibrate
-from calib.objective import Objective, Target
+from calib.fit import AFRESH, NOISES, FitResult, _may_win, calibrate
+from calib.objective import Objective, Target, Trial
 from calib.options import FitOptions
 from calib.parameters import Parameter, ParameterSet
 from calib.progress import Progress
-from calib.search import DESIGNS, FAR_OFF, SCREENING, Search
+from calib.search import CAUTION_NEAR, DESIGNS, FAR_OFF, SCREENING, Search
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.uncertainty import evidence, uncertainty
 from mpm.errors import SimulationError
@@ -394,6 +394,28 @@ def test_an_answer_whose_repetition_breaks_down_is_not_chosen() -> None:
     lost = calibrate(two_goal(), Fake(two_terms), replicate=Fake(two_terms, breaks=lambda p: True), options=QUICK)
     assert lost.best.misfit == min(t.misfit for t in lost.history if t.ok)
     assert lost.replicates and not any(t.ok for t in lost.replicates)
+
+
+def test_a_finalist_that_cannot_win_is_not_run_twice() -> None:
+    """One that was much worse than the best is not run again, whatever the second run has cost both alike; one that was hardly worse is,
+    and any where no second run stands.
+    """
+    search = Search(two_goal(), Fake(two_terms), None, QUICK, None)
+    search.run()
+    process = search.process()
+    best, *_, worst = sorted(search.finished, key=lambda t: t.misfit)
+
+    def of(trial: Trial, misfit: float) -> Trial:
+        return replace(trial, residual=trial.residual * math.sqrt(misfit / trial.misfit))
+
+    expected = process.expected(best.z, CAUTION_NEAR)
+    gap = worst.misfit - best.misfit + process.expected(worst.z, CAUTION_NEAR) - expected
+    assert gap > 2.0 * NOISES * max(process.luck, 1.0)
+    for cost in (0.0, gap):
+        again = of(best, expected + cost)
+        assert not _may_win(worst, process, [best], [again])
+        assert _may_win(of(best, best.misfit + 0.1), process, [best], [again])
+    assert _may_win(worst, process, [best], [replace(again, evaluation=replace(again.evaluation, status="failed"))])
 
 
 def test_a_run_that_presses_the_food_away_counts_as_one_that_broke_down() -> None:
