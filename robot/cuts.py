@@ -106,6 +106,12 @@ class Item:
         """The point (2,) of the table that lies there along its axis [m]."""
         return np.array([self.x, self.y]) + along * self.axis
 
+    def placed(self, points: np.ndarray, along: float) -> np.ndarray:
+        """Points (n, 3) of a cut's scene, whose blade is at ``along``, on the table [m]: x along the blade, y along the food's axis."""
+        across = np.array([self.axis[1], -self.axis[0]])
+        plane = self.at(along) + points[:, :1] * across + points[:, 1:2] * self.axis
+        return np.column_stack([plane, points[:, 2]])
+
     def piece_at(self, along: float) -> int | None:
         """Which piece lies there, None between pieces and beside them."""
         for k, p in enumerate(self.pieces):

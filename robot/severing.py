@@ -48,6 +48,34 @@ class Severed:
         return asdict(self)
 
 
+def cut_place(item: Item, along: float, food: FoodSpec, *, knife: str = "kitchen", coarse: bool = True) -> Scene:
+    """A press cut through a food at a place along its axis.
+
+    A place nearer to the end than two cells asks for finer ones.
+
+    Args:
+        item: The food, taken for whole.
+        along: Where along its axis [m].
+        food: Its properties.
+        knife: Name of the knife.
+        coarse: Cells and speed of a screening run.
+
+    Raises:
+        SceneError: A cut that the solver cannot make.
+    """
+    shape = item.shape
+    sizing = Sizing(shape.kind, shape.height, shape.width, None, 0.5 + along / shape.length)
+    sized, _ = specimen(food, None, sizing)
+    least = min(-sized.ends[0], sized.ends[1])
+    usual = cut_scene(food, replace(sized, cut=0.0), load_knife(knife), coarse=coarse)
+    cell = min(usual.numerics.dx, least / LEAST_CELLS)
+    if cell < FINEST * usual.numerics.dx:
+        raise SceneError(
+            f"a slice of {least * 1e3:.2g} mm would need cells of {cell * 1e3:.2g} mm, which take too long"
+        )
+    return replace(usual, food=replace(usual.food, shape=sized), numerics=replace(usual.numerics, dx=cell))
+
+
 def scene_of(
     item: Item,
     along: float,
@@ -61,7 +89,7 @@ def scene_of(
     """The cut that a commanded motion makes, None where it does not reach into the food.
 
     Taken from the motion: the way down from the food's top, its mean speed, the draw along the edge, and how long the lowest place is
-    held. A place nearer to the end than two cells asks for finer ones.
+    held.
 
     Args:
         item: The food before the cut, whole.
@@ -89,20 +117,8 @@ def scene_of(
     edge = np.array([np.cos(yaw), np.sin(yaw)])
     drawn = float((command[bottom, :2] - command[first, :2]) @ edge) / span
     held = int((z[bottom:] <= z[bottom] + 1e-4).sum()) - 1
-    at = 0.5 + along / shape.length
-    sizing = Sizing(shape.kind, shape.height, shape.width, None, at)
-    sized, _ = specimen(food, None, sizing)
+    scene = cut_place(item, along, food, knife=knife, coarse=coarse)
     stroke = depth if not arm.rigid else min(depth, shape.height)
-    least = min(-sized.ends[0], sized.ends[1])
-    blade = load_knife(knife)
-    usual = cut_scene(food, replace(sized, cut=0.0), blade, coarse=coarse)
-    cell = min(usual.numerics.dx, least / LEAST_CELLS)
-    if cell < FINEST * usual.numerics.dx:
-        raise SceneError(
-            f"a slice of {least * 1e3:.2g} mm would need cells of {cell * 1e3:.2g} mm, which take too long"
-        )
-    numerics = replace(usual.numerics, dx=cell)
-    scene = replace(usual, food=replace(usual.food, shape=sized), numerics=numerics)
     ratio = drawn / down if abs(drawn) > LEAST_DRAW * down else 0.0
     motion = replace(scene.motion, stroke=stroke, slice_ratio=ratio, speed=down, dwell=held / RATE)
     return replace(scene, motion=motion, arm=arm)

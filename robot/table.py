@@ -97,9 +97,19 @@ class Table:
         self._pose = self._pose + [x, y, z, yaw, pitch]
         there = self._pose.copy()
         there[2] = max(there[2], 0.0)
-        self.rollout.command.append(self._pose.copy())
+        self.arrive(self._pose.copy(), there, kept.clipped)
+
+    def arrive(self, command: np.ndarray, there: np.ndarray, clipped: tuple[str, ...] = ()) -> None:
+        """Take down where the edge has come to.
+
+        Args:
+            command: Where it was sent, shape (5,).
+            there: Where it is, shape (5,).
+            clipped: Limits that were met.
+        """
+        self.rollout.command.append(command)
         self.rollout.pose.append(there)
-        self.rollout.clipped.append(kept.clipped)
+        self.rollout.clipped.append(clipped)
         deep = bool(there[2] < CUT_DEPTH)
         if deep and not self._down:
             self._cut(there)

@@ -1,0 +1,209 @@
+"""A cut whose blade is moved from outside, a little at a time: the food's side of a robot simulator."""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from typing import Any
+
+import numpy as np
+
+from mpm import fields as kn
+from mpm.errors import SceneError, SimulationError
+from mpm.health import health
+from mpm.record import ForceRecord
+from mpm.runtime import Runtime
+from mpm.scene import Scene
+from mpm.solver import Simulation
+from mpm.surface import Surface
+from mpm.topology import Topology
+from mpm.watch import Snapshot, snapshot
+
+ON_FACE = 1e-9  # distance from the plane of the cut at which a vertex lies on its face [m]
+GRAVITY = 9.81  # m/s^2
+CLEAR = 2.0  # height of the edge above the uncut food at which nothing touches the blade any more [cells]
+
+
+class LiveCut:
+    """A food under a blade whose place is given at short intervals, in between which it moves evenly.
+
+    Real time passes as much faster in it as the scene's blade is faster than the real one (``time_scale``), and a motion faster than
+    the scene's takes more steps, so that the food never sees a higher Mach number. Until the edge comes near, and once it is
+    clear of the food again, nothing is simulated.
+
+    Another simulation of about this size takes over its fields: one is followed to its end before the next is made.
+
+    Args:
+        scene: The cut. Its motion says how fast the blade usually is (``speed`` [m/s]) and as what that is simulated (``mach``); a
+            ``slice_ratio`` other than 0 that it may also be drawn along its edge. The stroke is not used. The arm is rigid: what
+            holds the blade is outside.
+        runtime: Device.
+
+    Attributes:
+        status: ``done`` as long as the food is sound, else why it is not.
+        time: Real time that was simulated [s].
+        impulse: Impulse of the food on the blade, in real time [N s], shape (3,).
+
+    Raises:
+        SceneError: A scene without a blade or a real speed, or with an arm of its own.
+    """
+
+    def __init__(self, scene: Scene, runtime: Runtime | None = None) -> None:
+        if not scene.cuts:
+            raise SceneError("live cut: the scene has a press; give a knife")
+        if scene.motion.speed is None:
+            raise SceneError("live cut: the motion has no real speed; give the one at which the blade usually moves")
+        if not scene.arm.rigid:
+            raise SceneError("live cut: the blade is held from outside; leave the scene's arm rigid")
+        self.scene = scene
+        self._simulation = Simulation(scene, runtime or Runtime(threads=1))
+        self._simulation.counters = {"inverted": 0, "outside": 0}
+        self._k: Any = self._simulation.k
+        self._simulation._load(scene.food.material)
+        self._dt = self._simulation._time_step(scene.food.material)
+        self._top = scene.food.shape.height + self._simulation._gap()
+        self._z, self._s, self._first = self._top, 0.0, 0.0
+        self._rows: list[list[float]] = []
+        self._momentum, self._steps, self._wall = np.zeros(3), 0, 0.0
+        self._looks: Surface | None = None
+        self.status, self.time, self.impulse = "done", 0.0, np.zeros(3)
+
+    @property
+    def begun(self) -> bool:
+        """Whether the edge has come near the food."""
+        return bool(self._rows)
+
+    @property
+    def weight(self) -> float:
+        """Weight of the food [N]."""
+        simulation = self._simulation
+        return self.scene.food.material.rho * simulation.seeds.total * simulation.images * GRAVITY
+
+    @property
+    def uncut(self) -> float:
+        """Part of the section that the edge has not passed [-]."""
+        beside = self._simulation.seeds.beside
+        return float((beside & (self._k.of_particles(self._k.side) == 0)).sum() / beside.sum())
+
+    @property
+    def height(self) -> float:
+        """Height of the middle of the edge above the board [m], at most where the cut begins."""
+        return self._z
+
+    def move(self, height: float, slide: float, span: float) -> np.ndarray:
+        """Move the edge.
+
+        Args:
+            height: Of its middle above the board at the end [m]; the board stops it at 0.
+            slide: Way along the edge since the beginning, at the end [m].
+            span: Real time that passes [s].
+
+        Returns:
+            Mean force of the food on the blade: along the edge, across the blade, upwards [N], shape (3,).
+
+        Raises:
+            SceneError: A draw along the edge in a scene that has none, or numbers that are not finite.
+            SimulationError: The food broke down now or before.
+        """
+        if self.status != "done":
+            raise SimulationError(f"the live cut has stopped: {self.status}", reason=self.status, fraction=0.0)
+        if not (math.isfinite(height) and math.isfinite(slide) and span > 0 and math.isfinite(span)):
+            raise SceneError(f"live cut: a move to {height:g} m and {slide:g} m in {span:g} s; give finite numbers")
+        if not self.begun:
+            if height >= self._top:
+                self._s = slide
+                return np.zeros(3)
+            self._first = self._s
+        clear = self.scene.food.shape.height + CLEAR * self.scene.numerics.dx
+        if height > clear and self._z > clear:
+            self._z, self._s = height, slide
+            self._place()
+            return np.zeros(3)
+        return self._follow(max(height, 0.0), slide, span)
+
+    def _follow(self, height: float, slide: float, span: float) -> np.ndarray:
+        """Move the edge near the food."""
+        down, along = height - self._z, slide - self._s
+        if along != 0 and self.scene.mirrors[0]:
+            raise SceneError("live cut: the blade is drawn along its edge; give the motion a slice_ratio other than 0")
+        material, motion = self.scene.food.material, self.scene.motion
+        most = motion.mach * material.p_wave * self._dt  # way in a step
+        steps = max(
+            math.ceil(span / self.scene.time_scale / self._dt - 1e-9), math.ceil(math.hypot(down, along) / most - 1e-9)
+        )
+        sim = steps * self._dt
+        began = clock.perf_counter()
+        row = self._simulation._advance(steps, steps, self._dt, down / sim, along / sim)[0]
+        self._wall += clock.perf_counter() - began
+        sums, state, pose = np.split(row, (kn.N_SUMS, kn.N_SUMS + kn.N_STATE))
+        parts = self._simulation._row(sums, state, self._momentum, sim, material, self.scene.numerics.gravity)
+        counters = self._simulation.counters
+        counters["inverted"] += int(sums[kn.INVERTED])
+        counters["outside"] += int(sums[kn.OUTSIDE])
+        self._momentum, self._steps = np.array(parts[0]), self._steps + steps
+        self._rows.append(
+            [*self._simulation._place(pose), self._steps * self._dt, *(v for part in parts for v in part)]
+        )
+        self._z, self._s, self.time = height, slide, self.time + span
+        self.status = health(sums, state)
+        if self.status != "done":
+            raise SimulationError(
+                f"the live cut stopped with the edge at {1e3 * height:.1f} mm: {self.status}",
+                reason=self.status,
+                fraction=0.0,
+            )
+        force = np.array(parts[1]) + np.array(parts[2])
+        self.impulse = self.impulse + span * force
+        return force
+
+    def _place(self) -> None:
+        """Put the blade where it is, clear of the food."""
+        pose = self._k.pose.to_numpy()
+        pose[kn.Z] = pose[kn.COMMAND] = self._z
+        pose[kn.S] = self._s - self._first
+        pose[kn.VZ] = pose[kn.VS] = 0.0
+        self._k.pose.from_numpy(pose)
+
+    def pieces(self) -> Topology:
+        """Connected pieces of the food now."""
+        found: Topology = self._simulation._topology()
+        return found
+
+    def look(self) -> Snapshot:
+        """The particles now, in the scene's axes."""
+        k = self._k
+        x = self._simulation._turn(k.of_particles(k.x), -1.0)
+        stroke = self.scene.food.shape.height - self._z
+        return snapshot(self._steps * self._dt, stroke, self._s, k, x)
+
+    def surface(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The food's surface now: vertices [m] (m, 3) in the scene's axes, triangles (t, 3), and whether each vertex is flesh (m,):
+        of the face of the cut."""
+        if self._looks is None:
+            simulation = self._simulation
+            self._looks = Surface(self.scene.food.shape, simulation.seeds, self.scene.mirrors)
+        flesh = np.abs(self._looks.rest[:, 1]) < ON_FACE
+        return self._looks.points(self.look()), self._looks.triangles, flesh
+
+    def record(self) -> ForceRecord:
+        """The cut so far, a row for each move that was simulated.
+
+        Raises:
+            SimulationError: The edge has not come near the food yet.
+        """
+        if not self._rows:
+            raise SimulationError(
+                "the live cut has not begun: the edge never came down", reason="no_contact", fraction=0.0
+            )
+        speed = self.scene.motion.mach * self.scene.food.material.p_wave
+        fraction = min(max(row[0] for row in self._rows) / self.scene.food.shape.height, 1.0)
+        return self._simulation._record(
+            self._rows,
+            self.scene.food.material,
+            self.status,
+            max(fraction, 0.0),
+            self._dt,
+            self._steps,
+            speed,
+            self._wall,
+        )

@@ -1,0 +1,197 @@
+"""The food under a robot's knife: the edge's pose goes in at the rate of the robot's physics, the food's force comes back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib.materials import FoodSpec
+from mpm.errors import SceneError, SimulationError
+from mpm.live import LiveCut
+from mpm.record import ForceRecord
+from mpm.scene import Scene
+from robot.cuts import Item
+from robot.planner import SPEED
+from robot.severing import cut_place
+from robot.table import crossing
+
+ROOM = 2.0  # empty grid around the food, over half its size: a knife that comes back takes pieces along
+REST = 1e-4  # height at which the edge is on the board [m]
+NEAR = 0.01  # height of the edge above the food at which its cut is made ready [m]
+TOUCH = 1e-3  # force from which on the knife touches the food, over the weight of the food [-]
+DRAWN = 1.0  # way along the edge over the way down that a scene is made ready for [-]
+
+
+@dataclass(frozen=True, eq=False)
+class Done:
+    """A cut that has ended.
+
+    Attributes:
+        item: The food before it.
+        along: Where along its axis the edge came down [m].
+        severed: Whether it is in pieces; None where the simulation broke down.
+        uncut: Part of the section that still holds [-].
+        record: What the solver recorded; None where the edge did not reach it.
+        why: The finding, or why there is none, in words.
+    """
+
+    item: Item
+    along: float
+    severed: bool | None
+    uncut: float
+    record: ForceRecord | None
+    why: str
+
+
+class Coupling:
+    """Foods on a table and one knife; each cut in its turn is followed by the cutting solver.
+
+    The solver's blade stays in the plane in which it came down, across the food's axis: the way of the knife down, and along the edge
+    where it ``draws``, is passed on; its way across the blade and its tilt are not, and are recorded as ``aside`` and ``pitch``. The
+    force has no component across the blade either: of two even halves it has none. A second cut is one of the whole outline at its
+    place. A cut ends when nothing holds any more and the edge rests on the board or turns back: pieces that lie free are no longer
+    followed. It also ends when the knife is above the food again, or the simulation breaks down.
+
+    Args:
+        items: The foods.
+        foods: Their properties, by name.
+        knife: Name of the knife.
+        coarse: Cells of a screening run.
+        draws: Whether the knife is drawn along its edge; without it the food has a mirror plane more and costs half.
+        speed: Usual speed of the descent [m/s].
+
+    Attributes:
+        items: The foods as they are now.
+        live: The cut that goes on, or None.
+        done: Cuts that have ended.
+        force: Force of the food on the knife, world axes [N], shape (3,).
+        impulse: Impulse of the food on the knife so far [N s], shape (3,).
+        touching: Whether the food presses on the knife.
+        aside, pitch: Largest way across the blade [m] and tilt [rad] of the knife since a cut began.
+    """
+
+    def __init__(
+        self,
+        items: Sequence[Item],
+        foods: Mapping[str, FoodSpec],
+        *,
+        knife: str = "kitchen",
+        coarse: bool = True,
+        draws: bool = False,
+        speed: float = SPEED,
+    ) -> None:
+        self.items, self.foods = list(items), foods
+        self.knife, self.coarse, self.draws, self.speed = knife, coarse, draws, speed
+        self.live: LiveCut | None = None
+        self.done: list[Done] = []
+        self.force, self.impulse, self.touching = np.zeros(3), np.zeros(3), False
+        self.aside = self.pitch = 0.0
+        self._which, self._along, self._begin = 0, 0.0, np.zeros(5)
+        self._refused = False
+
+    @property
+    def severed(self) -> bool:
+        """Whether every cut so far has left pieces, and there was one."""
+        return bool(self.done) and all(d.severed for d in self.done)
+
+    def move(self, pose: np.ndarray, span: float) -> np.ndarray:
+        """The knife has moved to a pose in a span of time.
+
+        Args:
+            pose: Middle of the edge x, y, z [m], direction of the edge and its angle to the board [rad], shape (5,).
+            span: Time [s].
+
+        Returns:
+            Force of the food on the knife, world axes [N], shape (3,): the mean of the span.
+        """
+        self.force = np.zeros(3)
+        if self.live is None:
+            self._approach(pose)
+        if self.live is not None:
+            self._follow(pose, span)
+        self.impulse = self.impulse + span * self.force
+        return self.force
+
+    def point(self, pose: np.ndarray) -> np.ndarray:
+        """Where the food's force acts on the knife: on the edge, above the food's axis [m], shape (3,)."""
+        return np.array([*self.items[self._which].at(self._along), pose[2]])
+
+    def mesh(self) -> tuple[int, np.ndarray, np.ndarray, np.ndarray] | None:
+        """The food under the knife: its place in ``items``, vertices in the world [m] (m, 3), triangles (t, 3), and which vertices lie on
+        the face of the cut (m,); None while no cut goes on."""
+        if self.live is None or not self.live.begun:
+            return None
+        points, triangles, flesh = self.live.surface()
+        return self._which, self.items[self._which].placed(points, self._along), triangles, flesh
+
+    def uncut(self) -> float:
+        """Part of the section of the present cut that still holds [-], 1 where there is none."""
+        if self.live is None:
+            return self.done[-1].uncut if self.done else 1.0
+        return self.live.uncut
+
+    def end(self) -> None:
+        """End the present cut where it is."""
+        if self.live is None:
+            return
+        live, self.live = self.live, None
+        item = self.items[self._which]
+        if not live.begun:
+            return
+        record = live.record()
+        if live.status != "done" or record.pieces is None:
+            found = Done(item, self._along, None, 1.0, record, f"the simulation stopped: {live.status}")
+        else:
+            found = Done(item, self._along, record.pieces.complete, live.uncut, record, record.pieces.words())
+        self.done.append(found)
+        if found.severed:
+            self.items[self._which] = item.cut_at(self._along)
+        self.touching = False
+
+    def _approach(self, pose: np.ndarray) -> None:
+        """Make a cut ready where the edge is about to come down on a food."""
+        below = [k for k, item in enumerate(self.items) if pose[2] <= item.shape.height + NEAR]
+        met = [(k, along) for k in below if (along := crossing(self.items[k], pose)) is not None]
+        if not met:
+            self._refused = False
+        elif not self._refused:
+            self._which, self._along = met[0]
+            self._begin, self.aside, self.pitch = np.array(pose, float), 0.0, 0.0
+            item = self.items[self._which]
+            try:
+                self.live = LiveCut(self._scene(item, self._along))
+            except SceneError as e:
+                self._refused = True
+                self.done.append(Done(item, self._along, None, 1.0, None, str(e)))
+
+    def _scene(self, item: Item, along: float) -> Scene:
+        """The cut of a food there."""
+        scene = cut_place(item, along, self.foods[item.name], knife=self.knife, coarse=self.coarse)
+        motion = replace(scene.motion, speed=self.speed, slice_ratio=DRAWN if self.draws else 0.0)
+        return replace(scene, motion=motion, numerics=replace(scene.numerics, room=ROOM))
+
+    def _follow(self, pose: np.ndarray, span: float) -> None:
+        """Pass a pose on to the solver, and its force back."""
+        assert self.live is not None
+        item = self.items[self._which]
+        edge = np.array([np.cos(self._begin[3]), np.sin(self._begin[3])])
+        way = pose[:2] - self._begin[:2]
+        self.aside = max(self.aside, abs(float(way @ [-edge[1], edge[0]])))
+        self.pitch = max(self.pitch, abs(float(pose[4])))
+        before = self.live.height
+        try:
+            along, _, up = self.live.move(float(pose[2]), float(way @ edge) if self.draws else 0.0, span)
+        except SimulationError:
+            self._refused = True
+            self.end()
+            return
+        self.force = np.array([*(along * edge), up])
+        weight = self.live.weight
+        self.touching = bool(np.linalg.norm(self.force) > TOUCH * weight)
+        above = pose[2] > item.shape.height + NEAR and (self.live.begun or pose[2] > self._begin[2] + NEAR)
+        through = (pose[2] < REST or pose[2] > before) and self.live.begun and self.live.uncut == 0
+        if above or through:
+            self._refused = through
+            self.end()

@@ -1,0 +1,135 @@
+"""A cut whose blade is moved from outside: the same as one whose motion is prescribed, however the motion is chopped up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calib.knives import load_knife
+from calib.materials import load_food
+from calib.scenes import Sizing, cut_scene, specimen
+from mpm.errors import SceneError, SimulationError
+from mpm.live import LiveCut
+from mpm.runtime import Runtime
+from mpm.scene import Arm, Motion, Press, Scene
+from mpm.solver import Simulation
+
+SPEED = 0.04  # m/s
+STIFF, LAG = 500.0, 0.1  # of an arm [N/m, s]
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    """A strawberry under a kitchen knife, in screening cells."""
+    food = load_food("strawberry")
+    shape, _ = specimen(food, None, Sizing())
+    cut = cut_scene(food, shape, load_knife("kitchen"), coarse=True)
+    return replace(cut, motion=replace(cut.motion, speed=SPEED))
+
+
+def down(live: LiveCut, span: float, to: float = 0.0) -> None:
+    """Press evenly from above the food."""
+    z = live.scene.food.shape.height + 5e-3
+    while z > to:
+        z = max(z - SPEED * span, to)
+        live.move(z, 0.0, span)
+
+
+def test_it_is_the_cut_whose_motion_is_prescribed(scene):
+    """In steps of 2 and of 10 ms: peak and work to 1 %, the same new area, momentum balanced to rounding, and the impulse is that of the force
+    over real time.
+    """
+    whole = Simulation(scene, Runtime(threads=1)).run()
+    for span in (0.002, 0.01):
+        live = LiveCut(scene)
+        down(live, span)
+        record = live.record()
+        assert record.peak == pytest.approx(whole.peak, rel=0.01)
+        assert record.work == pytest.approx(whole.work, rel=0.01)
+        assert record.severed_area == whole.severed_area and record.pieces is not None and record.pieces.complete
+        assert live.uncut == 0
+        assert record.momentum_residual < 1e-9
+        assert record.status == "done" and record.fraction == pytest.approx(1.0)
+        mean = np.trapezoid(whole.knife[:, 2], whole.stroke) / SPEED
+        assert live.impulse[2] == pytest.approx(mean, rel=0.03)
+
+
+def test_a_faster_or_paused_motion_takes_the_same_force(scene):
+    """The laws do not know time: four times as fast takes as many steps, so that the Mach number stays; a pause takes nothing away."""
+    plain, fast, paused = LiveCut(scene), None, None
+    down(plain, 0.01)
+    steps, work = plain.record().steps, plain.record().work
+    fast = LiveCut(scene)
+    z = scene.food.shape.height + 5e-3
+    while z > 0:
+        z = max(z - 4 * SPEED * 0.01, 0.0)
+        fast.move(z, 0.0, 0.01)
+    assert fast.record().steps == pytest.approx(steps, rel=0.05)
+    assert fast.record().work == pytest.approx(work, rel=0.03)
+    paused = LiveCut(scene)
+    half = scene.food.shape.height / 2
+    down(paused, 0.01, half)
+    held = [float(paused.move(half, 0.0, 0.01)[2]) for _ in range(20)]
+    assert held[-1] == pytest.approx(held[4], rel=0.1) and held[-1] > 0
+
+
+def test_behind_an_arm_that_yields_it_ends_where_the_solvers_own_arm_does(scene):
+    """An arm outside that gives way by force over stiffness, with a lag, leaves the edge as high above the board as the solver's own."""
+    own = replace(scene, arm=Arm(STIFF), motion=replace(scene.motion, dwell=1.0))
+    whole = Simulation(own, Runtime(threads=1)).run()
+    short = scene.food.shape.height - float(whole.stroke[-1])
+    live = LiveCut(scene)
+    z = command = scene.food.shape.height + 5e-3
+    force = 0.0
+    for _ in range(300):
+        command = max(command - SPEED * 0.01, 0.0)
+        z += (command + force / STIFF - z) * (1 - np.exp(-0.01 / LAG))
+        force = float(live.move(z, 0.0, 0.01)[2])
+    assert short > 2e-3 and not live.pieces().complete
+    assert live.height == pytest.approx(short, abs=0.3e-3)
+    assert live.height == pytest.approx(force / STIFF, abs=0.1e-3)  # balance of the arm
+
+
+def test_nothing_is_simulated_before_the_edge_is_near_and_once_it_is_clear(scene):
+    """Above the food no step is taken and there is no force; it can come back for a second stroke."""
+    live = LiveCut(scene)
+    assert not live.begun and (live.move(0.2, 0.0, 0.01) == 0).all()
+    with pytest.raises(SimulationError, match="never came down"):
+        live.record()
+    down(live, 0.01, scene.food.shape.height / 2)
+    live.move(scene.food.shape.height + 0.02, 0.0, 0.5)
+    steps = live.record().steps
+    assert (live.move(0.2, 0.0, 0.01) == 0).all() and live.record().steps == steps
+    before = live.uncut
+    down(live, 0.01, scene.food.shape.height / 4)
+    assert live.uncut < before
+
+
+def test_its_surface_opens_with_the_cut(scene):
+    """Vertices of the face are known, and the two faces have come apart by the blade."""
+    live = LiveCut(scene)
+    down(live, 0.01)
+    points, triangles, flesh = live.surface()
+    assert triangles.max() < len(points) == len(flesh) and 0 < flesh.sum() < len(points) / 2
+    assert np.abs(points[flesh, 1]).max() > 0.3e-3
+    assert live.look().x.shape[1] == 3 and live.weight == pytest.approx(0.15, rel=0.8)
+
+
+def test_what_it_cannot_do_is_an_error(scene):
+    """A press, no real speed, an arm of its own, a draw without one in the scene, numbers that are none."""
+    press = Scene(scene.food, Press(), Motion(1e-3, speed=SPEED))
+    for wrong, says in (
+        (press, "press"),
+        (replace(scene, motion=replace(scene.motion, speed=None)), "real speed"),
+        (replace(scene, arm=Arm(100.0)), "rigid"),
+    ):
+        with pytest.raises(SceneError, match=says):
+            LiveCut(wrong)
+    live = LiveCut(scene)
+    with pytest.raises(SceneError, match="finite"):
+        live.move(float("nan"), 0.0, 0.01)
+    down(live, 0.01, scene.food.shape.height / 2)
+    with pytest.raises(SceneError, match="slice_ratio"):
+        live.move(0.01, 1e-3, 0.01)

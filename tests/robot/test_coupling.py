@@ -1,0 +1,115 @@
+"""Foods under a knife on an arm that yields: what is cut, what it costs, and what is passed on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calib.materials import load_food
+from mpm.live import LiveCut
+from mpm.shapes import Shape
+from robot.coupling import NEAR, Coupling
+from robot.cuts import Item
+from robot.planner import plan
+
+FOODS = {"strawberry": load_food("strawberry")}
+BERRY = Item("strawberry", Shape("ellipsoid", 0.04, 0.032, 0.032), x=0.03, y=-0.02, yaw=1.2)
+STIFF, LAG, SPAN = 1754.0, 0.1, 0.01
+
+
+def follow(coupling: Coupling, poses: np.ndarray) -> tuple[float, float]:
+    """Move along commanded poses behind an arm that yields downwards; the largest force and the lowest place of the edge."""
+    pose, force, most, low = poses[0].copy(), np.zeros(3), 0.0, np.inf
+    before = poses[0]
+    for command in poses:
+        for part in np.arange(1, 6) / 5:
+            wanted = before + part * (command - before)
+            wanted[2] += force[2] / STIFF
+            pose = pose + (wanted - pose) * (1 - np.exp(-SPAN / LAG))
+            pose[2] = max(pose[2], 0.0)
+            force = coupling.move(pose, SPAN)
+            most, low = max(most, float(force[2])), min(low, float(pose[2]))
+        before = command
+    return most, low
+
+
+def test_a_plan_to_the_board_stops_short_and_a_deeper_one_cuts_through():
+    """Behind the arm of ManiSkill's Panda; the cut ends with the food in two and its pieces apart, and the impulse is upwards."""
+    short = Coupling([BERRY], FOODS)
+    most, low = follow(short, plan(BERRY, 0.004).pose)
+    assert low > 1e-3 and len(short.done) == 1
+    through = Coupling([BERRY], FOODS)
+    peak, bottom = follow(through, plan(BERRY, 0.004, depth=-0.03, hold=0.5).pose)
+    assert bottom < 1e-3 and through.severed and through.uncut() == 0
+    assert peak == pytest.approx(most, rel=0.1)
+    (done,) = through.done
+    assert done.along == pytest.approx(0.004, abs=5e-4) and done.record is not None
+    assert done.record.momentum_residual < 1e-9
+    assert through.impulse[2] > 0 and abs(through.impulse[0]) < 0.05 * through.impulse[2]
+    assert len(through.items[0].pieces) == 2 and through.live is None
+
+
+def test_a_knife_that_misses_feels_nothing():
+    """Beside the food there is no cut, and above it nothing is simulated."""
+    coupling = Coupling([BERRY], FOODS)
+    most, _ = follow(coupling, plan(BERRY, 0.1).pose)
+    assert most == 0 and not coupling.done and coupling.live is None
+    coupling.move(np.array([BERRY.x, BERRY.y, BERRY.shape.height + 2 * NEAR, BERRY.yaw - np.pi / 2, 0.0]), SPAN)
+    assert coupling.live is None
+
+
+def test_a_slice_too_thin_is_said_once():
+    """Where the solver would need cells that take too long, the cut is not simulated, and nothing else is tried until the knife is up."""
+    coupling = Coupling([BERRY], FOODS)
+    most, _ = follow(coupling, plan(BERRY, -0.0198).pose)
+    assert most == 0
+    (done,) = coupling.done
+    assert done.severed is None and "take too long" in done.why and not coupling.severed
+
+
+def test_a_cut_that_breaks_down_is_said_and_not_begun_again(monkeypatch):
+    """The force ends, the reason is kept, and the food stays in one piece."""
+    move, calls = LiveCut.move, [0]
+
+    def broken(self, height, slide, span):
+        calls[0] += 1
+        if calls[0] == 40:
+            self._k.x.fill(1.0)
+        return move(self, height, slide, span)
+
+    monkeypatch.setattr(LiveCut, "move", broken)
+    coupling = Coupling([BERRY], FOODS)
+    follow(coupling, plan(BERRY, 0.0).pose)
+    (done,) = coupling.done
+    assert done.severed is None and "stopped" in done.why
+    assert len(coupling.items[0].pieces) == 1
+
+
+def test_the_draw_along_the_edge_is_passed_on_only_where_it_is_asked_for():
+    """A slice needs less force than a press where the solver sees the draw; the way across the blade is noted, not simulated."""
+    path = plan(BERRY, 0.0, style="slice", depth=-0.03).pose
+    pressed, drawn = Coupling([BERRY], FOODS), Coupling([BERRY], FOODS, draws=True)
+    hard, _ = follow(pressed, path)
+    easy, _ = follow(drawn, path)
+    assert 0 < easy < 0.9 * hard
+    aside = Coupling([replace(BERRY, yaw=np.pi / 2)], FOODS)
+    poses = plan(aside.items[0], 0.0, depth=-0.03).pose
+    poses[:, 1] += np.where(poses[:, 2] < 0.02, 2e-3, 0.0)
+    follow(aside, poses)
+    assert aside.aside == pytest.approx(2e-3, rel=0.2)
+
+
+def test_its_mesh_lies_on_the_table():
+    """Vertices in the world, around the food's place."""
+    coupling = Coupling([BERRY], FOODS)
+    poses = plan(BERRY, 0.0).pose
+    assert coupling.mesh() is None
+    for pose in poses[: int(np.argmax(poses[:, 2] < 0.01))]:
+        coupling.move(pose, 0.05)
+    found = coupling.mesh()
+    assert found is not None
+    _, points, _, _ = found
+    assert np.allclose(points[:, :2].mean(axis=0), [BERRY.x, BERRY.y], atol=3e-3)
+    assert points[:, 2].min() > -1e-3 and points[:, 2].max() < 0.04

@@ -1,0 +1,119 @@
+"""The robot simulator with the food in it, without a renderer; only where the extra ``[robot]`` is installed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mani_skill", reason="the extra [robot] is not installed")
+
+import gymnasium as gym
+
+from calib.materials import load_food
+from mpm.errors import CutcalError
+from robot import intsim
+from robot.cuts import target
+from robot.planner import plan
+from robot.suites import draw
+
+FOODS = {name: load_food(name) for name in ("strawberry", "banana")}
+QUIET = {"sim_backend": "physx_cpu", "render_backend": "none", "obs_mode": "state", "foods": FOODS}
+SEED = 2  # a banana
+
+
+def made(**how):
+    """An environment."""
+    return gym.make("CutFood-v1", **{"control_mode": "pd_joint_pos", **QUIET, **how}).unwrapped
+
+
+def cut(env, seed: int, depth: float = 0.0, hold: float = 0.0) -> dict[str, float]:
+    """One planned cut by joint targets: what came of it."""
+    env.reset(seed=seed)
+    episode = env.episode
+    path = plan(episode.item, target(episode.spec, episode.item), start=env.pose, depth=depth, hold=hold)
+    joints, worst, peak, low = env.agent.robot.get_qpos()[0].numpy().astype(float), 0.0, 0.0, np.inf
+    info = {}
+    for pose in path.pose:
+        joints, off = env.kinematics.joints(pose, joints)
+        _, _, _, _, info = env.step(np.array([*joints[:7], -1.0], np.float32))
+        worst, peak = max(worst, off), max(peak, float(env.forces[:, 2].max()))
+        low = min(low, float(env.pose[2]))
+    flags = {name: float(info[name].item()) for name in ("success", "severed", "uncut")}
+    return {"off": worst, "peak": peak, "low": low, **flags}
+
+
+def test_it_resets_to_the_same_episode_and_to_a_given_one():
+    """A seed is an episode of the suite; the edge begins at home, level."""
+    env = made()
+    env.reset(seed=SEED)
+    assert env.episode == draw("seeds", SEED, FOODS) and env.instruction == env.episode.instruction
+    assert env.pose == pytest.approx([-0.25, 0.0, 0.25, 0.0, 0.0], abs=1e-3)
+    other = draw("flips", 5, FOODS)
+    env.reset(seed=1, options={"episode": other})
+    assert env.episode is other
+    env.close()
+
+
+def test_the_food_stops_the_arm_and_geometry_does_not_see_it():
+    """A plan to the board: without the food's force the knife gets there; with it the criteria are met and the food holds. Commanded
+    deeper the food parts. Inverse kinematics to a tenth of a millimetre.
+    """
+    env = made()
+    short = cut(env, SEED)
+    deep = cut(env, SEED, depth=-0.05, hold=1.0)
+    env.close()
+    free = made(coupled=False)
+    alone = cut(free, SEED)
+    free.close()
+    assert max(short["off"], alone["off"]) < 1e-4
+    assert alone["peak"] == 0 and alone["low"] < short["low"] - 1e-3
+    assert short["success"] and alone["success"]
+    assert not short["severed"] and short["uncut"] > 0
+    assert deep["severed"] and deep["uncut"] < 0.02 < short["uncut"]
+    assert deep["peak"] == pytest.approx(short["peak"], rel=0.1)
+
+
+def test_a_stiffer_arm_comes_nearer_to_the_board():
+    """Ten times the stiffness of the joints, a tenth of what is missing, within a millimetre of the lag; the agent's class is left alone."""
+    weak, stiff = made(), made(stiffness=1e4, damping=1e3)
+    a, b = cut(weak, SEED), cut(stiff, SEED)
+    weak.close()
+    stiff.close()
+    assert b["low"] < a["low"] / 2
+    assert intsim.PandaKnife.arm_stiffness == 1e3
+
+
+@pytest.mark.parametrize("mode", ["pd_joint_pos", "pd_ee_delta_pose", "pd_ee_target_delta_pose", "pd_ee_pose"])
+def test_every_control_mode_takes_a_step(mode):
+    """The shapes of actions and states that the published harnesses assume: 8 or 7 numbers, 9 joints."""
+    env = made(control_mode=mode)
+    obs, _ = env.reset(seed=0)
+    size = 8 if mode == "pd_joint_pos" else 7
+    assert env.single_action_space.shape == (size,)
+    action = (
+        np.array([*env.agent.robot.get_qpos()[0, :7].numpy(), -1.0], np.float32)
+        if size == 8
+        else np.zeros(7, np.float32)
+    )
+    obs, reward, _, _, info = env.step(action)
+    assert obs.shape[1] >= 9 + 9 + 5 and info["success"].shape == (1,) and float(reward) == 0
+    assert info["force"].abs().sum() == 0
+    env.close()
+
+
+def test_the_force_is_no_observation():
+    """What a policy is given does not change with the force."""
+    env = made()
+    env.reset(seed=SEED)
+    before = env.get_obs()
+    env._force = np.array([0.0, 0.0, 50.0])
+    assert np.array_equal(before, env.get_obs())
+    env.close()
+
+
+def test_a_criterion_that_is_none_is_an_error():
+    """And a background that does not exist."""
+    with pytest.raises(CutcalError, match="criterion"):
+        made(criterion="perfect")
+    with pytest.raises(CutcalError, match="scenery"):
+        made(scenery=99)
