@@ -6,6 +6,7 @@ interval acts on the knife in the next. Without a renderer it runs all the same,
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from typing import Any
 
@@ -53,6 +54,9 @@ class CutFoodEnv(BaseEnv):
         criterion: What ``info["success"]`` is: ``published`` for the four published criteria, ``severed`` for pieces in the solver too.
         pixels: Width and height of the cameras' pictures.
         scenery: Which background, see :mod:`robot.scenery`.
+
+    Attributes:
+        solver_s: Time that the solver has taken so far [s].
     """
 
     SUPPORTED_ROBOTS = [PandaKnife.uid]
@@ -81,6 +85,7 @@ class CutFoodEnv(BaseEnv):
         self.foods = dict(foods) if foods is not None else {name: load_food(name) for name in FOODS}
         self.criterion, self.pixels = criterion, pixels
         self.scenery = Scenery(scenery)
+        self.solver_s = 0.0
         self._gains = {k: v for k, v in (("arm_stiffness", stiffness), ("arm_damping", damping)) if v is not None}
         self.episode: Episode | None = None
         kwargs.setdefault("robot_uids", PandaKnife.uid)
@@ -173,7 +178,9 @@ class CutFoodEnv(BaseEnv):
     def _after_simulation_step(self) -> None:
         pose = self.pose
         if self.coupled:
+            began = time.perf_counter()
             self._force = self.coupling.move(pose, 1 / PHYSICS)
+            self.solver_s += time.perf_counter() - began
             self._point = self.coupling.point(pose)
         self._forces.append(self._force)
 
@@ -186,10 +193,8 @@ class CutFoodEnv(BaseEnv):
     def evaluate(self) -> dict[str, Any]:
         """Success, the criteria, what the solver has found, and the force of the control step [N]."""
         assert self.episode is not None
-        info: dict[str, Any] = {
-            "success": torch.zeros(1, dtype=torch.bool),
-            "severed": torch.zeros(1, dtype=torch.bool),
-        }
+        no = torch.zeros(1, dtype=torch.bool)
+        info: dict[str, Any] = {"success": no, "published": no, "severed": no}
         if self.table.rollout.pose:
             judged = judge(self.episode.spec, self.episode.item, self.table.rollout, self.table.items[0])
             severed = len(self.coupling.items[0].pieces) > max(self.episode.spec.cuts, 1)
@@ -197,6 +202,7 @@ class CutFoodEnv(BaseEnv):
             published = (
                 judged.published if not self.episode.spec.pieces else judged.published and judged.criteria["count"]
             )
+            info["published"] = torch.tensor([published])
             info["success"] = torch.tensor([published and (severed or self.criterion == "published")])
         mean = np.mean(self._forces, axis=0) if self._forces else np.zeros(3)
         info["force"] = torch.tensor(mean[None], dtype=torch.float32)

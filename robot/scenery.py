@@ -13,9 +13,8 @@ import sapien
 from mpm.surface import half_of
 from robot.coupling import Coupling
 from robot.cuts import Item, TaskError
+from robot.data.manifest import BACKGROUNDS
 
-BACKGROUNDS = 15
-"""Procedural backgrounds: colours of table, board and walls, light and its direction; 0 is plain."""
 TABLE, BOARD, THICK = (0.8, 1.2), (0.4, 0.5), 0.02  # sizes along x, y and the board's thickness [m]
 AWAY = 3.0  # of the walls from the board [m]
 RING = 3e-3  # distance of the rings of a food's outline beside the cut [m]
@@ -125,9 +124,13 @@ class Scenery:
         if mesh is None:
             return
         which, points, triangles, flesh = mesh
+        self.show(which, points, triangles, flesh, coupling.items[which].name)
+
+    def show(self, which: int, points: np.ndarray, triangles: np.ndarray, flesh: np.ndarray, name: str) -> None:
+        """Show a food as this mesh: vertices in the world [m] (m, 3), triangles (t, 3), which vertices are flesh (m,)."""
         entity = self._foods[which]
         entity.remove_component(self._shown[which])
-        self._shown[which] = _body(points, triangles, flesh, coupling.items[which].name)
+        self._shown[which] = _body(points, triangles, flesh, name)
         entity.add_component(self._shown[which])
 
 

@@ -1,0 +1,126 @@
+"""``cutcal dataset``: demonstrations of cuts by a simulated robot, and their export."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from calib.cli.options import KNIFE_HELP, RESUME_HELP, Group, add_workers, number, print_json, say, whole, workers_of
+from mpm.errors import CutcalError
+
+HELP = "a robot's cuts with force, in shards that learning code loads"
+DESCRIPTION = """generate: a Panda in ManiSkill cuts what it is told, in words; the food is in
+the cutting solver and pushes back. Writes shards of HDF5 and JSON in ManiSkill's
+layout, with force, pieces and surface in a group mpm/, and dataset.json.
+export: writes them as a LeRobotDataset v3.0, with pictures where it can render."""
+EPILOG = """examples:
+  cutcal dataset generate --episodes 60 --out runs/cuts
+  cutcal dataset export runs/cuts --scenes 0,1,2 --out runs/lerobot
+
+generate needs pip install 'cutcal[robot]', export 'cutcal[data]', its pictures
+both and Vulkan (cutcal doctor). Exit codes: 0 done, 1 error."""
+WHAT = ("generate", "export")
+
+
+def add_args(p: Group) -> None:
+    """Options of the command."""
+    p.add_argument("what", choices=WHAT, metavar="WHAT", help="generate or export")
+    p.add_argument("folder", nargs="?", metavar="DIR", help="dataset that is exported")
+    p.add_argument("--episodes", type=whole(1), default=60, metavar="N", help="trajectories (default 60)")
+    p.add_argument(
+        "--food", action="append", metavar="NAME", help="this food alone, or several (default: the 15, in turn)"
+    )
+    p.add_argument(
+        "--task", action="append", metavar="SUITE", help="this kind of task, or several (default: all, in turn)"
+    )
+    p.add_argument(
+        "--demos",
+        choices=("sustained", "planned"),
+        default="sustained",
+        help="until the food parts (default), or as planned",
+    )
+    p.add_argument(
+        "--stiffness", type=number(1, 1e6, "N m/rad"), metavar="K", help="of the arm's joints [N m/rad] (default 1000)"
+    )
+    p.add_argument("--knife", default="kitchen", metavar="NAME", help=KNIFE_HELP)
+    p.add_argument("--seed", type=whole(0), default=0, metavar="N", help="of the first trajectory (default 0)")
+    p.add_argument("--shard", type=whole(1), default=20, metavar="N", help="trajectories of a file (default 20)")
+    p.add_argument(
+        "--scenes", metavar="LIST", help="backgrounds that are rendered, such as 0,1,2 (default: no pictures)"
+    )
+    p.add_argument("--pixels", type=whole(16), default=128, metavar="N", help="of the pictures (default 128)")
+    add_workers(p, "trajectories")
+    p.add_argument("--out", metavar="DIR", help="folder of the results; never overwritten")
+    p.add_argument("--resume", action="store_true", help=RESUME_HELP)
+    p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Generate or export."""
+    if args.out is None:
+        raise CutcalError("dataset: give --out, the folder of the results")
+    document = _generate(args) if args.what == "generate" else _export(args)
+    if args.json:
+        print_json(document)
+    else:
+        print(f"  wrote {args.out}")
+    return 0
+
+
+def _generate(args: argparse.Namespace) -> dict[str, Any]:
+    from robot.data.generate import available, generate
+    from robot.data.manifest import TASKS, Manifest
+    from robot.suites import FOODS
+
+    if args.folder is not None:
+        raise CutcalError(f"dataset generate: {args.folder!r} is too much; the folder of the results is --out")
+    unknown = [name for name in args.food or () if name not in FOODS]
+    if unknown:
+        raise CutcalError(f"--food {unknown[0]}: not one of {', '.join(FOODS)}")
+    manifest = Manifest(args.episodes, foods=args.food or FOODS, suites=args.task or TASKS, seed=args.seed)
+    available()
+    args.arch = "cpu"
+    with workers_of(args, say) as pool:
+        found = generate(
+            manifest,
+            Path(args.out),
+            pool,
+            demos=args.demos,
+            knife=args.knife,
+            stiffness=args.stiffness,
+            shard=args.shard,
+            resume=args.resume,
+            say=say,
+            command=("dataset", *(a for a in sys.argv[1:] if a != "dataset")),
+        )
+    if not args.json:
+        s = found["seconds_per_episode"]
+        print(
+            f"{found['trajectories']} trajectories of {found['steps']} steps: {found['published']} meet the published criteria, "
+            f"{found['severed']} are in pieces\n"
+            f"  {s['solver']:.1f} s of one core in the solver and {s['robot']:.1f} s in the robot simulator each; the longest "
+            f"{found['most_solver_s']:.0f} s\n"
+            f"  21,000 of them: {found['core_hours_of_21000']:.0f} core hours; {found['bytes'] / 1e6:.1f} MB now"
+        )
+        for broken in found["broken"]:
+            print(f"  trajectory {broken['index']}: {broken['status']}")
+    return found
+
+
+def _export(args: argparse.Namespace) -> dict[str, Any]:
+    from robot.data.lerobot import export
+
+    if args.folder is None:
+        raise CutcalError(
+            "dataset export: name the folder of a dataset, such as cutcal dataset export runs/cuts --out runs/lerobot"
+        )
+    try:
+        scenes = [int(k) for k in args.scenes.split(",")] if args.scenes else []
+    except ValueError:
+        raise CutcalError(f"--scenes {args.scenes}: give numbers of backgrounds, such as 0,1,2") from None
+    found = export(Path(args.folder), Path(args.out), scenes=scenes, pixels=args.pixels, say=say)
+    if not args.json:
+        print(f"{found['total_episodes']} episodes of {found['total_frames']} frames, {found['total_tasks']} sentences")
+    return found

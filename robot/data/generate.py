@@ -1,0 +1,237 @@
+"""Making a dataset: episodes in worker processes, shards on disk, going on after a stop."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from calib.documents import tag
+from calib.errors import CurveError, OutputError
+from calib.outputs import write_json
+from calib.progress import Countdown
+from calib.provenance import code_key, git_commit, key_of, versions
+from calib.workers import Workers
+from robot.data.manifest import Draw, Manifest
+from robot.data.shards import META, PART, SHARD, pack, write_part, write_shard
+from robot.language import instructions
+from robot.planner import RATE
+
+ENV = "CutFood-v1"
+DEMOS = ("sustained", "planned")
+"""Demonstrations: ``sustained`` goes on until the food is in pieces, ``planned`` is the motion of a plan without food."""
+WHOLE_SET = 21_000  # trajectories of the published data set
+_made: dict[str, Any] = {}
+
+
+def available() -> None:
+    """Whether the robot simulator is here.
+
+    Raises:
+        CurveError: It is not installed.
+    """
+    try:
+        import mani_skill  # noqa: F401
+    except ImportError:
+        raise CurveError(
+            "dataset: ManiSkill is not installed; pip install 'cutcal[robot]' (Python 3.10 to 3.12)"
+        ) from None
+
+
+def make(draw: Draw, demos: str, knife: str, stiffness: float | None, arch: str, threads: int) -> dict[str, Any]:
+    """One episode in a worker: its bytes, and what it took.
+
+    Args:
+        draw: What is done.
+        demos: Kind of demonstration.
+        knife: Name of the knife.
+        stiffness: Of the arm's joints [N m/rad]; ManiSkill's own without it.
+        arch, threads: Device of the solver; only CPUs are used.
+    """
+    del arch, threads
+    import gymnasium
+
+    import robot.intsim  # noqa: F401
+    from robot.data.demonstrate import demonstrate
+
+    began = time.perf_counter()
+    key = f"{knife} {stiffness}"
+    if key not in _made:
+        _made.clear()
+        _made[key] = gymnasium.make(
+            ENV,
+            sim_backend="physx_cpu",
+            render_backend="none",
+            obs_mode="state",
+            control_mode="pd_joint_pos",
+            knife=knife,
+            stiffness=stiffness,
+        ).unwrapped
+    env = _made[key]
+    start = time.perf_counter() - began
+    episode, before = draw.episode, env.solver_s
+    env.foods = {**env.foods, draw.food.name: draw.food}
+    env.reset(seed=draw.seed, options={"episode": episode, "draws": draw.style != "press"})
+    track = demonstrate(env, style=draw.style, sustained=demos == "sustained")
+    solver = env.solver_s - before
+    material = vars(draw.food.to_scene_food().material)
+    about = {
+        "episode_seed": draw.seed,
+        "reset_kwargs": {"seed": draw.seed},
+        "control_mode": "pd_joint_pos",
+        "elapsed_steps": len(track.action),
+        "success": track.published[-1] and track.severed[-1],
+        "published": track.published[-1],
+        "severed": track.severed[-1],
+        "status": track.status,
+        "index": draw.index,
+        "suite": draw.suite,
+        "style": draw.style,
+        "demos": demos,
+        "food": draw.food.name,
+        "instruction": episode.instruction,
+        "instructions": instructions(episode.spec, draw.seed),
+        "task": {**asdict(episode.spec), "ratio": float(episode.spec.ratio)},
+        "items": [
+            {"name": i.name, "x": i.x, "y": i.y, "yaw": i.yaw, **vars(i.shape)} for i in (episode.item, *episode.others)
+        ],
+        "values": draw.values,
+        "peak_N": max((float(f[:, 2].max()) for f in track.force), default=0.0),
+        "seconds": {"solver": solver, "robot": time.perf_counter() - began - start - solver, "start": start},
+    }
+    mpm = {
+        "food": draw.food.name,
+        "material": json.dumps(material),
+        "material_sha256": key_of(material),
+        "solver_sha256": code_key(),
+        "knife": knife,
+        "arm": json.dumps({"stiffness": stiffness}),
+    }
+    return {"about": about, "content": pack(track, about, mpm)}
+
+
+def generate(
+    manifest: Manifest,
+    out: Path,
+    pool: Workers,
+    *,
+    demos: str = "sustained",
+    knife: str = "kitchen",
+    stiffness: float | None = None,
+    shard: int = 20,
+    resume: bool = False,
+    say: Callable[[str], None] = lambda text: None,
+    command: tuple[str, ...] = (),
+) -> dict[str, Any]:
+    """Make the trajectories of a manifest, and write shards and dataset.json.
+
+    Args:
+        manifest: Which.
+        out: Folder.
+        pool: Where they are made.
+        demos: Kind of demonstration, in :data:`DEMOS`.
+        knife: Name of the knife.
+        stiffness: Of the arm's joints [N m/rad]; ManiSkill's own without it.
+        shard: Trajectories of a file.
+        resume: Go on with what is in ``out``.
+        say: Called with a line after each.
+        command: Command line, for provenance.
+
+    Returns:
+        The content of dataset.json.
+
+    Raises:
+        CutcalError: The folder is taken or holds another dataset, or ManiSkill is not installed.
+    """
+    available()
+    about = {"manifest": manifest.as_dict(), "demos": demos, "knife": knife, "stiffness": stiffness, "shard": shard}
+    _claim(out, about, resume)
+    groups = [range(k, min(k + shard, manifest.trajectories)) for k in range(0, manifest.trajectories, shard)]
+    todo = [
+        k
+        for n, group in enumerate(groups)
+        if not (out / f"{SHARD.format(n)}.h5").exists()
+        for k in group
+        if not (out / PART.format(k)).exists()
+    ]
+    if len(todo) < manifest.trajectories:
+        say(f"{manifest.trajectories - len(todo)} of {manifest.trajectories} trajectories are there already")
+    rest, done = Countdown(max(len(todo), 1)), 0
+    info = {"env_id": ENV, "env_kwargs": {"knife": knife, "stiffness": stiffness}, "control_freq": RATE}
+    _close(out, groups, info)
+    jobs = [(manifest.draw(k), demos, knife, stiffness) for k in todo]
+    for place, made in pool.each(make, jobs):
+        if made is None:
+            raise OutputError(
+                f"trajectory {todo[place]}: its process was killed twice, perhaps for lack of memory; add --resume"
+            )
+        write_part(out, todo[place], made["content"])
+        done += 1
+        a = made["about"]
+        outcome = "severed" if a["severed"] else "not severed"
+        say(
+            f"trajectory {a['index']}: {a['instruction']!r}, {a['style']}, peak {a['peak_N']:.1f} N, {outcome}"
+            f"{'' if a['status'] == 'done' else ' (' + a['status'] + ')'}; {done} of {len(todo)}, {rest.left(1)}"
+        )
+        _close(out, groups, info)
+    return _conclude(out, about, command)
+
+
+def _claim(out: Path, about: dict[str, Any], resume: bool) -> None:
+    """Make the folder, or see that it holds the same dataset."""
+    path = out / META
+    if path.exists() or any(out.glob("shard-*")):
+        if not resume:
+            raise OutputError(
+                f"--out {out}: holds a dataset and is never overwritten; choose another folder, or add --resume"
+            )
+        try:
+            found = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            raise OutputError(f"{path}: damaged; choose another folder") from None
+        if {name: found.get(name) for name in about} != json.loads(json.dumps(about)):
+            raise OutputError(f"--out {out}: holds another dataset; choose another folder")
+        return
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as e:
+        raise OutputError(f"--out {out}: cannot be written ({e.strerror}); choose another folder") from None
+    write_json(path, {"schema": tag("dataset"), **about})
+
+
+def _close(out: Path, groups: list[range], info: dict[str, Any]) -> None:
+    """Write the shards whose episodes are all there."""
+    for n, group in enumerate(groups):
+        if not (out / f"{SHARD.format(n)}.h5").exists() and all((out / PART.format(k)).exists() for k in group):
+            write_shard(out, n, group, info)
+
+
+def _conclude(out: Path, about: dict[str, Any], command: tuple[str, ...]) -> dict[str, Any]:
+    """The document, with what an episode takes and what the whole published set would."""
+    episodes = [
+        e for p in sorted(out.glob("shard-*.json")) for e in json.loads(p.read_text(encoding="utf-8"))["episodes"]
+    ]
+    n = max(len(episodes), 1)
+    mean = {part: sum(e["seconds"][part] for e in episodes) / n for part in ("solver", "robot")}
+    document = {
+        "schema": tag("dataset"),
+        **about,
+        "trajectories": len(episodes),
+        "steps": sum(e["elapsed_steps"] for e in episodes),
+        "published": sum(e["published"] for e in episodes),
+        "severed": sum(e["severed"] for e in episodes),
+        "broken": [{"index": e["index"], "status": e["status"]} for e in episodes if e["status"] != "done"],
+        "foods": {f: sum(e["food"] == f for e in episodes) for f in sorted({e["food"] for e in episodes})},
+        "seconds_per_episode": mean,
+        "most_solver_s": max((e["seconds"]["solver"] for e in episodes), default=0.0),
+        "core_hours_of_21000": WHOLE_SET * sum(mean.values()) / 3600,
+        "bytes": sum(p.stat().st_size for p in out.glob("shard-*")),
+        "command": list(command),
+        "versions": versions(),
+        "git": git_commit(),
+    }
+    write_json(out / META, document)
+    return document

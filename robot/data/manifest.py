@@ -1,0 +1,114 @@
+"""Which episodes a dataset has: each is drawn from its number alone, and nothing is made until it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from calib.materials import FoodSpec, load_food
+from robot.cuts import TaskError
+from robot.language import VARIANTS
+from robot.planner import STYLES
+from robot.suites import FOODS, SUITES, TEST, Episode, draw
+
+JITTER = {"E": 0.2, "R": 0.1, "yield_stress": 0.1, "mu": 0.2}
+"""Standard deviation of the logarithm of properties that differ from item to item [-]: assumed, a third of what gripped fruit scatters in
+stiffness and less for strength."""
+TASKS = ("seeds", "continuous", "split", "flips", "objects")
+"""Suites that training may see, in turn; the sentences of ``language`` and every seed from a million on are for tests."""
+BACKGROUNDS = 15
+"""Procedural backgrounds: colours of table, board and walls, light and its direction; 0 is plain."""
+PRESSED = 0.5  # part of the episodes that press; the other styles share the rest
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One trajectory. Attributes: index; suite; seed; style of the motion; episode; food, with its own values."""
+
+    index: int
+    suite: str
+    seed: int
+    style: str
+    episode: Episode
+    food: FoodSpec
+    values: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One element of the whole product. Attributes: trajectory, background, instruction, each a number."""
+
+    trajectory: int
+    background: int
+    instruction: int
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """The product of trajectories, backgrounds and sentences, counted and never stored: 21,000 x 15 x 5 are 1,575,000 samples.
+
+    Attributes:
+        trajectories, backgrounds, instructions: How many of each.
+        foods: Foods by name, asked for in turn.
+        suites: Kinds of task, in turn.
+        seed: First seed; those of a dataset are ``seed`` to ``seed + trajectories``.
+
+    Raises:
+        TaskError: Nothing to draw from, or seeds that belong to the tests.
+    """
+
+    trajectories: int = 21_000
+    backgrounds: int = BACKGROUNDS
+    instructions: int = VARIANTS
+    foods: Sequence[str] = FOODS
+    suites: Sequence[str] = TASKS
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if min(self.trajectories, self.backgrounds, self.instructions, len(self.foods), len(self.suites)) < 1:
+            raise TaskError(
+                "dataset: no trajectories, backgrounds, sentences, foods or tasks; give one of each at least"
+            )
+        unknown = [s for s in self.suites if s not in SUITES]
+        if unknown:
+            raise TaskError(f"dataset: suite {unknown[0]!r} is none of {', '.join(SUITES)}")
+        if self.seed < 0 or self.seed + self.trajectories > TEST:
+            raise TaskError(
+                f"dataset: seeds {self.seed} to {self.seed + self.trajectories}; those from {TEST} on are for tests"
+            )
+
+    def __len__(self) -> int:
+        return self.trajectories * self.backgrounds * self.instructions
+
+    def __getitem__(self, k: int) -> Sample:
+        if not 0 <= k < len(self):
+            raise IndexError(k)
+        rest, sentence = divmod(k, self.instructions)
+        return Sample(*divmod(rest, self.backgrounds), sentence)
+
+    def __iter__(self) -> Iterator[Sample]:
+        return (self[k] for k in range(len(self)))
+
+    def draw(self, index: int) -> Draw:
+        """A trajectory: food and task in turn, all else from its seed."""
+        seed = self.seed + index
+        name = self.foods[index % len(self.foods)]
+        suite = self.suites[(index + index // len(self.foods)) % len(self.suites)]
+        food = load_food(name)
+        rng = np.random.default_rng([seed, *b"dataset"])
+        values = {}
+        for prop, sd in JITTER.items():
+            if prop in food.properties:
+                found = food.properties[prop]
+                values[prop] = float(np.clip(found.value * np.exp(sd * rng.standard_normal()), found.low, found.high))
+        style = "press" if rng.random() < PRESSED else STYLES[1 + int(rng.integers(len(STYLES) - 1))]
+        episode = draw(suite, seed, {name: food})
+        return Draw(index, suite, seed, style, episode, food.with_values(values, source="drawn for a dataset"), values)
+
+    def as_dict(self) -> dict[str, Any]:
+        """As plain data."""
+        own = {name: getattr(self, name) for name in ("trajectories", "backgrounds", "instructions", "seed")}
+        return own | {"foods": list(self.foods), "suites": list(self.suites)}
