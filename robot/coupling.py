@@ -52,7 +52,8 @@ class Coupling:
     where it ``draws``, is passed on; its way across the blade and its tilt are not, and are recorded as ``aside`` and ``pitch``. The
     force has no component across the blade either: of two even halves it has none. A second cut is one of the whole outline at its
     place. A cut ends when nothing holds any more and the edge rests on the board or turns back: pieces that lie free are no longer
-    followed. It also ends when the knife is above the food again, or the simulation breaks down.
+    followed. It also ends when the knife is above the food again, or the simulation breaks down. It begins only from above: a food
+    that is met from its side is not cut.
 
     Args:
         items: The foods.
@@ -89,7 +90,7 @@ class Coupling:
         self.force, self.impulse, self.touching = np.zeros(3), np.zeros(3), False
         self.aside = self.pitch = 0.0
         self._which, self._along, self._begin = 0, 0.0, np.zeros(5)
-        self._refused = False
+        self._ready: set[int] = set()  # foods that the edge has been above since it was last down
 
     @property
     def severed(self) -> bool:
@@ -152,18 +153,19 @@ class Coupling:
 
     def _approach(self, pose: np.ndarray) -> None:
         """Make a cut ready where the edge is about to come down on a food."""
-        below = [k for k, item in enumerate(self.items) if pose[2] <= item.shape.height + NEAR]
-        met = [(k, along) for k in below if (along := crossing(self.items[k], pose)) is not None]
-        if not met:
-            self._refused = False
-        elif not self._refused:
+        over = {k: pose[2] - item.shape.height for k, item in enumerate(self.items)}
+        self._ready |= {k for k in over if over[k] > NEAR}
+        down = [k for k in sorted(self._ready) if over[k] <= NEAR]
+        met = [(k, along) for k in down if (along := crossing(self.items[k], pose)) is not None]
+        self._ready -= {k for k in down if over[k] < 0}
+        if met:
             self._which, self._along = met[0]
+            self._ready.discard(self._which)
             self._begin, self.aside, self.pitch = np.array(pose, float), 0.0, 0.0
             item = self.items[self._which]
             try:
                 self.live = LiveCut(self._scene(item, self._along))
             except SceneError as e:
-                self._refused = True
                 self.done.append(Done(item, self._along, None, 1.0, None, str(e)))
 
     def _scene(self, item: Item, along: float) -> Scene:
@@ -184,7 +186,6 @@ class Coupling:
         try:
             along, _, up = self.live.move(float(pose[2]), float(way @ edge) if self.draws else 0.0, span)
         except SimulationError:
-            self._refused = True
             self.end()
             return
         self.force = np.array([*(along * edge), up])
@@ -193,5 +194,4 @@ class Coupling:
         above = pose[2] > item.shape.height + NEAR and (self.live.begun or pose[2] > self._begin[2] + NEAR)
         through = (pose[2] < REST or pose[2] > before) and self.live.begun and self.live.uncut == 0
         if above or through:
-            self._refused = through
             self.end()

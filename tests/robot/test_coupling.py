@@ -60,6 +60,22 @@ def test_a_knife_that_misses_feels_nothing():
     assert coupling.live is None
 
 
+def test_a_cut_begins_from_above_alone():
+    """A knife that saws on in the gap, or comes from the side, begins no cut; lifted over the food it does."""
+    coupling = Coupling([BERRY], FOODS)
+    poses = plan(BERRY, 0.0, depth=-0.03, hold=0.5).pose
+    low = int(np.argmin(poses[:, 2]))
+    follow(coupling, poses[: low + 10])
+    assert coupling.severed
+    on_the_board = np.array([BERRY.x, BERRY.y, 1e-3, BERRY.yaw - np.pi / 2, 0.0])
+    for way in np.linspace(0, 0.015, 30):
+        coupling.move(on_the_board + [*(way * BERRY.axis), 0, 0, 0], SPAN)
+    assert len(coupling.done) == 1 and coupling.live is None
+    second = plan(BERRY, 0.012, depth=-0.03, hold=0.5, start=on_the_board + [0, 0, 0.1, 0, 0]).pose
+    follow(coupling, second)
+    assert len(coupling.done) == 2 and len(coupling.items[0].pieces) == 3
+
+
 def test_a_slice_too_thin_is_said_once():
     """Where the solver would need cells that take too long, the cut is not simulated, and nothing else is tried until the knife is up."""
     coupling = Coupling([BERRY], FOODS)
