@@ -182,7 +182,7 @@ def _one(
             )
             for name, scene in (("fine", setup.fine), ("coarse", setup.coarse), ("again", otherwise(setup.fine)))
         ]
-        options = FitOptions(budget=request.budget, batch=pool.workers, seed=k)
+        options = FitOptions(budget=request.budget, batch=pool.batch, seed=k)
         fine, coarse, again = evaluators
         result = calibrate(setup.objective, fine, coarse=coarse, replicate=again, options=options)
     except CutcalError as e:

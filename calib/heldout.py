@@ -166,7 +166,7 @@ def _specimen(specimens: Specimens, flesh: Mapping[str, float], name: str) -> _S
         specimens.evaluator(scene.with_material(**flesh), name, fidelity)
         for fidelity, scene in (("fine", setup.fine), ("coarse", setup.coarse))
     )
-    options = FitOptions(budget=BUDGET, batch=specimens.pool.workers, design=DESIGN, seed=specimens.study.seed)
+    options = FitOptions(budget=BUDGET, batch=specimens.pool.batch, design=DESIGN, seed=specimens.study.seed)
     result = calibrate(
         goal, fine, coarse=coarse, options=options, progress=specimens.staged(f"specimen of {name}, held out")
     )

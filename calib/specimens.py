@@ -179,7 +179,7 @@ class Specimens:
                 ("again", lambda s: otherwise(s.fine)),
             )
         )
-        options = FitOptions(budget=self.study.budget, batch=self.pool.workers, seed=self.study.seed)
+        options = FitOptions(budget=self.study.budget, batch=self.pool.batch, seed=self.study.seed)
         words = f"fit of {', '.join(names)}"
         staged = self.staged(words)
         result = calibrate(joint, fine, coarse=coarse, replicate=again, options=options, progress=staged)

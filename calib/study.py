@@ -63,7 +63,7 @@ def run(
     setup = set_up(request)
     for text in [*request.food.warnings(), *setup.curve.warnings, *setup.assumed]:
         say(text)
-    options = FitOptions(budget=request.budget, batch=pool.workers, seed=request.seed)
+    options = FitOptions(budget=request.budget, batch=pool.batch, seed=request.seed)
     options.check(len(setup.objective.parameters))
     prepare(out, resume=resume)
     header = Header(setup.curve.trace.sha256, key_of(setup.fine.as_dict()))

@@ -223,6 +223,22 @@ def test_a_killed_worker_costs_one_run(two, tmp_path, monkeypatch, capsys):
     assert own == other
 
 
+@pytest.mark.slow
+def test_one_worker_finds_what_two_find(tmp_path, monkeypatch):
+    """The same runs, the same values and the same intervals: a round of the search does not shrink with the workers."""
+    monkeypatch.setenv("CHEAP_LOG", str(tmp_path / "log"))
+    monkeypatch.setattr("calib.cli.options.Pool", CheapPool)
+    found = {}
+    for workers in ("1", "2"):
+        out = tmp_path / workers
+        main(["calibrate", *STUDY, "--workers", workers, "--out", str(out)])
+        found[workers] = (
+            json.loads((out / "summary.json").read_text())["parameters"],
+            sorted(stored(out / "evaluations.h5")),
+        )
+    assert found["1"] == found["2"]
+
+
 def stored(path: Path) -> list[tuple[Any, ...]]:
     """Key, state and values of each run of a store."""
     with h5py.File(path) as f:
