@@ -18,7 +18,7 @@ from robot.data import generate as g
 from robot.data.demonstrate import Track
 from robot.data.manifest import JITTER, TASKS, Manifest
 from robot.data.shards import META, pack, trajectories
-from robot.language import parse
+from robot.language import instructions, parse
 from robot.planner import PHASES, RATE
 from robot.suites import FOODS, TEST
 from tests.calib.documents import valid
@@ -113,6 +113,14 @@ def made(draw) -> dict:
         "episode_seed": draw.seed,
         "index": draw.index,
         "instruction": draw.episode.instruction,
+        "instructions": instructions(draw.episode.spec, draw.seed),
+        "suite": draw.suite,
+        "demos": "sustained",
+        "task": {
+            "ratio": float(draw.episode.spec.ratio),
+            "side": draw.episode.spec.side,
+            "pieces": draw.episode.spec.pieces,
+        },
         "elapsed_steps": len(t.action),
         "food": draw.food.name,
         "style": draw.style,

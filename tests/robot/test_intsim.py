@@ -8,17 +8,35 @@ import pytest
 pytest.importorskip("mani_skill", reason="the extra [robot] is not installed")
 
 import gymnasium as gym
+import h5py
+import sapien
 
 from calib.materials import load_food
 from mpm.errors import CutcalError
 from robot import intsim
 from robot.cuts import target
-from robot.planner import plan
+from robot.data.demonstrate import demonstrate
+from robot.data.generate import make
+from robot.data.manifest import Manifest
+from robot.data.shards import Stored
+from robot.planner import PHASES, plan
 from robot.suites import draw
 
 FOODS = {name: load_food(name) for name in ("strawberry", "banana")}
 QUIET = {"sim_backend": "physx_cpu", "render_backend": "none", "obs_mode": "state", "foods": FOODS}
 SEED = 2  # a banana
+
+
+def renders() -> bool:
+    """Whether SAPIEN finds a device that it can render with."""
+    try:
+        sapien.render.RenderMaterial()
+    except RuntimeError:
+        return False
+    return True
+
+
+VULKAN = renders()
 
 
 def made(**how):
@@ -117,3 +135,75 @@ def test_a_criterion_that_is_none_is_an_error():
         made(criterion="perfect")
     with pytest.raises(CutcalError, match="scenery"):
         made(scenery=99)
+
+
+def test_a_sustained_demonstration_parts_what_a_planned_one_leaves_whole():
+    """The same episode: as planned the criteria are met and the food holds; sustained it is in pieces, phases in their order, and
+    the force begins with the contact.
+    """
+    env = made()
+    env.reset(seed=SEED)
+    planned = demonstrate(env, sustained=False)
+    env.reset(seed=SEED)
+    sustained = demonstrate(env)
+    env.close()
+    assert planned.published[-1] and not planned.severed[-1]
+    assert sustained.published[-1] and min(sustained.uncut) < 0.05 < min(planned.uncut)
+    assert min(p[2] for p in sustained.command) < -0.005 < min(p[2] for p in planned.command)
+    order = [PHASES.index(p) for p in sustained.phase]
+    assert order == sorted(order) and set(order) == set(range(5))
+    touched = np.flatnonzero(sustained.touching)
+    assert touched[0] > order.index(PHASES.index("contact")) - 2
+    assert all((np.array(f) == 0).all() for f in sustained.force[: touched[0]])
+    assert len(sustained.meshes) > 20 and len(sustained.qpos) == len(sustained.action) + 1
+
+
+def test_replaying_the_actions_gives_the_same_path_and_force():
+    """The edge to a hundredth of a millimetre and the force to a thousandth, in an environment of its own."""
+    env = made()
+    env.reset(seed=1)
+    first = demonstrate(env, meshes=False)
+    env.close()
+    other = made()
+    other.reset(seed=1)
+    path, peak = [], 0.0
+    for action in first.action:
+        other.step(action)
+        path.append(other.pose)
+        peak = max(peak, float(other.forces[:, 2].max()))
+    other.close()
+    assert np.abs(np.array(path) - np.array(first.edge[1:])).max() < 1e-5
+    assert peak == pytest.approx(max(float(f[:, 2].max()) for f in first.force), rel=1e-3)
+
+
+def test_a_worker_makes_an_episode_that_can_be_read(tmp_path):
+    """What `dataset generate` stores of a real one: layout, task and the time that it took."""
+    draw = Manifest(trajectories=1, foods=("strawberry",), suites=("seeds",)).draw(0)
+    found = make(draw, "sustained", "kitchen", None, "cpu", 1)
+    (tmp_path / "part.h5").write_bytes(found["content"])
+    with h5py.File(tmp_path / "part.h5") as file:
+        n = found["about"]["elapsed_steps"]
+        assert file["actions"].shape == (n, 8) and file["mpm/force"].shape == (n, 5, 3)
+        assert file["mpm"].attrs["contact_step"] > 0 and file["mpm"].attrs["food"] == "strawberry"
+        assert file["mpm/force"][()].max() == pytest.approx(found["about"]["peak_N"], rel=1e-6)
+    assert found["about"]["seconds"]["solver"] > 0 and len(found["about"]["instructions"]) >= 5
+
+
+@pytest.mark.skipif(not VULKAN, reason="no Vulkan device that SAPIEN can render with")
+def test_pictures_of_a_stored_trajectory_show_what_was_simulated(tmp_path):
+    """Rendered from what is stored: the same view twice is the same picture, another background is another, and the cut opens the food."""
+    from robot.data.rendering import Renderer
+
+    draw = Manifest(trajectories=1, foods=("strawberry",), suites=("seeds",)).draw(0)
+    found = make(draw, "sustained", "kitchen", None, "cpu", 1)
+    (tmp_path / "part.h5").write_bytes(found["content"])
+    with h5py.File(tmp_path / "part.h5") as file:
+        stored = Stored(file, found["about"])
+        one, two = Renderer(0, 64), Renderer(5, 64)
+        plain, again, other = one.pictures(stored), one.pictures(stored), two.pictures(stored)
+        one.close()
+        two.close()
+    for view, frames in plain.items():
+        assert frames.shape == (found["about"]["elapsed_steps"], 64, 64, 3) and frames.std() > 10
+        assert np.array_equal(frames, again[view])
+        assert np.abs(frames.astype(int) - other[view]).mean() > 5
