@@ -35,7 +35,7 @@ LOOK_S = 1.0  # time between two looks at which workers there are, while no run 
 FETCH_S = 30.0  # time in which the result of a run that has ended must arrive
 DESERTED_S = 120.0  # time without any worker after which a study gives up; a nanny needs seconds to start another
 KILLS = 2  # workers that a job may kill
-EXECUTED = ("mpm", "calib", "fem_reference")  # packages whose code runs in workers
+EXECUTED = ("mpm", "calib", "fem_reference", "robot")  # packages whose code runs in workers
 LOST = object()  # in place of the result of a job that did not come to its end
 
 

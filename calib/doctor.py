@@ -41,7 +41,13 @@ CLOSE = 0.05
 PATIENCE = 180.0
 """Seconds after which a device that has not answered is given up: compiling for the first time takes a twentieth of that."""
 DEVICES = {"cuda": "CUDA", "vulkan": "Vulkan"}
-EXTRAS = {"cluster": "--scheduler", "sample": "--sample", "view": "--video and --page"}
+EXTRAS = {
+    "cluster": "--scheduler",
+    "sample": "--sample",
+    "view": "--video and --page",
+    "data": "dataset export",
+    "robot": "dataset generate",
+}
 """What the optional packages are for."""
 SMALL = 1.5e9
 """Free memory under which a calibration may not fit [byte]: a worker takes 0.2 GB (resident, of the small cut), and there are two of
@@ -83,6 +89,7 @@ def examine(folder: Path) -> Iterator[Finding]:
     yield kernels(cache)
     yield _tried("report", _typeset, "pip install --force-reinstall typst matplotlib")
     yield pictures()
+    yield robot()
     yield memory()
     yield writable("folder for results", folder)
 
@@ -141,9 +148,29 @@ def _typeset() -> str:
 
 
 def pictures() -> Finding:
-    """Whether a picture is drawn without a screen, in a process that may crash or hang."""
-    name, remedy = "pictures of simulate", "everything else works; on Linux the package libegl1 or libosmesa6 is needed"
-    command = [sys.executable, "-c", "from reports.picture import attempt; print(attempt())"]
+    """Whether a picture is drawn without a screen."""
+    remedy = "everything else works; on Linux the package libegl1 or libosmesa6 is needed"
+    return _optional("pictures of simulate", "from reports.picture import attempt; print(attempt())", remedy)
+
+
+def robot() -> Finding:
+    """Whether the robot simulator runs, and whether it renders."""
+    name = "robot simulator"
+    if not _installed("mani_skill"):
+        return Finding(
+            name, "absent", "ManiSkill is not installed; everything else works (pip install 'cutcal[robot]')"
+        )
+    remedy = (
+        "states and forces work, pictures do not: SAPIEN needs Vulkan with descriptorBindingPartiallyBound. Mesa 25 has it "
+        "(mesa-vulkan-drivers of Debian 13, or of Debian 12's backports), Debian 12's own 22.3 has not"
+    )
+    code = "import sapien; sapien.render.RenderMaterial(); print('ManiSkill is installed and SAPIEN renders')"
+    return _optional(name, code, remedy)
+
+
+def _optional(name: str, code: str, remedy: str) -> Finding:
+    """What cutcal does without, tried in a process that may crash or hang."""
+    command = [sys.executable, "-c", code]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
     except subprocess.TimeoutExpired:

@@ -12,8 +12,8 @@ from mpm.errors import CutcalError
 
 HELP = "a robot's cuts with force, in shards that learning code loads"
 DESCRIPTION = """generate: a Panda in ManiSkill cuts what it is told, in words; the food is in
-the cutting solver and pushes back. Writes shards of HDF5 and JSON in ManiSkill's
-layout, with force, pieces and surface in a group mpm/, and dataset.json.
+the cutting solver and pushes back. Writes dataset.json and shards of HDF5 and
+JSON in ManiSkill's layout, with force, pieces and surface in a group mpm/.
 export: writes them as a LeRobotDataset v3.0, with pictures where it can render."""
 EPILOG = """examples:
   cutcal dataset generate --episodes 60 --out runs/cuts
@@ -39,7 +39,8 @@ def add_args(p: Group) -> None:
         "--demos",
         choices=("sustained", "planned"),
         default="sustained",
-        help="until the food parts (default), or as planned",
+        metavar="KIND",
+        help="sustained until the food parts (default), or as planned",
     )
     p.add_argument(
         "--stiffness", type=number(1, 1e6, "N m/rad"), metavar="K", help="of the arm's joints [N m/rad] (default 1000)"

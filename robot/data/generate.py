@@ -11,6 +11,7 @@ from typing import Any
 
 from calib.documents import tag
 from calib.errors import CurveError, OutputError
+from calib.knives import load_knife
 from calib.outputs import write_json
 from calib.progress import Countdown
 from calib.provenance import code_key, git_commit, key_of, versions
@@ -147,6 +148,7 @@ def generate(
         CutcalError: The folder is taken or holds another dataset, or ManiSkill is not installed.
     """
     available()
+    load_knife(knife)
     about = {"manifest": manifest.as_dict(), "demos": demos, "knife": knife, "stiffness": stiffness, "shard": shard}
     _claim(out, about, resume)
     groups = [range(k, min(k + shard, manifest.trajectories)) for k in range(0, manifest.trajectories, shard)]

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import pytest
 
+from calib.cli.main import main
 from calib.errors import OutputError
 from calib.workers import Workers
 from robot.cuts import TaskError
@@ -198,6 +199,34 @@ def test_a_folder_that_is_taken_or_damaged_is_an_error(tmp_path):
     (out / META).write_text("{")
     with pytest.raises(OutputError, match="damaged"):
         g.generate(Manifest(trajectories=1), out, Inline(), resume=True)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("generate", "--out"),
+        ("generate runs/x --out y", "too much"),
+        ("generate --food bread --out y", "bread"),
+        ("generate --task cook --out y", "cook"),
+        ("generate --seed 999990 --out y", "for tests"),
+        ("generate --knife spoon --out y", "spoon"),
+        ("export --out y", "name the folder"),
+        ("export nowhere --out y", "no shards"),
+        ("export nowhere --out y --scenes 1,b", "numbers of backgrounds"),
+        ("export nowhere --out y --scenes 99", "0 to 14"),
+    ],
+)
+def test_wrong_words_on_the_command_line_are_one_line(words, says, capsys, tmp_path, monkeypatch):
+    """What was wrong, before anything is made."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("robot.data.generate.available", lambda: None)
+    if words.startswith("export nowhere"):
+        pytest.importorskip("pyarrow", reason="the extra [data] is not installed")
+        pytest.importorskip("av", reason="the extra [data] is not installed")
+    assert main(["dataset", *words.split()]) == 1
+    error = capsys.readouterr().err.strip()
+    assert says in error and "\n" not in error and error.startswith("cutcal: ")
+    assert not list((tmp_path).glob("y/shard*"))
 
 
 def test_without_the_robot_simulator_it_says_what_to_install(monkeypatch, tmp_path: Path):
