@@ -24,6 +24,7 @@ from robot.planner import RATE
 ENV = "CutFood-v1"
 DEMOS = ("sustained", "planned")
 """Demonstrations: ``sustained`` goes on until the food is in pieces, ``planned`` is the motion of a plan without food."""
+DRAWN = ("slice", "saw")  # styles whose way along the edge the solver follows
 WHOLE_SET = 21_000  # trajectories of the published data set
 _made: dict[str, Any] = {}
 
@@ -75,7 +76,7 @@ def make(draw: Draw, demos: str, knife: str, stiffness: float | None, arch: str,
     start = time.perf_counter() - began
     episode, before = draw.episode, env.solver_s
     env.foods = {**env.foods, draw.food.name: draw.food}
-    env.reset(seed=draw.seed, options={"episode": episode, "draws": draw.style != "press"})
+    env.reset(seed=draw.seed, options={"episode": episode, "draws": draw.style in DRAWN})
     track = demonstrate(env, style=draw.style, sustained=demos == "sustained")
     solver = env.solver_s - before
     material = vars(draw.food.to_scene_food().material)

@@ -75,6 +75,23 @@ def test_a_faster_or_paused_motion_takes_the_same_force(scene):
     assert held[-1] == pytest.approx(held[4], rel=0.1) and held[-1] > 0
 
 
+def test_sawing_costs_the_same_at_half_the_simulated_speed(scene):
+    """A blade that goes to and fro is as fast along its edge as it may be downwards, and no faster: peak to 8 %, work to 3 %. Twice as fast the
+    peak of a banana is off by 12 %, that of a tomato by 45 %.
+    """
+    found = []
+    for mach in (scene.motion.mach, scene.motion.mach / 2):
+        live = LiveCut(replace(scene, motion=replace(scene.motion, slice_ratio=1.0, mach=mach)))
+        z, k = scene.food.shape.height + 5e-3, 0
+        while z > 0:
+            z, k = max(z - SPEED * 0.01, 0.0), k + 1
+            live.move(z, 0.015 * np.sin(2 * np.pi * 1.5 * k * 0.01), 0.01)
+        found.append(live.record())
+    assert found[0].steps < 0.6 * found[1].steps
+    assert found[0].peak == pytest.approx(found[1].peak, rel=0.08)
+    assert found[0].work == pytest.approx(found[1].work, rel=0.03)
+
+
 def test_behind_an_arm_that_yields_it_ends_where_the_solvers_own_arm_does(scene):
     """An arm outside that gives way by force over stiffness, with a lag, leaves the edge as high above the board as the solver's own."""
     own = replace(scene, arm=Arm(STIFF), motion=replace(scene.motion, dwell=1.0))
