@@ -14,14 +14,15 @@ HELP = "a robot's cuts with force, in shards that learning code loads"
 DESCRIPTION = """generate: a Panda in ManiSkill cuts what it is told, in words; the food is in
 the cutting solver and pushes back. Writes dataset.json and shards of HDF5 and
 JSON in ManiSkill's layout, with force, pieces and surface in a group mpm/.
-export: writes them as a LeRobotDataset v3.0, with pictures where it can render."""
+export: writes them as a LeRobotDataset v3.0, with pictures where it can render,
+or as RLDS (TFDS), which OpenVLA and Octo read."""
 EPILOG = """examples:
   cutcal dataset generate --episodes 60 --out runs/cuts
   cutcal dataset export runs/cuts --scenes 0,1,2 --out runs/lerobot
 
 generate needs pip install 'cutcal[robot]', export 'cutcal[data]', its pictures
 both and Vulkan (cutcal doctor). Exit codes: 0 done, 1 error."""
-WHAT = ("generate", "export")
+WHAT, FORMATS = ("generate", "export"), ("lerobot", "rlds")
 
 
 def add_args(p: Group) -> None:
@@ -50,6 +51,9 @@ def add_args(p: Group) -> None:
     p.add_argument("--shard", type=whole(1), default=20, metavar="N", help="trajectories of a file (default 20)")
     p.add_argument(
         "--scenes", metavar="LIST", help="backgrounds that are rendered, such as 0,1,2 (default: no pictures)"
+    )
+    p.add_argument(
+        "--format", choices=FORMATS, default="lerobot", metavar="NAME", help="of an export: lerobot (default) or rlds"
     )
     p.add_argument("--pixels", type=whole(16), default=128, metavar="N", help="of the pictures (default 128)")
     add_workers(p, "trajectories")
@@ -111,7 +115,7 @@ def _generate(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _export(args: argparse.Namespace) -> dict[str, Any]:
-    from robot.data.lerobot import export
+    from robot.data import lerobot, rlds
 
     if args.folder is None:
         raise CutcalError(
@@ -121,7 +125,10 @@ def _export(args: argparse.Namespace) -> dict[str, Any]:
         scenes = [int(k) for k in args.scenes.split(",")] if args.scenes else []
     except ValueError:
         raise CutcalError(f"--scenes {args.scenes}: give numbers of backgrounds, such as 0,1,2") from None
+    export = rlds.export if args.format == "rlds" else lerobot.export
     found = export(Path(args.folder), Path(args.out), scenes=scenes, pixels=args.pixels, say=say)
-    if not args.json:
+    if not args.json and args.format == "rlds":
+        print(", ".join(f"{s['shardLengths'][0]} episodes to {s['name']}" for s in found["splits"]))
+    elif not args.json:
         print(f"{found['total_episodes']} episodes of {found['total_frames']} frames, {found['total_tasks']} sentences")
     return found

@@ -14,14 +14,12 @@ from typing import Any
 import numpy as np
 
 from calib.errors import OutputError
-from calib.progress import Countdown
 from robot.data.demonstrate import OPEN
-from robot.data.manifest import BACKGROUNDS
-from robot.data.shards import Stored, trajectories
+from robot.data.shards import Stored
+from robot.data.views import VIEWS, View, check, views
 from robot.planner import RATE
 
 VERSION = "v3.0"
-VIEWS = ("front", "side", "wrist")
 FILE_FRAMES = 50_000  # frames of a file of data or video
 SAMPLED = 32  # pictures of an episode from which its statistics are found
 QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
@@ -141,27 +139,10 @@ def export(
         import pyarrow  # noqa: F401
     except ImportError as e:
         raise OutputError(f"dataset export: {e.name} is not installed; pip install 'cutcal[data]'") from None
-    if any(not 0 <= k < BACKGROUNDS for k in scenes):
-        raise OutputError(f"--scenes {','.join(map(str, scenes))}: give numbers from 0 to {BACKGROUNDS - 1}")
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise OutputError(f"--out {out}: exists already and is never overwritten; choose another folder")
-    total = sum(1 for _ in trajectories(folder))
+    check(out, scenes)
     writer = _Writer(out, pixels if scenes else 0)
-    rest, done = Countdown(max(total * max(len(scenes), 1), 1)), 0
-    for place, scene in enumerate(scenes or [None]):
-        renderer = None
-        if scene is not None:
-            from robot.data.rendering import Renderer
-
-            renderer = Renderer(scene, pixels)
-        for k, stored in enumerate(trajectories(folder)):
-            sentences = stored.about["instructions"]
-            pictures = renderer.pictures(stored) if renderer is not None else {}
-            writer.add(stored, sentences[(k + place) % len(sentences)], pictures, scene)
-            done += 1
-            say(f"episode {done} of {total * max(len(scenes), 1)}, {rest.left(1)}")
-        if renderer is not None:
-            renderer.close()
+    for view in views(folder, scenes, pixels, say):
+        writer.add(view)
     return writer.close()
 
 
@@ -183,8 +164,9 @@ class _Writer:
         self.frames, self.file, self.in_file = 0, 0, 0
         self.videos: dict[str, _Video] = {}
 
-    def add(self, stored: Stored, sentence: str, pictures: dict[str, np.ndarray], scene: int | None) -> None:
+    def add(self, one: View) -> None:
         """An episode."""
+        stored, sentence, pictures, scene = one.stored, one.sentence, one.pictures, one.scene
         found = columns(stored)
         n = len(found["timestamp"])
         if self.in_file and self.in_file + n > FILE_FRAMES:

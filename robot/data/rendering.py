@@ -13,10 +13,9 @@ from mpm.shapes import Shape
 from robot.cuts import CutSpec, Item
 from robot.data.generate import ENV
 from robot.data.shards import Stored
+from robot.data.views import VIEWS
 from robot.scenery import COLOURS
 from robot.suites import Episode
-
-VIEWS = ("front", "side", "wrist")
 
 
 class Renderer:

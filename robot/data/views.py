@@ -1,0 +1,70 @@
+"""Every trajectory before every background that is asked for, with one of its sentences: what exports go through."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from calib.errors import OutputError
+from calib.progress import Countdown
+from robot.data.manifest import BACKGROUNDS
+from robot.data.shards import Stored, trajectories
+
+VIEWS = ("front", "side", "wrist")
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A trajectory before a background. Attributes: stored; scene, None without pictures; sentence; pictures by camera (T, h, w, 3)."""
+
+    stored: Stored
+    scene: int | None
+    sentence: str
+    pictures: dict[str, np.ndarray]
+
+
+def check(out: Path, scenes: Sequence[int]) -> None:
+    """Before anything is written.
+
+    Raises:
+        OutputError: A background that does not exist, or a folder that is taken.
+    """
+    if any(not 0 <= k < BACKGROUNDS for k in scenes):
+        raise OutputError(f"--scenes {','.join(map(str, scenes))}: give numbers from 0 to {BACKGROUNDS - 1}")
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise OutputError(f"--out {out}: exists already and is never overwritten; choose another folder")
+
+
+def views(
+    folder: Path, scenes: Sequence[int], pixels: int, say: Callable[[str], None] = lambda text: None
+) -> Iterator[View]:
+    """Each trajectory for each background; its sentences come in turn.
+
+    Args:
+        folder: A dataset of :func:`robot.data.generate.generate`.
+        scenes: Backgrounds that are rendered; without any each trajectory comes once, without pictures.
+        pixels: Width and height of the pictures.
+        say: Called with a line after each.
+
+    Raises:
+        CutcalError: There is no renderer, or the folder holds no dataset.
+    """
+    total = sum(1 for _ in trajectories(folder)) * max(len(scenes), 1)
+    rest, done = Countdown(max(total, 1)), 0
+    for place, scene in enumerate(scenes or [None]):
+        renderer = None
+        if scene is not None:
+            from robot.data.rendering import Renderer
+
+            renderer = Renderer(scene, pixels)
+        for k, stored in enumerate(trajectories(folder)):
+            sentences = stored.about["instructions"]
+            pictures = renderer.pictures(stored) if renderer is not None else {}
+            yield View(stored, scene, sentences[(k + place) % len(sentences)], pictures)
+            done += 1
+            say(f"episode {done} of {total}, {rest.left(1)}")
+        if renderer is not None:
+            renderer.close()
