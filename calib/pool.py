@@ -53,6 +53,11 @@ class Pool(Workers):
         # waited for: the executor's thread ends with its processes, and left alone it may trip over Python's own end
         self._executor.shutdown(wait=True, cancel_futures=True)
 
+    def renew(self) -> None:
+        """Begin with fresh processes: one keeps the memory of every size of scene that it has had."""
+        self.close()
+        self._executor = self._start()
+
     def each(self, work: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Result | None]]:
         """Call ``work(*job, arch, threads)`` for each job; yields (place among the jobs, result) in order of completion.
 

@@ -105,6 +105,9 @@ class Workers(ABC):
         second time, when nothing else ran in it.
         """
 
+    def renew(self) -> None:  # noqa: B027 - a cluster keeps its workers
+        """Begin with fresh processes, where they are this one's: a process keeps the memory of every size of scene that it has had."""
+
     def run(self, jobs: Sequence[tuple[Scene, Mapping[str, float]]]) -> Iterator[Evaluation]:
         """Run each scene with its material values; yields in order of completion, ``index`` is the place among the jobs.
 

@@ -162,25 +162,31 @@ def generate(
     ]
     if len(todo) < manifest.trajectories:
         say(f"{manifest.trajectories - len(todo)} of {manifest.trajectories} trajectories are there already")
-    rest, done = Countdown(max(len(todo), 1)), 0
+    rest, done, left = Countdown(max(len(todo), 1)), 0, set(todo)
     info = {"env_id": ENV, "env_kwargs": {"knife": knife, "stiffness": stiffness}, "control_freq": RATE}
     _close(out, groups, info)
-    jobs = [(manifest.draw(k), demos, knife, stiffness) for k in todo]
-    for place, made in pool.each(make, jobs):
-        if made is None:
-            raise OutputError(
-                f"trajectory {todo[place]}: its process was killed twice, perhaps for lack of memory; add --resume"
-            )
-        write_part(out, todo[place], made["content"])
-        done += 1
-        a = made["about"]
-        outcome = "severed" if a["severed"] else "not severed"
-        say(
-            f"trajectory {a['index']}: {a['instruction']!r}, {a['style']}, peak {a['peak_N']:.1f} N, {outcome}"
-            f"{'' if a['status'] == 'done' else ' (' + a['status'] + ')'}; {done} of {len(todo)}, {rest.left(1)}"
-        )
+    for group in groups:
+        own = [k for k in group if k in left]
+        jobs = [(manifest.draw(k), demos, knife, stiffness) for k in own]
+        for place, made in pool.each(make, jobs):
+            if made is None:
+                raise OutputError(
+                    f"trajectory {own[place]}: its process was killed twice, perhaps for lack of memory; add --resume"
+                )
+            write_part(out, own[place], made["content"])
+            done += 1
+            say(_told(made["about"], f"{done} of {len(todo)}, {rest.left(1)}"))
         _close(out, groups, info)
+        if own:
+            pool.renew()  # each food and size has fields of its own
     return _conclude(out, about, command)
+
+
+def _told(a: dict[str, Any], rest: str) -> str:
+    """A trajectory in words."""
+    outcome = "severed" if a["severed"] else "not severed"
+    trouble = "" if a["status"] == "done" else f" ({a['status']})"
+    return f"trajectory {a['index']}: {a['instruction']!r}, {a['style']}, peak {a['peak_N']:.1f} N, {outcome}{trouble}; {rest}"
 
 
 def _claim(out: Path, about: dict[str, Any], resume: bool) -> None:

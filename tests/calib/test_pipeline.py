@@ -339,6 +339,17 @@ class LastRun(Pool):
         return future
 
 
+def test_a_renewed_pool_has_other_processes():
+    """The old one has ended, with its memory, and jobs go on in the new one."""
+    with Pool(1) as pool:
+        first = pool._submit(os.getpid).result()
+        pool.renew()
+        second = pool._submit(os.getpid).result()
+        assert second != first
+        with pytest.raises(ProcessLookupError):
+            os.kill(first, 0)
+
+
 def test_killed_last_run_is_made_once_more():
     """The full record of the best values survives one death; after two the message says what is kept and what to do."""
     assert LastRun(1).record(None) == "the record"  # type: ignore[arg-type]
