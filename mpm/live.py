@@ -20,7 +20,6 @@ from mpm.topology import Topology
 from mpm.watch import Snapshot, snapshot
 
 ON_FACE = 1e-9  # distance from the plane of the cut at which a vertex lies on its face [m]
-GRAVITY = 9.81  # m/s^2
 CLEAR = 2.0  # height of the edge above the uncut food at which nothing touches the blade any more [cells]
 
 
@@ -76,8 +75,8 @@ class LiveCut:
     @property
     def weight(self) -> float:
         """Weight of the food [N]."""
-        simulation = self._simulation
-        return self.scene.food.material.rho * simulation.seeds.total * simulation.images * GRAVITY
+        simulation, gravity = self._simulation, self.scene.numerics.gravity
+        return self.scene.food.material.rho * simulation.seeds.total * simulation.images * gravity
 
     @property
     def uncut(self) -> float:

@@ -214,7 +214,11 @@ def _claim(out: Path, about: dict[str, Any], resume: bool) -> None:
 def _close(out: Path, groups: list[range], info: dict[str, Any]) -> None:
     """Write the shards whose episodes are all there."""
     for n, group in enumerate(groups):
-        if not (out / f"{SHARD.format(n)}.h5").exists() and all((out / PART.format(k)).exists() for k in group):
+        parts = [out / PART.format(k) for k in group]
+        if (out / f"{SHARD.format(n)}.h5").exists():
+            for part in parts:  # of a process that was killed when the shard was there
+                part.unlink(missing_ok=True)
+        elif all(part.exists() for part in parts):
             write_shard(out, n, group, info)
 
 

@@ -117,7 +117,7 @@ def test_a_device_that_is_missing_is_one_line(monkeypatch, capsys, tmp_path: Pat
         Runtime("metal")
 
 
-@pytest.mark.parametrize(
+ATTEMPTS = pytest.mark.parametrize(
     ("code", "stdout", "stderr", "state", "said"),
     [
         (0, "drawn without a screen by X\n", "", "ok", "drawn without"),
@@ -125,6 +125,10 @@ def test_a_device_that_is_missing_is_one_line(monkeypatch, capsys, tmp_path: Pat
         (-11, "", "", "absent", "ended with -11"),
     ],
 )
+"""How a process that tries something optional may end."""
+
+
+@ATTEMPTS
 def test_the_robot_simulator_may_be_missing_or_blind(monkeypatch, code, stdout, stderr, state, said):
     """Not installed: what to install. Installed without a renderer: which feature of Vulkan it asks for. Neither is a failure."""
     monkeypatch.setattr(doctor, "_installed", lambda name: False)
@@ -136,14 +140,7 @@ def test_the_robot_simulator_may_be_missing_or_blind(monkeypatch, code, stdout, 
     assert state == "ok" or "descriptorBindingPartiallyBound" in found.words
 
 
-@pytest.mark.parametrize(
-    ("code", "stdout", "stderr", "state", "said"),
-    [
-        (0, "drawn without a screen by X\n", "", "ok", "drawn without"),
-        (1, "", "Traceback\nRuntimeError: no OpenGL", "absent", "no OpenGL; everything else works"),
-        (-11, "", "", "absent", "ended with -11"),
-    ],
-)
+@ATTEMPTS
 def test_pictures_may_be_missing(monkeypatch, code, stdout, stderr, state, said):
     """Drawing in a process of its own: whatever it dies of is said, and nothing else needs it."""
     monkeypatch.setattr(subprocess, "run", lambda *a, **k: subprocess.CompletedProcess([], code, stdout, stderr))
