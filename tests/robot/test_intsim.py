@@ -129,6 +129,26 @@ def test_the_force_is_no_observation():
     env.close()
 
 
+def test_the_force_of_the_food_is_what_lifts_the_knife():
+    """A constant force on the held knife: the edge rises by force over the arm's stiffness (1 / 0.57 N/mm, measured apart from this code),
+    and twice as far for twice the force.
+    """
+    env, risen = made(coupled=False), []
+    for force in (0.0, 10.0, 20.0):
+        env.reset(seed=SEED)
+        pose = np.array([0.0, 0.0, 0.019, 0.0, 0.0])
+        joints = env.kinematics.joints(pose, env.agent.robot.get_qpos()[0].numpy().astype(float))[0]
+        env.agent.reset(joints)
+        env._force = np.array([0.0, 0.0, force])
+        for _ in range(40):
+            env._point = env.pose[:3]
+            env.step(np.array([*joints[:7], -1.0], np.float32))
+        risen.append(float(env.pose[2]))
+    env.close()
+    assert risen[1] - risen[0] == pytest.approx(0.57e-3 * 10, rel=0.1)
+    assert risen[2] - risen[0] == pytest.approx(2 * (risen[1] - risen[0]), rel=0.05)
+
+
 def test_a_criterion_that_is_none_is_an_error():
     """And a background that does not exist."""
     with pytest.raises(CutcalError, match="criterion"):
