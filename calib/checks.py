@@ -6,10 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from calib.evaluation import Evaluation
 from calib.provenance import code_key
 from calib.scenes import elsewhere
 from calib.store import EvaluationStore, content_key
-from calib.workers import Workers
+from calib.workers import Errand
 from mpm.scene import Scene
 
 
@@ -37,11 +38,21 @@ VARIANTS: Mapping[str, Callable[[Scene], Scene]] = {
     FINER_GRID: _finer,
 }
 """What should not matter, by name. The order of convergence, and an uncertainty, are the business of a convergence study."""
+VARIED = "at half the speed, with the grid and the particles elsewhere, and on cells of two thirds"
 
 
-def _haste(scene: Scene) -> float:
-    """Inverse of what a run takes, but for a factor: the longest is begun first, or the others' workers wait for it."""
-    return scene.motion.mach * scene.numerics.dx**4
+def check_errands(scene: Scene, store: EvaluationStore) -> list[Errand]:
+    """The simulations that :func:`check` compares: those of the variants that the store does not know."""
+    varied = {_key(other): other for other in (vary(scene) for vary in VARIANTS.values())}
+    return [Errand(other, _keeper(store, key)) for key, other in varied.items() if store.get(key) is None]
+
+
+def _keeper(store: EvaluationStore, key: str) -> Callable[[Evaluation], None]:
+    return lambda run: store.append(key, run, "check")
+
+
+def _key(scene: Scene) -> str:
+    return content_key(scene.as_dict(), {}, code_key())
 
 
 @dataclass(frozen=True)
@@ -70,31 +81,20 @@ class Check:
         return asdict(self)
 
 
-def check(
-    scene: Scene, own: Mapping[str, float], pool: Workers, store: EvaluationStore, say: Callable[[str], None]
-) -> list[Check]:
-    """Simulate the variants of a scene; what the store knows is not simulated again.
+def check(scene: Scene, own: Mapping[str, float], store: EvaluationStore) -> list[Check]:
+    """The variants of a scene against it.
 
     Args:
         scene: The scene with its calibrated material.
         own: Its ``peak_N``, ``work_J`` and ``unbooked_J``.
-        pool: Where they run.
-        store: Where they are kept.
-        say: Told when they are simulated.
+        store: Where :func:`check_errands` were kept.
+
+    Raises:
+        KeyError: They were not made.
     """
-    scenes = [vary(scene) for vary in VARIANTS.values()]
-    keys = [content_key(s.as_dict(), {}, code_key()) for s in scenes]
-    found = {k: known for k, key in enumerate(keys) if (known := store.get(key))}
-    new = sorted((k for k in range(len(scenes)) if k not in found), key=lambda k: _haste(scenes[k]))
-    if new:
-        say("simulating them at half the speed, with the grid and the particles elsewhere, and on cells of two thirds")
-    for result in pool.run([(scenes[k], {}) for k in new]):
-        k = new[result.index]
-        store.append(keys[k], result, "check")
-        found[k] = result
     out = []
-    for k, name in enumerate(VARIANTS):
-        run = found[k]
+    for name, vary in VARIANTS.items():
+        run = store.last(_key(vary(scene)))
         if run.ok and own["peak_N"] > 0 and own["work_J"] > 0:
             peak, work = (run.scalars[q] / own[q] - 1 for q in ("peak_N", "work_J"))
             unbooked = run.scalars["unbooked_J"] / run.scalars["work_J"] - own["unbooked_J"] / own["work_J"]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,7 @@ import numpy as np
 from calib.errors import OutputError
 from calib.provenance import code_key
 from calib.store import content_key
-from calib.workers import Workers
+from calib.workers import Errand
 from mpm.record import ForceRecord
 from mpm.scene import Scene
 from mpm.section import Section
@@ -29,26 +28,31 @@ SECTION = "section"
 JSON = ("counters", "pieces")  # parts of a record that are neither arrays nor numbers
 
 
-def whole_record(scene: Scene, pool: Workers, path: Path, say: Callable[[str], None]) -> ForceRecord:
-    """The record of a scene: from a file that holds it, else simulated and written there.
+def record_errands(scene: Scene, path: Path) -> list[Errand]:
+    """The simulation that brings the whole record of a scene into a file, in which a record of something else is replaced; none where
+    the file holds it.
 
-    Args:
-        scene: The cut.
-        pool: Where it is simulated.
-        path: The file; a record of something else in it is replaced.
-        say: Told when it is simulated.
+    The errand raises OutputError where the file cannot be written.
+    """
+    if _read(path, _key(scene)) is not None:
+        return []
+    return [Errand(scene, lambda record: _write(path, _key(scene), record), whole=True)]
+
+
+def read_record(scene: Scene, path: Path) -> ForceRecord:
+    """The whole record of a scene, from the file that an errand has written.
 
     Raises:
-        OutputError: The file cannot be written.
-        SimulationError: The process of the simulation was killed twice.
+        OutputError: The file does not hold it.
     """
-    key = content_key(scene.as_dict(), {}, code_key())
-    record = _read(path, key)
+    record = _read(path, _key(scene))
     if record is None:
-        say("simulating the best values once more for their full record")
-        record = pool.record(scene)
-        _write(path, key, record)
+        raise OutputError(f"{path}: changed since it was written; add --resume to simulate it again")
     return record
+
+
+def _key(scene: Scene) -> str:
+    return content_key(scene.as_dict(), {}, code_key())
 
 
 def _write(path: Path, key: str, record: ForceRecord) -> None:

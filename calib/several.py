@@ -9,7 +9,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from calib.checks import Check, check
+from calib.checks import VARIED, Check, check, check_errands
 from calib.conditioning import Conditioned
 from calib.config import Study
 from calib.documents import tag
@@ -21,7 +21,7 @@ from calib.outputs import prepare, write_csv, write_json
 from calib.parameters import plain
 from calib.progress import Progress
 from calib.provenance import git_commit, key_of, versions
-from calib.records import whole_record
+from calib.records import record_errands
 from calib.request import Setup
 from calib.scenes import place
 from calib.specimens import Fitted, Specimens, pressed, set_ups
@@ -74,10 +74,13 @@ def run(
         say(f"fitting {', '.join(kept)} together")
         fitted = specimens.fit(kept)
         scenes = {name: _scene(specimens, fitted, name) for name in kept}
-        checks = {name: _checks(specimens, fitted, name, scenes[name]) for name in kept}
+        errands = [e for scene in scenes.values() for e in check_errands(scene, store)]
+        errands += [e for name, scene in scenes.items() for e in record_errands(scene, out / f"record-{name}.h5")]
+        if errands:
+            say(f"simulating the best values of {', '.join(kept)} once more: whole, and {VARIED}")
+            pool.errands(errands)
+        checks = {name: check(scene, _own(fitted, name), store) for name, scene in scenes.items()}
         runs = len(store)
-        for name, scene in scenes.items():
-            whole_record(scene, pool, out / f"record-{name}.h5", specimens.told(name))
     for name, setup in setups.items():
         write_csv(out / f"curves-{name}.csv", _curves(setup, fitted, held.get(name), name))
     summary = _summary(study, setups, fitted, held, checks, scenes)
@@ -131,16 +134,9 @@ def _scene(specimens: Specimens, fitted: Fitted, name: str) -> Scene:
     return scene.with_material(**values)
 
 
-def _checks(specimens: Specimens, fitted: Fitted, name: str, scene: Scene) -> list[Check]:
-    """What numerical choices change of one trace's simulation."""
-    own = fitted.result.best.evaluation.parts[fitted.names.index(name)]
-    return check(
-        scene,
-        own.scalars,
-        specimens.pool,
-        specimens.store,
-        specimens.told(name),
-    )
+def _own(fitted: Fitted, name: str) -> Mapping[str, float]:
+    """Named results of the best simulation of one trace."""
+    return fitted.result.best.evaluation.parts[fitted.names.index(name)].scalars
 
 
 def _summary(

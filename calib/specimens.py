@@ -188,10 +188,6 @@ class Specimens:
         doubt = doubt_of(joint, result, scout=coarse, judge=fine, seed=self.study.seed, say=self.say)
         return Fitted(tuple(names), joint, result if doubt is None else doubt.result, doubt)
 
-    def told(self, name: str) -> Callable[[str], None]:
-        """``say`` with the name of a trace before what is said."""
-        return lambda text: self.say(f"{name}: {text}")
-
     def staged(self, words: str) -> Callable[[Progress], None] | None:
         """The progress callback with what is being fitted before each stage."""
         call = self.progress

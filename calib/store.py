@@ -29,7 +29,7 @@ import hashlib
 import json
 import os
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import TracebackType
@@ -160,6 +160,14 @@ class EvaluationStore:
         run = record.evaluation
         return run if run.status in REPEATABLE_STATUS and run.reason not in TRANSIENT_REASONS else None
 
+    def last(self, key: str) -> Evaluation:
+        """The run with this content key as it came out the last time.
+
+        Raises:
+            KeyError: There is none.
+        """
+        return self._records[key].evaluation
+
     def append(self, key: str, evaluation: Evaluation, fidelity: str) -> None:
         """Store a run; it is on disk when this returns.  A run with a known key takes the place of that one.
 
@@ -277,6 +285,13 @@ class CachedEvaluator:
         self._scene, self._code, self._fidelity = scene, code, fidelity
         self.computed = 0
         """Runs that were not in the store."""
+
+    def keeper(self, parameters: Mapping[str, float]) -> Callable[[Evaluation], None] | None:
+        """What stores the run of these values, whoever makes it; None where it is known."""
+        key = content_key(self._scene, parameters, self._code)
+        if self._store.get(key) is not None:
+            return None
+        return lambda run: self._store.append(key, replace(run, parameters=dict(parameters)), self._fidelity)
 
     def evaluate(self, batch: Sequence[Mapping[str, float]]) -> Iterator[Evaluation]:
         """Known runs at once, then new ones in order of completion, each stored before it is handed on."""

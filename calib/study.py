@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from calib.checks import Check, check, otherwise
+from calib.checks import VARIED, Check, check, check_errands, otherwise
 from calib.conditioning import Conditioned
 from calib.doubt import Doubt, doubt_of
 from calib.filters import filter_simulated
@@ -23,13 +23,13 @@ from calib.outputs import prepare, write_csv, write_json
 from calib.preparation import set_up
 from calib.progress import Progress
 from calib.provenance import code_key, key_of
-from calib.records import whole_record
+from calib.records import read_record, record_errands
 from calib.request import Request, Setup
 from calib.scenes import place
 from calib.sensitivity import sensitivity
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.summary import add_conditioning, summarise
-from calib.workers import Workers, plain
+from calib.workers import Errand, Workers, plain
 from mpm.record import ForceRecord
 
 
@@ -84,26 +84,39 @@ def run(
         )
         if doubt is not None:
             result = doubt.result
-        start = _start_curve(setup, result, fine)
         scene, values = place(setup.fine, result.best.evaluation.parameters, setup.kept)
-        setup = replace(setup, fine=scene)
+        first, setup = setup, replace(setup, fine=scene)
         scene = scene.with_material(**values)
-        record = whole_record(scene, pool, out / "record.h5", say)
-        checks: list[Check] = []
-        if result.status != "interrupted":
-            checks = check(scene, plain(record)["scalars"], pool, store, say)
+        errands, ended = record_errands(scene, out / "record.h5"), result.status != "interrupted"
+        if ended:
+            errands += [*check_errands(scene, store), *_start_errands(first, fine)]
+        if errands:
+            say(f"simulating the best values once more: {'whole, and ' + VARIED if ended else 'whole'}")
+            pool.errands(errands)
+        record = read_record(scene, out / "record.h5")
+        checks = check(scene, plain(record)["scalars"], store) if ended else []
+        start = _start_curve(first, fine) if ended else np.full_like(setup.curve.stroke, np.nan)
     add_conditioning(out / "evaluations.h5", setup.curve)
     return _write(request, setup, result, doubt, record, checks, start, out, time.monotonic() - began)
 
 
-def _start_curve(setup: Setup, result: FitResult, fine: CachedEvaluator) -> np.ndarray:
-    """Smoothed curve of the literature values [N], shape (240,); NaN where that run broke down or was not reached."""
-    empty = np.full_like(setup.curve.stroke, np.nan)
-    if result.status == "interrupted":
-        return empty
-    evaluation = next(iter(fine.evaluate([{p.name: p.value for p in setup.objective.parameters}])))
+def _literature(setup: Setup) -> dict[str, float]:
+    """The values that the fit began with, by name [SI]."""
+    return {p.name: p.value for p in setup.objective.parameters}
+
+
+def _start_errands(setup: Setup, fine: CachedEvaluator) -> list[Errand]:
+    """The simulation of the literature values, where the search has not made it."""
+    keep = fine.keeper(_literature(setup))
+    scene, values = place(setup.fine, _literature(setup), setup.kept)
+    return [] if keep is None else [Errand(scene.with_material(**values), keep)]
+
+
+def _start_curve(setup: Setup, fine: CachedEvaluator) -> np.ndarray:
+    """Smoothed curve of the literature values [N], shape (240,); NaN where that run broke down."""
+    evaluation = next(iter(fine.evaluate([_literature(setup)])))
     if not evaluation.ok:
-        return empty
+        return np.full_like(setup.curve.stroke, np.nan)
     return filter_simulated(setup.curve.stroke, evaluation.stroke, evaluation.force)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -70,6 +70,31 @@ def _whole(scene: Scene, arch: str, threads: int) -> ForceRecord:
     return Simulation(scene, Runtime(arch, threads)).run(sections=SECTIONS)
 
 
+def _errand(work: Callable[..., Result], *args: Any) -> Result:
+    """Whatever is asked for, in a worker."""
+    return work(*args)
+
+
+@dataclass(frozen=True)
+class Errand:
+    """One of several simulations that are made together, each of its own kind.
+
+    Attributes:
+        scene: What is simulated.
+        keep: Told the result: a record where ``whole``, else an evaluation of no values.
+        whole: Whether the whole record is wanted.
+    """
+
+    scene: Scene
+    keep: Callable[[Any], None]
+    whole: bool = False
+
+    @property
+    def haste(self) -> float:
+        """Inverse of what the run takes, but for a factor of the food."""
+        return self.scene.motion.mach * self.scene.numerics.dx**4
+
+
 class Workers(ABC):
     """Processes that run jobs; a context manager that ends what they were asked for.
 
@@ -114,31 +139,39 @@ class Workers(ABC):
         A run that killed its process twice is a failed one, for the reason :data:`DIED`.
         """
         for index, result in self.each(_run, [(scene, dict(values)) for scene, values in jobs]):
-            values = dict(jobs[index][1])
-            if result is None:
-                yield Evaluation(index, values, "failed", DIED, 0.0, np.empty(0), np.empty(0))
-            else:
-                yield Evaluation(index=index, parameters=values, **result)
+            yield _evaluation(index, dict(jobs[index][1]), result)
 
-    def record(self, scene: Scene) -> ForceRecord:
-        """The whole record of one scene.
+    def errands(self, errands: Sequence[Errand]) -> None:
+        """Make them all, the longest first, or the workers of the others would wait for it; each is kept as soon as it is made.
 
         Raises:
-            SimulationError: Its process was killed twice.
+            SimulationError: The process of a whole record was killed twice.
         """
-        ((_, record),) = self.each(_whole, [(scene,)])
-        if record is None:
-            raise SimulationError(
-                "the process of the last simulation was killed twice, perhaps for lack of memory; every run before it is "
-                "stored: free some memory and add --resume",
-                reason=DIED,
-                fraction=0.0,
-            )
-        return record
+        order = sorted(errands, key=lambda errand: errand.haste)
+        for k, result in self.each(_errand, [(_whole, e.scene) if e.whole else (_run, e.scene, {}) for e in order]):
+            order[k].keep(_alive(result) if order[k].whole else _evaluation(k, {}, result))
 
     def evaluator(self, scene: Scene, kept: Collection[str] = ()) -> SceneEvaluator:
         """Evaluator of candidates of one scene; ``kept`` sizes do not follow a fitted height."""
         return SceneEvaluator(self, scene, kept)
+
+
+def _evaluation(index: int, values: dict[str, float], result: dict[str, Any] | None) -> Evaluation:
+    """What a worker has sent back, or that it was killed twice."""
+    if result is None:
+        return Evaluation(index, values, "failed", DIED, 0.0, np.empty(0), np.empty(0))
+    return Evaluation(index=index, parameters=values, **result)
+
+
+def _alive(record: ForceRecord | None) -> ForceRecord:
+    if record is None:
+        raise SimulationError(
+            "the process of the last simulation was killed twice, perhaps for lack of memory; every run before it is "
+            "stored: free some memory and add --resume",
+            reason=DIED,
+            fraction=0.0,
+        )
+    return record
 
 
 class SceneEvaluator:

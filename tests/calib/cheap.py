@@ -75,10 +75,18 @@ def noted(log: Path, what: str) -> Counter[str]:
     return Counter(line[1] for line in lines if line[0] == what)
 
 
+MADE = {workers._run: run, workers._whole: whole}
+
+
+def _cheap(argument: Any) -> Any:
+    """What is asked for in an errand."""
+    return MADE[argument] if callable(argument) else argument
+
+
 class _Cheap(workers.Workers):
     def each(self, work: Any, jobs: Any) -> Any:
         """The same with the formula."""
-        return super().each({workers._run: run, workers._whole: whole}[work], jobs)
+        return super().each(work if work is workers._errand else MADE[work], [tuple(map(_cheap, job)) for job in jobs])
 
 
 class CheapPool(_Cheap, Pool):

@@ -29,7 +29,8 @@ from calib.knives import load_knife
 from calib.materials import load_food
 from calib.pool import Pool
 from calib.scenes import Sizing, cut_scene, specimen
-from calib.workers import DIED
+from calib.workers import DIED, Errand
+from mpm.record import ForceRecord
 from tests.calib.cheap import CheapCluster, CheapPool, noted
 from tests.data_dir import ROOT
 
@@ -181,7 +182,9 @@ def test_the_same_bits_as_on_this_machine(two):
     candidates = [(scene, {"E": value}) for value in (2e5, 4e5, 8e5)]
     with Pool(1) as here, full(two) as there:
         own, other = ({e.index: e for e in place.run(candidates)} for place in (here, there))
-        records = [place.record(scene) for place in (here, there)]
+        records: list[ForceRecord] = []
+        for place in (here, there):
+            place.errands([Errand(scene, records.append, whole=True)])
     for k in range(3):
         assert own[k].ok and other[k].parameters == own[k].parameters
         assert other[k].scalars == own[k].scalars

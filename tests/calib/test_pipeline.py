@@ -11,6 +11,7 @@ import time
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,11 +32,13 @@ from calib.provenance import code_key, key_of, versions
 from calib.scenes import Sizing, cut_scene, elsewhere, height_range, place, specimen
 from calib.trace import Trace
 from calib.verdicts import balances, judge, limits, spent, unbooked
-from calib.workers import DIED, SceneEvaluator
+from calib.workers import DIED, Errand, SceneEvaluator
 from mpm.errors import SimulationError
 from mpm.record import ENERGIES
+from mpm.scene import Scene
 from mpm.seeding import seed
 from mpm.shapes import SHAPE_KINDS
+from tests.mpm.scenes import PRISM
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -351,11 +354,39 @@ def test_a_renewed_pool_has_other_processes():
 
 
 def test_killed_last_run_is_made_once_more():
-    """The full record of the best values survives one death; after two the message says what is kept and what to do."""
-    assert LastRun(1).record(None) == "the record"  # type: ignore[arg-type]
+    """The full record of the best values survives one death; after two the message says what is kept and what to do. A check
+    that is killed twice is kept as one that broke down."""
+    kept: list[Any] = []
+    LastRun(1).errands([Errand(PRISM, kept.append, whole=True)])
+    assert kept == ["the record"]
     with pytest.raises(SimulationError, match="--resume") as error:
-        LastRun(2).record(None)  # type: ignore[arg-type]
+        LastRun(2).errands([Errand(PRISM, kept.append, whole=True)])
     assert error.value.reason == DIED
+    LastRun(2).errands([Errand(PRISM, kept.append)])
+    assert kept[1].reason == DIED and len(kept) == 2
+
+
+def test_the_longest_errand_comes_first():
+    """Finer cells before coarser ones, slower blades before faster ones, and each result goes to its own."""
+    made: list[float] = []
+    kept: dict[str, Any] = {}
+
+    class Here(Pool):
+        def __init__(self) -> None:
+            self.workers, self.arch, self.threads = 2, "cpu", 1
+
+        def each(self, work: Any, jobs: Any) -> Any:
+            for k, (_, scene, *_) in reversed(list(enumerate(jobs))):
+                made.append(scene.numerics.dx * scene.motion.mach)
+                yield k, scene
+
+    def scene(dx: float, mach: float) -> Scene:
+        motion, numerics = (replace(PRISM.motion, mach=mach), replace(PRISM.numerics, dx=dx))
+        return replace(PRISM, motion=motion, numerics=numerics)
+
+    scenes = {"coarse": scene(2e-3, 0.02), "slow": scene(2e-3, 0.01), "fine": scene(1e-3, 0.02)}
+    Here().errands([Errand(s, partial(kept.__setitem__, name), whole=True) for name, s in scenes.items()])
+    assert made[::-1] == [2e-5, 2e-5, 4e-5] and kept == scenes
 
 
 IDLE = """

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+import pytest
 
-from calib.records import whole_record
+from calib.errors import OutputError
+from calib.records import read_record, record_errands
 from mpm.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import Motion, Scene
@@ -16,32 +17,28 @@ from mpm.solver import Simulation
 from tests.mpm.scenes import PRISM
 
 
-class Counting:
-    """Simulates here, and counts."""
-
-    def __init__(self) -> None:
-        self.count = 0
-
-    def record(self, scene: Scene) -> ForceRecord:
-        """A record with two looks at the section."""
-        self.count += 1
-        return Simulation(scene, Runtime(threads=1)).run(sections=2)
+def whole(scene: Scene, path: Path) -> tuple[ForceRecord, int]:
+    """A record with two looks at the section, and how many simulations it took."""
+    errands = record_errands(scene, path)
+    for errand in errands:
+        errand.keep(Simulation(errand.scene, Runtime(threads=1)).run(sections=2))
+    return read_record(scene, path), len(errands)
 
 
 def test_a_record_is_read_back_with_its_section(tmp_path: Path) -> None:
     """Every number is the same, pieces, counters and section too; another scene or a damaged file is simulated again."""
-    pool: Any = Counting()
-    path, said = tmp_path / "record.h5", []
+    path = tmp_path / "record.h5"
     scene = replace(PRISM, motion=Motion(4e-3, 0.02))
-    first, again = (whole_record(scene, pool, path, said.append) for _ in range(2))
-    assert pool.count == len(said) == 1
+    (first, one), (again, none) = (whole(scene, path) for _ in range(2))
+    assert (one, none) == (1, 0)
     assert first.section is not None and again.section is not None
     for one, two in ((vars(first), vars(again)), (vars(first.section), vars(again.section))):
         for name, value in one.items():
             if name not in ("section", "pieces"):
                 assert np.array_equal(value, two[name]), name
     assert first.pieces == again.pieces and len(again.section.stroke) == 2
-    whole_record(replace(scene, motion=Motion(5e-3, 0.02)), pool, path, said.append)
+    assert whole(replace(scene, motion=Motion(5e-3, 0.02)), path)[1] == 1
     path.write_bytes(b"damaged")
-    whole_record(scene, pool, path, said.append)
-    assert pool.count == 3
+    with pytest.raises(OutputError, match="--resume"):
+        read_record(scene, path)
+    assert whole(scene, path)[1] == 1

@@ -20,12 +20,12 @@ import pytest
 from calib import records
 from calib.knives import load_knife
 from calib.materials import load_food
-from calib.records import whole_record
+from calib.records import read_record, record_errands
 from calib.scenes import Sizing, cut_scene, specimen
 from mpm.record import ForceRecord
 from mpm.scene import Scene
 from mpm.topology import Topology
-from tests.calib.cheap import LOG, SECONDS, CheapPool, cut, noted
+from tests.calib.cheap import LOG, SECONDS, cut, noted
 from tests.data_dir import ROOT
 
 KILLS = 10
@@ -153,40 +153,30 @@ def test_ten_kills_change_nothing(tmp_path):
     assert hunted.results() == calm.results()
 
 
-class Once(CheapPool):
-    """Makes one record."""
-
-    def record(self, scene: Scene) -> ForceRecord:
-        """What it is given."""
-        return MADE.pop()
-
-
-MADE: list[ForceRecord] = []
+def brought(scene: Scene, path: Path, record: ForceRecord) -> ForceRecord:
+    """A record as it is read back after it was made."""
+    (errand,) = record_errands(scene, path)
+    errand.keep(record)
+    assert record_errands(scene, path) == []
+    return read_record(scene, path)
 
 
 def test_a_record_comes_back_whole(tmp_path):
     """Every number, the pieces of the food, and None; a record of another scene or a damaged file is made anew."""
     food = load_food("banana")
     scene = cut_scene(food, specimen(food, None, Sizing())[0], load_knife("kitchen"))
-    path, said = tmp_path / "record.h5", []
+    path = tmp_path / "record.h5"
     for pieces in (None, Topology((2e-5, 1e-5), 1e-9, 0.0, None, 0.0), Topology((3e-5,), 0.0, 1e-4, (0.0, 0.01), 2e-3)):
         first = replace(
             cut(scene), pieces=pieces, counters={"inverted": 3}, status="left_grid", fraction=1 / 3, resistance=350.0
         )
-        MADE.append(first)
         path.unlink(missing_ok=True)
-        with Once() as pool:
-            whole_record(scene, pool, path, said.append)
-            again = whole_record(scene, pool, path, said.append)
-        assert not MADE
+        again = brought(scene, path, first)
         for name, value in vars(first).items():
             assert type(getattr(again, name)) is type(value) and np.array_equal(getattr(again, name), value), name
-    assert len(said) == 3
     other = scene.with_material(E=1e5)
-    MADE.extend([cut(scene), cut(other)])
-    with Once() as pool:
-        assert whole_record(other, pool, path, said.append).peak == cut(other).peak
-        path.write_bytes(path.read_bytes()[:1000])
-        again = whole_record(scene, pool, path, said.append)
-        assert again.peak == cut(scene).peak
-        assert np.isnan(again.resistance) and np.isnan(whole_record(scene, pool, path, said.append).resistance)
+    assert brought(other, path, cut(other)).peak == cut(other).peak
+    path.write_bytes(path.read_bytes()[:1000])
+    again = brought(scene, path, cut(scene))
+    assert again.peak == cut(scene).peak
+    assert np.isnan(again.resistance) and np.isnan(read_record(scene, path).resistance)
