@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,9 @@ from calib.errors import OutputError
 from calib.knives import load_knife
 from calib.materials import FoodSpec
 from calib.outputs import prepare, write_json
+from calib.progress import Countdown
 from calib.provenance import git_commit, key_of, versions
+from calib.workers import Workers
 from mpm.scene import Arm
 from robot.cuts import target
 from robot.judge import PLACE, Judged, judge, wilson
@@ -24,6 +26,7 @@ from robot.policies import Policy
 from robot.severing import ARM, Severed, sever
 from robot.suites import SUITES, TEST, Episode, draw
 from robot.table import Rollout, Table
+from robot.world import World
 
 STEPS = 2000  # of an episode, at most: 100 s
 ROWS = "evaluate.jsonl"
@@ -49,7 +52,15 @@ def run_episode(
     """One row of the evaluation: what was asked for, what was found."""
     rollout, table = roll_out(policy, episode)
     judged = judge(episode.spec, episode.item, rollout, table.items[0])
-    row: dict[str, Any] = {
+    row = _row(episode, rollout, judged)
+    if severing and not episode.spec.pieces:
+        row["severing"] = _sever(episode, rollout, judged, foods, knife, arm).as_dict()
+    return row
+
+
+def _row(episode: Episode, rollout: Rollout, judged: Judged) -> dict[str, Any]:
+    """What was asked for, and what geometry says of it."""
+    return {
         "suite": episode.suite,
         "seed": episode.seed,
         "food": episode.item.name,
@@ -67,9 +78,6 @@ def run_episode(
         "published": judged.published,
         "strict": judged.strict,
     }
-    if severing and not episode.spec.pieces:
-        row["severing"] = _sever(episode, rollout, judged, foods, knife, arm).as_dict()
-    return row
 
 
 def _finite(x: float) -> float | None:
@@ -105,6 +113,8 @@ def evaluate(
     severing: bool = False,
     knife: str = "kitchen",
     arm: Arm = ARM,
+    world: World | None = None,
+    pool: Workers | None = None,
     resume: bool = False,
     say: Say = lambda _: None,
     command: Sequence[str] = (),
@@ -120,9 +130,11 @@ def evaluate(
         out: Folder of the results.
         seed: Of the first episode of each suite, above :data:`robot.suites.TEST`.
         sigma: Standard deviation of the noisy oracle [m]: its closed form is given beside what was found.
-        severing: Simulate single cuts in the solver too.
+        severing: Simulate single cuts in the solver too; on the table.
         knife: Name of the knife.
-        arm: What holds it in the solver.
+        arm: What holds it in the solver; on the table.
+        world: Where the episodes take place: in IntSim, in closed loop with the food; without it on the table.
+        pool: Where IntSim runs.
         resume: Go on with what is in ``out``.
         say: Called with a line now and then.
         command: Command line, for provenance.
@@ -143,6 +155,7 @@ def evaluate(
         "sigma_m": sigma,
         "severing": severing,
         "arm": vars(arm),
+        "world": None if world is None else {"coupled": world.coupled, "stiffness": world.stiffness},
     }
     rows = _rows(out / ROWS, about)
     done = {(r["suite"], r["seed"]) for r in rows}
@@ -150,13 +163,23 @@ def evaluate(
     with (out / ROWS).open("a", encoding="utf-8") as file:
         if not rows and file.tell() == 0:
             file.write(json.dumps(about) + "\n")
-        for k, (suite, at) in enumerate(todo):
-            row = run_episode(policy, draw(suite, at, dict(foods)), foods, severing=severing, knife=knife, arm=arm)
+
+        def made() -> Iterator[dict[str, Any]]:
+            if world is not None and pool is not None:
+                yield from _in_world(policy, todo, foods, world, pool)
+                return
+            for suite, at in todo:
+                episode = draw(suite, at, dict(foods))
+                yield run_episode(policy, episode, foods, severing=severing, knife=knife, arm=arm)
+
+        rest = Countdown(max(len(todo), 1))
+        for k, row in enumerate(made(), 1):
             rows.append(row)
             file.write(json.dumps(row) + "\n")
             file.flush()
-            if severing or (k + 1) % 100 == 0:
-                say(f"{k + 1} of {len(todo)} episodes: {suite}, {row['food']}, {_words(row)}")
+            left = rest.left(1)
+            if severing or world is not None or k % 100 == 0:
+                say(f"{k} of {len(todo)} episodes: {row['suite']}, {row['food']}, {_words(row)}; {left}")
     wanted = {(s, TEST + seed + k) for s in suites for k in range(episodes)}
     document = {
         "schema": tag("evaluate"),
@@ -168,6 +191,24 @@ def evaluate(
     }
     write_json(out / "evaluate.json", document)
     return document
+
+
+def _in_world(
+    policy: Policy, todo: Sequence[tuple[str, int]], foods: Mapping[str, FoodSpec], world: World, pool: Workers
+) -> Iterator[dict[str, Any]]:
+    """Rows of episodes in IntSim, in order of completion."""
+    from robot.world import episode_of
+
+    for k, result in pool.each(episode_of, [(policy, suite, seed, dict(foods), world) for suite, seed in todo]):
+        suite, seed = todo[k]
+        if result is None:
+            raise OutputError(
+                f"{suite} {seed}: its process was killed twice, perhaps for lack of memory; free some and add --resume"
+            )
+        rollout, after, found = result
+        episode = draw(suite, seed, dict(foods))
+        judged = judge(episode.spec, episode.item, rollout, after)
+        yield _row(episode, rollout, judged) | {"severing": found.as_dict()}
 
 
 def _rows(path: Path, about: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -15,20 +15,22 @@ DESCRIPTION = """generate: a Panda in ManiSkill cuts what it is told, in words; 
 the cutting solver and pushes back. Writes dataset.json and shards of HDF5 and
 JSON in ManiSkill's layout, with force, pieces and surface in a group mpm/.
 export: writes them as a LeRobotDataset v3.0, with pictures where it can render,
-or as RLDS (TFDS), which OpenVLA and Octo read."""
+or as RLDS (TFDS), which OpenVLA and Octo read. clone: trains a small network to
+do what they do (cutcal evaluate --policy clone)."""
 EPILOG = """examples:
   cutcal dataset generate --episodes 60 --out runs/cuts
   cutcal dataset export runs/cuts --scenes 0,1,2 --out runs/lerobot
 
-generate needs pip install 'cutcal[robot]', export 'cutcal[data]', its pictures
-both and Vulkan (cutcal doctor). Exit codes: 0 done, 1 error."""
-WHAT, FORMATS = ("generate", "export"), ("lerobot", "rlds")
+generate and clone need pip install 'cutcal[robot]', export 'cutcal[data]', its
+pictures both and Vulkan (cutcal doctor). Exit codes: 0 done, 1 error."""
+WHAT, FORMATS = ("generate", "export", "clone"), ("lerobot", "rlds")
+KEEP = ("severed", "published", "all")
 
 
 def add_args(p: Group) -> None:
     """Options of the command."""
-    p.add_argument("what", choices=WHAT, metavar="WHAT", help="generate or export")
-    p.add_argument("folder", nargs="?", metavar="DIR", help="dataset that is exported")
+    p.add_argument("what", choices=WHAT, metavar="WHAT", help="generate, export or clone")
+    p.add_argument("folder", nargs="?", metavar="DIR", help="dataset that is exported or learnt from")
     p.add_argument("--episodes", type=whole(1), default=60, metavar="N", help="trajectories (default 60)")
     p.add_argument(
         "--food", action="append", metavar="NAME", help="this food alone, or several (default: the 15, in turn)"
@@ -38,10 +40,13 @@ def add_args(p: Group) -> None:
     )
     p.add_argument(
         "--demos",
-        choices=("sustained", "planned"),
+        choices=("sustained", "planned", "kinematic"),
         default="sustained",
         metavar="KIND",
-        help="sustained until the food parts (default), or as planned",
+        help="sustained until the food parts (default), planned, or kinematic",
+    )
+    p.add_argument(
+        "--style", action="append", metavar="NAME", help="press, slice, rock or saw, or several (default: all)"
     )
     p.add_argument(
         "--stiffness", type=number(1, 1e6, "N m/rad"), metavar="K", help="of the arm's joints [N m/rad] (default 1000)"
@@ -55,9 +60,13 @@ def add_args(p: Group) -> None:
     p.add_argument(
         "--format", choices=FORMATS, default="lerobot", metavar="NAME", help="of an export: lerobot (default) or rlds"
     )
+    p.add_argument(
+        "--keep", choices=KEEP, default="severed", metavar="KIND", help="clone: severed (default), published, all"
+    )
+    p.add_argument("--most", type=whole(1), metavar="N", help="clone: learn from at most so many")
     p.add_argument("--pixels", type=whole(16), default=128, metavar="N", help="of the pictures (default 128)")
     add_workers(p, "trajectories")
-    p.add_argument("--out", metavar="DIR", help="folder of the results; never overwritten")
+    p.add_argument("--out", metavar="DIR", help="folder of the results, file of a clone; never overwritten")
     p.add_argument("--resume", action="store_true", help=RESUME_HELP)
     p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
 
@@ -66,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
     """Generate or export."""
     if args.out is None:
         raise CutcalError("dataset: give --out, the folder of the results")
-    document = _generate(args) if args.what == "generate" else _export(args)
+    document = {"generate": _generate, "export": _export, "clone": _clone}[args.what](args)
     if args.json:
         print_json(document)
     else:
@@ -77,6 +86,7 @@ def run(args: argparse.Namespace) -> int:
 def _generate(args: argparse.Namespace) -> dict[str, Any]:
     from robot.data.generate import available, generate
     from robot.data.manifest import TASKS, Manifest
+    from robot.planner import STYLES
     from robot.suites import FOODS
 
     if args.folder is not None:
@@ -84,7 +94,13 @@ def _generate(args: argparse.Namespace) -> dict[str, Any]:
     unknown = [name for name in args.food or () if name not in FOODS]
     if unknown:
         raise CutcalError(f"--food {unknown[0]}: not one of {', '.join(FOODS)}")
-    manifest = Manifest(args.episodes, foods=args.food or FOODS, suites=args.task or TASKS, seed=args.seed)
+    manifest = Manifest(
+        args.episodes,
+        foods=args.food or FOODS,
+        suites=args.task or TASKS,
+        seed=args.seed,
+        styles=args.style or STYLES,
+    )
     available()
     args.arch = "cpu"
     with workers_of(args, say) as pool:
@@ -112,6 +128,27 @@ def _generate(args: argparse.Namespace) -> dict[str, Any]:
         for broken in found["broken"]:
             print(f"  trajectory {broken['index']}: {broken['status']}")
     return found
+
+
+def _clone(args: argparse.Namespace) -> dict[str, Any]:
+    if args.folder is None:
+        raise CutcalError(
+            "dataset clone: name the folder of a dataset, such as cutcal dataset clone runs/cuts --out clone.npz"
+        )
+    path = Path(args.out)
+    if path.exists():
+        raise CutcalError(f"--out {path}: exists and is never overwritten; choose another file")
+    try:
+        from robot.training import train
+    except ImportError:
+        raise CutcalError("dataset clone: torch is not installed; pip install 'cutcal[robot]'") from None
+    clone = train(Path(args.folder), keep=args.keep, most=args.most, seed=args.seed)
+    clone.save(path)
+    if not args.json:
+        print(
+            f"learnt from {clone.about['trajectories']} trajectories, {len(clone.vocabulary)} words; mean error {clone.about['loss']:.4f}"
+        )
+    return clone.about
 
 
 def _export(args: argparse.Namespace) -> dict[str, Any]:

@@ -4,23 +4,31 @@ from __future__ import annotations
 
 import argparse
 import sys
+from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from calib.cli.options import KNIFE_HELP, Group, number, print_json, say, whole
-from calib.materials import load_food, load_material_file
+from calib.cli.options import KNIFE_HELP, Group, add_workers, number, print_json, say, whole, workers_of
+from calib.materials import FoodSpec, load_food, load_material_file
 from mpm.errors import CutcalError
 
+if TYPE_CHECKING:
+    from calib.workers import Workers
+    from robot.policies import Policy
+    from robot.world import World
+
 HELP = "evaluate a policy that cuts what it is told, geometrically and in the solver"
-DESCRIPTION = """Rolls a policy out on a plain table, in suites of tasks in words, and counts its
-successes: the four published criteria, stricter ones, and whether the food is
-in pieces when the motion is simulated. Writes evaluate.json, evaluate.jsonl."""
+DESCRIPTION = """Rolls a policy out in suites of tasks in words, and counts its successes: the
+four published criteria, stricter ones, and whether the food is in pieces: on a
+plain table, with the motion simulated afterwards (--severing), or in closed
+loop with the food (--world intsim). Writes evaluate.json, evaluate.jsonl."""
 EPILOG = """example:
   cutcal evaluate --policy shallow --suite seeds --episodes 20 --severing
 
 The built-in policies are oracles that test the evaluation; a policy of your
 own is any object with reset(seed) and act(obs, instruction), from Python:
 robot.evaluate.evaluate. Exit codes: 0 done, 1 error."""
+WORLDS = ("table", "intsim", "kinematic")
 
 
 def add_args(p: Group) -> None:
@@ -43,6 +51,14 @@ def add_args(p: Group) -> None:
     p.add_argument(
         "--arm-stiffness", type=number(1, 1e9, "N/m"), metavar="N/M", help="of the arm in the solver (default 1754)"
     )
+    p.add_argument("--weights", metavar="FILE", help="of --policy clone: what cutcal dataset clone has written")
+    p.add_argument(
+        "--world", choices=WORLDS, default="table", metavar="NAME", help="table, intsim, or kinematic (no resistance)"
+    )
+    p.add_argument(
+        "--stiffness", type=number(1, 1e6, "N m/rad"), metavar="K", help="of intsim's joints [N m/rad] (default 1000)"
+    )
+    add_workers(p, "episodes of intsim")
     p.add_argument("--knife", default="kitchen", metavar="NAME", help=KNIFE_HELP)
     p.add_argument("--seed", type=whole(0), default=0, metavar="N", help="first seed of the tests (default 0)")
     p.add_argument("--out", metavar="DIR", help="folder of the results; never overwritten")
@@ -52,15 +68,16 @@ def add_args(p: Group) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Evaluate and write."""
-    from mpm.scene import Arm
-    from robot.evaluate import evaluate
+    from robot.clone import Clone
+    from robot.data.generate import available
     from robot.policies import POLICIES, make
-    from robot.severing import ARM
     from robot.suites import FOODS, SUITES
+    from robot.world import World
 
     if args.policy == "list" or args.suite == ["list"]:
         for name, (_, what) in POLICIES.items():
             print(f"policy {name:12s}{what}")
+        print(f"policy {'clone':12s}does what it has learnt from demonstrations (--weights)")
         for name, suite in SUITES.items():
             print(f"suite  {name:12s}{suite.what}")
         return 0
@@ -70,12 +87,46 @@ def run(args: argparse.Namespace) -> int:
         raise CutcalError(f"--suite {unknown[0]}: none of {', '.join(SUITES)}")
     if (args.policy == "noisy") != (args.sigma is not None):
         raise CutcalError("--sigma M is the error of --policy noisy: give both or neither")
-    policy = make(args.policy, args.sigma or 0.0)
+    if (args.policy == "clone") != (args.weights is not None):
+        raise CutcalError("--weights FILE are those of --policy clone: give both or neither")
+    if args.world == "table" and args.stiffness is not None:
+        raise CutcalError("--stiffness is of a robot's joints: add --world intsim, or give --arm-stiffness")
+    if args.world != "table" and (args.severing or args.arm_stiffness is not None):
+        raise CutcalError("--severing and --arm-stiffness are of --world table; in intsim the food resists anyway")
+    policy = make(args.policy, args.sigma or 0.0) if args.weights is None else Clone.load(Path(args.weights))
     calibrated = {food.name: food for food in map(load_material_file, args.material)}
     names = args.food or (list(calibrated) if args.material else FOODS)
     foods = {name: calibrated.get(name) or load_food(name) for name in names}
     out = Path(args.out or f"cutcal-evaluate-{args.policy}")
-    document = evaluate(
+    world = None if args.world == "table" else World(args.world == "intsim", args.stiffness, args.knife)
+    if world is not None:
+        available()
+    args.arch = "cpu"
+    with nullcontext() if world is None else workers_of(args, say) as pool:
+        document = _evaluate(args, policy, foods, suites, out, world, pool)
+    if args.json:
+        print_json(document)
+    else:
+        print(table(document))
+        print(f"  wrote {out}")
+    return 0
+
+
+def _evaluate(
+    args: argparse.Namespace,
+    policy: Policy,
+    foods: dict[str, FoodSpec],
+    suites: list[str],
+    out: Path,
+    world: World | None,
+    pool: Workers | None,
+) -> dict[str, Any]:
+    """What the options ask for."""
+    from mpm.scene import Arm
+    from robot.evaluate import evaluate
+    from robot.severing import ARM
+
+    return evaluate(
         policy,
         args.policy,
         foods,
@@ -87,16 +138,12 @@ def run(args: argparse.Namespace) -> int:
         severing=args.severing,
         knife=args.knife,
         arm=ARM if args.arm_stiffness is None else Arm(args.arm_stiffness),
+        world=world,
+        pool=pool,
         resume=args.resume,
         say=say,
         command=["cutcal", *sys.argv[1:]],
     )
-    if args.json:
-        print_json(document)
-    else:
-        print(table(document))
-        print(f"  wrote {out}")
-    return 0
 
 
 def table(document: dict[str, Any]) -> str:

@@ -20,13 +20,13 @@ from robot.data.manifest import Draw, Manifest
 from robot.data.shards import META, PART, SHARD, pack, write_part, write_shard
 from robot.language import instructions
 from robot.planner import RATE
+from robot.world import ENV, World, environment
 
-ENV = "CutFood-v1"
-DEMOS = ("sustained", "planned")
-"""Demonstrations: ``sustained`` goes on until the food is in pieces, ``planned`` is the motion of a plan without food."""
+DEMOS = ("sustained", "planned", "kinematic")
+"""Demonstrations: ``sustained`` goes on until the food is in pieces, ``planned`` is the motion that geometry plans, whatever the food does, and
+``kinematic`` the same without food that resists: nothing is in pieces then but in geometry."""
 DRAWN = ("slice", "saw")  # styles whose way along the edge the solver follows
 WHOLE_SET = 21_000  # trajectories of the published data set
-_made: dict[str, Any] = {}
 
 
 def available() -> None:
@@ -54,25 +54,10 @@ def make(draw: Draw, demos: str, knife: str, stiffness: float | None, arch: str,
         arch, threads: Device of the solver; only CPUs are used.
     """
     del arch, threads
-    import gymnasium
-
-    import robot.intsim  # noqa: F401
     from robot.data.demonstrate import demonstrate
 
     began = time.perf_counter()
-    key = f"{knife} {stiffness}"
-    if key not in _made:
-        _made.clear()
-        _made[key] = gymnasium.make(
-            ENV,
-            sim_backend="physx_cpu",
-            render_backend="none",
-            obs_mode="state",
-            control_mode="pd_joint_pos",
-            knife=knife,
-            stiffness=stiffness,
-        ).unwrapped
-    env = _made[key]
+    env = environment(World(demos != "kinematic", stiffness, knife))
     start = time.perf_counter() - began
     episode, before = draw.episode, env.solver_s
     env.foods = {**env.foods, draw.food.name: draw.food}

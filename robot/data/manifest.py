@@ -54,6 +54,7 @@ class Manifest:
         trajectories, backgrounds, instructions: How many of each.
         foods: Foods by name, asked for in turn.
         suites: Kinds of task, in turn.
+        styles: Styles of the motion; half of the episodes press where that is one of several.
         seed: First seed; those of a dataset are ``seed`` to ``seed + trajectories``.
 
     Raises:
@@ -66,15 +67,18 @@ class Manifest:
     foods: Sequence[str] = FOODS
     suites: Sequence[str] = TASKS
     seed: int = 0
+    styles: Sequence[str] = STYLES
 
     def __post_init__(self) -> None:
-        if min(self.trajectories, self.backgrounds, self.instructions, len(self.foods), len(self.suites)) < 1:
+        lists = (self.foods, self.suites, self.styles)
+        if min(self.trajectories, self.backgrounds, self.instructions, *map(len, lists)) < 1:
             raise TaskError(
-                "dataset: no trajectories, backgrounds, sentences, foods or tasks; give one of each at least"
+                "dataset: no trajectories, backgrounds, sentences, foods, tasks or styles; give one of each at least"
             )
-        unknown = [s for s in self.suites if s not in SUITES]
-        if unknown:
-            raise TaskError(f"dataset: suite {unknown[0]!r} is none of {', '.join(SUITES)}")
+        for what, given, known in (("suite", self.suites, SUITES), ("style", self.styles, STYLES)):
+            for name in given:
+                if name not in known:
+                    raise TaskError(f"dataset: {what} {name!r} is none of {', '.join(known)}")
         if self.seed < 0 or self.seed + self.trajectories > TEST:
             raise TaskError(
                 f"dataset: seeds {self.seed} to {self.seed + self.trajectories}; those from {TEST} on are for tests"
@@ -104,11 +108,13 @@ class Manifest:
             if prop in food.properties:
                 found = food.properties[prop]
                 values[prop] = float(np.clip(found.value * np.exp(sd * rng.standard_normal()), found.low, found.high))
-        style = "press" if rng.random() < PRESSED else STYLES[1 + int(rng.integers(len(STYLES) - 1))]
+        others = [style for style in self.styles if style != STYLES[0]]
+        pressed = STYLES[0] in self.styles and rng.random() < PRESSED
+        style = STYLES[0] if pressed or not others else others[int(rng.integers(len(others)))]
         episode = draw(suite, seed, {name: food})
         return Draw(index, suite, seed, style, episode, food.with_values(values, source="drawn for a dataset"), values)
 
     def as_dict(self) -> dict[str, Any]:
         """As plain data."""
         own = {name: getattr(self, name) for name in ("trajectories", "backgrounds", "instructions", "seed")}
-        return own | {"foods": list(self.foods), "suites": list(self.suites)}
+        return own | {name: list(getattr(self, name)) for name in ("foods", "suites", "styles")}

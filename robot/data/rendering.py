@@ -11,11 +11,11 @@ import robot.intsim  # noqa: F401
 from mpm.errors import CutcalError
 from mpm.shapes import Shape
 from robot.cuts import CutSpec, Item
-from robot.data.generate import ENV
 from robot.data.shards import Stored
 from robot.data.views import VIEWS
 from robot.scenery import COLOURS
 from robot.suites import Episode
+from robot.world import ENV
 
 
 class Renderer:

@@ -1,0 +1,123 @@
+"""A policy in closed loop with the food: episodes in IntSim, in worker processes; needs the extra ``[robot]``."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from calib.materials import FoodSpec
+from robot.planner import RATE
+from robot.policies import Policy
+from robot.severing import Severed
+from robot.suites import draw
+from robot.table import Rollout, guard
+
+ENV = "CutFood-v1"
+STEPS = 400  # of an episode, at most: 20 s
+OPEN = -1.0  # of the gripper's action: closed on the handle
+_kept: dict[str, Any] = {}
+
+
+@dataclass(frozen=True)
+class World:
+    """Where a policy is evaluated.
+
+    Attributes:
+        coupled: Whether the food resists.
+        stiffness: Of the arm's joints [N m/rad]; ManiSkill's own (1000) without it.
+        knife: Name of the knife.
+    """
+
+    coupled: bool = True
+    stiffness: float | None = None
+    knife: str = "kitchen"
+
+
+def environment(world: World) -> Any:
+    """The environment of a world, without a renderer; a process keeps the last one."""
+    import gymnasium
+
+    import robot.intsim  # noqa: F401
+
+    key = repr(world)
+    if key not in _kept:
+        _kept.clear()
+        _kept[key] = gymnasium.make(
+            ENV,
+            sim_backend="physx_cpu",
+            render_backend="none",
+            obs_mode="state",
+            control_mode="pd_joint_pos",
+            knife=world.knife,
+            coupled=world.coupled,
+            stiffness=world.stiffness,
+        ).unwrapped
+    return _kept[key]
+
+
+def episode_of(
+    policy: Policy, suite: str, seed: int, foods: dict[str, FoodSpec], world: World, arch: str, threads: int
+) -> tuple[Rollout, Any, Severed]:
+    """One episode, in a worker.
+
+    Args:
+        policy: The policy.
+        suite, seed: Of the episode.
+        foods: Foods that may be asked for, by name.
+        world: Where.
+        arch, threads: Device of the solver; only CPUs are used.
+
+    Returns:
+        The rollout, the food in plain geometry at its end, and what the solver has found.
+    """
+    del arch, threads
+    env = environment(world)
+    env.foods = foods
+    episode = draw(suite, seed, foods)
+    env.reset(seed=seed, options={"episode": episode})
+    found = follow(env, policy, zlib.crc32(f"{suite} {seed}".encode()))
+    return env.table.rollout, env.table.items[0], found
+
+
+def follow(env: Any, policy: Policy, seed: int) -> Severed:
+    """Let a policy act until it has done what it was told.
+
+    Its changes of pose are taken from where the edge is, as in ``pd_ee_delta_pose`` in metres, and what is commanded keeps within the arm's
+    limits; the joints for it are found by inverse kinematics.
+
+    Args:
+        env: A :class:`robot.intsim.CutFoodEnv` that was reset, in joint positions.
+        policy: The policy.
+        seed: Its own.
+    """
+    policy.reset(seed)
+    command, velocity = env.pose, np.zeros(3)
+    joints, peak, lag = env.agent.robot.get_qpos()[0].numpy().astype(float), 0.0, 0.0
+    for _ in range(STEPS):
+        food = env.coupling if env.coupled else env.table
+        action = policy.act({"pose": env.pose, "items": tuple(food.items)}, env.instruction)
+        if action is None:
+            break
+        x, y, z, _, pitch, yaw = np.asarray(action, float)[:6]
+        goal = env.pose + [x, y, z, yaw, pitch]
+        change = goal - command
+        kept = guard(np.array([*change[:3], 0.0, change[4], change[3]]), velocity)
+        velocity = kept.delta[:3] * RATE
+        command = command + [*kept.delta[:3], kept.delta[5], kept.delta[4]]
+        joints, _ = env.kinematics.joints(command, np.array([*joints[:7], 0.0, 0.0]))
+        env.step(np.array([*joints[:7], OPEN], np.float32))
+        env.table.rollout.clipped[-1] = kept.clipped
+        peak = max(peak, float(env.forces[:, 2].max()))
+        lag = max(lag, float(env.pose[2] - command[2]))
+    env.coupling.end()
+    done = env.coupling.done
+    broken = [d.why for d in done if d.severed is None]
+    if broken or not env.coupled:
+        return Severed(None, peak=peak, short=lag, why=broken[0] if broken else "the food does not resist here")
+    severed = len(env.coupling.items[0].pieces) > env.episode.spec.cuts
+    return Severed(
+        severed, env.coupling.uncut(), peak, lag, done[-1].why if done else "the edge does not reach the food"
+    )
