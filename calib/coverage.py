@@ -20,9 +20,7 @@ import pandas as pd
 
 from calib.checks import otherwise
 from calib.documents import tag
-from calib.doubt import doubt_of
 from calib.errors import OutputError
-from calib.fit import calibrate
 from calib.knives import load_knife
 from calib.materials import FoodSpec
 from calib.objective import ErrorModel
@@ -33,6 +31,7 @@ from calib.progress import Countdown
 from calib.provenance import code_key, git_commit, key_of, versions
 from calib.request import Request
 from calib.scenes import Sizing, cut_scene, specimen
+from calib.second import infer
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.workers import Workers
 from mpm.errors import CutcalError
@@ -184,15 +183,13 @@ def _one(
         ]
         options = FitOptions(budget=request.budget, batch=pool.batch, seed=k)
         fine, coarse, again = evaluators
-        result = calibrate(setup.objective, fine, coarse=coarse, replicate=again, options=options)
+        result, doubt = infer(setup.objective, fine, coarse=coarse, again=again, options=options)
     except CutcalError as e:
         return row | {"error": str(e)}
     if result.status == "interrupted":
         raise KeyboardInterrupt
-    doubt = doubt_of(setup.objective, result, scout=coarse, judge=fine, seed=k)
     if doubt is None:
         return row | {"error": "the search ended before there were intervals"}
-    result = doubt.result
     return row | {
         "parameters": {i.parameter.name: i.as_dict() for i in doubt.uncertainty.intervals},
         "inside": doubt.bands[0].inside,

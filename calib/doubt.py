@@ -16,7 +16,7 @@ from calib.nuisance import NuisanceEstimate
 from calib.objective import Objective, Trial
 from calib.posterior import Posterior, sampled
 from calib.predictive import Band, bands
-from calib.profiles import Profile, profiles, with_profiles
+from calib.profiles import RISE, Profile, profiles, with_profiles
 from calib.surrogate import Surrogate
 from calib.uncertainty import Uncertainty, evidence, uncertainty
 
@@ -112,7 +112,14 @@ def doubt_of(
         drawn = bands(surrogate, result.best.z, found, seed)
         posterior = Posterior(surrogate, result.parameters, found)
         own = sampled(posterior, result.best.z, seed) if sample else {}
-    return Doubt(result, with_profiles(found, walked), walked, _nuisances(objective, result, found), drawn, own)
+    intervals = with_profiles(found, walked, as_good(result))
+    return Doubt(result, intervals, walked, _nuisances(objective, result, found), drawn, own)
+
+
+def as_good(result: FitResult) -> list[FloatArray]:
+    """Points (p,) of the runs that count and whose chi-square is within the rise at the ends of an interval of the best one's."""
+    limit = result.best.misfit + RISE
+    return [t.z for t in result.history if t.cut and not t.coarse and t.misfit <= limit]
 
 
 def _better(result: FitResult, runs: list[Trial], luck: float) -> Trial | None:

@@ -9,7 +9,7 @@ above what the right material would leave is begun afresh: multi-start, with the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -143,15 +143,7 @@ def _afresh(search: Search, evaluator: Evaluator, coarse: Evaluator | None) -> s
     rest = options.budget - search.spent
     if rest < least or search.best.misfit <= chi2.median(goal.effective_rows):
         return "stalled"
-    first, spent, failed = search.best, search.spent, sum(not t.ok for t in search.trials)
-    report, done = search.progress, len(search.trials)
-
-    def told(p: Progress) -> None:
-        if report is not None:
-            misfit = min(p.misfit, first.misfit)
-            total = replace(p, done=done + p.done, spent=spent + p.spent, budget=options.budget, misfit=misfit)
-            report(replace(total, failed=failed + p.failed))
-
+    first, told = search.best, onward(search.progress, search.trials, search.best, options)
     other = Search(goal, evaluator, coarse, replace(options, budget=rest, seed=options.seed + AFRESH), told)
     try:
         status = other.run()
@@ -160,6 +152,27 @@ def _afresh(search: Search, evaluator: Evaluator, coarse: Evaluator | None) -> s
     finally:
         search.trials += other.trials
     return status if search.best is not first else "stalled"
+
+
+def onward(
+    report: Callable[[Progress], None] | None, trials: Sequence[Trial], best: Trial, options: FitOptions
+) -> Callable[[Progress], None] | None:
+    """The progress of one more search, told as that of all of them.
+
+    Args:
+        report: Who is told.
+        trials, best: The runs so far, and the best of them.
+        options: What all may spend.
+    """
+    if report is None:
+        return None
+    done, spent, failed = len(trials), options.cost(trials), sum(not t.ok for t in trials)
+
+    def told(p: Progress) -> None:
+        total = replace(p, done=done + p.done, spent=spent + p.spent, failed=failed + p.failed)
+        report(replace(total, budget=options.budget, misfit=min(p.misfit, best.misfit)))
+
+    return told
 
 
 def _choose(search: Search, replicate: Evaluator) -> tuple[Trial, list[Trial]]:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from calib.errors import MaterialError
+
+if TYPE_CHECKING:
+    from calib.objective import Trial
 
 
 @dataclass(frozen=True)
@@ -35,6 +40,10 @@ class FitOptions:
     def __post_init__(self) -> None:
         if min(self.budget, self.batch, self.design, self.coarse_cost, self.tolerance) <= 0 or self.seed < 0:
             raise ValueError(f"{self} has a number that is not positive; give positive ones.")
+
+    def cost(self, trials: Iterable[Trial]) -> float:
+        """What some runs have taken of the budget."""
+        return sum(self.coarse_cost if t.coarse else 1.0 for t in trials)
 
     def least(self, parameters: int) -> int:
         """Smallest budget of a search for so many parameters."""

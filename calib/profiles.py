@@ -201,19 +201,28 @@ class _Walker:
         return np.diag(STEP * self.surrogate.unit)
 
 
-def with_profiles(found: Uncertainty, walked: Sequence[Profile]) -> Uncertainty:
+def with_profiles(found: Uncertainty, walked: Sequence[Profile], beside: Sequence[FloatArray] = ()) -> Uncertainty:
     """The same uncertainty with the intervals and verdicts of the profiles.
+
+    Args:
+        found: The normal approximation.
+        walked: The profiles.
+        beside: Points (p,) of runs whose chi-square is within :data:`RISE` of the best: an interval reaches to each of them, whatever the
+            profile, which is walked from the best one alone, has seen.
 
     A side is bounded by the trace where the trace alone ends it within the literature's range. A parameter is ``identified``
     where both sides are, its interval is narrower than half the prior's, it is known to 15 % (one standard deviation), and the
     curve is explained; ``weak`` where one of these is not so; ``one_sided`` where the trace bounds one side and leaves the other to
     the prior or to what is possible; ``not_seen`` where it bounds neither.
     """
-    intervals = (_interval(i, p, found.explained) for i, p in zip(found.intervals, walked, strict=True))
+    intervals = (
+        _interval(i, p, found.explained, [float(z[p.index]) for z in beside])
+        for i, p in zip(found.intervals, walked, strict=True)
+    )
     return replace(found, intervals=tuple(intervals))
 
 
-def _interval(interval: Interval, profile: Profile, explained: bool) -> Interval:
+def _interval(interval: Interval, profile: Profile, explained: bool, beside: Sequence[float]) -> Interval:
     """The interval of a profile: what is not worse than the best run's value by more than the limit.
 
     The surrogate may put the optimum beside that value, and the unknown width and gain, which the search leaves alone, too. An
@@ -224,7 +233,8 @@ def _interval(interval: Interval, profile: Profile, explained: bool) -> Interval
     at = parameter.to_internal(parameter.value)
     above = np.maximum(profile.rise - float(np.interp(at, profile.z, profile.rise)), 0.0)
     ends = [profile.end(side, above) for side in (-1, 1)]
-    bottom, top = min(low if ends[0] is None else ends[0], at), max(high if ends[1] is None else ends[1], at)
+    bottom = min(low if ends[0] is None else ends[0], at, *beside)
+    top = max(high if ends[1] is None else ends[1], at, *beside)
     bounded = [_bounds(profile.end(side, profile.data), side, parameter) for side in (-1, 1)]
     width = (top - bottom) / (2.0 * Z95 * parameter.prior_sd)
     verdict: Verdict = "not_seen"

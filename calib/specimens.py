@@ -16,8 +16,8 @@ from calib.compression.measured import area, read_repeats, strain_grid
 from calib.compression.modulus import fit
 from calib.compression.press import UnitCurve, homogeneous
 from calib.config import Press, Study
-from calib.doubt import Doubt, doubt_of
-from calib.fit import FitResult, calibrate
+from calib.doubt import Doubt
+from calib.fit import FitResult
 from calib.joint import JointEvaluator, JointObjective
 from calib.options import FitOptions
 from calib.parameters import Z95, Parameter, ParameterSet, own, plain
@@ -25,6 +25,7 @@ from calib.preparation import set_up
 from calib.progress import Progress
 from calib.provenance import code_key
 from calib.request import Setup
+from calib.second import infer
 from calib.store import CachedEvaluator, EvaluationStore
 from calib.workers import Workers
 from mpm.scene import Scene
@@ -182,11 +183,10 @@ class Specimens:
         options = FitOptions(budget=self.study.budget, batch=self.pool.batch, seed=self.study.seed)
         words = f"fit of {', '.join(names)}"
         staged = self.staged(words)
-        result = calibrate(joint, fine, coarse=coarse, replicate=again, options=options, progress=staged)
+        result, doubt = infer(joint, fine, coarse=coarse, again=again, options=options, progress=staged, say=self.say)
         if result.status == "interrupted":
             raise KeyboardInterrupt
-        doubt = doubt_of(joint, result, scout=coarse, judge=fine, seed=self.study.seed, say=self.say)
-        return Fitted(tuple(names), joint, result if doubt is None else doubt.result, doubt)
+        return Fitted(tuple(names), joint, result, doubt)
 
     def staged(self, words: str) -> Callable[[Progress], None] | None:
         """The progress callback with what is being fitted before each stage."""

@@ -12,9 +12,9 @@ import numpy as np
 
 from calib.checks import VARIED, Check, check, check_errands, otherwise
 from calib.conditioning import Conditioned
-from calib.doubt import Doubt, doubt_of
+from calib.doubt import Doubt
 from calib.filters import filter_simulated
-from calib.fit import FitResult, calibrate
+from calib.fit import FitResult
 from calib.materials import FoodSpec, dump_material
 from calib.metrics import compare
 from calib.nulls import NullModel, null_models
@@ -26,6 +26,7 @@ from calib.provenance import code_key, key_of
 from calib.records import read_record, record_errands
 from calib.request import Request, Setup
 from calib.scenes import place
+from calib.second import infer
 from calib.sensitivity import sensitivity
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.summary import add_conditioning, summarise
@@ -78,12 +79,16 @@ def run(
             )
             for name, scene in (("fine", setup.fine), ("coarse", setup.coarse), ("again", otherwise(setup.fine)))
         )
-        result = calibrate(setup.objective, fine, coarse=coarse, replicate=again, options=options, progress=progress)
-        doubt = doubt_of(
-            setup.objective, result, scout=coarse, judge=fine, seed=request.seed, sample=request.sample, say=say
+        result, doubt = infer(
+            setup.objective,
+            fine,
+            coarse=coarse,
+            again=again,
+            options=options,
+            sample=request.sample,
+            progress=progress,
+            say=say,
         )
-        if doubt is not None:
-            result = doubt.result
         scene, values = place(setup.fine, result.best.evaluation.parameters, setup.kept)
         first, setup = setup, replace(setup, fine=scene)
         scene = scene.with_material(**values)

@@ -17,8 +17,7 @@ from calib.cli.main import main
 from calib.evaluation import Evaluation
 from calib.materials import load_material_file
 from calib.scenes import place
-from calib.workers import Workers
-from mpm.record import ForceRecord
+from calib.workers import Errand, Workers
 from mpm.scene import Scene
 from mpm.section import Section
 from reports.finished import read_section
@@ -52,11 +51,15 @@ class FakePool(Workers):
     def close(self) -> None:
         """Nothing to end."""
 
-    def record(self, scene: Scene) -> ForceRecord:
-        """A record with a look at a food of one particle [mm]."""
-        FakePool.runs += 1
-        mm = np.full((1, 1), 1e-3)
-        return replace(cut(scene), section=Section(mm[0], -mm, mm, mm, np.vstack([mm, mm]), True))
+    def errands(self, errands: Sequence[Errand]) -> None:
+        """A cut each, or its record with a look at a food of one particle [mm]."""
+        for errand in errands:
+            if errand.whole:
+                FakePool.runs += 1
+                mm = np.full((1, 1), 1e-3)
+                errand.keep(replace(cut(errand.scene), section=Section(mm[0], -mm, mm, mm, np.vstack([mm, mm]), True)))
+            else:
+                errand.keep(next(self.run([(errand.scene, {})])))
 
     def each(self, work: Any, jobs: Any) -> Any:
         """A study asks for runs alone; anything else would need a process."""
