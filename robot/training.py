@@ -69,7 +69,7 @@ def train(folder: Path, *, keep: str = "severed", most: int | None = None, seed:
         "trajectories": count,
         "steps": STEPS,
         "seed": seed,
-        "loss": float(loss),
+        "loss": float(loss.detach()),
     }
     return Clone(vocabulary, weights, about)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,9 @@ import gymnasium as gym
 import h5py
 import sapien
 
+from calib.errors import OutputError
 from calib.materials import load_food
+from calib.workers import Workers
 from mpm.errors import CutcalError
 from robot import intsim
 from robot.cuts import target
@@ -19,8 +23,12 @@ from robot.data.demonstrate import demonstrate
 from robot.data.generate import make
 from robot.data.manifest import Manifest
 from robot.data.shards import Stored
+from robot.evaluate import evaluate
 from robot.planner import PHASES, plan
+from robot.policies import make as make_policy
 from robot.suites import draw
+from robot.world import World
+from tests.calib.documents import valid
 
 FOODS = {name: load_food(name) for name in ("strawberry", "banana")}
 QUIET = {"sim_backend": "physx_cpu", "render_backend": "none", "obs_mode": "state", "foods": FOODS}
@@ -227,3 +235,65 @@ def test_pictures_of_a_stored_trajectory_show_what_was_simulated(tmp_path):
         assert frames.shape == (found["about"]["elapsed_steps"], 64, 64, 3) and frames.std() > 10
         assert np.array_equal(frames, again[view])
         assert np.abs(frames.astype(int) - other[view]).mean() > 5
+
+
+class Here(Workers):
+    """Jobs one after the other in this process."""
+
+    def __init__(self) -> None:
+        super().__init__(1, "cpu", 1)
+
+    def close(self) -> None:
+        """Nothing to end."""
+
+    def each(self, work, jobs):
+        """In order."""
+        for k, job in enumerate(jobs):
+            yield k, work(*job, "cpu", 1)
+
+
+def test_a_policy_is_judged_in_closed_loop_with_the_food(tmp_path):
+    """The planner's oracle in the robot: its commands are the plan's; where nothing resists the edge reaches the board; with food it
+    meets the published criteria and ends higher by what the force takes; commanded deeper the food parts. Rows go on after a stop.
+    """
+    food = {"strawberry": FOODS["strawberry"]}
+    found = {}
+    for name, policy, world in (
+        ("free", "oracle", World(coupled=False)),
+        ("planned", "oracle", World()),
+        ("deep", "overdrive", World()),
+    ):
+        out = tmp_path / name
+        found[name] = valid(evaluate(make_policy(policy), policy, food, ["seeds"], 2, out, world=world, pool=Here()))
+        rows = [json.loads(line) for line in (out / "evaluate.jsonl").read_text().splitlines()[1:]]
+        found[name]["rows"] = rows
+        assert all(r["published"] for r in rows) and not any(r["clipped"] for r in rows)
+    free, planned, deep = (found[name]["rows"] for name in ("free", "planned", "deep"))
+    for a, b, c in zip(free, planned, deep, strict=True):
+        assert a["severing"]["severed"] is None and a["severing"]["peak"] == 0 and a["height_m"] < 2e-3
+        assert b["height_m"] > a["height_m"] and b["severing"]["peak"] > 1
+        assert c["severing"]["severed"] and c["height_m"] < 1e-3
+    more = evaluate(
+        make_policy("oracle"),
+        "oracle",
+        food,
+        ["seeds"],
+        3,
+        tmp_path / "free",
+        world=World(coupled=False),
+        pool=Here(),
+        resume=True,
+    )
+    assert more["suites"]["seeds"]["published"]["trials"] == 3
+    with pytest.raises(OutputError, match="something else"):
+        evaluate(
+            make_policy("oracle"),
+            "oracle",
+            food,
+            ["seeds"],
+            3,
+            tmp_path / "free",
+            world=World(),
+            pool=Here(),
+            resume=True,
+        )
