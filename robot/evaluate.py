@@ -208,7 +208,8 @@ def _in_world(
         rollout, after, found = result
         episode = draw(suite, seed, dict(foods))
         judged = judge(episode.spec, episode.item, rollout, after)
-        yield _row(episode, rollout, judged) | {"severing": found.as_dict()}
+        row = _row(episode, rollout, judged)
+        yield row | {"severing": found.as_dict()} if world.coupled else row
 
 
 def _rows(path: Path, about: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +16,15 @@ DESCRIPTION = """generate: a Panda in ManiSkill cuts what it is told, in words; 
 the cutting solver and pushes back. Writes dataset.json and shards of HDF5 and
 JSON in ManiSkill's layout, with force, pieces and surface in a group mpm/.
 export: writes them as a LeRobotDataset v3.0, with pictures where it can render,
-or as RLDS (TFDS), which OpenVLA and Octo read. clone: trains a small network to
-do what they do (cutcal evaluate --policy clone)."""
+as RLDS (TFDS), which OpenVLA and Octo read, or as RDT reads ManiSkill's.
+clone: trains a small network to do what they do (evaluate --policy clone)."""
 EPILOG = """examples:
   cutcal dataset generate --episodes 60 --out runs/cuts
   cutcal dataset export runs/cuts --scenes 0,1,2 --out runs/lerobot
 
 generate and clone need pip install 'cutcal[robot]', export 'cutcal[data]', its
 pictures both and Vulkan (cutcal doctor). Exit codes: 0 done, 1 error."""
-WHAT, FORMATS = ("generate", "export", "clone"), ("lerobot", "rlds")
+WHAT, FORMATS = ("generate", "export", "clone"), ("lerobot", "rlds", "rdt")
 KEEP = ("severed", "published", "all")
 
 
@@ -58,7 +59,11 @@ def add_args(p: Group) -> None:
         "--scenes", metavar="LIST", help="backgrounds that are rendered, such as 0,1,2 (default: no pictures)"
     )
     p.add_argument(
-        "--format", choices=FORMATS, default="lerobot", metavar="NAME", help="of an export: lerobot (default) or rlds"
+        "--format",
+        choices=FORMATS,
+        default="lerobot",
+        metavar="NAME",
+        help="of an export: lerobot (default), rlds or rdt",
     )
     p.add_argument(
         "--keep", choices=KEEP, default="severed", metavar="KIND", help="clone: severed (default), published, all"
@@ -152,7 +157,7 @@ def _clone(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _export(args: argparse.Namespace) -> dict[str, Any]:
-    from robot.data import lerobot, rlds
+    from robot.data import lerobot, rdt, rlds
 
     if args.folder is None:
         raise CutcalError(
@@ -162,10 +167,16 @@ def _export(args: argparse.Namespace) -> dict[str, Any]:
         scenes = [int(k) for k in args.scenes.split(",")] if args.scenes else []
     except ValueError:
         raise CutcalError(f"--scenes {args.scenes}: give numbers of backgrounds, such as 0,1,2") from None
-    export = rlds.export if args.format == "rlds" else lerobot.export
-    found = export(Path(args.folder), Path(args.out), scenes=scenes, pixels=args.pixels, say=say)
+    exports: dict[str, Callable[..., dict[str, Any]]] = {
+        "lerobot": lerobot.export,
+        "rlds": rlds.export,
+        "rdt": rdt.export,
+    }
+    found = exports[args.format](Path(args.folder), Path(args.out), scenes=scenes, pixels=args.pixels, say=say)
     if not args.json and args.format == "rlds":
         print(", ".join(f"{s['shardLengths'][0]} episodes to {s['name']}" for s in found["splits"]))
+    elif not args.json and args.format == "rdt":
+        print(f"{sum(t['episodes'] for t in found.values())} episodes of {len(found)} tasks")
     elif not args.json:
         print(f"{found['total_episodes']} episodes of {found['total_frames']} frames, {found['total_tasks']} sentences")
     return found

@@ -270,7 +270,7 @@ def test_a_policy_is_judged_in_closed_loop_with_the_food(tmp_path):
         assert all(r["published"] for r in rows) and not any(r["clipped"] for r in rows)
     free, planned, deep = (found[name]["rows"] for name in ("free", "planned", "deep"))
     for a, b, c in zip(free, planned, deep, strict=True):
-        assert a["severing"]["severed"] is None and a["severing"]["peak"] == 0 and a["height_m"] < 2e-3
+        assert "severing" not in a and a["height_m"] < 2e-3
         assert b["height_m"] > a["height_m"] and b["severing"]["peak"] > 1
         assert c["severing"]["severed"] and c["height_m"] < 1e-3
     more = evaluate(
