@@ -6,13 +6,13 @@ import os
 import signal
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import connection, get_context, parent_process
 from typing import Any
 
-from calib.workers import Result, Workers
+from calib.workers import Errand, Result, Workers
 
 
 def _begin() -> None:
@@ -40,6 +40,7 @@ class Pool(Workers):
 
     def __init__(self, workers: int = 2, arch: str = "cpu", threads: int = 1) -> None:
         super().__init__(workers, arch, threads)
+        self._begun: dict[Future[Any], Errand] = {}
         self._executor = self._start()
 
     def _start(self) -> ProcessPoolExecutor:
@@ -47,6 +48,7 @@ class Pool(Workers):
 
     def close(self) -> None:
         """End the processes at once; runs that have not finished are lost."""
+        self._begun = {}
         processes = list((getattr(self._executor, "_processes", None) or {}).values())
         for process in processes:
             process.terminate()
@@ -73,15 +75,42 @@ class Pool(Workers):
             tried = alone.popleft() if alone and not running else None
             if tried is not None:
                 running[self._submit(work, *jobs[tried], self.arch, self.threads)] = tried
-            done, _ = wait(running, return_when=FIRST_COMPLETED)
-            for future in done:
+            done, _ = wait({*running, *self._begun}, return_when=FIRST_COMPLETED)
+            self._keep(done)
+            for future in done & running.keys():
                 k = running.pop(future)
-                if not isinstance(future.exception(), BrokenProcessPool):
+                if not _broken(future):
                     yield k, future.result()
                 elif k == tried:
                     yield k, None
                 else:
                     alone.append(k)
+
+    def begin(self, errand: Errand) -> None:
+        """Make an errand in one of several processes while the others do what is asked for."""
+        if self.workers > 1:
+            self._begun[self._submit(*errand.job, self.arch, self.threads)] = errand
+
+    def errands(self, errands: Sequence[Errand]) -> None:
+        """Make them all but those that were begun, which are waited for; what was begun and is not among them is dropped."""
+        begun = {f: e for f, e in self._begun.items() if any(e.same(other) for other in errands)}
+        for future in self._begun.keys() - begun.keys():
+            future.cancel()
+        self._begun = begun
+        super().errands([e for e in errands if not any(e.same(other) for other in begun.values())])
+        while self._begun:
+            done, _ = wait(self._begun, return_when=FIRST_COMPLETED)
+            lost = [self._begun[f] for f in done if _broken(f)]
+            self._keep(done)
+            super().errands(lost)
+
+    def _keep(self, done: Iterable[Future[Any]]) -> None:
+        """Keep what was begun and is made; what its process has lost is made with the rest."""
+        for future in done:
+            errand = self._begun.get(future)
+            if errand is not None and not _broken(future):
+                errand.keep(errand.kept(future.result()))
+            self._begun.pop(future, None)
 
     def _submit(self, work: Callable[..., Result], *args: Any) -> Future[Result]:
         try:
@@ -89,3 +118,8 @@ class Pool(Workers):
         except BrokenProcessPool:
             self._executor = self._start()
             return self._executor.submit(work, *args)
+
+
+def _broken(future: Future[Any]) -> bool:
+    """Whether the process of a future that is done was killed."""
+    return future.cancelled() or isinstance(future.exception(), BrokenProcessPool)

@@ -40,6 +40,7 @@ def infer(
     sample: bool = False,
     progress: Callable[[Progress], None] | None = None,
     say: Callable[[str], None] = lambda text: None,
+    found: Callable[[FitResult], None] = lambda result: None,
 ) -> tuple[FitResult, Doubt | None]:
     """Fit, find what the fit does not know, and search once more for what it calls identified.
 
@@ -52,6 +53,7 @@ def infer(
         sample: Whether the posterior is sampled as well.
         progress: Called after each simulation of a search.
         say: Called with each stage, as one sentence.
+        found: Told the fit when it is found and what it does not know is not: it will hardly change.
 
     Returns:
         The fit, and what it does not know: None where it ended too early for that.
@@ -61,10 +63,12 @@ def infer(
     """
     result = calibrate(objective, fine, coarse=coarse, replicate=again, options=options, progress=progress)
 
-    def doubted(found: FitResult, simulate: bool = True) -> Doubt | None:
+    def doubted(fit: FitResult, simulate: bool = True) -> Doubt | None:
         scout, judge = (coarse, fine) if simulate else (None, None)
-        return doubt_of(objective, found, scout=scout, judge=judge, seed=options.seed, sample=sample, say=say)
+        return doubt_of(objective, fit, scout=scout, judge=judge, seed=options.seed, sample=sample, say=say)
 
+    if result.status != "interrupted":
+        found(result)
     doubt = doubted(result, result.status != "interrupted")
     if doubt is None or result.status == "interrupted":
         return result, doubt

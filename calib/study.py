@@ -79,6 +79,13 @@ def run(
             )
             for name, scene in (("fine", setup.fine), ("coarse", setup.coarse), ("again", otherwise(setup.fine)))
         )
+
+        def begin(found: FitResult) -> None:
+            """The longest of the last simulations, beside those of the intervals."""
+            scene, values = place(setup.fine, found.best.evaluation.parameters, setup.kept)
+            for errand in sorted(check_errands(scene.with_material(**values), store), key=lambda e: e.haste)[:1]:
+                pool.begin(errand)
+
         result, doubt = infer(
             setup.objective,
             fine,
@@ -88,6 +95,7 @@ def run(
             sample=request.sample,
             progress=progress,
             say=say,
+            found=begin,
         )
         scene, values = place(setup.fine, result.best.evaluation.parameters, setup.kept)
         first, setup = setup, replace(setup, fine=scene)

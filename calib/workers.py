@@ -94,6 +94,23 @@ class Errand:
         """Inverse of what the run takes, but for a factor of the food."""
         return self.scene.motion.mach * self.scene.numerics.dx**4
 
+    @property
+    def job(self) -> tuple[Any, ...]:
+        """What a worker is asked for, but for device and threads."""
+        return (_whole, self.scene) if self.whole else (_run, self.scene, {})
+
+    def same(self, other: Errand) -> bool:
+        """Whether another one asks for the same."""
+        return (self.scene, self.whole) == (other.scene, other.whole)
+
+    def kept(self, result: Any) -> Any:
+        """What is kept of what a worker has sent back, None where it was killed twice.
+
+        Raises:
+            SimulationError: That of a whole record.
+        """
+        return _alive(result) if self.whole else _evaluation(0, {}, result)
+
 
 class Workers(ABC):
     """Processes that run jobs; a context manager that ends what they were asked for.
@@ -141,6 +158,10 @@ class Workers(ABC):
         for index, result in self.each(_run, [(scene, dict(values)) for scene, values in jobs]):
             yield _evaluation(index, dict(jobs[index][1]), result)
 
+    def begin(self, errand: Errand) -> None:  # noqa: B027 - where it is not begun it is made when its time has come
+        """Make an errand beside what else is asked for, where there are processes to spare: it is kept when it is made and something
+        is waited for."""
+
     def errands(self, errands: Sequence[Errand]) -> None:
         """Make them all, the longest first, or the workers of the others would wait for it; each is kept as soon as it is made.
 
@@ -148,8 +169,8 @@ class Workers(ABC):
             SimulationError: The process of a whole record was killed twice.
         """
         order = sorted(errands, key=lambda errand: errand.haste)
-        for k, result in self.each(_errand, [(_whole, e.scene) if e.whole else (_run, e.scene, {}) for e in order]):
-            order[k].keep(_alive(result) if order[k].whole else _evaluation(k, {}, result))
+        for k, result in self.each(_errand, [e.job for e in order]):
+            order[k].keep(order[k].kept(result))
 
     def evaluator(self, scene: Scene, kept: Collection[str] = ()) -> SceneEvaluator:
         """Evaluator of candidates of one scene; ``kept`` sizes do not follow a fitted height."""

@@ -17,6 +17,7 @@ from robot.table import Rollout, guard
 
 ENV = "CutFood-v1"
 STEPS = 400  # of an episode, at most: 20 s
+STILL, MOVED = 60, 1e-3  # steps within which an edge that has not moved so far [m] is stuck, and the episode over
 OPEN = -1.0  # of the gripper's action: closed on the handle
 _kept: dict[str, Any] = {}
 
@@ -83,7 +84,7 @@ def episode_of(
 
 
 def follow(env: Any, policy: Policy, seed: int) -> Severed:
-    """Let a policy act until it has done what it was told.
+    """Let a policy act until it has done what it was told, or the edge has been stuck for three seconds.
 
     Its changes of pose are taken from where the edge is, as in ``pd_ee_delta_pose`` in metres, and what is commanded keeps within the arm's
     limits; the joints for it are found by inverse kinematics.
@@ -95,6 +96,7 @@ def follow(env: Any, policy: Policy, seed: int) -> Severed:
     """
     policy.reset(seed)
     command, velocity = env.pose, np.zeros(3)
+    way: list[np.ndarray] = []
     joints, peak, lag = env.agent.robot.get_qpos()[0].numpy().astype(float), 0.0, 0.0
     for _ in range(STEPS):
         food = env.coupling if env.coupled else env.table
@@ -112,6 +114,9 @@ def follow(env: Any, policy: Policy, seed: int) -> Severed:
         env.table.rollout.clipped[-1] = kept.clipped
         peak = max(peak, float(env.forces[:, 2].max()))
         lag = max(lag, float(env.pose[2] - command[2]))
+        way.append(env.pose[:3])
+        if len(way) > STILL and np.linalg.norm(np.array(way[-STILL:]) - way[-1], axis=1).max() < MOVED:
+            break
     env.coupling.end()
     done = env.coupling.done
     broken = [d.why for d in done if d.severed is None]

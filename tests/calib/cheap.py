@@ -75,23 +75,24 @@ def noted(log: Path, what: str) -> Counter[str]:
     return Counter(line[1] for line in lines if line[0] == what)
 
 
-MADE = {workers._run: run, workers._whole: whole}
+MADE: dict[Any, Any] = {workers._run: run, workers._whole: whole}
 
 
-def _cheap(argument: Any) -> Any:
-    """What is asked for in an errand."""
-    return MADE[argument] if callable(argument) else argument
+def _cheap(job: tuple[Any, ...]) -> list[Any]:
+    """The same with the formula."""
+    return [MADE.get(part, part) if callable(part) else part for part in job]
 
 
-class _Cheap(workers.Workers):
-    def each(self, work: Any, jobs: Any) -> Any:
-        """The same with the formula."""
-        return super().each(work if work is workers._errand else MADE[work], [tuple(map(_cheap, job)) for job in jobs])
-
-
-class CheapPool(_Cheap, Pool):
+class CheapPool(Pool):
     """Processes of this machine."""
 
+    def _submit(self, work: Any, *args: Any) -> Any:
+        return super()._submit(*_cheap((work, *args)))
 
-class CheapCluster(_Cheap, Cluster):
+
+class CheapCluster(Cluster):
     """Processes of a cluster."""
+
+    def _submit(self, worker: str, work: Any, args: tuple[Any, ...]) -> Any:
+        made, *rest = _cheap((work, *args))
+        return super()._submit(worker, made, tuple(rest))

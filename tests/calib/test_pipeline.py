@@ -21,6 +21,7 @@ import pytest
 from calib.checks import Check
 from calib.conditioning import condition
 from calib.errors import MaterialError
+from calib.evaluation import Evaluation
 from calib.knives import load_knife
 from calib.materials import load_food, load_foods
 from calib.metrics import compare
@@ -34,10 +35,11 @@ from calib.trace import Trace
 from calib.verdicts import balances, judge, limits, spent, unbooked
 from calib.workers import DIED, Errand, SceneEvaluator
 from mpm.errors import SimulationError
-from mpm.record import ENERGIES
+from mpm.record import ENERGIES, ForceRecord
 from mpm.scene import Scene
 from mpm.seeding import seed
 from mpm.shapes import SHAPE_KINDS
+from tests.calib.cheap import LOG, SECONDS, CheapPool, noted
 from tests.mpm.scenes import PRISM
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -293,6 +295,7 @@ class FlakyPool(Pool):
 
     def __init__(self, deaths: int) -> None:
         self.workers, self.arch, self.threads = 2, "cpu", 1
+        self._begun = {}
         self.deaths, self.runs = deaths, 0
 
     def _submit(self, work: object, *args: object) -> Future[Any]:
@@ -330,6 +333,7 @@ class LastRun(Pool):
 
     def __init__(self, deaths: int) -> None:
         self.workers, self.arch, self.threads = 2, "cpu", 1
+        self._begun = {}
         self.deaths = deaths
 
     def _submit(self, work: object, *args: object) -> Future[Any]:
@@ -366,6 +370,34 @@ def test_killed_last_run_is_made_once_more():
     assert kept[1].reason == DIED and len(kept) == 2
 
 
+def test_an_errand_that_was_begun_is_made_once(tmp_path, monkeypatch):
+    """Beside other runs, kept when it is there, not asked for again; dropped where it is not wanted; made again where its process
+    was killed."""
+    log = tmp_path / "log"
+    monkeypatch.setenv(LOG, str(log))
+    monkeypatch.setenv(SECONDS, "0.3")
+    kept: list[Any] = []
+    scenes = [PRISM.with_material(E=value) for value in (1e5, 2e5, 3e5, 4e5)]
+    with CheapPool(2) as pool:
+        pool.begin(Errand(scenes[0], kept.append))
+        assert len(list(pool.run([(scenes[1], {}), (scenes[2], {})]))) == 2
+        assert [type(one) for one in kept] == [Evaluation]
+        pool.begin(Errand(scenes[3], kept.append))
+        pool.errands([Errand(scenes[3], kept.append), Errand(scenes[1], kept.append, whole=True)])
+        assert len(kept) == 3 and set(noted(log, "begin").values()) == {1} and len(noted(log, "end")) == 5
+        pool.begin(Errand(scenes[2], kept.append))
+        pool.errands([])
+        assert len(kept) == 3
+        pool.begin(Errand(scenes[0], kept.append, whole=True))
+        for process in list(pool._executor._processes.values()):
+            process.kill()
+        pool.errands([Errand(scenes[0], kept.append, whole=True)])
+        assert len(kept) == 4 and isinstance(kept[3], ForceRecord)
+    with CheapPool(1) as alone:
+        alone.begin(Errand(scenes[0], kept.append))
+        assert not alone._begun
+
+
 def test_the_longest_errand_comes_first():
     """Finer cells before coarser ones, slower blades before faster ones, and each result goes to its own."""
     made: list[float] = []
@@ -374,6 +406,7 @@ def test_the_longest_errand_comes_first():
     class Here(Pool):
         def __init__(self) -> None:
             self.workers, self.arch, self.threads = 2, "cpu", 1
+            self._begun = {}
 
         def each(self, work: Any, jobs: Any) -> Any:
             for k, (_, scene, *_) in reversed(list(enumerate(jobs))):
