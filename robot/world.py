@@ -17,7 +17,7 @@ from robot.table import Rollout, guard
 
 ENV = "CutFood-v1"
 STEPS = 400  # of an episode, at most: 20 s
-STILL, MOVED = 60, 1e-3  # steps within which an edge that has not moved so far [m] is stuck, and the episode over
+STILL, MOVED = 30, 1e-3  # steps within which an edge that has not moved so far [m] is stuck, and the episode over
 OPEN = -1.0  # of the gripper's action: closed on the handle
 _kept: dict[str, Any] = {}
 
@@ -84,7 +84,7 @@ def episode_of(
 
 
 def follow(env: Any, policy: Policy, seed: int) -> Severed:
-    """Let a policy act until it has done what it was told, or the edge has been stuck for three seconds.
+    """Let a policy act until it has done what it was told, or the edge has been stuck for a second and a half.
 
     Its changes of pose are taken from where the edge is, as in ``pd_ee_delta_pose`` in metres, and what is commanded keeps within the arm's
     limits; the joints for it are found by inverse kinematics.
