@@ -122,6 +122,12 @@ class Kinematics:
         self._mask = np.array([1] * 7 + [0] * 2)
         self._root = own.pose
 
+    def pose(self, joints: np.ndarray) -> np.ndarray:
+        """Pose of the edge (5,) in the world that joints (9,) give."""
+        self._model.compute_forward_kinematics(joints)
+        there = self._root * self._model.get_link_pose(self._link)
+        return pose_of(np.array(there.p, float), there.to_transformation_matrix()[:3, 0].astype(float))
+
     def joints(self, pose: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, float]:
         """Joint angles that bring the edge to a pose.
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from calib.materials import FoodSpec
+from mpm.errors import CutcalError
 from robot.planner import RATE
 from robot.policies import Policy
 from robot.severing import Severed
@@ -18,6 +19,8 @@ from robot.table import Rollout, guard
 ENV = "CutFood-v1"
 STEPS = 400  # of an episode, at most: 20 s
 STILL, MOVED = 30, 1e-3  # steps within which an edge that has not moved so far [m] is stuck, and the episode over
+FASTEST_JOINTS = np.array([2.175] * 4 + [2.61] * 3)
+"""Speeds of a Franka arm's joints at most [rad/s] (Franka control interface)."""
 OPEN = -1.0  # of the gripper's action: closed on the handle
 _kept: dict[str, Any] = {}
 
@@ -30,15 +33,21 @@ class World:
         coupled: Whether the food resists.
         stiffness: Of the arm's joints [N m/rad]; ManiSkill's own (1000) without it.
         knife: Name of the knife.
+        pixels: Width and height of the pictures that a policy is given; 0 for none, which needs no renderer.
     """
 
     coupled: bool = True
     stiffness: float | None = None
     knife: str = "kitchen"
+    pixels: int = 0
 
 
 def environment(world: World) -> Any:
-    """The environment of a world, without a renderer; a process keeps the last one."""
+    """The environment of a world; a process keeps the last one.
+
+    Raises:
+        CutcalError: Pictures are asked for and there is no renderer.
+    """
     import gymnasium
 
     import robot.intsim  # noqa: F401
@@ -46,16 +55,23 @@ def environment(world: World) -> Any:
     key = repr(world)
     if key not in _kept:
         _kept.clear()
-        _kept[key] = gymnasium.make(
-            ENV,
-            sim_backend="physx_cpu",
-            render_backend="none",
-            obs_mode="state",
-            control_mode="pd_joint_pos",
-            knife=world.knife,
-            coupled=world.coupled,
-            stiffness=world.stiffness,
-        ).unwrapped
+        seen = {"render_backend": "cpu", "obs_mode": "rgb", "pixels": world.pixels}
+        blind = {"render_backend": "none", "obs_mode": "state"}
+        try:
+            made = gymnasium.make(
+                ENV,
+                sim_backend="physx_cpu",
+                control_mode="pd_joint_pos",
+                knife=world.knife,
+                coupled=world.coupled,
+                stiffness=world.stiffness,
+                **(seen if world.pixels else blind),
+            )
+        except RuntimeError as e:
+            if not world.pixels:
+                raise
+            raise CutcalError(f"no pictures without a renderer ({e}); cutcal doctor says what is missing") from None
+        _kept[key] = made.unwrapped
     return _kept[key]
 
 
@@ -86,8 +102,9 @@ def episode_of(
 def follow(env: Any, policy: Policy, seed: int) -> Severed:
     """Let a policy act until it has done what it was told, or the edge has been stuck for a second and a half.
 
-    Its changes of pose are taken from where the edge is, as in ``pd_ee_delta_pose`` in metres, and what is commanded keeps within the arm's
-    limits; the joints for it are found by inverse kinematics.
+    Its changes of pose (7 numbers) are taken from where the edge is, as in ``pd_ee_delta_pose`` in metres, and what is commanded keeps within the
+    arm's limits; the joints for it are found by inverse kinematics. Joint targets (8 numbers) are commanded as they are, each joint within its speed.
+    It is given the edge's ``pose``, the ``joints``, the ``items``, and ``images`` by camera where there are any.
 
     Args:
         env: A :class:`robot.intsim.CutFoodEnv` that was reset, in joint positions.
@@ -100,18 +117,25 @@ def follow(env: Any, policy: Policy, seed: int) -> Severed:
     joints, peak, lag = env.agent.robot.get_qpos()[0].numpy().astype(float), 0.0, 0.0
     for _ in range(STEPS):
         food = env.coupling if env.coupled else env.table
-        action = policy.act({"pose": env.pose, "items": tuple(food.items)}, env.instruction)
+        own = env.agent.robot.get_qpos()[0].numpy().astype(float)
+        obs = {"pose": env.pose, "joints": own, "items": tuple(food.items), "images": _images(env)}
+        action = policy.act(obs, env.instruction)
         if action is None:
             break
-        x, y, z, _, pitch, yaw = np.asarray(action, float)[:6]
-        goal = env.pose + [x, y, z, yaw, pitch]
-        change = goal - command
-        kept = guard(np.array([*change[:3], 0.0, change[4], change[3]]), velocity)
-        velocity = kept.delta[:3] * RATE
-        command = command + [*kept.delta[:3], kept.delta[5], kept.delta[4]]
-        joints, _ = env.kinematics.joints(command, np.array([*joints[:7], 0.0, 0.0]))
+        if len(action) == len(FASTEST_JOINTS) + 1:
+            turn = np.asarray(action[:-1], float) - joints[:7]
+            slow = np.clip(turn, -FASTEST_JOINTS / RATE, FASTEST_JOINTS / RATE)
+            joints, clipped = np.array([*(joints[:7] + slow), 0.0, 0.0]), ("joint",) * bool((slow != turn).any())
+            command = env.kinematics.pose(joints)
+        else:
+            x, y, z, _, pitch, yaw = np.asarray(action, float)[:6]
+            change = env.pose + [x, y, z, yaw, pitch] - command
+            kept = guard(np.array([*change[:3], 0.0, change[4], change[3]]), velocity)
+            velocity, clipped = kept.delta[:3] * RATE, kept.clipped
+            command = command + [*kept.delta[:3], kept.delta[5], kept.delta[4]]
+            joints, _ = env.kinematics.joints(command, np.array([*joints[:7], 0.0, 0.0]))
         env.step(np.array([*joints[:7], OPEN], np.float32))
-        env.table.rollout.clipped[-1] = kept.clipped
+        env.table.rollout.clipped[-1] = clipped
         peak = max(peak, float(env.forces[:, 2].max()))
         lag = max(lag, float(env.pose[2] - command[2]))
         way.append(env.pose[:3])
@@ -126,3 +150,10 @@ def follow(env: Any, policy: Policy, seed: int) -> Severed:
     return Severed(
         severed, env.coupling.uncut(), peak, lag, done[-1].why if done else "the edge does not reach the food"
     )
+
+
+def _images(env: Any) -> dict[str, np.ndarray]:
+    """What the cameras see now (h, w, 3), by name; empty without a renderer."""
+    if env.obs_mode != "rgb":
+        return {}
+    return {name: seen["rgb"][0].numpy() for name, seen in env.get_obs()["sensor_data"].items()}

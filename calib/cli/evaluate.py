@@ -51,6 +51,7 @@ def add_args(p: Group) -> None:
     p.add_argument(
         "--arm-stiffness", type=number(1, 1e9, "N/m"), metavar="N/M", help="of the arm in the solver (default 1754)"
     )
+    p.add_argument("--server", metavar="URL", help="of --policy remote: a policy server (robot.remote)")
     p.add_argument("--weights", metavar="FILE", help="of --policy clone: what cutcal dataset clone has written")
     p.add_argument(
         "--world", choices=WORLDS, default="table", metavar="NAME", help="table, intsim, or kinematic (no resistance)"
@@ -58,6 +59,7 @@ def add_args(p: Group) -> None:
     p.add_argument(
         "--stiffness", type=number(1, 1e6, "N m/rad"), metavar="K", help="of intsim's joints [N m/rad] (default 1000)"
     )
+    p.add_argument("--pixels", type=whole(0), default=0, metavar="N", help="of intsim's pictures (default 0: none)")
     add_workers(p, "episodes of intsim")
     p.add_argument("--knife", default="kitchen", metavar="NAME", help=KNIFE_HELP)
     p.add_argument("--seed", type=whole(0), default=0, metavar="N", help="first seed of the tests (default 0)")
@@ -71,6 +73,7 @@ def run(args: argparse.Namespace) -> int:
     from robot.clone import Clone
     from robot.data.generate import available
     from robot.policies import POLICIES, make
+    from robot.remote import Remote
     from robot.suites import FOODS, SUITES
     from robot.world import World
 
@@ -78,6 +81,7 @@ def run(args: argparse.Namespace) -> int:
         for name, (_, what) in POLICIES.items():
             print(f"policy {name:12s}{what}")
         print(f"policy {'clone':12s}does what it has learnt from demonstrations (--weights)")
+        print(f"policy {'remote':12s}is asked of a server, such as those of RDT, Octo and OpenVLA (--server)")
         for name, suite in SUITES.items():
             print(f"suite  {name:12s}{suite.what}")
         return 0
@@ -93,17 +97,32 @@ def run(args: argparse.Namespace) -> int:
         raise CutcalError("--stiffness is of a robot's joints: add --world intsim, or give --arm-stiffness")
     if args.world != "table" and (args.severing or args.arm_stiffness is not None):
         raise CutcalError("--severing and --arm-stiffness are of --world table; in intsim the food resists anyway")
-    policy = make(args.policy, args.sigma or 0.0) if args.weights is None else Clone.load(Path(args.weights))
+    if (args.policy == "remote") != (args.server is not None):
+        raise CutcalError("--server URL is that of --policy remote: give both or neither")
+    if args.world == "table" and args.pixels:
+        raise CutcalError("--pixels are of a robot's cameras: add --world intsim")
+    policy: Policy
+    name = args.policy
+    if args.policy == "clone":
+        policy = clone = Clone.load(Path(args.weights))
+        name = (
+            f"clone of {clone.about['trajectories']} trajectories of {clone.about['dataset']} ({clone.about['keep']})"
+        )
+    elif args.policy == "remote":
+        policy = server = Remote(args.server)
+        name = f"remote {server.name}"
+    else:
+        policy = make(args.policy, args.sigma or 0.0)
     calibrated = {food.name: food for food in map(load_material_file, args.material)}
     names = args.food or (list(calibrated) if args.material else FOODS)
     foods = {name: calibrated.get(name) or load_food(name) for name in names}
     out = Path(args.out or f"cutcal-evaluate-{args.policy}")
-    world = None if args.world == "table" else World(args.world == "intsim", args.stiffness, args.knife)
+    world = None if args.world == "table" else World(args.world == "intsim", args.stiffness, args.knife, args.pixels)
     if world is not None:
         available()
     args.arch = "cpu"
     with nullcontext() if world is None else workers_of(args, say) as pool:
-        document = _evaluate(args, policy, foods, suites, out, world, pool)
+        document = _evaluate(args, policy, name, foods, suites, out, world, pool)
     if args.json:
         print_json(document)
     else:
@@ -115,6 +134,7 @@ def run(args: argparse.Namespace) -> int:
 def _evaluate(
     args: argparse.Namespace,
     policy: Policy,
+    name: str,
     foods: dict[str, FoodSpec],
     suites: list[str],
     out: Path,
@@ -128,7 +148,7 @@ def _evaluate(
 
     return evaluate(
         policy,
-        args.policy,
+        name,
         foods,
         suites,
         args.episodes,

@@ -4,8 +4,8 @@
     TASK/motionplanning/K//100/K%100/S.png    what the front camera sees before step S, from 1
 
 That loader knows one sentence for a task, which stands in its own source: a task here is one instruction's meaning, such as
-``orange-0_25-left``, and ``tasks.json`` has the sentence and the number of episodes of each. It divides by the range of each joint and action: the
-gripper, closed on the knife throughout, has none. The force is not in it.
+``orange-0_25-left``, and ``tasks.json`` has the sentence and the number of episodes of each. It scales by the range of each joint and action, which the
+gripper, closed on the knife throughout, has none of: ``statistics.json`` has the ranges, its own that of the mechanism. The force is not in it.
 """
 
 from __future__ import annotations
@@ -17,19 +17,24 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+import numpy as np
 
 from calib.errors import OutputError
+from robot.data.shards import trajectories
 from robot.data.views import View, check, views
 
 CAMERA = "front"
+JOINTS = 8  # of the state that RDT is given: the second finger does what the first does
+GRIPPER = {"state_min": 0.0, "state_max": 0.04, "action_min": -1.0, "action_max": 1.0}
+"""Ranges of the Panda's finger [m] and of its action."""
 FOLDER = 100  # episodes of a folder of pictures
-TASKS = "tasks.json"
+TASKS, STATISTICS = "tasks.json", "statistics.json"
 
 
 def export(
     folder: Path, out: Path, *, scenes: Sequence[int], pixels: int = 128, say: Callable[[str], None] = lambda text: None
 ) -> dict[str, Any]:
-    """Write a folder for each task, and tasks.json.
+    """Write a folder for each task, tasks.json and statistics.json.
 
     Args:
         folder: A dataset of :func:`robot.data.generate.generate`.
@@ -69,6 +74,7 @@ def export(
         except OSError as e:
             raise OutputError(f"{home}: cannot be written ({e}); free some space and export again elsewhere") from None
         known["episodes"] = k + 1
+    (out / STATISTICS).write_text(json.dumps(_statistics(folder), indent=1) + "\n", encoding="utf-8")
     (out / TASKS).write_text(json.dumps(tasks, indent=1) + "\n", encoding="utf-8")
     return tasks
 
@@ -81,6 +87,19 @@ def _trajectory(path: Path, k: int, view: View) -> None:
         for name in ("actions", "obs/agent/qpos"):
             group.create_dataset(name, data=stored[name][()], compression="gzip", shuffle=True)
         group.attrs["scene"], group.attrs["sentence"] = view.scene, view.sentence
+
+
+def _statistics(folder: Path) -> dict[str, list[float]]:
+    """Smallest and largest state and action of all trajectories, the gripper's of its mechanism."""
+    ends: dict[str, list[float]] = {}
+    for stored in trajectories(folder):
+        for kind, name in (("state", "obs/agent/qpos"), ("action", "actions")):
+            values = stored.group[name][()][:, :JOINTS]
+            for end, pick in (("min", np.min), ("max", np.max)):
+                before = ends.get(f"{kind}_{end}")
+                now = pick(values, axis=0)
+                ends[f"{kind}_{end}"] = (now if before is None else pick([before, now], axis=0)).astype(float).tolist()
+    return {name: [*values[:-1], GRIPPER[name]] for name, values in ends.items()}
 
 
 def task_of(food: str, task: Mapping[str, Any]) -> str:

@@ -27,7 +27,7 @@ from robot.evaluate import evaluate
 from robot.planner import PHASES, plan
 from robot.policies import make as make_policy
 from robot.suites import draw
-from robot.world import World
+from robot.world import World, environment, follow
 from tests.calib.documents import valid
 
 FOODS = {name: load_food(name) for name in ("strawberry", "banana")}
@@ -297,3 +297,50 @@ def test_a_policy_is_judged_in_closed_loop_with_the_food(tmp_path):
             pool=Here(),
             resume=True,
         )
+
+
+class Replay:
+    """Joint targets one after the other."""
+
+    def __init__(self, actions) -> None:
+        self.actions, self.seen = list(actions), []
+
+    def reset(self, seed: int) -> None:
+        """Nothing to forget."""
+
+    def act(self, obs, instruction):
+        """The next one."""
+        self.seen.append(obs)
+        return self.actions.pop(0) if self.actions else None
+
+
+def test_joint_targets_do_what_they_did_and_keep_within_their_speeds():
+    """A demonstration's own actions part the food again, with the same force; a target that is far away is approached at the joint's speed."""
+    env = environment(World())
+    env.foods = {"strawberry": FOODS["strawberry"]}
+    env.reset(seed=SEED)
+    track = demonstrate(env, meshes=False)
+    assert track.severed[-1]
+    env.reset(seed=SEED)
+    policy = Replay(track.action)
+    found = follow(env, policy, 0)
+    assert found.severed and found.peak == pytest.approx(max(f[:, 2].max() for f in track.force), rel=0.02)
+    assert np.allclose([o["pose"] for o in policy.seen[: len(track.edge)]], track.edge[: len(policy.seen)], atol=1e-3)
+    assert policy.seen[0]["joints"].shape == (9,) and policy.seen[0]["images"] == {}
+    env.reset(seed=SEED)
+    far = track.action[0].copy()
+    far[0] += 1.0
+    follow(env, Replay([far]), 0)
+    assert env.table.rollout.clipped == [("joint",)]
+
+
+@pytest.mark.skipif(not VULKAN, reason="SAPIEN finds no device that it can render with")
+def test_a_policy_is_given_pictures_where_it_wants_them():
+    """Three cameras, 8 bits, the size that was asked for."""
+    env = environment(World(pixels=32))
+    env.reset(seed=SEED)
+    policy = Replay([env.agent.robot.get_qpos()[0].numpy()[:8]])
+    follow(env, policy, 0)
+    images = policy.seen[0]["images"]
+    assert sorted(images) == ["front", "side", "wrist"]
+    assert all(i.shape == (32, 32, 3) and i.dtype == np.uint8 and i.std() > 5 for i in images.values())

@@ -14,7 +14,7 @@ import pytest
 from calib.errors import OutputError
 from robot.data import generate as g
 from robot.data.manifest import Manifest
-from robot.data.rdt import TASKS, export, task_of
+from robot.data.rdt import STATISTICS, TASKS, export, task_of
 from robot.data.shards import trajectories
 from robot.language import parse, same
 from tests.robot.test_data import Inline
@@ -59,6 +59,18 @@ def test_the_loader_finds_every_picture_and_joint(exported):
                 names: list[str] = []
                 file[key].visit(names.append)
                 assert sorted(names) == ["actions", "obs", "obs/agent", "obs/agent/qpos"]
+
+
+def test_ranges_are_those_of_all_trajectories_and_of_the_gripper(exported):
+    """Eight of each; no range is nothing, or the loader would divide by it."""
+    folder, out, _ = exported
+    found = {name: np.array(values) for name, values in json.loads((out / STATISTICS).read_text()).items()}
+    assert {len(values) for values in found.values()} == {8}
+    actions = np.concatenate([s.group["actions"][()] for s in trajectories(folder)])
+    assert found["action_min"][:7] == pytest.approx(actions.min(axis=0)[:7])
+    assert found["action_max"][:7] == pytest.approx(actions.max(axis=0)[:7])
+    assert (found["state_max"] > found["state_min"]).all() and (found["action_max"] > found["action_min"]).all()
+    assert found["action_min"][7] == -1 and found["state_max"][7] == 0.04
 
 
 def test_a_task_is_one_cut_in_all_its_words(exported):
