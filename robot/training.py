@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 
+from calib.errors import OutputError
 from mpm.shapes import Shape
 from robot.clone import CHUNK, Array, Clone, bag, relative, seen, words_of
 from robot.cuts import Item, TaskError
@@ -29,9 +29,13 @@ def train(folder: Path, *, keep: str = "severed", most: int | None = None, seed:
         seed: Of weights and batches.
 
     Raises:
-        OutputError: There is no dataset.
+        OutputError: There is no dataset, or torch is not installed.
         TaskError: None of its trajectories is kept.
     """
+    try:
+        import torch
+    except ImportError:
+        raise OutputError("dataset clone: torch is not installed; pip install 'cutcal[robot]'") from None
     x, sentences, y, count = _examples(folder, keep, most)
     vocabulary = tuple(sorted({w for group in sentences for s in group for w in words_of(s)}))
     bags = [np.array([bag(s, vocabulary) for s in group]) for group in sentences]

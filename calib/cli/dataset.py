@@ -143,10 +143,8 @@ def _clone(args: argparse.Namespace) -> dict[str, Any]:
     path = Path(args.out)
     if path.exists():
         raise CutcalError(f"--out {path}: exists and is never overwritten; choose another file")
-    try:
-        from robot.training import train
-    except ImportError:
-        raise CutcalError("dataset clone: torch is not installed; pip install 'cutcal[robot]'") from None
+    from robot.training import train
+
     clone = train(Path(args.folder), keep=args.keep, most=args.most, seed=args.seed)
     clone.save(path)
     if not args.json:
