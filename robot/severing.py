@@ -8,7 +8,7 @@ import numpy as np
 
 from calib.knives import load_knife
 from calib.materials import FoodSpec
-from calib.scenes import Sizing, cut_scene, specimen
+from calib.scenes import CELL_PER_ZONE, Sizing, cut_scene, specimen
 from mpm.errors import SceneError
 from mpm.record import ForceRecord
 from mpm.scene import Arm, Scene
@@ -48,7 +48,15 @@ class Severed:
         return asdict(self)
 
 
-def cut_place(item: Item, along: float, food: FoodSpec, *, knife: str = "kitchen", coarse: bool = True) -> Scene:
+def cut_place(
+    item: Item,
+    along: float,
+    food: FoodSpec,
+    *,
+    knife: str = "kitchen",
+    coarse: bool = True,
+    cells: int | None = None,
+) -> Scene:
     """A press cut through a food at a place along its axis.
 
     A place nearer to the end than two cells asks for finer ones.
@@ -59,6 +67,7 @@ def cut_place(item: Item, along: float, food: FoodSpec, *, knife: str = "kitchen
         food: Its properties.
         knife: Name of the knife.
         coarse: Cells and speed of a screening run.
+        cells: Most cells over height and width: a large food has larger ones, and a wider process zone of the edge with them.
 
     Raises:
         SceneError: A cut that the solver cannot make.
@@ -67,7 +76,11 @@ def cut_place(item: Item, along: float, food: FoodSpec, *, knife: str = "kitchen
     sizing = Sizing(shape.kind, shape.height, shape.width, None, 0.5 + along / shape.length)
     sized, _ = specimen(food, None, sizing)
     least = min(-sized.ends[0], sized.ends[1])
-    usual = cut_scene(food, replace(sized, cut=0.0), load_knife(knife), coarse=coarse)
+    whole, blade = replace(sized, cut=0.0), load_knife(knife)
+    usual = cut_scene(food, whole, blade, coarse=coarse)
+    largest = 0.0 if cells is None else min(shape.height, shape.width) / cells
+    if largest > usual.numerics.dx:
+        usual = cut_scene(food, whole, blade, coarse=coarse, dx=largest * (CELL_PER_ZONE if coarse else 1.0))
     cell = min(usual.numerics.dx, least / LEAST_CELLS)
     if cell < FINEST * usual.numerics.dx:
         raise SceneError(

@@ -10,9 +10,10 @@ import pytest
 from calib.materials import load_food
 from mpm.live import LiveCut
 from mpm.shapes import Shape
-from robot.coupling import NEAR, Coupling
+from robot.coupling import CELLS, NEAR, Coupling
 from robot.cuts import Item
 from robot.planner import plan
+from robot.severing import LEAST_CELLS, cut_place
 
 FOODS = {"strawberry": load_food("strawberry")}
 BERRY = Item("strawberry", Shape("ellipsoid", 0.04, 0.032, 0.032), x=0.03, y=-0.02, yaw=1.2)
@@ -129,3 +130,18 @@ def test_its_mesh_lies_on_the_table():
     _, points, _, _ = found
     assert np.allclose(points[:, :2].mean(axis=0), [BERRY.x, BERRY.y], atol=3e-3)
     assert points[:, 2].min() > -1e-3 and points[:, 2].max() < 0.04
+
+
+def test_a_large_food_has_larger_cells_and_a_small_one_those_of_a_screening_run():
+    """A melon 14 over its height, with an edge that is not narrower than one; a plum's as in an evaluation; a thin slice finer ones all the same."""
+    found = {}
+    for name, along in (("melon", 0.0), ("plum", 0.0), ("melon", 0.045)):
+        food = load_food(name)
+        item = Item(name, food.to_scene_food().shape)
+        found[name, along] = cut_place(item, along, food, cells=CELLS), cut_place(item, along, food)
+    large, usual = found["melon", 0.0]
+    assert large.numerics.dx == pytest.approx(0.1 / CELLS) and large.edge.zone >= large.numerics.dx > usual.numerics.dx
+    small, same = found["plum", 0.0]
+    assert small == same
+    slice_, _ = found["melon", 0.045]
+    assert slice_.numerics.dx == pytest.approx(0.005 / LEAST_CELLS)
