@@ -2,7 +2,8 @@
 
 A profile is walked from the best run, and sees no other food that explains the curve as well. On 85 made-up bananas whose cut was searched once, 18 of 25
 intervals of E, yield stress and initiation depth that were called identified held the truth; others belonged to such a food, with a fourth of the stiffness or
-a thirteenth of the yield stress. So a claim has to be found twice, and where the budget does not hold a second search it is none (multi-start as a check: Raue et al. 2013, PLoS ONE 8:e74335).
+a thirteenth of the yield stress. So a claim has to be found twice, and where the budget does not hold a second search it is none (multi-start as a
+check: Raue et al. 2013, PLoS ONE 8:e74335).
 """
 
 from __future__ import annotations
@@ -81,7 +82,7 @@ def infer(
         say(f"the budget is spent, so nothing confirms {names}: called weak; a budget of {2 * options.budget:g} may")
         return doubt.result, replace(doubt, uncertainty=_unconfirmed(doubt.uncertainty))
     say(f"a second search, from another design, for {names}")
-    result = _searched(objective, doubt, claimed, fine, coarse, replace(options, budget=rest), progress)
+    result = _searched(objective, doubt, claimed, fine, coarse, options, progress)
     if result.best is not doubt.result.best:
         doubt = doubted(result) or doubt
     else:
@@ -118,7 +119,9 @@ def _searched(
         return best.misfit <= first.best.misfit + RISE and all(low <= best.z[k] <= high for k, low, high in ends)
 
     told = onward(progress, first.history, first.best, options)
-    search = Search(objective, fine, coarse, replace(options, seed=options.seed + OTHERWISE), told, there)
+    rest = options.budget - options.cost(first.history)
+    own = replace(options, budget=rest, seed=options.seed + OTHERWISE)
+    search = Search(objective, fine, coarse, own, told, there)
     with threadpool_limits(1, "blas"):
         with suppress(SimulationError):  # no run of this design ends its stroke
             search.run()

@@ -82,7 +82,8 @@ def test_what_is_found_again_is_claimed_still(seed):
     more = result.history[first:]
     assert 0 < sum(not t.coarse for t in more) <= 6 < len(more)
     assert told[-1].done == len(result.history) - sum(t.stage == "profile" for t in more)
-    assert all(b.done >= a.done for a, b in zip(told[:-1], told[1:], strict=True))
+    assert all(b.done >= a.done and b.spent >= a.spent for a, b in zip(told[:-1], told[1:], strict=True))
+    assert {p.budget for p in told} == {100}
 
 
 def test_a_better_food_becomes_the_answer(monkeypatch):
