@@ -40,6 +40,7 @@ class Doubt:
         nuisances: What the best curves say of the measurement, trace by trace.
         bands: Posterior predictive band of each trace.
         sampled: 95 % intervals [unit] from a sample of the posterior by name, where one was asked for.
+        said: What a second search has shown (:mod:`calib.second`), in sentences; empty where it has confirmed the first or none was needed.
     """
 
     result: FitResult
@@ -48,6 +49,7 @@ class Doubt:
     nuisances: tuple[NuisanceEstimate, ...]
     bands: tuple[Band, ...]
     sampled: dict[str, tuple[float, float]] = field(default_factory=dict)
+    said: tuple[str, ...] = ()
 
 
 def doubt_of(

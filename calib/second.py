@@ -79,15 +79,27 @@ def infer(
         return doubt.result, doubt
     names = ", ".join(objective.parameters.names[k] for k in claimed)
     if rest < options.least(len(objective.parameters)):
-        say(f"the budget is spent, so nothing confirms {names}: called weak; a budget of {2 * options.budget:g} may")
-        return doubt.result, replace(doubt, uncertainty=_unconfirmed(doubt.uncertainty))
+        said = (
+            f"{names}: bounded by one search, and the budget held no second one that might confirm it, so called weak; a budget of "
+            f"{2 * options.budget:g} may."
+        )
+        say(said[:-1])
+        return doubt.result, replace(doubt, uncertainty=_unconfirmed(doubt.uncertainty), said=(said,))
     say(f"a second search, from another design, for {names}")
     result = _searched(objective, doubt, claimed, fine, coarse, options, progress)
     if result.best is not doubt.result.best:
-        doubt = doubted(result) or doubt
+        gain = doubt.result.best.misfit - result.best.misfit
+        said = (
+            f"A second search found a food that explains the curve better, by {gain:.3g} in chi-square: the values are its own.",
+        )
+        doubt = replace(doubted(result) or doubt, said=said)
     else:
         widened = with_profiles(doubt.uncertainty, doubt.profiles, as_good(result))
-        doubt = replace(doubt, result=result, uncertainty=widened)
+        lost = [objective.parameters.names[k] for k in claimed if widened.intervals[k].verdict != "identified"]
+        said = f"{', '.join(lost)}: a second search found another food that explains the curve as well; the interval reaches to it."
+        doubt = replace(doubt, result=result, uncertainty=widened, said=(said,) if lost else ())
+    for sentence in doubt.said:
+        say(sentence[:-1])
     return doubt.result, doubt
 
 

@@ -166,7 +166,7 @@ def _summary(
         "parameters": _parameters(study, fitted),
         "reduced_chi2": None if fitted.doubt is None else fitted.doubt.uncertainty.reduced_chi2,
         "failed_simulations": fitted.result.failed,
-        "limits": _limits(held, setups, study.scatter),
+        "limits": [*(() if fitted.doubt is None else fitted.doubt.said), *_limits(held, setups, study.scatter)],
     }
 
 

@@ -98,7 +98,7 @@ def summarise(
         **_numerics(request, setup, record),
         "numerical_checks": [c.as_dict() for c in checks],
         "warnings": [*request.food.warnings(), *setup.curve.warnings],
-        "limits": said,
+        "limits": [*(() if doubt is None else doubt.said), *said],
     }
 
 

@@ -70,6 +70,7 @@ def test_another_food_that_explains_the_curve_takes_a_claim_back(seed):
     e = doubt.uncertainty.intervals[0]
     assert e.verdict == "weak" and verdicts(doubt)["R"] == "identified"
     assert e.low95 < MIDDLE * math.exp(-0.9 * APART) and e.high95 > MIDDLE * math.exp(0.9 * APART)
+    assert len(doubt.said) == 1 and doubt.said[0].startswith("E: a second search found another food")
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -80,7 +81,7 @@ def test_what_is_found_again_is_claimed_still(seed):
     r = doubt.uncertainty.intervals[1]
     assert r.verdict == "identified" and r.low95 < TRUTH["R"] < r.high95
     more = result.history[first:]
-    assert 0 < sum(not t.coarse for t in more) <= 6 < len(more)
+    assert 0 < sum(not t.coarse for t in more) <= 6 < len(more) and doubt.said == ()
     assert told[-1].done == len(result.history) - sum(t.stage == "profile" for t in more)
     assert all(b.done >= a.done and b.spent >= a.spent for a, b in zip(told[:-1], told[1:], strict=True))
     assert {p.budget for p in told} == {100}
@@ -110,6 +111,7 @@ def test_a_better_food_becomes_the_answer(monkeypatch):
     assert result.best.misfit < poor.misfit - 5.0 and result.best.stage != "profile"
     assert [i.parameter.value for i in doubt.uncertainty.intervals] == list(result.best.evaluation.parameters.values())
     assert result.surrogate is not None and result.surrogate.best is result.best
+    assert "better, by" in doubt.said[0]
 
 
 def test_what_cannot_be_searched_twice_is_not_claimed():
@@ -117,7 +119,7 @@ def test_what_cannot_be_searched_twice_is_not_claimed():
     result, doubt, first = inferred(onefold, 0, budget=20)
     assert len(result.history) == first and verdicts(doubt)["R"] == "weak"
     r = doubt.uncertainty.intervals[1]
-    assert r.low95 < TRUTH["R"] < r.high95
+    assert r.low95 < TRUTH["R"] < r.high95 and "a budget of 40 may" in doubt.said[0]
 
 
 def test_an_interrupted_search_simulates_nothing_more():
