@@ -89,15 +89,13 @@ def infer(
     result = _searched(objective, doubt, claimed, fine, coarse, options, progress)
     if result.best is not doubt.result.best:
         gain = doubt.result.best.misfit - result.best.misfit
-        said = (
-            f"A second search found a food that explains the curve better, by {gain:.3g} in chi-square: the values are its own.",
-        )
-        doubt = replace(doubted(result) or doubt, said=said)
+        better = f"A second search found a food that explains the curve better, by {gain:.3g} in chi-square: the values are its own."
+        doubt = replace(doubted(result) or doubt, said=(better,))
     else:
         widened = with_profiles(doubt.uncertainty, doubt.profiles, as_good(result))
         lost = [objective.parameters.names[k] for k in claimed if widened.intervals[k].verdict != "identified"]
-        said = f"{', '.join(lost)}: a second search found another food that explains the curve as well; the interval reaches to it."
-        doubt = replace(doubt, result=result, uncertainty=widened, said=(said,) if lost else ())
+        another = f"{', '.join(lost)}: a second search found another food that explains the curve as well; the interval reaches to it."
+        doubt = replace(doubt, result=result, uncertainty=widened, said=(another,) if lost else ())
     for sentence in doubt.said:
         say(sentence[:-1])
     return doubt.result, doubt
