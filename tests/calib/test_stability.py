@@ -210,6 +210,7 @@ class OneKills(Pool):
 
     def __init__(self):
         self.workers, self.arch, self.threads = 2, "cpu", 1
+        self._begun = {}
         self.waiting, self.calls = [], []
 
     def _submit(self, work, *args):
