@@ -24,7 +24,7 @@ from calib.profiles import RISE, with_profiles
 from calib.progress import Progress
 from calib.search import Search
 from calib.surrogate import Surrogate
-from calib.uncertainty import Uncertainty
+from calib.uncertainty import Interval, Uncertainty
 from mpm.errors import SimulationError
 
 OTHERWISE = 2_000_003
@@ -84,13 +84,14 @@ def infer(
             f"{2 * options.budget:g} may."
         )
         say(said[:-1])
-        return doubt.result, replace(doubt, uncertainty=_unconfirmed(doubt.uncertainty), said=(said,))
+        return doubt.result, replace(doubt, uncertainty=_unconfirmed(doubt.uncertainty, None), said=(said,))
     say(f"a second search, from another design, for {names}")
     result = _searched(objective, doubt, claimed, fine, coarse, options, progress)
     if result.best is not doubt.result.best:
         gain = doubt.result.best.misfit - result.best.misfit
         better = f"A second search found a food that explains the curve better, by {gain:.3g} in chi-square: the values are its own."
-        doubt = replace(doubted(result) or doubt, said=(better,))
+        own = doubted(result) or doubt
+        doubt = replace(own, uncertainty=_unconfirmed(own.uncertainty, doubt.result.best), said=(better,))
     else:
         widened = with_profiles(doubt.uncertainty, doubt.profiles, as_good(result))
         lost = [objective.parameters.names[k] for k in claimed if widened.intervals[k].verdict != "identified"]
@@ -101,12 +102,15 @@ def infer(
     return doubt.result, doubt
 
 
-def _unconfirmed(found: Uncertainty) -> Uncertainty:
-    """The same with nothing called identified."""
-    return replace(
-        found,
-        intervals=tuple(replace(i, verdict="weak") if i.verdict == "identified" else i for i in found.intervals),
-    )
+def _unconfirmed(found: Uncertainty, other: Trial | None) -> Uncertainty:
+    """The same with nothing called identified but what holds the answer of the other search, where there was one."""
+
+    def seen(i: Interval) -> bool:
+        return other is not None and i.low95 <= other.evaluation.parameters[i.parameter.name] <= i.high95
+
+    lost = [i.verdict == "identified" and not seen(i) for i in found.intervals]
+    changed = (replace(i, verdict="weak") if gone else i for i, gone in zip(found.intervals, lost, strict=True))
+    return replace(found, intervals=tuple(changed))
 
 
 def _searched(

@@ -112,6 +112,10 @@ def test_a_better_food_becomes_the_answer(monkeypatch):
     assert [i.parameter.value for i in doubt.uncertainty.intervals] == list(result.best.evaluation.parameters.values())
     assert result.surrogate is not None and result.surrogate.best is result.best
     assert "better, by" in doubt.said[0]
+    r = doubt.uncertainty.intervals[1]
+    assert r.verdict == "weak" and not r.low95 <= poor.evaluation.parameters["R"] <= r.high95, (
+        "found by one search alone"
+    )
 
 
 def test_what_cannot_be_searched_twice_is_not_claimed():
