@@ -33,7 +33,7 @@ class Severed:
         severed: Whether the food is in pieces; None where it was not simulated.
         uncut: Part of the section that still holds [-].
         peak: Largest force on the knife [N].
-        short: Height of the edge over the one commanded, at the end [m].
+        short: Height of the edge over the one commanded [m], at the end, of an episode where the edge was lowest.
         why: Reason where it was not simulated, or the finding in words.
     """
 

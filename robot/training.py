@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from calib.errors import OutputError
-from mpm.shapes import Shape
 from robot.clone import CHUNK, Array, Clone, bag, relative, seen, words_of
-from robot.cuts import Item, TaskError
-from robot.data.shards import Stored, trajectories
+from robot.cuts import TaskError
+from robot.data.shards import Stored, item_of, trajectories
 
 WIDTH, LAYERS = 256, 3
 STEPS, BATCH, RATE = 4000, 256, 1e-3  # Adam with a rate that falls to nothing (cosine)
@@ -105,9 +103,3 @@ def _kept(folder: Path, keep: str) -> Iterator[Stored]:
         a = stored.about
         if a["status"] == "done" and (keep == "all" or (a["published"] and (keep != "severed" or a["severed"]))):
             yield stored
-
-
-def item_of(listed: dict[str, Any]) -> Item:
-    """A food as a dataset lists it."""
-    shape = {name: value for name, value in listed.items() if name not in ("name", "x", "y", "yaw")}
-    return Item(listed["name"], Shape(**shape), listed["x"], listed["y"], listed["yaw"])

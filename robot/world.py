@@ -10,6 +10,7 @@ import numpy as np
 
 from calib.materials import FoodSpec
 from mpm.errors import CutcalError
+from robot.data.demonstrate import OPEN
 from robot.planner import RATE
 from robot.policies import Policy
 from robot.severing import Severed
@@ -21,7 +22,6 @@ STEPS = 400  # of an episode, at most: 20 s
 STILL, MOVED = 30, 1e-3  # steps within which an edge that has not moved so far [m] is stuck, and the episode over
 FASTEST_JOINTS = np.array([2.175] * 4 + [2.61] * 3)
 """Speeds of a Franka arm's joints at most [rad/s] (Franka control interface)."""
-OPEN = -1.0  # of the gripper's action: closed on the handle
 _kept: dict[str, Any] = {}
 
 
@@ -114,7 +114,7 @@ def follow(env: Any, policy: Policy, seed: int) -> Severed:
     policy.reset(seed)
     command, velocity = env.pose, np.zeros(3)
     way: list[np.ndarray] = []
-    joints, peak, lag = env.agent.robot.get_qpos()[0].numpy().astype(float), 0.0, 0.0
+    joints, peak, short = env.agent.robot.get_qpos()[0].numpy().astype(float), 0.0, 0.0
     for _ in range(STEPS):
         food = env.coupling if env.coupled else env.table
         own = env.agent.robot.get_qpos()[0].numpy().astype(float)
@@ -137,18 +137,19 @@ def follow(env: Any, policy: Policy, seed: int) -> Severed:
         env.step(np.array([*joints[:7], OPEN], np.float32))
         env.table.rollout.clipped[-1] = clipped
         peak = max(peak, float(env.forces[:, 2].max()))
-        lag = max(lag, float(env.pose[2] - command[2]))
         way.append(env.pose[:3])
+        if way[-1][2] == min(there[2] for there in way):
+            short = float(way[-1][2] - command[2])
         if len(way) > STILL and np.linalg.norm(np.array(way[-STILL:]) - way[-1], axis=1).max() < MOVED:
             break
     env.coupling.end()
     done = env.coupling.done
     broken = [d.why for d in done if d.severed is None]
     if broken or not env.coupled:
-        return Severed(None, peak=peak, short=lag, why=broken[0] if broken else "the food does not resist here")
+        return Severed(None, peak=peak, short=short, why=broken[0] if broken else "the food does not resist here")
     severed = len(env.coupling.items[0].pieces) > env.episode.spec.cuts
     return Severed(
-        severed, env.coupling.uncut(), peak, lag, done[-1].why if done else "the edge does not reach the food"
+        severed, env.coupling.uncut(), peak, short, done[-1].why if done else "the edge does not reach the food"
     )
 
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from calib.errors import OutputError
 from robot.data.shards import trajectories
-from robot.data.views import View, check, views
+from robot.data.views import View, check_pictured, views
 
 CAMERA = "front"
 JOINTS = 8  # of the state that RDT is given: the second finger does what the first does
@@ -49,13 +49,9 @@ def export(
     Raises:
         CutcalError: A package or the renderer is missing, no background is named, the folder is taken or holds no dataset.
     """
-    try:
-        from PIL import Image
-    except ImportError as e:
-        raise OutputError(f"dataset export: {e.name} is not installed; pip install 'cutcal[data]'") from None
-    if not scenes:
-        raise OutputError("dataset export: RDT is given pictures; name backgrounds, such as --scenes 0,1,2")
-    check(out, scenes)
+    check_pictured(out, scenes, "RDT's input", "PIL")
+    from PIL import Image
+
     tasks: dict[str, dict[str, Any]] = {}
     for view in views(folder, scenes, pixels, say):
         name = task_of(view.stored.about["food"], view.stored.about["task"])

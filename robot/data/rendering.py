@@ -9,9 +9,8 @@ import numpy as np
 
 import robot.intsim  # noqa: F401
 from mpm.errors import CutcalError
-from mpm.shapes import Shape
-from robot.cuts import CutSpec, Item
-from robot.data.shards import Stored
+from robot.cuts import CutSpec
+from robot.data.shards import Stored, item_of
 from robot.data.views import VIEWS
 from robot.scenery import COLOURS
 from robot.suites import Episode
@@ -54,7 +53,7 @@ class Renderer:
     def pictures(self, stored: Stored) -> dict[str, np.ndarray]:
         """What each camera sees before every step, shape (T, pixels, pixels, 3), 8 bits."""
         env, about, group = self._env, stored.about, stored.group
-        items = [_item(one) for one in about["items"]]
+        items = [item_of(one) for one in about["items"]]
         spec = CutSpec(items[0].name, about["task"]["ratio"], about["task"]["side"], about["task"]["camera"])
         episode = Episode(about["suite"], about["episode_seed"], spec, items[0], tuple(items[1:]), about["instruction"])
         env.reset(seed=about["episode_seed"], options={"episode": episode})
@@ -81,8 +80,3 @@ class Renderer:
             for view in VIEWS:
                 out[view][t] = seen[view]["rgb"][0].numpy()
         return out
-
-
-def _item(stored: dict[str, Any]) -> Item:
-    shape = Shape(stored["kind"], stored["length"], stored["width"], stored["height"], stored["cut"])
-    return Item(stored["name"], shape, stored["x"], stored["y"], stored["yaw"])

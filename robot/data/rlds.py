@@ -15,9 +15,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from calib.errors import OutputError
 from robot.data.lerobot import columns
-from robot.data.views import VIEWS, View, check, views
+from robot.data.views import VIEWS, View, check_pictured, views
 
 NAME, VERSION = "cutcal", "1.0.0"
 VALIDATION = 20  # every so many-th trajectory is kept for validation
@@ -48,14 +47,7 @@ def export(
     Raises:
         CutcalError: A package or the renderer is missing, no background is named, the folder is taken or holds no dataset.
     """
-    try:
-        import google_crc32c  # noqa: F401
-        import PIL  # noqa: F401
-    except ImportError as e:
-        raise OutputError(f"dataset export: {e.name} is not installed; pip install 'cutcal[data]'") from None
-    if not scenes:
-        raise OutputError("dataset export: RLDS is pictures and actions; name backgrounds, such as --scenes 0,1,2")
-    check(out, scenes)
+    check_pictured(out, scenes, "RLDS", "google_crc32c", "PIL")
     home = out / NAME / VERSION
     home.mkdir(parents=True)
     counts, sizes = {"train": 0, "val": 0}, {"train": 0, "val": 0}

@@ -35,6 +35,8 @@ import numpy as np
 
 from calib.errors import OutputError
 from calib.outputs import finite
+from mpm.shapes import Shape
+from robot.cuts import Item
 from robot.data.demonstrate import OPEN, Track
 from robot.planner import PHASES, RATE
 
@@ -193,3 +195,9 @@ def trajectories(folder: Path) -> Iterator[Stored]:
                     yield Stored(file[f"traj_{about['episode_id']}"], about)
         except (OSError, KeyError, ValueError) as e:
             raise OutputError(f"{path}: damaged ({e}); make the dataset again") from None
+
+
+def item_of(listed: dict[str, Any]) -> Item:
+    """A food as a dataset lists it."""
+    shape = {name: value for name, value in listed.items() if name not in ("name", "x", "y", "yaw")}
+    return Item(listed["name"], Shape(**shape), listed["x"], listed["y"], listed["yaw"])

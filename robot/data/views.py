@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,25 @@ class View:
     scene: int | None
     sentence: str
     pictures: dict[str, np.ndarray]
+
+
+def check_pictured(out: Path, scenes: Sequence[int], kind: str, *packages: str) -> None:
+    """The same for an export that is nothing without pictures.
+
+    Args:
+        out, scenes: As in :func:`check`.
+        kind: What it is called.
+        packages: Names of the modules that it is written with.
+
+    Raises:
+        OutputError: Those of :func:`check`, no background, or a package that is not installed.
+    """
+    for name in packages:
+        if find_spec(name) is None:
+            raise OutputError(f"dataset export: {name} is not installed; pip install 'cutcal[data]'")
+    if not scenes:
+        raise OutputError(f"dataset export: {kind} is pictures and actions; name backgrounds, such as --scenes 0,1,2")
+    check(out, scenes)
 
 
 def check(out: Path, scenes: Sequence[int]) -> None:

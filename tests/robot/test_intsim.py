@@ -217,6 +217,7 @@ def test_a_worker_makes_an_episode_that_can_be_read(tmp_path):
     assert found["about"]["seconds"]["solver"] > 0 and len(found["about"]["instructions"]) >= 5
 
 
+# A picture needs a renderer; everything else of a stored trajectory is tested without one above.
 @pytest.mark.skipif(not VULKAN, reason="no Vulkan device that SAPIEN can render with")
 def test_pictures_of_a_stored_trajectory_show_what_was_simulated(tmp_path):
     """Rendered from what is stored: the same view twice is the same picture, another background is another, and the cut opens the food."""
@@ -334,6 +335,7 @@ def test_joint_targets_do_what_they_did_and_keep_within_their_speeds():
     assert env.table.rollout.clipped == [("joint",)]
 
 
+# A picture needs a renderer; that a policy is given none without one is tested directly above.
 @pytest.mark.skipif(not VULKAN, reason="SAPIEN finds no device that it can render with")
 def test_a_policy_is_given_pictures_where_it_wants_them():
     """Three cameras, 8 bits, the size that was asked for."""
