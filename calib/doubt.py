@@ -114,14 +114,24 @@ def doubt_of(
         drawn = bands(surrogate, result.best.z, found, seed)
         posterior = Posterior(surrogate, result.parameters, found)
         own = sampled(posterior, result.best.z, seed) if sample else {}
-    intervals = with_profiles(found, walked, as_good(result))
+    intervals = with_profiles(found, walked, [t.z for t in as_good(result, found)])
     return Doubt(result, intervals, walked, _nuisances(objective, result, found), drawn, own)
 
 
-def as_good(result: FitResult) -> list[FloatArray]:
-    """Points (p,) of the runs that count and whose chi-square is within the rise at the ends of an interval of the best one's."""
-    limit = result.best.misfit + RISE
-    return [t.z for t in result.history if t.cut and not t.coarse and t.misfit <= limit]
+def at_first_sight(objective: Objective | JointObjective, result: FitResult) -> Uncertainty | None:
+    """What the runs of a search alone say of the parameters; None where it ended before there were runs enough to tell."""
+    if result.jacobian is None or result.surrogate is None:
+        return None
+    with threadpool_limits(1, "blas"):
+        found, walked = _walk(objective, result, result.surrogate, result.jacobian)
+    return with_profiles(found, walked, [t.z for t in as_good(result, found)])
+
+
+def as_good(result: FitResult, found: Uncertainty) -> list[Trial]:
+    """The runs that count and whose chi-square, as the intervals see it, is within the rise at their ends of the best one's."""
+    runs = [result.best, *(t for t in result.history if t.cut and not t.coarse)]
+    size = np.sum(found.rows(np.array([t.residual for t in runs])) ** 2, axis=1)
+    return [t for t, own in zip(runs, size, strict=True) if own <= size[0] + RISE]
 
 
 def _better(result: FitResult, runs: list[Trial], luck: float) -> Trial | None:

@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 
 from calib.errors import CurveError
-from calib.nuisance import Whitening
 from calib.parameters import ParameterSet
 from calib.surrogate import Surrogate
 from calib.uncertainty import COVERED, Uncertainty
@@ -32,9 +31,6 @@ class Posterior:
 
     def __init__(self, surrogate: Surrogate, parameters: ParameterSet, found: Uncertainty) -> None:
         self.surrogate, self.parameters, self.found = surrogate, parameters, found
-        self._p = len(parameters)
-        self._weights = found.data.weights / math.sqrt(found.widened)
-        self._whiten = Whitening(found.data.unsearched / math.sqrt(found.widened))
 
     def rows(self, z: FloatArray) -> FloatArray:
         """Rows of data and priors at internal coordinates (p,), the priors last."""
@@ -42,9 +38,7 @@ class Posterior:
 
     def rows_all(self, z: FloatArray) -> FloatArray:
         """The same at many points (q, p): (q, rows)."""
-        rows = self.surrogate.residuals(z)
-        data = self._whiten((self._weights * rows[:, : -self._p]).T).T
-        return np.concatenate([data, rows[:, -self._p :]], axis=1)
+        return self.found.rows(self.surrogate.residuals(z))
 
     def log(self, z: FloatArray) -> float:
         """Logarithm of the posterior density at internal coordinates (p,), up to a constant; minus infinity out of bounds."""

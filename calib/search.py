@@ -86,7 +86,8 @@ LARGEST_SCALE = 3.0
 
 
 class Search:
-    """The rounds of one fit and all their runs; ``enough`` looks at the best run before each round, and may end them."""
+    """The rounds of one fit and all their runs; a best chi-square above ``enough``, or what the right material leaves in 99 of 100 cuts, is
+    not the end."""
 
     def __init__(
         self,
@@ -95,9 +96,10 @@ class Search:
         coarse: Evaluator | None,
         options: FitOptions,
         progress: Callable[[Progress], None] | None,
-        enough: Callable[[Trial], bool] = lambda best: False,
+        enough: float | None = None,
     ) -> None:
-        self.objective, self.options, self.progress, self.enough = objective, options, progress, enough
+        self.objective, self.options, self.progress = objective, options, progress
+        self.enough = chi2.ppf(EXPLAINED, objective.effective_rows) if enough is None else enough
         self.parameters = objective.parameters
         self.fine, self.coarse = evaluator, coarse
         self.trials: list[Trial] = []
@@ -159,12 +161,12 @@ class Search:
         while True:
             status, best = self._rounds(patience), self.best
             patience = 0.5
-            if status in ("budget", "enough"):
+            if status == "budget":
                 return status
-            unexplained = best.misfit > chi2.ppf(EXPLAINED, self.objective.effective_rows)
-            if unexplained and self._strides():
+            unmet = best.misfit > self.enough
+            if unmet and self._strides():
                 continue
-            if unexplained and self._unseen():
+            if unmet and self._unseen():
                 self._design([])
             elif self.coarse is None and self._differences():
                 process = self.process()
@@ -262,12 +264,10 @@ class Search:
         """Rounds of one batch each, until they are calm or the budget is spent.
 
         ``patience`` shortens the wait for gain; where it is short, only what still promises a gain after the coarse runs of a
-        round is run on fine cells, also far from the best point, and nothing ends the rounds.
+        round is run on fine cells, also far from the best point.
         """
         calm = stalled = 0
         while self._room() > 0:
-            if not self.screening and self.enough(self.best):
-                return "enough"
             before, worth, process = self.best.misfit, self.worth, self.process()
             near = _near(process)
             promise, far = _promise(process, near), self._far(process)

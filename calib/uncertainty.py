@@ -26,6 +26,7 @@ from scipy.stats import chi2
 from scipy.stats import t as student
 
 from calib.joint import JointObjective
+from calib.nuisance import Whitening
 from calib.objective import Objective, Trial
 from calib.parameters import Z95, Parameter, ParameterSet
 
@@ -159,6 +160,13 @@ class Uncertainty:
     def explained(self) -> bool:
         """Whether the best curve follows the data as the right one would."""
         return self.data.met and self.reduced_chi2 * self.freedom <= chi2.ppf(EXPLAINED, self.freedom)
+
+    def rows(self, residuals: FloatArray) -> FloatArray:
+        """Residual vectors (q, k + p) of runs as the intervals see them: the errors of the data widened, weighted and marginal."""
+        size = math.sqrt(self.widened)
+        k = len(self.data.weights)
+        data = Whitening(self.data.unsearched / size)((self.data.weights / size * residuals[:, :k]).T).T
+        return np.concatenate([data, residuals[:, k:]], axis=1)
 
     def known_width(self) -> dict[str, float]:
         """Width of each parameter's interval if gain and width were known, over what it is [-], by name."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from calib import second
-from calib.doubt import Doubt, doubt_of
+from calib.doubt import Doubt, at_first_sight, doubt_of
 from calib.fit import FitResult, calibrate
 from calib.objective import Objective, Target
 from calib.options import FitOptions
@@ -63,9 +63,10 @@ def verdicts(doubt: Doubt) -> dict[str, str]:
     return {i.parameter.name: i.verdict for i in doubt.uncertainty.intervals}
 
 
-@pytest.mark.parametrize("seed", [1, 3, 5])
+@pytest.mark.parametrize("seed", [0, 1, 3, 5, 6, 7])
 def test_another_food_that_explains_the_curve_takes_a_claim_back(seed):
-    """Which food one search ends at is chance; where the second ends at the other, the interval reaches to it and nothing is claimed."""
+    """Which food the first search ends at is chance; the second is sent away from it and ends at the other, the interval reaches to it and
+    nothing is claimed. Of twelve seeds one does not find it (2), and one claims nothing of E (4)."""
     _, doubt, _ = inferred(twofold, seed)
     e = doubt.uncertainty.intervals[0]
     assert e.verdict == "weak" and verdicts(doubt)["R"] == "identified"
@@ -74,49 +75,72 @@ def test_another_food_that_explains_the_curve_takes_a_claim_back(seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_what_is_found_again_is_claimed_still(seed):
-    """The second search ends as soon as it is where the first has ended, after few runs that count; all runs are in the history."""
+def test_what_no_other_food_refutes_is_claimed_still(seed):
+    """The second search finds nothing as good; all its runs are in the history, with the chi-square of the objective itself."""
     told: list[Progress] = []
     result, doubt, first = inferred(onefold, seed, told=told)
     r = doubt.uncertainty.intervals[1]
     assert r.verdict == "identified" and r.low95 < TRUTH["R"] < r.high95
-    more = result.history[first:]
-    assert 0 < sum(not t.coarse for t in more) <= 6 < len(more) and doubt.said == ()
-    assert told[-1].done == len(result.history) - sum(t.stage == "profile" for t in more)
+    more = [t for t in result.history if t.stage != "profile"]
+    assert len(more) > first and doubt.said == ()
+    goal = objective(onefold)
+    assert all(t.misfit == goal.trial(t.evaluation).misfit for t in result.history)
+    assert told[-1].done == len(more)
     assert all(b.done >= a.done and b.spent >= a.spent for a, b in zip(told[:-1], told[1:], strict=True))
     assert {p.budget for p in told} == {100}
 
 
-def test_a_better_food_becomes_the_answer(monkeypatch):
-    """Where the first search has ended in a basin that explains the curve less well, values and intervals are about the second's."""
-    goal, fake = objective(onefold), Fake(onefold, noisy=0.002)
-    options = FitOptions(seed=0)
-    right = calibrate(goal, fake, coarse=fake, replicate=fake, options=options)
+def test_what_is_claimed_is_barred():
+    """A point within all claimed intervals has a residual more, the deeper the larger; one outside of any of them has none."""
+    _, doubt, _ = inferred(onefold, 0)
+    both = doubt.uncertainty.intervals
+    barred = second._barred(TWO, both)
+    middle = np.array([0.5 * (i.parameter.to_internal(i.low95) + i.parameter.to_internal(i.high95)) for i in both])
+    half = np.array([0.5 * (i.parameter.to_internal(i.high95) - i.parameter.to_internal(i.low95)) for i in both])
+    points = middle + np.array([[0.0, 0.0], [1.5, 0.0], [0.0, 1.5], [3.1, 0.0], [0.0, -3.1], [1.0, 1.0]]) * half
+    rows = barred.prior_residual(points)
+    assert rows[:, -1] == pytest.approx([10.0, 5.0, 5.0, 0.0, 0.0, 20.0 / 3.0])
+    assert np.array_equal(rows[:, :-1], TWO.prior_residual(points))
+    assert np.array_equal(barred.prior_residual(points[1]), rows[1])
+
+
+def stuck(goal: Objective, fake: Fake, shift: float) -> FitResult:
+    """A fit whose search has ended at an R so many times the right one, with no better run in its history."""
+    right = calibrate(goal, fake, coarse=fake, replicate=fake, options=FitOptions(seed=0))
     values = dict(right.best.evaluation.parameters)
-    poor = goal.trial(next(iter(fake.evaluate([values | {"R": 1.03 * values["R"]}]))), stage="round")
+    poor = goal.trial(next(iter(fake.evaluate([values | {"R": shift * values["R"]}]))), stage="round")
     history = (*(t for t in right.history if t.misfit > poor.misfit), poor)
     surrogate = Surrogate(goal, history, poor)
-    stuck = replace(
+    return replace(
         right,
         best=poor,
         history=history,
         parameters=right.parameters.with_values(poor.evaluation.parameters),
         surrogate=surrogate,
         jacobian=surrogate.jacobian(poor.z),
+        replicates=(),
     )
-    monkeypatch.setattr(second, "calibrate", lambda *args, **how: stuck)
-    monkeypatch.setattr(second, "RISE", -math.inf)  # so that the second search goes on to its own end
-    result, doubt = infer(goal, fake, coarse=fake, again=fake, options=options)
-    assert doubt is not None and poor.misfit > right.best.misfit + 5.0
-    assert result.best.misfit < poor.misfit - 5.0 and result.best.stage != "profile"
-    assert [i.parameter.value for i in doubt.uncertainty.intervals] == list(result.best.evaluation.parameters.values())
+
+
+def test_a_better_food_becomes_the_answer():
+    """Where the first search has ended in a basin that explains the curve less well, values and intervals are about the second's, and
+    only what holds the first's value as well is claimed."""
+    goal, fake = objective(onefold), Fake(onefold, noisy=0.002)
+    first = stuck(goal, fake, 1.1)
+    narrow = replace(at_first_sight(goal, first).intervals[1], verdict="identified")  # type: ignore[union-attr]
+    narrow = replace(narrow, low95=0.99 * narrow.parameter.value, high95=1.01 * narrow.parameter.value)
+    result = second._searched(goal, first, [narrow], fake, fake, FitOptions(seed=0), None)
+    assert result.best.misfit < first.best.misfit - 5.0
+    assert result.parameters.to_dict(result.best.z) == result.best.evaluation.parameters
     assert result.surrogate is not None and result.surrogate.best is result.best
-    assert "better, by" in doubt.said[0]
-    assert verdicts(doubt)["R"] == "identified", "the first answer lies in its interval"
-    far = next(iter(fake.evaluate([values | {"R": 1.5 * values["R"]}])))
-    alone = second._unconfirmed(doubt.uncertainty, goal.trial(far, stage="round"))
-    assert alone.intervals[1].verdict == "weak", "found by one search alone"
-    assert alone.intervals[1].low95 == doubt.uncertainty.intervals[1].low95
+    doubt = doubt_of(goal, result, scout=fake, judge=fake)
+    assert doubt is not None
+    found = second._weighed(doubt, first, result, [narrow])
+    assert "better, by" in found.said[0] and verdicts(found)["R"] == "weak", "the first answer lies outside"
+    assert "the food of the first search had another" in found.said[1]
+    assert found.uncertainty.intervals[1].low95 == doubt.uncertainty.intervals[1].low95
+    near = replace(first, best=goal.trial(replace(result.best.evaluation)))
+    assert verdicts(second._weighed(doubt, near, result, [narrow]))["R"] == "identified"
 
 
 def test_what_cannot_be_searched_twice_is_not_claimed():
@@ -125,6 +149,28 @@ def test_what_cannot_be_searched_twice_is_not_claimed():
     assert len(result.history) == first and verdicts(doubt)["R"] == "weak"
     r = doubt.uncertainty.intervals[1]
     assert r.low95 < TRUTH["R"] < r.high95 and "a budget of 40 may" in doubt.said[0]
+
+
+def test_what_numerics_decide_is_not_claimed():
+    """An answer that does not explain the curve at half the speed and with other particles is none; no second search is made for it."""
+    goal, fake = objective(onefold), Fake(onefold, noisy=0.002)
+    other = Fake(lambda p: onefold(p) + 0.9 * np.sin(STROKE / 0.003), noisy=0.002)
+    result, doubt = infer(goal, fake, coarse=fake, again=other, options=FitOptions(seed=0))
+    first = calibrate(goal, fake, coarse=fake, replicate=other, options=FitOptions(seed=0))
+    assert doubt is not None and verdicts(doubt)["R"] == "weak" and result.best.misfit < 2.0
+    assert [t.stage for t in result.history[len(first.history) :]] == ["profile"] * (
+        len(result.history) - len(first.history)
+    )
+    assert "R: bounded, but the same values at half the speed" in doubt.said[0]
+
+
+def test_the_answer_is_always_run_twice():
+    """Also one that was found after the finalists were; once only."""
+    goal, fake = objective(onefold), Fake(onefold, noisy=0.002)
+    fit = stuck(goal, fake, 1.01)
+    once = second._repeated(goal, fit, fake)
+    assert len(once.replicates) == 1 and np.array_equal(once.replicates[0].z, fit.best.z)
+    assert second._repeated(goal, once, fake) is once and once.simulations == fit.simulations + 1
 
 
 def test_an_interrupted_search_simulates_nothing_more():
