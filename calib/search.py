@@ -62,6 +62,9 @@ SCOUTS = 1
 #: Part of the chi-square that the noise of one run makes which a round must bring: with a quarter one of 16 synthetic cuts
 #: ended 11 above its truth, with a tenth none more than 4.4.
 LUCK = 0.1
+#: Gain worth a round, as ``FitOptions.tolerance``, while the best curve is not good enough: a quarter of what bounds a 95 % interval. A curve
+#: that no food of the model follows is not followed better for polishing it, and another basin is found by looking elsewhere.
+AFAR = 1.0
 #: Random points from which, besides all runs, the most promising one is sought; how many are followed.
 STARTS, FOLLOWED = 16, 3
 #: Probes are drawn from the normal approximation of the posterior, this much wider (on 24 synthetic cuts this
@@ -140,8 +143,8 @@ class Search:
     @property
     def worth(self) -> float:
         """Gain in chi-square that is worth a round [-]: not what the noise of a run gives by chance."""
-        gain = self.options.tolerance * max(1.0, self.best.misfit / self.objective.effective_rows)
-        return max(gain, LUCK * self.luck)
+        least = self.options.tolerance if self.best.misfit <= self.enough else max(self.options.tolerance, AFAR)
+        return max(least * max(1.0, self.best.misfit / self.objective.effective_rows), LUCK * self.luck)
 
     def run(self) -> str:
         """Search until there is nothing to gain or to spend; return the status."""

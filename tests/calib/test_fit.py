@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from calib import search
 from calib.errors import MaterialError
 from calib.evaluation import Evaluation, Evaluator
 from calib.fit import AFRESH, NOISES, FitResult, _may_win, calibrate
@@ -232,6 +233,25 @@ def test_a_curve_far_off_is_sought_as_long_as_the_budget_holds(size: float, spen
     assert (result.best.misfit > FAR_OFF * objective.effective_rows) is spent
     designed = sum(t.stage == "design" for t in result.history) - 2  # less the given values and the centre
     assert (designed > DESIGNS * options.design) is spent
+
+
+def test_a_curve_that_nothing_follows_is_not_polished(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What rounds of small gains would bring is less than what bounds an interval where the errors are as large; they are not made."""
+    plain = goal(TRUTHS[0])
+    target = replace(plain.target, curve=plain.target.curve + 2.0 * np.sin(GRID / 0.0025))
+    objective = Objective(target, FIVE)
+
+    def ends(seed: int) -> tuple[float, float]:
+        fake, options = Fake(), FitOptions(seed=seed)
+        result = calibrate(objective, fake, coarse=fake, options=options)
+        return options.cost(result.history), result.best.misfit
+
+    found = [ends(seed) for seed in range(2)]
+    monkeypatch.setattr(search, "AFAR", 0.0)
+    polished = [ends(seed) for seed in range(2)]
+    for (cost, misfit), (longer, least) in zip(found, polished, strict=True):
+        assert misfit > 2.0 * objective.effective_rows and misfit - least < 3.84 * least / objective.effective_rows
+        assert cost < longer
 
 
 def test_single_linear_parameter() -> None:
