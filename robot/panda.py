@@ -62,9 +62,15 @@ def urdf(knife: str, *, visible: bool) -> str:
             for tag in ("visual", "material"):
                 for child_element in parent.findall(tag):
                     parent.remove(child_element)
-    path = Path(tempfile.mkdtemp(prefix="cutcal-panda-")) / f"panda_{knife}.urdf"
+    path = Path(_folder().name) / f"panda_{knife}{'' if visible else '_bare'}.urdf"
     tree.write(path, encoding="unicode")
     return str(path)
+
+
+@functools.cache
+def _folder() -> tempfile.TemporaryDirectory[str]:
+    """Where this process keeps its descriptions; removed when it ends."""
+    return tempfile.TemporaryDirectory(prefix="cutcal-panda-")
 
 
 def _numbers(*values: float) -> str:

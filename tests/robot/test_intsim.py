@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -346,3 +349,12 @@ def test_a_policy_is_given_pictures_where_it_wants_them():
     images = policy.seen[0]["images"]
     assert sorted(images) == ["front", "side", "wrist"]
     assert all(i.shape == (32, 32, 3) and i.dtype == np.uint8 and i.std() > 5 for i in images.values())
+
+
+def test_the_description_of_the_robot_is_removed():
+    """A process keeps one for each knife, apart from the one without looks, and leaves none behind."""
+    code = "from robot.panda import urdf; print(urdf('kitchen', visible=True), urdf('kitchen', visible=False))"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    paths = [Path(p) for p in found.stdout.split()[-2:]]
+    assert len(set(paths)) == 2 and all(p.suffix == ".urdf" for p in paths)
+    assert not any(p.exists() or p.parent.exists() for p in paths)
