@@ -24,7 +24,7 @@ from calib.fit import FitResult, calibrate, onward
 from calib.joint import JointObjective
 from calib.objective import Objective, Trial
 from calib.options import FitOptions
-from calib.parameters import ParameterSet
+from calib.parameters import ParameterSet, plain
 from calib.profiles import RISE
 from calib.progress import Progress
 from calib.search import Search
@@ -34,6 +34,10 @@ from mpm.errors import SimulationError
 
 FloatArray = npt.NDArray[np.float64]
 
+PROVEN = ("R", "R_skin")
+"""Properties that one search may claim: of their intervals 63 of 65 and 42 of 44 held the truth on 85 made-up bananas. Those of E, yield stress and
+initiation depth, which a cut bounds as well, did in 18 of 25: stiff foods that yield late and soft ones that flow and rub are cut with the same force, and
+two searches did not find the one beside the other."""
 OTHERWISE = 2_000_003
 """Added to the seed of the second search."""
 STRETCH = 3.0
@@ -95,7 +99,7 @@ def infer(
     if first.status == "interrupted":
         return first, doubt_of(objective, first, seed=options.seed, sample=sample)
     alone = at_first_sight(objective, first)
-    claimed = [] if alone is None else [i for i in alone.intervals if i.verdict == "identified"]
+    claimed = [] if alone is None else [i for i in alone.intervals if i.verdict == "identified" and _proven(i)]
     if claimed:
         first = _repeated(objective, first, again)
     result, second = first, None
@@ -107,6 +111,11 @@ def infer(
     doubt = doubt_of(objective, result, scout=coarse, judge=fine, seed=options.seed, sample=sample, say=say)
     if doubt is None:
         return result, None
+    doubt = _unclaimed(
+        doubt,
+        "bounded, but of made-up cuts one of four such intervals does not hold the truth",
+        lambda i: not _proven(i),
+    )
     if any(i.verdict == "identified" for i in doubt.uncertainty.intervals):
         doubt = replace(doubt, result=_repeated(objective, doubt.result, again))
     if second is not None:
@@ -186,8 +195,8 @@ def _weighed(doubt: Doubt, first: FitResult, second: FitResult, claimed: Sequenc
         values = first.best.evaluation.parameters
         gain = first.best.misfit - second.best.misfit
         said = f"A second search found a food that explains the curve better, by {gain:.3g} in chi-square: the values are its own."
-        doubt = _unclaimed(doubt, "the food of the first search had another", lambda i: not _holds(i, values))
-        return replace(doubt, said=(said, *doubt.said))
+        doubt = replace(doubt, said=(*doubt.said, said))
+        return _unclaimed(doubt, "the food of the first search had another", lambda i: not _holds(i, values))
     after = second.history[len(first.history) :]
     others = [t.evaluation.parameters for t in as_good(doubt.result, doubt.uncertainty) if any(t is o for o in after)]
     kept = {i.parameter.name for i in doubt.uncertainty.intervals if i.verdict == "identified"}
@@ -195,7 +204,7 @@ def _weighed(doubt: Doubt, first: FitResult, second: FitResult, claimed: Sequenc
     if not lost:
         return doubt
     said = f"{_names(lost)}: a second search found another food that explains the curve as well; the interval reaches to it."
-    return replace(doubt, said=(said,))
+    return replace(doubt, said=(*doubt.said, said))
 
 
 def _holds(interval: Interval, values: Mapping[str, float]) -> bool:
@@ -210,6 +219,10 @@ def _unclaimed(doubt: Doubt, why: str, lost: Callable[[Interval], bool] = lambda
     changed = tuple(replace(i, verdict="weak") if i in gone else i for i in doubt.uncertainty.intervals)
     said = f"{_names(gone)}: {why}, so called weak."
     return replace(doubt, uncertainty=replace(doubt.uncertainty, intervals=changed), said=(*doubt.said, said))
+
+
+def _proven(interval: Interval) -> bool:
+    return plain(interval.parameter.name) in PROVEN
 
 
 def _names(intervals: Sequence[Interval], between: str = ", ") -> str:
