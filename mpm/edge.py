@@ -23,8 +23,6 @@ from mpm.fields import (
     SLIP,
     TILT_COS,
     TILT_SIN,
-    VS,
-    VZ,
     ZONE,
     S,
 )
@@ -108,7 +106,7 @@ class Edge(Nodes):
     @ti.func
     def over(self, s):
         """Part of a slice that is under the blade [-]."""
-        reach = self.par[HALF_LENGTH] * self.par[TILT_COS] - ti.abs(s - ti.cast(self.pose[S], float))
+        reach = self.par[HALF_LENGTH] * ti.cast(self.pose[TILT_COS], float) - ti.abs(s - ti.cast(self.pose[S], float))
         return ti.math.clamp(reach * self.par[INV] + 0.5, 0.0, 1.0)
 
     @ti.func
@@ -140,16 +138,15 @@ class Edge(Nodes):
         width = self.par[DX] * self.width[i] * (begun - ended)
         full = SURFACE_FILL * self.par[FULL] * width * self.par[INV]
         if width > 0 and mass > EMPTY_ZONE * full:
-            c, t = self.par[TILT_COS], self.par[TILT_SIN]
-            mean = self.velocity[i]
+            c, t = ti.cast(self.pose[TILT_COS], float), ti.cast(self.pose[TILT_SIN], float)
+            mean, blade = self.velocity[i], self.blade_velocity(s, tip)
             if over > 0 and tip <= self.front[i] + self.par[SLIP]:
-                slide = (ti.cast(self.pose[VS], float) - mean[0]) * dt
-                fall = (mean[2] - ti.cast(self.pose[VZ], float)) * dt
+                slide, fall = (blade[0] - mean[0]) * dt, (mean[2] - blade[2]) * dt
                 line = self.line_force(i, c * slide - t * fall, c * fall + t * slide, begun - ended)
                 along, down = c * line[0] + t * line[1], c * line[1] - t * line[0]
                 impulse = ti.Vector([along, -down]) * width / c * over * dt
                 self.push[i] = impulse / mass
-                self.tool(EDGE, -self.images_x(i) * ti.Vector([impulse[0], 0.0, impulse[1]]))
+                self.knife(EDGE, -self.images_x(i) * ti.Vector([impulse[0], 0.0, impulse[1]]), s, tip)
                 self.sums[PARTED] += self.images_x(i) * (impulse[0] * slide - impulse[1] * fall) / dt
             else:
                 self.slip[i] = ti.Vector.zero(float, 2)

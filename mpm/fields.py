@@ -9,10 +9,10 @@ from mpm.runtime import adds_doubles
 MU, LAM, YIELD, MASS, VOL, FRICTION, BOARD_MU = range(7)
 R_FLESH, R_START, DEPTH, SLIP, ZONE, FULL, EPS0, EPSF = range(7, 15)
 SPINE, COS, SIN, HALF_LENGTH, BLADE, GRAVITY, RADIUS, ETA_S, ETA_B = range(15, 24)
-TILT_COS, TILT_SIN, YAW_COS, YAW_SIN, TACK, TACK_GAP = range(24, 30)
-ARM_K, ARM_C, ARM_MASS, ARM_LIMIT = range(30, 34)
-DX, INV, OX, OY, OZ, FIRST = range(34, 40)
-N_PARAMETERS = 40
+YAW_COS, YAW_SIN, TACK, TACK_GAP = range(24, 28)
+ARM_K, ARM_C, ARM_MASS, ARM_LIMIT = range(28, 32)
+DX, INV, OX, OY, OZ, FIRST = range(32, 38)
+N_PARAMETERS = 38
 # Rows of the table of sizes: particles, blocks of them, nodes along x, y, z, slices along the edge, the mirror plane across y, the
 # first and last + 1 node plane along y whose nodes have a second field, how far behind the first that is stored, and the sum of the
 # indices of two nodes that are mirror images across x.
@@ -20,12 +20,12 @@ COUNT, BLOCKS, NODES, STATIONS, PLANE, TWIN, TWIN_END, SECOND, PAIR = 0, 1, 2, 5
 N_SIZES = 11
 # Rows of the accumulator table, cleared by the host at each output interval.
 EDGE, FACE, BOARD = 0, 3, 6
-PLASTIC, DAMAGE, VISCOUS, INVERTED, OUTSIDE, RUBBED, PARTED = range(9, 16)
-N_SUMS = 16
+PLASTIC, DAMAGE, VISCOUS, INVERTED, OUTSIDE, RUBBED, PARTED, MOMENT = range(9, 17)
+N_SUMS = 17
 # Rows of the tool's pose: height of the edge in the middle of the blade, its middle along the blade, their velocities,
-# the height that is commanded, the vertical impulse booked before this step.
-Z, S, VZ, VS, COMMAND, BOOKED = range(6)
-N_POSE = 6
+# the height that is commanded, the vertical impulse booked before this step; its angle to the board, how fast that grows, cosine and sine.
+Z, S, VZ, VS, COMMAND, BOOKED, TILT, TURN, TILT_COS, TILT_SIN = range(10)
+N_POSE = 10
 # State at an output: momentum of the particles, kinetic and elastic energy.
 N_STATE = 5
 N_REPORT = N_SUMS + N_STATE + N_POSE
@@ -336,12 +336,21 @@ class Fields:
     def edge_height(self, s):
         """Height of the edge at a place along the blade [m]."""
         z = ti.cast(self.pose[Z], float)
-        return z + (s - ti.cast(self.pose[S], float)) * self.par[TILT_SIN] / self.par[TILT_COS]
+        c, t = ti.cast(self.pose[TILT_COS], float), ti.cast(self.pose[TILT_SIN], float)
+        return z + (s - ti.cast(self.pose[S], float)) * t / c
+
+    @ti.func
+    def blade_velocity(self, s, z):
+        """Velocity of the blade where it is at a place along the cut and a height [m/s], in the scene's axes."""
+        turn = ti.cast(self.pose[TURN], float)
+        along = ti.cast(self.pose[VS], float) - turn * (z - ti.cast(self.pose[Z], float))
+        up = ti.cast(self.pose[VZ], float) + turn * (s - ti.cast(self.pose[S], float))
+        return ti.Vector([along, 0.0, up])
 
     @ti.func
     def under_blade(self, s):
         """Whether a place along the cut lies within the length of the blade."""
-        return ti.abs(s - ti.cast(self.pose[S], float)) < self.par[HALF_LENGTH] * self.par[TILT_COS]
+        return ti.abs(s - ti.cast(self.pose[S], float)) < self.par[HALF_LENGTH] * ti.cast(self.pose[TILT_COS], float)
 
     @ti.func
     def images_x(self, i):
@@ -369,3 +378,12 @@ class Fields:
         if ti.static(not self.my):
             self.sums[row + 1] += impulse[1]
         self.sums[row + 2] += impulse[2]
+
+    @ti.func
+    def knife(self, row, impulse, s, z):
+        """Book an impulse of the food on the knife at a place along the cut and a height, and its moment about the middle of the edge,
+        which raises the end at +x."""
+        self.tool(row, impulse)
+        if ti.static(not self.mx):
+            wide, high = s - ti.cast(self.pose[S], float), z - ti.cast(self.pose[Z], float)
+            self.sums[MOMENT] += wide * impulse[2] - high * impulse[0]

@@ -12,14 +12,15 @@ from mpm import fields as kn
 from mpm.errors import SceneError, SimulationError
 from mpm.health import health
 from mpm.record import ForceRecord
-from mpm.runtime import Runtime
-from mpm.scene import Scene
-from mpm.solver import Simulation
+from mpm.runtime import Runtime, running
+from mpm.scene import Knife, Scene
+from mpm.solver import APPROACH, Simulation
 from mpm.surface import Surface
 from mpm.topology import Topology
 from mpm.watch import Snapshot, snapshot
 
 ON_FACE = 1e-9  # distance from the plane of the cut at which a vertex lies on its face [m]
+STEEPEST = 1.2  # angle of the edge to the board [rad]
 CLEAR = 2.0  # height of the edge above the uncut food at which nothing touches the blade any more [cells]
 
 
@@ -34,38 +35,49 @@ class LiveCut:
 
     Args:
         scene: The cut. Its motion says how fast the blade usually is (``speed`` [m/s]) and as what that is simulated (``mach``); a
-            ``slice_ratio`` other than 0 that it may also be drawn along its edge. The stroke is not used. The arm is rigid: what
-            holds the blade is outside.
+            ``slice_ratio`` other than 0 that it may also be drawn along its edge and tilted. The stroke is not used. The arm is
+            rigid: what holds the blade is outside.
         runtime: Device.
 
     Attributes:
         status: ``done`` as long as the food is sound, else why it is not.
         time: Real time that was simulated [s].
         impulse: Impulse of the food on the blade, in real time [N s], shape (3,).
+        moment: Of the food on the blade about the middle of its edge, which raises the end at +x [N m]: the mean of the last move; 0 where
+            the blade is neither drawn nor tilted.
 
     Raises:
         SceneError: A scene without a blade or a real speed, or with an arm of its own.
     """
 
     def __init__(self, scene: Scene, runtime: Runtime | None = None) -> None:
-        if not scene.cuts:
+        if not isinstance(scene.knife, Knife):
             raise SceneError("live cut: the scene has a press; give a knife")
         if scene.motion.speed is None:
             raise SceneError("live cut: the motion has no real speed; give the one at which the blade usually moves")
         if not scene.arm.rigid:
             raise SceneError("live cut: the blade is held from outside; leave the scene's arm rigid")
-        self.scene = scene
+        self.scene, self._length = scene, scene.knife.length
         self._simulation = Simulation(scene, runtime or Runtime(threads=1))
         self._simulation.counters = {"inverted": 0, "outside": 0}
-        self._k: Any = self._simulation.k
         self._simulation._load(scene.food.material)
         self._dt = self._simulation._time_step(scene.food.material)
-        self._top = scene.food.shape.height + self._simulation._gap()
-        self._z, self._s, self._first = self._top, 0.0, 0.0
+        self._top = scene.food.shape.height + APPROACH * scene.numerics.dx
+        self._z, self._s, self._tilt, self._first = math.inf, 0.0, 0.0, 0.0
         self._rows: list[list[float]] = []
         self._momentum, self._steps, self._wall = np.zeros(3), 0, 0.0
         self._looks: Surface | None = None
-        self.status, self.time, self.impulse = "done", 0.0, np.zeros(3)
+        self.status, self.time, self.impulse, self.moment = "done", 0.0, np.zeros(3), 0.0
+
+    @property
+    def _k(self) -> Any:
+        """Fields and kernels, as long as they are this cut's."""
+        simulation = self._simulation
+        if simulation.serial != running() or simulation.k.user is not simulation:
+            raise RuntimeError(
+                "another simulation has taken over the fields of this live cut: follow one to its end before the next is made"
+            )
+        return simulation.k
 
     @property
     def begun(self) -> bool:
@@ -87,52 +99,70 @@ class LiveCut:
     @property
     def height(self) -> float:
         """Height of the middle of the edge above the board [m], at most where the cut begins."""
-        return self._z
+        return min(self._z, self._top + self._drop(self._s, self._tilt))
 
-    def move(self, height: float, slide: float, span: float) -> np.ndarray:
+    def move(self, height: float, slide: float, span: float, tilt: float = 0.0) -> np.ndarray:
         """Move the edge.
 
         Args:
-            height: Of its middle above the board at the end [m]; the board stops it at 0.
+            height: Of its middle above the board at the end [m]; the board stops it where its lowest end over the food is at 0.
             slide: Way along the edge since the beginning, at the end [m].
             span: Real time that passes [s].
+            tilt: Angle of the edge to the board at the end, positive when the end at +x is higher [rad].
 
         Returns:
             Mean force of the food on the blade: along the edge, across the blade, upwards [N], shape (3,).
 
         Raises:
-            SceneError: A draw along the edge in a scene that has none, or numbers that are not finite.
+            SceneError: A draw along the edge or a tilt in a scene that has none, a tilt beyond :data:`STEEPEST`, or numbers that are not finite.
             SimulationError: The food broke down now or before.
         """
         if self.status != "done":
             raise SimulationError(f"the live cut has stopped: {self.status}", reason=self.status, fraction=0.0)
-        if not (math.isfinite(height) and math.isfinite(slide) and span > 0 and math.isfinite(span)):
-            raise SceneError(f"live cut: a move to {height:g} m and {slide:g} m in {span:g} s; give finite numbers")
+        if not (all(map(math.isfinite, (height, slide, tilt, span))) and span > 0):
+            raise SceneError(
+                f"live cut: a move to {height:g} m, {slide:g} m and {tilt:g} rad in {span:g} s; give finite numbers"
+            )
+        if abs(tilt) > STEEPEST:
+            raise SceneError(f"live cut: a tilt of {tilt:g} rad; give one within {STEEPEST:g} rad of the board")
+        self.moment = 0.0
+        low = height - self._drop(slide, tilt)
         if not self.begun:
-            if height >= self._top:
-                self._s = slide
+            if low >= self._top:
+                self._z, self._s, self._tilt = height, slide, tilt
                 return np.zeros(3)
             self._first = self._s
+            self._z = self._top + self._drop(self._s, self._tilt)
+            self._place()
         clear = self.scene.food.shape.height + CLEAR * self.scene.numerics.dx
-        if height > clear and self._z > clear:
-            self._z, self._s = height, slide
+        if low > clear and self._z - self._drop(self._s, self._tilt) > clear:
+            self._z, self._s, self._tilt = height, slide, tilt
             self._place()
             return np.zeros(3)
-        return self._follow(max(height, 0.0), slide, span)
+        return self._follow(height + max(-low, 0.0), slide, tilt, span)
 
-    def _follow(self, height: float, slide: float, span: float) -> np.ndarray:
+    def _drop(self, slide: float, tilt: float) -> float:
+        """How much lower than its middle the edge gets over the food [m]."""
+        half, first = self.scene.food.shape.width / 2, self._first if self.begun else slide
+        reach = min(half + abs(slide - first), self._length / 2 * math.cos(tilt))
+        return reach * abs(math.tan(tilt))
+
+    def _follow(self, height: float, slide: float, tilt: float, span: float) -> np.ndarray:
         """Move the edge near the food."""
-        down, along = height - self._z, slide - self._s
-        if along != 0 and self.scene.mirrors[0]:
-            raise SceneError("live cut: the blade is drawn along its edge; give the motion a slice_ratio other than 0")
-        material, motion = self.scene.food.material, self.scene.motion
+        down, along, turn = height - self._z, slide - self._s, tilt - self._tilt
+        if (along != 0 or tilt != 0 or turn != 0) and self.scene.mirrors[0]:
+            raise SceneError(
+                "live cut: the blade is drawn along its edge or tilted; give the motion a slice_ratio other than 0"
+            )
+        material, motion, shape = self.scene.food.material, self.scene.motion, self.scene.food.shape
         most = motion.mach * material.p_wave * self._dt  # way in a step
-        steps = max(
-            math.ceil(span / self.scene.time_scale / self._dt - 1e-9), math.ceil(math.hypot(down, along) / most - 1e-9)
-        )
+        way = math.hypot(down, along) + abs(turn) * math.hypot(
+            shape.width / 2, shape.height
+        )  # of the fastest point in the food
+        steps = max(math.ceil(span / self.scene.time_scale / self._dt - 1e-9), math.ceil(way / most - 1e-9))
         sim = steps * self._dt
         began = clock.perf_counter()
-        row = self._simulation._advance(steps, steps, self._dt, down / sim, along / sim)[0]
+        row = self._simulation._advance(steps, steps, self._dt, down / sim, along / sim, turn / sim)[0]
         self._wall += clock.perf_counter() - began
         sums, state, pose = np.split(row, (kn.N_SUMS, kn.N_SUMS + kn.N_STATE))
         parts = self._simulation._row(sums, state, self._momentum, sim, material, self.scene.numerics.gravity)
@@ -141,9 +171,15 @@ class LiveCut:
         counters["outside"] += int(sums[kn.OUTSIDE])
         self._momentum, self._steps = np.array(parts[0]), self._steps + steps
         self._rows.append(
-            [*self._simulation._place(pose), self._steps * self._dt, *(v for part in parts for v in part)]
+            [
+                *self._simulation._place(pose),
+                self._steps * self._dt,
+                *(v for part in parts for v in part),
+                pose[kn.TILT],
+            ]
         )
-        self._z, self._s, self.time = height, slide, self.time + span
+        self._z, self._s, self._tilt, self.time = height, slide, tilt, self.time + span
+        self.moment = float(parts[-1][0])
         self.status = health(sums, state)
         if self.status != "done":
             raise SimulationError(
@@ -157,15 +193,11 @@ class LiveCut:
 
     def _place(self) -> None:
         """Put the blade where it is, clear of the food."""
-        pose = self._k.pose.to_numpy()
-        pose[kn.Z] = pose[kn.COMMAND] = self._z
-        pose[kn.S] = self._s - self._first
-        pose[kn.VZ] = pose[kn.VS] = 0.0
-        self._k.pose.from_numpy(pose)
+        self._simulation._set_pose(self._z, self._s - self._first, self._tilt)
 
     def pieces(self) -> Topology:
         """Connected pieces of the food now."""
-        found: Topology = self._simulation._topology()
+        found: Topology = self._k.user._topology()
         return found
 
     def look(self) -> Snapshot:
@@ -196,7 +228,7 @@ class LiveCut:
             )
         speed = self.scene.motion.mach * self.scene.food.material.p_wave
         fraction = min(max(row[0] for row in self._rows) / self.scene.food.shape.height, 1.0)
-        return self._simulation._record(
+        return self._k.user._record(
             self._rows,
             self.scene.food.material,
             self.status,

@@ -18,8 +18,6 @@ from mpm.fields import (
     SECOND,
     SIN,
     SPINE,
-    VS,
-    VZ,
 )
 from mpm.split import Split
 
@@ -65,7 +63,7 @@ class Nodes(Split):
                     nrm = ti.Vector([0.0, 0.0, -1.0])
                 elif at[1] < 0:
                     nrm[1] = -nrm[1]
-                vel = ti.Vector([ti.cast(self.pose[VS], float), 0.0, ti.cast(self.pose[VZ], float)])
+                vel = self.blade_velocity(at[0], at[2])
                 mu = self.par[FRICTION]
                 if above < 0 or above > self.par[BLADE] or not self.under_blade(at[0]):
                     d = 1.0
@@ -74,7 +72,10 @@ class Nodes(Split):
             if d <= 0 and vn < 0:
                 t = rel - vn * nrm
                 new = vel + t + coulomb(-vn, t, mu)
-                self.tool(FACE if ti.static(which == 1) else BOARD, mult * q[3] * (u - new))
+                if ti.static(which == 1):
+                    self.knife(FACE, mult * q[3] * (u - new), at[0], at[2])
+                else:
+                    self.tool(BOARD, mult * q[3] * (u - new))
                 u = new
         return self.grid_axes(u)
 

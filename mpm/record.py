@@ -42,6 +42,9 @@ class ForceRecord:
         friction: Energy that friction, and faces that stick, have taken so far [J], shape (n,); of particles that touch, so
             that of the ``nodal`` contact is not in it.
         parting: Energy that the cutting edge has taken so far [J], shape (n,): the new surface, and the start of the cut.
+        moment: Moment of the food on the knife about the middle of the edge, which raises the end at +x [N m], shape (n,); 0 where
+            x = 0 is a mirror.
+        tilt: Angle of the edge to the board at the end of each interval [rad], shape (n,).
         mass: Mass of the food, mirror images included [kg].
         lagging: Whether contact acts on particles after they were moved: all but ``nodal`` contact.
         cell: Cell size [m].
@@ -78,6 +81,8 @@ class ForceRecord:
     viscous: np.ndarray
     friction: np.ndarray
     parting: np.ndarray
+    moment: np.ndarray
+    tilt: np.ndarray
     mass: float
     lagging: bool
     cell: float
@@ -133,14 +138,16 @@ class ForceRecord:
 
     @property
     def work(self) -> float:
-        """Work of the knife on the food [J], vertical and along the blade."""
+        """Work of the knife on the food [J]: down, along the blade, and as it turns."""
         return float(self.work_done[-1]) if len(self.stroke) else 0.0
 
     @property
     def work_done(self) -> np.ndarray:
         """Work of the knife on the food so far [J], shape (n,)."""
         down = self.knife[:, 2] * np.diff(self.stroke, prepend=0.0)
-        return np.cumsum(down - self.knife[:, 0] * np.diff(self.slide, prepend=0.0))
+        along = self.knife[:, 0] * np.diff(self.slide, prepend=0.0)
+        turning = self.moment[1:] * np.diff(self.tilt)  # the first interval begins above the food
+        return np.cumsum(down - along - np.concatenate([[0.0], turning])[: len(down)])
 
     @property
     def unbooked(self) -> np.ndarray:
@@ -217,6 +224,7 @@ class ForceRecord:
         for name in ("knife", "edge", "face", "board"):
             values = getattr(self, name)
             out |= {f"{name}_f{axis}_N": values[:, k] for k, axis in enumerate("xyz")}
+        out |= {"moment_Nm": self.moment, "tilt_rad": self.tilt}
         out |= {f"balance_{axis}_N": self.residual[:, k] for k, axis in enumerate("xyz")}
         for name in ENERGIES:
             out[f"{name}_J"] = getattr(self, name)

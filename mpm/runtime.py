@@ -113,6 +113,12 @@ def start(runtime: Runtime, precision: str) -> int:
     return _state["serial"]
 
 
+def running() -> int:
+    """Serial number of the runtime that was started last, 0 before the first."""
+    serial: int = _state["serial"]
+    return serial
+
+
 def adds_doubles() -> bool:
     """Whether kernels of the device that was started may add to a double from many threads."""
     import taichi as ti

@@ -162,7 +162,6 @@ class Simulation:
             half, table[kn.SPINE], table[kn.RADIUS] = tool.angle / 2, tool.spine, tool.radius
             table[kn.BLADE], table[kn.HALF_LENGTH] = tool.height, tool.length / 2
         table[kn.COS], table[kn.SIN] = math.cos(half), math.sin(half)
-        table[kn.TILT_COS], table[kn.TILT_SIN] = math.cos(scene.motion.tilt), math.sin(scene.motion.tilt)
         table[kn.YAW_COS], table[kn.YAW_SIN] = math.cos(num.grid_turn), math.sin(num.grid_turn)
         table[kn.GRAVITY] = num.gravity
         beta = self._retardation(material)
@@ -184,12 +183,14 @@ class Simulation:
         ):
             k.fill(field, values.astype(real))
         k.fill(k.soften, (edge.slip + path).astype(real))
-        self._set_pose(scene.food.shape.height + self._gap())
+        self._set_pose(scene.food.shape.height + self._gap(), 0.0, scene.motion.tilt)
 
-    def _set_pose(self, z: float) -> None:
-        """Put the middle of the edge at a height, at rest [m]."""
+    def _set_pose(self, z: float, s: float = 0.0, tilt: float = 0.0) -> None:
+        """Put the middle of the edge at a height and a place along the cut [m], at an angle to the board [rad], at rest."""
         pose = np.zeros(kn.N_POSE)
         pose[kn.Z] = pose[kn.COMMAND] = z
+        pose[kn.S], pose[kn.TILT] = s, tilt
+        pose[kn.TILT_COS], pose[kn.TILT_SIN] = math.cos(tilt), math.sin(tilt)
         self.k.pose.from_numpy(pose)
 
     def _gap(self) -> float:
@@ -255,7 +256,7 @@ class Simulation:
                     self.counters["outside"] += int(sums[kn.OUTSIDE])
                     parts = self._row(sums, state, last, n * dt, material, num.gravity)
                     last = np.array(parts[0])
-                    rows.append([*self._place(pose), dt * done, *(v for part in parts for v in part)])
+                    rows.append([*self._place(pose), dt * done, *(v for part in parts for v in part), pose[kn.TILT]])
                     status = health(sums, state)
                     if status != "done" or pressed_home(scene, rows):
                         break
@@ -279,26 +280,26 @@ class Simulation:
         height = self.scene.food.shape.height
         return [height - pose[kn.Z], height - pose[kn.COMMAND], pose[kn.S]]
 
-    def _advance(self, count: int, every: int, dt: float, down: float, along: float) -> np.ndarray:
-        """Some time steps with the tool commanded at these velocities [m/s]; one row of the report after ``every``."""
+    def _advance(self, count: int, every: int, dt: float, down: float, along: float, turn: float = 0.0) -> np.ndarray:
+        """Some time steps with the tool commanded at these velocities [m/s, rad/s]; one row of the report after ``every``."""
         k, rows = self.k, math.ceil(count / every)
         if k.user is not self:
             raise RuntimeError("another simulation has taken over these fields; load this one again before it goes on")
         out = np.zeros((rows, kn.N_REPORT))
         if k.threads == 1 and not k.atomic:
-            k.steps(rows, every, count, dt, down, along, out)
+            k.steps(rows, every, count, dt, down, along, turn, out)
             return out
         for r in range(rows):
             k.surround()
             for _ in range(min(every, count - r * every)):
-                k.step(dt, down, along)
+                k.step(dt, down, along, turn)
             k.write(out[r : r + 1])
         return out
 
     def _row(
         self, sums: np.ndarray, state: np.ndarray, last: np.ndarray, span: float, material: Material, gravity: float
     ) -> list[list[float]]:
-        """Momentum, edge, face, board, gravity, residual, energies of one interval."""
+        """Momentum, edge, face, board, gravity, residual, energies and moment of one interval."""
         mirror = np.array([0.0 if m else 1.0 for m in (*self.scene.mirrors, False)])
         momentum = self._turn(state[None, :3], -1.0)[0] * self.images * mirror
         edge, face, board = (sums[r : r + 3] / span for r in (kn.EDGE, kn.FACE, kn.BOARD))
@@ -306,7 +307,8 @@ class Simulation:
         residual = (momentum - last) / span - weight + edge + face + board
         lost = [self.images * self.seeds.volume * sums[r] for r in (kn.PLASTIC, kn.DAMAGE, kn.VISCOUS)]
         energy = [state[3] * self.images, state[4] * self.images, *lost, sums[kn.RUBBED], sums[kn.PARTED]]
-        return [list(momentum), list(edge), list(face), list(board), list(weight), list(residual), energy]
+        moment = [sums[kn.MOMENT] / span]
+        return [list(momentum), list(edge), list(face), list(board), list(weight), list(residual), energy, moment]
 
     def _topology(self) -> Any:
         """Pieces of the food now."""
@@ -357,6 +359,8 @@ class Simulation:
             viscous=viscous,
             friction=friction,
             parting=parting,
+            moment=a[:, 29],
+            tilt=a[:, 30],
             mass=material.rho * self.seeds.total * self.images,
             lagging=self.scene.numerics.contact != "nodal",
             cell=self.scene.numerics.dx,

@@ -131,7 +131,7 @@ class Touch(Survey):
         A particle meets the blade as far from its centre as it was from the cut plane when the food was whole, so
         that the faces displace the food by the true half thickness of the blade.
         """
-        cos_t, sin_t = self.par[TILT_COS], self.par[TILT_SIN]
+        cos_t, sin_t = ti.cast(self.pose[TILT_COS], float), ti.cast(self.pose[TILT_SIN], float)
         above = (at[2] - self.edge_height(at[0])) * cos_t
         touching = False
         dv, arm = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
@@ -156,14 +156,13 @@ class Touch(Survey):
             if press > 0:
                 touching = True
                 arm = -self.gap[p] * n
-                tool = ti.Vector([ti.cast(self.pose[VS], float), 0.0, ti.cast(self.pose[VZ], float)])
-                rel = u + arm[2] * up + arm[1] * across - tool
+                rel = u + arm[2] * up + arm[1] * across - self.blade_velocity(at[0] + arm[0], at[2] + arm[2])
                 slide = rel - rel.dot(n) * n
                 stick = self.stick[1, p] - self.stick[1, p].dot(n) * n
                 hold = stick_slip(stick, dt * slide, own, press, self.par[FRICTION])
                 self.stick[1, p] = own - hold
                 dv = CONTACT / dt * (force * n + hold)
-                self.tool(FACE, -m * dv)
+                self.knife(FACE, -m * dv, at[0] + arm[0], at[2] + arm[2])
                 self.sums[RUBBED] -= m * dv.dot(slide if force > 0 else rel)
         if not touching:
             self.stick[1, p] = ti.Vector.zero(float, 3)

@@ -51,9 +51,9 @@ class Done:
 class Coupling:
     """Foods on a table and one knife; each cut in its turn is followed by the cutting solver.
 
-    The solver's blade stays in the plane in which it came down, across the food's axis: the way of the knife down, and along the edge
-    where it ``draws``, is passed on; its way across the blade and its tilt are not, and are recorded as ``aside`` and ``pitch``. The
-    force has no component across the blade either: of two even halves it has none. A second cut is one of the whole outline at its
+    The solver's blade stays in the plane in which it came down, across the food's axis: the way of the knife down is passed on, and where
+    it ``draws`` its way along the edge and its tilt are too; its way across the blade is not, nor the tilt elsewhere, and both are
+    recorded as ``aside`` and ``pitch``. The force has no component across the blade either: of two even halves it has none. A second cut is one of the whole outline at its
     place. A cut ends when nothing holds any more and the edge rests on the board or turns back: pieces that lie free are no longer
     followed. It also ends when the knife is above the food again, or the simulation breaks down. It begins only from above: a food
     that is met from its side is not cut.
@@ -63,7 +63,7 @@ class Coupling:
         foods: Their properties, by name.
         knife: Name of the knife.
         coarse: Cells of a screening run, of a large food larger ones (:data:`CELLS`).
-        draws: Whether the knife is drawn along its edge; without it the food has a mirror plane more and costs half.
+        draws: Whether the knife is drawn along its edge or rocks; without it the food has a mirror plane more and costs half.
         speed: Usual speed of the descent [m/s].
 
     Attributes:
@@ -71,6 +71,7 @@ class Coupling:
         live: The cut that goes on, or None.
         done: Cuts that have ended.
         force: Force of the food on the knife, world axes [N], shape (3,).
+        torque: Of the food on the knife about :meth:`point`, world axes [N m], shape (3,): what tilts the edge; 0 unless it ``draws``.
         impulse: Impulse of the food on the knife so far [N s], shape (3,).
         touching: Whether the food presses on the knife.
         aside, pitch: Largest way across the blade [m] and tilt [rad] of the knife since a cut began.
@@ -90,7 +91,7 @@ class Coupling:
         self.knife, self.coarse, self.draws, self.speed = knife, coarse, draws, speed
         self.live: LiveCut | None = None
         self.done: list[Done] = []
-        self.force, self.impulse, self.touching = np.zeros(3), np.zeros(3), False
+        self.force, self.torque, self.impulse, self.touching = np.zeros(3), np.zeros(3), np.zeros(3), False
         self.aside = self.pitch = 0.0
         self._which, self._along, self._begin = 0, 0.0, np.zeros(5)
         self._ready: set[int] = set()  # foods that the edge has been above since it was last down
@@ -110,7 +111,7 @@ class Coupling:
         Returns:
             Force of the food on the knife, world axes [N], shape (3,): the mean of the span.
         """
-        self.force = np.zeros(3)
+        self.force, self.torque = np.zeros(3), np.zeros(3)
         if self.live is None:
             self._approach(pose)
         if self.live is not None:
@@ -119,8 +120,13 @@ class Coupling:
         return self.force
 
     def point(self, pose: np.ndarray) -> np.ndarray:
-        """Where the food's force acts on the knife: on the edge, above the food's axis [m], shape (3,)."""
-        return np.array([*self.items[self._which].at(self._along), pose[2]])
+        """Where the food's force acts on the knife, beside :attr:`torque`: on the edge, above the food's axis; where it ``draws`` the point
+        of the edge that was above it when the cut began [m], shape (3,)."""
+        if not self.draws:
+            return np.array([*self.items[self._which].at(self._along), pose[2]])
+        edge, tilt = self._lying(pose)
+        off = self._off
+        return np.array([*(pose[:2] + off * np.cos(tilt) * edge), pose[2] + off * np.sin(tilt)])
 
     def mesh(self) -> tuple[int, np.ndarray, np.ndarray, np.ndarray] | None:
         """The food under the knife: its place in ``items``, vertices in the world [m] (m, 3), triangles (t, 3), and which vertices lie on
@@ -156,7 +162,10 @@ class Coupling:
 
     def _approach(self, pose: np.ndarray) -> None:
         """Make a cut ready where the edge is about to come down on a food."""
-        over = {k: pose[2] - item.shape.height for k, item in enumerate(self.items)}
+        over = {
+            k: pose[2] - item.shape.height - item.shape.width / 2 * abs(np.tan(pose[4]))
+            for k, item in enumerate(self.items)
+        }
         self._ready |= {k for k in over if over[k] > NEAR}
         down = [k for k in sorted(self._ready) if over[k] <= NEAR]
         met = [(k, along) for k in down if (along := crossing(self.items[k], pose)) is not None]
@@ -178,21 +187,38 @@ class Coupling:
         motion = replace(scene.motion, speed=self.speed, slice_ratio=DRAWN if self.draws else 0.0)
         return replace(scene, motion=motion, numerics=replace(scene.numerics, room=ROOM))
 
+    def _lying(self, pose: np.ndarray) -> tuple[np.ndarray, float]:
+        """Direction of the edge as the cut began, along x of the cut's scene, shape (2,), and how much its end there is risen [rad]."""
+        edge = np.array([np.cos(self._begin[3]), np.sin(self._begin[3])])
+        edge *= np.sign(edge @ self.items[self._which].across)
+        same = edge @ [np.cos(pose[3]), np.sin(pose[3])] > 0  # an edge has two directions
+        return edge, float(pose[4] if same else -pose[4])
+
+    @property
+    def _off(self) -> float:
+        """How far along the edge from its middle the food's axis was when the cut began [m]."""
+        edge, _ = self._lying(self._begin)
+        return float((self.items[self._which].at(self._along) - self._begin[:2]) @ edge)
+
     def _follow(self, pose: np.ndarray, span: float) -> None:
         """Pass a pose on to the solver, and its force back."""
         assert self.live is not None
         item = self.items[self._which]
-        edge = np.array([np.cos(self._begin[3]), np.sin(self._begin[3])])
+        edge, tilt = self._lying(pose)
         way = pose[:2] - self._begin[:2]
         self.aside = max(self.aside, abs(float(way @ [-edge[1], edge[0]])))
         self.pitch = max(self.pitch, abs(float(pose[4])))
         before = self.live.height
         try:
-            along, _, up = self.live.move(float(pose[2]), float(way @ edge) if self.draws else 0.0, span)
+            if self.draws:
+                along, _, up = self.live.move(float(self.point(pose)[2]), float(way @ edge), span, tilt)
+            else:
+                along, _, up = self.live.move(float(pose[2]), 0.0, span)
         except SimulationError:
             self.end()
             return
         self.force = np.array([*(along * edge), up])
+        self.torque = self.live.moment * np.array([edge[1], -edge[0], 0.0])
         weight = self.live.weight
         self.touching = bool(np.linalg.norm(self.force) > TOUCH * weight)
         above = pose[2] > item.shape.height + NEAR and (self.live.begun or pose[2] > self._begin[2] + NEAR)

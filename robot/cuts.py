@@ -92,6 +92,11 @@ class Item:
         return np.array([math.cos(self.yaw), math.sin(self.yaw)])
 
     @property
+    def across(self) -> np.ndarray:
+        """Direction across its axis, along the blade that cuts it, shape (2,)."""
+        return np.array([self.axis[1], -self.axis[0]])
+
+    @property
     def box(self) -> tuple[float, float]:
         """Sizes of its bounding box along x and y [m]: of a box as long and as wide turned by its yaw."""
         c, s = abs(math.cos(self.yaw)), abs(math.sin(self.yaw))
@@ -108,8 +113,7 @@ class Item:
 
     def placed(self, points: np.ndarray, along: float) -> np.ndarray:
         """Points (n, 3) of a cut's scene, whose blade is at ``along``, on the table [m]: x along the blade, y along the food's axis."""
-        across = np.array([self.axis[1], -self.axis[0]])
-        plane = self.at(along) + points[:, :1] * across + points[:, 1:2] * self.axis
+        plane = self.at(along) + points[:, :1] * self.across + points[:, 1:2] * self.axis
         return np.column_stack([plane, points[:, 2]])
 
     def piece_at(self, along: float) -> int | None:

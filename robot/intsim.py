@@ -49,7 +49,7 @@ class CutFoodEnv(BaseEnv):
         knife: Name of the knife.
         coupled: Whether the food resists; without it the knife passes through, as in geometry alone.
         coarse: Cells of a screening run.
-        draws: Whether the knife is drawn along its edge in the solver.
+        draws: Whether the knife is drawn along its edge and tilted in the solver as well.
         stiffness, damping: Of the arm's joints [N m/rad, N m s/rad]; ManiSkill's own without it.
         criterion: What ``info["success"]`` is: ``published`` for the four published criteria, ``severed`` for pieces in the solver too.
         pixels: Width and height of the cameras' pictures.
@@ -174,6 +174,7 @@ class CutFoodEnv(BaseEnv):
         """The food's force of the last interval acts on the knife in this one."""
         if self._force.any():
             self._blade.add_force_at_point(self._force.astype(np.float32), self._point.astype(np.float32))
+            self._blade.add_force_torque(np.zeros(3, np.float32), self.coupling.torque.astype(np.float32))
 
     def _after_simulation_step(self) -> None:
         pose = self.pose

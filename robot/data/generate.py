@@ -25,7 +25,7 @@ from robot.world import ENV, World, environment
 DEMOS = ("sustained", "planned", "kinematic")
 """Demonstrations: ``sustained`` goes on until the food is in pieces, ``planned`` is the motion that geometry plans, whatever the food does, and
 ``kinematic`` the same without food that resists: nothing is in pieces then but in geometry."""
-DRAWN = ("slice", "saw")  # styles whose way along the edge the solver follows
+DRAWN = ("slice", "rock", "saw")  # styles whose way along the edge and tilt the solver follows
 WHOLE_SET = 21_000  # trajectories of the published data set
 
 

@@ -32,7 +32,10 @@ def cut(scene: Scene) -> ForceRecord:
     zero, up, nothing = np.zeros(ROWS), np.array([0.0, 0.0, 1.0]), np.zeros((ROWS, 3))
     return ForceRecord(
         **{name: stroke for name in ("stroke", "command", "time")},
-        **{name: zero for name in ("slide", "kinetic", "elastic", "plastic", "damage", "viscous", "friction")},
+        **{
+            name: zero
+            for name in ("slide", "kinetic", "elastic", "plastic", "damage", "viscous", "friction", "moment", "tilt")
+        },
         **{name: nothing for name in ("board", "gravity", "momentum", "residual")},
         edge=edge[:, None] * up,
         face=face[:, None] * up,

@@ -35,7 +35,7 @@ def record(**changes):
     """A sound record: 1 N over 10 mm, half of the work dissipated by flow, a tenth stored, the food at rest; it weighs 0.08 N."""
     zero, up = np.zeros(ROWS), np.tile([0.0, 0.0, 1.0], (ROWS, 1))
     stroke = np.linspace(0.25e-3, 0.01, ROWS)
-    values = dict.fromkeys(("slide", "kinetic", "damage", "viscous", "friction", "parting"), zero)
+    values = dict.fromkeys(("slide", "kinetic", "damage", "viscous", "friction", "parting", "moment", "tilt"), zero)
     values |= dict.fromkeys(("face", "momentum", "residual"), 0 * up)
     values |= {"stroke": stroke, "command": stroke, "time": stroke / 0.1, "edge": up, "board": -up}
     values |= {

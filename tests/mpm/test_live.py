@@ -13,8 +13,10 @@ from calib.scenes import Sizing, cut_scene, specimen
 from mpm.errors import SceneError, SimulationError
 from mpm.live import LiveCut
 from mpm.runtime import Runtime
-from mpm.scene import Arm, Motion, Press, Scene
+from mpm.scene import Arm, Board, Food, Motion, Press, Scene
+from mpm.shapes import Shape
 from mpm.solver import Simulation
+from tests.mpm import scenes
 
 SPEED = 0.04  # m/s
 STIFF, LAG = 500.0, 0.1  # of an arm [N/m, s]
@@ -92,6 +94,63 @@ def test_sawing_costs_the_same_at_half_the_simulated_speed(scene):
     assert found[0].work == pytest.approx(found[1].work, rel=0.03)
 
 
+ROCK = np.deg2rad(15.0)
+
+
+@pytest.fixture(scope="module")
+def block() -> Scene:
+    """A block of soft flesh on a rough board under a thin blade that may turn; 48 mm wide and 24 mm high."""
+    flesh = replace(scenes.FLESH, loss_factor=0.1)
+    food = Food(Shape("block", 0.03, 0.048, 0.024), flesh)
+    return replace(scenes.PRISM, food=food, board=Board(mu=9.0), motion=Motion(0.018, 0.01, 1.0, speed=SPEED))
+
+
+def test_a_tilted_edge_needs_what_it_has_cut_into(block):
+    """Straight down at 15 degrees from the corner on: the force grows by R / tan(tilt) a metre, to 3 %, until all of the edge is in the food, and acts
+    on the middle of the part that is in it, to 2 mm (it lags by the indentation at which a cut starts). It is the cut that the solver
+    makes whose tilt is prescribed.
+    """
+    live, half = LiveCut(block), 0.024
+    way = np.arange(0.024 + half * np.tan(ROCK) + 1e-3, half * np.tan(ROCK) + 1e-3, -4e-4)
+    rows = np.array([(live.move(z, 0.0, 0.01, ROCK)[2], live.moment) for z in way])
+    begun = (way < 0.0275) & (way > 0.019)
+    assert np.polyfit(way[begun], rows[begun, 0], 1)[0] == pytest.approx(-300.0 / np.tan(ROCK), rel=0.03)
+    into = (0.024 - way[begun]) / np.tan(ROCK)  # as far as the edge is in it
+    assert rows[begun, 1] / rows[begun, 0] == pytest.approx((into - half) / 2, abs=2e-3)
+    assert rows[-1, 0] == pytest.approx(300.0 * 0.048, rel=0.03) and abs(rows[-1, 1]) < 1e-3 * rows[-1, 0]
+    record, stroke = live.record(), 0.024 - float(way[-1])
+    steady = replace(block, motion=replace(block.motion, stroke=stroke, slice_ratio=0.0, tilt=ROCK))
+    whole = Simulation(steady, Runtime(threads=1)).run()
+    assert record.work == pytest.approx(whole.work, rel=0.01) and record.tilt[-1] == pytest.approx(ROCK)
+    at = [np.interp(0.0, r.stroke, r.moment) for r in (record, whole)]
+    assert at[0] == pytest.approx(at[1], rel=0.03) and at[0] < -0.05
+    with pytest.raises(RuntimeError, match="taken over"):
+        live.record()
+
+
+def test_a_rock_costs_what_a_press_does(block):
+    """One end to the board and then turned level about it: the same work to 2 %, of which the moment does a part, the same energy of parting to 1 %,
+    and momentum and energy balance as they do in a press.
+    """
+    press, half = LiveCut(block), 0.024
+    down(press, 0.01)
+    level, rock = press.record(), LiveCut(block)
+    for z in np.arange(0.024 + half * np.tan(ROCK) + 1e-3, half * np.tan(ROCK), -4e-4):
+        rock.move(z, 0.0, 0.01, ROCK)
+    before = rock.record()
+    assert rock.uncut == pytest.approx(half * np.tan(ROCK) / 0.024, abs=0.02)
+    for tilt in np.linspace(ROCK, 0.0, 40):
+        rock.move(half * np.tan(tilt), 0.0, 0.01, tilt)
+    rocked = rock.record()
+    assert rocked.severed and rocked.severed_area == level.severed_area
+    assert rocked.parting[-1] == pytest.approx(level.parting[-1], rel=0.01)
+    assert rocked.work == pytest.approx(level.work, rel=0.02)
+    late = rocked.stroke > before.stroke[-1]
+    turned = -np.sum((rocked.moment[1:] * np.diff(rocked.tilt))[late[1:]])
+    assert turned > 0.005 * rocked.work
+    assert 0 < rocked.unbooked[-1] < 0.03 * rocked.work and rocked.momentum_residual < 1e-9
+
+
 def test_behind_an_arm_that_yields_it_ends_where_the_solvers_own_arm_does(scene):
     """An arm outside that gives way by force over stiffness, with a lag, leaves the edge as high above the board as the solver's own."""
     own = replace(scene, arm=Arm(STIFF), motion=replace(scene.motion, dwell=1.0))
@@ -150,3 +209,7 @@ def test_what_it_cannot_do_is_an_error(scene):
     down(live, 0.01, scene.food.shape.height / 2)
     with pytest.raises(SceneError, match="slice_ratio"):
         live.move(0.01, 1e-3, 0.01)
+    with pytest.raises(SceneError, match="slice_ratio"):
+        live.move(0.01, 0.0, 0.01, 0.1)
+    with pytest.raises(SceneError, match="tilt of 1.5 rad"):
+        live.move(0.01, 0.0, 0.01, 1.5)

@@ -118,6 +118,51 @@ def test_the_draw_along_the_edge_is_passed_on_only_where_it_is_asked_for():
     assert aside.aside == pytest.approx(2e-3, rel=0.2)
 
 
+@pytest.mark.parametrize("flip", [1.0, -1.0])
+def test_a_rock_is_followed_at_the_end_that_is_down(flip):
+    """The lower end cuts first: there the food opens, and there its force pushes, which turns the knife back, whichever direction of the edge its
+    angle is counted in. The edge comes down level and the berry is in two.
+    """
+    coupling = Coupling([BERRY], FOODS, draws=True)
+    path = plan(BERRY, 0.0, style="rock", depth=0.0).pose
+    if flip < 0:
+        path[:, 3:] = path[:, 3:] + [np.pi, 0.0]
+        path[:, 4] *= -1.0
+    edge = np.array([np.cos(path[-1, 3]), np.sin(path[-1, 3])])
+    half = int(np.argmax(path[:, 2] < 0.6 * BERRY.shape.height))
+    for pose in path[:half]:
+        coupling.move(pose, 0.05)
+    tilt = float(path[half - 1, 4])
+    up = np.array([0.0, 0.0, 1.0])
+    turning = coupling.torque @ np.cross([*edge, 0.0], up)  # raises the end in the direction of the edge
+    assert coupling.force[2] > 0 and turning * tilt < 0
+    assert coupling.point(path[half - 1]) == pytest.approx([*BERRY.at(0.0), path[half - 1, 2]], abs=5e-4)
+    mesh = coupling.mesh()
+    assert mesh is not None
+    _, points, _, flesh = mesh
+    face, along = points[flesh], (points[flesh][:, :2] - BERRY.at(0.0)) @ edge
+    opened = np.abs((face[:, :2] - BERRY.at(0.0)) @ BERRY.axis) > 0.2e-3
+    assert np.mean(along[opened]) * tilt < 0
+    for pose in path[half:]:
+        coupling.move(pose, 0.05)
+    assert coupling.severed and coupling.pitch > np.radians(3.0)
+
+
+def test_a_rock_off_the_foods_middle_is_the_same_cut():
+    """The knife's middle beside the food's axis: what counts is the point of the edge above it; the same largest force to 3 %, and the torque is
+    about that point."""
+    found = []
+    for off in (0.0, 0.03):
+        coupling = Coupling([BERRY], FOODS, draws=True)
+        path = plan(BERRY, 0.0, style="rock", depth=0.0).pose
+        edge = np.column_stack([np.cos(path[:, 3]), np.sin(path[:, 3]), np.tan(path[:, 4])])
+        path[:, :3] -= off * edge
+        rows = [(coupling.move(pose, 0.05)[2], np.linalg.norm(coupling.torque)) for pose in path]
+        found.append(np.max(rows, axis=0))
+        assert coupling.severed
+    assert found[1] == pytest.approx(found[0], rel=0.03)
+
+
 def test_its_mesh_lies_on_the_table():
     """Vertices in the world, around the food's place."""
     coupling = Coupling([BERRY], FOODS)
