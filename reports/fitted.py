@@ -18,7 +18,7 @@ STRONG = 0.9
 LABEL, VERDICT = 20, 34
 #: Verdicts in the order of what the trace says, and what they mean.
 VERDICTS = {
-    "identified": "the trace alone bounds it on both sides, to 15 % or better",
+    "identified": "the trace alone bounds it on both sides, to 10 % or better",
     "weak": "bounded on both sides, but not so well",
     "one_sided": "the trace bounds one side; the other is the literature's, or what is possible",
     "only_as_product": "known times the width of the specimen and the gain of the sensor, or times another parameter",
