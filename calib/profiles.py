@@ -35,8 +35,8 @@ STEPS = 4
 LONGEST = 6
 """Half widths of the normal approximation after which a profile that has not risen is flat."""
 KNOWN = 0.10
-"""Largest relative standard deviation of an identified parameter [-]: what is claimed is known to 10 %, its median error is then below 7 %. At
-15 % that of R was 12 % on 17 made-up bananas whose intervals all held the truth."""
+"""Largest relative standard deviation of an identified parameter [-]: its median error is then below 7 %. On 100 made-up bananas it is 4 % of R and
+6 % of the skin's; with 15 %, on the first 27 of them, that of R was 12 %."""
 EVALUATIONS = 12
 """Evaluations of the surrogate with which the others follow a step."""
 
