@@ -123,7 +123,7 @@ def test_strain_is_smoothed_wherever_it_can_matter():
     )  # far beyond what food bears, so that it is felt two cells away
     k.F.from_numpy(padded(k, f))
     k.v.fill(1.0)  # what the grid carried before must be gone
-    k.steps(1, 1, 1, 1e-12, 0.0, 0.0, np.zeros((1, kn.N_REPORT)))
+    k.steps(1, 1, 1, 1e-12, 0.0, 0.0, 0.0, np.zeros((1, kn.N_REPORT)))
     x = (k.of_particles(k.x) - sim.origin) / sim.scene.numerics.dx
     base = np.floor(x - 0.5).astype(int)
     strain = np.array([np.linalg.eigvalsh(polar(f, side="left")[1])[-1] - 1 for f in k.deformation()])
