@@ -187,8 +187,8 @@ def judge(
     return lines
 
 
-HELD_WEAK = {"R": 0.96, "R_skin": 0.81, "E": 0.89, "yield_stress": 0.78, "initiation_depth": 0.92}
-"""Part of the weak 95 % intervals that held the truth on 100 made-up bananas (docs/pitfalls.md, how far to trust an interval)."""
+HELD_WEAK = {"R_skin": 0.81, "E": 0.89, "yield_stress": 0.78, "initiation_depth": 0.92}
+"""Part of the weak 95 % intervals that held the truth on 100 made-up bananas, where it is less (docs/pitfalls.md, how far to trust an interval)."""
 
 
 def limits(
@@ -218,7 +218,7 @@ def limits(
     ]
     if held:
         said.append(
-            f"A weak interval is not as sure as it is called: of made-up banana cuts those held the truth in {', '.join(held)}."
+            f"Weak intervals hold the truth less often than in 95 %: of 100 made-up banana cuts in {', '.join(held)}."
         )
     if stroke_source != "position":
         how = (
