@@ -13,14 +13,13 @@ from mpm.errors import SceneError, SimulationError
 from mpm.health import health
 from mpm.record import ForceRecord
 from mpm.runtime import Runtime, running
-from mpm.scene import Knife, Scene
+from mpm.scene import STEEPEST, Scene
 from mpm.solver import APPROACH, Simulation
 from mpm.surface import Surface
 from mpm.topology import Topology
 from mpm.watch import Snapshot, snapshot
 
 ON_FACE = 1e-9  # distance from the plane of the cut at which a vertex lies on its face [m]
-STEEPEST = 1.2  # angle of the edge to the board [rad]
 CLEAR = 2.0  # height of the edge above the uncut food at which nothing touches the blade any more [cells]
 
 
@@ -51,13 +50,13 @@ class LiveCut:
     """
 
     def __init__(self, scene: Scene, runtime: Runtime | None = None) -> None:
-        if not isinstance(scene.knife, Knife):
+        if not scene.cuts:
             raise SceneError("live cut: the scene has a press; give a knife")
         if scene.motion.speed is None:
             raise SceneError("live cut: the motion has no real speed; give the one at which the blade usually moves")
         if not scene.arm.rigid:
             raise SceneError("live cut: the blade is held from outside; leave the scene's arm rigid")
-        self.scene, self._length = scene, scene.knife.length
+        self.scene = scene
         self._simulation = Simulation(scene, runtime or Runtime(threads=1))
         self._simulation.counters = {"inverted": 0, "outside": 0}
         self._simulation._load(scene.food.material)
@@ -99,7 +98,7 @@ class LiveCut:
     @property
     def height(self) -> float:
         """Height of the middle of the edge above the board [m], at most where the cut begins."""
-        return min(self._z, self._top + self._drop(self._s, self._tilt))
+        return min(self._z, self._top + self._lowered(self._s, self._tilt))
 
     def move(self, height: float, slide: float, span: float, tilt: float = 0.0) -> np.ndarray:
         """Move the edge.
@@ -114,7 +113,7 @@ class LiveCut:
             Mean force of the food on the blade: along the edge, across the blade, upwards [N], shape (3,).
 
         Raises:
-            SceneError: A draw along the edge or a tilt in a scene that has none, a tilt beyond :data:`STEEPEST`, or numbers that are not finite.
+            SceneError: A draw along the edge or a tilt in a scene that has none, a tilt beyond :data:`mpm.scene.STEEPEST`, or numbers that are not finite.
             SimulationError: The food broke down now or before.
         """
         if self.status != "done":
@@ -126,26 +125,24 @@ class LiveCut:
         if abs(tilt) > STEEPEST:
             raise SceneError(f"live cut: a tilt of {tilt:g} rad; give one within {STEEPEST:g} rad of the board")
         self.moment = 0.0
-        low = height - self._drop(slide, tilt)
+        low = height - self._lowered(slide, tilt)
         if not self.begun:
             if low >= self._top:
                 self._z, self._s, self._tilt = height, slide, tilt
                 return np.zeros(3)
             self._first = self._s
-            self._z = self._top + self._drop(self._s, self._tilt)
+            self._z = self._top + self._lowered(self._s, self._tilt)
             self._place()
         clear = self.scene.food.shape.height + CLEAR * self.scene.numerics.dx
-        if low > clear and self._z - self._drop(self._s, self._tilt) > clear:
+        if low > clear and self._z - self._lowered(self._s, self._tilt) > clear:
             self._z, self._s, self._tilt = height, slide, tilt
             self._place()
             return np.zeros(3)
         return self._follow(height + max(-low, 0.0), slide, tilt, span)
 
-    def _drop(self, slide: float, tilt: float) -> float:
+    def _lowered(self, slide: float, tilt: float) -> float:
         """How much lower than its middle the edge gets over the food [m]."""
-        half, first = self.scene.food.shape.width / 2, self._first if self.begun else slide
-        reach = min(half + abs(slide - first), self._length / 2 * math.cos(tilt))
-        return reach * abs(math.tan(tilt))
+        return self.scene.lowered(tilt, slide - self._first if self.begun else 0.0)
 
     def _follow(self, height: float, slide: float, tilt: float, span: float) -> np.ndarray:
         """Move the edge near the food."""
@@ -156,9 +153,8 @@ class LiveCut:
             )
         material, motion, shape = self.scene.food.material, self.scene.motion, self.scene.food.shape
         most = motion.mach * material.p_wave * self._dt  # way in a step
-        way = math.hypot(down, along) + abs(turn) * math.hypot(
-            shape.width / 2, shape.height
-        )  # of the fastest point in the food
+        far = math.hypot(shape.width / 2, shape.height)
+        way = math.hypot(down, along) + abs(turn) * far  # of the blade's fastest point in the food
         steps = max(math.ceil(span / self.scene.time_scale / self._dt - 1e-9), math.ceil(way / most - 1e-9))
         sim = steps * self._dt
         began = clock.perf_counter()

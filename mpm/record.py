@@ -146,8 +146,8 @@ class ForceRecord:
         """Work of the knife on the food so far [J], shape (n,)."""
         down = self.knife[:, 2] * np.diff(self.stroke, prepend=0.0)
         along = self.knife[:, 0] * np.diff(self.slide, prepend=0.0)
-        turning = self.moment[1:] * np.diff(self.tilt)  # the first interval begins above the food
-        return np.cumsum(down - along - np.concatenate([[0.0], turning])[: len(down)])
+        turning = self.moment * np.diff(self.tilt, prepend=self.tilt[:1])  # the first interval begins above the food
+        return np.cumsum(down - along - turning)
 
     @property
     def unbooked(self) -> np.ndarray:

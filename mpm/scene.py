@@ -84,6 +84,10 @@ class Board:
         check_number("board", "mu", self.mu, -1e-300, 10.0, "")
 
 
+STEEPEST = 1.2
+"""Largest angle of the edge to the board [rad]: at 69 degrees the ends of what lies over the food are 2.6 of its widths apart in height."""
+
+
 @dataclass(frozen=True)
 class Motion:
     """The commanded motion of the blade: a stroke at constant speed, a pause, a retraction.
@@ -112,7 +116,7 @@ class Motion:
         check_number("motion", "stroke", self.stroke, 1e-4, 1.0, "m")
         check_number("motion", "mach", self.mach, 1e-5, 0.1, "")
         check_number("motion", "slice_ratio", self.slice_ratio, -20.0, 20.0, "")
-        check_number("motion", "tilt", self.tilt, -1.2, 1.2, "rad")
+        check_number("motion", "tilt", self.tilt, -STEEPEST, STEEPEST, "rad")
         check_number("motion", "dwell", self.dwell, -1e-300, 1e5, "s")
         check_number("motion", "retract", self.retract, -1e-300, 2.0, "m")
         if self.speed is not None:
@@ -258,10 +262,14 @@ class Scene:
     @property
     def drop(self) -> float:
         """How much lower than its middle the tilted edge gets over the food [m]."""
+        return self.lowered(self.motion.tilt)
+
+    def lowered(self, tilt: float, aside: float = 0.0) -> float:
+        """The same of an edge at another angle to the board [rad], whose middle is so far along the blade from the food's [m]."""
         if not isinstance(self.knife, Knife):
             return 0.0
-        reach = min(self.food.shape.width, self.knife.length * math.cos(self.motion.tilt)) / 2
-        return reach * math.tan(abs(self.motion.tilt))
+        reach = min(self.food.shape.width / 2 + abs(aside), self.knife.length / 2 * math.cos(tilt))
+        return reach * math.tan(abs(tilt))
 
     @property
     def time_scale(self) -> float:

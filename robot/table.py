@@ -126,11 +126,10 @@ class Table:
 def crossing(item: Item, pose: np.ndarray) -> float | None:
     """Where along the axis of a food an edge (5,) crosses it [m], None where it passes beside it or lies along it."""
     edge = np.array([np.cos(pose[3]), np.sin(pose[3])])
-    across = np.array([-item.axis[1], item.axis[0]])
     offset = pose[:2] - [item.x, item.y]
-    if abs(edge @ across) < 0.1:
+    if abs(edge @ item.across) < 0.1:
         return None
-    reach = -(offset @ across) / (edge @ across)  # way along the edge to the food's axis
+    reach = -(offset @ item.across) / (edge @ item.across)  # way along the edge to the food's axis
     along = float((offset + reach * edge) @ item.axis)
     inside = item.piece_at(along) is not None and abs(reach) < BLADE / 2
     return along if inside else None

@@ -151,6 +151,20 @@ def test_what_cannot_be_searched_twice_is_not_claimed():
     assert r.low95 < TRUTH["R"] < r.high95 and "a budget of 40 may" in doubt.said[0]
 
 
+def test_what_is_not_proven_is_not_claimed():
+    """A stiffness that the curve bounds as well as R is weak, and why is said."""
+    stiff = replace(TWO.items[0], name="E", unit="Pa")
+    named = {"E": TRUTH["R_skin"], "R": TRUTH["R"]}
+    fake = Fake(lambda p: onefold({"R_skin": p["E"] ** 6 / named["E"] ** 5, "R": p["R"]}), noisy=0.002)
+    target = Target(GRID, np.interp(GRID, STROKE, onefold(TRUTH)), 0.05, 0.05, np.interp)
+    goal = Objective(target, ParameterSet((stiff, TWO.items[1])))
+    alone = at_first_sight(goal, calibrate(goal, fake, coarse=fake, replicate=fake, options=FitOptions(seed=0)))
+    assert alone is not None and alone.intervals[0].verdict == "identified"
+    _, doubt = infer(goal, fake, coarse=fake, again=fake, options=FitOptions(seed=0))
+    assert doubt is not None and verdicts(doubt) == {"E": "weak", "R": "identified"}
+    assert any(said.startswith("E: bounded, but of made-up cuts one of four") for said in doubt.said)
+
+
 def test_what_numerics_decide_is_not_claimed():
     """An answer that does not explain the curve at half the speed and with other particles is none; no second search is made for it."""
     goal, fake = objective(onefold), Fake(onefold, noisy=0.002)
