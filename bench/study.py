@@ -28,6 +28,7 @@ from calib.pool import Pool
 from calib.progress import clock
 from calib.provenance import git_commit, versions
 from calib.scenes import Sizing, cut_scene, specimen
+from mpm.batch import simulate_together
 from mpm.material import Material
 from mpm.record import ForceRecord
 from mpm.runtime import Runtime
@@ -56,6 +57,7 @@ PEER_FLOOR = 4  # node that holds the block in a peer
 # the nodes, each for eight particles, cleared, added to, turned to velocities and read (3).
 WORDS = 45 + 29 + 3
 PARTS = 8  # of a cut that are timed by themselves
+BATCHES = (1, 2, 4, 8)  # cuts side by side
 COPY_WORDS = 1 << 23  # numbers that a thread copies to measure the bandwidth: 64 MiB
 
 Say = Callable[[str], None]
@@ -166,6 +168,7 @@ class Bench:
             ("paper_config", self.paper),
             ("default_cut", self.default_cut),
             ("processes", self.processes),
+            ("batches", self.batches),
         ):
             self._keep(**{name: part()})
         if self.peers:
@@ -295,6 +298,23 @@ class Bench:
             "steps a second"
         )
         return row
+
+    def batches(self) -> list[dict[str, Any]]:
+        """Time of several cuts side by side (:mod:`mpm.batch`), in turns, and that of each over the time of one alone."""
+        spent: dict[int, list[float]] = {n: [] for n in BATCHES}
+        for turn in range(self.repeats + 1):  # every size compiles in the first turn, which does not count
+            for n, times in spent.items():
+                began = time.perf_counter()
+                simulate_together([self.scene] * n, runtime=self.runtime)
+                if turn > 0:
+                    times.append(time.perf_counter() - began)
+        least = {n: min(times) for n, times in spent.items()}
+        rows = [{"cuts": n, "wall_s": wall, "per_cut": wall / n / least[1]} for n, wall in least.items()]
+        self.say(
+            "side by side: "
+            + ", ".join(f"{r['cuts']} cuts {r['per_cut']:.2f} of the time of one each" for r in rows[1:])
+        )
+        return rows
 
     def others(self, python: str) -> list[dict[str, Any]]:
         """Particle steps a second of the elastic block, ours and each peer's [1e6/s]; ours before and after it.

@@ -33,7 +33,7 @@ class Pool(Workers):
     """Workers on this machine.
 
     Args:
-        workers: Number of processes; they start when there is work for them.
+        workers: Simulations at a time: in as many processes, on a GPU side by side in one. They start when there is work for them.
         arch: Taichi device of each.
         threads: CPU threads of each.
     """
@@ -43,8 +43,18 @@ class Pool(Workers):
         self._begun: dict[Future[Any], Errand] = {}
         self._executor = self._start()
 
+    @property
+    def together(self) -> int:
+        """On a GPU all that are asked for at a time."""
+        return 1 if self.arch == "cpu" else self.workers
+
+    @property
+    def processes(self) -> int:
+        """Processes among which the simulations are shared."""
+        return self.workers // self.together
+
     def _start(self) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(self.workers, mp_context=get_context("spawn"), initializer=_begin)
+        return ProcessPoolExecutor(self.processes, mp_context=get_context("spawn"), initializer=_begin)
 
     def close(self) -> None:
         """End the processes at once; runs that have not finished are lost."""
@@ -69,7 +79,7 @@ class Pool(Workers):
         waiting, alone = deque(range(len(jobs))), deque[int]()
         running: dict[Future[Result], int] = {}
         while waiting or alone or running:
-            while waiting and not alone and len(running) < self.workers:
+            while waiting and not alone and len(running) < self.processes:
                 k = waiting.popleft()
                 running[self._submit(work, *jobs[k], self.arch, self.threads)] = k
             tried = alone.popleft() if alone and not running else None
@@ -88,7 +98,7 @@ class Pool(Workers):
 
     def begin(self, errand: Errand) -> None:
         """Make an errand in one of several processes while the others do what is asked for."""
-        if self.workers > 1:
+        if self.processes > 1:
             self._begun[self._submit(*errand.job, self.arch, self.threads)] = errand
 
     def errands(self, errands: Sequence[Errand]) -> None:

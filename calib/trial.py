@@ -44,8 +44,8 @@ class Trial(Simulation):
     def steps(self) -> float:
         """Time steps that the run takes [-]."""
         m, material = self.scene.motion, self.scene.food.material
-        dt = self._time_step(material)
-        way = m.stroke + self._gap() + m.retract
+        dt = self.time_step(material)
+        way = m.stroke + self.gap + m.retract
         return way / (m.mach * material.p_wave * dt) + m.dwell / self.scene.time_scale / dt
 
     @property
@@ -77,9 +77,9 @@ class Trial(Simulation):
             least=ROUNDING * self.scene.food.material.E * volume,
         )
 
-    def _time_step(self, material: Material) -> float:
+    def time_step(self, material: Material) -> float:
         """The sound step times the factor of the cell [s]."""
-        return self.cell.step * super()._time_step(material)
+        return self.cell.step * super().time_step(material)
 
     def _load(self, material: Material) -> None:
         """Fields of a cut, changed as the start says."""
@@ -90,13 +90,13 @@ class Trial(Simulation):
             k.x.from_numpy(x * s.squeeze + np.array([0.0, 0.0, s.lift], x.dtype))
         if s.strained:
             f = k.F.to_numpy()
-            f[:, [0, 4, 8]] = s.squeeze
+            f[0, :, [0, 4, 8]] = s.squeeze
             k.F.from_numpy(f)
         if s.depth or s.aside:
             pose = k.pose.to_numpy()
             if s.depth:
-                pose[kn.Z] = pose[kn.COMMAND] = self.scene.food.shape.height - s.depth
-            pose[kn.S] = s.aside
+                pose[0, [kn.Z, kn.COMMAND]] = self.scene.food.shape.height - s.depth
+            pose[0, kn.S] = s.aside
             k.pose.from_numpy(pose)
 
 

@@ -37,6 +37,15 @@ def _run(scene: Scene, values: dict[str, Any], arch: str, threads: int) -> dict[
     return plain(simulation.run(material))
 
 
+def _run_together(jobs: Sequence[tuple[Scene, dict[str, Any]]], arch: str, threads: int) -> list[dict[str, Any]]:
+    """Several simulations side by side in a worker."""
+    from mpm.batch import simulate_together
+    from mpm.runtime import Runtime
+
+    scenes = [scene.with_material(**values) for scene, values in jobs]
+    return [plain(record) for record in simulate_together(scenes, runtime=Runtime(arch, threads))]
+
+
 def plain(record: ForceRecord) -> dict[str, Any]:
     """What an evaluation keeps of a record."""
     scalars = {
@@ -125,6 +134,12 @@ class Workers(ABC):
         self.workers, self.arch, self.threads = workers, arch, threads
 
     @property
+    def together(self) -> int:
+        """Simulations that a process makes side by side, each launch a step of them all: more than one only on a GPU, which the launch of
+        one cut does not fill. On CPUs as many processes do it as well and do not wait for each other."""
+        return 1
+
+    @property
     def batch(self) -> int:
         """Simulations that a search asks for at once: those of all workers, and no fewer than :data:`LEAST`."""
         return max(self.workers, LEAST)
@@ -153,10 +168,23 @@ class Workers(ABC):
     def run(self, jobs: Sequence[tuple[Scene, Mapping[str, float]]]) -> Iterator[Evaluation]:
         """Run each scene with its material values; yields in order of completion, ``index`` is the place among the jobs.
 
-        A run that killed its process twice is a failed one, for the reason :data:`DIED`.
+        A run that killed its process twice is a failed one, for the reason :data:`DIED`; where several were made side by side, each of
+        them is tried by itself first.
         """
-        for index, result in self.each(_run, [(scene, dict(values)) for scene, values in jobs]):
-            yield _evaluation(index, dict(jobs[index][1]), result)
+        asked = [(scene, dict(values)) for scene, values in jobs]
+        alone = list(range(len(asked)))
+        if self.together > 1:
+            packs = [alone[k : k + self.together] for k in alone[:: self.together]]
+            alone = []
+            for which, results in self.each(_run_together, [([asked[k] for k in pack],) for pack in packs]):
+                if results is None:
+                    alone += packs[which]
+                else:
+                    for k, result in zip(packs[which], results, strict=True):
+                        yield _evaluation(k, asked[k][1], result)
+        for which, found in self.each(_run, [asked[k] for k in alone]):
+            k = alone[which]
+            yield _evaluation(k, asked[k][1], found)
 
     def begin(self, errand: Errand) -> None:  # noqa: B027 - where it is not begun it is made when its time has come
         """Make an errand beside what else is asked for, where there are processes to spare: it is kept when it is made and something

@@ -73,7 +73,7 @@ class FreeBody:
             self._k.fill(self._k.v, velocity(self.start).astype(self.start.dtype))
         if slope is not None:
             self._k.set_gradient(slope(self.start))
-        self.dt, self.time = self._simulation._time_step(material), 0.0
+        self.dt, self.time = self._simulation.time_step(material), 0.0
         self.mass = material.rho * self._simulation.seeds.volume
         self.impulse, self.friction = np.zeros(3), 0.0
         self._state = np.zeros(kn.N_STATE)
@@ -131,7 +131,7 @@ class FreeBody:
             if pull:
                 self._k.fill(self._k.v, self.v + span * pull(self.time))
             n = 1 if pull else count
-            row = self._simulation._advance(n, n, span, 0.0, 0.0)[0]
+            row = self._simulation.advance((n, n, span, 0.0, 0.0, 0.0))[0]
             sums, self._state, _ = np.split(row, (kn.N_SUMS, kn.N_SUMS + kn.N_STATE))
             self.time += n * span
             self.impulse += sums[kn.BOARD : kn.BOARD + 3]

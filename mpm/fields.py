@@ -28,6 +28,14 @@ Z, S, VZ, VS, COMMAND, BOOKED, TILT, TURN, TILT_COS, TILT_SIN = range(10)
 N_POSE = 10
 # State at an output: momentum of the particles, kinetic and elastic energy.
 N_STATE = 5
+# Rows of the table of orders: how many steps, after how many each a row of the report, time step, velocity upwards and along the blade
+# and rate of its turn that are commanded.
+STEPS, EVERY, STEP, UP, ALONG, ROLL = range(6)
+N_ORDER = 6
+# What a loop goes over: each cut, rows of nodes in reach, lines of nodes across the mirror, parts of the particles, slices along the edge,
+# rows of nodes about what could be damaged.
+EACH, ROW, LINE, PART, SLICE, HOT = range(6)
+N_LOOPS = 6
 N_REPORT = N_SUMS + N_STATE + N_POSE
 
 MIRROR = 2  # index of the first node plane that is no mirror image across x
@@ -35,38 +43,20 @@ FAR = 1 << 20  # a node that no grid has
 BESIDE = 3  # cells on either side of the cut plane whose nodes may carry both halves
 REGISTER = 32  # bytes of a register of a CPU: as many particles as fill it have their elastic stress found at once
 CPU_BLOCK = 512  # Taichi runs CPU loops shorter than this on one thread, so one iteration in 512 works for a thread
-# Capacities: the smallest one, the factor by which they grow, up to where, and the step by which they grow beyond.
-PARTICLE_ROOM = (4096, 4, 65_536, 65_536)
-NODE_ROOM = (24, 2, 96, 32)
-
-
-def capacity(size, room):
-    """The size of fields that hold ``size`` entries: few sizes, so that scenes of many sizes share what is compiled once."""
-    out, factor, most, step = room
-    while out < min(size, most):
-        out *= factor
-    return out if size <= out else out + -(-(size - out) // step) * step
-
-
-def particle_capacity(n):
-    """Particles that fields for n of them have room for."""
-    return capacity(n, PARTICLE_ROOM)
-
-
-def node_capacity(nodes):
-    """Nodes along an axis that a grid of so many has room for; odd, or neighbours along it would share the cache's sets."""
-    return capacity(nodes, NODE_ROOM) + 1
 
 
 @ti.data_oriented
 class Fields:
-    """Particles, grid, edge and tables, with room for a class of scenes; :meth:`lay_out` fits them to one.
+    """Particles, grid, edge and tables, with room for a class of scenes; :meth:`lay_out` fits them to some.
+
+    They hold one cut or a batch of them side by side, each with scene, material, time step and blade of its own; the first index of every
+    field says which. On a GPU one launch does a loop of all cuts, on CPUs a thread does all loops of a cut (:meth:`whose`).
 
     Deformation gradients are stored entry by entry for ``lanes`` particles, [block, 3 row + column, lane], so that the
     same operation on all of them is one instruction; velocity gradients column by column, each filled up to four.
 
     The grid stores two velocity fields: the first at ``[i, j, k]``, the second, which only nodes beside the cut plane
-    have, at ``[i, second + j, k]``.
+    have, at ``[i, second + j, k]`` of each cut.
 
     Args:
         room: Most particles.
@@ -79,9 +69,12 @@ class Fields:
         damage: Bulk damage on.
         turned: The grid is turned against the blade.
         branches: Number of Prony branches.
+        batch: Most cuts side by side; more than one on a GPU or with one thread a cut.
     """
 
-    def __init__(self, room, nodes, mirrors, stations, threads, nodal, press, damage, turned=False, branches=0):
+    def __init__(
+        self, room, nodes, mirrors, stations, threads, nodal, press, damage, turned=False, branches=0, batch=1
+    ):
         self.mx, self.my = mirrors
         self.i0 = MIRROR if self.mx else -1
         self.first = max(self.i0, 0)  # slice that is no mirror image
@@ -100,196 +93,183 @@ class Fields:
         mat3 = ti.types.matrix(3, 3, real)
         self.lanes = 1 if self.atomic else REGISTER // (8 if real == ti.f64 else 4)
         blocks = -(-room // self.lanes)
-        room = blocks * self.lanes
-        self.x, self.v = vec3.field(shape=room), vec3.field(shape=room)
-        self.C, self.F = vec4.field(shape=(room, 3)), ti.Vector.field(self.lanes, real, (blocks, 9))
+        self.batch, self.room, self.slices = batch, blocks * self.lanes, stations
+        room, worn, aged = self.room, self.room if damage else 1, self.room if branches else 1
+        self.x, self.v = (vec3.field(shape=(batch, room)) for _ in range(2))
+        self.C, self.F = vec4.field(shape=(batch, room, 3)), ti.Vector.field(self.lanes, real, (batch, blocks, 9))
         # Kirchhoff stress (6), viscous and plastic loss, and whether the particle must be done by itself
-        self.tau = ti.Vector.field(self.lanes, real, (blocks, 9))
-        self.side, self.gap = ti.field(ti.i32, room), ti.field(real, room)
-        self.foot = ti.field(real, room)
-        self.bulk = ti.field(real, room)  # volume over that of a particle beside the cut
+        self.tau = ti.Vector.field(self.lanes, real, (batch, blocks, 9))
+        self.side, self.gap = ti.field(ti.i32, (batch, room)), ti.field(real, (batch, room))
+        self.foot = ti.field(real, (batch, room))
+        self.bulk = ti.field(real, (batch, room))  # volume over that of a particle beside the cut
         # reference volume between a particle of the first layer and the board, and the tool; 0 behind the first layer
-        self.shell = ti.Vector.field(2, real, room)
+        self.shell = ti.Vector.field(2, real, (batch, room))
         # moment of the contact's last impulse as a gradient of the velocity: upwards, and across the blade; the fourth
         # entry upwards is the kinetic energy per mass that this impulse gave
-        self.lever = vec4.field(shape=(room, 2))
-        self.kappa, self.strain = (ti.field(real, room if damage else 1) for _ in range(2))
-        self.stick = vec3.field(shape=(2, room))  # board, blade
-        self.tacky, self.layers = ti.field(ti.i32, room), ti.field(ti.i32, room)
-        self.memory = mat3.field(shape=(max(branches, 1), room if branches else 1))
-        self.before = mat3.field(shape=room if branches else 1)
-        self.share_of, self.relax = ti.field(real, max(branches, 1)), ti.field(real, max(branches, 1))
-        self.g = vec4.field(shape=(self.threads, nodes[0], deep, nodes[2]))
-        self.u = vec4.field(shape=(nodes[0], deep, nodes[2]))
-        self.planes = vec4.field(shape=(self.threads, 16))  # of the nodes of the particle that a thread moves
-        self.hot = ti.field(ti.i32, 6)  # box of the lowest nodes of particles whose strain could damage something
-        self.slip, self.push = ti.Vector.field(2, real, stations), ti.Vector.field(2, real, stations)
-        self.velocity = vec3.field(shape=stations)  # mean velocity of the material at the edge
-        self.front, self.drift, self.cut = (ti.field(real, stations) for _ in range(3))
-        self.soften, self.start = ti.field(real, stations), ti.field(real, stations)
-        self.touched = ti.field(real, stations)
-        self.near = ti.field(ti.i32, stations)
-        self.top, self.low, self.width = (ti.field(real, stations) for _ in range(3))
-        self.floor_top, self.floor_low = ti.field(real, stations), ti.field(real, stations)
-        self.par = ti.field(real, N_PARAMETERS)
-        self.size = ti.field(ti.i32, N_SIZES)
-        self.pose = ti.field(ti.f64, N_POSE)
-        self.sums = ti.field(booked, N_SUMS)
-        self.state = ti.field(booked, N_STATE)
-        self.window = ti.field(ti.i32, 6)  # nodes that particles can reach before it is renewed: first, last + 1
+        self.lever = vec4.field(shape=(batch, room, 2))
+        self.kappa, self.strain = (ti.field(real, (batch, worn)) for _ in range(2))
+        self.stick = vec3.field(shape=(batch, 2, room))  # board, blade
+        self.tacky, self.layers = (ti.field(ti.i32, (batch, room)) for _ in range(2))
+        self.memory = mat3.field(shape=(batch, max(branches, 1), aged))
+        self.before = mat3.field(shape=(batch, aged))
+        self.share_of, self.relax = (ti.field(real, (batch, max(branches, 1))) for _ in range(2))
+        self.g = vec4.field(shape=(batch, self.threads, nodes[0], deep, nodes[2]))
+        self.u = vec4.field(shape=(batch, nodes[0], deep, nodes[2]))
+        self.planes = vec4.field(shape=(batch, self.threads, 16))  # of the nodes of the particle that a thread moves
+        self.hot = ti.field(
+            ti.i32, (batch, 6)
+        )  # box of the lowest nodes of particles whose strain could damage something
+        self.slip, self.push = (ti.Vector.field(2, real, (batch, stations)) for _ in range(2))
+        self.velocity = vec3.field(shape=(batch, stations))  # mean velocity of the material at the edge
+        self.front, self.drift, self.parted = (ti.field(real, (batch, stations)) for _ in range(3))
+        self.soften, self.start, self.touched = (ti.field(real, (batch, stations)) for _ in range(3))
+        self.near = ti.field(ti.i32, (batch, stations))
+        self.top, self.low, self.width = (ti.field(real, (batch, stations)) for _ in range(3))
+        self.floor_top, self.floor_low = (ti.field(real, (batch, stations)) for _ in range(2))
+        self.par = ti.field(real, (batch, N_PARAMETERS))
+        self.size = ti.field(ti.i32, (batch, N_SIZES))
+        self.pose = ti.field(ti.f64, (batch, N_POSE))
+        self.sums = ti.field(booked, (batch, N_SUMS))
+        self.state = ti.field(booked, (batch, N_STATE))
+        self.window = ti.field(
+            ti.i32, (batch, 6)
+        )  # nodes that particles can reach before it is renewed: first, last + 1
+        self.order = ti.field(ti.f64, (batch, N_ORDER))
+        self.left = ti.field(
+            ti.i32, batch
+        )  # steps that a cut has yet to do before the next row of the report, on a GPU
+        self.most = ti.field(ti.i32, N_LOOPS)  # most places that a loop goes over in any cut
         ti.sync()  # lays these fields out by themselves; Taichi does not manage those of eight scenes at once
 
-    def lay_out(self, n, nodes, middle, stations, between=False):
-        """Fit the fields to a scene.
+    def lay_out(self, cuts):
+        """Fit the fields to scenes.
 
         Args:
-            n: Number of particles.
-            nodes: Grid nodes along x, y, z.
-            middle: Index of the node plane along y that is nearest to y = 0: the mirror plane across y where there is one.
-            stations: Number of slices along the edge.
-            between: The mirror plane across x lies half-way between the first nodes and their images, not on the first nodes.
+            cuts: Of each cut (particles, grid nodes along x, y, z, index of the node plane along y that is nearest to y = 0: the mirror
+                plane across y where there is one, slices along the edge, whether the mirror plane across x lies half-way between the
+                first nodes and their images and not on the first nodes).
         """
-        self.n, self.nodes = n, nodes
-        first = 0 if self.turned else max(middle - BESIDE, 0)
-        end = nodes[1] if self.turned else min(middle + BESIDE + 1, nodes[1])
-        sizes = [n, -(-n // self.lanes), *nodes, stations, middle, first, end, nodes[1] - first]
-        sizes.append(2 * self.i0 - between)
-        self.size.from_numpy(np.array(sizes, np.int32))
+        sizes = np.zeros((self.batch, N_SIZES), np.int32)
+        for cut, (n, nodes, middle, stations, between) in enumerate(cuts):
+            first = 0 if self.turned else max(middle - BESIDE, 0)
+            end = nodes[1] if self.turned else min(middle + BESIDE + 1, nodes[1])
+            row = [n, -(-n // self.lanes), *nodes, stations, middle, first, end, nodes[1] - first]
+            sizes[cut] = [*row, 2 * self.i0 - between]
+        self.n = sizes[:, COUNT]
+        self.size.from_numpy(sizes)
+        most = np.zeros(N_LOOPS, np.int32)
+        most[[EACH, PART, SLICE]] = 1, sizes[:, BLOCKS].max(), sizes[:, STATIONS].max()
+        self.most.from_numpy(most)
 
-    def fill(self, field, values):
-        """Set the first entries of a field of particles or slices, the others to zero."""
-        out = np.zeros((*field.shape, *values.shape[1:]), values.dtype)
-        out[: len(values)] = values
+    def fill(self, field, *values):
+        """Set the first entries of a field of particles or slices of each cut, the others to zero."""
+        out = np.zeros((*field.shape, *values[0].shape[1:]), self.real if values[0].dtype.kind == "f" else np.int32)
+        for cut, given in enumerate(values):
+            out[cut, : len(given)] = given
         field.from_numpy(out)
 
-    def of_particles(self, field):
-        """A field's entries of the scene's particles as NumPy (n, ...)."""
-        return field.to_numpy()[: self.n]
+    def set_table(self, table, *rows):
+        """Set the rows of a table, one for each cut."""
+        out = table.to_numpy()
+        out[: len(rows)] = rows
+        table.from_numpy(out)
+
+    def of_particles(self, field, cut=0):
+        """A field's entries of the particles of a cut as NumPy (n, ...)."""
+        return field.to_numpy()[cut, : self.n[cut]]
 
     @ti.kernel
     def reset(self):
         """Particles at rest and unstrained, nothing cut, nothing booked."""
-        for p in self.x:
-            self.v[p] = ti.Vector.zero(float, 3)
-            self.side[p] = 0
-            self.tacky[p] = 0
+        for c, p in self.x:
+            self.v[c, p] = ti.Vector.zero(float, 3)
+            self.side[c, p] = 0
+            self.tacky[c, p] = 0
             for b in ti.static(range(2)):
-                self.stick[b, p] = ti.Vector.zero(float, 3)
+                self.stick[c, b, p] = ti.Vector.zero(float, 3)
             if ti.static(self.branches > 0):
-                self.before[p] = ti.Matrix.zero(float, 3, 3)
+                self.before[c, p] = ti.Matrix.zero(float, 3, 3)
                 for b in ti.static(range(self.branches)):
-                    self.memory[b, p] = ti.Matrix.zero(float, 3, 3)
-        for p, d in self.C:
-            self.C[p, d] = ti.Vector.zero(float, 4)
-        for p, d in self.lever:
-            self.lever[p, d] = ti.Vector.zero(float, 4)
-        for b, r in self.F:
+                    self.memory[c, b, p] = ti.Matrix.zero(float, 3, 3)
+        for c, p, d in self.C:
+            self.C[c, p, d] = ti.Vector.zero(float, 4)
+        for c, p, d in self.lever:
+            self.lever[c, p, d] = ti.Vector.zero(float, 4)
+        for c, b, r in self.F:
             for lane in ti.static(range(self.lanes)):
-                self.F[b, r][lane] = 1.0 if r % 4 == 0 else 0.0
-        for i, j, k in self.u:  # the edge also looks at nodes that no particle has reached yet
-            self.u[i, j, k] = ti.Vector.zero(float, 4)
-        for p in self.kappa:
-            self.kappa[p] = 0.0
-            self.strain[p] = 0.0
-        for i in self.cut:
-            self.slip[i] = ti.Vector.zero(float, 2)
-            self.push[i] = ti.Vector.zero(float, 2)
-            self.velocity[i] = ti.Vector.zero(float, 3)
-            self.cut[i] = 0.0
-            self.drift[i] = 0.0
-            self.start[i] = 0.0
-            self.touched[i] = 0.0
-            self.front[i] = 1e3
-        for k in self.sums:
-            self.sums[k] = 0.0
+                self.F[c, b, r][lane] = 1.0 if r % 4 == 0 else 0.0
+        for c, i, j, k in self.u:  # the edge also looks at nodes that no particle has reached yet
+            self.u[c, i, j, k] = ti.Vector.zero(float, 4)
+        for c, p in self.kappa:
+            self.kappa[c, p] = 0.0
+            self.strain[c, p] = 0.0
+        for c, i in self.parted:
+            self.slip[c, i] = ti.Vector.zero(float, 2)
+            self.push[c, i] = ti.Vector.zero(float, 2)
+            self.velocity[c, i] = ti.Vector.zero(float, 3)
+            self.parted[c, i] = 0.0
+            self.drift[c, i] = 0.0
+            self.start[c, i] = 0.0
+            self.touched[c, i] = 0.0
+            self.front[c, i] = 1e3
+        for c, k in self.sums:
+            self.sums[c, k] = 0.0
 
-    def deformation(self):
-        """Deformation gradients (n, 3, 3) as NumPy."""
-        return self.F.to_numpy().transpose(0, 2, 1).reshape(-1, 3, 3)[: self.n]
+    def deformation(self, cut=0):
+        """Deformation gradients of a cut (n, 3, 3) as NumPy."""
+        return self.F.to_numpy()[cut].transpose(0, 2, 1).reshape(-1, 3, 3)[: self.n[cut]]
 
-    def stresses(self):
-        """Kirchhoff stresses (n, 6) [Pa] of the last step as NumPy: xx, yy, zz, yz, xz, xy."""
-        return self.tau.to_numpy()[:, :6].transpose(0, 2, 1).reshape(-1, 6)[: self.n]
+    def stresses(self, cut=0):
+        """Kirchhoff stresses (n, 6) [Pa] of the last step of a cut as NumPy: xx, yy, zz, yz, xz, xy."""
+        return self.tau.to_numpy()[cut, :, :6].transpose(0, 2, 1).reshape(-1, 6)[: self.n[cut]]
 
-    def gradient(self):
-        """Velocity gradients (n, 3, 3) [1/s] as NumPy."""
-        return self.C.to_numpy()[: self.n, :, :3].transpose(0, 2, 1)
+    def gradient(self, cut=0):
+        """Velocity gradients of a cut (n, 3, 3) [1/s] as NumPy."""
+        return self.C.to_numpy()[cut, : self.n[cut], :, :3].transpose(0, 2, 1)
 
     def set_gradient(self, values):
-        """Set the velocity gradients from (n, 3, 3) [1/s]."""
+        """Set the velocity gradients of the first cut from (n, 3, 3) [1/s]."""
         c = self.C.to_numpy()
-        c[: self.n, :, :3] = np.transpose(values, (0, 2, 1))
+        c[0, : self.n[0], :, :3] = np.transpose(values, (0, 2, 1))
         self.C.from_numpy(c)
 
     @ti.func
-    def deformation_of(self, p):
+    def deformation_of(self, cut, p):
         """Deformation gradient of one particle."""
         b, lane = p // self.lanes, p % self.lanes
         f = ti.Matrix.zero(float, 3, 3)
         for r, c in ti.static(ti.ndrange(3, 3)):
-            f[r, c] = self.F[b, 3 * r + c][lane]
+            f[r, c] = self.F[cut, b, 3 * r + c][lane]
         return f
 
     @ti.func
-    def gradient_of(self, p):
+    def gradient_of(self, cut, p):
         """Velocity gradient of one particle [1/s]."""
-        x, y, z = self.C[p, 0], self.C[p, 1], self.C[p, 2]
+        x, y, z = self.C[cut, p, 0], self.C[cut, p, 1], self.C[cut, p, 2]
         return ti.Matrix([[x[0], y[0], z[0]], [x[1], y[1], z[1]], [x[2], y[2], z[2]]])
 
     @ti.func
-    def share(self, part):
-        """Blocks of particles, first and last + 1, of one part of a parallel loop over ``parts``, and its thread."""
-        thread, first, last = 0, 0, 0
-        if ti.static(self.atomic):
-            first, last = part, part + 1
-        elif ti.static(self.threads == 1):
-            last = self.size[BLOCKS]
-        elif part % CPU_BLOCK == 0:
-            thread, blocks = part // CPU_BLOCK, self.size[BLOCKS]
-            first, last = blocks * thread // self.threads, blocks * (thread + 1) // self.threads
-        return first, last, thread
+    def time_step(self, cut):
+        """Time step of a cut [s]."""
+        return ti.cast(self.order[cut, STEP], float)
 
     @ti.func
-    def shares(self):
-        """Number of iterations of a parallel loop over blocks of particles."""
-        return self.size[BLOCKS] if ti.static(self.atomic) else self.parts
-
-    @ti.func
-    def twin(self, j):
+    def twin(self, cut, j):
         """Whether the nodes of plane j along y have a second field."""
-        return self.size[TWIN] <= j < self.size[TWIN_END]
+        return self.size[cut, TWIN] <= j < self.size[cut, TWIN_END]
 
     @ti.func
-    def rows(self, w):
-        """Number of rows of nodes along z in the box ``w``; on a GPU each node is a row."""
-        return (w[3] - w[0]) * (w[4] - w[1]) * ((w[5] - w[2]) if ti.static(self.atomic) else 1)
-
-    @ti.func
-    def row(self, c, w):
-        """Place i, j of a row and its first and last node (excluded)."""
-        low, high = w[2], w[5]
-        r = c
-        if ti.static(self.atomic):
-            deep = w[5] - w[2]
-            r = c // deep
-            low += c - r * deep
-            high = low + 1
-        wide = w[4] - w[1]
-        i = r // wide
-        return w[0] + i, w[1] + r - i * wide, low, high
-
-    @ti.func
-    def add(self, thread, i, j, k, value):
+    def add(self, cut, thread, i, j, k, value):
         """Add to a node of a thread's own grid; atomically where all threads share one."""
         if ti.static(self.atomic):
-            self.g[thread, i, j, k] += value
+            self.g[cut, thread, i, j, k] += value
         else:
-            self.g[thread, i, j, k] = self.g[thread, i, j, k] + value
+            self.g[cut, thread, i, j, k] = self.g[cut, thread, i, j, k] + value
 
     @ti.func
-    def local(self, q):
+    def local(self, cut, q):
         """Lowest node of the 27 that a point reaches, and its offset in cells."""
-        u = (q - ti.Vector([self.par[OX], self.par[OY], self.par[OZ]])) * self.par[INV]
+        u = (q - ti.Vector([self.par[cut, OX], self.par[cut, OY], self.par[cut, OZ]])) * self.par[cut, INV]
         base = ti.floor(u - 0.5).cast(ti.i32)
         return base, u - base.cast(float)
 
@@ -308,82 +288,88 @@ class Fields:
         return [0.5 * (1.5 - fx) ** 2, 0.75 - (fx - 1) ** 2, 0.5 * (fx - 0.5) ** 2]
 
     @ti.func
-    def node(self, i, j, k):
+    def node(self, cut, i, j, k):
         """Position of a node [m]."""
         return ti.Vector(
-            [self.par[OX] + i * self.par[DX], self.par[OY] + j * self.par[DX], self.par[OZ] + k * self.par[DX]]
+            [
+                self.par[cut, OX] + i * self.par[cut, DX],
+                self.par[cut, OY] + j * self.par[cut, DX],
+                self.par[cut, OZ] + k * self.par[cut, DX],
+            ]
         )
 
     @ti.func
-    def blade_axes(self, q):
+    def blade_axes(self, cut, q):
         """A vector of the grid's axes in the scene's: along the blade, across it, up."""
         out = q
         if ti.static(self.turned):
-            c, s = self.par[YAW_COS], self.par[YAW_SIN]
+            c, s = self.par[cut, YAW_COS], self.par[cut, YAW_SIN]
             out = ti.Vector([c * q[0] + s * q[1], c * q[1] - s * q[0], q[2]])
         return out
 
     @ti.func
-    def grid_axes(self, q):
+    def grid_axes(self, cut, q):
         """A vector of the scene's axes in the grid's."""
         out = q
         if ti.static(self.turned):
-            c, s = self.par[YAW_COS], self.par[YAW_SIN]
+            c, s = self.par[cut, YAW_COS], self.par[cut, YAW_SIN]
             out = ti.Vector([c * q[0] - s * q[1], s * q[0] + c * q[1], q[2]])
         return out
 
     @ti.func
-    def edge_height(self, s):
+    def edge_height(self, cut, s):
         """Height of the edge at a place along the blade [m]."""
-        z = ti.cast(self.pose[Z], float)
-        c, t = ti.cast(self.pose[TILT_COS], float), ti.cast(self.pose[TILT_SIN], float)
-        return z + (s - ti.cast(self.pose[S], float)) * t / c
+        z = ti.cast(self.pose[cut, Z], float)
+        c, t = ti.cast(self.pose[cut, TILT_COS], float), ti.cast(self.pose[cut, TILT_SIN], float)
+        return z + (s - ti.cast(self.pose[cut, S], float)) * t / c
 
     @ti.func
-    def blade_velocity(self, s, z):
+    def blade_velocity(self, cut, s, z):
         """Velocity of the blade where it is at a place along the cut and a height [m/s], in the scene's axes."""
-        turn = ti.cast(self.pose[TURN], float)
-        along = ti.cast(self.pose[VS], float) - turn * (z - ti.cast(self.pose[Z], float))
-        up = ti.cast(self.pose[VZ], float) + turn * (s - ti.cast(self.pose[S], float))
+        turn = ti.cast(self.pose[cut, TURN], float)
+        along = ti.cast(self.pose[cut, VS], float) - turn * (z - ti.cast(self.pose[cut, Z], float))
+        up = ti.cast(self.pose[cut, VZ], float) + turn * (s - ti.cast(self.pose[cut, S], float))
         return ti.Vector([along, 0.0, up])
 
     @ti.func
-    def under_blade(self, s):
+    def under_blade(self, cut, s):
         """Whether a place along the cut lies within the length of the blade."""
-        return ti.abs(s - ti.cast(self.pose[S], float)) < self.par[HALF_LENGTH] * ti.cast(self.pose[TILT_COS], float)
+        return ti.abs(s - ti.cast(self.pose[cut, S], float)) < self.par[cut, HALF_LENGTH] * ti.cast(
+            self.pose[cut, TILT_COS], float
+        )
 
     @ti.func
-    def images_x(self, i):
+    def images_x(self, cut, i):
         """How many mirror images across x = 0 a node stands for: 0 for ghosts, 1 on the plane, else 2."""
         out = 1.0
         if ti.static(self.mx):
-            image = self.size[PAIR] - i
+            image = self.size[cut, PAIR] - i
             out = 0.0 if i < image else (1.0 if i == image else 2.0)
         return out
 
     @ti.func
-    def images(self, i, j):
+    def images(self, cut, i, j):
         """How many mirror images a node stands for."""
-        out = self.images_x(i)
+        out = self.images_x(cut, i)
         if ti.static(self.my):
-            plane = self.size[PLANE]
+            plane = self.size[cut, PLANE]
             out *= 0.0 if j > plane else (1.0 if j == plane else 2.0)
         return out
 
     @ti.func
-    def tool(self, row, impulse):
+    def tool(self, cut, row, impulse):
         """Book an impulse of the food on a tool, in the scene's axes; mirror images cancel across their plane."""
         if ti.static(not self.mx):
-            self.sums[row] += impulse[0]
+            self.sums[cut, row] += impulse[0]
         if ti.static(not self.my):
-            self.sums[row + 1] += impulse[1]
-        self.sums[row + 2] += impulse[2]
+            self.sums[cut, row + 1] += impulse[1]
+        self.sums[cut, row + 2] += impulse[2]
 
     @ti.func
-    def knife(self, row, impulse, s, z):
+    def knife(self, cut, row, impulse, s, z):
         """Book an impulse of the food on the knife at a place along the cut and a height, and its moment about the middle of the edge,
         which raises the end at +x."""
-        self.tool(row, impulse)
+        self.tool(cut, row, impulse)
         if ti.static(not self.mx):
-            wide, high = s - ti.cast(self.pose[S], float), z - ti.cast(self.pose[Z], float)
-            self.sums[MOMENT] += wide * impulse[2] - high * impulse[0]
+            wide, high = s - ti.cast(self.pose[cut, S], float), z - ti.cast(self.pose[cut, Z], float)
+            self.sums[cut, MOMENT] += wide * impulse[2] - high * impulse[0]

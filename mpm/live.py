@@ -8,16 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from mpm import fields as kn
 from mpm.errors import SceneError, SimulationError
-from mpm.health import health
+from mpm.ledger import Ledger
 from mpm.record import ForceRecord
 from mpm.runtime import Runtime, running
 from mpm.scene import STEEPEST, Scene
 from mpm.solver import APPROACH, Simulation
 from mpm.surface import Surface
 from mpm.topology import Topology
-from mpm.watch import Snapshot, snapshot
+from mpm.watch import Snapshot
 
 ON_FACE = 1e-9  # distance from the plane of the cut at which a vertex lies on its face [m]
 CLEAR = 2.0  # height of the edge above the uncut food at which nothing touches the blade any more [cells]
@@ -58,13 +57,11 @@ class LiveCut:
             raise SceneError("live cut: the blade is held from outside; leave the scene's arm rigid")
         self.scene = scene
         self._simulation = Simulation(scene, runtime or Runtime(threads=1))
-        self._simulation.counters = {"inverted": 0, "outside": 0}
         self._simulation._load(scene.food.material)
-        self._dt = self._simulation._time_step(scene.food.material)
+        self._dt = self._simulation.time_step(scene.food.material)
         self._top = scene.food.shape.height + APPROACH * scene.numerics.dx
         self._z, self._s, self._tilt, self._first = math.inf, 0.0, 0.0, 0.0
-        self._rows: list[list[float]] = []
-        self._momentum, self._steps, self._wall = np.zeros(3), 0, 0.0
+        self._ledger, self._wall = Ledger(self._simulation, scene.food.material), 0.0
         self._looks: Surface | None = None
         self.status, self.time, self.impulse, self.moment = "done", 0.0, np.zeros(3), 0.0
 
@@ -81,7 +78,7 @@ class LiveCut:
     @property
     def begun(self) -> bool:
         """Whether the edge has come near the food."""
-        return bool(self._rows)
+        return bool(self._ledger.rows)
 
     @property
     def weight(self) -> float:
@@ -158,32 +155,18 @@ class LiveCut:
         steps = max(math.ceil(span / self.scene.time_scale / self._dt - 1e-9), math.ceil(way / most - 1e-9))
         sim = steps * self._dt
         began = clock.perf_counter()
-        row = self._simulation._advance(steps, steps, self._dt, down / sim, along / sim, turn / sim)[0]
+        order = steps, steps, self._dt, down / sim, along / sim, turn / sim
+        self._ledger.book(self._simulation.advance(order)[0], steps, self._dt)
         self._wall += clock.perf_counter() - began
-        sums, state, pose = np.split(row, (kn.N_SUMS, kn.N_SUMS + kn.N_STATE))
-        parts = self._simulation._row(sums, state, self._momentum, sim, material, self.scene.numerics.gravity)
-        counters = self._simulation.counters
-        counters["inverted"] += int(sums[kn.INVERTED])
-        counters["outside"] += int(sums[kn.OUTSIDE])
-        self._momentum, self._steps = np.array(parts[0]), self._steps + steps
-        self._rows.append(
-            [
-                *self._simulation._place(pose),
-                self._steps * self._dt,
-                *(v for part in parts for v in part),
-                pose[kn.TILT],
-            ]
-        )
         self._z, self._s, self._tilt, self.time = height, slide, tilt, self.time + span
-        self.moment = float(parts[-1][0])
-        self.status = health(sums, state)
+        self.moment, self.status = self._ledger.moment, self._ledger.status
         if self.status != "done":
             raise SimulationError(
                 f"the live cut stopped with the edge at {1e3 * height:.1f} mm: {self.status}",
                 reason=self.status,
                 fraction=0.0,
             )
-        force = np.array(parts[1]) + np.array(parts[2])
+        force = self._ledger.force
         self.impulse = self.impulse + span * force
         return force
 
@@ -193,15 +176,14 @@ class LiveCut:
 
     def pieces(self) -> Topology:
         """Connected pieces of the food now."""
-        found: Topology = self._k.user._topology()
+        found: Topology = self._k.user.topology()
         return found
 
     def look(self) -> Snapshot:
         """The particles now, in the scene's axes."""
-        k = self._k
-        x = self._simulation._turn(k.of_particles(k.x), -1.0)
+        _ = self._k
         stroke = self.scene.food.shape.height - self._z
-        return snapshot(self._steps * self._dt, stroke, self._s, k, x)
+        return self._simulation.look(self._ledger.time, stroke, self._s)
 
     def surface(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The food's surface now: vertices [m] (m, 3) in the scene's axes, triangles (t, 3), and whether each vertex is flesh (m,):
@@ -218,19 +200,10 @@ class LiveCut:
         Raises:
             SimulationError: The edge has not come near the food yet.
         """
-        if not self._rows:
+        if not self.begun:
             raise SimulationError(
                 "the live cut has not begun: the edge never came down", reason="no_contact", fraction=0.0
             )
-        speed = self.scene.motion.mach * self.scene.food.material.p_wave
-        fraction = min(max(row[0] for row in self._rows) / self.scene.food.shape.height, 1.0)
-        return self._k.user._record(
-            self._rows,
-            self.scene.food.material,
-            self.status,
-            max(fraction, 0.0),
-            self._dt,
-            self._steps,
-            speed,
-            self._wall,
-        )
+        _ = self._k
+        fraction = min(max(row[0] for row in self._ledger.rows) / self.scene.food.shape.height, 1.0)
+        return self._ledger.record(dt=self._dt, fraction=max(fraction, 0.0), wall=self._wall)

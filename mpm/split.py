@@ -2,32 +2,33 @@
 
 import taichi as ti
 
-from mpm.fields import DX, FIRST, INV, OZ, STATIONS, ZONE, Fields
+from mpm.fields import DX, FIRST, INV, OZ, STATIONS, ZONE
+from mpm.loops import Loops
 
 CRACK_LEAD = 0.5  # cells by which the split of the nodes lags the crack it makes; see Split.split
 
 
 @ti.data_oriented
-class Split(Fields):
+class Split(Loops):
     """The crack as the transfers between particles and grid see it."""
 
     @ti.func
-    def front_at(self, s):
+    def front_at(self, cut, s):
         """Height of the crack front at a place along the cut [m], between the slices; far up where nothing is cut."""
-        r = (s - self.par[FIRST]) * self.par[INV]
-        i = ti.math.clamp(ti.floor(r, ti.i32), self.first, self.size[STATIONS] - 2)
+        r = (s - self.par[cut, FIRST]) * self.par[cut, INV]
+        i = ti.math.clamp(ti.floor(r, ti.i32), self.first, self.size[cut, STATIONS] - 2)
         t = ti.math.clamp(r - i, 0.0, 1.0)
         out = 1e3
-        if ti.max(self.front[i], self.front[i + 1]) < 1e2:
-            out = (1 - t) * self.front[i] + t * self.front[i + 1]
+        if ti.max(self.front[cut, i], self.front[cut, i + 1]) < 1e2:
+            out = (1 - t) * self.front[cut, i] + t * self.front[cut, i + 1]
         elif t < 0.5:
-            out = self.front[i]
+            out = self.front[cut, i]
         else:
-            out = self.front[i + 1]
+            out = self.front[cut, i + 1]
         return out
 
     @ti.func
-    def split(self, p, base, q, mine):
+    def split(self, cut, p, base, q, mine):
         """From which of the three node layers on, for each of the nine node columns, a particle meets the other side.
 
         Node and particle see each other across the cut plane when the line between them passes it below the crack
@@ -59,20 +60,22 @@ class Split(Fields):
         """
         code = 0x3FFFF
         if ti.static(self.cuts):
-            reach = ti.static(2.2 if self.turned else 1.6) * self.par[DX]
+            reach = ti.static(2.2 if self.turned else 1.6) * self.par[cut, DX]
             if ti.abs(q[1]) < reach:
-                front = self.front_at(q[0]) - 0.5 * self.par[ZONE]
-                front += CRACK_LEAD * self.par[DX]
+                front = self.front_at(cut, q[0]) - 0.5 * self.par[cut, ZONE]
+                front += CRACK_LEAD * self.par[cut, DX]
                 if front < 1e2:
                     code = 0
                     for column in range(ti.static(9 if self.turned else 3)):
-                        n = self.blade_axes(self.node(base[0] + column // 3, base[1] + column % 3, base[2]))[1]
+                        n = self.blade_axes(cut, self.node(cut, base[0] + column // 3, base[1] + column % 3, base[2]))[
+                            1
+                        ]
                         layer = 3
-                        if self.half_of_node(n) != mine:
-                            t = q[1] / (q[1] - n) if ti.abs(q[1] - n) > 1e-9 * self.par[DX] else 1.0
+                        if self.half_of_node(cut, n) != mine:
+                            t = q[1] / (q[1] - n) if ti.abs(q[1] - n) > 1e-9 * self.par[cut, DX] else 1.0
                             t = ti.math.clamp(t, 1e-6, 1.0)
                             # the line passes the plane at z_p + t (z_node - z_p); above the front it is cut
-                            level = (q[2] + (front - q[2]) / t - self.par[OZ]) * self.par[INV]
+                            level = (q[2] + (front - q[2]) / t - self.par[cut, OZ]) * self.par[cut, INV]
                             layer = ti.math.clamp(ti.floor(level - base[2], ti.i32) + 1, 0, 3)
                         code |= layer << (2 * column)
         return code
@@ -84,14 +87,14 @@ class Split(Fields):
         return (code >> (2 * (3 * i + j if ti.static(self.turned) else j))) & 3
 
     @ti.func
-    def half(self, p, n):
+    def half(self, cut, p, n):
         """Half of the food that a particle belongs to, 0 left, 1 right: fixed when it is severed, by its side before."""
         out = 0  # the modelled half of a mirror is the left
         if ti.static(not self.my):
-            out = self.side[p] - 1 if self.side[p] > 0 else ti.cast(n >= 0, ti.i32)
+            out = self.side[cut, p] - 1 if self.side[cut, p] > 0 else ti.cast(n >= 0, ti.i32)
         return out
 
     @ti.func
-    def half_of_node(self, n):
+    def half_of_node(self, cut, n):
         """Half that a node belongs to; a node on the plane belongs to the right."""
-        return ti.cast(n > -1e-6 * self.par[DX], ti.i32)
+        return ti.cast(n > -1e-6 * self.par[cut, DX], ti.i32)

@@ -39,17 +39,17 @@ class Touch(Survey):
     """What a particle of the surface feels of the tools, and they of it."""
 
     @ti.func
-    def may_touch(self, p, at):
+    def may_touch(self, cut, p, at):
         """Whether a particle is so near to the board or the blade that contact is worth a look."""
         out = True
         if ti.static(not self.press):
-            there, near = self.blade_axes(at), 2 * self.par[DX]
-            out = (0 < self.foot[p] and there[2] < near) or ti.abs(there[1]) < 0.5 * self.par[SPINE] + near
-            out = out or self.shell[p][1] > 0 or self.tacky[p] > 0
+            there, near = self.blade_axes(cut, at), 2 * self.par[cut, DX]
+            out = (0 < self.foot[cut, p] and there[2] < near) or ti.abs(there[1]) < 0.5 * self.par[cut, SPINE] + near
+            out = out or self.shell[cut, p][1] > 0 or self.tacky[cut, p] > 0
         return out
 
     @ti.func
-    def touch(self, p, dt, u, at):
+    def touch(self, cut, p, dt, u, at):
         """Contact of one particle with board and tool; returns its corrected velocity.
 
         What touches is the food's surface, not the particle's centre. Its distance from the centre stretches with the
@@ -60,39 +60,41 @@ class Touch(Survey):
         Chouly and Hild 2013, SIAM J. Numer. Anal. 51:1295). The spring alone, as stiff as the time step allows, would
         give way as much as a fifth of a cell of food does.
         """
-        m = self.par[MASS] * self.bulk[p] * ti.static((2 if self.mx else 1) * (2 if self.my else 1))
-        c = self.gradient_of(p)
-        up = self.blade_axes(c @ ti.Vector([0.0, 0.0, 1.0]))  # gradient of the velocity, upwards and across the blade
-        across = self.blade_axes(c @ self.grid_axes(ti.Vector([0.0, 1.0, 0.0])))
-        there, v = self.blade_axes(at), self.blade_axes(u)
-        least, most = FLAT * self.par[DX], 0.5 * self.par[DX]
+        m = self.par[cut, MASS] * self.bulk[cut, p] * ti.static((2 if self.mx else 1) * (2 if self.my else 1))
+        c = self.gradient_of(cut, p)
+        up = self.blade_axes(
+            cut, c @ ti.Vector([0.0, 0.0, 1.0])
+        )  # gradient of the velocity, upwards and across the blade
+        across = self.blade_axes(cut, c @ self.grid_axes(cut, ti.Vector([0.0, 1.0, 0.0])))
+        there, v = self.blade_axes(cut, at), self.blade_axes(cut, u)
+        least, most = FLAT * self.par[cut, DX], 0.5 * self.par[cut, DX]
         kick, high, wide = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
-        if 0 < self.foot[p] and there[2] < 2 * self.par[DX]:  # a free body has none
-            self.foot[p] = ti.math.clamp(self.foot[p] * (1 + dt * up[2]), least, most)
-            kick = self.touch_board(p, m, dt, v - self.foot[p] * up, there)
-            high -= self.foot[p] * kick
+        if 0 < self.foot[cut, p] and there[2] < 2 * self.par[cut, DX]:  # a free body has none
+            self.foot[cut, p] = ti.math.clamp(self.foot[cut, p] * (1 + dt * up[2]), least, most)
+            kick = self.touch_board(cut, p, m, dt, v - self.foot[cut, p] * up, there)
+            high -= self.foot[cut, p] * kick
         arm, push = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
         if ti.static(self.press):
-            if there[2] > ti.cast(self.pose[Z], float) - 2 * self.par[DX]:
-                self.gap[p] = ti.math.clamp(self.gap[p] * (1 + dt * up[2]), least, most)
-                arm = ti.Vector([0.0, 0.0, self.gap[p]])
-                push = self.touch_press(p, m, dt, v + kick + self.gap[p] * up, there + arm)
+            if there[2] > ti.cast(self.pose[cut, Z], float) - 2 * self.par[cut, DX]:
+                self.gap[cut, p] = ti.math.clamp(self.gap[cut, p] * (1 + dt * up[2]), least, most)
+                arm = ti.Vector([0.0, 0.0, self.gap[cut, p]])
+                push = self.touch_press(cut, p, m, dt, v + kick + self.gap[cut, p] * up, there + arm)
         else:
-            if ti.abs(there[1]) < 2 * self.par[DX]:
-                self.gap[p] = ti.math.clamp(self.gap[p] * (1 + dt * across[1]), least, most)
-            push, arm = self.touch_blade(p, m, dt, v + kick, up, across, there)
+            if ti.abs(there[1]) < 2 * self.par[cut, DX]:
+                self.gap[cut, p] = ti.math.clamp(self.gap[cut, p] * (1 + dt * across[1]), least, most)
+            push, arm = self.touch_blade(cut, p, m, dt, v + kick, up, across, there)
         high += arm[2] * push
         wide += arm[1] * push
-        scale = 4 * self.par[INV] * self.par[INV]
-        high, wide = self.grid_axes(high), self.grid_axes(wide)
+        scale = 4 * self.par[cut, INV] * self.par[cut, INV]
+        high, wide = self.grid_axes(cut, high), self.grid_axes(cut, wide)
         new = v + kick + push
         gift = 0.5 * (new.norm_sqr() - v.norm_sqr())
-        self.lever[p, 0] = ti.Vector([scale * high[0], scale * high[1], scale * high[2], gift])
-        self.lever[p, 1] = scale * ti.Vector([wide[0], wide[1], wide[2], 0.0])
-        return self.grid_axes(new)
+        self.lever[cut, p, 0] = ti.Vector([scale * high[0], scale * high[1], scale * high[2], gift])
+        self.lever[cut, p, 1] = scale * ti.Vector([wide[0], wide[1], wide[2], 0.0])
+        return self.grid_axes(cut, new)
 
     @ti.func
-    def traction(self, p, shell, depth, n, dt):
+    def traction(self, cut, p, shell, depth, n, dt):
         """Force that the food's own stress asks of a board or tool with outward normal n, over the contact's stiffness [m].
 
         Of the first layer only: ``shell`` is the reference volume between centre and surface, ``depth`` their distance.
@@ -101,97 +103,101 @@ class Touch(Survey):
         if shell > 0:
             block = p // self.lanes
             lane = p - block * self.lanes
-            t = ti.Vector([self.tau[block, r][lane] for r in range(6)])
-            out = self.blade_axes(full(t) @ self.grid_axes(n))
-            out *= -shell / depth * dt * dt / (CONTACT * self.par[MASS] * self.bulk[p])
+            t = ti.Vector([self.tau[cut, block, r][lane] for r in range(6)])
+            out = self.blade_axes(cut, full(t) @ self.grid_axes(cut, n))
+            out *= -shell / depth * dt * dt / (CONTACT * self.par[cut, MASS] * self.bulk[cut, p])
         return out
 
     @ti.func
-    def touch_board(self, p, m, dt, u, at):
+    def touch_board(self, cut, p, m, dt, u, at):
         """Contact of one particle with the board; returns the change of its velocity. ``u`` is that of its surface."""
         dv = ti.Vector.zero(float, 3)
-        own = self.traction(p, self.shell[p][0], self.foot[p], ti.Vector([0.0, 0.0, 1.0]), dt)
-        force = self.foot[p] - at[2] + own[2]
+        own = self.traction(cut, p, self.shell[cut, p][0], self.foot[cut, p], ti.Vector([0.0, 0.0, 1.0]), dt)
+        force = self.foot[cut, p] - at[2] + own[2]
         own[2] = 0.0
         if force > 0:
             slide = dt * ti.Vector([u[0], u[1], 0.0])
-            hold = stick_slip(self.stick[0, p], slide, own, force, self.par[BOARD_MU])
-            self.stick[0, p] = own - hold
+            hold = stick_slip(self.stick[cut, 0, p], slide, own, force, self.par[cut, BOARD_MU])
+            self.stick[cut, 0, p] = own - hold
             dv = CONTACT / dt * ti.Vector([hold[0], hold[1], force])
-            self.tool(BOARD, -m * dv)
-            self.sums[RUBBED] -= m / dt * dv.dot(slide)
+            self.tool(cut, BOARD, -m * dv)
+            self.sums[cut, RUBBED] -= m / dt * dv.dot(slide)
         else:
-            self.stick[0, p] = ti.Vector.zero(float, 3)
+            self.stick[cut, 0, p] = ti.Vector.zero(float, 3)
         return dv
 
     @ti.func
-    def touch_blade(self, p, m, dt, u, up, across, at):
+    def touch_blade(self, cut, p, m, dt, u, up, across, at):
         """Contact of one severed particle with the blade's faces; returns the change of its velocity, and its lever arm.
 
         A particle meets the blade as far from its centre as it was from the cut plane when the food was whole, so
         that the faces displace the food by the true half thickness of the blade.
         """
-        cos_t, sin_t = ti.cast(self.pose[TILT_COS], float), ti.cast(self.pose[TILT_SIN], float)
-        above = (at[2] - self.edge_height(at[0])) * cos_t
+        cos_t, sin_t = ti.cast(self.pose[cut, TILT_COS], float), ti.cast(self.pose[cut, TILT_SIN], float)
+        above = (at[2] - self.edge_height(cut, at[0])) * cos_t
         touching = False
         dv, arm = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
-        if self.side[p] != 0 and 0 < above < self.par[BLADE] and self.under_blade(at[0]):
-            sign = 1.0 if self.side[p] == 2 else -1.0
-            d, n = blade_distance(sign * at[1], above, self.par[SPINE], self.par[COS], self.par[SIN], self.par[RADIUS])
+        if self.side[cut, p] != 0 and 0 < above < self.par[cut, BLADE] and self.under_blade(cut, at[0]):
+            sign = 1.0 if self.side[cut, p] == 2 else -1.0
+            d, n = blade_distance(
+                sign * at[1], above, self.par[cut, SPINE], self.par[cut, COS], self.par[cut, SIN], self.par[cut, RADIUS]
+            )
             n = ti.Vector([-sin_t * n[2], sign * n[1], cos_t * n[2]])
-            own = self.traction(p, self.shell[p][1], self.gap[p], n, dt)
-            opening = d - self.gap[p]
+            own = self.traction(cut, p, self.shell[cut, p][1], self.gap[cut, p], n, dt)
+            opening = d - self.gap[cut, p]
             force = own.dot(n) - opening
             press = ti.max(force, 0.0)
             own -= own.dot(n) * n
-            if force > 0 and self.tacky[p] == 0:
-                self.tacky[p] = 1
-            if force <= 0 and self.tacky[p] == 1:
-                if opening < self.par[TACK_GAP]:
+            if force > 0 and self.tacky[cut, p] == 0:
+                self.tacky[cut, p] = 1
+            if force <= 0 and self.tacky[cut, p] == 1:
+                if opening < self.par[cut, TACK_GAP]:
                     opening = ti.max(opening, 0.0)
-                    force = -self.par[TACK] * tack(opening, self.par[TACK_GAP]) * dt * dt / CONTACT
+                    force = -self.par[cut, TACK] * tack(opening, self.par[cut, TACK_GAP]) * dt * dt / CONTACT
                     press = -force
                 else:
-                    self.tacky[p] = 0
+                    self.tacky[cut, p] = 0
             if press > 0:
                 touching = True
-                arm = -self.gap[p] * n
-                rel = u + arm[2] * up + arm[1] * across - self.blade_velocity(at[0] + arm[0], at[2] + arm[2])
+                arm = -self.gap[cut, p] * n
+                rel = u + arm[2] * up + arm[1] * across - self.blade_velocity(cut, at[0] + arm[0], at[2] + arm[2])
                 slide = rel - rel.dot(n) * n
-                stick = self.stick[1, p] - self.stick[1, p].dot(n) * n
-                hold = stick_slip(stick, dt * slide, own, press, self.par[FRICTION])
-                self.stick[1, p] = own - hold
+                stick = self.stick[cut, 1, p] - self.stick[cut, 1, p].dot(n) * n
+                hold = stick_slip(stick, dt * slide, own, press, self.par[cut, FRICTION])
+                self.stick[cut, 1, p] = own - hold
                 dv = CONTACT / dt * (force * n + hold)
-                self.knife(FACE, -m * dv, at[0] + arm[0], at[2] + arm[2])
-                self.sums[RUBBED] -= m * dv.dot(slide if force > 0 else rel)
+                self.knife(cut, FACE, -m * dv, at[0] + arm[0], at[2] + arm[2])
+                self.sums[cut, RUBBED] -= m * dv.dot(slide if force > 0 else rel)
         if not touching:
-            self.stick[1, p] = ti.Vector.zero(float, 3)
+            self.stick[cut, 1, p] = ti.Vector.zero(float, 3)
         return dv, arm
 
     @ti.func
-    def touch_press(self, p, m, dt, u, at):
+    def touch_press(self, cut, p, m, dt, u, at):
         """Contact of one particle with a plate or wedge that presses from above; returns the change of its velocity.
 
         ``at`` and ``u`` are place and velocity of the food's surface above the particle.
         """
         sign = 1.0 if at[1] >= 0 else -1.0
-        above = at[2] - ti.cast(self.pose[Z], float)
-        d, n = blade_distance(sign * at[1], above, self.par[SPINE], self.par[COS], self.par[SIN], self.par[RADIUS])
+        above = at[2] - ti.cast(self.pose[cut, Z], float)
+        d, n = blade_distance(
+            sign * at[1], above, self.par[cut, SPINE], self.par[cut, COS], self.par[cut, SIN], self.par[cut, RADIUS]
+        )
         n = ti.Vector([0.0, sign * n[1], n[2]])
-        own = self.traction(p, self.shell[p][1], self.gap[p], n, dt)
+        own = self.traction(cut, p, self.shell[cut, p][1], self.gap[cut, p], n, dt)
         force = own.dot(n) - d
         own -= own.dot(n) * n
         dv = ti.Vector.zero(float, 3)
         if force > 0:
-            tool = ti.Vector([ti.cast(self.pose[VS], float), 0.0, ti.cast(self.pose[VZ], float)])
-            stick = self.stick[1, p] - self.stick[1, p].dot(n) * n
+            tool = ti.Vector([ti.cast(self.pose[cut, VS], float), 0.0, ti.cast(self.pose[cut, VZ], float)])
+            stick = self.stick[cut, 1, p] - self.stick[cut, 1, p].dot(n) * n
             slide = u - tool
             slide -= slide.dot(n) * n
-            hold = stick_slip(stick, dt * slide, own, force, self.par[FRICTION])
-            self.stick[1, p] = own - hold
+            hold = stick_slip(stick, dt * slide, own, force, self.par[cut, FRICTION])
+            self.stick[cut, 1, p] = own - hold
             dv = CONTACT / dt * (force * n + hold)
-            self.tool(FACE, -m * dv)
-            self.sums[RUBBED] -= m * dv.dot(slide)
+            self.tool(cut, FACE, -m * dv)
+            self.sums[cut, RUBBED] -= m * dv.dot(slide)
         else:
-            self.stick[1, p] = ti.Vector.zero(float, 3)
+            self.stick[cut, 1, p] = ti.Vector.zero(float, 3)
         return dv

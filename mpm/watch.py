@@ -30,7 +30,7 @@ class Snapshot:
     severed: np.ndarray
 
 
-def snapshot(time: float, stroke: float, slide: float, fields: Any, x: np.ndarray) -> Snapshot:
+def snapshot(time: float, stroke: float, slide: float, fields: Any, x: np.ndarray, place: int = 0) -> Snapshot:
     """What there is to see now.
 
     Args:
@@ -39,11 +39,12 @@ def snapshot(time: float, stroke: float, slide: float, fields: Any, x: np.ndarra
         slide: Way of the blade along its edge [m].
         fields: The fields of the run.
         x: Places of its particles in the scene's axes [m], shape (n, 3).
+        place: Of the run among the cuts of the fields.
     """
-    cauchy = fields.stresses() / np.linalg.det(fields.deformation())[:, None]
+    cauchy = fields.stresses(place) / np.linalg.det(fields.deformation(place))[:, None]
     xx, yy, zz, yz, xz, xy = cauchy.T
     mises = np.sqrt(((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2 + 3 * (yz**2 + xz**2 + xy**2))
-    return Snapshot(time, stroke, slide, x, mises, fields.of_particles(fields.side) > 0)
+    return Snapshot(time, stroke, slide, x, mises, fields.of_particles(fields.side, place) > 0)
 
 
 class Watch:

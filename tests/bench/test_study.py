@@ -69,6 +69,7 @@ class Workers:
     """Processes that divide eight seconds' work among them, after a minute for the first."""
 
     now = 0.0
+    compiled: set[int] = set()
 
     def __init__(self, workers: int, arch: str) -> None:
         self.workers, self.start = workers, 60.0
@@ -84,6 +85,12 @@ class Workers:
         Workers.now += self.start + 2.0 * len(jobs) / self.workers
         self.start = 0.0
         return jobs
+
+
+def side_by_side(scenes: list[Scene], runtime: object) -> None:
+    """A minute to compile for the first of each size, then a second and half a second for each cut."""
+    Workers.now += 1.0 + 0.5 * len(scenes) + (0.0 if len(scenes) in Workers.compiled else 60.0)
+    Workers.compiled.add(len(scenes))
 
 
 def peer(python: str, name: str, block: dict, threads: int) -> dict:
@@ -103,6 +110,7 @@ def document(monkeypatch, tmp_path) -> dict:
     monkeypatch.setattr(bench.study, "time", clock)
     monkeypatch.setattr(bench.study, "bandwidth", lambda threads: 2e10)
     monkeypatch.setattr(bench.study, "Simulation", Solver)
+    monkeypatch.setattr(bench.study, "simulate_together", side_by_side)
     monkeypatch.setattr(bench.textbook, "Textbook", Yardstick)
     said: list[str] = []
     bench.study.run(
@@ -138,6 +146,8 @@ def test_ratios_are_those_of_the_times(document):
     assert rows["half the time step"]["time_ratio"] == pytest.approx(2.0, rel=0.01)
     assert rows["single precision"]["time_ratio"] == pytest.approx(1.0)  # neither compiles while it is timed
     assert "nrmse" not in rows["ten times as stiff"]
+    assert [row["cuts"] for row in d["batches"]] == [1, 2, 4, 8]
+    assert [row["per_cut"] for row in d["batches"]] == pytest.approx([1.0, 2 / 3, 0.5, 5 / 12])
     assert d["processes"].pop("cut_Mps") > 0
     assert d["processes"] == {"processes": 2, "speed_up": pytest.approx(2.0)}
     empty = next(row for name, row in rows.items() if "empty grid" in name)

@@ -297,29 +297,25 @@ def test_prepare_makes_folders_once(tmp_path):
 class FlakyPool(Pool):
     """A pool whose first ``deaths`` runs lose their process."""
 
-    def __init__(self, deaths: int) -> None:
-        self.workers, self.arch, self.threads = 2, "cpu", 1
+    def __init__(self, deaths: int, workers: int = 2, arch: str = "cpu") -> None:
+        self.workers, self.arch, self.threads = workers, arch, 1
         self._begun = {}
         self.deaths, self.runs = deaths, 0
+        self.sizes: list[int] = []  # of what was asked for
 
     def _submit(self, work: object, *args: object) -> Future[Any]:
         self.runs += 1
+        together = isinstance(args[0], list)
+        jobs: Any = args[0] if together else [args]
+        self.sizes.append(len(jobs))
         future: Future[Any] = Future()
         if self.runs <= self.deaths:
             future.set_exception(BrokenProcessPool("killed"))
             return future
         curve = np.linspace(0, 1, 5)
-        future.set_result(
-            {
-                "status": "ok",
-                "reason": "",
-                "fraction": 1.0,
-                "stroke": curve,
-                "force": curve,
-                "scalars": {},
-                "seconds": 0.1,
-            }
-        )
+        done = {"status": "ok", "reason": "", "fraction": 1.0, "stroke": curve, "scalars": {}, "seconds": 0.1}
+        results = [done | {"force": job[1].get("E", 0.0) * curve} for job in jobs]
+        future.set_result(results if together else results[0])
         return future
 
 
@@ -330,6 +326,20 @@ def test_killed_worker_is_tried_once_more():
     assert one.ok and pool.runs == 2
     (two,) = SceneEvaluator(FlakyPool(deaths=2), None).evaluate([{"E": 1.0}])  # type: ignore[arg-type]
     assert (two.status, two.reason, two.fraction) == ("failed", DIED, 0.0)
+
+
+def test_a_gpu_gets_all_that_is_asked_for_at_a_time() -> None:
+    """Five candidates, four at a time: two launches in one process, each result with its own values. Where the first kills its process
+    twice, its four are tried by themselves, and nothing is lost.
+    """
+    batch = [{"E": float(k)} for k in range(5)]
+    for deaths, sizes in ((0, [4, 1]), (2, [4, 4, 1, 1, 1, 1, 1])):
+        pool = FlakyPool(deaths, workers=4, arch="cuda")
+        assert pool.processes == 1 and pool.batch == 4
+        found = sorted(SceneEvaluator(pool, None).evaluate(batch), key=lambda e: e.index)  # type: ignore[arg-type]
+        assert pool.sizes == sizes
+        assert [e.index for e in found] == list(range(5)) and all(e.ok for e in found)
+        assert [e.force[-1] for e in found] == [e.parameters["E"] for e in found] == [0.0, 1.0, 2.0, 3.0, 4.0]
 
 
 class LastRun(Pool):

@@ -167,7 +167,7 @@ def test_front_beside_the_mirror_is_that_of_the_first_slice():
     simulation._load(FLESH)
     k = simulation.k
     fronts = np.full(k.front.shape, 0.02)
-    fronts[: k.i0] = 0.01
+    fronts[:, : k.i0] = 0.01
     k.front.from_numpy(fronts)
 
     assert simulation.stations[k.i0] == pytest.approx(0.5 * scene.numerics.dx)
@@ -177,7 +177,7 @@ def test_front_beside_the_mirror_is_that_of_the_first_slice():
     @ti.kernel
     def look():
         for n in range(4):
-            places[n] = k.front_at(places[n])
+            places[n] = k.front_at(0, places[n])
 
     look()
     np.testing.assert_allclose(places.to_numpy(), 0.02, rtol=1e-12)

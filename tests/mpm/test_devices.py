@@ -39,7 +39,7 @@ def test_the_layout_of_a_gpu_gives_the_same_cut(
     """
     scene = replace(scene, numerics=replace(scene.numerics, precision=precision))
     one = Simulation(scene, Runtime(threads=1)).run()
-    monkeypatch.setattr(Simulation, "_threads", lambda self: 0)
+    monkeypatch.setattr(Simulation, "threads", lambda self: 0)
     other = Simulation(scene, Runtime(threads=2))
     assert other.k.atomic and other.k.lanes == 1
     record = other.run()

@@ -8,12 +8,13 @@ import taichi as ti
 from scipy.linalg import polar
 
 from mpm import fields as kn
+from mpm.capacity import node_capacity, particle_capacity
 from mpm.kernels import Kernels
 from mpm.material import Material
 from mpm.runtime import Runtime
 from mpm.scene import EdgeLaw, Food, Motion, Numerics, Scene
 from mpm.shapes import Shape
-from mpm.solver import Simulation
+from mpm.solver import Simulation, kernels
 from tests.mpm import twins
 from tests.mpm.scenes import PRISM, WEDGE
 
@@ -42,15 +43,15 @@ BRITTLE = Scene(
 @ti.kernel
 def elastic(k: ti.template(), dt: float):
     """The elastic pass alone."""
-    for block in range(k.size[kn.BLOCKS]):
-        k.elastic(block, dt)
+    for block in range(k.size[0, kn.BLOCKS]):
+        k.elastic(0, block, dt)
 
 
 def padded(k, f):
     """Deformation gradients (n, 3, 3) as the fields store them, with room for more particles."""
-    whole = np.zeros((k.F.shape[0] * k.lanes, 3, 3))
+    whole = np.zeros((k.room, 3, 3))
     whole[: len(f)] = f
-    return whole.reshape(-1, k.lanes, 9).swapaxes(1, 2)
+    return whole.reshape(1, -1, k.lanes, 9).swapaxes(2, 3)
 
 
 @pytest.fixture(scope="module")
@@ -61,16 +62,16 @@ def strained():
     sim = Simulation(scene, Runtime(threads=1))
     sim._load(viscous)
     k, rng = sim.k, np.random.default_rng(0)
-    f = np.eye(3) + rng.uniform(-0.2, 0.2, (k.n, 3, 3)) * rng.uniform(0, 1, (k.n, 1, 1))
+    f = np.eye(3) + rng.uniform(-0.2, 0.2, (k.n[0], 3, 3)) * rng.uniform(0, 1, (k.n[0], 1, 1))
     f[:5] = np.diag([-0.5, 1.0, 1.0])
-    slope = rng.uniform(-1, 1, (k.n, 3, 3))
+    slope = rng.uniform(-1, 1, (k.n[0], 3, 3))
     k.F.from_numpy(padded(k, f))
     k.set_gradient(slope)
     np.testing.assert_array_equal(k.deformation(), f)
     np.testing.assert_array_equal(k.gradient(), slope)
     dt = 1e-5
     elastic(k, dt)
-    tau = k.tau.to_numpy().transpose(0, 2, 1).reshape(-1, 9)[: k.n]
+    tau = k.tau.to_numpy()[0].transpose(0, 2, 1).reshape(-1, 9)[: k.n[0]]
     return sim, dt, f, slope, tau, k.deformation()
 
 
@@ -78,7 +79,7 @@ def test_stress_of_four_particles_at_once(strained):
     """Deformation gradient, Kirchhoff stress with the viscous part, and the losses are those of the formulas, also where
     some of the four flow: to 1e-9, flowing ones to 1e-6."""
     sim, dt, f, slope, tau, new = strained
-    par, m = sim.k.par.to_numpy(), sim.scene.food.material
+    par, m = sim.k.par.to_numpy()[0], sim.scene.food.material
     flowing = 0
     for p in np.flatnonzero(tau[:, 8] == 0)[::3]:
         want = f[p] + dt * slope[p] @ f[p]
@@ -115,19 +116,19 @@ def test_strain_is_smoothed_wherever_it_can_matter():
     tough = replace(BRITTLE.food.material, yield_stress=np.inf)
     sim = Simulation(replace(BRITTLE, food=Food(BRITTLE.food.shape, tough)), Runtime(threads=1))
     sim._load(tough)
-    k, par = sim.k, sim.k.par.to_numpy()
-    calm = np.random.default_rng(0).uniform(0, 0.9 * par[kn.EPS0], (k.n, 1, 1))
+    k, par = sim.k, sim.k.par.to_numpy()[0]
+    calm = np.random.default_rng(0).uniform(0, 0.9 * par[kn.EPS0], (k.n[0], 1, 1))
     f = (1 + calm) * np.eye(3)
     f[np.linalg.norm(k.of_particles(k.x) - [0.002, 0.004, 0.008], axis=1) < 1.5e-3] += 9.0 * np.eye(
         3
     )  # far beyond what food bears, so that it is felt two cells away
     k.F.from_numpy(padded(k, f))
     k.v.fill(1.0)  # what the grid carried before must be gone
-    k.steps(1, 1, 1, 1e-12, 0.0, 0.0, 0.0, np.zeros((1, kn.N_REPORT)))
+    k.go([(1, 1, 1e-12, 0.0, 0.0, 0.0)])
     x = (k.of_particles(k.x) - sim.origin) / sim.scene.numerics.dx
     base = np.floor(x - 0.5).astype(int)
     strain = np.array([np.linalg.eigvalsh(polar(f, side="left")[1])[-1] - 1 for f in k.deformation()])
-    weight, total = np.zeros(k.nodes), np.zeros(k.nodes)
+    weight, total = np.zeros(sim.nodes), np.zeros(sim.nodes)
     near = [(i, j, m) for i in range(3) for j in range(3) for m in range(3)]
     shape = [np.prod(twins.bspline(base + d - x), axis=1) for d in near]
     for d, w in zip(near, shape, strict=True):
@@ -136,7 +137,7 @@ def test_strain_is_smoothed_wherever_it_can_matter():
     mean = total / np.maximum(weight, 1e-30)
     smooth = sum(w * mean[tuple((base + d).T)] for d, w in zip(near, shape, strict=True))
     hit = smooth > par[kn.EPS0]
-    assert 100 < hit.sum() < 0.2 * k.n
+    assert 100 < hit.sum() < 0.2 * k.n[0]
     ours = k.of_particles(k.strain)
     np.testing.assert_allclose(ours[hit], smooth[hit], rtol=1e-9)
     assert (ours[~hit] <= par[kn.EPS0]).all()
@@ -155,7 +156,7 @@ def test_many_threads_repeat_one(alone, threads):
     """Split among two threads, or as on a GPU (here on the CPU), a cut with flow, friction, damage and both halves gives
     the same force to 1e-9."""
     sim = Simulation(BRITTLE, Runtime(threads=2))
-    sim.k = sim._kernels(threads)
+    sim.k = kernels(sim.kind(threads), sim.serial)
     record = sim.run()
     assert alone.damage[-1] > 0
     assert alone.plastic[-1] > 0
@@ -191,8 +192,8 @@ def test_fields_have_room_for_what_they_hold_and_come_in_few_sizes():
     """Up to 65,536 particles and 96 nodes there are three sizes each; beyond, no more than one step is empty."""
     particles, nodes = range(1, 300_000, 501), range(3, 400)
     for of, sizes, whole, step in (
-        (kn.particle_capacity, particles, 65_536, 65_536),
-        (kn.node_capacity, nodes, 96, 32),
+        (particle_capacity, particles, 65_536, 65_536),
+        (node_capacity, nodes, 96, 32),
     ):
         assert all(of(n) >= n for n in sizes)
         assert len({of(n) for n in sizes if n <= whole}) == 3
@@ -212,7 +213,7 @@ def test_scenes_of_a_class_share_kernels_and_keep_their_force():
     force = one.run().resolved
     assert other.run().resolved.max() > 1.1 * force.max()
     with pytest.raises(RuntimeError, match="another simulation"):
-        one._advance(1, 1, 1e-6, 0.0, 0.0)
+        one.advance((1, 1, 1e-6, 0.0, 0.0, 0.0))
     np.testing.assert_array_equal(one.run().resolved, force)
     tight = (len(one.seeds.x), one.nodes, small.mirrors, len(one.stations))
     one.k = Kernels(*tight, threads=1, nodal=False, press=False, damage=False)
