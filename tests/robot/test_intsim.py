@@ -160,6 +160,29 @@ def test_the_force_of_the_food_is_what_lifts_the_knife():
     assert risen[2] - risen[0] == pytest.approx(2 * (risen[1] - risen[0]), rel=0.05)
 
 
+def test_the_moment_of_the_food_turns_the_knife():
+    """A force at the middle of the edge and a moment about it tilt the knife as the same force does 50 mm along the edge, towards the end where
+    it pushes; to 3 % of the tilt, since the point moves with the edge and the moment does not.
+    """
+    env, tilts, force, off = made(coupled=False), [], 20.0, 0.05
+    for part in (0.0, 0.5, 1.0):  # of the moment by the place of the force
+        env.reset(seed=SEED)
+        joints = env.kinematics.joints(
+            np.array([0.0, 0.0, 0.05, 0.0, 0.0]), env.agent.robot.get_qpos()[0].numpy().astype(float)
+        )[0]
+        env.agent.reset(joints)
+        env._force = np.array([0.0, 0.0, force])
+        env.coupling.torque = np.array([0.0, -(1 - part) * off * force, 0.0])  # raises the end at +x
+        for _ in range(40):
+            env._point = env.pose[:3] + [part * off, 0.0, 0.0]
+            env.step(np.array([*joints[:7], -1.0], np.float32))
+        yaw, tilt = env.pose[3:]
+        tilts.append(float(tilt if np.cos(yaw) > 0 else -tilt))
+    env.close()
+    assert tilts[2] > np.radians(0.05)
+    assert tilts[:2] == pytest.approx([tilts[2]] * 2, rel=0.03)
+
+
 def test_a_criterion_that_is_none_is_an_error():
     """And a background that does not exist."""
     with pytest.raises(CutcalError, match="criterion"):
