@@ -95,6 +95,11 @@ class Fields:
         blocks = -(-room // self.lanes)
         self.batch, self.room, self.slices = batch, blocks * self.lanes, stations
         room, worn, aged = self.room, self.room if damage else 1, self.room if branches else 1
+        # What is double on every device is laid out by itself: beside fields of four bytes Taichi's Vulkan puts it where it may
+        # not begin at a multiple of eight, and then writes the end of its neighbour.
+        self.pose, self.order = ti.field(ti.f64, (batch, N_POSE)), ti.field(ti.f64, (batch, N_ORDER))
+        ti.sync()
+        self.sums, self.state = ti.field(booked, (batch, N_SUMS)), ti.field(booked, (batch, N_STATE))
         self.x, self.v = (vec3.field(shape=(batch, room)) for _ in range(2))
         self.C, self.F = vec4.field(shape=(batch, room, 3)), ti.Vector.field(self.lanes, real, (batch, blocks, 9))
         # Kirchhoff stress (6), viscous and plastic loss, and whether the particle must be done by itself
@@ -128,13 +133,9 @@ class Fields:
         self.floor_top, self.floor_low = (ti.field(real, (batch, stations)) for _ in range(2))
         self.par = ti.field(real, (batch, N_PARAMETERS))
         self.size = ti.field(ti.i32, (batch, N_SIZES))
-        self.pose = ti.field(ti.f64, (batch, N_POSE))
-        self.sums = ti.field(booked, (batch, N_SUMS))
-        self.state = ti.field(booked, (batch, N_STATE))
         self.window = ti.field(
             ti.i32, (batch, 6)
         )  # nodes that particles can reach before it is renewed: first, last + 1
-        self.order = ti.field(ti.f64, (batch, N_ORDER))
         self.left = ti.field(
             ti.i32, batch
         )  # steps that a cut has yet to do before the next row of the report, on a GPU

@@ -121,8 +121,10 @@ class Kernels(Transfer):
         """
         ti.loop_config(serialize=self.alone)
         for q in range(self.loop(cut, EACH)):
-            c, _, mine = self.turn_of(cut, q, EACH)
-            if mine:
+            c, _, _ = self.whose(cut, q, EACH)
+            if ti.static(self.atomic):
+                self.left[c] -= 1
+            if self.on(c):
                 self.drive(c)
         if ti.static(self.cuts):
             ti.loop_config(serialize=self.alone)
@@ -199,9 +201,6 @@ class Kernels(Transfer):
                     self.gather(c, p, thread, dt, w)
         if ti.static(self.damage):
             self.smooth_strain(cut)
-        if ti.static(self.atomic):
-            for c in range(self.batch):
-                self.left[c] -= 1
 
     @ti.func
     def add_threads(self, cut, i, j, k):

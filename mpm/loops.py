@@ -40,12 +40,15 @@ class Loops(Fields):
         return c, r, there
 
     @ti.func
+    def on(self, cut):
+        """Whether a cut takes part in this step of a launch; its count of steps that are left is already that after the step."""
+        return self.left[cut] >= 0 if ti.static(self.atomic) else True
+
+    @ti.func
     def turn_of(self, cut, q, what: ti.template()):
         """The same in a time step, which is only for cuts that have steps left."""
         c, r, there = self.whose(cut, q, what)
-        if ti.static(self.atomic):
-            there = there and self.left[c] > 0
-        return c, r, there
+        return c, r, there and self.on(c)
 
     @ti.func
     def box(self, cut, what: ti.template()):

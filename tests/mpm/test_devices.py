@@ -10,6 +10,7 @@ import pytest
 import taichi as ti
 
 from mpm import runtime
+from mpm.batch import simulate_together
 from mpm.errors import SceneError
 from mpm.record import ForceRecord
 from mpm.runtime import Runtime
@@ -70,3 +71,17 @@ def test_a_device_gives_the_curve_of_the_cpu(arch: str) -> None:
     except SceneError as e:
         pytest.skip(str(e))
     assert record.status == "done" and apart(one, record) < 1e-4 and record.momentum_residual < 1e-4
+
+
+@pytest.mark.gpu
+@pytest.mark.parametrize("arch", ["cuda", "vulkan"])
+def test_a_device_does_many_cuts_in_one_launch(arch: str) -> None:
+    """Three foods side by side have the curves of the CPU, each its own; skipped where the device is not there."""
+    scenes = [SCENE, SCENE.with_material(E=3e6, R=80.0), SCENE.with_material(mu=0.6)]
+    try:
+        records = simulate_together(scenes, runtime=Runtime(arch))
+    except SceneError as e:
+        pytest.skip(str(e))
+    for scene, record in zip(scenes, records, strict=True):
+        one = Simulation(scene, Runtime(threads=1)).run()
+        assert record.status == "done" and apart(one, record) < 1e-4 and record.momentum_residual < 1e-4
