@@ -300,14 +300,15 @@ class Bench:
         return row
 
     def batches(self) -> list[dict[str, Any]]:
-        """Time of several cuts side by side (:mod:`mpm.batch`), in turns, and that of each over the time of one alone."""
-        spent: dict[int, list[float]] = {n: [] for n in BATCHES}
-        for turn in range(self.repeats + 1):  # every size compiles in the first turn, which does not count
-            for n, times in spent.items():
+        """Time of several cuts side by side (:mod:`mpm.batch`), and that of each over the time of one alone."""
+        spent: dict[int, list[float]] = {}
+        for n in BATCHES:
+            spent[n] = []
+            for turn in range(self.repeats + 1):  # every size compiles in its first turn, which does not count
                 began = time.perf_counter()
                 simulate_together([self.scene] * n, runtime=self.runtime)
                 if turn > 0:
-                    times.append(time.perf_counter() - began)
+                    spent[n].append(time.perf_counter() - began)
         least = {n: min(times) for n, times in spent.items()}
         rows = [{"cuts": n, "wall_s": wall, "per_cut": wall / n / least[1]} for n, wall in least.items()]
         self.say(

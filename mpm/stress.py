@@ -248,6 +248,9 @@ class Stress(Edge):
         within two cells of a strain above the threshold may be damaged, and those within four contribute to that. It
         uses the grids of the threads, which are cleared at the start of a step.
         """
+        hot = (
+            1 if ti.static(self.atomic) else ti.cast(self.hot[cut, 3] >= 0, ti.i32)
+        )  # threads that find nothing are not woken
         for q in range(self.loop(cut, HOT)):
             c, r, mine = self.turn_of(cut, q, HOT)
             if mine:
@@ -255,14 +258,14 @@ class Stress(Edge):
                 for k in range(low, high):
                     for s in ti.static(range(self.threads)):
                         self.g[c, s, i, j, k] = ti.Vector.zero(float, 4)
-        for q in range(self.loop(cut, PART)):
+        for q in range(self.loop(cut, PART) * hot):
             c, part, mine = self.turn_of(cut, q, PART)
             first, last, thread = self.share(c, part)
             if mine and first < last and self.hot[c, 3] >= 0:
                 window = self.box(c, ROW)
                 for p in range(first * self.lanes, ti.min(last * self.lanes, self.size[c, COUNT])):
                     self.spread_strain(c, p, thread, window)
-        for q in range(self.loop(cut, PART)):
+        for q in range(self.loop(cut, PART) * hot):
             c, part, mine = self.turn_of(cut, q, PART)
             first, last, _ = self.share(c, part)
             if mine and first < last and self.hot[c, 3] >= 0:
