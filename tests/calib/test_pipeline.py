@@ -34,7 +34,7 @@ from calib.scenes import Sizing, cut_scene, elsewhere, height_range, place, spec
 from calib.trace import Trace
 from calib.verdicts import balances, judge, limits, spent, unbooked
 from calib.workers import DIED, Errand, SceneEvaluator
-from mpm.errors import SimulationError
+from mpm.errors import SceneError, SimulationError
 from mpm.record import ENERGIES, ForceRecord
 from mpm.scene import Scene
 from mpm.seeding import seed
@@ -340,6 +340,20 @@ def test_a_gpu_gets_all_that_is_asked_for_at_a_time() -> None:
         assert pool.sizes == sizes
         assert [e.index for e in found] == list(range(5)) and all(e.ok for e in found)
         assert [e.force[-1] for e in found] == [e.parameters["E"] for e in found] == [0.0, 1.0, 2.0, 3.0, 4.0]
+
+
+@pytest.mark.gpu
+def test_a_device_gets_three_candidates_in_one_launch() -> None:
+    """Each has the peak that a process on the CPU gives it; skipped where there is no such device."""
+    scene = replace(PRISM, motion=replace(PRISM.motion, stroke=1e-3))
+    jobs: Any = [(scene, {}), (scene, {"E": 2e6}), (scene, {"R": 300.0})]
+    with Pool(3, "vulkan") as pool, Pool(2) as cores:
+        try:
+            device = sorted(pool.run(jobs), key=lambda e: e.index)
+        except SceneError as e:
+            pytest.skip(str(e))
+        for one, other in zip(device, sorted(cores.run(jobs), key=lambda e: e.index), strict=True):
+            assert one.ok and one.scalars["peak_N"] == pytest.approx(other.scalars["peak_N"], rel=1e-4)
 
 
 class LastRun(Pool):
