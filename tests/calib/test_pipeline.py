@@ -33,13 +33,14 @@ from calib.provenance import code_key, key_of, versions
 from calib.scenes import Sizing, cut_scene, elsewhere, height_range, place, specimen
 from calib.trace import Trace
 from calib.verdicts import balances, judge, limits, spent, unbooked
-from calib.workers import DIED, Errand, SceneEvaluator
+from calib.workers import DIED, Errand, SceneEvaluator, plain
 from mpm.errors import SceneError, SimulationError
 from mpm.record import ENERGIES, ForceRecord
 from mpm.scene import Scene
 from mpm.seeding import seed
 from mpm.shapes import SHAPE_KINDS
 from tests.calib.cheap import LOG, SECONDS, CheapPool, noted
+from tests.calib.cheap import cut as cheap_cut
 from tests.mpm.scenes import PRISM
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -326,6 +327,19 @@ def test_killed_worker_is_tried_once_more():
     assert one.ok and pool.runs == 2
     (two,) = SceneEvaluator(FlakyPool(deaths=2), None).evaluate([{"E": 1.0}])  # type: ignore[arg-type]
     assert (two.status, two.reason, two.fraction) == ("failed", DIED, 0.0)
+
+
+def test_last_bits_of_a_force_are_not_kept() -> None:
+    """Another build of the solver, whose forces and strokes differ by rounding, gives a search the very same curve; a millionth of the peak
+    is still felt.
+    """
+    record = cheap_cut(PRISM)
+    other = replace(record, edge=record.edge * (1 + 2e-15), stroke=record.stroke * (1 - 2e-16))
+    assert (other.resolved != record.resolved).any() and (other.stroke != record.stroke).any()
+    for key in ("stroke", "force"):
+        np.testing.assert_array_equal(plain(other)[key], plain(record)[key])
+    felt = plain(replace(record, edge=record.edge * (1 + 1e-6)))["force"]
+    assert np.abs(felt - plain(record)["force"]).max() == pytest.approx(1e-6 * record.edge.max(), rel=0.2)
 
 
 def test_a_gpu_gets_all_that_is_asked_for_at_a_time() -> None:
