@@ -248,9 +248,8 @@ class Stress(Edge):
         within two cells of a strain above the threshold may be damaged, and those within four contribute to that. It
         uses the grids of the threads, which are cleared at the start of a step.
         """
-        hot = (
-            1 if ti.static(self.atomic) else ti.cast(self.hot[cut, 3] >= 0, ti.i32)
-        )  # threads that find nothing are not woken
+        # threads that would find nothing are not woken
+        hot = 1 if ti.static(self.atomic) else ti.cast(self.hot[cut, 3] >= 0, ti.i32)
         for q in range(self.loop(cut, HOT)):
             c, r, mine = self.turn_of(cut, q, HOT)
             if mine:
