@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time as clock
-from typing import Any
 
 import numpy as np
 
@@ -66,14 +65,14 @@ class LiveCut:
         self.status, self.time, self.impulse, self.moment = "done", 0.0, np.zeros(3), 0.0
 
     @property
-    def _k(self) -> Any:
-        """Fields and kernels, as long as they are this cut's."""
+    def _held(self) -> Simulation:
+        """The simulation, as long as its fields are this cut's."""
         simulation = self._simulation
         if simulation.serial != running() or simulation.k.user is not simulation:
             raise RuntimeError(
                 "another simulation has taken over the fields of this live cut: follow one to its end before the next is made"
             )
-        return simulation.k
+        return simulation
 
     @property
     def begun(self) -> bool:
@@ -90,7 +89,7 @@ class LiveCut:
     def uncut(self) -> float:
         """Part of the section that the edge has not passed [-]."""
         beside = self._simulation.seeds.beside
-        return float((beside & (self._k.of_particles(self._k.side) == 0)).sum() / beside.sum())
+        return float((beside & (self._held.k.of_particles(self._held.k.side) == 0)).sum() / beside.sum())
 
     @property
     def height(self) -> float:
@@ -176,14 +175,11 @@ class LiveCut:
 
     def pieces(self) -> Topology:
         """Connected pieces of the food now."""
-        found: Topology = self._k.user.topology()
-        return found
+        return self._held.topology()
 
     def look(self) -> Snapshot:
         """The particles now, in the scene's axes."""
-        _ = self._k
-        stroke = self.scene.food.shape.height - self._z
-        return self._simulation.look(self._ledger.time, stroke, self._s)
+        return self._held.look(self._ledger.time, self.scene.food.shape.height - self._z, self._s)
 
     def surface(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The food's surface now: vertices [m] (m, 3) in the scene's axes, triangles (t, 3), and whether each vertex is flesh (m,):
@@ -204,6 +200,6 @@ class LiveCut:
             raise SimulationError(
                 "the live cut has not begun: the edge never came down", reason="no_contact", fraction=0.0
             )
-        _ = self._k
+        _ = self._held  # the pieces are read from its fields
         fraction = min(max(row[0] for row in self._ledger.rows) / self.scene.food.shape.height, 1.0)
         return self._ledger.record(dt=self._dt, fraction=max(fraction, 0.0), wall=self._wall)
