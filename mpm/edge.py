@@ -179,11 +179,11 @@ class Edge(Nodes):
     @ti.func
     def moving(self, cut, a, j, k):
         """Momentum and mass of both fields of a node."""
-        q = self.u[cut, a, j, k]
+        q = self.u[self.shared(cut, a, j, k)]
         out = q[3] * ti.Vector([q[0], q[1], q[2], 1.0])
         if ti.static(self.twins):
             if self.twin(cut, j):
-                other = self.u[cut, a, self.size[cut, SECOND] + j, k]
+                other = self.u[self.shared(cut, a, self.size[cut, SECOND] + j, k)]
                 out += other[3] * ti.Vector([other[0], other[1], other[2], 1.0])
         return out
 
@@ -208,8 +208,8 @@ class Edge(Nodes):
     def give(self, cut, a, j, k, dv):
         """Change the velocity of both fields of a node."""
         for d in ti.static(range(3)):
-            self.u[cut, a, j, k][d] += dv[d]
+            self.u[self.shared(cut, a, j, k)][d] += dv[d]
         if ti.static(self.twins):
             if self.twin(cut, j):
                 for d in ti.static(range(3)):
-                    self.u[cut, a, self.size[cut, SECOND] + j, k][d] += dv[d]
+                    self.u[self.shared(cut, a, self.size[cut, SECOND] + j, k)][d] += dv[d]

@@ -102,7 +102,8 @@ class Fields:
         self.sums, self.state = ti.field(booked, (batch, N_SUMS)), ti.field(booked, (batch, N_STATE))
         self.x, self.v = (vec3.field(shape=(batch, room)) for _ in range(2))
         self.C, self.F = vec4.field(shape=(batch, room, 3)), ti.Vector.field(self.lanes, real, (batch, blocks, 9))
-        # Kirchhoff stress (6), viscous and plastic loss, and whether the particle must be done by itself
+        # Kirchhoff stress (6), viscous and plastic loss, and the trace of the left stretch, negative where the particle must be
+        # done by itself
         self.tau = ti.Vector.field(self.lanes, real, (batch, blocks, 9))
         self.side, self.gap = ti.field(ti.i32, (batch, room)), ti.field(real, (batch, room))
         self.foot = ti.field(real, (batch, room))
@@ -114,12 +115,15 @@ class Fields:
         self.lever = vec4.field(shape=(batch, room, 2))
         self.kappa, self.strain = (ti.field(real, (batch, worn)) for _ in range(2))
         self.stick = vec3.field(shape=(batch, 2, room))  # board, blade
+        # layers: Split.split of the last step, and whether `lever` is to be heeded
         self.tacky, self.layers = (ti.field(ti.i32, (batch, room)) for _ in range(2))
         self.memory = mat3.field(shape=(batch, max(branches, 1), aged))
         self.before = mat3.field(shape=(batch, aged))
         self.share_of, self.relax = (ti.field(real, (batch, max(branches, 1))) for _ in range(2))
-        self.g = vec4.field(shape=(batch, self.threads, nodes[0], deep, nodes[2]))
-        self.u = vec4.field(shape=(batch, nodes[0], deep, nodes[2]))
+        self.stride_y, self.stride_x = nodes[2], deep * nodes[2]  # from a node to the next along y and along x
+        self.grid = nodes[0] * self.stride_x
+        self.all_bits = (1 << (batch * self.threads * self.grid).bit_length()) - 1
+        self.g, self.u = vec4.field(shape=batch * self.threads * self.grid), vec4.field(shape=batch * self.grid)
         self.planes = vec4.field(shape=(batch, self.threads, 16))  # of the nodes of the particle that a thread moves
         self.hot = ti.field(
             ti.i32, (batch, 6)
@@ -186,6 +190,7 @@ class Fields:
             self.v[c, p] = ti.Vector.zero(float, 3)
             self.side[c, p] = 0
             self.tacky[c, p] = 0
+            self.layers[c, p] = 0
             for b in ti.static(range(2)):
                 self.stick[c, b, p] = ti.Vector.zero(float, 3)
             if ti.static(self.branches > 0):
@@ -199,8 +204,9 @@ class Fields:
         for c, b, r in self.F:
             for lane in ti.static(range(self.lanes)):
                 self.F[c, b, r][lane] = 1.0 if r % 4 == 0 else 0.0
-        for c, i, j, k in self.u:  # the edge also looks at nodes that no particle has reached yet
-            self.u[c, i, j, k] = ti.Vector.zero(float, 4)
+                self.tau[c, b, r][lane] = 3.0 if r == 8 else 0.0
+        for q in self.u:  # the edge also looks at nodes that no particle has reached yet
+            self.u[q] = ti.Vector.zero(float, 4)
         for c, p in self.kappa:
             self.kappa[c, p] = 0.0
             self.strain[c, p] = 0.0
@@ -260,12 +266,27 @@ class Fields:
         return self.size[cut, TWIN] <= j < self.size[cut, TWIN_END]
 
     @ti.func
-    def add(self, cut, thread, i, j, k, value):
-        """Add to a node of a thread's own grid; atomically where all threads share one."""
+    def shared(self, grid, i, j, k):
+        """Index of a node in the velocities ``u`` of a cut.
+
+        No index has the bits that are masked. But LLVM then knows that this one and a constant make no negative number,
+        and reaches the 27 nodes of a particle by one register and 27 constants, for which it needs three instructions each
+        otherwise.
+        """
+        return (grid * self.grid + i * self.stride_x + j * self.stride_y + k) & self.all_bits
+
+    @ti.func
+    def own(self, cut, thread, i, j, k):
+        """Index of a node in the momenta and masses ``g`` of a thread's own grid."""
+        return self.shared(cut * self.threads + thread, i, j, k)
+
+    @ti.func
+    def add(self, at, value):
+        """Add to a node of a thread's own grid, given by its :meth:`own`; atomically where all threads share one."""
         if ti.static(self.atomic):
-            self.g[cut, thread, i, j, k] += value
+            self.g[at] += value
         else:
-            self.g[cut, thread, i, j, k] = self.g[cut, thread, i, j, k] + value
+            self.g[at] = self.g[at] + value
 
     @ti.func
     def local(self, cut, q):

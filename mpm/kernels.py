@@ -87,12 +87,12 @@ class Kernels(Transfer):
         i, j, low, high = self.row(cut, r, ROW)
         for k in range(low, high):
             for s in ti.static(range(self.threads)):
-                self.g[cut, s, i, j, k] = ti.Vector.zero(float, 4)
+                self.g[self.own(cut, s, i, j, k)] = ti.Vector.zero(float, 4)
         if ti.static(self.twins):
             if self.twin(cut, j):
                 for k in range(low, high):
                     for s in ti.static(range(self.threads)):
-                        self.g[cut, s, i, self.size[cut, SECOND] + j, k] = ti.Vector.zero(float, 4)
+                        self.g[self.own(cut, s, i, self.size[cut, SECOND] + j, k)] = ti.Vector.zero(float, 4)
 
     @ti.func
     def add_row(self, cut, r):
@@ -146,7 +146,7 @@ class Kernels(Transfer):
                     total += self.scatter_block(c, block, thread, dt, w)
                 for r in ti.static(range(5)):
                     self.sums[c, PLASTIC + r] += total[r]
-        if ti.static(self.threads > 1):
+        if ti.static(self.threads > 1 and self.mx):
             for q in range(self.loop(cut, ROW)):
                 self.add_row(cut, q)
         if ti.static(self.mx):
@@ -205,10 +205,10 @@ class Kernels(Transfer):
     @ti.func
     def add_threads(self, cut, i, j, k):
         """Sum the private grids of all threads at one node."""
-        q = self.g[cut, 0, i, j, k]
+        q = self.g[self.own(cut, 0, i, j, k)]
         for t in ti.static(range(1, self.threads)):
-            q += self.g[cut, t, i, j, k]
-        self.g[cut, 0, i, j, k] = q
+            q += self.g[self.own(cut, t, i, j, k)]
+        self.g[self.own(cut, 0, i, j, k)] = q
 
     @ti.func
     def until_report(self, cut, row):

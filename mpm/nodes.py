@@ -29,12 +29,12 @@ class Nodes(Split):
     @ti.func
     def add_mirrored(self, cut, i, m, j, k):
         """Make node i and its image m across x carry the sum of both."""
-        a, b = self.g[cut, 0, i, j, k], self.g[cut, 0, m, j, k]
+        a, b = self.g[self.own(cut, 0, i, j, k)], self.g[self.own(cut, 0, m, j, k)]
         b[0] = -b[0]
         a += b
-        self.g[cut, 0, i, j, k] = a
+        self.g[self.own(cut, 0, i, j, k)] = a
         a[0] = -a[0]
-        self.g[cut, 0, m, j, k] = a
+        self.g[self.own(cut, 0, m, j, k)] = a
 
     @ti.func
     def fold_x(self, cut, j, k):
@@ -42,9 +42,9 @@ class Nodes(Split):
         for m in ti.static(range(self.i0)):
             self.add_mirrored(cut, self.size[cut, PAIR] - m, m, j, k)
         if self.size[cut, PAIR] == 2 * self.i0:
-            c = 2.0 * self.g[cut, 0, self.i0, j, k]
+            c = 2.0 * self.g[self.own(cut, 0, self.i0, j, k)]
             c[0] = 0.0
-            self.g[cut, 0, self.i0, j, k] = c
+            self.g[self.own(cut, 0, self.i0, j, k)] = c
 
     @ti.func
     def nodal_contact(self, cut, i, j, k, q, u):
@@ -87,26 +87,38 @@ class Nodes(Split):
         return self.grid_axes(cut, u)
 
     @ti.func
+    def scattered(self, cut, i, j, k):
+        """Momentum and mass that all threads have scattered to a node; where x has a mirror they are added up before it."""
+        q = self.g[self.own(cut, 0, i, j, k)]
+        if ti.static(not self.mx):
+            for s in ti.static(range(1, self.threads)):
+                q += self.g[self.own(cut, s, i, j, k)]
+        return q
+
+    @ti.func
     def both(self, cut, i, j, k):
-        """Momentum and mass of the first and the second field at a node, mirror images across y included."""
-        a, b = self.g[cut, 0, i, j, k], ti.Vector.zero(float, 4)
+        """Momentum and mass of the first and the second field at a node, mirror images across y included, and the masses
+        without them."""
+        a, b = self.scattered(cut, i, j, k), ti.Vector.zero(float, 4)
+        masses = ti.Vector([a[3], 0.0])
         if ti.static(self.twins):
             if self.twin(cut, j):
                 second = self.size[cut, SECOND]
-                b = self.g[cut, 0, i, second + j, k]
+                b = self.scattered(cut, i, second + j, k)
+                masses[1] = b[3]
                 if ti.static(self.my):
                     m = 2 * self.size[cut, PLANE] - j
                     if self.twin(cut, m):
                         flip = ti.Vector([1.0, -1.0, 1.0, 1.0])
-                        a += flip * self.g[cut, 0, i, m, k]
+                        a += flip * self.scattered(cut, i, m, k)
                         if j != self.size[cut, PLANE]:
-                            b += flip * self.g[cut, 0, i, second + m, k]
-        return a, b
+                            b += flip * self.scattered(cut, i, second + m, k)
+        return a, b, masses
 
     @ti.func
     def update_node(self, cut, i, j, k, dt):
         """Momentum to velocity at a node, for the food on its own side and for the severed food of the other side."""
-        a, b = self.both(cut, i, j, k)
+        a, b, masses = self.both(cut, i, j, k)
         fall = ti.Vector([0.0, 0.0, -self.par[cut, GRAVITY] * dt])
         va, vb = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
         if a[3] > 0:
@@ -120,8 +132,8 @@ class Nodes(Split):
             if self.twin(cut, j):
                 # velocity of all that shares the field, mass of what was scattered here
                 at = self.size[cut, SECOND] + j
-                self.u[cut, i, at, k] = ti.Vector([vb[0], vb[1], vb[2], self.g[cut, 0, i, at, k][3]])
-        self.u[cut, i, j, k] = ti.Vector([va[0], va[1], va[2], self.g[cut, 0, i, j, k][3]])
+                self.u[self.shared(cut, i, at, k)] = ti.Vector([vb[0], vb[1], vb[2], masses[1]])
+        self.u[self.shared(cut, i, j, k)] = ti.Vector([va[0], va[1], va[2], masses[0]])
 
     @ti.func
     def keep_apart(self, cut, i, j, k, a, b, va, vb):

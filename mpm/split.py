@@ -5,6 +5,8 @@ import taichi as ti
 from mpm.fields import DX, FIRST, INV, OZ, STATIONS, ZONE
 from mpm.loops import Loops
 
+WHOLE = 0x3FFFF  # of Split.split where all nodes are shared
+PUSHED = WHOLE + 1  # the bit above it in Fields.layers: the particle has a moment of contact
 CRACK_LEAD = 0.5  # cells by which the split of the nodes lags the crack it makes; see Split.split
 
 
@@ -58,7 +60,7 @@ class Split(Loops):
         Returns:
             Layers, two bits a column in the order of :meth:`layer`; 3 where all nodes are shared.
         """
-        code = 0x3FFFF
+        code = WHOLE
         if ti.static(self.cuts):
             reach = ti.static(2.2 if self.turned else 1.6) * self.par[cut, DX]
             if ti.abs(q[1]) < reach:

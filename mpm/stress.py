@@ -109,11 +109,17 @@ class Stress(Edge):
         xx, yy, zz, yz, xz, xy = product_with_transpose(d0, d1, d2, e0, e1, e2, f0, f1, f2)
         ca, cb, cc, _, _, _ = cofactors(xx, yy, zz, yz, xz, xy)
         first, second = xx + yy + zz, ca + cb + cc
-        x = ti.sqrt(3 * first)
-        x -= halley(x, first, second, j)
-        x -= halley(x, first, second, j)
+        x = ti.abs(self.tau[cut, block, 8])  # of the last step: one iteration finds what has changed since
         change = halley(x, first, second, j)
         x -= change
+        found = ti.abs(change) <= STRETCH_TOLERANCE * x
+        if not found.all():
+            x = ti.sqrt(3 * first)
+            x -= halley(x, first, second, j)
+            x -= halley(x, first, second, j)
+            change = halley(x, first, second, j)
+            x -= change
+            found = ti.abs(change) <= STRETCH_TOLERANCE * x
         vxx, vyy, vzz, vyz, vxz, vxy = stretch_of(x, first, j, xx, yy, zz, yz, xz, xy)
         mu, lam = self.par[cut, MU], self.par[cut, LAM]
         mises2 = mises_squared(xx - vxx, yy - vyy, zz - vzz, yz - vyz, xz - vxz, xy - vxy) * (4 * mu * mu)
@@ -130,6 +136,7 @@ class Stress(Edge):
             h0, h1, h2 = exchange(vxx, vyy, vzz, vyz, vxz, vxy, j, rxx, ryy, rzz, ryz, rxz, rxy, d2, e2, f2)
             d2, e2, f2 = ti.select(flows, h0, d2), ti.select(flows, h1, e2), ti.select(flows, h2, f2)
             vxx, vyy, vzz, vyz, vxz, vxy = rxx, ryy, rzz, ryz, rxz, rxy
+            x = rxx + ryy + rzz
         txx, tyy, tzz, tyz, txz, txy = deviator_stress(vxx, vyy, vzz, vyz, vxz, vxy, mu)
         strain2 = 0.0 * j
         if ti.static(self.damage):
@@ -141,13 +148,14 @@ class Stress(Edge):
         press = lam * j * (j - 1) + bulk
         heat = shear * (dxx * dxx + dyy * dyy + dzz * dzz + 2 * (syz * syz + sxz * sxz + sxy * sxy)) + bulk * swell
         eps0 = self.par[cut, EPS0]
-        odd = (j <= 0) | (change > STRETCH_TOLERANCE * x)
+        unfit = (j <= 0) | (found == 0)
+        odd = unfit
         if ti.static(self.damage):
             odd |= (strain2 > eps0 * eps0) & (eps0 > 0)
             for lane in ti.static(range(self.lanes)):
                 p = block * self.lanes + lane
                 odd[lane] |= (ti.max(self.kappa[cut, p], self.strain[cut, p]) > eps0) & (eps0 > 0)
-        self.tau[cut, block, 8] = ti.cast(odd, float)
+        self.tau[cut, block, 8] = ti.select(unfit, -3.0, ti.select(odd, -x, x))
         for r, new, old in ti.static(
             (
                 (0, d0, a0),
@@ -235,10 +243,10 @@ class Stress(Edge):
         if self.near_hot(cut, base, 4) and self.inside(base, window) > 0:
             f = self.deformation_of(cut, p)
             strain = largest_eigenvalue(left_stretch(left_cauchy_green(f), f.determinant()) - unit())
-            w = self.weights(fx)
+            w, lowest = self.weights(fx), self.own(cut, thread, base[0], base[1], base[2])
             for i, j, k in ti.static(ti.ndrange(3, 3, 3)):
                 wt = w[i][0] * w[j][1] * w[k][2]
-                self.add(cut, thread, base[0] + i, base[1] + j, base[2] + k, ti.Vector([wt * strain, wt, 0.0, 0.0]))
+                self.add(lowest + (i * self.stride_x + j * self.stride_y + k), ti.Vector([wt * strain, wt, 0.0, 0.0]))
 
     @ti.func
     def smooth_strain(self, cut):
@@ -256,7 +264,7 @@ class Stress(Edge):
                 i, j, low, high = self.row(c, r, HOT)
                 for k in range(low, high):
                     for s in ti.static(range(self.threads)):
-                        self.g[c, s, i, j, k] = ti.Vector.zero(float, 4)
+                        self.g[self.own(c, s, i, j, k)] = ti.Vector.zero(float, 4)
         for q in range(self.loop(cut, PART) * hot):
             c, part, mine = self.turn_of(cut, q, PART)
             first, last, thread = self.share(c, part)
@@ -282,7 +290,7 @@ class Stress(Edge):
             for i, j, k in ti.static(ti.ndrange(3, 3, 3)):
                 total = ti.Vector.zero(float, 2)
                 for s in ti.static(range(self.threads)):
-                    q = self.g[cut, s, base[0] + i, base[1] + j, base[2] + k]
+                    q = self.g[self.own(cut, s, base[0] + i, base[1] + j, base[2] + k)]
                     total += ti.Vector([q[0], q[1]])
                 e += w[i][0] * w[j][1] * w[k][2] * total[0] / ti.max(total[1], 1e-30)
             self.strain[cut, p] = e

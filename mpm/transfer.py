@@ -11,6 +11,7 @@ from mpm.fields import (
     SECOND,
     VOL,
 )
+from mpm.split import PUSHED, WHOLE
 from mpm.touch import Touch
 
 
@@ -30,11 +31,11 @@ class Transfer(Touch):
                 self.side[cut, p] = 1 + self.half(cut, p, q[1])
 
     @ti.func
-    def columns(self, cut, base, i, code):
-        """Where the fields of the nodes of a particle are stored along y, (j, k): its own side's or the other one's."""
+    def columns(self, cut, i, code):
+        """Where the fields of the nodes of a particle are stored along y from the lowest on, (j, k): its own side's or the other one's."""
         at, second = ti.Matrix.zero(ti.i32, 3, 3), self.size[cut, SECOND]
         for j, k in ti.static(ti.ndrange(3, 3)):
-            at[j, k] = base[1] + j
+            at[j, k] = j
             if ti.static(self.cuts):
                 at[j, k] += 0 if k < self.layer(code, i, j) else second
         return at
@@ -59,7 +60,7 @@ class Transfer(Touch):
         bulk, loss, tau = self.bulk[cut, p], ti.Vector.zero(float, 4), 0.0 * unit()
         one_by_one = True
         if ti.static(self.branches == 0):
-            one_by_one = self.tau[cut, block, 8][lane] > 0
+            one_by_one = self.tau[cut, block, 8][lane] < 0
         if one_by_one:
             loss, tau = self.stress(cut, p, block, lane, dt)
             for r in ti.static(range(6)):
@@ -78,7 +79,8 @@ class Transfer(Touch):
             ax = pull * ti.Vector([tau[0], tau[5], tau[4], 0.0]) + carry * self.C[cut, p, 0]
             ay = pull * ti.Vector([tau[5], tau[1], tau[3], 0.0]) + carry * self.C[cut, p, 1]
             az = pull * ti.Vector([tau[4], tau[3], tau[2], 0.0]) + carry * self.C[cut, p, 2]
-            if ti.static(not self.nodal):
+            pushed = self.layers[cut, p] & PUSHED
+            if pushed:
                 az += carry * self.lever[cut, p, 0]
                 if ti.static(self.turned):
                     across = self.grid_axes(cut, ti.Vector([0.0, 1.0, 0.0]))
@@ -89,18 +91,42 @@ class Transfer(Touch):
             v = self.v[cut, p]
             corner = m * ti.Vector([v[0], v[1], v[2], 1.0]) - fx[0] * ax - fx[1] * ay - fx[2] * az
             code = self.split(cut, p, base, q, self.half(cut, p, q[1]))
-            self.layers[cut, p] = code
-            at = self.columns(cut, base, 0, code)
-            for i in ti.static(range(3)):
-                if ti.static(self.turned):
-                    at = self.columns(cut, base, i, code)
-                for j in ti.static(range(3)):
+            self.layers[cut, p] = code | pushed
+            lowest = self.own(cut, thread, base[0], base[1], base[2])
+            if code == WHOLE:
+                for i, j in ti.static(ti.ndrange(3, 3)):
                     wij = w[i][0] * w[j][1]
-                    low = wij * (corner + i * ax + j * ay)
-                    rise = wij * az
-                    for k in ti.static(range(3)):
-                        self.add(cut, thread, base[0] + i, at[j, k], base[2] + k, w[k][2] * (low + k * rise))
+                    self.add_column(
+                        lowest + (i * self.stride_x + j * self.stride_y), w, wij * (corner + i * ax + j * ay), wij * az
+                    )
+            else:
+                at = self.columns(cut, 0, code)
+                for i in ti.static(range(3)):
+                    if ti.static(self.turned):
+                        at = self.columns(cut, i, code)
+                    for j in ti.static(range(3)):
+                        wij = w[i][0] * w[j][1]
+                        low = wij * (corner + i * ax + j * ay)
+                        rise = wij * az
+                        for k in ti.static(range(3)):
+                            self.add(
+                                lowest + (i * self.stride_x + k) + at[j, k] * self.stride_y, w[k][2] * (low + k * rise)
+                            )
         return ti.Vector([bulk * loss[0], bulk * loss[1], bulk * loss[2], loss[3], outside])
+
+    @ti.func
+    def add_column(self, at, w, low, rise):
+        """Add to three nodes above each other: all are read before the first is written, so that none waits for another."""
+        a, b, c = w[0][2] * low, w[1][2] * (low + rise), w[2][2] * (low + 2 * rise)
+        if ti.static(self.atomic):
+            self.add(at, a)
+            self.add(at + 1, b)
+            self.add(at + 2, c)
+        else:
+            a += self.g[at]
+            b += self.g[at + 1]
+            c += self.g[at + 2]
+            self.g[at], self.g[at + 1], self.g[at + 2] = a, b, c
 
     @ti.func
     def gather(self, cut, p, thread, dt, window):
@@ -112,18 +138,44 @@ class Transfer(Touch):
             self.move(cut, p, thread, base, fx, dt)
 
     @ti.func
-    def plane(self, cut, i, base, cols, w, d):
-        """Velocity of plane ``i`` of a particle's nodes times their weights across it, and its slopes along y and z."""
+    def plane(self, at, w):
+        """Velocity of the nine nodes of a particle in one plane across x times their weights, and its moments about the
+        lowest node along y and z in cells.
+
+        Args:
+            at: Their indices (j, k).
+            w: Weights of the nodes.
+        """
         whole, py, pz = ti.Vector.zero(float, 4), ti.Vector.zero(float, 4), ti.Vector.zero(float, 4)
         for j in ti.static(range(3)):
-            a = self.u[cut, base[0] + i, cols[j, 0], base[2]]
-            b = self.u[cut, base[0] + i, cols[j, 1], base[2] + 1]
-            c = self.u[cut, base[0] + i, cols[j, 2], base[2] + 2]
-            row = w[0][2] * a + w[1][2] * b + w[2][2] * c
-            whole += w[j][1] * row
-            py += d[j][1] * row
-            pz += w[j][1] * (d[0][2] * a + d[1][2] * b + d[2][2] * c)
+            b, c = w[1][2] * self.u[at[j, 1]], w[2][2] * self.u[at[j, 2]]
+            row = w[j][1] * (w[0][2] * self.u[at[j, 0]] + b + c)
+            whole += row
+            py += j * row
+            pz += w[j][1] * (b + 2 * c)
         return whole, py, pz
+
+    @ti.func
+    def whole_plane(self, lowest):
+        """Indices of the nine nodes above the lowest one in a plane across x."""
+        at = ti.Matrix.zero(ti.i32, 3, 3)
+        for j, k in ti.static(ti.ndrange(3, 3)):
+            at[j, k] = (lowest & self.all_bits) + (j * self.stride_y + k)
+        return at
+
+    @ti.func
+    def split_plane(self, cut, lowest, i, code):
+        """The same where some have the field of the other side."""
+        at = self.columns(cut, i, code)
+        for j, k in ti.static(ti.ndrange(3, 3)):
+            at[j, k] = lowest + at[j, k] * self.stride_y + k
+        return at
+
+    @ti.func
+    def keep_plane(self, cut, thread, i, plane):
+        """Keep what :meth:`plane` gave for plane ``i``."""
+        for r in ti.static(range(3)):
+            self.planes[cut, thread, 3 * r + i] = plane[r]
 
     @ti.func
     def move(self, cut, p, thread, base, fx, dt):
@@ -133,42 +185,41 @@ class Transfer(Touch):
         would let the surface slip through the material without straining it.
         """
         w = self.weights(fx)
-        d = [4 * self.par[cut, INV] * (i - fx) * w[i] for i in ti.static(range(3))]  # weights of the velocity gradient
-        code = self.layers[cut, p]
-        cols = self.columns(cut, base, 0, code)
+        code, lowest = self.layers[cut, p] & WHOLE, self.shared(cut, base[0], base[1], base[2])
         zero = ti.Vector.zero(float, 4)
         u4, cx, cy, cz = zero, zero, zero, zero
         if ti.static(self.atomic):
             for i in ti.static(range(3)):
-                if ti.static(self.turned):
-                    cols = self.columns(cut, base, i, code)
-                whole, py, pz = self.plane(cut, i, base, cols, w, d)
-                u4, cx = u4 + w[i][0] * whole, cx + d[i][0] * whole
+                whole, py, pz = self.plane(self.split_plane(cut, lowest + i * self.stride_x, i, code), w)
+                u4, cx = u4 + w[i][0] * whole, cx + i * w[i][0] * whole
                 cy, cz = cy + w[i][0] * py, cz + w[i][0] * pz
         else:
-            # Where the loop is unrolled LLVM does not find the vectors of four, and the whole step takes 8 % longer. So its end
-            # is one that LLVM cannot know, and what it finds goes through memory.
-            for i in range(ti.min(self.size[cut, COUNT], 3)):
-                if ti.static(self.turned):
-                    cols = self.columns(cut, base, i, code)
-                whole, py, pz = self.plane(cut, i, base, cols, w, d)
-                self.planes[cut, thread, i], self.planes[cut, thread, 3 + i], self.planes[cut, thread, 6 + i] = (
-                    whole,
-                    py,
-                    pz,
-                )
+            # Where the loops are unrolled LLVM does not find the vectors of four, and the whole step takes 8 % longer. So their end
+            # is one that LLVM cannot know, and what they find goes through memory.
+            end = ti.min(self.size[cut, COUNT], 3)
+            if code == WHOLE:
+                for i in range(end):
+                    self.keep_plane(cut, thread, i, self.plane(self.whole_plane(lowest + i * self.stride_x), w))
+            else:
+                for i in range(end):
+                    at = self.split_plane(cut, lowest + i * self.stride_x, i, code)
+                    self.keep_plane(cut, thread, i, self.plane(at, w))
             for i in ti.static(range(3)):
-                whole = self.planes[cut, thread, i]
-                u4, cx = u4 + w[i][0] * whole, cx + d[i][0] * whole
+                whole = w[i][0] * self.planes[cut, thread, i]
+                u4, cx = u4 + whole, cx + i * whole
                 cy += w[i][0] * self.planes[cut, thread, 3 + i]
                 cz += w[i][0] * self.planes[cut, thread, 6 + i]
         u = ti.Vector([u4[0], u4[1], u4[2]])
+        slope = 4 * self.par[cut, INV]
+        cx, cy, cz = slope * (cx - fx[0] * u4), slope * (cy - fx[1] * u4), slope * (cz - fx[2] * u4)
         self.C[cut, p, 0], self.C[cut, p, 1], self.C[cut, p, 2] = cx, cy, cz
         at = self.x[cut, p] + dt * u
         if ti.static(not self.nodal):
             if self.may_touch(cut, p, at):
                 u = self.touch(cut, p, dt, u, at)
-            else:
+                self.layers[cut, p] = code | PUSHED
+            elif self.layers[cut, p] > WHOLE:
                 self.lever[cut, p, 0], self.lever[cut, p, 1] = zero, zero
+                self.layers[cut, p] = code
         self.v[cut, p] = u
         self.x[cut, p] = at

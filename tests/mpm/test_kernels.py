@@ -54,9 +54,12 @@ def padded(k, f):
     return whole.reshape(1, -1, k.lanes, 9).swapaxes(2, 3)
 
 
-@pytest.fixture(scope="module")
-def strained():
-    """A prism whose particles have random strains up to 20 %, a few of them inverted; its tables before and after."""
+@pytest.fixture(scope="module", params=["at rest", "the last step", "nonsense"])
+def strained(request):
+    """A prism whose particles have random strains up to 20 %, a few of them inverted; its tables before and after.
+
+    The search for the stretch starts from that at rest, from the right one before the step, or from nonsense.
+    """
     viscous = replace(PRISM.food.material, loss_factor=0.1)
     scene = replace(PRISM, food=Food(PRISM.food.shape, viscous))
     sim = Simulation(scene, Runtime(threads=1))
@@ -66,6 +69,13 @@ def strained():
     f[:5] = np.diag([-0.5, 1.0, 1.0])
     slope = rng.uniform(-1, 1, (k.n[0], 3, 3))
     k.F.from_numpy(padded(k, f))
+    if request.param != "at rest":
+        starts = np.array([np.trace(polar(each, side="left")[1]) for each in f])
+        if request.param == "nonsense":
+            starts = rng.choice([0.0, np.nan, np.inf, 1e9, 1.0, -7.0], len(f))
+        table = k.tau.to_numpy()
+        table[0, :, 8].ravel()[: len(f)] = starts
+        k.tau.from_numpy(table)
     k.set_gradient(slope)
     np.testing.assert_array_equal(k.deformation(), f)
     np.testing.assert_array_equal(k.gradient(), slope)
@@ -81,7 +91,7 @@ def test_stress_of_four_particles_at_once(strained):
     sim, dt, f, slope, tau, new = strained
     par, m = sim.k.par.to_numpy()[0], sim.scene.food.material
     flowing = 0
-    for p in np.flatnonzero(tau[:, 8] == 0)[::3]:
+    for p in np.flatnonzero(tau[:, 8] > 0)[::3]:
         want = f[p] + dt * slope[p] @ f[p]
         rate = (slope[p] + slope[p].T) / 2
         swell, j = np.trace(rate) * np.eye(3), np.linalg.det(want)
@@ -106,7 +116,8 @@ def test_inverted_particles_are_left_to_be_done_one_by_one(strained):
     _, dt, f, slope, tau, new = strained
     beyond = np.linalg.det(f + dt * slope @ f) <= 0
     assert beyond.sum() == 5
-    np.testing.assert_array_equal(tau[:, 8] > 0, beyond)
+    np.testing.assert_array_equal(tau[:, 8] < 0, beyond)
+    assert np.all(tau[~beyond, 8] > 0)
     np.testing.assert_array_equal(new[beyond], f[beyond])
 
 
