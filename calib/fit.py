@@ -132,8 +132,9 @@ def _afresh(search: Search, evaluator: Evaluator, coarse: Evaluator | None) -> s
     """Search once more from another design, with nothing of what a stalled search has learnt, for what is left of its budget; the runs
     of both are then the search's.
 
-    That is where the right material would more likely than not have left a smaller chi-square, and the budget holds a search. Of 21
-    made-up cuts two had stalled at two to four times the chi-square that other seeds found.
+    That is where the right material would more likely than not have left a smaller chi-square, the budget holds a search, and the first
+    has not already looked elsewhere for long in vain. Of 21 made-up cuts two had stalled at two to four times the chi-square that
+    other seeds found.
 
     Returns:
         How the better of the two ended.
@@ -141,7 +142,7 @@ def _afresh(search: Search, evaluator: Evaluator, coarse: Evaluator | None) -> s
     goal, options = search.objective, search.options
     least = options.least(len(goal.parameters))
     rest = options.budget - search.spent
-    if rest < least or search.best.misfit <= chi2.median(goal.effective_rows):
+    if rest < least or search.idle or search.best.misfit <= chi2.median(goal.effective_rows):
         return "stalled"
     first, told = search.best, onward(search.progress, search.trials, search.best, options)
     other = Search(goal, evaluator, coarse, replace(options, budget=rest, seed=options.seed + AFRESH), told)

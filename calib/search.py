@@ -14,7 +14,7 @@
 4. When neither the process nor the runs give a gain worth its noise: if the curve is still not explained
    (chi-square above its 99 % quantile), strides along each parameter to both ends of its prior range (one
    that is not felt here, such as a yield stress that nothing reaches, may be felt there), after those another design or more,
-   and rounds whose fine runs are made only where the coarse ones promise a gain;
+   and rounds whose fine runs are made only where the coarse ones promise a gain, until nothing was gained for long;
    else, without a coarse evaluator, differences about the best point, and again 3 if that brings or promises a gain; with one
    the profiles step along each parameter anyway (of ten cuts one had gone on after such differences, from a chi-square of 29.9
    to 28.6).  The Jacobian there is that of the process, in which the noise of single runs is averaged out; plain differences of
@@ -52,8 +52,7 @@ LATTICE = 1e-3
 RADIUS = 1.0
 #: A promising point elsewhere must be this far from the one nearby [coordinate units].
 ELSEWHERE = 0.2
-#: Weight of not knowing the curve in the expected chi-square: 1 is the expectation; less elsewhere, for the
-#: sake of basins that are unexplored but promising.
+#: Weight of not knowing the curve in the expected chi-square: 1 is the expectation; less elsewhere, for the sake of promising basins.
 CAUTION_NEAR, CAUTION_FAR = 1.0, 0.3
 #: The same with which a second fine run beside the most promising one is chosen: nearly the process's word.
 CAUTION_BOLD = 0.1
@@ -81,8 +80,10 @@ DESIGNS = 3
 #: The same where the best curve is off by more than twice its tolerance (the chi-square exceeds so many times the number of
 #: independent data): no model's error explains that, and what is left of the budget is spent on looking elsewhere.
 MORE_DESIGNS, FAR_OFF = 12, 4.0
-#: Part of the budget that the coarse evaluator may spend on the screening: 60 runs of the default budget.  On
-#: two synthetic and two real cuts it ended by itself after 32 to 50.
+#: Spent without a gain worth a round [fine simulations], after which a search whose curve is not explained, but not far off, ends: what
+#: one that explains its curve takes in all (27.5 in 16 synthetic cuts).  For a real potato all that followed 34 brought nothing.
+IDLE = 25.0
+#: Part of the budget that the coarse evaluator may spend on the screening: 60 runs of the default budget.  Real cuts took 32 to 50.
 SCREENING = 0.15
 #: Largest joint scaling of the design's materials, as a logarithm: a factor 20 either way.
 LARGEST_SCALE = 3.0
@@ -113,6 +114,7 @@ class Search:
         self.strode: list[FloatArray] = []
         self.screening = False
         self.luck = 0.0
+        self.level, self.gained = math.inf, 0.0
         low, high = self.parameters.box
         sobol = qmc.Sobol(len(low), scramble=True, seed=options.seed)
         count = MORE_DESIGNS * options.design
@@ -134,6 +136,12 @@ class Search:
     def spent(self) -> float:
         """Budget spent [fine simulations]."""
         return self.options.cost(self.trials)
+
+    @property
+    def idle(self) -> bool:
+        """Whether the curve is not explained, by no more than a model's error may, and nothing has been gained for long."""
+        off = not self.screening and self.enough < self.best.misfit <= FAR_OFF * self.objective.effective_rows
+        return off and self.spent - self.gained >= IDLE
 
     @property
     def scouting(self) -> float:
@@ -166,6 +174,8 @@ class Search:
             patience = 0.5
             if status == "budget":
                 return status
+            if self.idle:
+                return "stalled"
             unmet = best.misfit > self.enough
             if unmet and self._strides():
                 continue
@@ -270,7 +280,7 @@ class Search:
         round is run on fine cells, also far from the best point.
         """
         calm = stalled = 0
-        while self._room() > 0:
+        while self._room() > 0 and not self.idle:
             before, worth, process = self.best.misfit, self.worth, self.process()
             near = _near(process)
             promise, far = _promise(process, near), self._far(process)
@@ -295,7 +305,7 @@ class Search:
             calm = 0 if gained or promise >= worth else calm + 1
             if calm >= patience * CALM_ROUNDS or stalled >= patience * STALLED_ROUNDS:
                 return "converged" if calm >= patience * CALM_ROUNDS else "stalled"
-        return "budget"
+        return "stalled" if self.idle else "budget"
 
     def _beside(self, process: Surrogate, near: FloatArray) -> list[FloatArray]:
         """Points for a second fine run: of least chi-square if the process is believed, and a probe where that is the same."""
@@ -353,6 +363,8 @@ class Search:
             order.append(evaluation.index)
             self._report(stage)
         self.trials[first:] = [self.trials[first + i] for i in np.argsort(order)]
+        if not self.screening and self.finished and self.level - self.best.misfit >= self.worth:
+            self.level, self.gained = self.best.misfit, self.spent
 
     def _simulate(self, batch: list[dict[str, float]], coarse: bool) -> Iterator[Evaluation]:
         evaluator = self.coarse if coarse and self.coarse is not None else self.fine

@@ -254,6 +254,28 @@ def test_a_curve_that_nothing_follows_is_not_polished(monkeypatch: pytest.Monkey
         assert cost < longer
 
 
+@pytest.mark.parametrize(("size", "given_up"), [(2.0, True), (4.0, False)])
+def test_a_search_without_gain_ends(size: float, given_up: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What no material explains is given up when as much as a whole search takes has brought nothing, unless it is far off; and is not begun
+    afresh then.
+    """
+    plain = goal(TRUTHS[0])
+    objective = Objective(replace(plain.target, curve=plain.target.curve + size * np.sin(GRID / 0.0025)), FIVE)
+    options = FitOptions(seed=1)
+
+    def ends() -> tuple[FitResult, float]:
+        fake = Fake()
+        result = calibrate(objective, fake, coarse=fake, options=options)
+        return result, options.cost(result.history)
+
+    long, longer = ends()
+    monkeypatch.setattr(search, "IDLE", 8.0)
+    short, cost = ends()
+    assert (objective.effective_rows < long.best.misfit < FAR_OFF * objective.effective_rows) is given_up
+    assert (cost < longer) is given_up and (short.status == "stalled") is given_up
+    assert short.best.misfit - long.best.misfit < 3.84 * short.best.misfit / objective.effective_rows
+
+
 def test_single_linear_parameter() -> None:
     """One parameter that is no stress (no scaling, one dimension) is found to the lattice without noise."""
     alone = ParameterSet((FIVE["mu"],))
