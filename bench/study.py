@@ -53,9 +53,10 @@ BLOCK = Scene(
 TEXTBOOK_STEPS = 10
 PEER_FLOOR = 4  # node that holds the block in a peer
 # What a particle step has to move to and from memory in a scene that no cache holds, in numbers of eight bytes: to the
-# grid F twice, C, stress, x, v, two indices (45); back x twice, v, C, two indices, height of contact, two stretches (29);
+# grid F twice, C, stress, the last stretch, x, v, two indices (46); back x twice, v, C, two indices, height of contact,
+# two stretches (29);
 # the nodes, each for eight particles, cleared, added to, turned to velocities and read (3).
-WORDS = 45 + 29 + 3
+WORDS = 46 + 29 + 3
 PARTS = 8  # of a cut that are timed by themselves
 BATCHES = (1, 2, 4, 8)  # cuts side by side
 COPY_WORDS = 1 << 23  # numbers that a thread copies to measure the bandwidth: 64 MiB

@@ -99,7 +99,7 @@ class Transfer(Touch):
                     self.add_column(
                         lowest + (i * self.stride_x + j * self.stride_y), w, wij * (corner + i * ax + j * ay), wij * az
                     )
-            else:
+            else:  # node by node, in another order than above: else LLVM makes one path of the two, with an address for each node
                 at = self.columns(cut, 0, code)
                 for i in ti.static(range(3)):
                     if ti.static(self.turned):
