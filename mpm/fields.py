@@ -41,6 +41,7 @@ N_REPORT = N_SUMS + N_STATE + N_POSE
 MIRROR = 2  # index of the first node plane that is no mirror image across x
 FAR = 1 << 20  # a node that no grid has
 BESIDE = 3  # cells on either side of the cut plane whose nodes may carry both halves
+AT_REST = 3.0  # trace of the stretch of food that is not strained
 REGISTER = 32  # bytes of a register of a CPU: as many particles as fill it have their elastic stress found at once
 CPU_BLOCK = 512  # Taichi runs CPU loops shorter than this on one thread, so one iteration in 512 works for a thread
 
@@ -204,7 +205,7 @@ class Fields:
         for c, b, r in self.F:
             for lane in ti.static(range(self.lanes)):
                 self.F[c, b, r][lane] = 1.0 if r % 4 == 0 else 0.0
-                self.tau[c, b, r][lane] = 3.0 if r == 8 else 0.0
+                self.tau[c, b, r][lane] = AT_REST if r == 8 else 0.0
         for q in self.u:  # the edge also looks at nodes that no particle has reached yet
             self.u[q] = ti.Vector.zero(float, 4)
         for c, p in self.kappa:

@@ -28,7 +28,7 @@ from mpm.constitutive import (
     upper,
 )
 from mpm.edge import Edge
-from mpm.fields import COUNT, EPS0, EPSF, ETA_B, ETA_S, HOT, LAM, MU, PART, ROW, YIELD
+from mpm.fields import AT_REST, COUNT, EPS0, EPSF, ETA_B, ETA_S, HOT, LAM, MU, PART, ROW, YIELD
 
 
 @ti.data_oriented
@@ -155,7 +155,7 @@ class Stress(Edge):
             for lane in ti.static(range(self.lanes)):
                 p = block * self.lanes + lane
                 odd[lane] |= (ti.max(self.kappa[cut, p], self.strain[cut, p]) > eps0) & (eps0 > 0)
-        self.tau[cut, block, 8] = ti.select(unfit, -3.0, ti.select(odd, -x, x))
+        self.tau[cut, block, 8] = ti.select(unfit, -AT_REST, ti.select(odd, -x, x))
         for r, new, old in ti.static(
             (
                 (0, d0, a0),

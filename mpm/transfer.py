@@ -79,54 +79,58 @@ class Transfer(Touch):
             ax = pull * ti.Vector([tau[0], tau[5], tau[4], 0.0]) + carry * self.C[cut, p, 0]
             ay = pull * ti.Vector([tau[5], tau[1], tau[3], 0.0]) + carry * self.C[cut, p, 1]
             az = pull * ti.Vector([tau[4], tau[3], tau[2], 0.0]) + carry * self.C[cut, p, 2]
-            pushed = self.layers[cut, p] & PUSHED
-            if pushed:
-                az += carry * self.lever[cut, p, 0]
-                if ti.static(self.turned):
-                    across = self.grid_axes(cut, ti.Vector([0.0, 1.0, 0.0]))
-                    ax += across[0] * carry * self.lever[cut, p, 1]
-                    ay += across[1] * carry * self.lever[cut, p, 1]
-                else:
-                    ay += carry * self.lever[cut, p, 1]
+            pushed = 0
+            if ti.static(not self.nodal):
+                pushed = self.layers[cut, p] & PUSHED
+                if pushed:
+                    az += carry * self.lever[cut, p, 0]
+                    if ti.static(self.turned):
+                        across = self.grid_axes(cut, ti.Vector([0.0, 1.0, 0.0]))
+                        ax += across[0] * carry * self.lever[cut, p, 1]
+                        ay += across[1] * carry * self.lever[cut, p, 1]
+                    else:
+                        ay += carry * self.lever[cut, p, 1]
             v = self.v[cut, p]
             corner = m * ti.Vector([v[0], v[1], v[2], 1.0]) - fx[0] * ax - fx[1] * ay - fx[2] * az
             code = self.split(cut, p, base, q, self.half(cut, p, q[1]))
             self.layers[cut, p] = code | pushed
             lowest = self.own(cut, thread, base[0], base[1], base[2])
-            if code == WHOLE:
-                for i, j in ti.static(ti.ndrange(3, 3)):
-                    wij = w[i][0] * w[j][1]
-                    self.add_column(
-                        lowest + (i * self.stride_x + j * self.stride_y), w, wij * (corner + i * ax + j * ay), wij * az
-                    )
-            else:  # node by node, in another order than above: else LLVM makes one path of the two, with an address for each node
-                at = self.columns(cut, 0, code)
-                for i in ti.static(range(3)):
-                    if ti.static(self.turned):
-                        at = self.columns(cut, i, code)
-                    for j in ti.static(range(3)):
-                        wij = w[i][0] * w[j][1]
-                        low = wij * (corner + i * ax + j * ay)
-                        rise = wij * az
-                        for k in ti.static(range(3)):
-                            self.add(
-                                lowest + (i * self.stride_x + k) + at[j, k] * self.stride_y, w[k][2] * (low + k * rise)
-                            )
+            if ti.static(self.atomic):
+                self.add_split(cut, lowest, code, w, corner, ax, ay, az)
+            elif code == WHOLE:
+                self.add_whole(lowest, w, corner, ax, ay, az)
+            else:
+                self.add_split(cut, lowest, code, w, corner, ax, ay, az)
         return ti.Vector([bulk * loss[0], bulk * loss[1], bulk * loss[2], loss[3], outside])
 
     @ti.func
-    def add_column(self, at, w, low, rise):
-        """Add to three nodes above each other: all are read before the first is written, so that none waits for another."""
-        a, b, c = w[0][2] * low, w[1][2] * (low + rise), w[2][2] * (low + 2 * rise)
-        if ti.static(self.atomic):
-            self.add(at, a)
-            self.add(at + 1, b)
-            self.add(at + 2, c)
-        else:
-            a += self.g[at]
+    def add_whole(self, lowest, w, corner, ax, ay, az):
+        """Add a particle that sees no cut to its 27 nodes: of three above each other all are read before the first is written, so that
+        none waits for another."""
+        for i, j in ti.static(ti.ndrange(3, 3)):
+            wij, at = w[i][0] * w[j][1], lowest + (i * self.stride_x + j * self.stride_y)
+            low, rise = wij * (corner + i * ax + j * ay), wij * az
+            a, b, c = w[0][2] * low + self.g[at], w[1][2] * (low + rise), w[2][2] * (low + 2 * rise)
             b += self.g[at + 1]
             c += self.g[at + 2]
             self.g[at], self.g[at + 1], self.g[at + 2] = a, b, c
+
+    @ti.func
+    def add_split(self, cut, lowest, code, w, corner, ax, ay, az):
+        """The same at the cut, where some nodes have the field of the other side.
+
+        Node by node: in the order of :meth:`add_whole` LLVM makes one path of the two, with an address for each node.
+        """
+        at = self.columns(cut, 0, code)
+        for i in ti.static(range(3)):
+            if ti.static(self.turned):
+                at = self.columns(cut, i, code)
+            for j in ti.static(range(3)):
+                wij = w[i][0] * w[j][1]
+                low, rise = wij * (corner + i * ax + j * ay), wij * az
+                for k in ti.static(range(3)):
+                    node = lowest + (i * self.stride_x + k) + at[j, k] * self.stride_y
+                    self.add(node, w[k][2] * (low + k * rise))
 
     @ti.func
     def gather(self, cut, p, thread, dt, window):
@@ -157,7 +161,7 @@ class Transfer(Touch):
 
     @ti.func
     def whole_plane(self, lowest):
-        """Indices of the nine nodes above the lowest one in a plane across x."""
+        """Indices of the nine nodes above the lowest one in a plane across x; masked as in :meth:`shared`."""
         at = ti.Matrix.zero(ti.i32, 3, 3)
         for j, k in ti.static(ti.ndrange(3, 3)):
             at[j, k] = (lowest & self.all_bits) + (j * self.stride_y + k)
