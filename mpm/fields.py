@@ -116,7 +116,7 @@ class Fields:
         self.lever = vec4.field(shape=(batch, room, 2))
         self.kappa, self.strain = (ti.field(real, (batch, worn)) for _ in range(2))
         self.stick = vec3.field(shape=(batch, 2, room))  # board, blade
-        # layers: Split.split of the last step, and whether `lever` is to be heeded
+        # layers: Split.split of the last step, with split.PUSHED where `lever` is of this step; elsewhere it means nothing
         self.tacky, self.layers = (ti.field(ti.i32, (batch, room)) for _ in range(2))
         self.memory = mat3.field(shape=(batch, max(branches, 1), aged))
         self.before = mat3.field(shape=(batch, aged))
@@ -200,8 +200,6 @@ class Fields:
                     self.memory[c, b, p] = ti.Matrix.zero(float, 3, 3)
         for c, p, d in self.C:
             self.C[c, p, d] = ti.Vector.zero(float, 4)
-        for c, p, d in self.lever:
-            self.lever[c, p, d] = ti.Vector.zero(float, 4)
         for c, b, r in self.F:
             for lane in ti.static(range(self.lanes)):
                 self.F[c, b, r][lane] = 1.0 if r % 4 == 0 else 0.0

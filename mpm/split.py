@@ -6,7 +6,9 @@ from mpm.fields import DX, FIRST, INV, OZ, STATIONS, ZONE
 from mpm.loops import Loops
 
 WHOLE = 0x3FFFF  # of Split.split where all nodes are shared
-PUSHED = WHOLE + 1  # the bit above it in Fields.layers: the particle has a moment of contact
+PUSHED = (
+    WHOLE + 1
+)  # the bit above it in Fields.layers: the particle has a moment of contact, from one transfer back to the next
 CRACK_LEAD = 0.5  # cells by which the split of the nodes lags the crack it makes; see Split.split
 
 

@@ -27,6 +27,7 @@ from mpm.fields import (
     ROW,
     VOL,
 )
+from mpm.split import PUSHED
 from mpm.stress import Stress
 
 MARGIN = 3  # cells by which the window exceeds the particles; it is renewed at every output
@@ -63,9 +64,8 @@ class Survey(Stress):
                 stored += self.memory[cut, b, p].norm_sqr() / (4 * self.par[cut, MU] * self.share_of[cut, b])
             dev = held * dev + stored
         keep = 1.0 - d
-        kinetic = m * (
-            0.5 * u.norm_sqr() - self.lever[cut, p, 0][3] + 0.125 * self.par[cut, DX] * self.par[cut, DX] * spin
-        )
+        gift = self.lever[cut, p, 0][3] if self.layers[cut, p] & PUSHED else 0.0
+        kinetic = m * (0.5 * u.norm_sqr() - gift + 0.125 * self.par[cut, DX] * self.par[cut, DX] * spin)
         energy = self.par[cut, VOL] * self.bulk[cut, p] * (keep * dev + (keep if j > 1 else 1.0) * vol)
         return ti.Vector([m * u[0], m * u[1], m * u[2], kinetic, energy])
 

@@ -79,10 +79,8 @@ class Transfer(Touch):
             ax = pull * ti.Vector([tau[0], tau[5], tau[4], 0.0]) + carry * self.C[cut, p, 0]
             ay = pull * ti.Vector([tau[5], tau[1], tau[3], 0.0]) + carry * self.C[cut, p, 1]
             az = pull * ti.Vector([tau[4], tau[3], tau[2], 0.0]) + carry * self.C[cut, p, 2]
-            pushed = 0
             if ti.static(not self.nodal):
-                pushed = self.layers[cut, p] & PUSHED
-                if pushed:
+                if self.layers[cut, p] & PUSHED:
                     az += carry * self.lever[cut, p, 0]
                     if ti.static(self.turned):
                         across = self.grid_axes(cut, ti.Vector([0.0, 1.0, 0.0]))
@@ -93,7 +91,7 @@ class Transfer(Touch):
             v = self.v[cut, p]
             corner = m * ti.Vector([v[0], v[1], v[2], 1.0]) - fx[0] * ax - fx[1] * ay - fx[2] * az
             code = self.split(cut, p, base, q, self.half(cut, p, q[1]))
-            self.layers[cut, p] = code | pushed
+            self.layers[cut, p] = code
             lowest = self.own(cut, thread, base[0], base[1], base[2])
             if ti.static(self.atomic):
                 self.add_split(cut, lowest, code, w, corner, ax, ay, az)
@@ -189,7 +187,7 @@ class Transfer(Touch):
         would let the surface slip through the material without straining it.
         """
         w = self.weights(fx)
-        code, lowest = self.layers[cut, p] & WHOLE, self.shared(cut, base[0], base[1], base[2])
+        code, lowest = self.layers[cut, p], self.shared(cut, base[0], base[1], base[2])
         zero = ti.Vector.zero(float, 4)
         u4, cx, cy, cz = zero, zero, zero, zero
         if ti.static(self.atomic):
@@ -222,8 +220,5 @@ class Transfer(Touch):
             if self.may_touch(cut, p, at):
                 u = self.touch(cut, p, dt, u, at)
                 self.layers[cut, p] = code | PUSHED
-            elif self.layers[cut, p] > WHOLE:
-                self.lever[cut, p, 0], self.lever[cut, p, 1] = zero, zero
-                self.layers[cut, p] = code
         self.v[cut, p] = u
         self.x[cut, p] = at

@@ -270,7 +270,10 @@ def test_a_search_without_gain_ends(size: float, given_up: bool, monkeypatch: py
 
     long, longer = ends()
     monkeypatch.setattr(search, "IDLE", 8.0)
+    whole, begun = Search.run, []
+    monkeypatch.setattr(Search, "run", lambda self: begun.append(self) or whole(self))
     short, cost = ends()
+    assert len(begun) == 1 or not given_up
     assert (objective.effective_rows < long.best.misfit < FAR_OFF * objective.effective_rows) is given_up
     assert (cost < longer) is given_up and (short.status == "stalled") is given_up
     assert short.best.misfit - long.best.misfit < 3.84 * short.best.misfit / objective.effective_rows

@@ -15,6 +15,7 @@ from mpm.runtime import Runtime
 from mpm.scene import EdgeLaw, Food, Motion, Numerics, Scene
 from mpm.shapes import Shape
 from mpm.solver import Simulation, kernels
+from mpm.split import WHOLE
 from tests.mpm import twins
 from tests.mpm.scenes import PRISM, WEDGE
 
@@ -247,3 +248,23 @@ def test_food_without_resistance_is_cut():
     record = Simulation(replace(scene, motion=replace(PRISM.motion, stroke=6e-3)), Runtime(threads=1)).run()
     assert record.status == "done"
     assert np.abs(record.edge).max() < 1e-9
+
+
+@pytest.mark.parametrize(("where", "value", "same"), [(0, np.nan, True), (1, 0.0, False)], ids=["elsewhere", "there"])
+def test_a_moment_of_contact_is_read_where_there_is_one(where, value, same, monkeypatch):
+    """Nonsense in the moments of particles that touch nothing changes no digit of forces and energies; those that there are count."""
+    sim = Simulation(replace(PRISM, knife=WEDGE, motion=replace(PRISM.motion, stroke=3e-3)), Runtime(threads=1))
+    plain, advance, touched = sim.run(), sim.advance, []
+
+    def spoil(order):
+        out = advance(order)
+        lever, has = sim.k.lever.to_numpy(), sim.k.layers.to_numpy() > WHOLE
+        lever[has == where] = value
+        sim.k.lever.from_numpy(lever)
+        touched.append(has[0, : sim.k.n[0]].mean())
+        return out
+
+    monkeypatch.setattr(sim, "advance", spoil)
+    spoilt = sim.run()
+    assert len(touched) > 3 and 0 < min(touched) and max(touched) < 0.9
+    assert (np.array_equal(spoilt.face, plain.face) and np.array_equal(spoilt.kinetic, plain.kinetic)) is same
