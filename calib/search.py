@@ -81,7 +81,7 @@ DESIGNS = 3
 #: independent data): no model's error explains that, and what is left of the budget is spent on looking elsewhere.
 MORE_DESIGNS, FAR_OFF = 12, 4.0
 #: Spent without a gain worth a round [fine simulations], after which a search whose curve is not explained, but not far off, ends: what
-#: about what one that explains its curve takes in all (27.5 in 16 synthetic cuts).  For a real potato all that followed 34 brought nothing.
+#: one that explains its curve takes in all, nearly (27.5 in 16 synthetic cuts).  For a real potato all that followed 34 brought nothing.
 IDLE = 25.0
 #: Part of the budget that the coarse evaluator may spend on the screening: 60 runs of the default budget.  Real cuts took 32 to 50.
 SCREENING = 0.15

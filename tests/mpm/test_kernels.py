@@ -176,6 +176,25 @@ def test_many_threads_repeat_one(alone, threads):
     np.testing.assert_allclose(record.damage[-1], alone.damage[-1], rtol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("shift", "mirrors"),
+    [((0.0, 0.0, 0.0), (True, True)), ((0.25, 0.0, 0.0), (False, True)), ((0.0, 0.25, 0.0), (True, False))],
+    ids=["both mirrors", "across y", "across x"],
+)
+def test_two_threads_repeat_one_beside_mirrors(shift, mirrors):
+    """What two threads scatter is summed where the mirrors want it: the force of one thread, to 1e-9."""
+    scene = replace(PRISM, knife=WEDGE, motion=replace(PRISM.motion, stroke=3e-3))
+    scene = replace(scene, numerics=replace(scene.numerics, mirror=True, grid_shift=shift))
+    assert scene.mirrors == mirrors
+    one = Simulation(scene, Runtime(threads=1)).run()
+    sim = Simulation(scene, Runtime(threads=2))
+    sim.k = kernels(sim.kind(2), sim.serial)
+    assert sim.k.threads == 2
+    two = sim.run()
+    for part in ("edge", "face", "board"):
+        np.testing.assert_allclose(getattr(two, part), getattr(one, part), atol=1e-9 * one.resolved.max())
+
+
 @pytest.mark.slow
 def test_a_simulation_outlives_a_restart_of_taichi():
     """Another precision starts Taichi anew, and every field is gone; a simulation made before runs again, and alike."""
