@@ -74,6 +74,13 @@ class Variant:
     physics: bool = False
 
 
+def _clocked(pool: Pool, jobs: Sequence[tuple[Scene, dict[str, Any]]]) -> float:
+    """Time that workers take for some cuts [s]."""
+    began = time.perf_counter()
+    list(pool.run(jobs))
+    return time.perf_counter() - began
+
+
 class Pace:
     """Rate of a simulation; each part of its cut counts with the least time of its turns.
 
@@ -280,23 +287,29 @@ class Bench:
         """What a calibration gains from a process for each core: the same cuts in one process and in several, in turns."""
         count = self.runtime.cpu_threads
         spent: dict[int, list[float]] = {1: [], count: []}
+        afresh: list[float] = []
+        jobs: list[tuple[Scene, dict[str, Any]]] = [(self.scene, {})]
         with ExitStack() as stack:
             pools = {n: stack.enter_context(Pool(n, self.runtime.arch)) for n in spent}
             for turn in range(self.repeats + 1):  # every process compiles in the first turn, which does not count
                 for n, pool in pools.items():
-                    began = time.perf_counter()
-                    list(pool.run([(self.scene, {})] * (2 * count)))
+                    took = _clocked(pool, jobs * (2 * count))
                     if turn > 0:
-                        spent[n].append(time.perf_counter() - began)
+                        spent[n].append(took)
+            for _ in range(self.repeats):  # what it compiled is kept: a further process has only to start
+                pools[1].renew()
+                began = _clocked(pools[1], jobs)
+                afresh.append(began - _clocked(pools[1], jobs))
         done = 2 * count * self.record.particles * self.record.steps
         row = {
             "processes": count,
             "speed_up": min(spent[1]) / min(spent[count]),
             "cut_Mps": done / min(spent[count]) / 1e6,
+            "start_up_s": min(afresh),
         }
         self.say(
             f"{count} processes: {row['speed_up']:.2f} times as many cuts as one, {row['cut_Mps']:.2f} million particle "
-            "steps a second"
+            f"steps a second; a further process starts in {row['start_up_s']:.2f} s"
         )
         return row
 

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import connection, get_context, parent_process
+from multiprocessing import connection, get_all_start_methods, get_context, parent_process
 from typing import Any
 
 from calib.workers import Errand, Result, Workers
@@ -27,6 +27,15 @@ def _follow(parent: int) -> None:
     """End this process as soon as the main one has ended, were it killed: nobody waits for results any more."""
     connection.wait([parent])
     os._exit(1)
+
+
+def _context() -> Any:
+    """How processes start: as copies of one that has imported what all need and done nothing else, where the system can copy one."""
+    if "forkserver" not in get_all_start_methods():
+        return get_context("spawn")
+    context = get_context("forkserver")
+    context.set_forkserver_preload(["calib.workers", "mpm.solver", "mpm.batch"])
+    return context
 
 
 class Pool(Workers):
@@ -54,7 +63,7 @@ class Pool(Workers):
         return self.workers // self.together
 
     def _start(self) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(self.processes, mp_context=get_context("spawn"), initializer=_begin)
+        return ProcessPoolExecutor(self.processes, mp_context=_context(), initializer=_begin)
 
     def close(self) -> None:
         """End the processes at once; runs that have not finished are lost."""

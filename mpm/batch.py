@@ -9,7 +9,7 @@ from mpm.course import REST, Course
 from mpm.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import Scene
-from mpm.solver import Simulation, kernels, load
+from mpm.solver import Simulation, kernels
 
 
 def simulate_together(scenes: Sequence[Scene], *, runtime: Runtime | None = None) -> list[ForceRecord]:
@@ -41,7 +41,7 @@ def _run(cuts: Sequence[Simulation]) -> list[ForceRecord]:
     for place, cut in enumerate(cuts):
         cut.k, cut.place = k, place
     k.user = cuts
-    load(k, [(cut, cut.scene.food.material) for cut in cuts])
+    k.begin([cut.contents(cut.scene.food.material) for cut in cuts])
     courses = [Course(cut, cut.scene) for cut in cuts]
     while any(orders := [course.order() for course in courses]):
         reports = k.go([order or REST for order in orders])

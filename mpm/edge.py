@@ -34,7 +34,6 @@ SURFACE_FILL = 5 / 6
 EMPTY_ZONE = 0.15  # filled less than this the zone carries no edge; at the board it is still filled to 0.2
 
 
-@ti.data_oriented
 class Edge(Nodes):
     """The edge's law and its reaction on the grid."""
 

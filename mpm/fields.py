@@ -46,9 +46,9 @@ REGISTER = 32  # bytes of a register of a CPU: as many particles as fill it have
 CPU_BLOCK = 512  # Taichi runs CPU loops shorter than this on one thread, so one iteration in 512 works for a thread
 
 
-@ti.data_oriented
 class Fields:
-    """Particles, grid, edge and tables, with room for a class of scenes; :meth:`lay_out` fits them to some.
+    """Particles, grid, edge and tables, with room for a class of scenes; :meth:`Exchange.begin <mpm.exchange.Exchange.begin>` fits them to
+    some.
 
     They hold one cut or a batch of them side by side, each with scene, material, time step and blade of its own; the first index of every
     field says which. On a GPU one launch does a loop of all cuts, on CPUs a thread does all loops of a cut (:meth:`whose`).
@@ -146,98 +146,6 @@ class Fields:
         )  # steps that a cut has yet to do before the next row of the report, on a GPU
         self.most = ti.field(ti.i32, N_LOOPS)  # most places that a loop goes over in any cut
         ti.sync()  # lays these fields out by themselves; Taichi does not manage those of eight scenes at once
-
-    def lay_out(self, cuts):
-        """Fit the fields to scenes.
-
-        Args:
-            cuts: Of each cut (particles, grid nodes along x, y, z, index of the node plane along y that is nearest to y = 0: the mirror
-                plane across y where there is one, slices along the edge, whether the mirror plane across x lies half-way between the
-                first nodes and their images and not on the first nodes).
-        """
-        sizes = np.zeros((self.batch, N_SIZES), np.int32)
-        for cut, (n, nodes, middle, stations, between) in enumerate(cuts):
-            first = 0 if self.turned else max(middle - BESIDE, 0)
-            end = nodes[1] if self.turned else min(middle + BESIDE + 1, nodes[1])
-            row = [n, -(-n // self.lanes), *nodes, stations, middle, first, end, nodes[1] - first]
-            sizes[cut] = [*row, 2 * self.i0 - between]
-        self.n = sizes[:, COUNT]
-        self.size.from_numpy(sizes)
-        most = np.zeros(N_LOOPS, np.int32)
-        most[[EACH, PART, SLICE]] = 1, sizes[:, BLOCKS].max(), sizes[:, STATIONS].max()
-        self.most.from_numpy(most)
-
-    def fill(self, field, *values):
-        """Set the first entries of a field of particles or slices of each cut, the others to zero."""
-        out = np.zeros((*field.shape, *values[0].shape[1:]), self.real if values[0].dtype.kind == "f" else np.int32)
-        for cut, given in enumerate(values):
-            out[cut, : len(given)] = given
-        field.from_numpy(out)
-
-    def set_table(self, table, *rows):
-        """Set the rows of a table, one for each cut."""
-        out = table.to_numpy()
-        out[: len(rows)] = rows
-        table.from_numpy(out)
-
-    def of_particles(self, field, cut=0):
-        """A field's entries of the particles of a cut as NumPy (n, ...)."""
-        return field.to_numpy()[cut, : self.n[cut]]
-
-    @ti.kernel
-    def reset(self):
-        """Particles at rest and unstrained, nothing cut, nothing booked."""
-        for c, p in self.x:
-            self.v[c, p] = ti.Vector.zero(float, 3)
-            self.side[c, p] = 0
-            self.tacky[c, p] = 0
-            self.layers[c, p] = 0
-            for b in ti.static(range(2)):
-                self.stick[c, b, p] = ti.Vector.zero(float, 3)
-            if ti.static(self.branches > 0):
-                self.before[c, p] = ti.Matrix.zero(float, 3, 3)
-                for b in ti.static(range(self.branches)):
-                    self.memory[c, b, p] = ti.Matrix.zero(float, 3, 3)
-        for c, p, d in self.C:
-            self.C[c, p, d] = ti.Vector.zero(float, 4)
-        for c, b, r in self.F:
-            for lane in ti.static(range(self.lanes)):
-                self.F[c, b, r][lane] = 1.0 if r % 4 == 0 else 0.0
-                self.tau[c, b, r][lane] = AT_REST if r == 8 else 0.0
-        for q in self.u:  # the edge also looks at nodes that no particle has reached yet
-            self.u[q] = ti.Vector.zero(float, 4)
-        for c, p in self.kappa:
-            self.kappa[c, p] = 0.0
-            self.strain[c, p] = 0.0
-        for c, i in self.parted:
-            self.slip[c, i] = ti.Vector.zero(float, 2)
-            self.push[c, i] = ti.Vector.zero(float, 2)
-            self.velocity[c, i] = ti.Vector.zero(float, 3)
-            self.parted[c, i] = 0.0
-            self.drift[c, i] = 0.0
-            self.start[c, i] = 0.0
-            self.touched[c, i] = 0.0
-            self.front[c, i] = 1e3
-        for c, k in self.sums:
-            self.sums[c, k] = 0.0
-
-    def deformation(self, cut=0):
-        """Deformation gradients of a cut (n, 3, 3) as NumPy."""
-        return self.F.to_numpy()[cut].transpose(0, 2, 1).reshape(-1, 3, 3)[: self.n[cut]]
-
-    def stresses(self, cut=0):
-        """Kirchhoff stresses (n, 6) [Pa] of the last step of a cut as NumPy: xx, yy, zz, yz, xz, xy."""
-        return self.tau.to_numpy()[cut, :, :6].transpose(0, 2, 1).reshape(-1, 6)[: self.n[cut]]
-
-    def gradient(self, cut=0):
-        """Velocity gradients of a cut (n, 3, 3) [1/s] as NumPy."""
-        return self.C.to_numpy()[cut, : self.n[cut], :, :3].transpose(0, 2, 1)
-
-    def set_gradient(self, values):
-        """Set the velocity gradients of the first cut from (n, 3, 3) [1/s]."""
-        c = self.C.to_numpy()
-        c[0, : self.n[0], :, :3] = np.transpose(values, (0, 2, 1))
-        self.C.from_numpy(c)
 
     @ti.func
     def deformation_of(self, cut, p):

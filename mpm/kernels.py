@@ -3,6 +3,7 @@
 import numpy as np
 import taichi as ti
 
+from mpm.exchange import ROWS, TABLES
 from mpm.fields import (
     ALONG,
     ARM_C,
@@ -40,8 +41,6 @@ from mpm.fields import (
     Z,
 )
 from mpm.transfer import Transfer
-
-TABLE = ti.types.ndarray(dtype=ti.f64, ndim=3)
 
 
 @ti.data_oriented
@@ -228,9 +227,16 @@ class Kernels(Transfer):
                     self.advance(cut)
                 self.report(cut, r, out)
 
+    @ti.func
+    def listen(self, orders: ti.template()):
+        """Take orders."""
+        for c, k in self.order:
+            self.order[c, k] = orders[c, k]
+
     @ti.kernel
-    def steps(self, out: TABLE):
+    def steps(self, orders: ROWS, out: TABLES):
         """All time steps that are ordered without leaving the kernel, one thread a cut, with a row of the report after every so many."""
+        self.listen(orders)
         if ti.static(self.batch == 1):
             self.follow_orders(0, out)
         else:
@@ -244,15 +250,16 @@ class Kernels(Transfer):
         self.advance(0)
 
     @ti.kernel
-    def surround(self, row: int):
+    def surround(self, orders: ROWS, row: int):
         """Renew the window, before the steps that lead to a row of the report."""
+        self.listen(orders)
         self.look_around(0)
         if ti.static(self.atomic):
             for c in range(self.batch):
                 self.left[c] = self.until_report(c, row)
 
     @ti.kernel
-    def write(self, out: TABLE):
+    def write(self, out: TABLES):
         """One row of the report."""
         self.report(0, 0, out)
 
@@ -269,15 +276,14 @@ class Kernels(Transfer):
         table = np.zeros((self.batch, N_ORDER))
         table[:, EVERY] = 1
         table[: len(orders)] = orders
-        self.order.from_numpy(table)
         counts, every = table[:, STEPS].astype(int), table[:, EVERY].astype(int)
         rows = int((-(-counts // every)).max())
         out = np.zeros((self.batch, rows, N_REPORT))
         if self.threads == 1 and not self.atomic:
-            self.steps(out)
+            self.steps(table, out)
             return out
         for r in range(rows):
-            self.surround(r)
+            self.surround(table, r)
             for _ in range(np.clip(counts - r * every, 0, every).max()):
                 self.step()
             line = np.zeros((self.batch, 1, N_REPORT))

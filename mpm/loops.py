@@ -2,11 +2,11 @@
 
 import taichi as ti
 
-from mpm.fields import BLOCKS, CPU_BLOCK, HOT, LINE, PART, ROW, SLICE, STATIONS, Fields
+from mpm.exchange import Exchange
+from mpm.fields import BLOCKS, CPU_BLOCK, HOT, LINE, PART, ROW, SLICE, STATIONS
 
 
-@ti.data_oriented
-class Loops(Fields):
+class Loops(Exchange):
     """Places of the loops: on CPUs those of one cut, on a GPU those of all cuts in one launch."""
 
     @ti.func

@@ -22,7 +22,6 @@ from mpm.fields import (
 from mpm.split import Split
 
 
-@ti.data_oriented
 class Nodes(Split):
     """Updates of the grid between the two transfers."""
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import io
 import os
 from dataclasses import dataclass, replace
 from typing import Any
 
 from mpm.errors import SceneError
+from mpm.frontend import hasten
 
 ARCHES = ("cpu", "cuda", "vulkan", "gpu")
 """Devices; not Metal, which has no doubles: the way of the blade needs them."""
@@ -38,32 +38,6 @@ class Runtime:
 _state: dict[str, Any] = {"key": None, "serial": 0}
 
 
-def hasten_taichi() -> None:
-    """Let Taichi read the source of a function once and name a statement by its line.
-
-    For each call and each copy of an unrolled loop Taichi 1.7 reads the function's source again and draws a caret under
-    the statement, for messages that nobody sees: half of the time in which a cached kernel is made ready. Where Taichi
-    is not as it was in 1.7 nothing is done.
-    """
-    try:
-        from taichi.lang import kernel_impl
-        from taichi.lang.ast.ast_transformer_utils import ASTTransformerContext as Context
-
-        if hasattr(kernel_impl.getsourcelines, "cache_info"):
-            return
-        readers = {name: functools.cache(getattr(kernel_impl, name)) for name in ("getsourcelines", "getsourcefile")}
-    except (ImportError, AttributeError):
-        return
-    for name, reader in readers.items():
-        setattr(kernel_impl, name, reader)
-
-    def get_pos_info(self: Any, node: Any) -> str:
-        where = f'File "{self.file}", line {node.lineno + self.lineno_offset}, in {self.func.func.__name__}:'
-        return f"{where}\n{self.src[node.lineno - 1].rstrip()}\n"
-
-    Context.get_pos_info = get_pos_info
-
-
 def start(runtime: Runtime, precision: str) -> int:
     """Start Taichi for this device and precision, or keep the one that runs.
 
@@ -75,7 +49,7 @@ def start(runtime: Runtime, precision: str) -> int:
     """
     import taichi as ti
 
-    hasten_taichi()
+    hasten()
     key = (runtime, precision)
     if _state["key"] == key:
         return _state["serial"]

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import minimum_filter
 
 from mpm.errors import SceneError
 from mpm.scene import Numerics, Scene
@@ -124,7 +123,8 @@ def _thin(cells: np.ndarray, num: Numerics, mirrored: bool) -> tuple[np.ndarray,
     at = tuple((block - block.min(axis=0) + margin).T)
     count = np.zeros([a.max() + 2 for a in at], int)
     np.add.at(count, at, 1)
-    inner = minimum_filter(count == num.ppc**3, size=3, mode="nearest")[at]
+    full = np.pad(count == num.ppc**3, 1, mode="edge")
+    inner = np.lib.stride_tricks.sliding_window_view(full, (3, 3, 3))[at].all(axis=(1, 2, 3))
     key = np.stack([cells[:, 0], depth, cells[:, 2]], axis=1)
     key[inner] = [-1, 0, -1] + block[inner] * [-1, 1, -1]  # apart from those of single cells, which are not negative
     _, first, owner, bulk = np.unique(key, axis=0, return_index=True, return_inverse=True, return_counts=True)

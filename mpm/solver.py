@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from mpm.arm import arm_mass
 from mpm.capacity import batch_capacity, node_capacity, particle_capacity
 from mpm.course import Course, Order, Progress
 from mpm.errors import SimulationError
+from mpm.exchange import BULK, FOOT, GAP, N_PARTICLE, N_SLICE, PLACE, SHELL, SOFTEN, TACKY, Contents
 from mpm.kernels import Kernels
 from mpm.layout import lay_out
 from mpm.material import Material
@@ -20,7 +20,8 @@ from mpm.record import ForceRecord
 from mpm.runtime import Runtime, start
 from mpm.scene import BAND_CELLS, Press, Scene
 from mpm.seeding import seed
-from mpm.shapes import skin_path, slices
+from mpm.shapes import skin_path
+from mpm.shapes import slices as outline
 from mpm.topology import Topology, topology
 from mpm.touch import CONTACT
 from mpm.watch import Snapshot, Watch, snapshot
@@ -115,29 +116,33 @@ class Simulation:
     def _load(self, material: Material) -> None:
         """Write seeds and constants into the fields."""
         self.k.user = self
-        load(self.k, [(self, material)])
+        self.k.begin([self.contents(material)])
 
-    def layout(self) -> tuple[Any, ...]:
-        """Sizes of the cut, as :meth:`Fields.lay_out` asks for them."""
-        middle = round(-self.origin[1] / self.scene.numerics.dx)
-        return len(self.seeds.x), self.nodes, middle, len(self.stations), self.scene.mirrored_between
-
-    def contents(self, material: Material) -> dict[str, np.ndarray]:
-        """What the fields of particles and slices begin with, by their names."""
+    def contents(self, material: Material) -> Contents:
+        """What the fields begin with."""
         scene, seeds, xs = self.scene, self.seeds, self.stations
         gap, outer = (seeds.gap, seeds.beside) if scene.cuts else (seeds.head, seeds.top)
         path = skin_path(scene.food.shape, xs, material.skin_thickness) if material.skin_thickness > 0 else 0 * xs
-        outline = slices(scene.food.shape, xs, scene.numerics.dx)
-        return {
-            "x": self.turned(seeds.x),
-            "foot": seeds.foot,
-            "gap": gap,
-            "bulk": seeds.bulk,
-            "shell": np.stack([seeds.foot * seeds.bottom, gap * outer], axis=1) * seeds.areas[:, None],
-            "tacky": np.where(seeds.beside & (material.adhesion > 0), 0, -1),
-            **dict(zip(("top", "low", "width", "floor_top", "floor_low"), outline, strict=True)),
-            "soften": scene.edge.slip + path,
-        }
+        particles, slices = np.empty((len(seeds.x), N_PARTICLE)), np.empty((len(xs), N_SLICE))
+        particles[:, PLACE:FOOT] = self.turned(seeds.x)
+        particles[:, FOOT], particles[:, GAP], particles[:, BULK] = seeds.foot, gap, seeds.bulk
+        particles[:, SHELL], particles[:, SHELL + 1] = (
+            seeds.areas * seeds.foot * seeds.bottom,
+            seeds.areas * gap * outer,
+        )
+        particles[:, TACKY] = np.where(seeds.beside & (material.adhesion > 0), 0, -1)
+        slices[:, :SOFTEN] = np.transpose(outline(scene.food.shape, xs, scene.numerics.dx))
+        slices[:, SOFTEN] = scene.edge.slip + path
+        return Contents(
+            nodes=self.nodes,
+            plane=round(-self.origin[1] / scene.numerics.dx),
+            between=scene.mirrored_between,
+            particles=particles,
+            slices=slices,
+            parameters=self.constants(material),
+            pose=pose(scene.food.shape.height + self.gap, 0.0, scene.motion.tilt),
+            relaxation=self.relaxation(material),
+        )
 
     def constants(self, material: Material) -> np.ndarray:
         """The table of parameters, shape (N_PARAMETERS,)."""
@@ -184,7 +189,7 @@ class Simulation:
 
     def _set_pose(self, z: float, s: float = 0.0, tilt: float = 0.0) -> None:
         """Put the middle of the edge at a height and a place along the cut [m], at an angle to the board [rad], at rest."""
-        self.k.set_table(self.k.pose, pose(z, s, tilt))
+        self.k.set_pose(pose(z, s, tilt))
 
     @property
     def gap(self) -> float:
@@ -229,21 +234,19 @@ class Simulation:
 
     def look(self, time: float, stroke: float, slide: float) -> Snapshot:
         """The particles now, in the scene's axes, at a simulated time [s], a stroke and a way along the blade [m]."""
-        k = self.k
-        return snapshot(time, stroke, slide, k, self.turned(k.of_particles(k.x, self.place), -1.0), self.place)
+        now = self.k.particles(self.place)
+        return snapshot(time, stroke, slide, now, self.turned(now.x, -1.0))
 
     def topology(self) -> Topology:
         """Pieces of the food now."""
-        k, mirrors = self.k, self.scene.mirrors
-        side, f = k.of_particles(k.side, self.place), k.deformation(self.place)
-        across = self.turned(k.of_particles(k.x, self.place), -1.0)[:, 1]
-        half = np.where(side > 0, side - 1, 0 if mirrors[1] else across >= 0)
-        damage = np.zeros(len(side))
-        if k.damage:
-            table = k.par.to_numpy()[self.place]
-            kappa = np.maximum(k.of_particles(k.kappa, self.place), table[kn.EPS0])
+        mirrors, now = self.scene.mirrors, self.k.particles(self.place)
+        half = np.where(now.side > 0, now.side - 1, 0 if mirrors[1] else self.turned(now.x, -1.0)[:, 1] >= 0)
+        damage = np.zeros(len(now.side))
+        if self.k.damage:
+            table = self.k.par.to_numpy()[self.place]
+            kappa = np.maximum(now.kappa, table[kn.EPS0])
             damage = 1 - table[kn.EPS0] / kappa * np.exp(-(kappa - table[kn.EPS0]) / (table[kn.EPSF] - table[kn.EPS0]))
-        return topology(self.seeds, mirrors, half.astype(int), side > 0, np.linalg.det(f), damage)
+        return topology(self.seeds, mirrors, half.astype(int), now.side > 0, np.linalg.det(now.F), damage)
 
 
 def pose(z: float, s: float = 0.0, tilt: float = 0.0) -> np.ndarray:
@@ -265,21 +268,6 @@ def kernels(kind: tuple[Any, ...], serial: int) -> Kernels:
     while len(_kept) > KEPT:
         del _kept[next(iter(_kept))]
     return kept
-
-
-def load(k: Any, cuts: Sequence[tuple[Simulation, Material]]) -> None:
-    """Write seeds and constants of cuts into fields, side by side."""
-    k.lay_out([cut.layout() for cut, _ in cuts])
-    k.reset()
-    contents = [cut.contents(material) for cut, material in cuts]
-    for name in contents[0]:
-        k.fill(getattr(k, name), *(one[name] for one in contents))
-    k.set_table(k.par, *(cut.constants(material) for cut, material in cuts))
-    if k.branches:
-        relaxation = [cut.relaxation(material) for cut, material in cuts]
-        k.set_table(k.share_of, *(one[0] for one in relaxation))
-        k.set_table(k.relax, *(one[1] for one in relaxation))
-    k.set_table(k.pose, *(pose(c.scene.food.shape.height + c.gap, 0.0, c.scene.motion.tilt) for c, _ in cuts))
 
 
 def simulate(scene: Scene, *, runtime: Runtime | None = None, progress: Progress | None = None) -> ForceRecord:

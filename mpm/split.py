@@ -12,7 +12,6 @@ PUSHED = (
 CRACK_LEAD = 0.5  # cells by which the split of the nodes lags the crack it makes; see Split.split
 
 
-@ti.data_oriented
 class Split(Loops):
     """The crack as the transfers between particles and grid see it."""
 

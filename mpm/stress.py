@@ -31,7 +31,6 @@ from mpm.edge import Edge
 from mpm.fields import AT_REST, COUNT, EPS0, EPSF, ETA_B, ETA_S, HOT, LAM, MU, PART, ROW, YIELD
 
 
-@ti.data_oriented
 class Stress(Edge):
     """Deformation gradient and Kirchhoff stress of the particles in a time step."""
 

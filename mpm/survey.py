@@ -33,7 +33,6 @@ from mpm.stress import Stress
 MARGIN = 3  # cells by which the window exceeds the particles; it is renewed at every output
 
 
-@ti.data_oriented
 class Survey(Stress):
     """Loops over all particles that change none."""
 

@@ -34,7 +34,6 @@ CONTACT = 2.0
 FLAT = 0.02  # least distance between a particle's centre and the surface that squeezing leaves, over the cell
 
 
-@ti.data_oriented
 class Touch(Survey):
     """What a particle of the surface feels of the tools, and they of it."""
 

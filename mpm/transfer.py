@@ -15,7 +15,6 @@ from mpm.split import PUSHED, WHOLE
 from mpm.touch import Touch
 
 
-@ti.data_oriented
 class Transfer(Touch):
     """Particles to the grid, and the grid to particles."""
 

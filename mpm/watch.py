@@ -4,9 +4,27 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
+
+
+class Particles(NamedTuple):
+    """Particles of a cut after some steps.
+
+    Attributes:
+        x: Places in the grid's axes [m], shape (n, 3).
+        side: 0 where the cut has not passed, else 1 or 2 for the half.
+        F: Deformation gradients, shape (n, 3, 3).
+        tau: Kirchhoff stresses [Pa], xx, yy, zz, yz, xz, xy, shape (n, 6).
+        kappa: Largest equivalent strain that has acted on bulk damage so far; 0 without it.
+    """
+
+    x: np.ndarray
+    side: np.ndarray
+    F: np.ndarray
+    tau: np.ndarray
+    kappa: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,21 +48,20 @@ class Snapshot:
     severed: np.ndarray
 
 
-def snapshot(time: float, stroke: float, slide: float, fields: Any, x: np.ndarray, place: int = 0) -> Snapshot:
+def snapshot(time: float, stroke: float, slide: float, now: Particles, x: np.ndarray) -> Snapshot:
     """What there is to see now.
 
     Args:
         time: Simulated time [s].
         stroke: Way of the edge below the food's top [m].
         slide: Way of the blade along its edge [m].
-        fields: The fields of the run.
-        x: Places of its particles in the scene's axes [m], shape (n, 3).
-        place: Of the run among the cuts of the fields.
+        now: The particles.
+        x: Their places in the scene's axes [m], shape (n, 3).
     """
-    cauchy = fields.stresses(place) / np.linalg.det(fields.deformation(place))[:, None]
+    cauchy = now.tau / np.linalg.det(now.F)[:, None]
     xx, yy, zz, yz, xz, xy = cauchy.T
     mises = np.sqrt(((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2 + 3 * (yz**2 + xz**2 + xy**2))
-    return Snapshot(time, stroke, slide, x, mises, fields.of_particles(fields.side, place) > 0)
+    return Snapshot(time, stroke, slide, x, mises, now.side > 0)
 
 
 class Watch:

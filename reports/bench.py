@@ -63,6 +63,8 @@ def _brief(d: Data) -> Brief:
         facts.append(
             (f"{processes['processes']} processes", f"{quantity(processes['speed_up'], '-')} times the cuts of one")
         )
+    if "start_up_s" in processes:
+        facts.append(("A further process", f"starts in {quantity(processes['start_up_s'], 's')}"))
     for row in (d.get("batches") or [])[1:]:
         facts.append((f"{row['cuts']} cuts side by side", f"{quantity(row['per_cut'], '-')} of the time of one each"))
     return Brief(

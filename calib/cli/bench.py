@@ -98,7 +98,8 @@ def table(document: dict[str, Any]) -> str:
     lines += [_line(row["name"], row) for row in document["ablations"]]
     p = document["processes"]
     lines.append(
-        f"  {p['processes']} processes do {p['speed_up']:.2f} times the cuts of one, {p['cut_Mps']:.2f} million a second"
+        f"  {p['processes']} processes do {p['speed_up']:.2f} times the cuts of one, {p['cut_Mps']:.2f} million a second; "
+        f"a further one starts in {p['start_up_s']:.2f} s"
     )
     lines += [
         f"  elastic block: {row['ratio']:.1f} times {row['name']} {row['version']} ({row['Mps']:.2f} million a second)"

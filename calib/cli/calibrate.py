@@ -222,14 +222,3 @@ def verdict_text(summary: dict[str, Any], out: Path) -> str:
         f"({summary['trace']['label']}), {summary['simulations']} simulations in {summary['wall_s']:.0f} s"
     )
     return "\n".join([head, *lines, f"  wrote {out}"])
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point of the ``calibrate`` script."""
-    from calib.cli.main import main as cutcal
-
-    return cutcal(["calibrate", *(sys.argv[1:] if argv is None else argv)])
-
-
-if __name__ == "__main__":
-    sys.exit(main())

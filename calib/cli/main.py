@@ -1,37 +1,21 @@
-"""``cutcal``: dispatch to the sub-commands, and turn expected errors into one line and exit code 1."""
+"""``cutcal``: dispatch to the sub-commands, and turn expected errors into one line and exit code 1.
+
+Every worker process imports this module again, as the program it was started by: nothing is imported before it is needed.
+"""
 
 from __future__ import annotations
 
 import io
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 import calib
-from calib.cli import (
-    bench,
-    calibrate,
-    completion,
-    compress,
-    converge,
-    coverage,
-    dataset,
-    doctor,
-    evaluate,
-    foods,
-    knives,
-    predict,
-    prior,
-    regress,
-    report,
-    scalars,
-    schema,
-    simulate,
-    stress,
-    verify,
-)
-from calib.cli.parsing import Parser, parse
-from mpm.errors import CutcalError
+
+if TYPE_CHECKING:
+    from calib.cli.parsing import Parser
 
 DESCRIPTION = "Calibrate cutting simulations of food against measured knife forces."
 EPILOG = """example:
@@ -39,38 +23,46 @@ EPILOG = """example:
 
 cutcal COMMAND --help explains a command.
 Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass."""
-COMMANDS = {
-    "calibrate": calibrate,
-    "compress": compress,
-    "converge": converge,
-    "coverage": coverage,
-    "bench": bench,
-    "stress": stress,
-    "predict": predict,
-    "simulate": simulate,
-    "evaluate": evaluate,
-    "dataset": dataset,
-    "verify": verify,
-    "report": report,
-    "foods": foods,
-    "knives": knives,
-    "doctor": doctor,
-    "prior": prior,
-    "regress": regress,
-    "scalars": scalars,
-    "schema": schema,
-    "completion": completion,
-}
+COMMANDS = (
+    "calibrate",
+    "compress",
+    "converge",
+    "coverage",
+    "bench",
+    "stress",
+    "predict",
+    "simulate",
+    "evaluate",
+    "dataset",
+    "verify",
+    "report",
+    "foods",
+    "knives",
+    "doctor",
+    "prior",
+    "regress",
+    "scalars",
+    "schema",
+    "completion",
+)
 CLOSED = 141  # what a shell reports for a program whose reader has gone
 INTERRUPTED = 130  # what a shell reports for a program ended by Ctrl-C
 
 
-def parser() -> Parser:
-    """The whole command line."""
+def command(name: str) -> Any:
+    """The module of a command."""
+    return import_module(f"calib.cli.{name}")
+
+
+def parser(names: Iterable[str] = COMMANDS) -> Parser:
+    """The command line with these commands."""
+    from calib.cli.parsing import Parser
+
     top = Parser(prog="cutcal", description=DESCRIPTION, epilog=EPILOG, add_help=True)
     top.add_argument("--version", action="version", version=f"cutcal {calib.__version__}")
     sub = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name, module in COMMANDS.items():
+    for name in names:
+        module = command(name)
         one = sub.add_parser(
             name,
             help=module.HELP,
@@ -82,14 +74,26 @@ def parser() -> Parser:
     return top
 
 
+def calibrate() -> int:
+    """Entry point of the ``calibrate`` script."""
+    return main(["calibrate", *sys.argv[1:]])
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; returns its exit code."""
+    from calib.cli.parsing import Misused, parse
+    from mpm.errors import CutcalError
+
+    words = sys.argv[1:] if argv is None else argv
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal or pipe that has no degree sign gets a question mark
     try:
-        args = parse(parser(), argv)
-        code: int = COMMANDS[args.command].run(args)
+        try:
+            args = parse(parser(words[:1] if set(words[:1]) & set(COMMANDS) else COMMANDS), words)
+        except Misused:
+            args = parse(parser(), words)  # says of an option that another command has it
+        code: int = command(args.command).run(args)
         sys.stdout.flush()
         return code
     except BrokenPipeError:  # the reader, such as head, has enough

@@ -78,12 +78,12 @@ def strained(request):
         table[0, :, 8].ravel()[: len(f)] = starts
         k.tau.from_numpy(table)
     k.set_gradient(slope)
-    np.testing.assert_array_equal(k.deformation(), f)
+    np.testing.assert_array_equal(k.particles().F, f)
     np.testing.assert_array_equal(k.gradient(), slope)
     dt = 1e-5
     elastic(k, dt)
     tau = k.tau.to_numpy()[0].transpose(0, 2, 1).reshape(-1, 9)[: k.n[0]]
-    return sim, dt, f, slope, tau, k.deformation()
+    return sim, dt, f, slope, tau, k.particles().F
 
 
 def test_stress_of_four_particles_at_once(strained):
@@ -139,7 +139,7 @@ def test_strain_is_smoothed_wherever_it_can_matter():
     k.go([(1, 1, 1e-12, 0.0, 0.0, 0.0)])
     x = (k.of_particles(k.x) - sim.origin) / sim.scene.numerics.dx
     base = np.floor(x - 0.5).astype(int)
-    strain = np.array([np.linalg.eigvalsh(polar(f, side="left")[1])[-1] - 1 for f in k.deformation()])
+    strain = np.array([np.linalg.eigvalsh(polar(f, side="left")[1])[-1] - 1 for f in k.particles().F])
     weight, total = np.zeros(sim.nodes), np.zeros(sim.nodes)
     near = [(i, j, m) for i in range(3) for j in range(3) for m in range(3)]
     shape = [np.prod(twins.bspline(base + d - x), axis=1) for d in near]
