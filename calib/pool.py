@@ -15,8 +15,14 @@ from typing import Any
 from calib.workers import Errand, Result, Workers
 
 
-def _begin() -> None:
-    """Start of a worker: Ctrl-C is handled by the main process, which then ends the workers; they end with it anyway."""
+def _begin(environment: dict[str, str]) -> None:
+    """Start of a worker: Ctrl-C is handled by the main process, which then ends the workers; they end with it anyway.
+
+    Args:
+        environment: Of the main process now; the process that a worker is a copy of has an older one.
+    """
+    os.environ.clear()
+    os.environ.update(environment)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
     if parent is not None:
@@ -63,7 +69,9 @@ class Pool(Workers):
         return self.workers // self.together
 
     def _start(self) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(self.processes, mp_context=_context(), initializer=_begin)
+        return ProcessPoolExecutor(
+            self.processes, mp_context=_context(), initializer=_begin, initargs=(dict(os.environ),)
+        )
 
     def close(self) -> None:
         """End the processes at once; runs that have not finished are lost."""
