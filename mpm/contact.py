@@ -50,8 +50,8 @@ def coulomb(jn, tangent, mu):
 
 
 @ti.func
-def stick_slip(stick, slide, own, press, mu):
-    """Elastic-sticking Coulomb friction: tangential spring as stiff as the normal one, capped at mu times its force.
+def stick_slip(stick, slide, own, most):
+    """Elastic-sticking friction: a tangential spring as stiff as the normal one, which slips at the largest friction.
 
     Capping each step's impulse at the one that stops the particle would make friction viscous, because the grid takes
     most of that impulse away again; the spring remembers.
@@ -60,16 +60,15 @@ def stick_slip(stick, slide, own, press, mu):
         stick: Tangential stretch of the spring so far [m], 3-vector.
         slide: Sliding of the particle along the tool in this step [m], 3-vector, tangential.
         own: Tangential part of the food's own traction over the spring's stiffness [m], which needs no stretch.
-        press: Normal force over the normal spring's stiffness [m].
-        mu: Friction coefficient [-].
+        most: Largest friction over the spring's stiffness [m].
 
     Returns:
         Friction force over the spring's stiffness [m]; ``own`` less it is the new stretch.
     """
     out = own - stick - slide
-    size, cap = out.norm(), mu * press
-    if size > cap:
-        out *= cap / size
+    size = out.norm()
+    if size > most:
+        out *= most / size
     return out
 
 

@@ -24,6 +24,7 @@ from mpm.fields import (
     TILT_SIN,
     VS,
     VZ,
+    YIELD,
     Z,
 )
 from mpm.survey import Survey
@@ -108,6 +109,20 @@ class Touch(Survey):
         return out
 
     @ti.func
+    def friction(self, cut, p, shell, depth, press, mu, dt):
+        """Largest friction at a normal force, both over the contact's stiffness [m]: Coulomb's, and on the food's face no more than
+        its yield stress in shear (Orowan 1943; Zorev 1963).
+
+        Beyond that the food shears in a band of no thickness along the face. A grid without this limit shears a whole layer
+        of cells, drags it down with the blade and is pressed for it the more, the finer the cells.
+        """
+        most = mu * press
+        if shell > 0:
+            yields = self.par[cut, YIELD] / ti.sqrt(3.0) * shell / depth
+            most = ti.min(most, yields * dt * dt / (CONTACT * self.par[cut, MASS] * self.bulk[cut, p]))
+        return most
+
+    @ti.func
     def touch_board(self, cut, p, m, dt, u, at):
         """Contact of one particle with the board; returns the change of its velocity. ``u`` is that of its surface."""
         dv = ti.Vector.zero(float, 3)
@@ -116,7 +131,9 @@ class Touch(Survey):
         own[2] = 0.0
         if force > 0:
             slide = dt * ti.Vector([u[0], u[1], 0.0])
-            hold = stick_slip(self.stick[cut, 0, p], slide, own, force, self.par[cut, BOARD_MU])
+            mu, shell = self.par[cut, BOARD_MU], self.shell[cut, p][0]
+            most = self.friction(cut, p, shell, self.foot[cut, p], force, mu, dt)
+            hold = stick_slip(self.stick[cut, 0, p], slide, own, most)
             self.stick[cut, 0, p] = own - hold
             dv = CONTACT / dt * ti.Vector([hold[0], hold[1], force])
             self.tool(cut, BOARD, -m * dv)
@@ -162,7 +179,9 @@ class Touch(Survey):
                 rel = u + arm[2] * up + arm[1] * across - self.blade_velocity(cut, at[0] + arm[0], at[2] + arm[2])
                 slide = rel - rel.dot(n) * n
                 stick = self.stick[cut, 1, p] - self.stick[cut, 1, p].dot(n) * n
-                hold = stick_slip(stick, dt * slide, own, press, self.par[cut, FRICTION])
+                mu, shell = self.par[cut, FRICTION], self.shell[cut, p][1]
+                most = self.friction(cut, p, shell, self.gap[cut, p], press, mu, dt)
+                hold = stick_slip(stick, dt * slide, own, most)
                 self.stick[cut, 1, p] = own - hold
                 dv = CONTACT / dt * (force * n + hold)
                 self.knife(cut, FACE, -m * dv, at[0] + arm[0], at[2] + arm[2])
@@ -192,7 +211,8 @@ class Touch(Survey):
             stick = self.stick[cut, 1, p] - self.stick[cut, 1, p].dot(n) * n
             slide = u - tool
             slide -= slide.dot(n) * n
-            hold = stick_slip(stick, dt * slide, own, force, self.par[cut, FRICTION])
+            mu, shell = self.par[cut, FRICTION], self.shell[cut, p][1]
+            hold = stick_slip(stick, dt * slide, own, self.friction(cut, p, shell, self.gap[cut, p], force, mu, dt))
             self.stick[cut, 1, p] = own - hold
             dv = CONTACT / dt * (force * n + hold)
             self.tool(cut, FACE, -m * dv)

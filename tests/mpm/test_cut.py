@@ -237,6 +237,18 @@ def test_friction_is_coulomb_and_free_of_rate(prism):
     assert faces[2] == pytest.approx(faces[0], rel=0.05)
 
 
+def test_a_weaker_food_rubs_less():
+    """Rubbing food that yields in shear on the blade takes less work the weaker it is, on cells of 3 mm and of 2 mm alike.
+
+    Without the limit of friction the weak one takes 12 % more than the strong one, and on cells of 2 mm 32 % more.
+    """
+    strong = replace(PRISM, knife=WEDGE).with_material(mu=0.7, R=50.0, R_initiation=50.0)
+    weak = strong.with_material(yield_stress=FLESH.yield_stress / 8)
+    fine = replace(weak, numerics=replace(weak.numerics, dx=2e-3))
+    assert run(weak).work < 0.7 * run(strong).work
+    assert run(fine).work == pytest.approx(run(weak).work, rel=0.05)
+
+
 def test_work_is_never_below_resistance_times_area(prism):
     """The edge's work is at least R times the area it has swept, less the slip it needs to develop (one slip length)."""
     record = prism.run(FLESH)

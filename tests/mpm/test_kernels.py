@@ -16,8 +16,9 @@ from mpm.scene import EdgeLaw, Food, Motion, Numerics, Scene
 from mpm.shapes import Shape
 from mpm.solver import Simulation, kernels
 from mpm.split import WHOLE
+from mpm.touch import CONTACT
 from tests.mpm import twins
-from tests.mpm.scenes import PRISM, WEDGE
+from tests.mpm.scenes import FLESH, PRISM, WEDGE
 
 BRITTLE = Scene(
     Food(
@@ -287,3 +288,22 @@ def test_a_moment_of_contact_is_read_where_there_is_one(where, value, same, monk
     spoilt = sim.run()
     assert len(touched) > 3 and 0 < min(touched) and max(touched) < 0.9
     assert (np.array_equal(spoilt.face, plain.face) and np.array_equal(spoilt.kinetic, plain.kinetic)) is same
+
+
+@ti.kernel
+def most_friction(k: ti.template(), dt: float) -> ti.f64:
+    """Largest friction of the cut face under an endless pressure [N]."""
+    total = ti.cast(0.0, ti.f64)
+    for p in range(k.size[0, kn.COUNT]):
+        if k.shell[0, p][1] > 0:
+            stiffness = CONTACT * k.par[0, kn.MASS] * k.bulk[0, p] / dt**2
+            total += stiffness * k.friction(0, p, k.shell[0, p][1], k.gap[0, p], 1e9, 1.0, dt)
+    return total
+
+
+def test_a_face_bears_its_yield_stress_in_shear_times_its_area():
+    """The largest friction of all particles of the cut face, a quarter of them simulated, is that of the face."""
+    sim = Simulation(PRISM, Runtime(threads=1))
+    sim._load(FLESH)
+    half_face = 0.012 * 0.024
+    assert most_friction(sim.k, 1e-5) == pytest.approx(FLESH.yield_stress / np.sqrt(3) * half_face, rel=0.02)
