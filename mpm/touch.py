@@ -131,9 +131,7 @@ class Touch(Survey):
         own[2] = 0.0
         if force > 0:
             slide = dt * ti.Vector([u[0], u[1], 0.0])
-            mu, shell = self.par[cut, BOARD_MU], self.shell[cut, p][0]
-            most = self.friction(cut, p, shell, self.foot[cut, p], force, mu, dt)
-            hold = stick_slip(self.stick[cut, 0, p], slide, own, most)
+            hold = stick_slip(self.stick[cut, 0, p], slide, own, self.par[cut, BOARD_MU] * force)
             self.stick[cut, 0, p] = own - hold
             dv = CONTACT / dt * ti.Vector([hold[0], hold[1], force])
             self.tool(cut, BOARD, -m * dv)
