@@ -298,8 +298,8 @@ class Bench:
                         spent[n].append(took)
             for _ in range(self.repeats):  # what it compiled is kept: a further process has only to start
                 pools[1].renew()
-                began = _clocked(pools[1], jobs)
-                afresh.append(began - _clocked(pools[1], jobs))
+                first = _clocked(pools[1], jobs)
+                afresh.append(first - _clocked(pools[1], jobs))
         done = 2 * count * self.record.particles * self.record.steps
         row = {
             "processes": count,

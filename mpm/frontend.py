@@ -24,11 +24,12 @@ def hasten() -> None:
     nothing is done.
     """
     try:
+        import taichi as ti
         from taichi.lang import kernel_impl
         from taichi.lang.ast.ast_transformer_utils import ASTTransformerContext as Context
         from taichi.lang.ast.ast_transformer_utils import Builder
 
-        if hasattr(kernel_impl.getsourcelines, "cache_info"):
+        if ti.__version__[:2] != (1, 7) or hasattr(kernel_impl.getsourcelines, "cache_info"):
             return
         lines, file = kernel_impl.getsourcelines, kernel_impl.getsourcefile
         transform, parse, build = kernel_impl.transform_tree, kernel_impl.ast.parse, Builder.__call__

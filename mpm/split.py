@@ -6,9 +6,8 @@ from mpm.fields import DX, FIRST, INV, OZ, STATIONS, ZONE
 from mpm.loops import Loops
 
 WHOLE = 0x3FFFF  # of Split.split where all nodes are shared
-PUSHED = (
-    WHOLE + 1
-)  # the bit above it in Fields.layers: the particle has a moment of contact, from one transfer back to the next
+# The bit above it in Fields.layers: the particle has a moment of contact, from one transfer back to the next.
+PUSHED = WHOLE + 1
 CRACK_LEAD = 0.5  # cells by which the split of the nodes lags the crack it makes; see Split.split
 
 

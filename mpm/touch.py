@@ -109,22 +109,27 @@ class Touch(Survey):
         return out
 
     @ti.func
-    def friction(self, cut, p, shell, depth, press, mu, dt):
-        """Largest friction at a normal force, both over the contact's stiffness [m]: Coulomb's, and on the food's face no more than
-        its yield stress in shear (Orowan 1943; Zorev 1963).
+    def friction(self, cut, p, press, dt):
+        """Largest friction on the tool at a normal force, both over the contact's stiffness [m]: Coulomb's, and on the food's face no
+        more than its yield stress in shear (Orowan 1943; Zorev 1963).
 
         Beyond that the food shears in a band of no thickness along the face. A grid without this limit shears a whole layer
         of cells, drags it down with the blade and is pressed for it the more, the finer the cells.
         """
-        most = mu * press
+        most, shell = self.par[cut, FRICTION] * press, self.shell[cut, p][1]
         if shell > 0:
-            yields = self.par[cut, YIELD] / ti.sqrt(3.0) * shell / depth
+            yields = self.par[cut, YIELD] / ti.sqrt(3.0) * shell / self.gap[cut, p]
             most = ti.min(most, yields * dt * dt / (CONTACT * self.par[cut, MASS] * self.bulk[cut, p]))
         return most
 
     @ti.func
     def touch_board(self, cut, p, m, dt, u, at):
-        """Contact of one particle with the board; returns the change of its velocity. ``u`` is that of its surface."""
+        """Contact of one particle with the board; returns the change of its velocity. ``u`` is that of its surface.
+
+        Friction is Coulomb's alone. The limit of :meth:`friction` would bind where the pressure exceeds the yield stress over
+        sqrt(3) mu, which under a food that lies on a board is at the points of a round one, whose contact is narrower than a
+        particle's face: the area to multiply is not known there. Nor is food drawn along the board by a tool.
+        """
         dv = ti.Vector.zero(float, 3)
         own = self.traction(cut, p, self.shell[cut, p][0], self.foot[cut, p], ti.Vector([0.0, 0.0, 1.0]), dt)
         force = self.foot[cut, p] - at[2] + own[2]
@@ -177,9 +182,7 @@ class Touch(Survey):
                 rel = u + arm[2] * up + arm[1] * across - self.blade_velocity(cut, at[0] + arm[0], at[2] + arm[2])
                 slide = rel - rel.dot(n) * n
                 stick = self.stick[cut, 1, p] - self.stick[cut, 1, p].dot(n) * n
-                mu, shell = self.par[cut, FRICTION], self.shell[cut, p][1]
-                most = self.friction(cut, p, shell, self.gap[cut, p], press, mu, dt)
-                hold = stick_slip(stick, dt * slide, own, most)
+                hold = stick_slip(stick, dt * slide, own, self.friction(cut, p, press, dt))
                 self.stick[cut, 1, p] = own - hold
                 dv = CONTACT / dt * (force * n + hold)
                 self.knife(cut, FACE, -m * dv, at[0] + arm[0], at[2] + arm[2])
@@ -209,8 +212,7 @@ class Touch(Survey):
             stick = self.stick[cut, 1, p] - self.stick[cut, 1, p].dot(n) * n
             slide = u - tool
             slide -= slide.dot(n) * n
-            mu, shell = self.par[cut, FRICTION], self.shell[cut, p][1]
-            hold = stick_slip(stick, dt * slide, own, self.friction(cut, p, shell, self.gap[cut, p], force, mu, dt))
+            hold = stick_slip(stick, dt * slide, own, self.friction(cut, p, force, dt))
             self.stick[cut, 1, p] = own - hold
             dv = CONTACT / dt * (force * n + hold)
             self.tool(cut, FACE, -m * dv)

@@ -90,7 +90,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="replace")  # a terminal or pipe that has no degree sign gets a question mark
     try:
         try:
-            args = parse(parser(words[:1] if set(words[:1]) & set(COMMANDS) else COMMANDS), words)
+            args = parse(parser([word for word in words[:1] if word in COMMANDS] or COMMANDS), words)
         except Misused:
             args = parse(parser(), words)  # says of an option that another command has it
         code: int = command(args.command).run(args)
