@@ -9,39 +9,35 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import connection, get_all_start_methods, get_context, parent_process
+from multiprocessing import connection, get_context, parent_process
 from typing import Any
 
 from calib.workers import Errand, Result, Workers
+from mpm.runtime import stop
 
 
-def _begin(environment: dict[str, str]) -> None:
-    """Start of a worker: Ctrl-C is handled by the main process, which then ends the workers; they end with it anyway.
-
-    Args:
-        environment: Of the main process now; the process that a worker is a copy of has an older one.
-    """
-    os.environ.clear()
-    os.environ.update(environment)
+def _begin() -> None:
+    """Start of a worker: Ctrl-C is handled by the main process, which then ends the workers; they end with it anyway."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _end)
     parent = parent_process()
     if parent is not None:
         threading.Thread(target=_follow, args=(parent.sentinel,), daemon=True).start()
+
+
+def _end(*_: Any) -> None:
+    """End of a worker when it is told to: after the launch it is in, and with what it has compiled kept for the next process.
+
+    On Windows nobody is told: there the next process compiles anew.
+    """
+    stop()
+    os._exit(0)
 
 
 def _follow(parent: int) -> None:
     """End this process as soon as the main one has ended, were it killed: nobody waits for results any more."""
     connection.wait([parent])
     os._exit(1)
-
-
-def _context() -> Any:
-    """How processes start: as copies of one that has imported what all need and done nothing else, where the system can copy one."""
-    if "forkserver" not in get_all_start_methods():
-        return get_context("spawn")
-    context = get_context("forkserver")
-    context.set_forkserver_preload(["calib.workers", "mpm.solver", "mpm.batch"])
-    return context
 
 
 class Pool(Workers):
@@ -69,12 +65,10 @@ class Pool(Workers):
         return self.workers // self.together
 
     def _start(self) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(
-            self.processes, mp_context=_context(), initializer=_begin, initargs=(dict(os.environ),)
-        )
+        return ProcessPoolExecutor(self.processes, mp_context=get_context("spawn"), initializer=_begin)
 
     def close(self) -> None:
-        """End the processes at once; runs that have not finished are lost."""
+        """End the processes after the launch that each is in; runs that have not finished are lost."""
         self._begun = {}
         processes = list((getattr(self._executor, "_processes", None) or {}).values())
         for process in processes:

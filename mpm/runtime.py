@@ -87,6 +87,15 @@ def start(runtime: Runtime, precision: str) -> int:
     return _state["serial"]
 
 
+def stop() -> None:
+    """End the runtime, if one was started. Only then Taichi puts what it has compiled into the cache of all processes."""
+    if _state["key"] is not None:
+        import taichi as ti
+
+        _state["key"] = None
+        ti.reset()
+
+
 def running() -> int:
     """Serial number of the runtime that was started last, 0 before the first."""
     serial: int = _state["serial"]

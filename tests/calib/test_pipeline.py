@@ -36,6 +36,7 @@ from calib.verdicts import balances, judge, limits, spent, unbooked
 from calib.workers import DIED, Errand, SceneEvaluator, plain
 from mpm.errors import SceneError, SimulationError
 from mpm.record import ENERGIES, ForceRecord
+from mpm.runtime import Runtime, start
 from mpm.scene import Scene
 from mpm.seeding import seed
 from mpm.shapes import SHAPE_KINDS
@@ -397,6 +398,32 @@ def test_a_renewed_pool_has_other_processes():
         assert second != first
         with pytest.raises(ProcessLookupError):
             os.kill(first, 0)
+
+
+def compiled(arch: str, threads: int) -> int:
+    """In a worker: a kernel that nobody has compiled before."""
+    import taichi as ti
+
+    start(Runtime(arch, threads), "f64")
+    number = ti.field(ti.i32, ())
+
+    @ti.kernel
+    def write():
+        number[None] = 7
+
+    write()
+    return int(number[None])
+
+
+# Windows ends processes without telling them.
+@pytest.mark.skipif(sys.platform == "win32", reason="a worker is not told of its end here")
+def test_what_a_worker_has_compiled_is_kept(tmp_path, monkeypatch):
+    """A pool that is closed leaves the kernels of its workers to further processes."""
+    monkeypatch.setenv("TI_OFFLINE_CACHE_FILE_PATH", str(tmp_path))
+    pool = Pool(1)
+    assert list(pool.each(compiled, [()])) == [(0, 7)]
+    pool.close()
+    assert list(tmp_path.glob("*.tic"))
 
 
 def test_killed_last_run_is_made_once_more():
