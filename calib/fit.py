@@ -9,7 +9,7 @@ above what the right material would leave is begun afresh: multi-start, with the
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,7 +22,7 @@ from calib.joint import JointObjective
 from calib.objective import Objective, Trial
 from calib.options import FitOptions
 from calib.parameters import ParameterSet
-from calib.progress import Progress
+from calib.progress import Progress, onward
 from calib.search import CAUTION_NEAR, ELSEWHERE, Search
 from calib.surrogate import Surrogate
 from mpm.errors import SimulationError
@@ -153,27 +153,6 @@ def _afresh(search: Search, evaluator: Evaluator, coarse: Evaluator | None) -> s
     finally:
         search.trials += other.trials
     return status if search.best is not first else "stalled"
-
-
-def onward(
-    report: Callable[[Progress], None] | None, trials: Sequence[Trial], best: Trial, options: FitOptions
-) -> Callable[[Progress], None] | None:
-    """The progress of one more search, told as that of all of them.
-
-    Args:
-        report: Who is told.
-        trials, best: The runs so far, and the best of them.
-        options: What all may spend.
-    """
-    if report is None:
-        return None
-    done, spent, failed = len(trials), options.cost(trials), sum(not t.ok for t in trials)
-
-    def told(p: Progress) -> None:
-        total = replace(p, done=done + p.done, spent=spent + p.spent, failed=failed + p.failed)
-        report(replace(total, budget=options.budget, misfit=min(p.misfit, best.misfit)))
-
-    return told
 
 
 def _choose(search: Search, replicate: Evaluator) -> tuple[Trial, list[Trial]]:

@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from types import TracebackType
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
+
+if TYPE_CHECKING:
+    from calib.objective import Trial
+    from calib.options import FitOptions
 
 #: Width of the bar in characters.
 BAR = 20
@@ -48,6 +52,28 @@ class Progress:
         parts.append(f"at most {clock(self.eta_s)} left")
         parts.append(self.stage)
         return ", ".join(parts)
+
+
+def onward(
+    report: Callable[[Progress], None] | None, trials: Sequence[Trial], best: Trial, options: FitOptions
+) -> Callable[[Progress], None] | None:
+    """The progress of one more search, told as that of all of them.
+
+    Args:
+        report: Who is told.
+        trials, best: The runs so far, and the best of them.
+        options: What all may spend.
+    """
+    if report is None:
+        return None
+    done, spent, failed = len(trials), options.cost(trials), sum(not t.ok for t in trials)
+
+    def told(p: Progress) -> None:
+        rest = (options.budget - spent - p.spent) / max(p.budget - p.spent, options.coarse_cost)
+        total = replace(p, done=done + p.done, spent=spent + p.spent, failed=failed + p.failed)
+        report(replace(total, budget=options.budget, misfit=min(p.misfit, best.misfit), eta_s=max(rest, 0.0) * p.eta_s))
+
+    return told
 
 
 def clock(seconds: float) -> str:

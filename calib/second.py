@@ -20,13 +20,13 @@ from threadpoolctl import threadpool_limits
 
 from calib.doubt import Doubt, as_good, at_first_sight, doubt_of
 from calib.evaluation import Evaluator
-from calib.fit import FitResult, calibrate, onward
+from calib.fit import FitResult, calibrate
 from calib.joint import JointObjective
 from calib.objective import Objective, Trial
 from calib.options import FitOptions
 from calib.parameters import ParameterSet, plain
 from calib.profiles import RISE
-from calib.progress import Progress
+from calib.progress import Progress, onward
 from calib.search import Search
 from calib.surrogate import Surrogate
 from calib.uncertainty import EXPLAINED, Interval
