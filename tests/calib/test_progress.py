@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import io
 import math
+from types import SimpleNamespace
 
 import pytest
 
-from calib.progress import Countdown, Progress, ProgressBar, clock
+from calib.options import FitOptions
+from calib.progress import Countdown, Progress, ProgressBar, clock, onward
 
 
 class Terminal(io.StringIO):
@@ -29,6 +31,19 @@ def test_line_tells_count_budget_failures_misfit_and_time() -> None:
         "12 simulations (12 of 80), 2 failed, chi2 12.35, at most 1:15 left, round"
     )
     assert "chi2 -" in progress(1, math.inf).line() and "failed" not in progress(1).line()
+
+
+def test_another_search_is_told_as_part_of_all() -> None:
+    """Its runs, budget and failures are counted with those before it, and its time is that of what all have left."""
+    seen: list[Progress] = []
+    before = [
+        SimpleNamespace(coarse=k < 4, ok=k > 0, misfit=9.0) for k in range(10)
+    ]  # four coarse runs: 7 of the budget
+    told = onward(seen.append, before, before[-1], FitOptions(budget=80.0))  # type: ignore[arg-type]
+    assert told is not None
+    told(Progress(5, 5.0, 39.0, 1, 12.0, 68.0, "round"))
+    assert seen == [Progress(15, 12.0, 80.0, 2, 9.0, 136.0, "round")]
+    assert onward(None, before, before[-1], FitOptions()) is None  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
