@@ -19,7 +19,7 @@ from calib.objective import Objective, Target, Trial
 from calib.options import FitOptions
 from calib.parameters import Parameter, ParameterSet
 from calib.progress import Progress
-from calib.search import ANEW, CAUTION_NEAR, FAR_OFF, SCREENING, Search
+from calib.search import AFAR, ANEW, CAUTION_NEAR, FAR_OFF, LUCK, SCREENING, Search
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.uncertainty import EXPLAINED, evidence, uncertainty
 from mpm.errors import SimulationError
@@ -247,23 +247,45 @@ def test_a_curve_far_off_is_sought_as_long_as_the_budget_holds(
     assert (screenings(result, options) > 1 + ANEW) is spent
 
 
-def test_a_curve_that_nothing_follows_is_not_polished(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What rounds of small gains would bring is less than what bounds an interval where the errors are as large; they are not made."""
+@pytest.mark.parametrize(("size", "polished"), [(0.0, True), (2.0, False)])
+def test_a_curve_that_nothing_follows_is_not_polished(
+    size: float, polished: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is gained where the errors are as large is less than what bounds an interval, and no fine run is made for it; where the curve is
+    explained the same gain, by its errors, is worth a round. How much shorter searches get is a matter of chance: 12 seeds took 38.7
+    and 40.5 of the budget in place of 46.7 and 47.0, with one kind of processor and another.
+    """
+    plain = goal(TRUTHS[0])
+    target = replace(plain.target, curve=plain.target.curve + size * np.sin(GRID / 0.0025))
+    objective, options, fake = Objective(target, FIVE), FitOptions(), Fake()
+    made = Search(objective, fake, fake, options, None)
+    made._design([made.parameters.start])
+    made._evaluate([made.parameters.to_vector(TRUTHS[0])], "design")
+    assert bool(made.best.misfit <= made.enough) is polished
+    reduced = max(1.0, made.best.misfit / objective.effective_rows)
+    made.process()  # tells the noise of a run
+    assert made.luck * LUCK < options.tolerance
+    assert made.worth == pytest.approx((options.tolerance if polished else AFAR) * reduced)
+    monkeypatch.setattr(search, "_promise", lambda process, z: 0.5 * AFAR * reduced)
+    fine = sum(not t.coarse for t in made.trials)
+    assert made._rounds(0.5) == "converged" or polished
+    assert (sum(not t.coarse for t in made.trials) > fine) is polished
+
+
+def test_what_is_not_polished_loses_less_than_an_interval(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The chi-square that rounds of small gains would have brought is less than what bounds an interval where the errors are as large."""
     plain = goal(TRUTHS[0])
     target = replace(plain.target, curve=plain.target.curve + 2.0 * np.sin(GRID / 0.0025))
     objective = Objective(target, FIVE)
 
-    def ends(seed: int) -> tuple[float, float]:
-        fake, options = Fake(), FitOptions(seed=seed)
-        result = calibrate(objective, fake, coarse=fake, options=options)
-        return options.cost(result.history), result.best.misfit
+    def ends(seed: int) -> float:
+        fake = Fake()
+        return calibrate(objective, fake, coarse=fake, options=FitOptions(seed=seed)).best.misfit
 
-    found = [ends(seed) for seed in range(3)]
+    found = [ends(seed) for seed in range(2)]
     monkeypatch.setattr(search, "AFAR", 0.0)
-    polished = [ends(seed) for seed in range(3)]
-    for (_, misfit), (_, least) in zip(found, polished, strict=True):
+    for misfit, least in zip(found, [ends(seed) for seed in range(2)], strict=True):
         assert misfit > 2.0 * objective.effective_rows and misfit - least < 3.84 * least / objective.effective_rows
-    assert sum(cost for cost, _ in found) < sum(longer for longer, _ in polished)
 
 
 @pytest.mark.parametrize(("size", "given_up"), [(2.0, True), (4.0, False)])
