@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from calib.calibration import Calibration
 from calib.checks import Check
 from calib.conditioning import condition
 from calib.errors import MaterialError
@@ -28,7 +29,7 @@ from calib.metrics import compare
 from calib.nulls import null_models
 from calib.outputs import prepare, write_json
 from calib.pool import Pool
-from calib.preparation import fit_parameters
+from calib.preparation import fit_parameters, set_up
 from calib.provenance import code_key, key_of, versions
 from calib.scenes import Sizing, cut_scene, elsewhere, height_range, place, specimen
 from calib.trace import Trace
@@ -152,6 +153,18 @@ def test_every_food_makes_a_scene_that_can_run(name):
         fine, coarse = (cut_scene(food, shape, load_knife("kitchen"), dx=dx, coarse=one) for one in (False, True))
         assert fine.edge == coarse.edge and fine.edge.zone >= coarse.numerics.dx > fine.numerics.dx
     assert fit_parameters(food, food.default_fit).names == food.default_fit
+
+
+def test_scouts_differ_from_the_answer_in_cell_and_speed_alone():
+    """What a search learns from coarse runs is about the same specimen, edge and material; they are at four times the speed."""
+    setup = set_up(Calibration("banana", ROOT / "force_data" / "banana_reconstructed.csv").request())
+    fine, coarse = setup.fine, setup.coarse
+    assert coarse.motion == replace(fine.motion, mach=4 * fine.motion.mach)
+    assert (
+        coarse.numerics == replace(fine.numerics, dx=coarse.numerics.dx)
+        and coarse.numerics.dx == 4 / 3 * fine.numerics.dx
+    )
+    assert replace(coarse, motion=fine.motion, numerics=fine.numerics) == fine
 
 
 def test_fit_takes_any_property_and_refuses_others():
