@@ -81,13 +81,19 @@ class Check:
         return asdict(self)
 
 
-def check(scene: Scene, own: Mapping[str, float], store: EvaluationStore) -> list[Check]:
+def _unbooked(run: Evaluation) -> float:
+    """Part of the work that no law has taken [-]."""
+    return run.scalars["unbooked_J"] / run.scalars["work_J"]
+
+
+def check(scene: Scene, own: Evaluation, store: EvaluationStore, stroke: float) -> list[Check]:
     """The variants of a scene against it.
 
     Args:
         scene: The scene with its calibrated material.
-        own: Its ``peak_N``, ``work_J`` and ``unbooked_J``.
+        own: Its simulation.
         store: Where :func:`check_errands` were kept.
+        stroke: What the trace has of the stroke [m].
 
     Raises:
         KeyError: They were not made.
@@ -95,9 +101,9 @@ def check(scene: Scene, own: Mapping[str, float], store: EvaluationStore) -> lis
     out = []
     for name, vary in VARIANTS.items():
         run = store.last(_key(vary(scene)))
-        if run.ok and own["peak_N"] > 0 and own["work_J"] > 0:
-            peak, work = (run.scalars[q] / own[q] - 1 for q in ("peak_N", "work_J"))
-            unbooked = run.scalars["unbooked_J"] / run.scalars["work_J"] - own["unbooked_J"] / own["work_J"]
+        if run.ok and min(own.until(stroke)) > 0:
+            peak, work = (new / old - 1 for new, old in zip(run.until(stroke), own.until(stroke), strict=True))
+            unbooked = _unbooked(run) - _unbooked(own)
             out.append(Check(name, None, peak, work, unbooked))
         else:
             out.append(Check(name, run.reason or "no force", None, None))

@@ -94,6 +94,12 @@ class Evaluation:
         """Whether the run reached the end of its stroke."""
         return self.status == "ok"
 
+    def until(self, stroke: float) -> tuple[float, float]:
+        """Largest force [N] and work [J] up to a stroke [m], by which a simulation may be longer than the trace it is compared with."""
+        steps = np.diff(self.stroke, prepend=0.0)
+        last, work = (np.interp(stroke, self.stroke, values) for values in (self.force, np.cumsum(self.force * steps)))
+        return max(float(self.force[self.stroke <= stroke].max(initial=0.0)), float(last)), float(work)
+
 
 class Evaluator(Protocol):
     """Whatever runs simulations: a pool of processes, a cache before it, or a fake."""

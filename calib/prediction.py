@@ -15,7 +15,7 @@ from calib.outputs import prepare, write_csv, write_json
 from calib.preparation import conditioned
 from calib.provenance import git_commit, versions
 from calib.request import Request
-from calib.scenes import cut_scene, specimen
+from calib.scenes import cut_scene, specimen, windowed
 from mpm.errors import SimulationError
 
 NRMSE_LIMIT, RATING_LIMIT = 0.10, 0.80
@@ -34,7 +34,9 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
     curve, _ = conditioned(request)
     shape, assumed = specimen(request.food, curve, request.sizing)
     knife = load_knife(request.knife)
-    scene = cut_scene(request.food, shape, knife, stroke=curve.stroke_length_m, dx=request.dx, seed=request.seed)
+    scene = windowed(
+        cut_scene(request.food, shape, knife, stroke=curve.stroke_length_m, dx=request.dx, seed=request.seed)
+    )
     for text in [*request.food.warnings(), *curve.warnings, *assumed]:
         say(text)
     prepare(out, resume=False)

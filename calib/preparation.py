@@ -20,7 +20,7 @@ from calib.objective import Objective, Target
 from calib.parameters import Z95, Parameter, ParameterSet
 from calib.properties import rule_of
 from calib.request import Request, Setup
-from calib.scenes import cut_scene, height_range, specimen
+from calib.scenes import cut_scene, height_range, specimen, windowed
 from mpm.scene import Scene
 
 # Hard bounds reach this factor beyond the literature's range, so that a trace may contradict the literature.
@@ -93,8 +93,14 @@ def set_up(request: Request) -> Setup:
     curve, air_sha256 = conditioned(request)
     shape, assumed = specimen(food, curve, request.sizing)
     knife = load_knife(request.knife)
+    heights = height_range(food, curve, request.sizing)
     fine, screening = (
-        cut_scene(food, shape, knife, stroke=curve.stroke_length_m, dx=request.dx, seed=request.seed, coarse=coarse)
+        windowed(
+            cut_scene(
+                food, shape, knife, stroke=curve.stroke_length_m, dx=request.dx, seed=request.seed, coarse=coarse
+            ),
+            heights,
+        )
         for coarse in (False, True)
     )
     coarse = replace(screening, motion=replace(screening.motion, mach=SCOUTS_HASTE * screening.motion.mach))
@@ -106,7 +112,6 @@ def set_up(request: Request) -> Setup:
     target = Target(curve.stroke, curve.curve, curve.curve_noise_sd_N, curve.peak_sd_N, filter_simulated, u_num)
     given = nuisances(curve, sensor, width_sd=width_sd, scaled=request.scaled)
     scale_sd = math.hypot(width_sd, sensor.gain_sd) if request.scaled else 0.0
-    heights = height_range(food, curve, request.sizing)
     names = request.fit or (food.default_fit if heights is None else (*food.default_fit, "height"))
     objective = Objective(target, fit_parameters(food, names, heights), request.errors, given, scale_sd)
     return Setup(curve, fine, coarse, objective, assumed, request.sizing.kept, air_sha256)

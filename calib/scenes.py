@@ -151,6 +151,23 @@ def place(scene: Scene, values: Mapping[str, float], kept: Collection[str] = ())
     )
 
 
+def windowed(scene: Scene, heights: tuple[float, float, float] | None = None) -> Scene:
+    """The scene with half a cell more of stroke, where the food is that high.
+
+    The simulated force is a mean over a cell of the way, which up to the end of what is compared then has its whole window. Where
+    it has not, the mean is carried on along a line, and what the grid adds with it: the last sample of an apple's cut, its peak, changed
+    by -1.1 to -6.3 % with five other particles, grids and cells, and by +0.9 to -2.3 % with its window.
+
+    Args:
+        scene: The scene of what is compared.
+        heights: As :func:`height_range` gives them; its cell will grow with its height.
+    """
+    own = scene.food.shape.height
+    low, _, high = heights or (own, own, own)
+    stroke = min(scene.motion.stroke + 0.5 * scene.numerics.dx * high / own, low)
+    return replace(scene, motion=replace(scene.motion, stroke=stroke))
+
+
 def elsewhere(scene: Scene, k: int) -> Scene:
     """The scene with other particles and the grid shifted along the blade and upwards, for k = 1, 2, ...
 

@@ -13,6 +13,7 @@ from calib.checks import VARIED, Check, check, check_errands
 from calib.conditioning import Conditioned
 from calib.config import Study
 from calib.documents import tag
+from calib.evaluation import Evaluation
 from calib.heldout import Prediction, predict
 from calib.materials import FoodSpec, dump_material
 from calib.metrics import compare
@@ -79,7 +80,7 @@ def run(
         if errands:
             say(f"simulating the best values of {', '.join(kept)} once more: whole, and {VARIED}")
             pool.errands(errands)
-        checks = {name: check(scene, _own(fitted, name), store) for name, scene in scenes.items()}
+        checks = {n: check(s, _own(fitted, n), store, setups[n].curve.stroke_length_m) for n, s in scenes.items()}
         runs = len(store)
     for name, setup in setups.items():
         write_csv(out / f"curves-{name}.csv", _curves(setup, fitted, held.get(name), name))
@@ -134,9 +135,9 @@ def _scene(specimens: Specimens, fitted: Fitted, name: str) -> Scene:
     return scene.with_material(**values)
 
 
-def _own(fitted: Fitted, name: str) -> Mapping[str, float]:
-    """Named results of the best simulation of one trace."""
-    return fitted.result.best.evaluation.parts[fitted.names.index(name)].scalars
+def _own(fitted: Fitted, name: str) -> Evaluation:
+    """The best simulation of one trace."""
+    return fitted.result.best.evaluation.parts[fitted.names.index(name)]
 
 
 def _summary(

@@ -30,7 +30,7 @@ from calib.second import infer
 from calib.sensitivity import sensitivity
 from calib.store import CachedEvaluator, EvaluationStore, Header
 from calib.summary import add_conditioning, summarise
-from calib.workers import Errand, Workers, plain
+from calib.workers import Errand, Workers
 from mpm.record import ForceRecord
 
 
@@ -107,7 +107,7 @@ def run(
             say(f"simulating the best values once more: {'whole, and ' + VARIED if ended else 'whole'}")
             pool.errands(errands)
         record = read_record(scene, out / "record.h5")
-        checks = check(scene, plain(record)["scalars"], store) if ended else []
+        checks = check(scene, result.best.evaluation, store, setup.curve.stroke_length_m) if ended else []
         start = _start_curve(first, fine) if ended else np.full_like(setup.curve.stroke, np.nan)
     add_conditioning(out / "evaluations.h5", setup.curve)
     return _write(request, setup, result, doubt, record, checks, start, out, time.monotonic() - began)

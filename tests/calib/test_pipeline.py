@@ -16,10 +16,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from calib.calibration import Calibration
-from calib.checks import Check
+from calib.checks import Check, check, check_errands
 from calib.conditioning import condition
 from calib.errors import MaterialError
 from calib.evaluation import Evaluation
@@ -31,7 +32,8 @@ from calib.outputs import prepare, write_json
 from calib.pool import Pool
 from calib.preparation import fit_parameters, set_up
 from calib.provenance import code_key, key_of, versions
-from calib.scenes import Sizing, cut_scene, elsewhere, height_range, place, specimen
+from calib.scenes import Sizing, cut_scene, elsewhere, height_range, place, specimen, windowed
+from calib.store import EvaluationStore, Header
 from calib.trace import Trace
 from calib.verdicts import balances, judge, limits, spent, unbooked
 from calib.workers import DIED, Errand, SceneEvaluator, plain
@@ -126,6 +128,53 @@ def test_fitted_height_takes_the_other_sizes_along():
     free, _ = place(scene, {"height": 1.2 * shape.height})
     assert len(seed(free).x) == len(seed(scene).x)
     assert place(scene, {"E": 1e6}) == (scene, {"E": 1e6})
+
+
+def test_the_mean_over_a_cell_has_its_whole_window_up_to_the_end_of_the_trace(tmp_path):
+    """Half a cell more is simulated than a trace that ends under load shows, at every height that is possible; one that cut through has the
+    food's whole height."""
+    t = np.arange(0, 2.5, 0.01)
+    depth = np.clip((t - 0.5) * 0.02, 0, None)
+    force = 20 * (1 - np.exp(-depth / 0.005)) + np.random.default_rng(0).normal(0, 0.05, len(t))
+    path = tmp_path / "loaded.csv"
+    pd.DataFrame({"time_s": t, "force_N": force, "position_m": 0.06 - depth}).to_csv(path, index=False)
+    setup = set_up(Calibration("cucumber", path).request())
+    length, heights = setup.curve.stroke_length_m, setup.objective.parameters["height"]
+    for scene in (setup.fine, setup.coarse):
+        for height in (heights.low, heights.value, heights.high):
+            placed, _ = place(scene, {"height": height})
+            assert length + 0.5 * placed.numerics.dx <= placed.motion.stroke * (1 + 1e-9)
+            assert placed.motion.stroke <= height * (1 + 1e-9)
+    measured = set_up(Calibration("cucumber", path, height=length + 1e-4).request())
+    assert measured.fine.motion.stroke == measured.fine.food.shape.height
+    whole = cut_scene(load_food("cucumber"), measured.fine.food.shape, load_knife("kitchen"))
+    assert windowed(whole) == whole
+
+
+def test_a_repeated_run_is_compared_over_the_stroke_of_the_trace(tmp_path):
+    """What happens beyond the trace's end changes neither peak nor work; a run that broke down or felt nothing is said to."""
+    stroke = np.linspace(0.001, 0.02, 20)
+    scalars = {"work_J": 1.0, "unbooked_J": 0.1}
+    own = Evaluation(0, {}, "ok", "", 1.0, stroke, np.where(stroke < 0.0155, 10.0, 90.0), scalars)
+    assert own.until(0.015) == pytest.approx((10.0, 0.15))
+    assert own.until(0.0095) == pytest.approx((10.0, 0.095))
+    assert replace(own, force=1e3 * stroke).until(0.0095)[0] == pytest.approx(9.5)
+    with EvaluationStore(tmp_path / "s.h5", Header("", "")) as store:
+        again = iter(
+            (
+                replace(own, force=np.where(stroke < 0.0155, 10.5, 0.0), scalars={"work_J": 2.0, "unbooked_J": 0.4}),
+                replace(own, status="failed", reason="not_finite", fraction=0.5),
+                own,
+            )
+        )
+        for errand in check_errands(PRISM, store):
+            errand.keep(next(again))
+        half, elsewhere_, finer = check(PRISM, own, store, 0.015)
+        assert (half.peak_change, half.work_change) == pytest.approx((0.05, 0.05))
+        assert half.unbooked_change == pytest.approx(0.1) and finer.change == 0.0
+        assert (elsewhere_.reason, elsewhere_.change) == ("not_finite", None)
+        silent = check(PRISM, replace(own, force=0.0 * stroke), store, 0.015)
+        assert {c.reason for c in silent} == {"no force", "not_finite"}
 
 
 def test_height_is_fitted_only_where_it_is_free():

@@ -53,10 +53,20 @@ def test_prediction_needs_a_calibrated_food(capsys, tmp_path):
 
 
 def test_run_that_breaks_down_is_an_error_and_not_a_prediction(material, tmp_path, capsys, monkeypatch):
-    """A run that ends early is one error with its reason and the part that was done; nothing is compared."""
-    whole = Simulation.run
-    monkeypatch.setattr(Simulation, "run", lambda s: replace(whole(s), status="not_finite", fraction=0.4))
+    """A run that ends early is one error with its reason and the part that was done; nothing is compared. Of a food that is higher than
+    the stroke half a cell more is cut."""
+    whole, strokes = Simulation.run, []
+
+    def broken(simulation):
+        strokes.append(simulation.scene.motion.stroke)
+        return replace(whole(simulation), status="not_finite", fraction=0.4)
+
+    monkeypatch.setattr(Simulation, "run", broken)
     command = ["predict", "--food", "banana", "--material", material, *TRACE, "--out", str(tmp_path / "x")]
     assert main(command) == 1
     assert "broke down at 40% of its stroke (not_finite)" in capsys.readouterr().err
     assert not (tmp_path / "x" / "summary.json").exists()
+    for cell in ("6e-3", "5e-3"):
+        higher = [*command, "--height", "0.04", "--speed", "0.015", "--dx", cell]
+        assert main([*higher, "--out", str(tmp_path / cell)]) == 1
+    assert strokes == pytest.approx([0.033, strokes[1], strokes[1] - 5e-4])
