@@ -137,6 +137,13 @@ def agreement(metrics: Metrics) -> list[Verdict]:
     ]
 
 
+def _at_natural_limit(name: str, parameter: Mapping[str, Any]) -> bool:
+    """Whether a parameter at a bound is at the end of what is possible: its interval reaches there, and its value is nearer to that end."""
+    limit = NATURAL_LIMITS.get(name, -math.inf)
+    value, low, high = (parameter[q] for q in ("value", "low95", "high95"))
+    return bool(low <= limit and value - limit < high - value)
+
+
 def judge(
     metrics: Metrics,
     nulls: Mapping[str, Metrics],
@@ -179,7 +186,7 @@ def judge(
     lines += [*balances(momentum_residual, ke_over_ie, parted), *changes(checks)]
     lines += [_nuisance(name, n) for name, n in (nuisances or {}).items() if name in JUDGED]
     on = [n for n, p in parameters.items() if p["verdict"] == "at_bound"]
-    stuck = [n for n in on if n != SIZE and parameters[n]["value"] != NATURAL_LIMITS.get(n)]
+    stuck = [n for n in on if n != SIZE and not _at_natural_limit(n, parameters[n])]
     note = ", ".join(stuck + [f"{n} at its natural limit" for n in on if n not in stuck])
     lines.append(Verdict("parameters at a bound", len(stuck), 0, "", not stuck, note))
     for name in ("held-out specimens", "grid convergence of the calibrated force", "repeated cuts"):

@@ -251,8 +251,8 @@ def test_verdicts_fail_what_fails():
     real = 10 * np.sin(np.pi * s / 0.05)
     nulls = {n: m.metrics for n, m in null_models(s, real).items()}
     parameters = {
-        "E": {"verdict": "at_bound", "value": 1e4},
-        "mu": {"verdict": "at_bound", "value": 0.0},
+        "E": {"verdict": "at_bound", "value": 1e4, "low95": 1e4, "high95": 2e4},
+        "mu": {"verdict": "at_bound", "value": 0.004, "low95": 0.0, "high95": 0.6},
         "R": {"verdict": "identified", "value": 300.0},
     }
     checks = [
@@ -261,15 +261,10 @@ def test_verdicts_fail_what_fails():
         Check("broken", "inverted", None, None),
         Check("cells of two thirds", None, 0.01, 0.01, -0.03),
     ]
-    lines = judge(
-        compare(s, real, 1.2 * real),
-        nulls,
-        momentum_residual=0.02,
-        ke_over_ie=0.2,
-        parted=0.7,
-        parameters=parameters,
-        checks=checks,
+    judged = partial(
+        judge, compare(s, real, 1.2 * real), nulls, momentum_residual=0.02, ke_over_ie=0.2, parted=0.7, checks=checks
     )
+    lines = judged(parameters=parameters)
     failed = {v.name for v in lines if v.passed is False}
     assert failed == {
         "peak force error",
@@ -296,6 +291,8 @@ def test_verdicts_fail_what_fails():
     assert sum(v.passed is None for v in lines) == 3
     bounds = next(v for v in lines if v.name == "parameters at a bound")
     assert bounds.value == 1 and "mu at its natural limit" in bounds.note
+    most = {"mu": {"verdict": "at_bound", "value": 1.19, "low95": 0.0, "high95": 1.2}}
+    assert [v.note for v in judged(parameters=most) if v.name == bounds.name] == ["mu"]
     fracture = {"edge_J_m2": 97.0, "released_J_m2": 52.0}
     said = limits("measured", "speed", "constant", lines, parameters, ["the width is assumed"], fracture)
     for word in (
