@@ -69,6 +69,7 @@ class IsoRating:
         R: Overall rating, 0.4 Z + 0.2 (EP + EM + ES).
         shift: Samples by which the model lags the reference (negative: leads), of 240.
         at_bound: Whether the shift stopped at the end of the searched range; EP then says nothing.
+        without_phase: Where at_bound what Z, EM and ES of the curves as they are give, in R's proportions; else None.
     """
 
     Z: float
@@ -78,6 +79,14 @@ class IsoRating:
     R: float
     shift: int
     at_bound: bool
+    without_phase: float | None = None
+
+    @property
+    def caveat(self) -> str:
+        """What has to be said beside R, as a clause; empty where there is nothing."""
+        if self.without_phase is None:
+            return ""
+        return f"the phase search of R ran to its bound, where its phase part is 0 whatever the model; without it R is {self.without_phase:.3f}"
 
 
 @dataclass(frozen=True)
@@ -235,8 +244,18 @@ def iso18571(stroke: np.ndarray, real: np.ndarray, sim: np.ndarray) -> IsoRating
     corridor = float(np.mean(np.clip((ISO_OUTER - gap) / (ISO_OUTER - ISO_INNER), 0.0, 1.0) ** 2))
     most = int(ISO_SHIFT * ISO_SAMPLES)
     shift = _best_shift(r, m, most)
-    phase = (most - abs(shift)) / most
-    r, m = _overlap(r, m, shift)
+    phase, at_bound = (most - abs(shift)) / most, abs(shift) == most
+    magnitude, slope = _magnitude_and_slope(*_overlap(r, m, shift))
+    rating = float(np.dot(ISO_WEIGHTS, (corridor, phase, magnitude, slope)))
+    if not at_bound:
+        return IsoRating(corridor, phase, magnitude, slope, rating, shift, at_bound)
+    whole, _, *others = ISO_WEIGHTS
+    rest = float(np.dot((whole, *others), (corridor, *_magnitude_and_slope(r, m)))) / (whole + sum(others))
+    return IsoRating(corridor, phase, magnitude, slope, rating, shift, at_bound, rest)
+
+
+def _magnitude_and_slope(r: np.ndarray, m: np.ndarray) -> tuple[float, float]:
+    """The magnitude and the slope part of a rating of two curves."""
     path_r, path_m = _warp(r, m, int(np.ceil(ISO_WARP * len(r))) - 1)
     error = float(np.abs(m[path_m] - r[path_r]).sum() / np.abs(r[path_r]).sum())
     magnitude = max(0.0, 1.0 - error / ISO_MAGNITUDE)
@@ -244,8 +263,7 @@ def iso18571(stroke: np.ndarray, real: np.ndarray, sim: np.ndarray) -> IsoRating
     steep = float(np.abs(slope_r).sum())
     slope_gap = float(np.abs(slope_m - slope_r).sum())
     slope = max(0.0, 1.0 - slope_gap / (ISO_SLOPE * steep)) if steep > 0.0 else float(slope_gap == 0.0)
-    rating = float(np.dot(ISO_WEIGHTS, (corridor, phase, magnitude, slope)))
-    return IsoRating(corridor, phase, magnitude, slope, rating, shift, abs(shift) == most)
+    return magnitude, slope
 
 
 def _checked(stroke: np.ndarray, real: np.ndarray, sim: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

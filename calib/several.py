@@ -224,7 +224,7 @@ def _parameters(study: Study, fitted: Fitted) -> dict[str, Any]:
 
 def _limits(held: Mapping[str, Prediction], setups: Mapping[str, Setup], scatter: float) -> list[str]:
     """What the study does not show, one sentence each."""
-    said = []
+    said = [f"{name}: {p.metrics.iso18571.caveat}." for name, p in held.items() if p.metrics.iso18571.caveat]
     if held:
         said.append(
             f"The figures of {', '.join(held)} under hold_out are predictions; those under traces are in-sample."

@@ -290,4 +290,5 @@ def _metrics(s: Data) -> Data:
         "iso": {k: quantity(iso[k], "-") for k in ("Z", "EP", "EM", "ES", "R")},
         "shift": count(iso["shift"]),
         "at_bound": bool(iso["at_bound"]),
+        "without_phase": quantity(iso.get("without_phase"), "-"),
     }  # fmt: skip

@@ -24,6 +24,7 @@ from calib.cli.options import (
     titled,
     workers_of,
 )
+from calib.metrics import IsoRating
 from calib.objective import ErrorModel
 from calib.progress import ProgressBar
 from calib.request import Request
@@ -193,6 +194,8 @@ def study_text(summary: dict[str, Any], out: Path) -> str:
                 f"  {'pass' if t['passed'] else 'FAIL'}  {name + ', ' + words:18s}{m['peak_error']:+8.1%}{m['nrmse']:8.3f}"
                 f"{m['shape_error']:8.3f}{m['iso18571']['R']:7.3f}{within:>9s}{t['factor']:8.3g}"
             )
+            caveat = IsoRating(**m["iso18571"]).caveat
+            lines += [f"        {caveat}"] if caveat else []
     lines.append(f"  {'fitted':24s}{'value':>10s} {'':6s}{'95 % interval':>24s}")
     for name, p in summary["parameters"].items():
         interval = "" if p["low95"] is None else f"{p['low95']:.3g} to {p['high95']:.3g}"

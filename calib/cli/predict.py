@@ -9,6 +9,7 @@ from pathlib import Path
 from calib.cli.calibrate import add_trace, measured
 from calib.cli.options import add_food, add_run, note, print_json
 from calib.errors import MaterialError
+from calib.metrics import IsoRating
 
 HELP = "predict a measured cut with values calibrated on another"
 DESCRIPTION = """Simulate the cut of a trace with the values of --material, without fitting
@@ -55,5 +56,8 @@ def run(args: argparse.Namespace) -> int:
             f"NRMSE {m['nrmse']:.3f} (limit {limits['nrmse']:.2f}), R {m['iso18571']['R']:.3f} (limit {limits['rating']:.2f}), "
             f"shape {m['shape_error']:.3f}, work {m['work_error']:+.1%}"
         )
+        caveat = IsoRating(**m["iso18571"]).caveat
+        if caveat:
+            print(f"  {caveat}")
         print(f"  wrote {out}")
     return 0 if summary["passed"] else 2

@@ -142,7 +142,7 @@ def test_dictionary_goes_into_json() -> None:
     """The nested dictionary has the documented keys and survives strict JSON."""
     d = json.loads(json.dumps(compare(S, S * 300.0, HALF_SINE).as_dict(), allow_nan=False))
     assert set(d["sprague_geers"]) == {"M", "P", "C"}
-    assert set(d["iso18571"]) == {"Z", "EP", "EM", "ES", "R", "shift", "at_bound"}
+    assert set(d["iso18571"]) == {"Z", "EP", "EM", "ES", "R", "shift", "at_bound", "without_phase"}
     assert set(d) == set(Metrics.__dataclass_fields__)
 
 
@@ -186,12 +186,18 @@ def test_iso_slope_by_hand() -> None:
     assert iso18571(S, line, 3.0 - line).ES == pytest.approx(0.0, abs=1e-9)
 
 
-def test_iso_phase_of_a_ramp_says_that_it_says_nothing() -> None:
-    """A slower exponential rise is matched by shifting to the bound, and the rating flags it."""
+def test_iso_phase_of_a_ramp_says_that_it_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A slower exponential rise is matched by shifting to the bound; the rating flags it, and gives that of the other parts unshifted."""
     x = np.linspace(0.0, 1.0, ISO_SAMPLES)
     rating = iso18571(x, 1.0 - np.exp(-4.0 * x), 0.8 * x**1.2)
     assert rating.at_bound
     assert rating.EP == 0.0
+    assert rating.without_phase is not None and rating.without_phase < 0.3  # a curve that is far off stays so
+    assert f"without it R is {rating.without_phase:.3f}" in rating.caveat
+    assert iso18571(x, x, x).without_phase is None and iso18571(x, x, x).caveat == ""
+    monkeypatch.setattr("calib.metrics._best_shift", lambda *_: 0)
+    unshifted = iso18571(x, 1.0 - np.exp(-4.0 * x), 0.8 * x**1.2)
+    assert unshifted.EP == 1.0 and rating.without_phase == pytest.approx((unshifted.R - 0.2) / 0.8)
 
 
 def test_iso_warping_stays_in_its_window() -> None:
