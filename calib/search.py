@@ -38,7 +38,7 @@ from calib.evaluation import Evaluation, Evaluator
 from calib.joint import JointObjective, residual
 from calib.objective import Objective, Trial
 from calib.options import FitOptions
-from calib.progress import Progress, onward
+from calib.progress import Progress, at_most, onward
 from calib.surrogate import Surrogate, coordinate_unit
 from calib.uncertainty import EXPLAINED
 from mpm.errors import SimulationError
@@ -373,8 +373,6 @@ class Search:
         """Call the progress callback."""
         if self.progress is None:
             return
-        seconds = [t.evaluation.seconds / (self.options.coarse_cost if t.coarse else 1.0) for t in self.trials]
-        rest = self.options.budget - self.spent
         misfit = self.best.misfit if self.finished else math.inf
         self.progress(
             Progress(
@@ -383,7 +381,7 @@ class Search:
                 budget=self.options.budget,
                 failed=sum(not t.ok for t in self.trials),
                 misfit=misfit,
-                eta_s=float(np.mean(seconds)) * rest / self.options.batch,
+                eta_s=at_most(self.trials, self.options.budget - self.spent, self.options),
                 stage=f"{stage} on coarse cells" if self.trials[-1].coarse else stage,
             )
         )

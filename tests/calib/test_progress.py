@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from calib.options import FitOptions
-from calib.progress import Countdown, Progress, ProgressBar, clock, onward
+from calib.progress import COARSE_TIME, Countdown, Progress, ProgressBar, at_most, clock, onward
 
 
 class Terminal(io.StringIO):
@@ -44,6 +44,17 @@ def test_another_search_is_told_as_part_of_all() -> None:
     told(Progress(5, 5.0, 39.0, 1, 12.0, 68.0, "round"))
     assert seen == [Progress(15, 12.0, 80.0, 2, 9.0, 136.0, "round")]
     assert onward(None, before, before[-1], FitOptions()) is None  # type: ignore[arg-type]
+
+
+def test_time_left_is_that_of_default_runs() -> None:
+    """Coarse runs take less of the time than of the budget, and the rest may be spent on default ones; with no such run yet they tell."""
+    runs = [
+        SimpleNamespace(coarse=coarse, evaluation=SimpleNamespace(seconds=s))
+        for coarse, s in ((True, 0.5), (True, 0.7), (False, 6.0), (False, 8.0))
+    ]
+    options = FitOptions(budget=80.0, batch=2)
+    assert at_most(runs, 10.0, options) == pytest.approx(35.0)  # type: ignore[arg-type]
+    assert at_most(runs[:2], 10.0, options) == pytest.approx(3.0 / COARSE_TIME)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
