@@ -195,7 +195,8 @@ def judge(
 
 
 HELD_WEAK = {"R": 0.92, "R_skin": 0.90, "E": 0.88, "yield_stress": 0.80, "initiation_depth": 0.84}
-"""Part of the weak 95 % intervals that held the truth on 100 made-up bananas, where it is less (docs/pitfalls.md, how far to trust an interval)."""
+"""Part of the weak 95 % intervals that held the truth on 100 made-up bananas, where it is less and there are
+more than ten (docs/pitfalls.md, how far to trust an interval)."""
 
 
 def limits(

@@ -394,15 +394,15 @@ def test_progress_is_reported_after_each_run() -> None:
 def test_noise_is_not_fitted() -> None:
     """Noise alone must not keep the search going: it stops well before a large budget.
 
-    With five times the usual noise the process of one in eight seeds (here 5) keeps promising gains, and only the lack of them ends it.
+    With five times the usual noise the process of three in ten seeds keeps promising gains, and only the lack of them ends it.
     """
     statuses = []
-    for size, seed in ((0.01, 2), (0.05, 0), (0.05, 5)):
-        fake = Fake(two_terms, noisy=size)
-        result = calibrate(two_goal(), fake, options=FitOptions(budget=150, design=3, seed=seed))
-        assert fake.runs < 100
-        statuses.append(result.status)
-    assert set(statuses) == {"converged", "stalled"}
+    for size in (0.01, 0.05):
+        for seed in range(10):
+            fake = Fake(two_terms, noisy=size)
+            statuses.append(calibrate(two_goal(), fake, options=FitOptions(budget=150, design=3, seed=seed)).status)
+            assert fake.runs < 100
+    assert set(statuses) == {"converged", "stalled"} and statuses.count("converged") > statuses.count("stalled")
 
 
 def stuck(monkeypatch: pytest.MonkeyPatch, start: Mapping[str, float]) -> None:

@@ -50,15 +50,19 @@ from tests.mpm.scenes import PRISM
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def trace(loaded: bool) -> Any:
+def recorded(loaded: bool) -> Trace:
     """A cut with a position over 40 mm that ends under load or released."""
     t = np.arange(0, 3, 0.01)
     s = np.clip((t - 0.5) * 0.02, 0, 0.04)
     force = 20 * (1 - np.exp(-s / 0.005)) if loaded else 20 * np.sin(np.pi * s / 0.04)
     noisy = force + np.random.default_rng(0).normal(0, 0.05, len(t))
     position = 0.06 - 0.02 * np.minimum(t, 2.5)
-    raw = Trace(time=t, force=noisy, position=position, source="made.csv", sha256="", columns={}, label="measured")
-    return condition(raw)
+    return Trace(time=t, force=noisy, position=position, source="made.csv", sha256="", columns={}, label="measured")
+
+
+def trace(loaded: bool) -> Any:
+    """The same, conditioned."""
+    return condition(recorded(loaded))
 
 
 def test_height_follows_the_stroke():
@@ -133,11 +137,8 @@ def test_fitted_height_takes_the_other_sizes_along():
 def test_the_mean_over_a_cell_has_its_whole_window_up_to_the_end_of_the_trace(tmp_path):
     """Half a cell more is simulated than a trace that ends under load shows, at every height that is possible; one that cut through has the
     food's whole height."""
-    t = np.arange(0, 2.5, 0.01)
-    depth = np.clip((t - 0.5) * 0.02, 0, None)
-    force = 20 * (1 - np.exp(-depth / 0.005)) + np.random.default_rng(0).normal(0, 0.05, len(t))
-    path = tmp_path / "loaded.csv"
-    pd.DataFrame({"time_s": t, "force_N": force, "position_m": 0.06 - depth}).to_csv(path, index=False)
+    path, raw = tmp_path / "loaded.csv", recorded(loaded=True)
+    pd.DataFrame({"time_s": raw.time, "force_N": raw.force, "position_m": raw.position}).to_csv(path, index=False)
     setup = set_up(Calibration("cucumber", path).request())
     length, heights = setup.curve.stroke_length_m, setup.objective.parameters["height"]
     for scene in (setup.fine, setup.coarse):

@@ -45,6 +45,16 @@ def test_prediction_takes_one_number_from_the_trace(material, tmp_path, capsys):
     assert "one factor" in capsys.readouterr().out
 
 
+def test_a_void_phase_is_said_beside_the_rating(material, tmp_path, capsys, monkeypatch):
+    """Where the phase search ends at its bound, R is printed with what it is without its phase, which decides nothing."""
+    monkeypatch.setattr("calib.metrics._best_shift", lambda r, m, most: most)
+    main(["predict", "--food", "banana", "--material", material, *TRACE, "--out", str(tmp_path / "x")])
+    summary = valid(json.loads((tmp_path / "x" / "summary.json").read_text()))
+    rating = summary["metrics"]["iso18571"]
+    assert f"without it R is {rating['without_phase']:.3f}" in capsys.readouterr().out
+    assert rating["R"] < 0.8 < rating["without_phase"] and not summary["passed"]
+
+
 def test_prediction_needs_a_calibrated_food(capsys, tmp_path):
     """Without --material there is nothing that was calibrated: one error, nothing written."""
     assert main(["predict", "--food", "banana", *TRACE, "--out", str(tmp_path / "x")]) == 1

@@ -201,6 +201,22 @@ def test_one_cut_is_held_out_for_good(study: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_void_phase_is_said_and_does_not_pass(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A prediction whose phase search ends at its bound fails by R, and terminal and limits say what R is without its phase."""
+    monkeypatch.setattr("calib.metrics._best_shift", lambda r, m, most: most)
+    study.write_text(study.read_text().replace("hold_out: each", "hold_out: [b]"))
+    code, summary = ran(study, tmp_path / "out")
+    held = summary["hold_out"]["b"]
+    rating = held["metrics"]["iso18571"]
+    said = f"without it R is {rating['without_phase']:.3f}"
+    assert code == 2 and not held["passed"] and rating["R"] < 0.8 < rating["without_phase"]
+    assert said in capsys.readouterr().out
+    assert any(text.startswith("b: ") and said in text for text in summary["limits"])
+
+
+@pytest.mark.slow
 def test_a_force_without_balance_does_not_pass(study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Curves as good as before, but 2 % of the momentum is missing: neither the fit nor the prediction passes."""
     monkeypatch.setattr(FakePool, "balances", {"momentum_residual": 0.02, "ke_over_ie": 0.001})
