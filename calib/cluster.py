@@ -34,6 +34,7 @@ CONNECT_S = 5.0  # time in which a scheduler must answer
 LOOK_S = 1.0  # time between two looks at which workers there are, while no run ends
 FETCH_S = 30.0  # time in which the result of a run that has ended must arrive
 DESERTED_S = 120.0  # time without any worker after which a study gives up; a nanny needs seconds to start another
+GREETINGS = 5  # attempts to be greeted by a scheduler that is telling its clients news
 KILLS = 2  # workers that a job may kill
 EXECUTED = ("mpm", "calib", "fem_reference", "robot")  # packages whose code runs in workers
 LOST = object()  # in place of the result of a job that did not come to its end
@@ -191,7 +192,7 @@ def _connect(address: str) -> Client:
     try:
         kind = asyncio.run(_kind(address))
         if kind == "Scheduler":
-            return Client(address, timeout=CONNECT_S, set_as_default=False, name="cutcal")
+            return _client(functools.partial(Client, address, timeout=CONNECT_S, set_as_default=False, name="cutcal"))
         why = f"it is the address of a {kind.lower()}"
     except (OSError, ValueError, TypeError, asyncio.TimeoutError) as e:  # TypeError: TLS that is not configured
         why = str(e) or "something else listens there"
@@ -199,6 +200,16 @@ def _connect(address: str) -> Client:
         f"--scheduler {address}: no Dask scheduler answers there ({why}); start one with 'dask scheduler', which prints its "
         "address"
     )
+
+
+def _client(connect: Callable[[], Client]) -> Client:
+    """A client. Whatever the scheduler tells all its clients within milliseconds of its greeting, such as what another study
+    has cancelled, arrives together with that; ``Client`` asserts that a greeting comes alone. Who connects again is greeted anew.
+    """
+    for _ in range(GREETINGS):
+        with suppress(AssertionError):
+            return connect()
+    raise OSError("it is too busy to greet a client")
 
 
 async def _kind(address: str) -> str:

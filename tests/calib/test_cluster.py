@@ -366,6 +366,30 @@ def test_a_scheduler_that_ends_is_said(tmp_path, monkeypatch):
                     made.stop(made.processes[0])
 
 
+@pytest.mark.parametrize("greeted", [True, False])
+def test_news_that_comes_with_the_greeting(two, monkeypatch, greeted):
+    """What a scheduler tells all its clients while one connects is no fault: it connects again, and not for ever."""
+    import distributed
+
+    connected = distributed.Client._ensure_connected
+    attempts = []
+
+    async def crowded(self: Any, timeout: float | None = None) -> None:
+        attempts.append(self)
+        await connected(self, timeout)
+        assert greeted and len(attempts) > 2, "as Client says where a greeting does not come alone"
+
+    full(two).close()
+    monkeypatch.setattr(distributed.Client, "_ensure_connected", crowded)
+    if greeted:
+        with Cluster(two.address) as there:
+            assert there.workers == 2 and len(attempts) == 3
+    else:
+        with pytest.raises(ClusterError, match="too busy to greet"):
+            Cluster(two.address)
+        assert len(attempts) == cluster.GREETINGS
+
+
 def usable(made: Servers) -> bool:
     """Whether there is a worker."""
     try:
