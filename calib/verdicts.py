@@ -255,4 +255,15 @@ def limits(
         "One finer grid was tried, which gives a difference but neither an order nor an uncertainty (cutcal converge --material "
         "measures both; calibrate --u-num takes them into the likelihood)."
     )
+    said += [f"{remedy[0].upper()}{remedy[1:]}." for remedy in map(remedied, verdicts) if remedy]
     return said
+
+
+def remedied(line: Verdict) -> str:
+    """What to do about a line of the table that failed, where a command does it; empty for all others."""
+    if line.name != FINER_GRID or line.passed is not False:
+        return ""
+    return (
+        "values and intervals answer for these cells alone: cutcal converge --material measures what they leave out, and the same "
+        "calibration with --u-num takes it into the likelihood"
+    )

@@ -28,6 +28,7 @@ from calib.metrics import IsoRating
 from calib.objective import ErrorModel
 from calib.progress import ProgressBar
 from calib.request import Request
+from calib.verdicts import Verdict, remedied
 from mpm.errors import CutcalError
 
 HELP = "fit a food to a measured knife-force trace, and report"
@@ -215,6 +216,8 @@ def verdict_text(summary: dict[str, Any], out: Path) -> str:
         value = "" if v["value"] is None else f"{v['value']:.3g}"
         limit = "" if v["limit"] is None else f"limit {v['limit']:.3g}"
         lines.append(f"  {mark:8s}{v['name']:42s}{value:>10s}  {limit}")
+        remedy = remedied(Verdict(**v))
+        lines += [f"  {'':8s}{remedy}"] if remedy else []
     lines.append(f"  {'fitted':8s}{'95 % interval':>42s}")
     for name, p in summary["parameters"].items():
         interval = "" if p["low95"] is None else f"{p['low95']:.3g} to {p['high95']:.3g}"

@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calib.cli.calibrate import verdict_text
 from calib.cli.main import main
 from calib.materials import load_material_file
 from calib.metrics import compare
@@ -73,6 +74,17 @@ def test_numerical_choices_are_checked(finished):
         assert one["reason"] is None
         assert line["value"] == max(abs(one["peak_change"]), abs(one["work_change"]))
         assert 0 < line["value"] < 0.2
+
+
+def test_a_grid_that_counts_is_said_with_a_remedy(finished):
+    """Under the failed line of the terminal stands what to do, and nothing under one that passed."""
+    summary = json.loads((finished[0] / "summary.json").read_text())
+    line = next(v for v in summary["verdicts"] if v["name"] == "cells of two thirds")
+    for passed in (True, False):
+        line["passed"] = passed
+        text = verdict_text(summary, finished[0]).splitlines()
+        place = next(k for k, words in enumerate(text) if line["name"] in words)
+        assert ("--u-num" in text[place + 1]) == (not passed) and "".join(text).count("--u-num") == (not passed)
 
 
 def test_kill_loses_nothing_and_resume_repeats_nothing(killed, finished):

@@ -35,7 +35,7 @@ from calib.provenance import code_key, key_of, versions
 from calib.scenes import Sizing, cut_scene, elsewhere, height_range, place, specimen, windowed
 from calib.store import EvaluationStore, Header
 from calib.trace import Trace
-from calib.verdicts import balances, judge, limits, spent, unbooked
+from calib.verdicts import balances, changes, judge, limits, remedied, spent, unbooked
 from calib.workers import DIED, Errand, SceneEvaluator, plain
 from mpm.errors import SceneError, SimulationError
 from mpm.record import ENERGIES, ForceRecord
@@ -311,6 +311,15 @@ def test_verdicts_fail_what_fails():
     shaky = parameters | {"yield_stress": {**next(iter(parameters.values())), "verdict": "weak"}}
     told = limits("measured", "speed", "constant", lines, shaky, [])
     assert any("Weak intervals" in text and "for yield_stress" in text and "for R" not in text for text in told)
+
+
+@pytest.mark.parametrize("change", [0.01, -0.08])
+def test_a_force_that_hangs_on_the_cells_says_what_to_do(change):
+    """The remedy is among the limits of a calibration whose finer grid fails, and of no other."""
+    lines = changes([Check("slower", None, 0.01, -0.06), Check("cells of two thirds", None, 0.01, change, 0.0)])
+    said = limits("measured", "position", "air", lines, {}, [])
+    assert [remedied(line) != "" for line in lines] == [False, change < -0.05, False]
+    assert any("Values and intervals answer for these cells alone" in text for text in said) == (change < -0.05)
 
 
 def test_where_the_work_went_is_said_largest_first():
