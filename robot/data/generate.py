@@ -17,7 +17,7 @@ from calib.progress import Countdown
 from calib.provenance import code_key, git_commit, key_of, versions
 from calib.workers import Workers
 from robot.data.manifest import Draw, Manifest
-from robot.data.shards import META, PART, SHARD, pack, write_part, write_shard
+from robot.data.shards import META, PART, SHARD, episodes_of, keep, pack, write_shard
 from robot.language import instructions
 from robot.planner import RATE
 from robot.world import ENV, World, environment
@@ -158,7 +158,7 @@ def generate(
                 raise OutputError(
                     f"trajectory {own[place]}: its process was killed twice, perhaps for lack of memory; add --resume"
                 )
-            write_part(out, own[place], made["content"])
+            keep(out / PART.format(own[place]), made["content"])
             done += 1
             say(_told(made["about"], f"{done} of {len(todo)}, {rest.left(1)}"))
         _close(out, groups, info)
@@ -209,9 +209,8 @@ def _close(out: Path, groups: list[range], info: dict[str, Any]) -> None:
 
 def _conclude(out: Path, about: dict[str, Any], command: tuple[str, ...]) -> dict[str, Any]:
     """The document, with what an episode takes and what the whole published set would."""
-    episodes = [
-        e for p in sorted(out.glob("shard-*.json")) for e in json.loads(p.read_text(encoding="utf-8"))["episodes"]
-    ]
+    episodes = [one for path in sorted(out.glob("shard-*.h5")) for one in episodes_of(path)]
+    before = json.loads((out / META).read_text(encoding="utf-8"))
     n = max(len(episodes), 1)
     mean = {part: sum(e["seconds"][part] for e in episodes) / n for part in ("solver", "robot")}
     document = {
@@ -226,6 +225,7 @@ def _conclude(out: Path, about: dict[str, Any], command: tuple[str, ...]) -> dic
         "seconds_per_episode": mean,
         "most_solver_s": max((e["seconds"]["solver"] for e in episodes), default=0.0),
         "core_hours_of_21000": WHOLE_SET * sum(mean.values()) / 3600,
+        **({"pictures": before["pictures"]} if "pictures" in before else {}),
         "bytes": sum(p.stat().st_size for p in out.glob("shard-*")),
         "command": list(command),
         "versions": versions(),

@@ -14,9 +14,11 @@ from typing import Any
 import numpy as np
 
 from calib.errors import OutputError
+from calib.workers import Workers
 from robot.data.demonstrate import OPEN
+from robot.data.pictures import VIEWS
 from robot.data.shards import Stored
-from robot.data.views import VIEWS, View, check, views
+from robot.data.views import View, check, views
 from robot.planner import RATE
 
 VERSION = "v3.0"
@@ -114,6 +116,7 @@ def export(
     *,
     scenes: Sequence[int] = (),
     pixels: int = 128,
+    pool: Workers | None = None,
     say: Callable[[str], None] = lambda text: None,
 ) -> dict[str, Any]:
     """Write a LeRobotDataset v3.0.
@@ -126,6 +129,7 @@ def export(
         out: Folder that is made.
         scenes: Backgrounds that are rendered; without any there are no pictures.
         pixels: Width and height of the pictures.
+        pool: Where pictures are rendered that the dataset does not have yet.
         say: Called with a line after each episode.
 
     Returns:
@@ -141,7 +145,7 @@ def export(
         raise OutputError(f"dataset export: {e.name} is not installed; pip install 'cutcal[data]'") from None
     check(out, scenes)
     writer = _Writer(out, pixels if scenes else 0)
-    for view in views(folder, scenes, pixels, say):
+    for view in views(folder, scenes, pixels, pool, say):
         writer.add(view)
     return writer.close()
 

@@ -20,6 +20,7 @@ import h5py
 import numpy as np
 
 from calib.errors import OutputError
+from calib.workers import Workers
 from robot.data.shards import trajectories
 from robot.data.views import View, check_pictured, views
 
@@ -32,7 +33,13 @@ TASKS, STATISTICS = "tasks.json", "statistics.json"
 
 
 def export(
-    folder: Path, out: Path, *, scenes: Sequence[int], pixels: int = 128, say: Callable[[str], None] = lambda text: None
+    folder: Path,
+    out: Path,
+    *,
+    scenes: Sequence[int],
+    pixels: int = 128,
+    pool: Workers | None = None,
+    say: Callable[[str], None] = lambda text: None,
 ) -> dict[str, Any]:
     """Write a folder for each task, tasks.json and statistics.json.
 
@@ -41,6 +48,7 @@ def export(
         out: Folder that is made.
         scenes: Backgrounds that are rendered, at least one; each makes an episode of its own.
         pixels: Width and height of the pictures.
+        pool: Where pictures are rendered that the dataset does not have yet.
         say: Called with a line after each episode.
 
     Returns:
@@ -53,7 +61,7 @@ def export(
     from PIL import Image
 
     tasks: dict[str, dict[str, Any]] = {}
-    for view in views(folder, scenes, pixels, say):
+    for view in views(folder, scenes, pixels, pool, say):
         name = task_of(view.stored.about["food"], view.stored.about["task"])
         home = out / name / "motionplanning"
         known = tasks.setdefault(name, {"instruction": view.sentence, "instructions": [], "episodes": 0})

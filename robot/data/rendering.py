@@ -10,8 +10,8 @@ import numpy as np
 import robot.intsim  # noqa: F401
 from mpm.errors import CutcalError
 from robot.cuts import CutSpec
+from robot.data.pictures import VIEWS
 from robot.data.shards import Stored, item_of
-from robot.data.views import VIEWS
 from robot.scenery import COLOURS
 from robot.suites import Episode
 from robot.world import ENV

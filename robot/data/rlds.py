@@ -15,8 +15,10 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from calib.workers import Workers
 from robot.data.lerobot import columns
-from robot.data.views import VIEWS, View, check_pictured, views
+from robot.data.pictures import VIEWS
+from robot.data.views import View, check_pictured, views
 
 NAME, VERSION = "cutcal", "1.0.0"
 VALIDATION = 20  # every so many-th trajectory is kept for validation
@@ -26,7 +28,13 @@ CLASS = "tensorflow_datasets.core.features."
 
 
 def export(
-    folder: Path, out: Path, *, scenes: Sequence[int], pixels: int = 128, say: Callable[[str], None] = lambda text: None
+    folder: Path,
+    out: Path,
+    *,
+    scenes: Sequence[int],
+    pixels: int = 128,
+    pool: Workers | None = None,
+    say: Callable[[str], None] = lambda text: None,
 ) -> dict[str, Any]:
     """Write ``cutcal/1.0.0`` with the splits train and val.
 
@@ -39,6 +47,7 @@ def export(
         out: Folder that is made.
         scenes: Backgrounds that are rendered, at least one.
         pixels: Width and height of the pictures.
+        pool: Where pictures are rendered that the dataset does not have yet.
         say: Called with a line after each episode.
 
     Returns:
@@ -53,7 +62,7 @@ def export(
     counts, sizes = {"train": 0, "val": 0}, {"train": 0, "val": 0}
     files = {split: (home / _file(split)).open("wb") for split in counts}
     try:
-        for view in views(folder, scenes, pixels, say):
+        for view in views(folder, scenes, pixels, pool, say):
             split = "val" if view.stored.about["index"] % VALIDATION == VALIDATION - 1 else "train"
             sizes[split] += write_record(files[split], example(episode(view)))
             counts[split] += 1

@@ -25,7 +25,7 @@ from __future__ import annotations
 import io
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -42,6 +42,7 @@ from robot.planner import PHASES, RATE
 
 SHARD = "shard-{:04d}"
 PART = "part-{:06d}.h5"  # an episode whose shard is not complete
+ABOUT = "about"  # attribute of such a file: the entry in the JSON file
 META = "dataset.json"
 
 
@@ -55,7 +56,7 @@ def pack(track: Track, about: Mapping[str, Any], mpm: Mapping[str, Any]) -> byte
     """
     stream = io.BytesIO()
     with h5py.File(stream, "w") as file:
-        file.attrs["about"] = json.dumps(finite(dict(about)))
+        file.attrs[ABOUT] = json.dumps(finite(dict(about)))
         n = len(track.action)
         force = np.array(track.force, np.float32).reshape(n, -1, 3)
         mean = force.mean(axis=1)
@@ -116,13 +117,12 @@ def _surface(file: h5py.File, track: Track) -> None:
         group.create_dataset("flesh", data=shown[0][4])
 
 
-def write_part(out: Path, index: int, content: bytes) -> None:
-    """Keep an episode until its shard is complete.
+def keep(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all.
 
     Raises:
         OutputError: The disk is full, or the like.
     """
-    path = out / PART.format(index)
     draft = path.with_suffix(".draft")
     try:
         with draft.open("wb") as stream:
@@ -134,46 +134,92 @@ def write_part(out: Path, index: int, content: bytes) -> None:
         raise OutputError(f"{path}: cannot be written ({e.strerror}); what was made before is there") from None
 
 
+def put_together(
+    path: Path, parts: Sequence[Path], beside: Callable[[list[dict[str, Any]]], None] = lambda about: None
+) -> None:
+    """Make one file of several, each of them the group ``traj_k`` of it; a kill leaves them or the file.
+
+    Args:
+        path: The file.
+        parts: The others, in order; they are not removed.
+        beside: Called with what each part is said to be, before the file is there.
+
+    Raises:
+        OutputError: The disk is full, or the like.
+    """
+    draft = path.with_suffix(".draft")
+    listed = []
+    try:
+        with h5py.File(draft, "w") as file:
+            for k, name in enumerate(parts):
+                with h5py.File(name) as part:
+                    group = file.create_group(f"traj_{k}")
+                    for child in part:
+                        part.copy(child, group)
+                    for key in set(part.attrs) - {ABOUT}:
+                        group.attrs[key] = part.attrs[key]
+                    listed.append(json.loads(part.attrs.get(ABOUT, "{}")))
+        beside(listed)
+        os.replace(draft, path)
+    except OSError as e:
+        raise OutputError(f"{path}: cannot be written ({e}); what was made before is there") from None
+
+
 def write_shard(out: Path, number: int, indices: Sequence[int], env_info: Mapping[str, Any]) -> None:
-    """Put episodes together, in order, and remove their parts; a kill leaves them or the shard.
+    """Put episodes together, in order, and remove their parts.
 
     Raises:
         OutputError: The disk is full, or the like.
     """
     path = out / f"{SHARD.format(number)}.h5"
-    draft = path.with_suffix(".draft")
-    episodes = []
-    try:
-        with h5py.File(draft, "w") as file:
-            for k, index in enumerate(indices):
-                with h5py.File(out / PART.format(index)) as part:
-                    group = file.create_group(f"traj_{k}")
-                    for name in part:
-                        part.copy(name, group)
-                    episodes.append({"episode_id": k, **json.loads(part.attrs["about"])})
+    head = {"env_info": dict(env_info), "source_type": "motionplanning", "source_desc": "cutcal"}
+
+    def beside(listed: list[dict[str, Any]]) -> None:
         text = json.dumps(
-            {
-                "env_info": dict(env_info),
-                "source_type": "motionplanning",
-                "source_desc": "cutcal",
-                "episodes": episodes,
-            },
-            indent=1,
+            {**head, "episodes": [{"episode_id": k, **about} for k, about in enumerate(listed)]}, indent=1
         )
         path.with_suffix(".json").write_text(text + "\n", encoding="utf-8")
-        os.replace(draft, path)
-        for index in indices:
-            (out / PART.format(index)).unlink()
-    except OSError as e:
-        raise OutputError(f"{path}: cannot be written ({e}); what was made before is there") from None
+
+    parts = [out / PART.format(index) for index in indices]
+    put_together(path, parts, beside)
+    for part in parts:
+        part.unlink()
 
 
 @dataclass(frozen=True, eq=False)
 class Stored:
-    """One trajectory of a dataset. Attributes: group, open while it is looked at; about, its entry in the JSON file."""
+    """One trajectory of a dataset. Attributes: group, open while it is looked at; about, its entry in the JSON file; number of its shard."""
 
     group: h5py.Group
     about: dict[str, Any]
+    shard: int = 0
+
+
+def shards_of(folder: Path) -> list[Path]:
+    """The shards in a folder, in order.
+
+    Raises:
+        OutputError: There is none that is complete.
+    """
+    shards = sorted(folder.glob("shard-*.h5"))
+    if not shards:
+        raise OutputError(
+            f"{folder}: no shards of a dataset (shard-0000.h5, ...); name the folder that was made, or finish it"
+        )
+    return shards
+
+
+def episodes_of(shard: Path) -> list[dict[str, Any]]:
+    """What the JSON file of a shard says of each trajectory.
+
+    Raises:
+        OutputError: It is damaged.
+    """
+    try:
+        listed: list[dict[str, Any]] = json.loads(shard.with_suffix(".json").read_text(encoding="utf-8"))["episodes"]
+    except (OSError, KeyError, ValueError) as e:
+        raise OutputError(f"{shard}: damaged ({e}); make the dataset again") from None
+    return listed
 
 
 def trajectories(folder: Path) -> Iterator[Stored]:
@@ -182,17 +228,12 @@ def trajectories(folder: Path) -> Iterator[Stored]:
     Raises:
         OutputError: There is no complete shard, or one is damaged.
     """
-    shards = sorted(folder.glob("shard-*.h5"))
-    if not shards:
-        raise OutputError(
-            f"{folder}: no shards of a dataset (shard-0000.h5, ...); name the folder that was made, or finish it"
-        )
-    for path in shards:
+    for n, path in enumerate(shards_of(folder)):
+        listed = episodes_of(path)
         try:
-            listed = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))["episodes"]
             with h5py.File(path) as file:
                 for about in listed:
-                    yield Stored(file[f"traj_{about['episode_id']}"], about)
+                    yield Stored(file[f"traj_{about['episode_id']}"], about, n)
         except (OSError, KeyError, ValueError) as e:
             raise OutputError(f"{path}: damaged ({e}); make the dataset again") from None
 

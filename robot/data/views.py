@@ -11,10 +11,9 @@ import numpy as np
 
 from calib.errors import OutputError
 from calib.progress import Countdown
-from robot.data.manifest import BACKGROUNDS
+from calib.workers import Workers
+from robot.data.pictures import check_scenes, pictures_of, render
 from robot.data.shards import Stored, trajectories
-
-VIEWS = ("front", "side", "wrist")
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,39 +51,38 @@ def check(out: Path, scenes: Sequence[int]) -> None:
     Raises:
         OutputError: A background that does not exist, or a folder that is taken.
     """
-    if any(not 0 <= k < BACKGROUNDS for k in scenes):
-        raise OutputError(f"--scenes {','.join(map(str, scenes))}: give numbers from 0 to {BACKGROUNDS - 1}")
+    check_scenes(scenes)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise OutputError(f"--out {out}: exists already and is never overwritten; choose another folder")
 
 
 def views(
-    folder: Path, scenes: Sequence[int], pixels: int, say: Callable[[str], None] = lambda text: None
+    folder: Path,
+    scenes: Sequence[int],
+    pixels: int,
+    pool: Workers | None = None,
+    say: Callable[[str], None] = lambda text: None,
 ) -> Iterator[View]:
     """Each trajectory for each background; its sentences come in turn.
 
     Args:
         folder: A dataset of :func:`robot.data.generate.generate`.
-        scenes: Backgrounds that are rendered; without any each trajectory comes once, without pictures.
+        scenes: Backgrounds; without any each trajectory comes once, without pictures.
         pixels: Width and height of the pictures.
+        pool: Where those are rendered that are not in the folder yet; they are kept there.
         say: Called with a line after each.
 
     Raises:
-        CutcalError: There is no renderer, or the folder holds no dataset.
+        CutcalError: There is no renderer, or the folder holds no dataset, or not the pictures and there is no pool.
     """
+    if scenes and pool is not None:
+        render(folder, scenes, pixels, pool, say)
     total = sum(1 for _ in trajectories(folder)) * max(len(scenes), 1)
     rest, done = Countdown(max(total, 1)), 0
     for place, scene in enumerate(scenes or [None]):
-        renderer = None
-        if scene is not None:
-            from robot.data.rendering import Renderer
-
-            renderer = Renderer(scene, pixels)
         for k, stored in enumerate(trajectories(folder)):
             sentences = stored.about["instructions"]
-            pictures = renderer.pictures(stored) if renderer is not None else {}
+            pictures = {} if scene is None else pictures_of(folder, stored, scene, pixels)
             yield View(stored, scene, sentences[(k + place) % len(sentences)], pictures)
             done += 1
             say(f"episode {done} of {total}, {rest.left(1)}")
-        if renderer is not None:
-            renderer.close()

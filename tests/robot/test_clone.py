@@ -14,7 +14,7 @@ from robot.clone import CHUNK, Clone, absolute, bag, relative, seen, words_of
 from robot.cuts import Item, TaskError, target
 from robot.data.demonstrate import Track
 from robot.data.manifest import Manifest
-from robot.data.shards import pack, write_part, write_shard
+from robot.data.shards import PART, keep, pack, write_shard
 from robot.evaluate import evaluate, roll_out
 from robot.language import instructions
 from robot.planner import HOME, plan
@@ -146,7 +146,7 @@ def dataset(folder, count: int) -> None:
             "items": [{"name": i.name, "x": i.x, "y": i.y, "yaw": i.yaw, **vars(i.shape)}],
             "instructions": instructions(episode.spec, k),
         }
-        write_part(folder, k, pack(track, about, {}))
+        keep(folder / PART.format(k), pack(track, about, {}))
     write_shard(folder, 0, range(count), {})
     assert manifest.draw(1).style == "press"
 

@@ -18,7 +18,6 @@ import sapien
 
 from calib.errors import OutputError
 from calib.materials import load_food
-from calib.workers import Workers
 from mpm.errors import CutcalError
 from robot import intsim
 from robot.cuts import target
@@ -32,6 +31,7 @@ from robot.policies import make as make_policy
 from robot.suites import draw
 from robot.world import World, environment, follow
 from tests.calib.documents import valid
+from tests.robot.painter import Here
 
 FOODS = {name: load_food(name) for name in ("strawberry", "banana")}
 QUIET = {"sim_backend": "physx_cpu", "render_backend": "none", "obs_mode": "state", "foods": FOODS}
@@ -262,21 +262,6 @@ def test_pictures_of_a_stored_trajectory_show_what_was_simulated(tmp_path):
         assert frames.shape == (found["about"]["elapsed_steps"], 64, 64, 3) and frames.std() > 10
         assert np.array_equal(frames, again[view])
         assert np.abs(frames.astype(int) - other[view]).mean() > 5
-
-
-class Here(Workers):
-    """Jobs one after the other in this process."""
-
-    def __init__(self) -> None:
-        super().__init__(1, "cpu", 1)
-
-    def close(self) -> None:
-        """Nothing to end."""
-
-    def each(self, work, jobs):
-        """In order."""
-        for k, job in enumerate(jobs):
-            yield k, work(*job, "cpu", 1)
 
 
 def test_a_policy_is_judged_in_closed_loop_with_the_food(tmp_path):

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -13,33 +11,14 @@ from calib.errors import OutputError
 from robot.data import generate as g
 from robot.data.lerobot import FEATURES, columns, export, statistics, together
 from robot.data.manifest import Manifest
+from robot.data.pictures import VIEWS
 from robot.data.shards import trajectories
 from robot.planner import RATE
+from tests.robot.painter import PIXELS, Here, Painter, paint_with
 from tests.robot.test_data import Inline
 
 pq = pytest.importorskip("pyarrow.parquet", reason="the extra [data] is not installed")
 av = pytest.importorskip("av", reason="the extra [data] is not installed")
-
-PIXELS = 32
-
-
-class Painter:
-    """Pictures that tell scene, view and step by their colour."""
-
-    def __init__(self, scene: int, pixels: int) -> None:
-        self.scene, self.pixels = scene, pixels
-
-    def close(self) -> None:
-        """Nothing to give back."""
-
-    def pictures(self, stored):
-        """One colour a picture."""
-        n = len(stored.group["actions"])
-        shades = (10 * np.arange(n) + 40 * self.scene).astype(np.uint8)
-        return {
-            view: np.broadcast_to(shades[:, None, None, None], (n, self.pixels, self.pixels, 3)).copy()
-            for view in ("front", "side", "wrist")
-        }
 
 
 @pytest.fixture
@@ -53,10 +32,8 @@ def stored(tmp_path, monkeypatch):
 @pytest.fixture
 def painted(stored, tmp_path, monkeypatch):
     """Their export before two backgrounds."""
-    module = ModuleType("robot.data.rendering")
-    module.Renderer = Painter
-    monkeypatch.setitem(sys.modules, "robot.data.rendering", module)
-    info = export(stored, tmp_path / "lr", scenes=[0, 2], pixels=PIXELS)
+    paint_with(Painter, monkeypatch)
+    info = export(stored, tmp_path / "lr", scenes=[0, 2], pixels=PIXELS, pool=Here())
     return tmp_path / "lr", info
 
 
@@ -86,9 +63,6 @@ def test_the_columns_are_what_was_stored(stored, painted):
             assert stats[name]["mean"] == pytest.approx(whole.mean(axis=0).tolist())
             assert stats[name]["std"] == pytest.approx(whole.std(axis=0).tolist())
             assert stats[name]["count"] == [first]
-
-
-VIEWS = ("front", "side", "wrist")
 
 
 def trajectories_of(folder) -> list[dict[str, np.ndarray]]:

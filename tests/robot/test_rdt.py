@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections import Counter
-from types import ModuleType
 
 import h5py
 import numpy as np
@@ -17,8 +15,8 @@ from robot.data.manifest import Manifest
 from robot.data.rdt import STATISTICS, TASKS, export, task_of
 from robot.data.shards import trajectories
 from robot.language import parse, same
+from tests.robot.painter import PIXELS, Here, Painter, paint_with
 from tests.robot.test_data import Inline
-from tests.robot.test_lerobot import PIXELS, Painter
 
 Image = pytest.importorskip("PIL.Image", reason="the extra [data] is not installed")
 
@@ -28,10 +26,8 @@ def exported(tmp_path, monkeypatch):
     """Made-up trajectories of two foods before two backgrounds."""
     monkeypatch.setattr(g, "available", lambda: None)
     g.generate(Manifest(trajectories=10, foods=("plum", "kiwi"), suites=("flips",)), tmp_path / "set", Inline())
-    module = ModuleType("robot.data.rendering")
-    module.Renderer = Painter
-    monkeypatch.setitem(sys.modules, "robot.data.rendering", module)
-    tasks = export(tmp_path / "set", tmp_path / "rdt", scenes=[0, 2], pixels=PIXELS)
+    paint_with(Painter, monkeypatch)
+    tasks = export(tmp_path / "set", tmp_path / "rdt", scenes=[0, 2], pixels=PIXELS, pool=Here())
     return tmp_path / "set", tmp_path / "rdt", tasks
 
 

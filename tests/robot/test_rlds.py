@@ -5,8 +5,6 @@ from __future__ import annotations
 import io
 import json
 import struct
-import sys
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -17,8 +15,8 @@ from robot.data.lerobot import columns
 from robot.data.manifest import Manifest
 from robot.data.rlds import VALIDATION, _varint, export
 from robot.data.shards import trajectories
+from tests.robot.painter import PIXELS, Here, Painter, paint_with
 from tests.robot.test_data import Inline
-from tests.robot.test_lerobot import PIXELS, Painter
 
 crc = pytest.importorskip("google_crc32c", reason="the extra [data] is not installed")
 Image = pytest.importorskip("PIL.Image", reason="the extra [data] is not installed")
@@ -81,10 +79,8 @@ def exported(tmp_path, monkeypatch):
     """Twenty-one made-up trajectories before two backgrounds."""
     monkeypatch.setattr(g, "available", lambda: None)
     g.generate(Manifest(trajectories=VALIDATION + 1), tmp_path / "set", Inline(), shard=30)
-    module = ModuleType("robot.data.rendering")
-    module.Renderer = Painter
-    monkeypatch.setitem(sys.modules, "robot.data.rendering", module)
-    export(tmp_path / "set", tmp_path / "rlds", scenes=[0, 2], pixels=PIXELS)
+    paint_with(Painter, monkeypatch)
+    export(tmp_path / "set", tmp_path / "rlds", scenes=[0, 2], pixels=PIXELS, pool=Here())
     return tmp_path / "set", tmp_path / "rlds" / "cutcal" / "1.0.0"
 
 
