@@ -22,7 +22,7 @@ from calib.outputs import write_json
 from calib.progress import Countdown
 from calib.workers import Workers
 from robot.data.manifest import BACKGROUNDS
-from robot.data.shards import META, Stored, episodes_of, keep, put_together, shards_of
+from robot.data.shards import META, Stored, episodes_of, keep, number_of, put_together, shards_of
 
 VIEWS = ("front", "side", "wrist")
 FILE = "pictures-{:d}-{:02d}-{:04d}.h5"  # pixels, background, shard
@@ -57,16 +57,16 @@ def render(
         CutcalError: A background that does not exist, there is no renderer, the folder holds no dataset or cannot be written.
     """
     check_scenes(scenes)
-    shards = [(path, episodes_of(path)) for path in shards_of(folder)]
+    shards = {number_of(path): (path, episodes_of(path)) for path in shards_of(folder)}
     todo = {
         n: [(scene, k) for scene in scenes for k, one in enumerate(listed) if not _there(folder, pixels, scene, n, one)]
-        for n, (_, listed) in enumerate(shards)
+        for n, (_, listed) in shards.items()
     }
-    count, total = sum(map(len, todo.values())), len(scenes) * sum(len(listed) for _, listed in shards)
+    count, total = sum(map(len, todo.values())), len(scenes) * sum(len(listed) for _, listed in shards.values())
     if 0 < count < total:
         say(f"pictures of {total - count} of {total} are there already")
     rest, done = Countdown(max(count, 1)), 0
-    for n, (path, listed) in enumerate(shards):
+    for n, (path, listed) in shards.items():
         for place, made in pool.each(paint, [(_slim(path, k), listed[k], scene, pixels) for scene, k in todo[n]]):
             scene, k = todo[n][place]
             if made is None:

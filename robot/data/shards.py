@@ -209,6 +209,11 @@ def shards_of(folder: Path) -> list[Path]:
     return shards
 
 
+def number_of(shard: Path) -> int:
+    """The number in the name of a shard: those before it may still be missing."""
+    return int(shard.stem.removeprefix("shard-"))
+
+
 def episodes_of(shard: Path) -> list[dict[str, Any]]:
     """What the JSON file of a shard says of each trajectory.
 
@@ -228,12 +233,12 @@ def trajectories(folder: Path) -> Iterator[Stored]:
     Raises:
         OutputError: There is no complete shard, or one is damaged.
     """
-    for n, path in enumerate(shards_of(folder)):
+    for path in shards_of(folder):
         listed = episodes_of(path)
         try:
             with h5py.File(path) as file:
                 for about in listed:
-                    yield Stored(file[f"traj_{about['episode_id']}"], about, n)
+                    yield Stored(file[f"traj_{about['episode_id']}"], about, number_of(path))
         except (OSError, KeyError, ValueError) as e:
             raise OutputError(f"{path}: damaged ({e}); make the dataset again") from None
 

@@ -81,6 +81,20 @@ def test_a_further_background_or_size_is_added_and_physics_never_made_again(made
     assert again["pictures"]["pixels"] == 16 and valid(again)
 
 
+def test_pictures_stay_with_their_shard_where_one_before_it_is_still_missing(made):
+    """Rendered of a dataset that is not finished, they are those of the same trajectories when it is."""
+    late = [made / f"shard-0001{end}" for end in (".h5", ".json")]
+    kept = [path.read_bytes() for path in late]
+    for path in late:
+        path.unlink()
+    render(made, [0], PIXELS, Here())
+    for path, content in zip(late, kept, strict=True):
+        path.write_bytes(content)
+    assert files(made) == ["pictures-32-00-0000.h5", "pictures-32-00-0002.h5"]
+    render(made, [0], PIXELS, Here(SHARD))
+    assert [one.shard for one in trajectories(made)] == [0, 0, 1, 1, 2] and len(list(views(made, [0], PIXELS))) == COUNT
+
+
 def test_one_command_makes_trajectories_and_pictures(tmp_path, monkeypatch, capsys):
     """``generate --scenes``: both, with what each costs; an export then renders nothing."""
     monkeypatch.setattr(g, "available", lambda: None)
