@@ -72,7 +72,7 @@ def render(
             if made is None:
                 raise OutputError(
                     f"pictures of trajectory {listed[k]['index']}: their process was killed twice, perhaps for lack of memory; "
-                    "the same command goes on"
+                    "what was rendered before is kept"
                 )
             keep(folder / PART.format(pixels, scene, listed[k]["index"]), made)
             done += 1

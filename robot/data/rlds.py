@@ -57,12 +57,13 @@ def export(
         CutcalError: A package or the renderer is missing, no background is named, the folder is taken or holds no dataset.
     """
     check_pictured(out, scenes, "RLDS", "google_crc32c", "PIL")
+    shown = views(folder, scenes, pixels, pool, say)
     home = out / NAME / VERSION
     home.mkdir(parents=True)
     counts, sizes = {"train": 0, "val": 0}, {"train": 0, "val": 0}
     files = {split: (home / _file(split)).open("wb") for split in counts}
     try:
-        for view in views(folder, scenes, pixels, pool, say):
+        for view in shown:
             split = "val" if view.stored.about["index"] % VALIDATION == VALIDATION - 1 else "train"
             sizes[split] += write_record(files[split], example(episode(view)))
             counts[split] += 1

@@ -63,7 +63,7 @@ def views(
     pool: Workers | None = None,
     say: Callable[[str], None] = lambda text: None,
 ) -> Iterator[View]:
-    """Each trajectory for each background; its sentences come in turn.
+    """Each trajectory for each background; its sentences come in turn. What has to be rendered is, before this returns.
 
     Args:
         folder: A dataset of :func:`robot.data.generate.generate`.
@@ -77,6 +77,10 @@ def views(
     """
     if scenes and pool is not None:
         render(folder, scenes, pixels, pool, say)
+    return _each(folder, scenes, pixels, say)
+
+
+def _each(folder: Path, scenes: Sequence[int], pixels: int, say: Callable[[str], None]) -> Iterator[View]:
     total = sum(1 for _ in trajectories(folder)) * max(len(scenes), 1)
     rest, done = Countdown(max(total, 1)), 0
     for place, scene in enumerate(scenes or [None]):

@@ -12,6 +12,7 @@ from calib.cli.main import main
 from calib.errors import OutputError
 from mpm.errors import CutcalError
 from robot.data import generate as g
+from robot.data import lerobot, rdt, rlds
 from robot.data.manifest import Manifest
 from robot.data.pictures import VIEWS, available, pictures_of, render
 from robot.data.shards import META, trajectories
@@ -122,6 +123,19 @@ def test_one_command_makes_trajectories_and_pictures(tmp_path, monkeypatch, caps
         main([*export, str(tmp_path / "lerobot")]) == 0
         and main([*export, str(tmp_path / "rlds"), "--format", "rlds"]) == 0
     )
+
+
+@pytest.mark.parametrize("kind", [lerobot, rlds, rdt])
+def test_an_export_that_is_stopped_while_it_renders_can_be_asked_for_again(made, tmp_path, kind):
+    """Its folder is made when the pictures are there, and the second time renders the rest alone."""
+    pytest.importorskip("pyarrow", reason="the extra [data] is not installed")
+    pytest.importorskip("av", reason="the extra [data] is not installed")
+    with pytest.raises(KeyboardInterrupt):
+        kind.export(made, tmp_path / "out", scenes=[0], pixels=PIXELS, pool=Here(2))
+    assert not (tmp_path / "out").exists()
+    rest = Here(COUNT - 2)
+    kind.export(made, tmp_path / "out", scenes=[0], pixels=PIXELS, pool=rest)
+    assert rest.most == 0
 
 
 def test_without_a_renderer_nothing_is_simulated(made, monkeypatch, tmp_path, capsys):
