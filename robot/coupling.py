@@ -19,6 +19,7 @@ from robot.table import crossing
 
 ROOM = 2.0  # empty grid around the food, over half its size: a knife that comes back takes pieces along
 REST = 1e-4  # height at which the edge is on the board [m]
+STANDS = 1e-3  # speed of the edge below which it stands [m/s]: one end of the blade on the board, say, and the middle above it
 NEAR = 0.01  # height of the edge above the food at which its cut is made ready [m]
 TOUCH = 1e-3  # force from which on the knife touches the food, over the weight of the food [-]
 CELLS = 14
@@ -54,8 +55,8 @@ class Coupling:
     The solver's blade stays in the plane in which it came down, across the food's axis: the way of the knife down is passed on, and where
     it ``draws`` its way along the edge and its tilt are too; its way across the blade is not, nor the tilt elsewhere, and both are
     recorded as ``aside`` and ``pitch``. The force has no component across the blade either: of two even halves it has none. A second cut is one of the whole outline at its
-    place. A cut ends when nothing holds any more and the edge rests on the board or turns back: pieces that lie free are no longer
-    followed. It also ends when the knife is above the food again, or the simulation breaks down. It begins only from above: a food
+    place. A cut ends when nothing holds any more and the edge rests on the board or turns back, or stands and the food is in pieces: those that
+    lie free are no longer followed. A knife that goes on being pressed or drawn would take them off the grid. It also ends when the knife is above the food again, or the simulation breaks down. It begins only from above: a food
     that is met from its side is not cut.
 
     Args:
@@ -222,6 +223,14 @@ class Coupling:
         weight = self.live.weight
         self.touching = bool(np.linalg.norm(self.force) > TOUCH * weight)
         above = pose[2] > item.shape.height + NEAR and (self.live.begun or pose[2] > self._begin[2] + NEAR)
-        through = (pose[2] < REST or pose[2] > before) and self.live.begun and self.live.uncut == 0
-        if above or through:
+        if above or (
+            self.live.begun and self.live.uncut == 0 and self._through(before - self.live.height, pose[2], span)
+        ):
             self.end()
+
+    def _through(self, down: float, height: float, span: float) -> bool:
+        """Whether an edge that has passed the whole section is done: in a span of time it went ``down`` as far as the board let it, to ``height`` [m]."""
+        assert self.live is not None
+        if height < REST or down < 0:
+            return True
+        return down < STANDS * span and self.live.pieces().complete

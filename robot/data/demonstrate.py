@@ -12,6 +12,7 @@ from robot.planner import HOME, PHASES, RATE, SPEED, minimum_jerk, plan
 
 REACHED = 2e-4  # height of the edge at which it is on the board [m]
 DEEPEST = 0.08  # way below the board that is commanded at most [m]: 140 N behind the Panda's own gains
+LEVELLED = 0.2  # part of the edge's tilt by which a step of pressing on turns the command back [-]
 HOLD = 0.3  # time that the edge is held on the board [s]
 RETRACT = 1.5  # time of the way back up [s]
 OPEN = -1.0  # of the gripper's action: closed on the handle
@@ -78,6 +79,7 @@ def demonstrate(env: Any, *, style: str = "press", sustained: bool = True, meshe
             whole = len(item.pieces)
             while len(env.coupling.items[0].pieces) == whole and env.pose[2] > REACHED and pose[2] > -DEEPEST:
                 pose[2] -= SPEED / RATE
+                pose[4] -= LEVELLED * env.pose[4]
                 _step(env, track, pose, "cut", meshes)
             for _ in range(round(HOLD * RATE)):
                 _step(env, track, pose, "hold", meshes)

@@ -52,6 +52,21 @@ def test_a_plan_to_the_board_stops_short_and_a_deeper_one_cuts_through():
     assert len(through.items[0].pieces) == 2 and through.live is None
 
 
+def test_a_cut_ends_where_the_knife_stands_and_nothing_holds():
+    """Not while it comes down, and not where it stands in food that holds: with the food in two it need not reach the board."""
+    coupling = Coupling([BERRY], FOODS)
+    pose = np.array([BERRY.x, BERRY.y, 0.045, BERRY.yaw - np.pi / 2, 0.0])
+    while coupling.uncut() > 0:
+        pose[2] -= 5e-4
+        coupling.move(pose, SPAN)
+        if 0.4 < coupling.uncut() < 0.5:
+            coupling.move(pose, SPAN)
+            assert coupling.live is not None
+    assert pose[2] > 2e-4 and coupling.live is not None and not coupling.severed
+    coupling.move(pose, SPAN)
+    assert coupling.live is None and coupling.severed and len(coupling.items[0].pieces) == 2
+
+
 def test_a_knife_that_misses_feels_nothing():
     """Beside the food there is no cut, and above it nothing is simulated."""
     coupling = Coupling([BERRY], FOODS)

@@ -21,7 +21,7 @@ from calib.materials import load_food
 from mpm.errors import CutcalError
 from robot import intsim
 from robot.cuts import target
-from robot.data.demonstrate import demonstrate
+from robot.data.demonstrate import DEEPEST, LEVELLED, demonstrate
 from robot.data.generate import make
 from robot.data.manifest import Manifest
 from robot.data.shards import Stored
@@ -210,6 +210,31 @@ def test_a_sustained_demonstration_parts_what_a_planned_one_leaves_whole():
     assert touched[0] > order.index(PHASES.index("contact")) - 2
     assert all((np.array(f) == 0).all() for f in sustained.force[: touched[0]])
     assert len(sustained.meshes) > 20 and len(sustained.qpos) == len(sustained.action) + 1
+
+
+def test_pressing_on_levels_the_blade(monkeypatch):
+    """The load turns the hand and one end of the blade rests on the board: turned back, the other end parts the rest; without that it hangs."""
+    draw_ = Manifest(trajectories=1, foods=("banana",), suites=("seeds",), styles=("press",)).draw(0)
+    env = environment(World())
+    env.foods = {**env.foods, "banana": draw_.food}
+    found = {}
+    for part in (LEVELLED, 0.0):
+        monkeypatch.setattr("robot.data.demonstrate.LEVELLED", part)
+        env.reset(seed=draw_.seed, options={"episode": draw_.episode})
+        found[part] = demonstrate(env, meshes=False)
+    level, hanging = found.values()
+    assert level.severed[-1] and level.published[-1] and not hanging.severed[-1] and hanging.uncut[-1] > 0.01
+    assert min(p[2] for p in level.command) > min(p[2] for p in hanging.command)
+
+
+def test_a_drawn_cut_ends_when_the_food_is_in_pieces():
+    """With one end of the blade on the board the middle is above it and stands: nothing is pressed further, nor dragged along."""
+    draw_ = Manifest(trajectories=1, foods=("apple",), suites=("seeds",), styles=("slice",)).draw(0)
+    env = environment(World())
+    env.foods = {**env.foods, "apple": draw_.food}
+    env.reset(seed=draw_.seed, options={"episode": draw_.episode, "draws": True})
+    track = demonstrate(env, style="slice", meshes=False)
+    assert track.severed[-1] and track.published[-1] and min(p[2] for p in track.command) > -DEEPEST / 2
 
 
 def test_replaying_the_actions_gives_the_same_path_and_force():
