@@ -7,12 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from calib.knives import load_knife
 from robot.cuts import TaskError, target
 from robot.planner import HOME, PHASES, RATE, SPEED, minimum_jerk, plan
 
 REACHED = 2e-4  # height of the edge at which it is on the board [m]
 DEEPEST = 0.08  # way below the board that is commanded at most [m]: 140 N behind the Panda's own gains
-LEVELLED = 0.2  # part of the edge's tilt by which a step of pressing on turns the command back [-]
+LEVELLED = 0.2  # part of the edge's tilt by which a step of pressing on turns the command back where one end of it is on the board [-]
+LONGEST = 40  # steps in which it is turned at most: as many as the way down to the deepest command takes
+LOW = 5e-4  # height of the lower end of the blade at which it is there [m]
 HOLD = 0.3  # time that the edge is held on the board [s]
 RETRACT = 1.5  # time of the way back up [s]
 OPEN = -1.0  # of the gripper's action: closed on the handle
@@ -58,11 +61,12 @@ def demonstrate(env: Any, *, style: str = "press", sustained: bool = True, meshe
     Args:
         env: A :class:`robot.intsim.CutFoodEnv` that was reset, in joint positions.
         style: Of the motion.
-        sustained: Whether the edge is commanded deeper until the food is in pieces or the board reached, and held there; without it the motion is the
-            planned one, whatever the food does.
+        sustained: Whether the edge is commanded deeper until the food is in pieces or the board reached, and held there; the load turns the hand, and
+            where one end of the blade then rests on the board and the other hangs, it is turned back. Without it the motion is the planned one, whatever
+            the food does.
         meshes: Whether the food's surface is kept.
     """
-    track, episode = Track(), env.episode
+    track, episode, half = Track(), env.episode, load_knife(env.knife).length / 2
     _see(env, track)
     for _ in range(episode.spec.cuts):
         item = (env.coupling if env.coupled else env.table).items[0]
@@ -76,10 +80,18 @@ def demonstrate(env: Any, *, style: str = "press", sustained: bool = True, meshe
                 _step(env, track, pose, str(phase), meshes)
         pose = track.command[-1].copy()
         if sustained:
-            whole = len(item.pieces)
-            while len(env.coupling.items[0].pieces) == whole and env.pose[2] > REACHED and pose[2] > -DEEPEST:
-                pose[2] -= SPEED / RATE
-                pose[4] -= LEVELLED * env.pose[4]
+            whole, turned = len(item.pieces), 0
+            while (
+                len(env.coupling.items[0].pieces) == whole
+                and env.pose[2] > REACHED
+                and pose[2] > -DEEPEST
+                and turned < LONGEST
+            ):
+                if env.pose[2] - half * abs(np.sin(env.pose[4])) < LOW:
+                    pose[4] -= LEVELLED * env.pose[4]
+                    turned += 1
+                else:
+                    pose[2] -= SPEED / RATE
                 _step(env, track, pose, "cut", meshes)
             for _ in range(round(HOLD * RATE)):
                 _step(env, track, pose, "hold", meshes)

@@ -224,7 +224,8 @@ def test_pressing_on_levels_the_blade(monkeypatch):
         found[part] = demonstrate(env, meshes=False)
     level, hanging = found.values()
     assert level.severed[-1] and level.published[-1] and not hanging.severed[-1] and hanging.uncut[-1] > 0.01
-    assert min(p[2] for p in level.command) > min(p[2] for p in hanging.command)
+    turned = [p[4] for p in level.command if p[4] != level.command[0][4]]
+    assert 0 < len(turned) and min(p[2] for p in level.command) > -DEEPEST / 2
 
 
 def test_a_drawn_cut_ends_when_the_food_is_in_pieces():
