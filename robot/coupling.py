@@ -19,7 +19,7 @@ from robot.table import crossing
 
 ROOM = 2.0  # empty grid around the food, over half its size: a knife that comes back takes pieces along
 REST = 1e-4  # height at which the edge is on the board [m]
-STANDS = 1e-3  # speed of the edge below which it stands [m/s]: one end of the blade on the board, say, and the middle above it
+STANDS = 1e-3  # speed of the edge below which it stands [m/s], a fortieth of that of a press: one end of the blade on the board, say, and the middle above it
 NEAR = 0.01  # height of the edge above the food at which its cut is made ready [m]
 TOUCH = 1e-3  # force from which on the knife touches the food, over the weight of the food [-]
 CELLS = 14

@@ -13,9 +13,10 @@ from robot.planner import HOME, PHASES, RATE, SPEED, minimum_jerk, plan
 
 REACHED = 2e-4  # height of the edge at which it is on the board [m]
 DEEPEST = 0.08  # way below the board that is commanded at most [m]: 140 N behind the Panda's own gains
-LEVELLED = 0.2  # part of the edge's tilt by which a step of pressing on turns the command back where one end of it is on the board [-]
+LEVELLED = 0.2  # part of the edge's tilt by which a step of pressing on turns the command back where one end of it is on the board [-]: in a quarter of a
+# second, after the arm, which lags by a tenth
 LONGEST = 40  # steps in which it is turned at most: as many as the way down to the deepest command takes
-LOW = 5e-4  # height of the lower end of the blade at which it is there [m]
+LOW = 5e-4  # height of the lower end of the blade at which it is there [m], half of what the middle hangs above it (1.1 mm, banana)
 HOLD = 0.3  # time that the edge is held on the board [s]
 RETRACT = 1.5  # time of the way back up [s]
 OPEN = -1.0  # of the gripper's action: closed on the handle

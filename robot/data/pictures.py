@@ -57,6 +57,7 @@ def render(
         CutcalError: A background that does not exist, there is no renderer, the folder holds no dataset or cannot be written.
     """
     check_scenes(scenes)
+    about = _about(folder)
     shards = {number_of(path): (path, episodes_of(path)) for path in shards_of(folder)}
     todo = {
         n: [(scene, k) for scene in scenes for k, one in enumerate(listed) if not _there(folder, pixels, scene, n, one)]
@@ -81,7 +82,9 @@ def render(
             )
         for scene in scenes:
             _close(folder, pixels, scene, n, listed)
-    return _conclude(folder, scenes, pixels)
+    found = _summed(folder, scenes, pixels)
+    write_json(folder / META, about | {"pictures": found})
+    return found
 
 
 def available(pool: Workers, scenes: Sequence[int], pixels: int) -> None:
@@ -193,12 +196,23 @@ def _close(folder: Path, pixels: int, scene: int, shard: int, listed: Sequence[d
     parts = [folder / PART.format(pixels, scene, one["index"]) for one in listed]
     if not path.exists():
         put_together(path, parts)
+        return
     for part in parts:
         part.unlink(missing_ok=True)
 
 
-def _conclude(folder: Path, scenes: Sequence[int], pixels: int) -> dict[str, Any]:
-    """What rendering took and takes, which dataset.json is told."""
+def _about(folder: Path) -> dict[str, Any]:
+    """What dataset.json says, before anything is rendered."""
+    shards_of(folder)  # or it is no dataset at all
+    try:
+        found: dict[str, Any] = json.loads((folder / META).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as e:
+        raise OutputError(f"{folder / META}: not there or damaged ({e}); make the dataset again") from None
+    return found
+
+
+def _summed(folder: Path, scenes: Sequence[int], pixels: int) -> dict[str, Any]:
+    """What rendering took and takes."""
     files = sorted(path for scene in scenes for path in folder.glob(f"pictures-{pixels}-{scene:02d}-*.h5"))
     seconds, number = [], 0
     for path in files:
@@ -206,7 +220,7 @@ def _conclude(folder: Path, scenes: Sequence[int], pixels: int) -> dict[str, Any
             seconds += [float(group.attrs["seconds"]) for group in file.values()]
             number += sum(len(column) for group in file.values() for column in group.values())
     mean = sum(seconds) / max(len(seconds), 1)
-    found = {
+    return {
         "scenes": sorted(set(scenes)),
         "pixels": pixels,
         "number": number,
@@ -214,6 +228,3 @@ def _conclude(folder: Path, scenes: Sequence[int], pixels: int) -> dict[str, Any
         "core_hours_of_315000": WHOLE_SET * mean / 3600,
         "bytes": sum(path.stat().st_size for path in files),
     }
-    meta = folder / META
-    write_json(meta, json.loads(meta.read_text(encoding="utf-8")) | {"pictures": found})
-    return found

@@ -141,7 +141,7 @@ def put_together(
 
     Args:
         path: The file.
-        parts: The others, in order; they are not removed.
+        parts: The others, in order; they are removed when the file is there.
         beside: Called with what each part is said to be, before the file is there.
 
     Raises:
@@ -152,15 +152,17 @@ def put_together(
     try:
         with h5py.File(draft, "w") as file:
             for k, name in enumerate(parts):
-                with h5py.File(name) as part:
+                with h5py.File(name) as own:
                     group = file.create_group(f"traj_{k}")
-                    for child in part:
-                        part.copy(child, group)
-                    for key in set(part.attrs) - {ABOUT}:
-                        group.attrs[key] = part.attrs[key]
-                    listed.append(json.loads(part.attrs.get(ABOUT, "{}")))
+                    for child in own:
+                        own.copy(child, group)
+                    for key in set(own.attrs) - {ABOUT}:
+                        group.attrs[key] = own.attrs[key]
+                    listed.append(json.loads(own.attrs.get(ABOUT, "{}")))
         beside(listed)
         os.replace(draft, path)
+        for part in parts:
+            part.unlink()
     except OSError as e:
         raise OutputError(f"{path}: cannot be written ({e}); what was made before is there") from None
 
@@ -180,10 +182,7 @@ def write_shard(out: Path, number: int, indices: Sequence[int], env_info: Mappin
         )
         path.with_suffix(".json").write_text(text + "\n", encoding="utf-8")
 
-    parts = [out / PART.format(index) for index in indices]
-    put_together(path, parts, beside)
-    for part in parts:
-        part.unlink()
+    put_together(path, [out / PART.format(index) for index in indices], beside)
 
 
 @dataclass(frozen=True, eq=False)

@@ -167,10 +167,14 @@ def test_without_a_renderer_nothing_is_simulated(made, monkeypatch, tmp_path, ca
 
 
 def test_pictures_that_are_not_there_or_damaged_are_an_error(made):
-    """Named, with what to do."""
+    """Named, with what to do; of a folder whose document is gone nothing is rendered."""
     with pytest.raises(OutputError, match="pictures-32-00-0000.h5"):
         next(views(made, [0], PIXELS))
     render(made, [0], PIXELS, Here())
     (made / "pictures-32-00-0001.h5").write_bytes(b"none")
     with pytest.raises(OutputError, match=r"pictures-32-00-0001.h5.*remove it"):
         list(views(made, [0], PIXELS))
+    for broken in ("{", None):
+        (made / META).unlink() if broken is None else (made / META).write_text(broken)
+        with pytest.raises(OutputError, match=r"dataset.json.*make the dataset again"):
+            render(made, [1], PIXELS, Here(0))
