@@ -9,20 +9,21 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from calib._version import __version__ as __version__
+
 if TYPE_CHECKING:
-    from calib.calibration import Calibration
-    from calib.config import Study
-    from calib.materials import FoodSpec as Food
-    from calib.trace import Trace
+    from calib.api import Calibration
+    from calib.material.food import FoodSpec as Food
+    from calib.multi_specimen.study_file import Study
+    from calib.trace.trace import Trace
 
 __all__ = ["Calibration", "Food", "Study", "Trace"]
-__version__ = "0.1.0"
 
 _PLACES = {
-    "Calibration": ("calib.calibration", "Calibration"),
-    "Food": ("calib.materials", "FoodSpec"),
-    "Study": ("calib.config", "Study"),
-    "Trace": ("calib.trace", "Trace"),
+    "Calibration": ("calib.api", "Calibration"),
+    "Food": ("calib.material.food", "FoodSpec"),
+    "Study": ("calib.multi_specimen.study_file", "Study"),
+    "Trace": ("calib.trace.trace", "Trace"),
 }
 
 

@@ -10,7 +10,7 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-from calib.cli.main import COMMANDS, parser
+from cutcal.main import COMMANDS, parser
 
 WIDTH = "100"
 """Columns of the help texts."""

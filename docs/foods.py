@@ -9,8 +9,8 @@ from matplotlib import style
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from calib.validation import data_path
-from reports.figures import MM, STYLE, WIDTH
+from calib.io.yaml_checks import data_path
+from reports.base.figures import MM, STYLE, WIDTH
 from reports.prior import draw, foods, height
 
 

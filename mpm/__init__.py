@@ -6,7 +6,7 @@ import os
 
 from mpm.errors import CutcalError, SceneError, SimulationError
 from mpm.material import Material
-from mpm.record import ForceRecord
+from mpm.output.record import ForceRecord
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
 from mpm.shapes import Shape
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from mpm.course import REST, Course
-from mpm.record import ForceRecord
+from mpm.motion import REST, Course
+from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import Scene
 from mpm.solver import Simulation, kernels

@@ -8,14 +8,14 @@ import time as clock
 import numpy as np
 
 from mpm.errors import SceneError, SimulationError
-from mpm.ledger import Ledger
-from mpm.record import ForceRecord
+from mpm.output.record import ForceRecord
+from mpm.output.recorder import Ledger
+from mpm.output.snapshot import Snapshot
+from mpm.output.surface import Surface
+from mpm.output.topology import Topology
 from mpm.runtime import Runtime, running
 from mpm.scene import STEEPEST, Scene
 from mpm.solver import APPROACH, Simulation
-from mpm.surface import Surface
-from mpm.topology import Topology
-from mpm.watch import Snapshot
 
 ON_FACE = 1e-9  # distance from the plane of the cut at which a vertex lies on its face [m]
 CLEAR = 2.0  # height of the edge above the uncut food at which nothing touches the blade any more [cells]

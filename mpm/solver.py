@@ -7,24 +7,24 @@ from typing import Any
 
 import numpy as np
 
-from mpm import fields as kn
 from mpm.arm import arm_mass
-from mpm.capacity import batch_capacity, node_capacity, particle_capacity
-from mpm.course import Course, Order, Progress
+from mpm.discretisation.capacity import batch_capacity, node_capacity, particle_capacity
+from mpm.discretisation.grid import lay_out
+from mpm.discretisation.particles import seed
 from mpm.errors import SimulationError
-from mpm.exchange import BULK, FOOT, GAP, N_PARTICLE, N_SLICE, PLACE, SHELL, SOFTEN, TACKY, Contents
-from mpm.kernels import Kernels
-from mpm.layout import lay_out
+from mpm.kernels import fields as kn
+from mpm.kernels.host_transfer import BULK, FOOT, GAP, N_PARTICLE, N_SLICE, PLACE, SHELL, SOFTEN, TACKY, Contents
+from mpm.kernels.kernels import Kernels
+from mpm.kernels.surface_contact import CONTACT
 from mpm.material import Material
-from mpm.record import ForceRecord
+from mpm.motion import Course, Order, Progress
+from mpm.output.record import ForceRecord
+from mpm.output.snapshot import Snapshot, Watch, snapshot
+from mpm.output.topology import Topology, topology
 from mpm.runtime import Runtime, start
 from mpm.scene import BAND_CELLS, Press, Scene
-from mpm.seeding import seed
 from mpm.shapes import skin_path
 from mpm.shapes import slices as outline
-from mpm.topology import Topology, topology
-from mpm.touch import CONTACT
-from mpm.watch import Snapshot, Watch, snapshot
 
 # Particles for which another thread pays.  On two cores the second thread gains nothing for 8,000 particles, 10 to 25 % for
 # 38,000 and 20 to 90 % for 128,000, by the machine; processes share the cores better, which is how a calibration uses them.

@@ -9,10 +9,10 @@ from typing import Any
 from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
-from reports.brief import Brief, Part, Table, write_brief
-from reports.document import breakable, count, duration, quantity
-from reports.figures import BLACK, BLUE, GREY, svg
-from reports.finished import Data
+from reports.base.brief import Brief, Part, Table, write_brief
+from reports.base.figures import BLACK, BLUE, GREY, svg
+from reports.base.format import breakable, count, duration, quantity
+from reports.base.run_folder import Data
 
 ERRORS = ("peak_error", "work_error", "nrmse")
 KERNELS = "On a block at rest, in one run side by side; only the ratios mean something on another machine."

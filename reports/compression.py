@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 from matplotlib.figure import Figure
 
-from reports.figures import BAND, MEASURED, SIMULATED, svg
+from reports.base.figures import BAND, MEASURED, SIMULATED, svg
 
 
 def write_figure(out: Path) -> None:

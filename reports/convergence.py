@@ -11,11 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reports import ReportError
-from reports.brief import AGAIN, Brief, Part, Table, write_brief
-from reports.document import count, duration, listed, quantity
-from reports.figures import BLACK, BLUE, GREEN, GREY, LIGHT, ORANGE, RED, SKY, stroke_axis, svg
-from reports.finished import Data
-from reports.words import capital, words
+from reports.base.brief import AGAIN, Brief, Part, Table, write_brief
+from reports.base.figures import BLACK, BLUE, GREEN, GREY, LIGHT, ORANGE, RED, SKY, stroke_axis, svg
+from reports.base.format import count, duration, listed, quantity
+from reports.base.labels import capital, words
+from reports.base.run_folder import Data
 
 ESTIMATED = {"work": "J", "peak": "N"}
 AXES = {

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from reports.figures import BLACK, RED, svg
+from reports.base.figures import BLACK, RED, svg
 
 COLUMNS = 4
 PANEL = 34.0  # height of a panel [mm]

@@ -11,11 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from reports.brief import Brief, Part, Table, write_brief
-from reports.document import breakable, duration, quantity
-from reports.figures import BLACK, BLUE, GREEN, GREY, ORANGE, RED, svg
-from reports.finished import Data
-from reports.words import capital, words
+from reports.base.brief import Brief, Part, Table, write_brief
+from reports.base.figures import BLACK, BLUE, GREEN, GREY, ORANGE, RED, svg
+from reports.base.format import breakable, duration, quantity
+from reports.base.labels import capital, words
+from reports.base.run_folder import Data
 
 PLANES = {
     "E and nu": ("E_Pa", "nu", "stiffness [Pa]", "Poisson's ratio"),

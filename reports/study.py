@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from calib.parameters import plain as property_of
-from mpm.section import Section
-from reports import ReportError, measurement, section
-from reports.document import breakable, count, duration, interval, listed, publish, quantity
-from reports.figures import BLACK, BLUE, MEASURED, SIMULATED, next_to, predictive, stroke_axis, svg
-from reports.finished import Data, check_kind, read_columns, read_date, read_json, read_section
-from reports.words import capital, meaning, words
+from calib.problem.parameters import plain as property_of
+from mpm.output.section import Section
+from reports import ReportError
+from reports.base.figures import BLACK, BLUE, MEASURED, SIMULATED, next_to, predictive, stroke_axis, svg
+from reports.base.format import breakable, count, duration, interval, listed, publish, quantity
+from reports.base.labels import capital, meaning, words
+from reports.base.run_folder import Data, check_kind, read_columns, read_date, read_json, read_section
+from reports.calibration import cut_figure, measurement
 
 PREDICTED: dict[str, Any] = {"color": BLUE, "lw": 1.8, "dashes": (1.4, 1.2)}
 #: Height of the figure of a trace [mm], with the food under the blade beside it, and what is added on the first page.
@@ -29,7 +30,7 @@ _METRICS: Data = {
     "peak_real_N peak_sim_N": _OPT,
     "iso18571": {"R": _OPT},
 }
-#: What summary.json must hold, as in :mod:`reports.finished`.
+#: What summary.json must hold, as in :mod:`reports.base.run_folder`.
 SCHEMA: Data = {
     "food study": _TEXT,
     "passed": (bool,),
@@ -131,7 +132,7 @@ def picture(done: Study, name: str) -> bytes:
     look = None
     if fitted and name in done.sections:
         of_cut = (fitted["knife"], fitted["shape"]["height"], curves["stroke_m"], curves["sim_N"])
-        look = section.glance(done.sections[name], *of_cut)
+        look = cut_figure.glance(done.sections[name], *of_cut)
 
     def draw(figure: Figure) -> None:
         axes = next_to(figure, look)

@@ -8,11 +8,11 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, NullFormatter
 
-from reports.brief import Brief, Part, Table, write_brief
-from reports.document import breakable, duration, plain
-from reports.figures import BLACK, BLUE, GREY, svg
-from reports.finished import Data
-from reports.words import capital
+from reports.base.brief import Brief, Part, Table, write_brief
+from reports.base.figures import BLACK, BLUE, GREY, svg
+from reports.base.format import breakable, duration, plain
+from reports.base.labels import capital
+from reports.base.run_folder import Data
 
 ROW_HEIGHT = 4.2  # [mm]
 FLOOR = 1e-3  # smaller parts of the tolerance are drawn here

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from calib.columns import candidates, choose, numbers
 from calib.errors import CurveError, TraceError
-from calib.tables import Table, read_table
-from calib.trace import MIN_SAMPLES
+from calib.trace.columns import candidates, choose, numbers
+from calib.trace.table import Table, read_table
+from calib.trace.trace import MIN_SAMPLES
 from mpm.shapes import Shape, volume
 
 STEP = 0.001

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from calib.compression.measured import area, strain_grid
 from calib.errors import CurveError
-from calib.progress import clock
+from calib.io.progress import clock
 from mpm.errors import SimulationError
 from mpm.material import Material
 from mpm.runtime import Runtime

@@ -12,11 +12,11 @@ import numpy as np
 from calib.compression.measured import SMALL, area, read_repeats
 from calib.compression.modulus import Fit, fit, scale, sensitivity
 from calib.compression.press import CONTACT, Say, grid_change, press_scene, solver_error, unit_curve
-from calib.documents import tag
 from calib.errors import CurveError
-from calib.outputs import prepare, write_csv, write_json
-from calib.provenance import git_commit, versions
-from calib.verdicts import Verdict
+from calib.io.folder import prepare, write_csv, write_json
+from calib.io.provenance import git_commit, versions
+from calib.io.schema import tag
+from calib.validation.acceptance import Verdict
 from mpm.shapes import Shape
 
 NRMSE_LIMIT = 0.05

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from calib.metrics import compare
-from calib.nulls import null_models
+from calib.validation.metrics import compare
+from calib.validation.null_models import null_models
 
 stroke = np.linspace(0.0, 0.03, 240)
 x = stroke / 0.03

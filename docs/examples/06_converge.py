@@ -1,6 +1,6 @@
 """Order, index and uncertainty of numbers from several grids; no simulation."""
 
-from calib.convergence import estimate
+from studies.convergence.gci import estimate
 
 cells = [3e-3, 2e-3, 1.5e-3, 1e-3]
 work = [0.6197, 0.6158, 0.6134, 0.6109]  # of an apple, in J

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from calib import workers
-from calib.cluster import Cluster
-from calib.pool import Pool
-from calib.provenance import key_of
-from mpm.record import ForceRecord
+from calib.io.provenance import key_of
+from calib.simulation import workers
+from calib.simulation.dask_cluster import Cluster
+from calib.simulation.process_pool import Pool
+from mpm.output.record import ForceRecord
 from mpm.scene import Scene
 
 LOG = "CHEAP_LOG"  # file in which each run says that it begins and that it has ended

@@ -11,7 +11,7 @@ from typing import Any
 from jsonschema import Draft202012Validator
 from referencing import Registry, Resource
 
-from calib.documents import COMMON, FOLDER, schema
+from calib.io.schema import COMMON, FOLDER, schema
 
 SHARED = json.loads((FOLDER / f"{COMMON}.json").read_text(encoding="utf-8"))
 KNOWN = Registry().with_resource(SHARED["$id"], Resource.from_contents(SHARED)).crawl()

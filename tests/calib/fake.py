@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from calib.evaluation import Evaluation
-from calib.objective import Objective, Target
-from calib.parameters import Parameter, ParameterSet
+from calib.problem.objective import Objective, Target
+from calib.problem.parameters import Parameter, ParameterSet
+from calib.simulation.evaluation import Evaluation
 
 LENGTH, WIDTH = 0.04, 0.03
 STROKE = np.linspace(0.0, LENGTH, 500)

@@ -19,35 +19,34 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calib.calibration import Calibration
-from calib.checks import Check, check, check_errands
-from calib.conditioning import condition
+from calib.api import Calibration
 from calib.errors import MaterialError
-from calib.evaluation import Evaluation
-from calib.knives import load_knife
-from calib.materials import load_food, load_foods
-from calib.metrics import compare
-from calib.nulls import null_models
-from calib.outputs import prepare, write_json
-from calib.pool import Pool
-from calib.preparation import fit_parameters, set_up
-from calib.provenance import code_key, key_of, versions
-from calib.scenes import Sizing, cut_scene, elsewhere, height_range, place, specimen, windowed
-from calib.store import EvaluationStore, Header
-from calib.trace import Trace
-from calib.verdicts import balances, changes, judge, limits, remedied, spent, unbooked
-from calib.workers import DIED, Errand, SceneEvaluator, plain
+from calib.io.folder import prepare, write_json
+from calib.io.provenance import code_key, key_of, versions
+from calib.material.food import load_food, load_foods
+from calib.material.knife import load_knife
+from calib.material.scene import Sizing, cut_scene, elsewhere, height_range, place, specimen, windowed
+from calib.problem.setup import fit_parameters, set_up
+from calib.simulation.evaluation import Evaluation
+from calib.simulation.evaluation_store import EvaluationStore, Header
+from calib.simulation.process_pool import Pool
+from calib.simulation.workers import DIED, Errand, SceneEvaluator, plain
+from calib.trace.conditioning import condition
+from calib.trace.trace import Trace
+from calib.validation.acceptance import balances, changes, judge, limits, remedied, spent, unbooked
+from calib.validation.metrics import compare
+from calib.validation.null_models import null_models
+from calib.validation.numerical_checks import Check, check, check_errands
+from mpm.discretisation.particles import seed
 from mpm.errors import SceneError, SimulationError
-from mpm.record import ENERGIES, ForceRecord
+from mpm.output.record import ENERGIES, ForceRecord
 from mpm.runtime import Runtime, start
 from mpm.scene import Scene
-from mpm.seeding import seed
 from mpm.shapes import SHAPE_KINDS
 from tests.calib.cheap import LOG, SECONDS, CheapPool, noted
 from tests.calib.cheap import cut as cheap_cut
+from tests.data_dir import ROOT
 from tests.mpm.scenes import PRISM
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def recorded(loaded: bool) -> Trace:
@@ -341,9 +340,8 @@ def test_keys_follow_the_content():
 def test_code_is_the_same_in_a_checkout_and_installed(tmp_path, monkeypatch):
     """The key of the code follows every module of the packages that are named, and not the data an installed one holds."""
     (tmp_path / "calib" / "part").mkdir(parents=True)
-    own = tmp_path / "calib" / "__init__.py"
-    own.write_text("")
-    monkeypatch.setattr("calib.provenance.calib.__file__", str(own))
+    (tmp_path / "calib" / "__init__.py").write_text("")
+    monkeypatch.setattr("calib.io.provenance.PACKAGE", tmp_path / "calib")
     keys = [code_key("calib")]
     for name in ("data/script.py", "part/module.py"):
         (tmp_path / "calib" / name).parent.mkdir(exist_ok=True)
@@ -562,7 +560,7 @@ def test_the_longest_errand_comes_first():
 
 IDLE = """
 import os, sys, time
-from calib.pool import Pool
+from calib.simulation.process_pool import Pool
 if __name__ == "__main__":
     pool = Pool(1)
     print(pool._submit(os.getpid).result(), flush=True)
@@ -602,10 +600,10 @@ def _alive(process: int) -> bool:
 def test_imports_stay_light():
     """Importing calib and mpm loads neither Taichi nor any plotting nor Dask; nothing is printed, and Taichi will call nobody."""
     code = (
-        "import os, sys, calib.cli.main\n"
-        "again = {'numpy', 'pandas', 'mpm', 'calib.cli.calibrate'} & set(sys.modules)\n"  # in every worker, as its program
+        "import os, sys, cutcal.main\n"
+        "again = {'numpy', 'pandas', 'mpm', 'cutcal.commands.calibration.calibrate'} & set(sys.modules)\n"  # in every worker, as its program
         "assert not again, again\n"
-        "import calib, mpm, calib.study\n"
+        "import calib, mpm, calib.calibration.run\n"
         "assert os.environ['TI_SKIP_VERSION_CHECK'] == 'ON'\n"
         "heavy = {'taichi', 'matplotlib', 'pyvista', 'typst', 'skfem', 'distributed'} & set(sys.modules)\n"
         "assert not heavy, heavy"

@@ -17,14 +17,14 @@ import h5py
 import numpy as np
 import pytest
 
-from calib import records
-from calib.knives import load_knife
-from calib.materials import load_food
-from calib.records import read_record, record_errands
-from calib.scenes import Sizing, cut_scene, specimen
-from mpm.record import ForceRecord
+from calib.material.food import load_food
+from calib.material.knife import load_knife
+from calib.material.scene import Sizing, cut_scene, specimen
+from calib.simulation import record_file
+from calib.simulation.record_file import read_record, record_errands
+from mpm.output.record import ForceRecord
+from mpm.output.topology import Topology
 from mpm.scene import Scene
-from mpm.topology import Topology
 from tests.calib.cheap import LOG, SECONDS, cut, noted
 from tests.data_dir import ROOT
 
@@ -35,8 +35,8 @@ PATIENCE_S = 120.0  # until a study that was started anew has got on, on a loade
 STUDY = """
 if __name__ == "__main__":
     import sys
-    from calib.cli import options
-    from calib.cli.main import main
+    from cutcal import options
+    from cutcal.main import main
     from tests.calib.cheap import CheapPool
 
     options.Pool = CheapPool
@@ -105,7 +105,7 @@ class Study:
             return set()
         with h5py.File(path) as f:
             key = f.attrs["key"]
-        record = records._read(path, key)
+        record = record_file._read(path, key)
         assert record is not None
         return {f"whole:{record.peak!r}"}
 

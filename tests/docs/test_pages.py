@@ -14,14 +14,14 @@ import pytest
 
 import calib
 import mpm
-from calib.checks import VARIANTS, Check
-from calib.cli.main import COMMANDS, parser
-from calib.config import read_study
-from calib.knives import load_knife
-from calib.materials import load_material_file
-from calib.metrics import compare
-from calib.nulls import null_models
-from calib.verdicts import JUDGED, Verdict, judge
+from calib.material.food import load_material_file
+from calib.material.knife import load_knife
+from calib.multi_specimen.study_file import read_study
+from calib.validation.acceptance import JUDGED, Verdict, judge
+from calib.validation.metrics import compare
+from calib.validation.null_models import null_models
+from calib.validation.numerical_checks import VARIANTS, Check
+from cutcal.main import COMMANDS, parser
 from tests.data_dir import ROOT
 
 DOCS = ROOT / "docs"
@@ -113,7 +113,7 @@ def test_links_lead_to_files(path: Path) -> None:
 @pytest.mark.parametrize("page", ["theory.md", "converge.md"])
 def test_named_modules_exist(page: str) -> None:
     """A module or function that a page names by its full path exists."""
-    named = sorted(set(re.findall(r"`((?:calib|mpm|fem_reference)\.[\w.]+)`", read(DOCS / page))))
+    named = sorted(set(re.findall(r"`((?:calib|mpm|fem_reference|studies)\.[\w.]+)`", read(DOCS / page))))
     assert named
     for name in named:
         thing(name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mpm.material import Material
-from mpm.record import ForceRecord
+from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import EdgeLaw, Food, Knife, Motion, Numerics, Scene
 from mpm.shapes import Shape

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from mpm.batch import simulate_together
-from mpm.capacity import batch_capacity
-from mpm.record import ForceRecord
+from mpm.discretisation.capacity import batch_capacity
+from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import Scene
 from mpm.solver import Simulation

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 import taichi as ti
 
+from mpm.discretisation.particles import Seeds
 from mpm.errors import SceneError
 from mpm.material import Material
-from mpm.record import ForceRecord
+from mpm.output.record import ForceRecord
+from mpm.output.snapshot import Watch
 from mpm.runtime import Runtime
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
-from mpm.seeding import Seeds
 from mpm.shapes import Shape
 from mpm.solver import Simulation
-from mpm.watch import Watch
 from tests.mpm.scenes import FLESH, PRISM, WEDGE
 
 

@@ -12,7 +12,7 @@ import taichi as ti
 from mpm import runtime
 from mpm.batch import simulate_together
 from mpm.errors import SceneError
-from mpm.record import ForceRecord
+from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import Scene
 from mpm.solver import Simulation

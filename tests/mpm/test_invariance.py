@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mpm.material import Material
-from mpm.record import ForceRecord
+from mpm.output.record import ForceRecord
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
 from mpm.shapes import Shape
 from tests.mpm.scenes import THIN, WEDGE, cut

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib.knives import load_knife
-from calib.materials import load_food
-from calib.scenes import Sizing, cut_scene, specimen
+from calib.material.food import load_food
+from calib.material.knife import load_knife
+from calib.material.scene import Sizing, cut_scene, specimen
 from mpm.errors import SceneError, SimulationError
 from mpm.live import LiveCut
 from mpm.runtime import Runtime

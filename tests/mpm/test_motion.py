@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mpm.errors import SceneError
-from mpm.record import ForceRecord
+from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import Arm, Board, Food, Motion
 from mpm.shapes import Shape

@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 
 from mpm.errors import SceneError
 from mpm.material import Material
-from mpm.record import ForceRecord
+from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
 from mpm.shapes import Shape

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mpm.discretisation.grid import lay_out
+from mpm.discretisation.particles import seed
 from mpm.errors import SceneError
-from mpm.layout import lay_out
 from mpm.material import Material
-from mpm.record import _moving_mean
+from mpm.output.record import _moving_mean
 from mpm.scene import Food, Knife, Motion, Numerics, Scene
-from mpm.seeding import seed
 from mpm.shapes import SHAPE_KINDS, Shape, inside, section_area, skin_path, slices, surface, volume
 
 MATERIAL = Material(E=1e6, nu=0.35, rho=1000.0)

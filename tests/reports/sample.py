@@ -12,9 +12,9 @@ from typing import Any
 import h5py
 import numpy as np
 
-from calib.metrics import compare
-from calib.nulls import NullModel, null_models, three_term
-from reports.document import NBSP
+from calib.validation.metrics import compare
+from calib.validation.null_models import NullModel, null_models, three_term
+from reports.base.format import NBSP
 
 STROKE_M = 0.033
 SPEED = 0.011

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from calib.metrics import Metrics, compare
-from calib.nulls import null_models, three_term
+from calib.validation.metrics import Metrics, compare
+from calib.validation.null_models import null_models, three_term
 from tests.reports import sample
 
 STROKE = np.linspace(0.0, 0.033, 240)

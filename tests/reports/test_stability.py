@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 
-from calib.stability import REASONS
 from reports.stability import LOOKS, write_figure
+from studies.stability.study import REASONS
 
 
 def drawn(folder, cells) -> bytes:

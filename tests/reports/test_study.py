@@ -10,8 +10,8 @@ import pytest
 from reports import ReportError
 from reports.study import content, picture, read_study, write_report
 from tests.reports import study_sample as sample
+from tests.reports.base.test_figures import looked_at
 from tests.reports.sample import pages, spaced
-from tests.reports.test_figures import looked_at
 
 
 def test_a_study_becomes_a_pdf_that_is_stable(tmp_path: Path) -> None:

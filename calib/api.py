@@ -1,0 +1,260 @@
+"""Calibrating from Python as from the command line: a request in plain values, and what a finished folder holds."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from calib.errors import OutputError
+from calib.io.progress import Progress
+from calib.io.wording import brief
+from calib.material.food import FoodSpec, load_material_file
+from calib.material.scene import MIDDLE, Sizing
+from calib.problem.request import Request
+from calib.trace.trace import Trace, read_trace
+from mpm.errors import CutcalError, check_number
+from mpm.runtime import ARCHES
+from mpm.shapes import SHAPE_KINDS
+
+LIMITS: dict[str, tuple[float, float, str]] = {
+    "speed": (0.0, 10.0, "m/s"),
+    "t_end": (0.0, 1e6, "s"),
+    "height": (1e-3, 1.0, "m"),
+    "width": (1e-3, 1.0, "m"),
+    "length": (1e-3, 1.0, "m"),
+    "at": (0.0, 1.0, ""),
+    "dx": (1e-4, 0.02, "m"),
+    "budget": (0.0, 1e6, ""),
+}
+"""Numbers between which a value must lie, and its unit: those of the command line."""
+KEYS = ("food", "created", "status", "passed", "trace", "parameters", "versions")
+"""What tells the summary of a calibration from that of a cut."""
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """What to calibrate; :meth:`run` does it. The names are those of the options of ``calibrate``.
+
+    Attributes:
+        food: Name in ``materials.yaml``, path of a material's YAML file, or a :class:`~calib.material.food.FoodSpec`.
+        trace: The cut: a :class:`~calib.trace.trace.Trace`, a pandas DataFrame, or the path of a file.
+        air: The same motion without food, in any of these forms, or None.
+        knife: Name in ``knives.yaml``, or path of a YAML file.
+        speed: Knife speed [m/s], where the trace has no position.
+        t_end: Time after which the record is ignored [s], or None.
+        shape: Outline of the specimen, one of ``mpm.shapes.SHAPE_KINDS``; None for the food's.
+        height, width, length: Sizes of the specimen [m], None where they were not measured.
+        at: Where the blade cuts, as the part of the length on one side [-].
+        fit: Names of the fitted properties; None for those that cutting sees.
+        dx: Cell size [m], or None.
+        budget: Largest number of simulations.
+        workers: Simulations at a time.
+        seed: Seed of the particles and of the search.
+        arch: Device of the simulations.
+
+    Raises:
+        CutcalError: An unknown food, a trace that cannot be read, or an impossible value.
+    """
+
+    food: str | Path | FoodSpec
+    trace: str | Path | Trace | pd.DataFrame
+    air: str | Path | Trace | pd.DataFrame | None = None
+    knife: str | Path = "kitchen"
+    speed: float | None = None
+    t_end: float | None = None
+    shape: str | None = None
+    height: float | None = None
+    width: float | None = None
+    length: float | None = None
+    at: float = MIDDLE
+    fit: Sequence[str] | None = None
+    dx: float | None = None
+    budget: float = 100
+    workers: int = 2
+    seed: int = 0
+    arch: str = "cpu"
+    _food: FoodSpec = field(init=False, repr=False)
+    _records: tuple[Trace, Trace | None] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for name, (low, high, unit) in LIMITS.items():
+            if getattr(self, name) is not None:
+                check_number("Calibration", name, getattr(self, name), low, high, unit)
+        for name, lowest in (("workers", 1), ("seed", 0)):
+            value = getattr(self, name)
+            if not isinstance(value, int) or isinstance(value, bool) or value < lowest:
+                raise CutcalError(f"Calibration: {name} = {brief(value)}; give a whole number of at least {lowest}")
+        for name, options in (("shape", SHAPE_KINDS), ("arch", ARCHES)):
+            if getattr(self, name) not in (*options, *((None,) if name == "shape" else ())):
+                raise CutcalError(f"Calibration: {name} = {brief(getattr(self, name))} is none of {', '.join(options)}")
+        if isinstance(self.fit, str):
+            raise CutcalError(f"Calibration: fit = {brief(self.fit)} is text; give a list of names, such as ['E', 'R']")
+        food = self.food if isinstance(self.food, FoodSpec) else FoodSpec.load(self.food)
+        object.__setattr__(self, "_food", food)
+        object.__setattr__(self, "_records", (_record(self.trace), None if self.air is None else _record(self.air)))
+
+    def request(self, out: str | Path = "") -> Request:
+        """The same for :func:`calib.calibration.run.run`.
+
+        Args:
+            out: Output folder, for the command that the summary states.
+        """
+        trace, air = self._records
+        return Request(
+            food=self._food,
+            trace=trace,
+            air=air,
+            knife=str(self.knife),
+            speed=self.speed,
+            t_end=self.t_end,
+            sizing=Sizing(self.shape, self.height, self.width, self.length, self.at),
+            fit=None if self.fit is None else tuple(self.fit),
+            dx=self.dx,
+            budget=self.budget,
+            seed=self.seed,
+            arch=self.arch,
+            command=(f"{self._call()}.run({str(out)!r})",),
+        )
+
+    def run(
+        self,
+        out: str | Path,
+        *,
+        resume: bool = False,
+        progress: Callable[[Progress], None] | None = None,
+        say: Callable[[str], None] | None = None,
+    ) -> CalibrationResult:
+        """Calibrate, and write what ``calibrate`` writes.
+
+        Args:
+            out: Output folder, which is made and never overwritten.
+            resume: Go on with the run in ``out``; nothing is simulated twice.
+            progress: Called after each simulation.
+            say: Called with each warning and stage, as one sentence.
+
+        Raises:
+            CutcalError: Anything wrong with the input; nothing that was computed is lost.
+        """
+        from calib.calibration.run import run
+        from calib.simulation.process_pool import Pool
+
+        with script_hidden(), Pool(self.workers, self.arch) as pool:
+            run(self.request(out), Path(out), pool, resume=resume, progress=progress, say=say)
+        return Calibration.load(out)
+
+    @staticmethod
+    def load(out: str | Path) -> CalibrationResult:
+        """The result in a folder that :meth:`run` or ``calibrate --out`` has written.
+
+        Raises:
+            OutputError: There is no finished calibration in it.
+        """
+        path = Path(out) / "summary.json"
+        try:
+            summary = json.loads(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise OutputError(
+                f"{path}: cannot be read ({error.strerror}); name the folder of a finished calibration, or run it again with "
+                "resume=True"
+            ) from None
+        except ValueError as error:
+            raise OutputError(
+                f"{path}: damaged, not JSON ({brief(str(error))}); run it again with resume=True"
+            ) from None
+        missing = [key for key in KEYS if key not in summary] if isinstance(summary, dict) else list(KEYS)
+        if missing:
+            raise OutputError(f"{path}: not of a calibration ({', '.join(missing)} missing); name another folder")
+        return CalibrationResult(Path(out), summary)
+
+    def _call(self) -> str:
+        """This object as it would be written, without what is as usual."""
+        words = [f"Food({self.food.name!r})" if isinstance(self.food, FoodSpec) else repr(str(self.food))]
+        for item in fields(self)[1:]:
+            value = getattr(self, item.name) if item.init else item.default
+            if isinstance(value, (Trace, pd.DataFrame)):
+                record = self._records[item.name == "air"]
+                assert record is not None  # because the value is not
+                words.append(f"{item.name}={type(value).__name__}({record.source!r})")
+            elif value != item.default:
+                words.append(f"{item.name}={str(value) if isinstance(value, Path) else value!r}")
+        return f"Calibration({', '.join(words)})"
+
+
+@dataclass(frozen=True)
+class CalibrationResult:
+    """A finished calibration, from its folder.
+
+    Attributes:
+        folder: The output folder.
+        summary: Content of ``summary.json``: every figure of the report, SI units, errors as fractions.
+    """
+
+    folder: Path
+    summary: dict[str, Any] = field(repr=False)
+
+    @property
+    def passed(self) -> bool:
+        """Whether every line of the verdict was passed."""
+        return bool(self.summary["passed"])
+
+    @property
+    def parameters(self) -> pd.DataFrame:
+        """Fitted values by name: value, unit, 95 % interval, literature range, verdict, status, source."""
+        return pd.DataFrame.from_dict(self.summary["parameters"], orient="index")
+
+    @property
+    def curves(self) -> pd.DataFrame:
+        """Trace, simulation, its parts and the null models over the stroke [m, N].
+
+        Raises:
+            OutputError: curves.csv is missing or damaged.
+        """
+        path = self.folder / "curves.csv"
+        try:
+            return pd.read_csv(path)
+        except (OSError, ValueError) as error:
+            raise OutputError(
+                f"{path}: cannot be read ({brief(str(error))}); run the calibration with resume=True"
+            ) from None
+
+    @property
+    def material(self) -> FoodSpec:
+        """The calibrated food.
+
+        Raises:
+            MaterialError: material.yaml is missing or damaged.
+        """
+        return load_material_file(self.folder / "material.yaml")
+
+    @property
+    def report(self) -> Path:
+        """Path of the report."""
+        return self.folder / "report.pdf"
+
+
+def _record(given: str | Path | Trace | pd.DataFrame) -> Trace:
+    """A record in any of its forms."""
+    return given if isinstance(given, Trace) else read_trace(given)
+
+
+@contextmanager
+def script_hidden() -> Iterator[None]:
+    """Keep worker processes from running the caller's script, of which they need nothing.
+
+    Each would import it again, and without ``if __name__ == "__main__"`` in it start a calibration of its own.
+    """
+    main = sys.modules["__main__"]
+    hidden: dict[str, Any] = {name: main.__dict__[name] for name in ("__file__", "__spec__") if name in main.__dict__}
+    main.__dict__.pop("__file__", None)
+    main.__spec__ = None
+    try:
+        yield
+    finally:
+        main.__dict__.update(hidden)

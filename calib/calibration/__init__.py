@@ -1,0 +1,1 @@
+"""One calibration: a trace in, fitted parameters and their documents out."""

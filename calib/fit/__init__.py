@@ -1,0 +1,1 @@
+"""The fit: surrogate, search and multi-start under a budget of simulations."""

@@ -1,0 +1,1 @@
+"""Files and terminal: YAML checks, folders of output, schemas, provenance, progress."""

@@ -1,0 +1,167 @@
+"""One line about a running fit: on a terminal it is rewritten in place, elsewhere printed now and then."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from types import TracebackType
+from typing import TYPE_CHECKING, TextIO
+
+if TYPE_CHECKING:
+    from calib.fit.options import FitOptions
+    from calib.problem.objective import Trial
+
+#: Width of the bar in characters.
+BAR = 20
+
+#: Time of a coarse run over that of a default one [-]: 0.08 to 0.10 in six real cuts. The budget counts it as more (``FitOptions.coarse_cost``).
+COARSE_TIME = 0.09
+
+#: Without a terminal (log file, pipe) a line is printed at most this often [s].
+PLAIN_INTERVAL_S = 30.0
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a fit stands.
+
+    Attributes:
+        done: Simulations finished, failed ones included.
+        spent: Budget spent, in simulations on the fine grid [-].
+        budget: Budget, in the same measure [-].
+        failed: Simulations that did not finish their stroke.
+        misfit: Smallest chi-square of a finished run so far [-]; infinite while there is none.
+        eta_s: Time that the rest of the budget takes at most [s]; a fit that converges ends earlier.
+        stage: What the last simulation was run for.
+    """
+
+    done: int
+    spent: float
+    budget: float
+    failed: int
+    misfit: float
+    eta_s: float
+    stage: str
+
+    def line(self) -> str:
+        """One line of plain text without bar, such as ``12 simulations of 80, ...``."""
+        parts = [f"{self.done} simulations ({self.spent:.4g} of {self.budget:.4g})"]
+        if self.failed:
+            parts.append(f"{self.failed} failed")
+        parts.append(f"chi2 {self.misfit:.4g}" if math.isfinite(self.misfit) else "chi2 -")
+        parts.append(f"at most {clock(self.eta_s)} left")
+        parts.append(self.stage)
+        return ", ".join(parts)
+
+
+def at_most(trials: Sequence[Trial], rest: float, options: FitOptions) -> float:
+    """Time that the rest of a budget takes at most [s]: were it all spent on default runs. Before there is one, by what coarse ones take."""
+    default = [t.evaluation.seconds for t in trials if not t.coarse]
+    each = default or [t.evaluation.seconds / COARSE_TIME for t in trials]
+    return rest * math.fsum(each) / len(each) / options.batch
+
+
+def onward(
+    report: Callable[[Progress], None] | None, trials: Sequence[Trial], best: Trial, options: FitOptions
+) -> Callable[[Progress], None] | None:
+    """The progress of one more search, told as that of all of them.
+
+    Args:
+        report: Who is told.
+        trials, best: The runs so far, and the best of them.
+        options: What all may spend.
+    """
+    if report is None:
+        return None
+    done, spent, failed = len(trials), options.cost(trials), sum(not t.ok for t in trials)
+
+    def told(p: Progress) -> None:
+        rest = (options.budget - spent - p.spent) / max(p.budget - p.spent, options.coarse_cost)
+        total = replace(p, done=done + p.done, spent=spent + p.spent, failed=failed + p.failed)
+        report(replace(total, budget=options.budget, misfit=min(p.misfit, best.misfit), eta_s=max(rest, 0.0) * p.eta_s))
+
+    return told
+
+
+def clock(seconds: float) -> str:
+    """A duration [s] as ``m:ss`` or ``h:mm:ss``; ``?`` when it is not known.
+
+    >>> clock(75.2), clock(3675), clock(float("nan"))
+    ('1:15', '1:01:15', '?')
+    """
+    if not math.isfinite(seconds):
+        return "?"
+    minutes, rest = divmod(round(max(seconds, 0.0)), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
+
+class Countdown:
+    """How long the rest of some work takes, from what its finished part took.
+
+    Args:
+        total: Cost of all of it, in any measure.
+        now: Clock [s].
+    """
+
+    def __init__(self, total: float, now: Callable[[], float] = time.monotonic) -> None:
+        self._total, self._spent, self._now = total, 0.0, now
+        self._began = now()
+
+    def left(self, cost: float) -> str:
+        """The time left, in words, after a part of this cost is done too."""
+        self._spent += cost
+        took = self._now() - self._began
+        return f"about {clock(took * (self._total - self._spent) / self._spent)} left"
+
+
+class ProgressBar:
+    """Callback that shows :class:`Progress` on a stream; a context manager that ends the line it rewrites.
+
+    Args:
+        stream: Where to write; standard error when None, so that ``--json`` output stays clean.
+        interval_s: Shortest time between two lines when the stream is no terminal [s].
+        now: Clock [s] for that interval.
+    """
+
+    def __init__(
+        self,
+        stream: TextIO | None = None,
+        *,
+        interval_s: float = PLAIN_INTERVAL_S,
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._stream = sys.stderr if stream is None else stream
+        self._interval = interval_s
+        self._now = now
+        self._terminal = self._stream.isatty()
+        self._width = 0
+        self._last = -math.inf
+
+    def __call__(self, progress: Progress) -> None:
+        """Show ``progress``."""
+        if self._terminal:
+            self._rewrite(progress)
+        elif self._now() - self._last >= self._interval:
+            self._last = self._now()
+            print(progress.line(), file=self._stream, flush=True)
+
+    def _rewrite(self, progress: Progress) -> None:
+        """Replace the line on the terminal."""
+        full = min(BAR, int(BAR * progress.spent / progress.budget))
+        text = f"[{'#' * full}{'.' * (BAR - full)}] {progress.line()}"
+        print("\r" + text.ljust(self._width), end="", file=self._stream, flush=True)
+        self._width = len(text)
+
+    def __enter__(self) -> ProgressBar:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._width:
+            print(file=self._stream, flush=True)
+            self._width = 0

@@ -1,0 +1,64 @@
+"""Where a result comes from: versions, commit, command line, hashes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import subprocess
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from calib._version import __version__
+from calib.io.yaml_checks import PACKAGE
+
+DATA = "data"  # folder of a package that an installed one has and a checkout has not
+PACKAGES = ("taichi", "numpy", "scipy", "SALib", "pandas", "h5py", "matplotlib", "typst")
+
+
+def versions() -> dict[str, str]:
+    """Versions of cutcal, Python and the packages that a result depends on."""
+    out = {"cutcal": __version__, "python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            out[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return out
+
+
+def git_commit() -> str | None:
+    """Commit of the checkout that cutcal runs from, with ``+changes`` where it was edited; None when installed."""
+    top = PACKAGE.parent
+    if not (top / ".git").exists():
+        return None
+    try:
+        commit = _git(top, "rev-parse", "HEAD")
+        dirty = _git(top, "status", "--porcelain", "--untracked-files=no")
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return commit + ("+changes" if dirty else "")
+
+
+def _git(top: Path, *words: str) -> str:
+    done = subprocess.run(["git", "-C", str(top), *words], capture_output=True, text=True, timeout=10, check=True)
+    return done.stdout.strip()
+
+
+def code_key(*packages: str) -> str:
+    """SHA-256 over the source of these packages, of the solver where none is named: a stored run is reused only by the
+    code that made it.
+    """
+    top = PACKAGE.parent
+    digest = hashlib.sha256()
+    for package in packages or ("mpm",):
+        for path in sorted((top / package).rglob("*.py")):
+            if path.relative_to(top).parts[1] != DATA:
+                digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()
+
+
+def key_of(content: Any) -> str:
+    """SHA-256 over plain data in canonical form."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()

@@ -1,0 +1,1 @@
+"""Foods, knives and the scenes that they make."""

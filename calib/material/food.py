@@ -1,0 +1,325 @@
+"""Foods: shapes and properties with range, source and status, from ``materials.yaml`` or a calibrated file.
+
+Every property is {value, low, high, unit, source, status}. ``low`` and ``high`` are the 95 % range of the
+literature, which a fit uses as its prior. ``sources`` lists the published values, so that the loader can say
+where they disagree.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from calib.errors import MaterialError, OutputError
+from calib.io.wording import listed
+from calib.io.yaml_checks import Dumper, Place, check_keys, choice, data_path, mapping, read_yaml, suggest, text
+from calib.material.properties import (
+    DIMENSIONS,
+    OPTIONAL,
+    PROPERTIES,
+    REQUIRED,
+    SYNONYMS,
+    Property,
+    Source,
+    check_override,
+    rule_of,
+)
+from mpm.shapes import SHAPE_KINDS
+
+if TYPE_CHECKING:
+    from mpm.scene import Food
+
+__all__ = [
+    "FoodSpec",
+    "Property",
+    "Source",
+    "check_override",
+    "dump_material",
+    "load_food",
+    "load_foods",
+    "load_material_file",
+]
+
+#: Range of a property that has no literature and is given by the user: the value over and times this.
+GIVEN_SPREAD = 10.0
+
+_DAMAGE = ("tensile_strength", "fracture_energy")
+_NULLABLE = ("R_skin", *_DAMAGE)
+
+
+@dataclass(frozen=True)
+class FoodSpec:
+    """A food: outline, dimensions and properties.
+
+    Attributes:
+        name: Lower case with underscores.
+        shape_kind: One of ``mpm.shapes.SHAPE_KINDS``.
+        dims: ``length``, ``width``, ``height`` [m].
+        properties: By name; a property the food has no value for (null in the file) is absent.
+        calibration: Provenance of a calibrated food, or None.
+        not_modelled: What a real one has and the simulated one has not, such as a stone, or None.
+
+    Raises:
+        MaterialError: Unknown shape, a missing property, or a skin without resistance.
+    """
+
+    name: str
+    shape_kind: str
+    dims: Mapping[str, Property]
+    properties: Mapping[str, Property]
+    calibration: Mapping[str, Any] | None = field(default=None, compare=False)
+    not_modelled: str | None = None
+
+    def __post_init__(self) -> None:
+        here = Place("", (self.name,))
+        choice(here.at("shape").at("kind"), self.shape_kind, SHAPE_KINDS)
+        check_keys(here.at("shape"), self.dims, DIMENSIONS)
+        needed = [p for p in PROPERTIES if p not in _NULLABLE]
+        check_keys(here.at("properties"), self.properties, needed, _NULLABLE, SYNONYMS)
+        if self.properties["skin_thickness"].value > 0.0 and "R_skin" not in self.properties:
+            raise here.at("properties").error("skin_thickness > 0 needs R_skin; give it, or skin_thickness 0")
+
+    @classmethod
+    def load(cls, name: str | Path) -> FoodSpec:
+        """A food by its name in ``materials.yaml``, or from the YAML file of one food, as a calibration writes it.
+
+        Raises:
+            MaterialError: There is no such food, or something is wrong with the file.
+        """
+        if isinstance(name, Path) or str(name).endswith((".yaml", ".yml")):
+            return load_material_file(name)
+        return load_food(name)
+
+    @property
+    def default_fit(self) -> tuple[str, ...]:
+        """Names of the properties that a calibration fits unless told otherwise."""
+        start = ("R_skin", "skin_thickness") if self.properties["skin_thickness"].value > 0.0 else ("R_initiation",)
+        return ("E", "yield_stress", "R", *start, "initiation_depth", "mu")
+
+    def value(self, name: str) -> float | None:
+        """Value of a property [SI], None where the food has none.
+
+        Raises:
+            MaterialError: There is no property of that name.
+        """
+        rule_of(name)
+        return self.properties[name].value if name in self.properties else None
+
+    def prior(self, name: str) -> tuple[float, float]:
+        """The literature's 95 % range of a property, (low, high) [SI].
+
+        Raises:
+            MaterialError: There is no property of that name, or the food has no value for it.
+        """
+        rule_of(name)
+        if name not in self.properties:
+            raise MaterialError(f"{self.name}: no literature range for {name}; give a value for it first")
+        return self.properties[name].low, self.properties[name].high
+
+    def with_sizes(self, sizes: Mapping[str, float], *, status: str, source: str) -> FoodSpec:
+        """The same food with other dimensions [m], by name; ranges stay.
+
+        Raises:
+            MaterialError: An impossible size.
+        """
+        new = dict(self.dims)
+        for name, x in sizes.items():
+            new[name] = replace(new[name], value=x, status=status, source=source)
+        return replace(self, dims=new)
+
+    def with_values(
+        self, values: Mapping[str, float], *, status: str = "given", source: str = "given by the user"
+    ) -> FoodSpec:
+        """The same food with other values [SI]; ranges and published values stay.
+
+        Args:
+            values: By property name.
+            status: ``given`` or ``fitted``.
+            source: Where the values come from.
+
+        Raises:
+            MaterialError: An unknown property, or a value out of its limits.
+        """
+        new = dict(self.properties)
+        for name, raw in values.items():
+            x = check_override(name, raw)
+            old = new.get(name)
+            if old is None:
+                new[name] = Property(name, x, x / GIVEN_SPREAD, x * GIVEN_SPREAD, PROPERTIES[name].unit, source, status)
+            else:
+                new[name] = replace(old, value=x, status=status, source=source)
+        return replace(self, properties=new)
+
+    def warnings(self) -> list[str]:
+        """What a user of this food must know: what is not modelled, sources that disagree or are flagged, odd values."""
+        both = {"shape": self.dims, "properties": self.properties}
+        said = [] if self.not_modelled is None else [f"{self.name}: not modelled: {self.not_modelled}"]
+        said += [
+            f"{self.name}.{group}.{name}: {w}"
+            for group, items in both.items()
+            for name, item in items.items()
+            for w in item.warnings()
+        ]
+        have = [n for n in _DAMAGE if n in self.properties]
+        if len(have) == 1:
+            other = next(n for n in _DAMAGE if n not in have)
+            said.append(f"{self.name}.properties.{have[0]}: not used, because bulk damage also needs {other}")
+        return said
+
+    def to_scene_food(
+        self,
+        *,
+        height: float | None = None,
+        width: float | None = None,
+        length: float | None = None,
+        shape: str | None = None,
+    ) -> Food:
+        """The food as the solver takes it.
+
+        Args:
+            height: Another height [m].
+            width: Another width along the blade [m].
+            length: Another length across the blade [m].
+            shape: Another outline.
+
+        Raises:
+            SceneError: A shape or size that the solver cannot take.
+        """
+        from mpm.material import Material
+        from mpm.scene import Food
+        from mpm.shapes import Shape
+
+        sizes = {"length": length, "width": width, "height": height}
+        size = {n: self.dims[n].value if given is None else given for n, given in sizes.items()}
+        values: dict[str, Any] = {n: p.value for n, p in self.properties.items()}
+        if not all(n in values for n in _DAMAGE):
+            values = {n: v for n, v in values.items() if n not in _DAMAGE}
+        return Food(Shape(shape or self.shape_kind, **size), Material(**values))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data in the layout of ``materials.yaml``."""
+        shape = {"kind": self.shape_kind} | {n: self.dims[n].as_dict() for n in DIMENSIONS}
+        have = {n: p.as_dict() for n, p in self.properties.items()}
+        said = {} if self.not_modelled is None else {"not_modelled": self.not_modelled}
+        return {**said, "shape": shape, "properties": {n: have.get(n) for n in PROPERTIES}}
+
+
+def load_foods(path: Path | str | None = None) -> dict[str, FoodSpec]:
+    """All foods of a materials file, by name.
+
+    Args:
+        path: A file in the layout of ``materials.yaml``; by default the one shipped with cutcal.
+
+    Raises:
+        MaterialError: The file cannot be read or has an error; the message names file and place.
+    """
+    top, content = read_yaml(data_path("materials.yaml") if path is None else path)
+    return {name: _read_food(top.at(name), raw) for name, raw in content.items() if name != "calibration"}
+
+
+def load_food(name: str, path: Path | str | None = None) -> FoodSpec:
+    """One food of a materials file.
+
+    Args:
+        name: Lower case with underscores.
+        path: As in :func:`load_foods`.
+
+    Raises:
+        MaterialError: As :func:`load_foods`, or an unknown food (with the nearest known one and the list).
+    """
+    foods = load_foods(path)
+    if name not in foods:
+        near = suggest(name, foods)
+        listing = "" if near.startswith(";") else f"; known: {', '.join(foods)}"
+        raise MaterialError(f"unknown food {name!r}{near}{listing}")
+    return foods[name]
+
+
+def load_material_file(path: Path | str) -> FoodSpec:
+    """The food of a file with one food, as a calibration writes it; ``calibration`` holds its provenance.
+
+    Raises:
+        MaterialError: As :func:`load_foods`, or not exactly one food in the file.
+    """
+    top, content = read_yaml(path)
+    provenance = content.pop("calibration", None)
+    if len(content) != 1:
+        raise top.error(f"has {len(content)} foods, but one is needed; leave one of: {listed(list(content))}")
+    name, raw = next(iter(content.items()))
+    kept = None if provenance is None else mapping(top.at("calibration"), provenance)
+    return replace(_read_food(top.at(name), raw), calibration=kept)
+
+
+def dump_material(food: FoodSpec, path: Path | str, provenance: Mapping[str, Any]) -> None:
+    """Write a food and where its values come from; :func:`load_material_file` reads it back unchanged.
+
+    Args:
+        food: The calibrated food.
+        path: The file to write; an existing one is replaced as a whole or not at all.
+        provenance: Plain data (text, numbers, lists, mappings), for instance trace hash, versions, intervals.
+
+    Raises:
+        OutputError: The file cannot be written, or ``provenance`` holds something that is not plain data.
+    """
+    path = Path(path)
+    document = {food.name: food.as_dict(), "calibration": dict(provenance)}
+    try:
+        body = yaml.dump(document, Dumper=Dumper, sort_keys=False, allow_unicode=True, width=110)
+    except yaml.representer.RepresenterError as e:
+        raise OutputError(f"{path}: the provenance holds {e.args[-1]!r}; give plain data only") from None
+    head = "# One calibrated food in the layout of materials.yaml. All values in SI units.\n"
+    temporary = path.with_name(path.name + ".part")
+    try:
+        temporary.write_text(head + body, encoding="utf-8")
+        os.replace(temporary, path)
+    except OSError as e:
+        raise OutputError(f"{path}: cannot be written ({e.strerror}); choose another folder") from None
+
+
+def _read_food(place: Place, raw: Any) -> FoodSpec:
+    food = mapping(place, raw)
+    check_keys(place, food, ("shape", "properties"), ("not_modelled",))
+    said = text(place.at("not_modelled"), food["not_modelled"]) if "not_modelled" in food else None
+    shape = mapping(place.at("shape"), food["shape"])
+    given = mapping(place.at("properties"), food["properties"])
+    check_keys(place.at("shape"), shape, ("kind", *DIMENSIONS), synonyms=SYNONYMS)
+    check_keys(place.at("properties"), given, PROPERTIES, synonyms=SYNONYMS)
+    dims = {n: read_property(place.at("shape"), n, shape[n]) for n in DIMENSIONS}
+    have = [n for n in PROPERTIES if given[n] is not None or n not in _NULLABLE]
+    properties = {n: read_property(place.at("properties"), n, given[n]) for n in have}
+    try:
+        return FoodSpec(place.path[-1], shape["kind"], dims, properties, not_modelled=said)
+    except MaterialError as e:
+        raise replace(place, path=()).error(str(e)) from None
+
+
+def read_property(parent: Place, name: str, raw: Any) -> Property:
+    """A property in the layout of ``materials.yaml``.
+
+    Args:
+        parent: The place that it stands in, for errors.
+        name: Its name.
+        raw: What YAML has there.
+
+    Raises:
+        CutcalError: Of the class of ``parent``: unknown name or key, wrong unit or status, a number out of its limits.
+    """
+    place = parent.at(name)
+    given = mapping(place, raw)
+    check_keys(place, given, REQUIRED, OPTIONAL)
+    listed = given.get("sources", [])
+    if not isinstance(listed, list):
+        raise place.at("sources").error("must be a list of {value, source}")
+    for i, entry in enumerate(listed):
+        here = place.at("sources").at(str(i))
+        check_keys(here, mapping(here, entry), ("value", "source"))
+    sources = tuple(Source(**entry) for entry in listed)
+    try:
+        return Property(name, **{**given, "sources": sources})
+    except MaterialError as e:
+        raise parent.wrap(e) from None

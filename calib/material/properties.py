@@ -1,0 +1,223 @@
+"""Properties of foods: what each one is, its SI unit and limits, and a value with its range and sources."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from calib.errors import MaterialError
+from calib.io.yaml_checks import Place, check_unit, choice, number, suggest, text
+from mpm.material import MAX_POISSON
+
+#: Where a literature value comes from: measured on this food; Table 2 of the CulinaryCut paper; another food,
+#: another test or a second-hand quotation; nobody's measurement.
+LITERATURE = ("measured", "paper_table2", "proxy", "assumed")
+
+#: Where another value comes from: fitted to a trace, or given by the user.
+OWN = ("fitted", "given")
+
+#: Published values further apart than this are worth a warning (the test method alone can move E by 13 times:
+#: limequat, Vatani et al. 2024, Microsc. Res. Tech.).
+DISAGREEMENT = 3.0
+
+#: Keys of a property in a file.
+REQUIRED = ("value", "low", "high", "unit", "source", "status")
+OPTIONAL = ("sources", "flag")
+#: What people call the properties, in lower case.
+SYNONYMS = {
+    "young": "E", "youngs": "E", "youngs_modulus": "E", "modulus": "E", "stiffness": "E",
+    "poisson": "nu", "poissons_ratio": "nu", "density": "rho",
+    "yield": "yield_stress", "sigma_y": "yield_stress", "yield_strength": "yield_stress",
+    "friction": "mu", "friction_coefficient": "mu",
+    "toughness": "R", "fracture_toughness": "R", "cutting_resistance": "R", "resistance": "R",
+    "initiation": "R_initiation", "depth": "initiation_depth", "damping": "loss_factor", "skin": "skin_thickness", "skin_resistance": "R_skin",
+    "gf": "fracture_energy", "strength": "tensile_strength", "diameter": "width",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What a property may be.
+
+    Attributes:
+        unit: SI unit.
+        low: Smallest value [unit].
+        high: Largest value [unit].
+        meaning: What it is.
+        why: Why it has these limits.
+    """
+
+    unit: str
+    low: float
+    high: float
+    meaning: str
+    why: str = "anything else is a slip of the unit"
+
+
+PROPERTIES: dict[str, Rule] = {
+    "rho": Rule("kg/m^3", 50.0, 5e3, "density"),
+    "E": Rule("Pa", 1e2, 1e10, "Young's modulus"),
+    "nu": Rule(
+        "-", -0.999, MAX_POISSON, "Poisson's ratio",
+        f"an isotropic solid has -1 < nu < 0.5, and above {MAX_POISSON} the solver locks volumetrically",
+    ),
+    "yield_stress": Rule("Pa", 10.0, 1e9, "von Mises yield stress"),
+    "R": Rule("J/m^2", 0.1, 1e5, "cutting (propagation) resistance of the flesh"),
+    "R_initiation": Rule("N/m", 0.1, 1e5, "line force at which a cut starts in bare flesh"),
+    "R_skin": Rule("N/m", 0.1, 1e5, "line force at which the edge goes through the skin"),
+    "skin_thickness": Rule("m", 0.0, 0.05, "thickness of the skin, 0 = no skin"),
+    "initiation_depth": Rule("m", 1e-4, 0.05, "indentation under the edge at which a cut starts"),
+    "mu": Rule("-", 0.0, 2.0, "Coulomb friction of food on blade"),
+    "loss_factor": Rule("-", 0.0, 1.0, "mechanical loss factor tan(delta) at the first axial mode"),
+    "tensile_strength": Rule("Pa", 10.0, 1e9, "stress at which bulk damage starts"),
+    "fracture_energy": Rule("J/m^2", 0.1, 1e6, "energy per crack area of bulk damage"),
+}  # fmt: skip
+
+DIMENSIONS: dict[str, Rule] = {
+    "length": Rule("m", 1e-3, 1.0, "size along y, across the blade"),
+    "width": Rule("m", 1e-3, 1.0, "size along x, along the blade"),
+    "height": Rule("m", 1e-3, 1.0, "size along z, up"),
+}
+
+
+@dataclass(frozen=True)
+class Source:
+    """One published value.
+
+    Attributes:
+        value: In the unit of its property.
+        source: Where it was published and how it was got.
+    """
+
+    value: float
+    source: str
+
+
+@dataclass(frozen=True)
+class Property:
+    """One property of a food, or one of its dimensions.
+
+    Attributes:
+        name: As in ``materials.yaml``.
+        value: The value used unless it is fitted [unit].
+        low: Lower end of the literature's 95 % range [unit].
+        high: Upper end of the literature's 95 % range [unit].
+        unit: SI unit.
+        source: Where ``value`` comes from; for an assumed value the reason.
+        status: One of ``LITERATURE`` or ``OWN``.
+        sources: Published values, the used one may be among them.
+        flag: Reason why a published value must not be trusted, or None.
+
+    Raises:
+        MaterialError: Unknown name, wrong unit or status, a number out of its limits, low > high, or a
+            literature value outside its own range. (A fitted or given value may leave the range;
+            :meth:`warnings` says so.)
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    unit: str
+    source: str
+    status: str
+    sources: tuple[Source, ...] = ()
+    flag: str | None = None
+
+    def __post_init__(self) -> None:
+        here = Place("", (self.name,))
+        rule = rule_of(self.name, PROPERTIES | DIMENSIONS)
+        for key in ("value", "low", "high"):
+            object.__setattr__(self, key, number(here.at(key), getattr(self, key)))
+        check_unit(here, self.unit, rule.unit, self.value)
+        for key in ("value", "low", "high"):
+            _check_limits(here.at(key), getattr(self, key), rule)
+        text(here.at("source"), self.source)
+        choice(here.at("status"), self.status, (*LITERATURE, *OWN))
+        for i, entry in enumerate(self.sources):
+            number(here.at("sources").at(str(i)).at("value"), entry.value)
+            text(here.at("sources").at(str(i)).at("source"), entry.source)
+        if self.flag is not None:
+            text(here.at("flag"), self.flag)
+        self._check_range(here)
+
+    def _check_range(self, here: Place) -> None:
+        if self.low > self.high:
+            raise here.error(f"has the range {self.low:g} to {self.high:g} {self.unit}; write low <= high")
+        if self.status in LITERATURE and not self.low <= self.value <= self.high:
+            raise here.error(
+                f"has the value {self.value:g} outside its range {self.low:g} to {self.high:g} {self.unit}; "
+                "correct the value or widen the range"
+            )
+
+    def warnings(self) -> list[str]:
+        """What a reader of this value must know, one sentence each; empty where there is nothing."""
+        said = []
+        values = [s.value for s in self.sources] + ([self.value] if self.status in LITERATURE else [])
+        if min(values, default=0.0) > 0.0 and max(values) > DISAGREEMENT * min(values):
+            said.append(
+                f"published values go from {min(values):.3g} to {max(values):.3g} {self.unit}, "
+                f"{max(values) / min(values):.3g} times"
+            )
+        if self.flag:
+            said.append(self.flag)
+        if not self.low <= self.value <= self.high:
+            said.append(
+                f"{self.value:.4g} {self.unit} ({self.status}) is outside the literature's range "
+                f"{self.low:.3g} to {self.high:.3g} {self.unit}"
+            )
+        return said
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data in the layout of ``materials.yaml``."""
+        out: dict[str, Any] = {key: getattr(self, key) for key in REQUIRED}
+        if self.sources:
+            out["sources"] = [{"value": s.value, "source": s.source} for s in self.sources]
+        if self.flag:
+            out["flag"] = self.flag
+        return out
+
+
+def check_override(name: str, value: float | str) -> float:
+    """A value given by hand for a property, as a number [SI].
+
+    Args:
+        name: Property name.
+        value: A number, or text that is one, in the property's SI unit.
+
+    Raises:
+        MaterialError: An unknown property, text that is no number, or a value out of its limits.
+    """
+    rule = rule_of(name)
+    place = Place("", (name,))
+    if isinstance(value, str):
+        try:
+            value = float(value)
+        except ValueError:
+            raise place.error(
+                f"{value!r} is not a number; give the {rule.meaning} as a plain number in {rule.unit}"
+            ) from None
+    x = number(place, value)
+    _check_limits(place, x, rule)
+    return x
+
+
+def rule_of(name: str, rules: Mapping[str, Rule] = PROPERTIES) -> Rule:
+    """Unit and limits of a property.
+
+    Raises:
+        MaterialError: There is no property of that name (with the nearest one).
+    """
+    if name not in rules:
+        raise MaterialError(f"unknown property {name!r}{suggest(name, rules, SYNONYMS)}")
+    return rules[name]
+
+
+def _check_limits(place: Place, x: float, rule: Rule) -> None:
+    if not rule.low <= x <= rule.high:
+        unit = "" if rule.unit == "-" else f" {rule.unit}"
+        raise place.error(
+            f"{x:g}{unit} cannot be the {rule.meaning}; "
+            f"it must lie between {rule.low:g} and {rule.high:g}{unit}: {rule.why}"
+        )

@@ -1,0 +1,1 @@
+"""Several specimens of one food in one fit: the study file, joint runs, held-out cuts."""

@@ -1,0 +1,1 @@
+"""The problem that a fit solves: parameters, nuisance parameters, objective, set-up."""

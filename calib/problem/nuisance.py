@@ -1,0 +1,210 @@
+"""What a measurement leaves open of its own curve: tare, drift, lag and gain, each with a standard deviation.
+
+To first order each of them moves the measured curve along one known shape g, and its size is normal about zero with
+a standard deviation of its own, so that it joins the covariance of the residuals (Kennedy & O'Hagan 2001, J. R. Statist.
+Soc. B 63:425, section 4; for the offset and the gain of a sensor this is the marginal likelihood of a linear Gaussian
+model, Rasmussen & Williams 2006, section 2.7):
+
+    V = diag(sigma^2) + sum_k sd_k^2 g_k g_k^T
+
+    tare   1                     drift   s / L (0 at contact, 1 at the end of the stroke)
+    lag    -dF/ds                gain    F, as for a width that is not known
+
+Tare, drift and lag are integrated out of the curve while the search runs: an onset found 0.3 mm late costs the right material a
+chi-square of hundreds where the model is right to 1 %, and the search would go elsewhere for it.  The headline figures stay those
+of the bare simulation against the bare trace, and so does the peak in the search: a drift widens its tolerance and cannot explain
+it away.  Gain and width only scale a curve, as the stress-like parameters do: the search leaves them at their likely values, and
+they widen the intervals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from calib.errors import TraceError
+from calib.trace.conditioning import Conditioned
+
+FloatArray = npt.NDArray[np.float64]
+
+#: Relative standard deviation of the gain of a calibrated force sensor, where nothing is said of it.  Assumed: no source was found
+#: that holds for all; give --gain-sd from the sensor's own calibration.
+GAIN_SD = 0.02
+#: The same for a wrench that a robot estimates from its joint torques: masses hung on such an arm in three poses read 1, 17
+#: and 25 % too little, presses on a scale 6 and 8 % too much (panda-force, static calibration), which is 0.15 about their mean.
+TORQUE_GAIN_SD = 0.15
+TORQUE_COLUMNS = ("base_f", "knife_f", "o_f_ext", "k_f_ext")
+"""Beginnings of names of columns that hold such an estimate."""
+#: A drift is extrapolated over the cut, but beyond this part of the peak it is a broken measurement, which is warned of
+#: and not fitted away.
+LARGEST_DRIFT = 0.05
+#: An estimate this many standard deviations of its prior away contradicts it.
+OUTSIDE = 3.0
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """What is known of a force sensor.
+
+    Attributes:
+        gain_sd: Relative standard deviation of its gain [-].
+        lag_sd: Standard deviation of the delay between its force and its position or clock [s].
+
+    Raises:
+        TraceError: A negative or infinite one, or a gain that is not known to a factor.
+    """
+
+    gain_sd: float = GAIN_SD
+    lag_sd: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.gain_sd < 1.0:
+            raise TraceError(f"--gain-sd {self.gain_sd:g}: give the relative uncertainty of the sensor's gain, 0 to 1")
+        if not 0.0 <= self.lag_sd < 1.0:
+            raise TraceError(f"--lag-sd {self.lag_sd:g} s: give the uncertainty of the sensor's delay, 0 to 1 s")
+
+
+def sensor_of(curve: Conditioned, gain_sd: float | None, lag_sd: float | None) -> tuple[Sensor, str | None]:
+    """The sensor of a trace, by the name of its force column where nothing is given, and what was assumed.
+
+    Args:
+        curve: The conditioned trace.
+        gain_sd: Given relative standard deviation of the gain [-], or None.
+        lag_sd: Given standard deviation of the delay [s], or None.
+
+    Raises:
+        TraceError: Impossible values.
+    """
+    lag = 0.0 if lag_sd is None else lag_sd
+    if gain_sd is not None:
+        return Sensor(gain_sd, lag), None
+    name = curve.trace.columns.get("force", "").lower()
+    if name.startswith(TORQUE_COLUMNS):
+        said = (
+            f"{curve.trace.columns['force']} is estimated from joint torques: its gain is taken as known to "
+            f"{TORQUE_GAIN_SD:.0%} (hung masses read 1 to 25 % too little on such an arm); give --gain-sd if you measured it"
+        )
+        return Sensor(TORQUE_GAIN_SD, lag), said
+    return Sensor(GAIN_SD, lag), None
+
+
+@dataclass(frozen=True, eq=False)
+class Nuisance:
+    """One thing that the measurement leaves open.
+
+    Attributes:
+        name: ``tare``, ``drift``, ``lag``, ``gain`` or ``width``.
+        unit: Unit of its size.
+        sd: Prior standard deviation [unit]; the prior mean is zero.
+        shape: Change of the measured curve by one unit [N/unit] (n,).
+        peak: Change of the measured peak by one unit [N/unit], 0 where the peak's own standard deviation has it.
+        searched: Whether the search integrates it out of the curve.
+    """
+
+    name: str
+    unit: str
+    sd: float
+    shape: FloatArray
+    peak: float
+    searched: bool
+
+
+@dataclass(frozen=True)
+class NuisanceEstimate:
+    """What a fitted curve says of a nuisance.
+
+    Attributes: name; unit; prior_sd; value and sd of its posterior [unit].
+    """
+
+    name: str
+    unit: str
+    prior_sd: float
+    value: float
+    sd: float
+
+    @property
+    def outside(self) -> bool:
+        """Whether it contradicts its prior."""
+        return abs(self.value) > OUTSIDE * self.prior_sd
+
+    def as_dict(self) -> dict[str, float | str | bool]:
+        """Plain data."""
+        return {
+            "value": self.value,
+            "sd": self.sd,
+            "prior_sd": self.prior_sd,
+            "unit": self.unit,
+            "outside": self.outside,
+        }
+
+
+def nuisances(
+    curve: Conditioned, sensor: Sensor, *, width_sd: float = 0.0, scaled: bool = False
+) -> tuple[Nuisance, ...]:
+    """What the measurement of a curve leaves open.
+
+    Args:
+        curve: The conditioned trace.
+        sensor: Its sensor.
+        width_sd: Relative standard deviation of the specimen's width [-], 0 where it was measured.
+        scaled: Whether gain and width are one factor that the objective has (``scale_sd``), as where specimens share their flesh.
+    """
+    length = curve.stroke_length_m
+    speed = length / (curve.end_s - curve.onset_s)
+    peak = float(curve.curve.max())
+    drift = min(float(np.hypot(curve.drift_N_per_s, curve.drift_sd_N_per_s)) * length / speed, LARGEST_DRIFT * peak)
+    lag = float(np.hypot(curve.onset_sd_s, sensor.lag_sd)) * speed
+    slope = np.gradient(curve.curve, curve.stroke)
+    top = float(curve.stroke[int(curve.curve.argmax())]) / length
+    one = np.ones_like(curve.curve)
+    found = [
+        ("tare", "N", curve.baseline_sd_N, one, 0.0, True),
+        ("drift", "N", drift, curve.stroke / length, top, True),
+        ("lag", "m", lag, -slope, 0.0, True),
+    ]
+    if not scaled:
+        found.append(("gain", "-", sensor.gain_sd, curve.curve, peak, False))
+        found.append(("width", "-", width_sd, curve.curve, peak, False))
+    return tuple(Nuisance(*n) for n in found if n[2] > 0.0)
+
+
+class Whitening:
+    """Turns residuals of unit variance, which nuisances correlate, into independent ones of unit variance.
+
+    With the columns G of one prior standard deviation of each nuisance, V = 1 + G G^T = 1 + U S^2 U^T, and
+    V^(-1/2) = 1 - U (1 - (1 + S^2)^(-1/2)) U^T.
+
+    Args:
+        columns: Residual by one prior standard deviation of each nuisance (n, k).
+    """
+
+    def __init__(self, columns: FloatArray) -> None:
+        self._u, size, _ = np.linalg.svd(columns, full_matrices=False)
+        self._part = 1.0 - 1.0 / np.sqrt(1.0 + size**2)
+
+    def __call__(self, rows: FloatArray) -> FloatArray:
+        """V^(-1/2) times residuals (n,) or columns of them (n, m)."""
+        out: FloatArray = rows - self._u @ ((self._part * (self._u.T @ rows).T).T)
+        return out
+
+
+def estimate(given: Sequence[Nuisance], columns: FloatArray, rows: FloatArray) -> tuple[NuisanceEstimate, ...]:
+    """Posterior of each nuisance given the residuals of a simulated curve.
+
+    Args:
+        given: The nuisances.
+        columns: Residual (simulated less measured) by one prior standard deviation of each (n, k), of unit variance.
+        rows: The residuals (n,), likewise.
+    """
+    if not given:
+        return ()
+    covariance = np.linalg.inv(columns.T @ columns + np.eye(len(given)))
+    mean = covariance @ (columns.T @ rows)
+    sd = np.sqrt(np.diag(covariance))
+    return tuple(
+        NuisanceEstimate(n.name, n.unit, n.sd, float(m) * n.sd, float(s) * n.sd)
+        for n, m, s in zip(given, mean, sd, strict=True)
+    )

@@ -1,0 +1,110 @@
+"""What a calibration is asked to do, and what is decided before its first simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from calib.material.food import FoodSpec
+from calib.material.scene import Sizing
+from calib.problem.objective import ErrorModel, Objective
+from calib.trace.conditioning import Conditioned
+from calib.trace.table import split_address
+from calib.trace.trace import Trace, read_trace
+from mpm.scene import Scene
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to calibrate.
+
+    Attributes:
+        food: The food with its literature ranges.
+        trace: The cut, or its file.
+        air: The same motion without food, or its file, or None.
+        columns: ``time_col``, ``force_col``, ``position_col``, ``depth_col``, ``sign`` for reading files.
+        knife: Name or YAML file.
+        speed: Knife speed [m/s], or None.
+        t_end: End of the record [s], or None.
+        sizing: What is known of the specimen.
+        fit: Names of the fitted properties; None for the food's default.
+        dx: Cell size [m], or None.
+        gain_sd: Relative standard deviation of the sensor's gain [-]; None for what its kind suggests.
+        lag_sd: Standard deviation of the sensor's delay [s], or None.
+        scaled: Whether the search has a factor for the width of the specimen, as it has in a fit of several.
+        u_num: Folder of a convergence study whose numerical uncertainty enters the likelihood, or None.
+        errors: How far a right model may be from the trace.
+        sample: Whether the posterior is sampled beside its profiles.
+        budget: Largest number of simulations.
+        seed: Seed of particles and search.
+        arch: Device.
+        command: Command line, for provenance.
+    """
+
+    food: FoodSpec
+    trace: Path | Trace
+    air: Path | Trace | None = None
+    columns: Mapping[str, Any] = field(default_factory=dict)
+    knife: str = "kitchen"
+    speed: float | None = None
+    t_end: float | None = None
+    sizing: Sizing = field(default_factory=Sizing)
+    fit: tuple[str, ...] | None = None
+    dx: float | None = None
+    gain_sd: float | None = None
+    lag_sd: float | None = None
+    scaled: bool = False
+    u_num: Path | None = None
+    errors: ErrorModel = field(default_factory=ErrorModel)
+    sample: bool = False
+    budget: float = 100
+    seed: int = 0
+    arch: str = "cpu"
+    command: tuple[str, ...] = ()
+
+    @property
+    def air_source(self) -> str | None:
+        """What the air run is called, None without one."""
+        return None if self.air is None else _source(self.air)
+
+    @property
+    def stem(self) -> str:
+        """Name of the trace for a folder."""
+        return Path(_source(self.trace).replace(":", "_")).stem
+
+    def records(self) -> tuple[Trace, Trace | None]:
+        """The cut, and the air run where there is one.
+
+        Raises:
+            TraceError: A file cannot be read.
+        """
+        return self._record(self.trace), None if self.air is None else self._record(self.air)
+
+    def _record(self, given: Path | Trace) -> Trace:
+        """A record, with the SHA-256 of its numbers if it comes from no file and no DataFrame."""
+        if not isinstance(given, Trace):
+            return read_trace(given, **self.columns)
+        return given if given.sha256 else replace(given, source=_source(given), sha256=given.digest)
+
+
+def _source(given: Path | Trace) -> str:
+    """What a record is called; one made from arrays says so."""
+    if not isinstance(given, Trace):
+        file, address = split_address(given)
+        return f"{file.name}:{address}" if address else file.name
+    return given.source if given.sha256 else f"{given.source} (arrays)"
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Everything that is decided before the first simulation."""
+
+    curve: Conditioned
+    fine: Scene
+    coarse: Scene
+    objective: Objective
+    assumed: list[str]
+    kept: tuple[str, ...] = ()
+    air_sha256: str | None = None

@@ -1,0 +1,1 @@
+"""Fits to published peaks and energies where there is no trace."""

@@ -1,0 +1,94 @@
+"""The whole record of one cut in a file, so that it is simulated once.
+
+An HDF5 file: what a :class:`mpm.output.record.ForceRecord` has over the stroke as datasets of its names and units, all else as
+attributes, ``counters`` and ``pieces`` as JSON, and ``key``, the SHA-256 of scene and code.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from calib.errors import OutputError
+from calib.io.provenance import code_key
+from calib.simulation.evaluation_store import content_key
+from calib.simulation.workers import Errand
+from mpm.output.record import ForceRecord
+from mpm.output.section import Section
+from mpm.output.topology import Topology
+from mpm.scene import Scene
+
+SECTION = "section"
+JSON = ("counters", "pieces")  # parts of a record that are neither arrays nor numbers
+
+
+def record_errands(scene: Scene, path: Path) -> list[Errand]:
+    """The simulation that brings the whole record of a scene into a file, in which a record of something else is replaced; none where
+    the file holds it.
+
+    The errand raises OutputError where the file cannot be written.
+    """
+    if _read(path, _key(scene)) is not None:
+        return []
+    return [Errand(scene, lambda record: _write(path, _key(scene), record), whole=True)]
+
+
+def read_record(scene: Scene, path: Path) -> ForceRecord:
+    """The whole record of a scene, from the file that an errand has written.
+
+    Raises:
+        OutputError: The file does not hold it.
+    """
+    record = _read(path, _key(scene))
+    if record is None:
+        raise OutputError(f"{path}: changed since it was written; add --resume to simulate it again")
+    return record
+
+
+def _key(scene: Scene) -> str:
+    return content_key(scene.as_dict(), {}, code_key())
+
+
+def _write(path: Path, key: str, record: ForceRecord) -> None:
+    """Write a file under another name and rename it: a kill leaves the old one or none."""
+    draft = path.with_name(path.name + ".draft")
+    try:
+        with h5py.File(draft, "w") as file:
+            file.attrs["key"] = key
+            for name, value in asdict(record).items():
+                if isinstance(value, np.ndarray):
+                    file[name] = value
+                elif name == SECTION:
+                    for part, content in (value or {}).items():
+                        file[f"{SECTION}/{part}"] = content
+                else:
+                    file.attrs[name] = json.dumps(value) if name in JSON else value
+        os.replace(draft, path)
+    except OSError as e:
+        raise OutputError(f"{path}: cannot be written ({e}); check the disk") from None
+
+
+def _read(path: Path, key: str) -> ForceRecord | None:
+    """The record of this key; None where the file is missing, damaged, or holds another one."""
+    try:
+        with h5py.File(path) as file:
+            if file.attrs["key"] != key:
+                return None
+            section = {name: part[()] for name, part in file.get(SECTION, {}).items()}
+            found = {name: values[()] for name, values in file.items() if name != SECTION}
+            found |= {name: v.item() if isinstance(v, np.generic) else v for name, v in file.attrs.items()}
+            found[SECTION] = Section(**section) if section else None
+            values = {f.name: found[f.name] for f in fields(ForceRecord)}
+            values |= {name: json.loads(values[name]) for name in JSON}
+    except (OSError, KeyError, ValueError):
+        return None
+    if values["pieces"] is not None:
+        pieces: dict[str, Any] = {n: tuple(v) if isinstance(v, list) else v for n, v in values["pieces"].items()}
+        values["pieces"] = Topology(**pieces)
+    return ForceRecord(**values)

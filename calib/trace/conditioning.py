@@ -1,0 +1,391 @@
+"""From a trace as recorded to a tared force over the stroke, with the uncertainty of every step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib.errors import TraceError
+from calib.trace.contact_onset import FLOOR_FRACTION, SUSTAIN, Contact, find_contact, first_sustained
+from calib.trace.filters import FILTER_SD_M, N_STROKE, leading_grid, resample, smooth
+from calib.trace.trace import MIN_SAMPLES, Trace
+
+AIR_SLACK_SAMPLES = 3
+"""Sampling intervals by which an air run may be shorter than the cut; its last value is held over them."""
+AIR_PATH_M = 2e-3
+"""Largest difference in height between cut and air run before contact [m] that goes without a warning."""
+DWELL_M = 0.1e-3
+"""Height above the lowest position so far [m] at which the knife still counts as there: a robot arm's
+repeatability. The stroke is over where it comes that near to the lowest of all; higher, it is retracting."""
+RELEASE_SD = 4.0
+"""The force is released when it stays within this many noise standard deviations of the baseline ..."""
+RELEASE_FRACTION = 0.05
+"""... or below this fraction of the peak, whichever is higher: a baseline drifts during a cut."""
+DRIFT_FRACTION = 0.02
+"""Drift over the cut, as a fraction of the peak, that is warned about."""
+DRIFT_REACH = 10.0
+"""Lengths of the baseline window over which its drift is extrapolated; a shorter window says nothing of
+the cut."""
+DRIFT_SIGNIFICANCE = 3.0
+"""Standard uncertainties by which a drift must differ from zero to be warned about."""
+STROKE_RANGE_M = (1e-3, 0.5)
+"""Strokes outside are taken for a unit mix-up [m]: less than a grape's skin, more than any kitchen
+knife's way."""
+PEAK_RANGE_N = (0.05, 5e3)
+"""Peak forces outside are taken for a unit mix-up [N]."""
+NOTHING_N = 1e-6
+"""Variation of a force below which there is nothing in it but rounding [N]."""
+PEAK_HALF_WIDTH = 2
+"""Points on each side of the maximum through which the parabola of the peak is fitted."""
+BEYOND = 0.1
+"""Part of the specimen's height by which a stroke may exceed it: 10 N bend an arm of 3 kN/m by 3 mm, a tenth of a fruit of 3 cm."""
+MAX_DESCENT_FRACTION = 0.5
+"""Part of the position's range that must lie before its lowest point for a record to be a downward stroke."""
+
+
+@dataclass(frozen=True)
+class Conditioned:
+    """A cut as force over stroke, ready to be compared with a simulation.
+
+    Attributes:
+        trace: The trace it was made from, cut at ``t_end`` if that was given.
+        baseline_N: Level subtracted from the force [N]; with an air run, what was left after subtracting it.
+        baseline_sd_N: Standard uncertainty of that level (noise, its correlation, drift within the window)
+            [N].
+        baseline_kind: ``constant`` or ``air``.
+        onset_s: Time of contact on the trace's clock [s].
+        onset_sd_s: Its standard uncertainty [s].
+        end_s: Time at which the downward stroke ends [s].
+        time: Time of the whole record [s], shape (n,).
+        force: Tared, unfiltered force of the whole record [N], shape (n,).
+        stroke: Uniform stroke from contact to the end of the downward stroke [m], shape (240,).
+        curve: Filtered force on that stroke [N], shape (240,).
+        stroke_source: ``position``, ``speed`` or ``height``.
+        stroke_length_m: Length of the downward stroke after contact [m].
+        noise_sd_N: Robust standard deviation of one unfiltered sample before contact [N].
+        curve_noise_sd_N: What of it is left in a point of the filtered curve, its correlation counted [N].
+        filter_sd_m: Standard deviation of the Gaussian filter [m].
+        peak_N: Maximum of the curve from a parabola through the points around it [N].
+        peak_sd_N: Its standard uncertainty from filtered noise and baseline [N].
+        drift_N_per_s: Drift of the force in the baseline window [N/s].
+        drift_sd_N_per_s: Its standard uncertainty [N/s].
+        warnings: What a reader should know, one sentence each.
+    """
+
+    trace: Trace
+    baseline_N: float
+    baseline_sd_N: float
+    baseline_kind: str
+    onset_s: float
+    onset_sd_s: float
+    end_s: float
+    time: np.ndarray
+    force: np.ndarray
+    stroke: np.ndarray
+    curve: np.ndarray
+    stroke_source: str
+    stroke_length_m: float
+    noise_sd_N: float
+    curve_noise_sd_N: float
+    filter_sd_m: float
+    peak_N: float
+    peak_sd_N: float
+    drift_N_per_s: float
+    drift_sd_N_per_s: float
+    warnings: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        if self.stroke.shape != self.curve.shape or not np.all(np.isfinite(self.curve)):
+            raise TraceError(f"{self.trace.source}: the conditioned curve is not finite on its stroke")
+
+
+def condition(
+    trace: Trace,
+    *,
+    air: Trace | None = None,
+    speed: float | None = None,
+    height: float | None = None,
+    t_end: float | None = None,
+    board: float | None = None,
+) -> Conditioned:
+    """Tare a trace, find contact, and put the force on a uniform stroke with a zero-phase filter.
+
+    Args:
+        trace: The cut.
+        air: The same motion without food, subtracted at equal time.
+        speed: Knife speed [m/s], needed where the trace has no position.
+        height: Height of the food [m]; without position and speed, onset to release is taken for this height.
+        t_end: End of the record on the trace's clock [s]; what comes later (board contact, say) is dropped.
+        board: Stroke at which the edge is at the board, which is the specimen's height where that was measured [m]; the curve ends
+            there.
+
+    Returns:
+        The conditioned cut.
+
+    Raises:
+        TraceError: No usable cut in the trace; the message says why and what to do.
+    """
+    _check_options(trace, speed, height)
+    trace = trace if t_end is None else trace.until(t_end)
+    warnings = list(trace.notes)
+    if trace.label == "reconstructed":
+        warnings.append(f"{trace.source} is a reconstruction, not a measurement: nothing fitted to it is validated")
+    if trace.start:
+        warnings.append(
+            f"the clock of {trace.source} starts at {trace.start:.10g} s; all times, also --t-end, are counted from "
+            "there"
+        )
+    force = trace.force
+    if air is not None:
+        force = force - _air_force(trace, air)
+    last = _lowest(trace)
+    if last + 1 < MIN_SAMPLES:
+        raise TraceError(
+            f"{trace.source}, column {trace.columns.get('position')}: the position is at its lowest after {last + 1} samples, "
+            f"at least {MIN_SAMPLES} are needed on the way down; it must be a height, or a depth named like stroke_m; name "
+            "another with --position-col, or none and give --speed"
+        )
+    if 0.0 < np.ptp(force[: last + 1]) < NOTHING_N:
+        raise TraceError(
+            f"{trace.source}, column {trace.columns.get('force')}: no contact found: the force varies by "
+            f"{np.ptp(force[: last + 1]):.3g} N in all; check the column and its unit (force_N, force_mN, force_kN)"
+        )
+    contact = find_contact(trace.time[: last + 1], force[: last + 1], source=trace.source)
+    if air is None:
+        warnings += _drift_warnings(trace, force, contact, trace.time[last])
+    else:
+        warnings += _air_warnings(trace, air, contact.onset)
+    if contact.baseline.noise_sd < FLOOR_FRACTION * contact.peak:
+        warnings.append(
+            f"the force before contact hardly varies ({contact.baseline.noise_sd:.2g} N): digitised, "
+            "smoothed or clipped data; the noise and every uncertainty that follows from it are too small"
+        )
+    tared = force - contact.baseline.level
+    stroke, end, source = _stroke_axis(trace, tared, contact, last, speed, height, warnings)
+    if board is not None and end > board * (1 + 1e-9):
+        if end > (1 + BEYOND) * board:
+            raise TraceError(
+                f"{trace.source}: the stroke after contact is {1e3 * end:.1f} mm (from {source}), but the specimen is {1e3 * board:.1f} "
+                "mm high; check the height, or the position or speed, or say with --t-end where the cut ends"
+            )
+        warnings.append(
+            f"the stroke of {1e3 * end:.1f} mm goes beyond the specimen's height of {1e3 * board:.1f} mm; what is below the board's "
+            "top is left out"
+        )
+        end = board
+    grid, curve = _on_grid(trace, stroke, tared, contact.onset, end)
+    noise = _filtered_noise(contact, len(tared[(stroke >= 0.0) & (stroke <= grid[-1])]), grid[-1])
+    peak = _peak(curve)
+    _check_peak(trace, peak)
+    return Conditioned(
+        trace=trace,
+        baseline_N=contact.baseline.level,
+        baseline_sd_N=contact.baseline.level_sd,
+        baseline_kind="constant" if air is None else "air",
+        onset_s=contact.onset,
+        onset_sd_s=contact.onset_sd,
+        end_s=float(trace.time[int(np.argmax(stroke >= grid[-1] * (1 - 1e-9)))]),
+        time=trace.time,
+        force=tared,
+        stroke=grid,
+        curve=curve,
+        stroke_source=source,
+        stroke_length_m=float(grid[-1]),
+        noise_sd_N=contact.baseline.noise_sd,
+        curve_noise_sd_N=noise,
+        filter_sd_m=FILTER_SD_M,
+        peak_N=peak,
+        peak_sd_N=float(np.hypot(noise, contact.baseline.level_sd)),
+        drift_N_per_s=contact.baseline.slope,
+        drift_sd_N_per_s=contact.baseline.slope_sd,
+        warnings=tuple(warnings),
+    )
+
+
+def _check_options(trace: Trace, speed: float | None, height: float | None) -> None:
+    """Speed and height must be positive, and one of them must be there if the trace has no position."""
+    for name, value, unit in (("speed", speed, "m/s"), ("height", height, "m")):
+        if value is not None and not (np.isfinite(value) and value > 0.0):
+            raise TraceError(f"{name} is {value} {unit}; it must be positive (option --{name})")
+    if trace.position is None and speed is None and height is None:
+        raise TraceError(
+            f"{trace.source}: no position column, so the stroke is unknown; give the knife speed with "
+            "--speed (m/s), or name a position column with --position-col"
+        )
+
+
+def _air_force(trace: Trace, air: Trace) -> np.ndarray:
+    """Force of the air run at the times of the cut [N]."""
+    slack = AIR_SLACK_SAMPLES * max(trace.dt, air.dt)
+    missing = []
+    if air.time[0] > trace.time[0] + slack:
+        missing.append(f"{trace.time[0]:.4g} to {air.time[0]:.4g} s")
+    if air.time[-1] < trace.time[-1] - slack:
+        missing.append(f"{air.time[-1]:.4g} to {trace.time[-1]:.4g} s")
+    if missing:
+        raise TraceError(
+            f"{air.source}: the air run does not cover the cut {trace.source}: {' and '.join(missing)} is "
+            "missing; use an air run of the same motion, or end the cut earlier with --t-end"
+        )
+    return np.interp(trace.time, air.time, air.force)
+
+
+def _air_warnings(trace: Trace, air: Trace, onset: float) -> list[str]:
+    """An air run that is another quantity or another motion than the cut."""
+    found = []
+    if trace.columns.get("force") != air.columns.get("force"):
+        found.append(
+            f"the force columns differ: {trace.columns.get('force')} in the cut, {air.columns.get('force')} "
+            "in the air run"
+        )
+    if trace.position is not None and air.position is not None:
+        before = trace.time <= onset
+        gap = np.abs(np.interp(trace.time, air.time, air.position) - trace.position)[before]
+        if gap.max() > AIR_PATH_M:
+            found.append(
+                f"air run and cut differ by up to {1e3 * gap.max():.1f} mm in height before contact: not "
+                "the same motion"
+            )
+    return found
+
+
+def _drift_warnings(trace: Trace, force: np.ndarray, contact: Contact, end: float) -> list[str]:
+    """A constant baseline that the force before contact contradicts."""
+    base = contact.baseline
+    found = []
+    drift = base.slope * (end - contact.onset)
+    told = end - contact.onset < DRIFT_REACH * (trace.time[base.stop - 1] - trace.time[base.start])
+    significant = abs(base.slope) > DRIFT_SIGNIFICANCE * base.slope_sd
+    if told and significant and abs(drift) > DRIFT_FRACTION * contact.peak:
+        found.append(
+            f"the baseline drifts by {base.slope:.3g} N/s before contact, {drift:.2g} N over the cut "
+            f"({abs(drift) / contact.peak:.1%} of the peak); it was not removed: give an air run with --air"
+        )
+    first = force[: max(SUSTAIN, base.stop // 10)]
+    moved = base.level - float(np.median(first))
+    if abs(moved) > max(DRIFT_FRACTION * contact.peak, DRIFT_SIGNIFICANCE * base.noise_sd):
+        found.append(
+            f"the force before contact is not constant: its level moves by {moved:.2g} N "
+            f"({abs(moved) / contact.peak:.1%} of the peak) from the start of the record; give an air run "
+            "with --air"
+        )
+    return found
+
+
+def _lowest(trace: Trace) -> int:
+    """Index of the end of the descent, DWELL_M above the lowest position, or the last sample."""
+    if trace.position is None:
+        return len(trace.time) - 1
+    lowest = int(np.argmin(trace.position))
+    descent = float(np.max(trace.position[: lowest + 1]) - trace.position[lowest])
+    if descent < MAX_DESCENT_FRACTION * np.ptp(trace.position):
+        return len(trace.time) - 1
+    top = int(np.argmax(trace.position[: lowest + 1]))
+    return top + int(np.argmax(trace.position[top : lowest + 1] <= trace.position[lowest] + DWELL_M))
+
+
+def _stroke_axis(
+    trace: Trace,
+    tared: np.ndarray,
+    contact: Contact,
+    last: int,
+    speed: float | None,
+    height: float | None,
+    warnings: list[str],
+) -> tuple[np.ndarray, float, str]:
+    """Stroke of every sample, negative before contact [m], its value at the end, and its source."""
+    if trace.position is not None:
+        if speed is not None:
+            warnings.append("the speed is not used: the stroke comes from the position column")
+        stroke = float(np.interp(contact.onset, trace.time, trace.position)) - trace.position
+        end = float(stroke[last])
+        if not end > 0.0:
+            raise TraceError(
+                f"{trace.source}, column {trace.columns.get('position')}: the position does not descend "
+                f"after contact at {contact.onset:.4g} s (it changes by {-end:.3g} m); it must be a height, "
+                "or a depth (--depth-col); name another with --position-col, or none and give --speed"
+            )
+        source = "position"
+    else:
+        release, released = _release(trace.time, tared, contact)
+        elapsed = trace.time - contact.onset
+        if speed is not None:
+            rate, source = speed, "speed"
+        else:
+            assert height is not None
+            rate, source = height / (release - contact.onset), "height"
+            until = "release" if released else "the end of the record (the force is not released in it)"
+            warnings.append(
+                f"no position and no speed: contact to {until} was taken for the food's height of "
+                f"{1e3 * height:.3g} mm at constant speed ({1e3 * rate:.3g} mm/s); a fitted stiffness or R "
+                "inherits that guess"
+            )
+        stroke, end = rate * elapsed, rate * (release - contact.onset)
+    low, high = STROKE_RANGE_M
+    if not low <= end <= high:
+        raise TraceError(
+            f"{trace.source}: the stroke after contact is {end:.3g} m (from {source}), outside {low:g} to "
+            f"{high:g} m; check millimetres against metres in the position, speed or height"
+        )
+    return stroke, end, source
+
+
+def _release(time: np.ndarray, tared: np.ndarray, contact: Contact) -> tuple[float, bool]:
+    """Time at which the force is back at the baseline for good, and whether the record has it."""
+    limit = max(RELEASE_SD * contact.baseline.noise_sd, RELEASE_FRACTION * contact.peak)
+    after_last = first_sustained((tared > limit)[::-1])
+    last = len(tared) - 1 - (after_last or 0)
+    if last >= len(tared) - SUSTAIN:
+        return float(time[-1]), False
+    return float(time[last + 1]), True
+
+
+def _on_grid(
+    trace: Trace, stroke: np.ndarray, tared: np.ndarray, onset: float, end: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Uniform stroke grid from 0 to ``end`` [m] and the filtered force on it [N]."""
+    grid = np.linspace(0.0, end, N_STROKE)
+    lead = leading_grid(grid)
+    whole = np.concatenate([lead, grid])
+    last = int(np.argmax((trace.time > onset) & (stroke >= end)))
+    away = np.flatnonzero((trace.time < onset) & (stroke < whole[0]))
+    first = int(away[-1]) if len(away) else 0
+    deepest = np.maximum.accumulate(stroke[first : last + 1])
+    advancing = deepest - stroke[first : last + 1] <= DWELL_M
+    s, f = deepest[advancing], tared[first : last + 1][advancing]
+    if s[0] > whole[0]:
+        s, f = np.concatenate([[whole[0]], s]), np.concatenate([[0.0], f])
+    force = resample(s, f, whole)
+    return grid, smooth(grid, force[len(lead) :], FILTER_SD_M, before=force[: len(lead)])
+
+
+def _peak(curve: np.ndarray) -> float:
+    """Peak by a parabola around the maximum [N]."""
+    i = int(np.argmax(curve))
+    if PEAK_HALF_WIDTH <= i < len(curve) - PEAK_HALF_WIDTH:
+        x = np.arange(-PEAK_HALF_WIDTH, PEAK_HALF_WIDTH + 1)
+        a, b, c = np.polyfit(x, curve[i + x], 2)
+        if a < 0.0 and abs(b / (2.0 * a)) <= PEAK_HALF_WIDTH:
+            return float(c - b * b / (4.0 * a))
+    return float(curve[i])
+
+
+def _filtered_noise(contact: Contact, samples: int, length: float) -> float:
+    """Standard deviation of the noise that is left in a point of the filtered curve [N].
+
+    The Gaussian averages 2 sqrt(pi) of its standard deviations' worth of samples.
+    """
+    base = contact.baseline
+    averaged = 2.0 * np.sqrt(np.pi) * FILTER_SD_M * samples / length
+    return float(base.noise_sd * np.sqrt(min(1.0, base.inflation / max(averaged, 1.0))))
+
+
+def _check_peak(trace: Trace, peak: float) -> None:
+    """Refuse a peak that no knife and no food give."""
+    low, high = PEAK_RANGE_N
+    if not low <= peak <= high:
+        raise TraceError(
+            f"{trace.source}, column {trace.columns.get('force')}: the peak is {peak:.3g} N, outside "
+            f"{low:g} to {high:g} N; check the unit in the column's name (force_N, force_mN, force_kN)"
+        )

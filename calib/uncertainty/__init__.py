@@ -1,0 +1,1 @@
+"""Intervals: profile likelihood, posterior sample, global search, sensitivity, predictive bands."""

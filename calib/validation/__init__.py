@@ -1,0 +1,1 @@
+"""What a fit is worth: metrics, null models, numerical checks, acceptance, prediction."""

@@ -1,0 +1,110 @@
+"""What numerical choices do to a calibrated force: the best values once more, slower and elsewhere on the grid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from calib.io.provenance import code_key
+from calib.material.scene import elsewhere
+from calib.simulation.evaluation import Evaluation
+from calib.simulation.evaluation_store import EvaluationStore, content_key
+from calib.simulation.workers import Errand
+from mpm.scene import Scene
+
+
+def _slower(scene: Scene) -> Scene:
+    return replace(scene, motion=replace(scene.motion, mach=scene.motion.mach / 2))
+
+
+FINER = 2 / 3
+"""Cell of the finer grid over that of the calibration: five times the cost of the cut."""
+
+
+def _finer(scene: Scene) -> Scene:
+    return replace(scene, numerics=replace(scene.numerics, dx=FINER * scene.numerics.dx))
+
+
+def otherwise(scene: Scene) -> Scene:
+    """The scene at half the speed, with other particles and the grid elsewhere: what an answer should not depend on."""
+    return elsewhere(_slower(scene), 2)
+
+
+FINER_GRID = "cells of two thirds"
+VARIANTS: Mapping[str, Callable[[Scene], Scene]] = {
+    "half the simulated speed": _slower,
+    "grid and particles elsewhere": lambda scene: elsewhere(scene, 1),
+    FINER_GRID: _finer,
+}
+"""What should not matter, by name. The order of convergence, and an uncertainty, are the business of a convergence study."""
+VARIED = "at half the speed, with the grid and the particles elsewhere, and on cells of two thirds"
+
+
+def check_errands(scene: Scene, store: EvaluationStore) -> list[Errand]:
+    """The simulations that :func:`check` compares: those of the variants that the store does not know."""
+    varied = {_key(other): other for other in (vary(scene) for vary in VARIANTS.values())}
+    return [Errand(other, _keeper(store, key)) for key, other in varied.items() if store.get(key) is None]
+
+
+def _keeper(store: EvaluationStore, key: str) -> Callable[[Evaluation], None]:
+    return lambda run: store.append(key, run, "check")
+
+
+def _key(scene: Scene) -> str:
+    return content_key(scene.as_dict(), {}, code_key())
+
+
+@dataclass(frozen=True)
+class Check:
+    """A repeated simulation against the one that is reported.
+
+    Attributes: name; reason why it broke down, or None; changes of peak and work, as fractions, and of the part of the work that
+    no law has taken, None where it broke down.
+    """
+
+    name: str
+    reason: str | None
+    peak_change: float | None
+    work_change: float | None
+    unbooked_change: float | None = None
+
+    @property
+    def change(self) -> float | None:
+        """The larger of the two, without its sign."""
+        if self.peak_change is None or self.work_change is None:
+            return None
+        return max(abs(self.peak_change), abs(self.work_change))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return asdict(self)
+
+
+def _unbooked(run: Evaluation) -> float:
+    """Part of the work that no law has taken [-]."""
+    return run.scalars["unbooked_J"] / run.scalars["work_J"]
+
+
+def check(scene: Scene, own: Evaluation, store: EvaluationStore, stroke: float) -> list[Check]:
+    """The variants of a scene against it.
+
+    Args:
+        scene: The scene with its calibrated material.
+        own: Its simulation.
+        store: Where :func:`check_errands` were kept.
+        stroke: What the trace has of the stroke [m].
+
+    Raises:
+        KeyError: They were not made.
+    """
+    out = []
+    for name, vary in VARIANTS.items():
+        run = store.last(_key(vary(scene)))
+        if run.ok and min(own.until(stroke)) > 0:
+            peak, work = (new / old - 1 for new, old in zip(run.until(stroke), own.until(stroke), strict=True))
+            unbooked = _unbooked(run) - _unbooked(own)
+            out.append(Check(name, None, peak, work, unbooked))
+        else:
+            out.append(Check(name, run.reason or "no force", None, None))
+    return out

@@ -1,0 +1,230 @@
+"""``calibrate`` (also ``cutcal calibrate``): fit a food to a knife-force trace and report."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from calib.io.progress import ProgressBar
+from calib.problem.objective import ErrorModel
+from calib.problem.request import Request
+from calib.validation.acceptance import Verdict, remedied
+from calib.validation.metrics import IsoRating
+from cutcal.commands.calibration.describe import description
+from cutcal.options import (
+    RESUME_HELP,
+    RUN,
+    add_food,
+    add_run,
+    add_workers,
+    food_of,
+    note,
+    number,
+    print_json,
+    sizing_of,
+    titled,
+    workers_of,
+)
+from mpm.errors import CutcalError
+
+HELP = "fit a food to a measured knife-force trace, and report"
+DESCRIPTION = """Fit a food to a knife-force trace (CSV, JSON, HDF5; units in columns' names)."""
+EPILOG = """examples:
+  calibrate --food potato --trace cut.csv --air air.csv --check
+  calibrate --config potatoes.yaml --out runs/potatoes
+
+Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass."""
+
+
+def add_args(p: argparse.ArgumentParser) -> None:
+    """Options of this command."""
+    p.usage = "%(prog)s --food NAME --trace FILE [options]"
+    add_trace(p, required=False)
+    add_food(p, required=False)
+    fit = p.add_argument_group("fit")
+    fit.add_argument("--config", metavar="YAML", help="fit the cuts of this study, in place of --trace")
+    fit.add_argument("--fit", metavar="NAMES", help="properties, e.g. E,nu,R,mu (default: those a cut sees)")
+    fit.add_argument("--budget", type=number(0, 1e6, ""), metavar="N", help="most simulations of a trace (default 100)")
+    fit.add_argument(
+        "--discrepancy",
+        type=number(0, 1, ""),
+        metavar="PART",
+        help="how far a right model may be, of the peak (0.03)",
+    )
+    fit.add_argument("--sample", action="store_true", help="sample the posterior as well (needs emcee)")
+    fit.add_argument("--u-num", metavar="DIR", help="a converge study whose uncertainty the fit heeds")
+    add_workers(p, "simulations")
+    titled(p, RUN).add_argument("--check", action="store_true", help="say how the trace is read, and simulate nothing")
+    titled(p, RUN).add_argument("--resume", action="store_true", help=RESUME_HELP)
+    add_run(p)
+
+
+def add_trace(p: argparse.ArgumentParser, *, required: bool = True) -> None:
+    """Options that say what was measured."""
+    g = p.add_argument_group("measurement")
+    g.add_argument("--trace", required=required, metavar="FILE", help="record of the cut")
+    g.add_argument("--air", metavar="FILE", help="the same motion without food, to be subtracted")
+    g.add_argument("--time-col", metavar="NAME", help="column of the time")
+    g.add_argument("--force-col", metavar="NAME", help="column of the force on the knife")
+    g.add_argument("--position-col", metavar="NAME", help="column of the knife's height ('none': none)")
+    g.add_argument("--depth-col", metavar="NAME", help="the same where it grows as the knife descends")
+    g.add_argument("--sign", choices=("+", "-"), metavar="+|-", help="sign that makes resistance positive")
+    g.add_argument("--speed", type=number(0, 10, "m/s"), metavar="M/S", help="of the knife, where there is no position")
+    g.add_argument("--gain-sd", type=number(0, 1, ""), metavar="PART", help="doubt of the sensor's gain (default 0.02)")
+    g.add_argument("--lag-sd", type=number(0, 1, "s"), metavar="S", help="doubt of force against position in time [s]")
+    g.add_argument("--t-end", type=float, metavar="S", help="leave out what is later [s] (board contact)")
+
+
+BUDGET = 100.0
+"""Simulations that a calibration on one trace may take."""
+
+
+def request_of(args: argparse.Namespace, command: Sequence[str]) -> Request:
+    """The request that the options make.
+
+    Raises:
+        CutcalError: An impossible value, an unknown name, a missing file.
+    """
+    named = None if args.fit is None else tuple(n.strip() for n in args.fit.split(",") if n.strip())
+    if named == ():
+        raise CutcalError(f"--fit {args.fit!r} names no property; give for instance --fit E,R, or leave it out")
+    u_num = None if args.u_num is None else Path(args.u_num)
+    errors = ErrorModel() if args.discrepancy is None else ErrorModel(discrepancy=args.discrepancy)
+    return replace(
+        measured(args, command),
+        errors=errors,
+        fit=named,
+        budget=args.budget or BUDGET,
+        u_num=u_num,
+        sample=args.sample,
+    )
+
+
+def measured(args: argparse.Namespace, command: Sequence[str]) -> Request:
+    """The part of a request that says what was cut and measured.
+
+    Raises:
+        CutcalError: An impossible value, an unknown name, a missing file.
+    """
+    columns: dict[str, Any] = {
+        "time_col": args.time_col,
+        "force_col": args.force_col,
+        "position_col": args.position_col,
+        "depth_col": args.depth_col,
+        "sign": args.sign,
+    }
+    return Request(
+        food=food_of(args),
+        trace=Path(args.trace),
+        air=None if args.air is None else Path(args.air),
+        columns=columns,
+        knife=args.knife,
+        speed=args.speed,
+        t_end=args.t_end,
+        gain_sd=args.gain_sd,
+        lag_sd=args.lag_sd,
+        sizing=sizing_of(args),
+        dx=args.dx,
+        seed=args.seed,
+        arch=args.arch,
+        command=tuple(command),
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Calibrate; prints the verdict, or the summary as JSON."""
+    from calib.calibration.run import run as calibrate
+
+    command = ["calibrate", *(a for a in sys.argv[1:] if a != "calibrate")]
+    if args.config is not None:
+        return run_study(args, command)
+    missing = [f"--{name}" for name in ("food", "trace") if getattr(args, name) is None]
+    if missing:
+        raise CutcalError(f"{' and '.join(missing)} missing: name the food and its trace, or a study with --config")
+    request = request_of(args, command)
+    if args.check:
+        print(description(request))
+        return 0
+    out = Path(args.out or f"cutcal-{request.food.name}-{request.stem}")
+
+    with workers_of(args, note) as pool, ProgressBar() as bar:
+        summary = calibrate(request, out, pool, resume=args.resume, progress=bar, say=note)
+    if args.json:
+        print_json(summary)
+    else:
+        print(verdict_text(summary, out))
+    return 0 if summary["passed"] else 2
+
+
+def run_study(args: argparse.Namespace, command: Sequence[str]) -> int:
+    """Fit and predict the cuts of a study; prints its table, or the summary as JSON."""
+    from calib.multi_specimen.run import run as study_run
+    from calib.multi_specimen.study_file import overridden, read_study
+
+    if args.check:
+        raise CutcalError("--check is for one trace: give --food and --trace, and leave --config out")
+    taken = [n for n in ("food", "trace", "air", "material", "fit") if getattr(args, n) is not None]
+    if taken:
+        raise CutcalError(f"--{taken[0]} beside --config: write it into {args.config}, where it belongs to a trace")
+    read = read_study(args.config)
+    study = overridden(read, budget=args.budget, arch=args.arch, command=tuple(command))
+    out = Path(args.out or f"cutcal-{Path(args.config).stem}")
+
+    with workers_of(args, note) as pool, ProgressBar() as bar:
+        summary = study_run(study, out, pool, resume=args.resume, progress=bar, say=note)
+    if args.json:
+        print_json(summary)
+    else:
+        print(study_text(summary, out))
+    return 0 if summary["passed"] else 2
+
+
+def study_text(summary: dict[str, Any], out: Path) -> str:
+    """What the terminal shows at the end of a study."""
+    lines = [f"  {'':24s}{'peak':>8s}{'NRMSE':>8s}{'shape':>8s}{'R':>7s}{'in band':>9s}{'factor':>8s}"]
+    kinds = (("in-sample", summary["traces"]), ("held out", summary["hold_out"]))
+    for words, group in kinds:
+        for name, t in group.items():
+            m, inside = t["metrics"], t["predictive_inside"]
+            within = "" if inside is None else f"{inside:.0%}"
+            lines.append(
+                f"  {'pass' if t['passed'] else 'FAIL'}  {name + ', ' + words:18s}{m['peak_error']:+8.1%}{m['nrmse']:8.3f}"
+                f"{m['shape_error']:8.3f}{m['iso18571']['R']:7.3f}{within:>9s}{t['factor']:8.3g}"
+            )
+            caveat = IsoRating(**m["iso18571"]).caveat
+            lines += [f"        {caveat}"] if caveat else []
+    lines.append(f"  {'fitted':24s}{'value':>10s} {'':6s}{'95 % interval':>24s}")
+    for name, p in summary["parameters"].items():
+        interval = "" if p["low95"] is None else f"{p['low95']:.3g} to {p['high95']:.3g}"
+        lines.append(f"  {name:24s}{p['value']:>10.4g} {p['unit']:6s}{interval:>24s}  {p['verdict']}")
+    head = (
+        f"{summary['food']}, {summary['study']}: {'passed' if summary['passed'] else 'not passed'}; "
+        f"{summary['simulations']} simulations in {summary['wall_s']:.0f} s"
+    )
+    return "\n".join([head, *lines, f"  wrote {out}"])
+
+
+def verdict_text(summary: dict[str, Any], out: Path) -> str:
+    """What the terminal shows at the end."""
+    lines = []
+    for v in summary["verdicts"]:
+        mark = {True: "pass", False: "FAIL", None: "not run"}[v["passed"]]
+        value = "" if v["value"] is None else f"{v['value']:.3g}"
+        limit = "" if v["limit"] is None else f"limit {v['limit']:.3g}"
+        lines.append(f"  {mark:8s}{v['name']:42s}{value:>10s}  {limit}")
+        remedy = remedied(Verdict(**v))
+        lines += [f"  {'':8s}{remedy}"] if remedy else []
+    lines.append(f"  {'fitted':8s}{'95 % interval':>42s}")
+    for name, p in summary["parameters"].items():
+        interval = "" if p["low95"] is None else f"{p['low95']:.3g} to {p['high95']:.3g}"
+        lines.append(f"  {'':8s}{name:18s}{p['value']:>10.4g} {p['unit']:6s}{interval:>24s}  {p['verdict']}")
+    state = "interrupted" if summary["status"] == "interrupted" else "passed" if summary["passed"] else "not passed"
+    head = (
+        f"{summary['food']}: {state}; peak {summary['peak_sim_N']:.2f} N against {summary['peak_real_N']:.2f} N "
+        f"({summary['trace']['label']}), {summary['simulations']} simulations in {summary['wall_s']:.0f} s"
+    )
+    return "\n".join([head, *lines, f"  wrote {out}"])

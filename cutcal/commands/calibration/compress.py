@@ -1,0 +1,143 @@
+"""``cutcal compress``: Young's modulus from a compression test between two plates."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from calib.errors import CurveError
+from cutcal.options import (
+    add_run,
+    number,
+    print_json,
+    whole,
+)
+from mpm.shapes import Shape
+
+HELP = "Young's modulus from a compression test between two plates"
+DESCRIPTION = """Calibrate Young's modulus on the force of a specimen that is compressed between
+two plates. One simulation at a reference modulus gives the curve; each repeat
+is fitted by scaling it. Strain is compression / height, stress force / first
+area. The first sample of a repeat is its zero; no toe is corrected. Writes
+compress.json, curves.csv and compress.svg to --out."""
+EPILOG = """examples:
+  cutcal compress --trace gel.csv --height 0.03 --diameter 0.05 --nu 0.49
+  cutcal compress --trace a.csv b.csv --height 0.02 --width 0.02 --length 0.02 \\
+      --nu 0.4 --strain 0.2 --bracket
+
+A trace has a column of compression (compression_mm, displacement_mm, ...), one
+of load (load_N, force_kN, ...) and may have one of repeats (replicate).
+
+Exit codes: 0 passed, 1 error in input or run, 2 fitted but not within the
+limits (curve error 5 %, modulus over 0-5 % strain 10 %, solver 3 %)."""
+
+
+def add_args(p: argparse.ArgumentParser) -> None:
+    """Options of this command."""
+    p.add_argument("--trace", required=True, nargs="+", metavar="FILE", help="CSV, JSON or HDF5 files of one material")
+    p.add_argument("--height", type=number(1e-3, 1.0, "m"), metavar="M", help="height of the specimen [m]")
+    p.add_argument("--diameter", type=number(1e-3, 1.0, "m"), metavar="M", help="diameter of an upright cylinder [m]")
+    for name in ("width", "length"):
+        p.add_argument(f"--{name}", type=number(1e-3, 1.0, "m"), metavar="M", help=f"{name} of a block [m]")
+    p.add_argument("--nu", type=float, metavar="NU", help="Poisson's ratio, which the test does not tell")
+    p.add_argument(
+        "--strain",
+        type=number(0.0, 0.8, ""),
+        default=0.4,
+        metavar="E",
+        help="largest engineering strain to fit (default 0.4)",
+    )
+    p.add_argument("--bonded", action="store_true", help="the food sticks to the plates (default: it slides)")
+    p.add_argument("--bracket", action="store_true", help="also the modulus if the plates were the other way")
+    p.add_argument("--cells", type=whole(1), metavar="N", help="cells over the height (default 10, 15 if bonded)")
+    p.add_argument("--compression-col", metavar="C", help="its column; metres without a unit")
+    p.add_argument("--force-col", metavar="C", help="column of the load; newtons without a unit")
+    add_run(p)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Calibrate; prints the result, or compress.json."""
+    from calib.compression.study import run as calibrate
+
+    shape = shape_of(args)
+    if args.nu is None:
+        raise CurveError(
+            "--nu is missing: a compression force alone does not tell Young's modulus from Poisson's ratio; give it, for "
+            "instance 0.49 for a gel or a rubber, 0.2 to 0.4 for a food with pores"
+        )
+    out = Path(args.out or f"cutcal-compress-{Path(args.trace[0]).stem}")
+    document = calibrate(
+        args.trace,
+        shape,
+        args.nu,
+        out,
+        strain=args.strain,
+        cells=args.cells if args.cells is not None else 15 if args.bonded else 10,
+        bonded=args.bonded,
+        bracket=args.bracket,
+        compression_col=args.compression_col,
+        force_col=args.force_col,
+        seed=args.seed,
+        arch=args.arch,
+        about={"command": ["compress", *(a for a in sys.argv[1:] if a != "compress")]},
+        say=lambda text: print(text, file=sys.stderr, flush=True),
+    )
+    if args.json:
+        print_json(document)
+    else:
+        print(f"{table(document)}\n  wrote {out}")
+    return 0 if document["passed"] else 2
+
+
+def shape_of(args: argparse.Namespace) -> Shape:
+    """The specimen that the options give.
+
+    Raises:
+        CurveError: Sizes are missing, or of two shapes.
+    """
+    if args.height is None:
+        raise CurveError("--height is missing: strain is compression over the height of the specimen [m]")
+    if args.diameter is not None:
+        if args.width is not None or args.length is not None:
+            raise CurveError(
+                "--diameter is of an upright cylinder, --width and --length are of a block; give one shape"
+            )
+        return Shape("upright_cylinder", args.diameter, args.diameter, args.height)
+    if args.width is None or args.length is None:
+        raise CurveError(
+            "the area under the plate is missing: give --diameter of an upright cylinder, or --width and --length of a "
+            "block [m]"
+        )
+    return Shape("block", args.length, args.width, args.height)
+
+
+def table(document: dict[str, Any]) -> str:
+    """What the terminal shows at the end."""
+    modulus, small, force = document["E"], document["slope"], document["force_error"]
+    window = f"over 0-{modulus['window'][1]:.0%} strain"
+    count = modulus["repeats"]
+    spread = "one repeat, no interval"
+    if count > 1:
+        spread = (
+            f"sd {modulus['sd_Pa'] / 1e3:.3g} kPa, 95 % interval {modulus['low_Pa'] / 1e3:.4g} to "
+            f"{modulus['high_Pa'] / 1e3:.4g} kPa, {count} repeats"
+        )
+    lines = [
+        f"E = {modulus['mean_Pa'] / 1e3:.4g} kPa {window} ({spread})",
+        f"  modulus 0-5 %: measured {small['measured_Pa'] / 1e3:.4g} kPa, fitted {small['fitted_Pa'] / 1e3:.4g} kPa "
+        f"({small['error']:+.1%})",
+        f"  largest force error beyond {force['from_strain']:.0%} strain: {force['value']:+.1%} at {force['strain']:.1%}",
+    ]
+    for other in document["sensitivity"] or ():
+        lines.append(f"  at nu {other['nu']:.3g} the same force is E = {other['E_Pa'] / 1e3:.4g} kPa {window}")
+    if document["bracket"]:
+        other = document["bracket"]
+        lines.append(f"  with {other['plates']} plates it is E = {other['E_Pa'] / 1e3:.4g} kPa {window}")
+    for line in document["verdicts"]:
+        word = "ok  " if line["passed"] else "FAIL"
+        note = f": {line['note']}" if line["note"] else ""
+        lines.append(f"  {word} {line['value']:6.1%} (limit {line['limit']:.0%})  {line['name']}{note}")
+    lines += [f"  note: {text}" for text in document["not_shown"]]
+    return "\n".join(lines)

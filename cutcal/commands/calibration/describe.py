@@ -1,0 +1,45 @@
+"""How a trace is read and what would be fitted to it, in words, before anything is simulated."""
+
+from __future__ import annotations
+
+from calib.problem.request import Request
+from calib.problem.setup import set_up
+from mpm.scene import Knife
+
+SOURCES = {
+    "position": "the position column",
+    "speed": "the given speed",
+    "height": "the food's height, at one speed from contact to release",
+}
+"""What the stroke is taken from, in words."""
+
+
+def description(request: Request) -> str:
+    """What a calibration would start from: columns, tare, contact, stroke, specimen, cells, parameters, budget, warnings.
+
+    Raises:
+        CutcalError: Anything wrong with the input.
+    """
+    setup = set_up(request)
+    c, scene = setup.curve, setup.fine
+    trace, shape, knife = c.trace, scene.food.shape, scene.knife
+    blade = f", spine {knife.spine * 1e3:g} mm" if isinstance(knife, Knife) else ""
+    named = ", ".join(f"{role} from {name}" for role, name in trace.columns.items())
+    sizes = " x ".join(f"{1e3 * size:.3g}" for size in (shape.length, shape.width, shape.height))
+    start = f"level before contact {c.baseline_N:.4g} N +- {c.baseline_sd_N:.2g}"
+    lines = [
+        ("trace", f"{trace.source}, {trace.label}; {named}"),
+        ("record", f"{len(trace.time)} samples in {trace.time[-1] - trace.time[0]:.4g} s, {1 / trace.dt:.4g} a second"),
+        ("subtracted", f"{'air run, then the ' if c.baseline_kind == 'air' else ''}{start}"),
+        ("contact", f"at {c.onset_s:.4g} s +- {c.onset_sd_s:.2g}; the stroke ends at {c.end_s:.4g} s"),
+        ("stroke", f"{1e3 * c.stroke_length_m:.4g} mm, from {SOURCES[c.stroke_source]}"),
+        ("peak", f"{c.peak_N:.4g} N +- {c.peak_sd_N:.2g}, noise {c.noise_sd_N:.2g} N a sample"),
+        ("specimen", f"{shape.kind}, {sizes} mm (across the blade, along it, height)"),
+        ("knife", f"{knife.name}{blade}"),
+        ("cells", f"{1e3 * scene.numerics.dx:.3g} mm, screening on {1e3 * setup.coarse.numerics.dx:.3g} mm"),
+        ("fitted", ", ".join(p.name for p in setup.objective.parameters)),
+        ("budget", f"{request.budget:g} simulations at most, one of screening is a quarter"),
+    ]
+    words = [f"{name:12s}{text}" for name, text in lines]
+    warned = [*c.warnings, *setup.assumed, *request.food.warnings()]
+    return "\n".join([*words, *(f"note: {text}" for text in warned)])

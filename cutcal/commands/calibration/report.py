@@ -1,0 +1,59 @@
+"""``cutcal report``: typeset the report of a finished run again."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+
+from calib.io.schema import tag
+from cutcal.options import add_json, print_json
+from reports import ReportError
+
+HELP = "write report.pdf of a finished run again"
+DESCRIPTION = """Typeset report.pdf again from the files that a calibration, a study of several
+cuts, converge, verify, stress or bench wrote."""
+EPILOG = "example:\n  cutcal report runs/banana"
+
+
+def add_args(p: argparse.ArgumentParser) -> None:
+    """Options of this command."""
+    p.add_argument("dir", metavar="DIR", help="folder of the run (--out)")
+    add_json(p)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the report."""
+    path = writer(Path(args.dir))(Path(args.dir))
+    if args.json:
+        print_json({"schema": tag("report"), "report": str(path)})
+    else:
+        print(f"wrote {path}")
+    return 0
+
+
+def writer(folder: Path) -> Callable[[Path], Path]:
+    """What writes the report of a folder, by the file that a run of its kind leaves there.
+
+    Raises:
+        ReportError: The folder is missing, or holds no finished run.
+    """
+    from reports import bench, convergence, stability, study, verification
+    from reports.calibration import report
+
+    found: dict[str, Callable[[Path], Path]] = {
+        "converge.json": convergence.write_report,
+        "verify.json": verification.write_report,
+        "stress.json": stability.write_report,
+        "bench.json": bench.write_report,
+    }
+    for name, write in found.items():
+        if (folder / name).exists():
+            return write
+    if not folder.is_dir():
+        raise ReportError(f"{folder}: no such folder; give the output folder of a calibration, or of another run")
+    summary = folder / "summary.json"
+    if not summary.exists():
+        names = ", ".join(("summary.json", *found))
+        raise ReportError(f"{folder}: holds none of {names}; give the --out of a finished run")
+    return study.write_report if study.is_study(summary) else report.write_report

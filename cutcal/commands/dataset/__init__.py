@@ -1,0 +1,1 @@
+"""Commands of the robot path: datasets and the evaluation of policies."""

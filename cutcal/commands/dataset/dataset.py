@@ -1,0 +1,204 @@
+"""``cutcal dataset``: demonstrations of cuts by a simulated robot, and their export."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
+
+from cutcal.options import KNIFE_HELP, RESUME_HELP, Group, add_workers, number, print_json, say, whole, workers_of
+from mpm.errors import CutcalError
+
+HELP = "a robot's cuts with force, in shards that learning code loads"
+DESCRIPTION = """generate: a Panda in ManiSkill cuts what it is told, in words; the food is in
+the cutting solver and pushes back. Writes dataset.json and shards of HDF5 and
+JSON in ManiSkill's layout, with force, pieces and surface in a group mpm/, and
+with --scenes pictures of all of it before other backgrounds.
+export: writes them as a LeRobotDataset v3.0, with pictures where it can render,
+as RLDS (TFDS), which OpenVLA and Octo read, or as RDT reads ManiSkill's.
+clone: trains a small network to do what they do (evaluate --policy clone)."""
+EPILOG = """examples:
+  cutcal dataset generate --episodes 60 --scenes 0,1,2 --out runs/cuts
+  cutcal dataset export runs/cuts --scenes 0,1,2 --out runs/lerobot
+
+generate and clone need pip install 'cutcal[robot]', export 'cutcal[data]', its
+pictures both and Vulkan (cutcal doctor). Exit codes: 0 done, 1 error."""
+WHAT, FORMATS = ("generate", "export", "clone"), ("lerobot", "rlds", "rdt")
+KEEP = ("severed", "published", "all")
+
+
+def add_args(p: Group) -> None:
+    """Options of the command."""
+    p.add_argument("what", choices=WHAT, metavar="WHAT", help="generate, export or clone")
+    p.add_argument("folder", nargs="?", metavar="DIR", help="dataset that is exported or learnt from")
+    p.add_argument("--episodes", type=whole(1), default=60, metavar="N", help="trajectories (default 60)")
+    p.add_argument(
+        "--food", action="append", metavar="NAME", help="this food alone, or several (default: the 15, in turn)"
+    )
+    p.add_argument(
+        "--task", action="append", metavar="SUITE", help="this kind of task, or several (default: all, in turn)"
+    )
+    p.add_argument(
+        "--demos",
+        choices=("sustained", "planned", "kinematic"),
+        default="sustained",
+        metavar="KIND",
+        help="sustained until the food parts (default), planned, or kinematic",
+    )
+    p.add_argument(
+        "--style", action="append", metavar="NAME", help="press, slice, rock or saw, or several (default: all)"
+    )
+    p.add_argument(
+        "--stiffness", type=number(1, 1e6, "N m/rad"), metavar="K", help="of the arm's joints [N m/rad] (default 1000)"
+    )
+    p.add_argument("--knife", default="kitchen", metavar="NAME", help=KNIFE_HELP)
+    p.add_argument("--seed", type=whole(0), default=0, metavar="N", help="of the first trajectory (default 0)")
+    p.add_argument("--shard", type=whole(1), default=20, metavar="N", help="trajectories of a file (default 20)")
+    p.add_argument(
+        "--scenes", metavar="LIST", help="backgrounds that are rendered, such as 0,1,2 (default: no pictures)"
+    )
+    p.add_argument(
+        "--format",
+        choices=FORMATS,
+        default="lerobot",
+        metavar="NAME",
+        help="of an export: lerobot (default), rlds or rdt",
+    )
+    p.add_argument(
+        "--keep", choices=KEEP, default="severed", metavar="KIND", help="clone: severed (default), published, all"
+    )
+    p.add_argument("--most", type=whole(1), metavar="N", help="clone: learn from at most so many")
+    p.add_argument("--pixels", type=whole(16), default=128, metavar="N", help="of the pictures (default 128)")
+    add_workers(p, "trajectories")
+    p.add_argument("--out", metavar="DIR", help="folder of the results, file of a clone; never overwritten")
+    p.add_argument("--resume", action="store_true", help=RESUME_HELP)
+    p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Generate or export."""
+    if args.out is None:
+        raise CutcalError("dataset: give --out, the folder of the results")
+    document = {"generate": _generate, "export": _export, "clone": _clone}[args.what](args)
+    if args.json:
+        print_json(document)
+    else:
+        print(f"  wrote {args.out}")
+    return 0
+
+
+def _generate(args: argparse.Namespace) -> dict[str, Any]:
+    from intsim.data import pictures
+    from intsim.data.generate import available, generate
+    from intsim.data.manifest import TASKS, Manifest
+    from intsim.task.planner import STYLES
+    from intsim.task.suites import FOODS
+
+    if args.folder is not None:
+        raise CutcalError(f"dataset generate: {args.folder!r} is too much; the folder of the results is --out")
+    unknown = [name for name in args.food or () if name not in FOODS]
+    if unknown:
+        raise CutcalError(f"--food {unknown[0]}: not one of {', '.join(FOODS)}")
+    scenes = _scenes(args)
+    manifest = Manifest(
+        args.episodes,
+        foods=args.food or FOODS,
+        suites=args.task or TASKS,
+        seed=args.seed,
+        styles=args.style or STYLES,
+    )
+    available()
+    args.arch = "cpu"
+    with workers_of(args, say) as pool:
+        if scenes:
+            pictures.available(pool, scenes, args.pixels)
+        found = generate(
+            manifest,
+            Path(args.out),
+            pool,
+            demos=args.demos,
+            knife=args.knife,
+            stiffness=args.stiffness,
+            shard=args.shard,
+            resume=args.resume,
+            say=say,
+            command=("dataset", *(a for a in sys.argv[1:] if a != "dataset")),
+        )
+        if scenes:
+            pool.renew()
+            found["pictures"] = pictures.render(Path(args.out), scenes, args.pixels, pool, say)
+    if not args.json:
+        s = found["seconds_per_episode"]
+        print(
+            f"{found['trajectories']} trajectories of {found['steps']} steps: {found['published']} meet the published criteria, "
+            f"{found['severed']} are in pieces\n"
+            f"  {s['solver']:.1f} s of one core in the solver and {s['robot']:.1f} s in the robot simulator each; the longest "
+            f"{found['most_solver_s']:.0f} s\n"
+            f"  21,000 of them: {found['core_hours_of_21000']:.0f} core hours; {found['bytes'] / 1e6:.1f} MB now"
+        )
+        if scenes:
+            p = found["pictures"]
+            print(
+                f"  {p['number']} pictures before {len(scenes)} backgrounds: {p['seconds_per_episode']:.1f} s of one core for each trajectory and "
+                f"background\n  21,000 before 15: {p['core_hours_of_315000']:.0f} core hours; {p['bytes'] / 1e6:.1f} MB now"
+            )
+        for broken in found["broken"]:
+            print(f"  trajectory {broken['index']}: {broken['status']}")
+    return found
+
+
+def _scenes(args: argparse.Namespace) -> list[int]:
+    """The backgrounds that are asked for, each once."""
+    try:
+        return list(dict.fromkeys(int(k) for k in args.scenes.split(","))) if args.scenes else []
+    except ValueError:
+        raise CutcalError(f"--scenes {args.scenes}: give numbers of backgrounds, such as 0,1,2") from None
+
+
+def _clone(args: argparse.Namespace) -> dict[str, Any]:
+    if args.folder is None:
+        raise CutcalError(
+            "dataset clone: name the folder of a dataset, such as cutcal dataset clone runs/cuts --out clone.npz"
+        )
+    path = Path(args.out)
+    if path.exists():
+        raise CutcalError(f"--out {path}: exists and is never overwritten; choose another file")
+    from intsim.policy.training import train
+
+    clone = train(Path(args.folder), keep=args.keep, most=args.most, seed=args.seed)
+    clone.save(path)
+    if not args.json:
+        print(
+            f"learnt from {clone.about['trajectories']} trajectories, {len(clone.vocabulary)} words; mean error {clone.about['loss']:.4f}"
+        )
+    return clone.about
+
+
+def _export(args: argparse.Namespace) -> dict[str, Any]:
+    from intsim.data import lerobot, rdt, rlds
+
+    if args.folder is None:
+        raise CutcalError(
+            "dataset export: name the folder of a dataset, such as cutcal dataset export runs/cuts --out runs/lerobot"
+        )
+    scenes = _scenes(args)
+    exports: dict[str, Callable[..., dict[str, Any]]] = {
+        "lerobot": lerobot.export,
+        "rlds": rlds.export,
+        "rdt": rdt.export,
+    }
+    args.arch = "cpu"
+    with workers_of(args, say) if scenes else nullcontext() as pool:
+        found = exports[args.format](
+            Path(args.folder), Path(args.out), scenes=scenes, pixels=args.pixels, pool=pool, say=say
+        )
+    if not args.json and args.format == "rlds":
+        print(", ".join(f"{s['shardLengths'][0]} episodes to {s['name']}" for s in found["splits"]))
+    elif not args.json and args.format == "rdt":
+        print(f"{sum(t['episodes'] for t in found.values())} episodes of {len(found)} tasks")
+    elif not args.json:
+        print(f"{found['total_episodes']} episodes of {found['total_frames']} frames, {found['total_tasks']} sentences")
+    return found

@@ -1,0 +1,215 @@
+"""``cutcal simulate``: one cut, its forces and its balance."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from calib.io.folder import prepare, write_csv, write_json
+from calib.io.progress import Countdown, clock
+from calib.io.provenance import git_commit, versions
+from calib.io.schema import tag
+from calib.material.knife import load_knife
+from calib.material.scene import cut_scene, specimen
+from calib.simulation.evaluation import PARTED, pressed_away
+from calib.validation.acceptance import spent, unbooked
+from cutcal.options import (
+    add_food,
+    add_run,
+    food_of,
+    note,
+    number,
+    print_json,
+    say,
+    sizing_of,
+    whole,
+)
+from mpm.output.record import ForceRecord
+from mpm.output.snapshot import Watch
+from mpm.scene import CONTACTS, Arm
+
+HELP = "simulate one cut"
+DESCRIPTION = "Simulate one cut and write force.csv and summary.json."
+LOOKS = 72  # at the cut, of a video: five seconds
+PAGES = 2  # looks of which a page has one
+TOLD = 12  # pictures of a video after which a line says how many there are
+EPILOG = "example:\n  cutcal simulate --food cucumber --knife edc --out runs/cucumber"
+
+
+def add_args(p: argparse.ArgumentParser) -> None:
+    """Options of this command."""
+    add_food(p)
+    p.add_argument("--speed", type=number(0, 10, "m/s"), metavar="M/S", help="real speed of the knife, for the record")
+    p.add_argument(
+        "--stroke", type=number(1e-4, 1, "m"), metavar="M", help="way of the edge [m] (default: the whole height)"
+    )
+    p.add_argument(
+        "--offset",
+        type=number(-10, 10, "cells"),
+        default=0.0,
+        metavar="CELLS",
+        help="blade against the grid (default 0)",
+    )
+    p.add_argument(
+        "--contact",
+        choices=CONTACTS,
+        default="cohesive",
+        metavar="KIND",
+        help="cohesive (default), or nodal for comparison",
+    )
+    p.add_argument(
+        "--mach",
+        type=number(0, 0.05, ""),
+        default=0.01,
+        metavar="PART",
+        help="blade speed over the P-wave's (default 0.01)",
+    )
+    p.add_argument(
+        "--slice-ratio",
+        type=number(-20, 20, ""),
+        default=0.0,
+        metavar="RATIO",
+        help="speed along the edge over speed down",
+    )
+    p.add_argument(
+        "--tilt", type=number(-60, 60, "degrees"), default=0.0, metavar="DEG", help="edge against the board [degrees]"
+    )
+    p.add_argument(
+        "--retract", type=number(0, 1, "m"), default=0.0, metavar="M", help="way back up after the stroke [m]"
+    )
+    p.add_argument(
+        "--turn", type=number(-90, 90, "degrees"), default=0.0, metavar="DEG", help="scene against the grid [degrees]"
+    )
+    p.add_argument(
+        "--arm-stiffness",
+        type=number(1, 1e9, "N/m"),
+        metavar="N/M",
+        help="of the robot's arm; rigid if not given",
+    )
+    p.add_argument("--force-limit", type=number(0, 1e6, "N"), metavar="N", help="most force that the arm can give [N]")
+    p.add_argument("--threads", type=whole(0), default=0, metavar="N", help="CPU threads (default 0: all cores)")
+    p.add_argument("--pictures", action="store_true", help="draw the cut at contact, largest force and end")
+    p.add_argument("--video", action="store_true", help="draw it as a film, cut.mp4")
+    p.add_argument("--page", action="store_true", help="write a page to turn it around, cut.html")
+    add_run(p)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Simulate and write."""
+    food, knife = food_of(args), load_knife(args.knife)
+    out = Path(args.out or f"cutcal-simulate-{food.name}")
+    shape, assumed = specimen(food, None, sizing_of(args))
+    scene = cut_scene(
+        food,
+        shape,
+        knife,
+        stroke=args.stroke,
+        dx=args.dx,
+        mach=args.mach,
+        contact=args.contact,
+        grid_shift=(0.0, args.offset, 0.0),
+        seed=args.seed,
+    )
+    scene = replace(
+        scene,
+        motion=replace(
+            scene.motion,
+            slice_ratio=args.slice_ratio,
+            tilt=math.radians(args.tilt),
+            retract=args.retract,
+            speed=args.speed,
+        ),
+        numerics=replace(scene.numerics, grid_turn=math.radians(args.turn)),
+        arm=Arm(args.arm_stiffness, args.force_limit),
+    )
+    prepare(out, resume=False)
+    import time
+
+    from mpm.runtime import Runtime
+    from mpm.solver import Simulation
+
+    began = time.monotonic()
+
+    def show(done: float, force: float) -> None:
+        left = (time.monotonic() - began) * (1 - done) / done
+        print(f"\r{done:5.0%}  {force:8.2f} N  {clock(left)} left ", end="", file=sys.stderr, flush=True)
+
+    simulation = Simulation(scene, Runtime(args.arch, args.threads))
+    watch = Watch(LOOKS) if args.pictures or args.video or args.page else None
+    record = simulation.run(progress=show if sys.stderr.isatty() else None, watch=watch)
+    if sys.stderr.isatty():
+        print(file=sys.stderr)
+    write_csv(out / "force.csv", record.columns())
+    if record.parted < PARTED:
+        assumed.append(pressed_away(record.parted))
+        note(assumed[-1])
+    summary = {
+        "schema": tag("simulate"),
+        "food": food.name,
+        "knife": knife.name,
+        **record.summary(),
+        "dx_m": scene.numerics.dx,
+        "mach": scene.motion.mach,
+        "contact": scene.numerics.contact,
+        "shape": vars(shape),
+        "speed_real_m_s": args.speed,
+        "seed": args.seed,
+        "device": args.arch,
+        "versions": versions(),
+        "git": git_commit(),
+        "warnings": [*food.warnings(), *assumed],
+    }
+    write_json(out / "summary.json", summary)
+    if watch is not None:
+        _draw(args, out, simulation, record, watch, f"{food.name}, {knife.name} knife")
+    if args.json:
+        print_json(summary)
+    else:
+        print(
+            f"{food.name}: peak {record.peak:.2f} N, work {record.work:.3f} J, {record.status}; "
+            f"momentum balance closes to {record.momentum_residual:.1e} of the peak; wrote {out}"
+        )
+        part, fracture = unbooked(record.budget), record.fracture
+        if part is not None:
+            rate = "" if fracture is None else f" ({fracture['released_J_m2']:.3g} J/m^2)"
+            print(
+                f"where the work went: {spent(record.budget)}; released at the front of the crack or lost by the discretisation "
+                f"{part:.1%}{rate}"
+            )
+        if record.pieces is not None:
+            print(record.pieces.words())
+    return 0 if record.status == "done" else 1
+
+
+def _draw(args: argparse.Namespace, out: Path, simulation: Any, record: ForceRecord, watch: Watch, title: str) -> None:
+    """Pictures, video and page, whatever was asked for; force.csv and summary.json are written before."""
+    if not watch.taken:
+        say("nothing to draw: the run broke down before the first look")
+        return
+    from mpm.output.surface import Surface
+    from reports.base.html_page import page
+    from reports.base.scene_render import Film, stills, video
+
+    scene = simulation.scene
+    surface = Surface(scene.food.shape, simulation.seeds, scene.mirrors)
+    film = Film(scene, surface, watch.taken, record.time, record.stroke, record.resolved)
+    if args.pictures:
+        say("drawing contact, largest force and end")
+        stills(film, out)
+    if args.page:
+        say("writing cut.html")
+        page(replace(film, looks=watch.taken[PAGES - 1 :: PAGES]), out / "cut.html", title)
+    if args.video:
+        rest = Countdown(len(watch.taken))
+
+        def told(done: int) -> None:
+            left = rest.left(1.0)
+            if done % TOLD == 0:
+                say(f"drawing cut.mp4: {done} of {len(watch.taken)} pictures, {left}")
+
+        say("drawing cut.mp4")
+        video(film, out / "cut.mp4", told)

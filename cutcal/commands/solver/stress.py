@@ -1,0 +1,83 @@
+"""``cutcal stress``: where the solver is stable, and how it ends where it is not."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from cutcal.options import (
+    RESUME_HELP,
+    RUN,
+    add_run,
+    add_workers,
+    print_json,
+    say,
+    titled,
+    workers_of,
+)
+
+HELP = "map of where the solver is stable"
+DESCRIPTION = """Run some 250 small cuts with one or two things pushed to the end of their
+range or past it: stiffness, Poisson's ratio, time step, cell, speed, density,
+yield stress, cutting resistance, blades that miss the food, food in the air or
+a hundred times too dense. Each must end stable, or refused or stopped for a
+reason that is named; momentum and energy are audited. Writes stress.json,
+stress.svg and report.pdf to --out."""
+EPILOG = """examples:
+  cutcal stress --quick
+  cutcal stress --out runs/stress --workers 4
+
+Ctrl-C keeps what was computed; the same command with --resume goes on.
+Exit codes: 0 every physical cell below 0.8 of the time step's limit is stable
+and all others are explained, 1 error in input or run, 2 they are not."""
+SHOWN = 12  # cells that the table names
+
+
+def add_args(p: argparse.ArgumentParser) -> None:
+    """Options of this command."""
+    p.add_argument("--quick", action="store_true", help="a dozen coarse cells instead of the whole map")
+    add_workers(p, "simulations")
+    titled(p, RUN).add_argument("--resume", action="store_true", help=RESUME_HELP)
+    add_run(p)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the map; prints its table, or stress.json."""
+    from studies.stability.cases import cells, quick_cells
+    from studies.stability.study import run as study
+
+    out = Path(args.out or "cutcal-stress")
+    about = {"command": ["stress", *(a for a in sys.argv[1:] if a != "stress")], "seed": args.seed}
+
+    with workers_of(args, say) as pool:
+        todo = (quick_cells if args.quick else cells)(args.seed)
+        document = study(todo, out, pool, about=about, resume=args.resume, say=say)
+    if args.json:
+        print_json(document)
+    else:
+        print(table(document))
+        print(f"  wrote {out}")
+    return 0 if document["passed"] else 2
+
+
+def table(document: dict[str, Any]) -> str:
+    """What the terminal shows at the end."""
+    physical, limit = document["physical"], document["limits"]["dt_over_limit"]
+    lines = [
+        f"{len(document['cells'])} cells: {'passed' if document['passed'] else 'not passed'}",
+        f"  {physical['stable']} of {physical['cells']} physical cells below {limit:g} of the time step's limit are stable",
+    ]
+    for reason, count in sorted(document["counts"].items(), key=lambda item: -item[1]):
+        words = document["reasons"].get(reason, "reached the end, momentum and energy balance")
+        lines.append(f"  {count:4d} {reason}: {words}")
+    for title, names in (
+        ("physical, but not stable", physical["not_stable"]),
+        ("unexplained", document["unexplained_cells"]),
+    ):
+        reasons = {c["name"]: c["reason"] for c in document["cells"]}
+        lines += [f"  {title}: {name} ({reasons[name]})" for name in names[:SHOWN]]
+        if len(names) > SHOWN:
+            lines.append(f"  {title}: {len(names) - SHOWN} more, see stress.json")
+    return "\n".join(lines)

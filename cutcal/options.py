@@ -1,0 +1,187 @@
+"""Options that several sub-commands share, the checks of their values, and how all of them speak beside their results."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+from calib.io.folder import finite
+from calib.material.food import FoodSpec, check_override, load_food, load_material_file
+from calib.material.scene import MIDDLE, Sizing
+from calib.simulation.dask_cluster import Cluster
+from calib.simulation.process_pool import Pool
+from calib.simulation.workers import Workers
+from mpm.errors import CutcalError
+from mpm.runtime import ARCHES
+from mpm.shapes import SHAPE_KINDS
+
+Group: TypeAlias = argparse._ActionsContainer
+"""A parser, or a group of its options."""
+RUN = "run"  # title of the group of options that say where and how
+RESUME_HELP = "go on with the run in --out; nothing is simulated twice"
+KNIFE_HELP = "knife of knives.yaml, or a YAML file (default kitchen)"
+LOCAL_WORKERS = 2  # simulations at a time on this machine: a process each
+
+
+def say(text: str) -> None:
+    """One line beside the results, which are on stdout."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def note(text: str) -> None:
+    """One line about the input or the run that a reader of the results should know."""
+    say(f"note: {text}")
+
+
+def number(low: float, high: float, unit: str) -> Callable[[str], float]:
+    """Type of an option that takes a number between two limits (both excluded)."""
+
+    def convert(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+        if not (math.isfinite(value) and low < value < high):
+            raise argparse.ArgumentTypeError(f"{text} must lie between {low:g} and {high:g} {unit}".rstrip())
+        return value
+
+    return convert
+
+
+def whole(least: int) -> Callable[[str], int]:
+    """Type of an option that takes a whole number of at least so many."""
+
+    def convert(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+        if value < least:
+            raise argparse.ArgumentTypeError(f"{text} must be at least {least}")
+        return value
+
+    return convert
+
+
+def numbers(low: float, high: float, unit: str) -> Callable[[str], tuple[float, ...]]:
+    """Type of an option that takes several numbers with commas between them, each within limits and none twice."""
+    one = number(low, high, unit)
+
+    def convert(text: str) -> tuple[float, ...]:
+        values = tuple(one(part) for part in text.split(",") if part.strip())
+        if not values or len(set(values)) < len(values):
+            raise argparse.ArgumentTypeError(f"{text!r}: write different numbers with commas between them")
+        return values
+
+    return convert
+
+
+def add_food(p: Group, *, cell: bool = True, required: bool = True) -> None:
+    """Options that say what is cut with what."""
+    p = p.add_argument_group("food and knife")
+    p.add_argument("--food", required=required, metavar="NAME", help="food of materials.yaml (cutcal foods lists them)")
+    p.add_argument("--material", metavar="YAML", help="take the food from this file: a material.yaml")
+    p.add_argument(
+        "--set", action="append", default=[], metavar="NAME=VALUE", help="give a property another value [SI]"
+    )
+    p.add_argument("--knife", default="kitchen", metavar="NAME", help=KNIFE_HELP)
+    p.add_argument(
+        "--shape", choices=SHAPE_KINDS, metavar="KIND", help="outline of the specimen, such as half_cylinder"
+    )
+    for name, what in (("height", ""), ("width", ", along the blade"), ("length", ", across the blade")):
+        p.add_argument(f"--{name}", type=number(1e-3, 1.0, "m"), metavar="M", help=f"{name} of the specimen{what} [m]")
+    p.add_argument(
+        "--at",
+        type=number(0, 1, ""),
+        default=MIDDLE,
+        metavar="PART",
+        help="place of the blade, part of the length (default 0.5)",
+    )
+    if cell:
+        p.add_argument(
+            "--dx", type=number(1e-4, 0.02, "m"), metavar="M", help="cell of the grid [m] (default: by the food)"
+        )
+
+
+def add_run(p: Group) -> None:
+    """Options that say where and how."""
+    p = titled(p, RUN)
+    p.add_argument("--out", metavar="DIR", help="folder of the results; never overwritten")
+    p.add_argument(
+        "--seed", type=whole(0), default=0, metavar="N", help="seed of particles, search and draws (default 0)"
+    )
+    add_arch(p)
+    add_json(p)
+
+
+def titled(p: Group, title: str) -> Group:
+    """The group of a title, made where there is none yet."""
+    own = [g for g in getattr(p, "_action_groups", []) if g.title == title]
+    return own[0] if own else p.add_argument_group(title)
+
+
+def add_arch(p: Group) -> None:
+    """The option that says on which device."""
+    p.add_argument("--arch", choices=ARCHES, default="cpu", metavar="DEVICE", help=f"{', '.join(ARCHES)} (default cpu)")
+
+
+def add_json(p: Group) -> None:
+    """The option that every command with a document has."""
+    p.add_argument("--json", action="store_true", help="print one JSON document on stdout and nothing else")
+
+
+def print_json(document: Any) -> None:
+    """Print a document: JSON, in letters that every terminal and pipe can take."""
+    print(json.dumps(finite(document), indent=2, allow_nan=False))
+
+
+def add_workers(p: Group, what: str) -> None:
+    """Options that say how many at a time, and on which machines."""
+    p = titled(p, RUN)
+    p.add_argument("--workers", type=int, metavar="N", help=f"{what} at a time (default 2; of a cluster all)")
+    p.add_argument("--scheduler", metavar="ADDRESS", help="Dask cluster that runs them, such as tcp://host:8786")
+
+
+def workers_of(args: argparse.Namespace, say: Callable[[str], None]) -> Workers:
+    """Where the options want the simulations to run; nothing is started before it has to do.
+
+    Args:
+        args: The options.
+        say: Called with a sentence about the workers of a cluster.
+
+    Raises:
+        CutcalError: An impossible number, or a cluster that cannot be used.
+    """
+    if args.workers is not None and args.workers < 1:
+        raise CutcalError(f"--workers {args.workers}: at least 1")
+    if args.scheduler is not None:
+        return Cluster(args.scheduler, args.workers, args.arch, say=say)
+    return Pool(LOCAL_WORKERS if args.workers is None else args.workers, args.arch)
+
+
+def food_of(args: argparse.Namespace) -> FoodSpec:
+    """The food that the options name.
+
+    Raises:
+        MaterialError: Unknown food, bad file, or an impossible value.
+        CutcalError: ``--set`` without a value.
+    """
+    food = load_food(args.food) if args.material is None else load_material_file(args.material)
+    if args.material is not None and food.name != args.food:
+        raise CutcalError(f"--material {args.material}: holds {food.name}, but --food is {args.food}")
+    values = {}
+    for item in args.set:
+        name, sign, value = item.partition("=")
+        if not sign:
+            raise CutcalError(f"--set {item}: write NAME=VALUE, for instance --set E=2e5")
+        values[name.strip()] = check_override(name.strip(), value.strip())
+    return food.with_values(values) if values else food
+
+
+def sizing_of(args: argparse.Namespace) -> Sizing:
+    """Sizes that the user gave."""
+    return Sizing(args.shape, args.height, args.width, args.length, args.at)

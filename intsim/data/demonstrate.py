@@ -1,0 +1,137 @@
+"""A demonstration in IntSim: the planned motion, and the effort that it takes where the food resists."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from calib.material.knife import load_knife
+from intsim.task.planner import HOME, PHASES, RATE, SPEED, minimum_jerk, plan
+from intsim.task.targets import TaskError, target
+
+REACHED = 2e-4  # height of the edge at which it is on the board [m]
+DEEPEST = 0.08  # way below the board that is commanded at most [m]: 140 N behind the Panda's own gains
+LEVELLED = 0.2  # part of the edge's tilt by which a step of pressing on turns the command back where one end of it is on the board [-]: in a quarter of a
+# second, after the arm, which lags by a tenth
+LONGEST = 40  # steps in which it is turned at most: as many as the way down to the deepest command takes
+LOW = 5e-4  # height of the lower end of the blade at which it is there [m], half of what the middle hangs above it (1.1 mm, banana)
+HOLD = 0.3  # time that the edge is held on the board [s]
+RETRACT = 1.5  # time of the way back up [s]
+OPEN = -1.0  # of the gripper's action: closed on the handle
+OFF = 1e-3  # error of the inverse kinematics that is too large [m]
+
+
+@dataclass(eq=False)
+class Track:
+    """What was done and seen, step by step.
+
+    Attributes:
+        qpos, qvel: Joints before the first step and after each (n + 1, 9).
+        edge: Pose x, y, z, yaw, pitch of the edge, the same (n + 1, 5).
+        command: Commanded pose of the edge (n, 5).
+        action: Joint targets and gripper (n, 8).
+        phase: Phase of each step (n,).
+        force: Force of the food on the knife in each step of the robot's physics [N] (n, 5, 3).
+        touching, uncut, pieces: Whether food presses on the knife, part of the section that holds, pieces of the food (n,).
+        published, severed: Success by the published criteria, and in pieces (n,).
+        meshes: Steps after which the food under the knife was kept, which food, its vertices, triangles and flesh.
+        status: ``done``, or what went wrong.
+    """
+
+    qpos: list[np.ndarray] = field(default_factory=list)
+    qvel: list[np.ndarray] = field(default_factory=list)
+    edge: list[np.ndarray] = field(default_factory=list)
+    command: list[np.ndarray] = field(default_factory=list)
+    action: list[np.ndarray] = field(default_factory=list)
+    phase: list[str] = field(default_factory=list)
+    force: list[np.ndarray] = field(default_factory=list)
+    touching: list[bool] = field(default_factory=list)
+    uncut: list[float] = field(default_factory=list)
+    pieces: list[int] = field(default_factory=list)
+    published: list[bool] = field(default_factory=list)
+    severed: list[bool] = field(default_factory=list)
+    meshes: list[tuple[int, int, np.ndarray, np.ndarray, np.ndarray]] = field(default_factory=list)
+    status: str = "done"
+
+
+def demonstrate(env: Any, *, style: str = "press", sustained: bool = True, meshes: bool = True) -> Track:
+    """Cut what the environment's episode asks for.
+
+    Args:
+        env: A :class:`intsim.sim.environment.CutFoodEnv` that was reset, in joint positions.
+        style: Of the motion.
+        sustained: Whether the edge is commanded deeper until the food is in pieces or the board reached, and held there; the load turns the hand, and
+            where one end of the blade then rests on the board and the other hangs, it is turned back. Without it the motion is the planned one, whatever
+            the food does.
+        meshes: Whether the food's surface is kept.
+    """
+    track, episode, half = Track(), env.episode, load_knife(env.knife).length / 2
+    _see(env, track)
+    for _ in range(episode.spec.cuts):
+        item = (env.coupling if env.coupled else env.table).items[0]
+        try:
+            along = target(episode.spec, item)
+        except TaskError:
+            break
+        path = plan(item, along, style=style, start=env.pose)
+        for pose, phase in zip(path.pose, path.phase, strict=True):
+            if phase != "retract":
+                _step(env, track, pose, str(phase), meshes)
+        pose = track.command[-1].copy()
+        if sustained:
+            whole, turned = len(item.pieces), 0
+            while (
+                len(env.coupling.items[0].pieces) == whole
+                and env.pose[2] > REACHED
+                and pose[2] > -DEEPEST
+                and turned < LONGEST
+            ):
+                if env.pose[2] - half * abs(np.sin(env.pose[4])) < LOW:
+                    pose[4] -= LEVELLED * env.pose[4]
+                    turned += 1
+                else:
+                    pose[2] -= SPEED / RATE
+                _step(env, track, pose, "cut", meshes)
+            for _ in range(round(HOLD * RATE)):
+                _step(env, track, pose, "hold", meshes)
+        up = np.array([*pose[:2], HOME[2], pose[3], 0.0])
+        for part in minimum_jerk(round(RETRACT * RATE)):
+            _step(env, track, pose + part * (up - pose), "retract", meshes)
+    return track
+
+
+def _see(env: Any, track: Track) -> None:
+    robot = env.agent.robot
+    track.qpos.append(robot.get_qpos()[0].numpy().astype(np.float32))
+    track.qvel.append(robot.get_qvel()[0].numpy().astype(np.float32))
+    track.edge.append(env.pose)
+
+
+def _step(env: Any, track: Track, pose: np.ndarray, phase: str, meshes: bool) -> None:
+    """One control step towards a pose."""
+    near = np.array([*track.action[-1][:7], 0.0, 0.0]) if track.action else track.qpos[-1].astype(float)
+    joints, off = env.kinematics.joints(pose, near)
+    if off > OFF:
+        track.status = f"the arm does not reach {np.round(pose[:3], 3).tolist()}"
+    action = np.array([*joints[:7], OPEN], np.float32)
+    _, _, _, _, info = env.step(action)
+    assert phase in PHASES
+    track.command.append(np.array(pose, float))
+    track.action.append(action)
+    track.phase.append(phase)
+    track.force.append(env.forces)
+    track.touching.append(bool(info["touching"]))
+    track.uncut.append(float(info["uncut"]))
+    track.pieces.append(len(env.coupling.items[0].pieces))
+    track.published.append(bool(info["published"]))
+    track.severed.append(bool(info["severed"]))
+    _see(env, track)
+    broken = next((d.why for d in env.coupling.done if d.severed is None), "")
+    if broken:
+        track.status = broken
+    mesh = env.coupling.mesh() if meshes else None
+    if mesh is not None:
+        which, points, triangles, flesh = mesh
+        track.meshes.append((len(track.action), which, points, triangles, flesh))

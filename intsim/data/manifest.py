@@ -1,0 +1,120 @@
+"""Which episodes a dataset has: each is drawn from its number alone, and nothing is made until it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from calib.material.food import FoodSpec, load_food
+from intsim.task.language import VARIANTS
+from intsim.task.planner import STYLES
+from intsim.task.suites import FOODS, SUITES, TEST, Episode, draw
+from intsim.task.targets import TaskError
+
+JITTER = {"E": 0.2, "R": 0.1, "yield_stress": 0.1, "mu": 0.2}
+"""Standard deviation of the logarithm of properties that differ from item to item [-]: assumed, a third of what gripped fruit scatters in
+stiffness and less for strength."""
+TASKS = ("seeds", "continuous", "split", "flips", "objects")
+"""Suites that training may see, in turn; the sentences of ``language`` and every seed from a million on are for tests."""
+BACKGROUNDS = 15
+"""Procedural backgrounds: colours of table, board and walls, light and its direction; 0 is plain."""
+PRESSED = 0.5  # part of the episodes that press; the other styles share the rest
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One trajectory. Attributes: index; suite; seed; style of the motion; episode; food, with its own values."""
+
+    index: int
+    suite: str
+    seed: int
+    style: str
+    episode: Episode
+    food: FoodSpec
+    values: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One element of the whole product. Attributes: trajectory, background, instruction, each a number."""
+
+    trajectory: int
+    background: int
+    instruction: int
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """The product of trajectories, backgrounds and sentences, counted and never stored: 21,000 x 15 x 5 are 1,575,000 samples.
+
+    Attributes:
+        trajectories, backgrounds, instructions: How many of each.
+        foods: Foods by name, asked for in turn.
+        suites: Kinds of task, in turn.
+        styles: Styles of the motion; half of the episodes press where that is one of several.
+        seed: First seed; those of a dataset are ``seed`` to ``seed + trajectories``.
+
+    Raises:
+        TaskError: Nothing to draw from, or seeds that belong to the tests.
+    """
+
+    trajectories: int = 21_000
+    backgrounds: int = BACKGROUNDS
+    instructions: int = VARIANTS
+    foods: Sequence[str] = FOODS
+    suites: Sequence[str] = TASKS
+    seed: int = 0
+    styles: Sequence[str] = STYLES
+
+    def __post_init__(self) -> None:
+        lists = (self.foods, self.suites, self.styles)
+        if min(self.trajectories, self.backgrounds, self.instructions, *map(len, lists)) < 1:
+            raise TaskError(
+                "dataset: no trajectories, backgrounds, sentences, foods, tasks or styles; give one of each at least"
+            )
+        for what, given, known in (("suite", self.suites, SUITES), ("style", self.styles, STYLES)):
+            for name in given:
+                if name not in known:
+                    raise TaskError(f"dataset: {what} {name!r} is none of {', '.join(known)}")
+        if self.seed < 0 or self.seed + self.trajectories > TEST:
+            raise TaskError(
+                f"dataset: seeds {self.seed} to {self.seed + self.trajectories}; those from {TEST} on are for tests"
+            )
+
+    def __len__(self) -> int:
+        return self.trajectories * self.backgrounds * self.instructions
+
+    def __getitem__(self, k: int) -> Sample:
+        if not 0 <= k < len(self):
+            raise IndexError(k)
+        rest, sentence = divmod(k, self.instructions)
+        return Sample(*divmod(rest, self.backgrounds), sentence)
+
+    def __iter__(self) -> Iterator[Sample]:
+        return (self[k] for k in range(len(self)))
+
+    def draw(self, index: int) -> Draw:
+        """A trajectory: food and task in turn, all else from its seed."""
+        seed = self.seed + index
+        name = self.foods[index % len(self.foods)]
+        suite = self.suites[(index + index // len(self.foods)) % len(self.suites)]
+        food = load_food(name)
+        rng = np.random.default_rng([seed, *b"dataset"])
+        values = {}
+        for prop, sd in JITTER.items():
+            if prop in food.properties:
+                found = food.properties[prop]
+                values[prop] = float(np.clip(found.value * np.exp(sd * rng.standard_normal()), found.low, found.high))
+        others = [style for style in self.styles if style != STYLES[0]]
+        pressed = STYLES[0] in self.styles and rng.random() < PRESSED
+        style = STYLES[0] if pressed or not others else others[int(rng.integers(len(others)))]
+        episode = draw(suite, seed, {name: food})
+        return Draw(index, suite, seed, style, episode, food.with_values(values, source="drawn for a dataset"), values)
+
+    def as_dict(self) -> dict[str, Any]:
+        """As plain data."""
+        own = {name: getattr(self, name) for name in ("trajectories", "backgrounds", "instructions", "seed")}
+        return own | {name: list(getattr(self, name)) for name in ("foods", "suites", "styles")}

@@ -1,0 +1,205 @@
+"""Export as RLDS, the TFDS layout that OpenVLA and Octo read; needs the extras ``[data]`` and ``[robot]``, and Vulkan, but no TensorFlow.
+
+A record is a ``tf.train.Example`` for each episode, its steps end to end, written here by hand: a message of one map from names to lists, and
+TFRecord's frame of length and checksum. The force is not in it.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from calib.simulation.workers import Workers
+from intsim.data.lerobot import columns
+from intsim.data.pictures import VIEWS
+from intsim.data.views import View, check_pictured, views
+
+NAME, VERSION = "cutcal", "1.0.0"
+VALIDATION = 20  # every so many-th trajectory is kept for validation
+QUALITY = 95  # of the JPEG pictures
+MASK = 0xA282EAD8  # of TFRecord's checksums
+CLASS = "tensorflow_datasets.core.features."
+
+
+def export(
+    folder: Path,
+    out: Path,
+    *,
+    scenes: Sequence[int],
+    pixels: int = 128,
+    pool: Workers | None = None,
+    say: Callable[[str], None] = lambda text: None,
+) -> dict[str, Any]:
+    """Write ``cutcal/1.0.0`` with the splits train and val.
+
+    Each step has the observation (pictures ``image``, ``side_image``, ``wrist_image`` and ``state``: x y z roll pitch yaw pad gripper), the action
+    (change of pose [m, rad] and gripper), reward, discount, the flags of its place, and the sentence. ``val`` are whole trajectories, before every
+    background.
+
+    Args:
+        folder: A dataset of :func:`intsim.data.generate.generate`.
+        out: Folder that is made.
+        scenes: Backgrounds that are rendered, at least one.
+        pixels: Width and height of the pictures.
+        pool: Where pictures are rendered that the dataset does not have yet.
+        say: Called with a line after each episode.
+
+    Returns:
+        The content of dataset_info.json.
+
+    Raises:
+        CutcalError: A package or the renderer is missing, no background is named, the folder is taken or holds no dataset.
+    """
+    check_pictured(out, scenes, "RLDS", "google_crc32c", "PIL")
+    shown = views(folder, scenes, pixels, pool, say)
+    home = out / NAME / VERSION
+    home.mkdir(parents=True)
+    counts, sizes = {"train": 0, "val": 0}, {"train": 0, "val": 0}
+    files = {split: (home / _file(split)).open("wb") for split in counts}
+    try:
+        for view in shown:
+            split = "val" if view.stored.about["index"] % VALIDATION == VALIDATION - 1 else "train"
+            sizes[split] += write_record(files[split], example(episode(view)))
+            counts[split] += 1
+    finally:
+        for file in files.values():
+            file.close()
+    for split in [s for s, n in counts.items() if n == 0]:
+        (home / _file(split)).unlink()
+    info = {
+        "name": NAME,
+        "version": VERSION,
+        "description": "Cuts of food by a simulated Panda, told in words.",
+        "fileFormat": "tfrecord",
+        "splits": [
+            {
+                "name": split,
+                "numBytes": str(sizes[split]),
+                "shardLengths": [str(n)],
+                "filepathTemplate": "{DATASET}-{SPLIT}.{FILEFORMAT}-{SHARD_X_OF_Y}",
+            }
+            for split, n in counts.items()
+            if n
+        ],
+    }
+    (home / "dataset_info.json").write_text(json.dumps(info, indent=2) + "\n", encoding="utf-8")
+    (home / "features.json").write_text(json.dumps(features(pixels), indent=2) + "\n", encoding="utf-8")
+    return info
+
+
+def _file(split: str) -> str:
+    return f"{NAME}-{split}.tfrecord-00000-of-00001"
+
+
+def episode(view: View) -> dict[str, list[bytes] | np.ndarray]:
+    """The lists of one episode by name."""
+    found = columns(view.stored)
+    n = len(found["timestamp"])
+    step = np.arange(n)
+    out: dict[str, list[bytes] | np.ndarray] = {
+        f"steps/observation/{name}": [_jpeg(picture) for picture in view.pictures[camera]]
+        for camera, name in zip(VIEWS, ("image", "side_image", "wrist_image"), strict=True)
+    }
+    done = (step == n - 1) & bool(view.stored.about["success"])
+    return out | {
+        "steps/observation/state": found["observation.state"],
+        "steps/action": found["action"],
+        "steps/reward": done.astype(np.float32),
+        "steps/discount": np.ones(n, np.float32),
+        "steps/is_first": step == 0,
+        "steps/is_last": step == n - 1,
+        "steps/is_terminal": done,
+        "steps/language_instruction": [view.sentence.encode()] * n,
+        "episode_metadata/file_path": [f"trajectory {view.stored.about['index']}, background {view.scene}".encode()],
+    }
+
+
+def _jpeg(picture: np.ndarray) -> bytes:
+    from PIL import Image
+
+    stream = io.BytesIO()
+    Image.fromarray(picture).save(stream, format="JPEG", quality=QUALITY)
+    return stream.getvalue()
+
+
+def example(lists: Mapping[str, list[bytes] | np.ndarray]) -> bytes:
+    """A ``tf.train.Example`` as protocol buffer: bytes, floats, or integers and flags by name."""
+    entries = b""
+    for name, values in lists.items():
+        if isinstance(values, list):
+            feature = _field(1, b"".join(_field(1, value) for value in values))
+        elif values.dtype.kind == "f":
+            feature = _field(2, _field(1, values.astype("<f4").tobytes()))
+        else:
+            feature = _field(3, _field(1, b"".join(_varint(int(v)) for v in values.ravel())))
+        entries += _field(1, _field(1, name.encode()) + _field(2, feature))
+    return _field(1, entries)
+
+
+def _field(number: int, content: bytes) -> bytes:
+    """A field with a length before it."""
+    return _varint(number << 3 | 2) + _varint(len(content)) + content
+
+
+def _varint(value: int) -> bytes:
+    out = bytearray()
+    while value > 0x7F:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    out.append(value)
+    return bytes(out)
+
+
+def write_record(file: BinaryIO, content: bytes) -> int:
+    """Append a record with TFRecord's frame; returns the size of its content [bytes]."""
+    length = struct.pack("<Q", len(content))
+    file.write(length + _checksum(length) + content + _checksum(content))
+    return len(content)
+
+
+def _checksum(content: bytes) -> bytes:
+    import google_crc32c
+
+    crc = google_crc32c.value(content)
+    return struct.pack("<I", ((crc >> 15 | crc << 17) + MASK) & 0xFFFFFFFF)
+
+
+def features(pixels: int) -> dict[str, Any]:
+    """Content of features.json: what TFDS builds its reader from."""
+    picture = {
+        "pythonClassName": CLASS + "image_feature.Image",
+        "image": {"shape": _shape(pixels, pixels, 3), "dtype": "uint8", "encodingFormat": "jpeg"},
+    }
+    text = {"pythonClassName": CLASS + "text_feature.Text", "text": {}}
+    observation = {"image": picture, "side_image": picture, "wrist_image": picture, "state": _tensor("float32", 8)}
+    flags = {name: _tensor("bool") for name in ("is_first", "is_last", "is_terminal")}
+    steps = {
+        "observation": _dictionary(observation),
+        "action": _tensor("float32", 7),
+        "reward": _tensor("float32"),
+        "discount": _tensor("float32"),
+        **flags,
+        "language_instruction": text,
+    }
+    sequence = {"feature": _dictionary(steps), "length": "-1"}
+    dataset = {"pythonClassName": CLASS + "dataset_feature.Dataset", "sequence": sequence}
+    return _dictionary({"steps": dataset, "episode_metadata": _dictionary({"file_path": text})})
+
+
+def _shape(*sizes: int) -> dict[str, Any]:
+    return {"dimensions": [str(size) for size in sizes]} if sizes else {}
+
+
+def _tensor(kind: str, *sizes: int) -> dict[str, Any]:
+    name = "tensor_feature.Tensor" if sizes else "scalar.Scalar"
+    return {"pythonClassName": CLASS + name, "tensor": {"shape": _shape(*sizes), "dtype": kind, "encoding": "none"}}
+
+
+def _dictionary(parts: Mapping[str, Any]) -> dict[str, Any]:
+    return {"pythonClassName": CLASS + "features_dict.FeaturesDict", "featuresDict": {"features": dict(parts)}}

@@ -1,0 +1,1 @@
+"""Policies: oracles, published models, behaviour cloning."""

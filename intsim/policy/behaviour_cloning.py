@@ -1,0 +1,158 @@
+"""A behaviour-cloning policy: a small network that does what demonstrations did (trained by :mod:`intsim.policy.training`).
+
+It is no vision-language-action model: it is given the place and size of the food in numbers, and the words of the instruction as a bag. What it must
+learn is where the words want the cut, the way there, and how far the edge is commanded. It sees where the edge is and was a step before, no
+force and no command, and gives the next commanded poses in one piece (action chunking: Zhao et al. 2023, arXiv:2304.13705).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calib.errors import OutputError
+from intsim.policy.oracles import OPEN
+from intsim.task.planner import HOME
+from intsim.task.targets import Item
+
+CHUNK = 8  # commanded poses in one piece: 0.4 s
+LENGTH = 0.1  # unit of the network's lengths [m]
+MOVED = 0.01  # unit of its ways in a step [m]
+LONGEST = 240  # steps of an episode: 12 s
+RISEN = 0.03  # below its height at home, at which the edge has come back [m]
+WORD = re.compile(r"[a-z]+|\d+/\d+|\d+(?:\.\d+)?%?")
+
+Array = np.ndarray
+
+
+def words_of(sentence: str) -> list[str]:
+    """Words and numbers of a sentence, in small letters."""
+    return WORD.findall(sentence.lower())
+
+
+def relative(pose: Array, item: Item) -> Array:
+    """Poses (..., 5) as seen from a food: along and across it, height [LENGTH], twice the angle between edge and axis as cosine and sine,
+    shape (..., 5)."""
+    offset = pose[..., :2] - [item.x, item.y]
+    c, s = item.axis
+    turn = 2 * (pose[..., 3] - item.yaw)  # an edge has no direction
+    along, across = offset @ [c, s], offset @ [-s, c]
+    return np.stack([along / LENGTH, across / LENGTH, pose[..., 2] / LENGTH, np.cos(turn), np.sin(turn)], axis=-1)
+
+
+def absolute(seen: Array, item: Item) -> Array:
+    """Poses (..., 5) on the table from :func:`relative`, level."""
+    c, s = item.axis
+    along, across, z = (LENGTH * seen[..., k] for k in range(3))
+    yaw = item.yaw + np.arctan2(seen[..., 4], seen[..., 3]) / 2
+    yaw = (yaw + math.pi / 2) % math.pi - math.pi / 2
+    return np.stack([item.x + c * along - s * across, item.y + s * along + c * across, z, yaw, 0 * z], axis=-1)
+
+
+def seen(pose: Array, before: Array, item: Item) -> Array:
+    """What the network is given of poses (..., 5), those a step before, and the food: shape (..., 13)."""
+    now, then = relative(pose, item), relative(before, item)
+    size = np.array([item.shape.length, item.shape.width, item.shape.height]) / LENGTH
+    rest = np.broadcast_to(size, (*now.shape[:-1], 3))
+    return np.concatenate([now, (now - then) * (LENGTH / MOVED), rest], axis=-1)
+
+
+@dataclass(eq=False)
+class Clone:
+    """A policy that was learnt.
+
+    Attributes:
+        vocabulary: Words that it knows.
+        weights: Of the layers: (matrix, vector) of each.
+        about: What it was trained on.
+    """
+
+    vocabulary: tuple[str, ...]
+    weights: list[tuple[Array, Array]]
+    about: dict[str, Any]
+
+    def __post_init__(self) -> None:
+        self.reset(0)
+
+    def reset(self, seed: int) -> None:
+        """A new episode begins."""
+        del seed
+        self._todo: list[Array] = []
+        self._before: Array | None = None
+        self._steps, self._down = 0, False
+
+    def act(self, obs: dict[str, Any], instruction: str) -> Array | None:
+        """The next change of pose; None when the edge has been down and is back up, or the time is over."""
+        pose = np.asarray(obs["pose"], float)
+        item = self._food(obs["items"], instruction)
+        self._steps += 1
+        self._down |= bool(pose[2] < item.shape.height)
+        if self._steps > LONGEST or (self._down and pose[2] > HOME[2] - RISEN):
+            return None
+        if not self._todo:
+            before = pose if self._before is None else self._before
+            given = np.concatenate([seen(pose, before, item), bag(instruction, self.vocabulary)])
+            self._todo = list(absolute(self._forward(given).reshape(CHUNK, 5), item))
+        self._before = pose
+        goal = self._todo.pop(0)
+        change = goal - pose
+        turn = (change[3] + math.pi / 2) % math.pi - math.pi / 2
+        return np.array([*change[:3], 0.0, change[4], turn, OPEN])
+
+    def _forward(self, x: Array) -> Array:
+        for k, (matrix, vector) in enumerate(self.weights):
+            x = matrix @ x + vector
+            if k < len(self.weights) - 1:
+                x = np.maximum(x, 0.0)
+        return x
+
+    def _food(self, items: Sequence[Item], instruction: str) -> Item:
+        """The food that is named, else the first."""
+        said = set(words_of(instruction))
+        return next((i for i in items if set(i.name.split("_")) <= said), items[0])
+
+    def save(self, path: Path) -> None:
+        """Write it as numbers (npz) with its vocabulary.
+
+        Raises:
+            OutputError: The file cannot be written.
+        """
+        arrays: dict[str, Any] = {}
+        for k, layer in enumerate(self.weights):
+            arrays |= {f"w{k}": layer[0], f"b{k}": layer[1]}
+        about = json.dumps({"vocabulary": self.vocabulary, "about": self.about})
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with path.open("wb") as stream:
+                np.savez(stream, about=np.array(about), **arrays)
+        except OSError as e:
+            raise OutputError(f"{path}: cannot be written ({e.strerror})") from None
+
+    @staticmethod
+    def load(path: Path) -> Clone:
+        """A clone from its file.
+
+        Raises:
+            OutputError: The file is missing or holds something else.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                found = json.loads(str(file["about"]))
+                layers = sum(name.startswith("w") for name in file.files)
+                weights = [(file[f"w{k}"], file[f"b{k}"]) for k in range(layers)]
+        except (OSError, KeyError, ValueError) as e:
+            raise OutputError(f"{path}: not a trained clone ({e}); make one with cutcal dataset clone") from None
+        return Clone(tuple(found["vocabulary"]), weights, found["about"])
+
+
+def bag(sentence: str, vocabulary: Sequence[str]) -> Array:
+    """Which words of a vocabulary a sentence has, shape (v,)."""
+    said = set(words_of(sentence))
+    return np.array([float(word in said) for word in vocabulary])

@@ -1,0 +1,144 @@
+"""Who moves the knife: one ``act(obs, instruction)``; oracles that test the evaluation, and a policy that knows nothing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import numpy as np
+
+from intsim.task.language import parse
+from intsim.task.planner import HOME, plan
+from intsim.task.targets import CutSpec, Item, TaskError, boxed_target, target
+
+OPEN = 0.0  # of the gripper: closed on the handle
+SHORT = 7e-3
+"""Height at which the shallow oracle stops [m]: what 12.5 N, the paper's banana, leave of a cut under ManiSkill's arm (0.57 mm/N)."""
+
+
+class Policy(Protocol):
+    """What an evaluation needs of a policy."""
+
+    def reset(self, seed: int) -> None:
+        """A new episode begins."""
+
+    def act(self, obs: dict[str, Any], instruction: str) -> np.ndarray | None:
+        """The next change of pose x, y, z [m], roll, pitch, yaw [rad] and gripper, shape (7,); None when it has done what it was told."""
+
+
+class Oracle:
+    """Reads the instruction and the foods and follows a plan; its errors are those that it is given.
+
+    Args:
+        sigma: Standard deviation of the place along the food [m].
+        wrong_side: Measure from the other end.
+        wrong_item: Cut another food where there is one.
+        depth: Height of the edge at the end of each cut [m].
+        hold: Time that it is held there [s].
+        style: Of :func:`intsim.task.planner.plan`.
+        boxed: Know the food's bounding box alone, as the published planner does.
+    """
+
+    def __init__(
+        self,
+        *,
+        sigma: float = 0.0,
+        wrong_side: bool = False,
+        wrong_item: bool = False,
+        depth: float = 0.0,
+        hold: float = 0.0,
+        style: str = "press",
+        boxed: bool = False,
+    ) -> None:
+        self.sigma, self.wrong_side, self.wrong_item, self.boxed = sigma, wrong_side, wrong_item, boxed
+        self.depth, self.hold, self.style = depth, hold, style
+        self.reset(0)
+
+    def reset(self, seed: int) -> None:
+        """Forget the plan."""
+        self._rng = np.random.default_rng(seed)
+        self._todo: list[np.ndarray] = []
+        self._spec: CutSpec | None = None
+        self._cuts = 0
+
+    def act(self, obs: dict[str, Any], instruction: str) -> np.ndarray | None:
+        """The next step of the plan; a new one after each cut of several."""
+        if not self._todo:
+            self._plan(obs, instruction)
+        if not self._todo:
+            return None
+        change = self._todo.pop(0) - obs["pose"]
+        return np.array([*change[:3], 0.0, change[4], change[3], OPEN])
+
+    def _plan(self, obs: dict[str, Any], instruction: str) -> None:
+        items: tuple[Item, ...] = obs["items"]
+        if self._spec is None:
+            self._spec = parse(instruction, [i.name for i in items])
+        if self._cuts == self._spec.cuts:
+            return
+        self._cuts += 1
+        item = next(i for i in items if i.name == self._spec.item)
+        if self.wrong_item:
+            item = next((i for i in items if i.name != self._spec.item), item)
+        try:
+            along = target(self._spec, item)
+        except TaskError:  # nothing is left to cut
+            return
+        place, yaw = boxed_target(self._spec, item) if self.boxed else (None, None)
+        if self.wrong_side and not self._spec.pieces:
+            along = -along
+        along += self.sigma * float(self._rng.standard_normal())
+        path = plan(
+            item, along, style=self.style, start=obs["pose"], yaw=yaw, place=place, depth=self.depth, hold=self.hold
+        )
+        self._todo = list(path.pose)
+
+
+class Wanderer:
+    """Moves at random around its home: what success without any knowledge looks like."""
+
+    def __init__(self) -> None:
+        self.reset(0)
+
+    def reset(self, seed: int) -> None:
+        """Draw where to go."""
+        rng = np.random.default_rng(seed)
+        goal = np.array([*rng.uniform([-0.2, -0.25], [0.2, 0.25]), 0.0, rng.uniform(-math.pi / 2, math.pi / 2), 0.0])
+        above = np.array([*goal[:2], HOME[2], goal[3], 0.0])
+        self._todo = [*np.linspace([*HOME, 0.0, 0.0], above, 40), *np.linspace(above, goal, 100)]
+
+    def act(self, obs: dict[str, Any], instruction: str) -> np.ndarray | None:
+        """The next step, whatever it was told."""
+        del instruction
+        if not self._todo:
+            return None
+        change = self._todo.pop(0) - obs["pose"]
+        return np.array([*change[:3], 0.0, change[4], change[3], OPEN])
+
+
+POLICIES: dict[str, tuple[Callable[[float], Policy], str]] = {
+    "oracle": (lambda sigma: Oracle(), "cuts where it is told"),
+    "noisy": (lambda sigma: Oracle(sigma=sigma), "misses the place along the food by a normal error (--sigma)"),
+    "wrong-side": (lambda sigma: Oracle(wrong_side=True), "takes left for right"),
+    "wrong-item": (lambda sigma: Oracle(wrong_item=True), "cuts another food where there is one"),
+    "shallow": (lambda sigma: Oracle(depth=SHORT), "stops 7 mm above the board"),
+    "overdrive": (
+        lambda sigma: Oracle(depth=-0.03, hold=0.5),
+        "commands the edge 30 mm into the board and holds it for half a second",
+    ),
+    "boxed": (lambda sigma: Oracle(boxed=True), "knows the bounding box alone, as the published planner does"),
+    "random": (lambda sigma: Wanderer(), "comes down somewhere"),
+}
+"""Policies by name, each from a standard deviation [m], and what they do."""
+
+
+def make(name: str, sigma: float = 0.01) -> Policy:
+    """A policy by its name.
+
+    Raises:
+        TaskError: There is none of this name.
+    """
+    if name not in POLICIES:
+        raise TaskError(f"policy: {name!r} is none of {', '.join(POLICIES)}")
+    return POLICIES[name][0](sigma)

@@ -1,0 +1,231 @@
+"""Published vision-language-action models as servers of :mod:`intsim.policy.remote`: RDT, Octo and OpenVLA, each loaded by its authors' own code.
+
+    python -m intsim.policy.vla_adapters openvla --weights runs/openvla-cutcal --key cutcal --port 8000
+    cutcal evaluate --policy remote --server http://127.0.0.1:8000 --world intsim --pixels 256
+
+Each runs in an environment of its own, with the packages that its authors ask for and a GPU; the evaluation runs in another. They have to be fine-tuned on an
+export of ``cutcal dataset`` first: none has seen a knife. No weights are loaded in the tests, where stand-ins take the place of the packages.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections import deque
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from intsim.policy.remote import Model, Server
+from mpm.errors import CutcalError
+
+FRONT = "front"  # the picture that all three are given
+STRIDE = 4  # RDT's actions are interpolated four times finer than its control
+HISTORY = 2  # pictures that RDT and Octo remember
+PRIMARY, WRIST = 256, 128  # sizes of Octo's pictures
+
+
+class OpenVLA:
+    """OpenVLA (Kim et al. 2024, arXiv:2406.09246): one picture, one change of pose.
+
+    Args:
+        weights: Folder or name of a fine-tuned model.
+        key: Name of the data set whose statistics scale its actions back.
+        device: Of the network.
+    """
+
+    name, action = "openvla", "pose"
+    cameras: Sequence[str] = (FRONT,)
+
+    def __init__(self, weights: str, key: str, device: str = "cuda:0") -> None:
+        import torch
+        from transformers import AutoModelForVision2Seq, AutoProcessor
+
+        self.key, self.device, self.kind = key, device, torch.bfloat16
+        self.processor = AutoProcessor.from_pretrained(weights, trust_remote_code=True)
+        self.network = AutoModelForVision2Seq.from_pretrained(
+            weights, torch_dtype=self.kind, low_cpu_mem_usage=True, trust_remote_code=True
+        ).to(device)
+
+    def reset(self, seed: int, instruction: str) -> None:
+        """It remembers nothing."""
+
+    def act(
+        self, instruction: str, pose: np.ndarray, joints: np.ndarray | None, images: dict[str, np.ndarray]
+    ) -> np.ndarray:
+        """One action, (1, 7)."""
+        from PIL import Image
+
+        asked = f"In: What action should the robot take to {instruction.lower()}?\nOut:"
+        given = self.processor(asked, Image.fromarray(images[FRONT])).to(self.device, dtype=self.kind)
+        found = self.network.predict_action(**given, unnorm_key=self.key, do_sample=False)
+        return np.asarray(found, float).reshape(1, 7)
+
+
+class Octo:
+    """Octo (Octo Model Team 2024, arXiv:2405.12213): two pictures and those a step before, a few changes of pose.
+
+    Args:
+        weights: Folder or name of a fine-tuned model.
+        key: Name of the data set whose statistics scale its actions back, where the model has several.
+    """
+
+    name, action = "octo", "pose"
+    cameras: Sequence[str] = (FRONT, "wrist")
+
+    def __init__(self, weights: str, key: str = "") -> None:
+        from octo.model.octo_model import OctoModel
+
+        self.network = OctoModel.load_pretrained(weights)
+        found = self.network.dataset_statistics
+        self.statistics = (found[key] if key else found)["action"]
+        self.reset(0, "")
+
+    def reset(self, seed: int, instruction: str) -> None:
+        """Forget the last picture."""
+        import jax
+
+        self.random = jax.random.PRNGKey(seed)
+        self.seen: deque[dict[str, np.ndarray]] = deque(maxlen=HISTORY)
+        self.task = self.network.create_tasks(texts=[instruction])
+
+    def act(
+        self, instruction: str, pose: np.ndarray, joints: np.ndarray | None, images: dict[str, np.ndarray]
+    ) -> np.ndarray:
+        """Some actions, (n, 7)."""
+        import jax
+
+        now = {"image_primary": _sized(images[FRONT], PRIMARY), "image_wrist": _sized(images["wrist"], WRIST)}
+        self.seen.append(now)
+        missing = HISTORY - len(self.seen)
+        window = [self.seen[0]] * missing + list(self.seen)
+        given: dict[str, np.ndarray] = {name: np.stack([one[name] for one in window])[None] for name in now}
+        given["timestep_pad_mask"] = np.array([[False] * missing + [True] * len(self.seen)])
+        self.random, own = jax.random.split(self.random)
+        found = self.network.sample_actions(given, self.task, unnormalization_statistics=self.statistics, rng=own)
+        return np.asarray(found, float)[0]
+
+
+class RDT:
+    """RDT (Liu et al. 2024, arXiv:2410.07864) by the model of its ManiSkill evaluation: two pictures, joints, a row of joint targets.
+
+    Args:
+        weights: Checkpoint, .pt or .safetensors.
+        root: Its authors' repository, which is no package.
+        statistics: statistics.json of the export that it was fine-tuned on.
+        text, vision: Names of its encoders.
+    """
+
+    name, action = "rdt", "joints"
+    cameras: Sequence[str] = (FRONT,)
+
+    def __init__(
+        self,
+        weights: str,
+        root: str,
+        statistics: str,
+        text: str = "google/t5-v1_1-xxl",
+        vision: str = "google/siglip-so400m-patch14-384",
+    ) -> None:
+        sys.path.insert(0, str(root))
+        import torch
+        import yaml
+        from scripts import maniskill_model
+
+        config = yaml.safe_load((Path(root) / "configs" / "base.yaml").read_text(encoding="utf-8"))
+        maniskill_model.DATA_STAT.update(json.loads(Path(statistics).read_text(encoding="utf-8")))
+        self.network = maniskill_model.create_model(
+            args=config,
+            dtype=torch.bfloat16,
+            pretrained=weights,
+            pretrained_text_encoder_name_or_path=text,
+            pretrained_vision_encoder_name_or_path=vision,
+        )
+        self.reset(0, "")
+
+    def reset(self, seed: int, instruction: str) -> None:
+        """Forget the last picture, and encode the sentence."""
+        import torch
+
+        torch.manual_seed(seed)
+        self.network.reset()
+        self.words = self.network.encode_instruction(instruction)
+        self.seen: deque[Any] = deque([None] * HISTORY, maxlen=HISTORY)
+
+    def act(
+        self, instruction: str, pose: np.ndarray, joints: np.ndarray | None, images: dict[str, np.ndarray]
+    ) -> np.ndarray:
+        """A row of joint targets and gripper, (n, 8)."""
+        import torch
+        from PIL import Image
+
+        if joints is None:
+            raise ValueError("joints are missing: RDT is evaluated with --world intsim")
+        self.seen.append(Image.fromarray(images[FRONT]))
+        shown = [one for picture in self.seen for one in (picture, None, None)]  # its wrist cameras are not there
+        own = torch.tensor(joints[None, :-1], dtype=torch.float32)
+        found = self.network.step(own, shown, self.words).squeeze(0).cpu().numpy()
+        return np.asarray(found, float)[::STRIDE]
+
+
+def _sized(image: np.ndarray, size: int) -> np.ndarray:
+    """A square picture of another size."""
+    from PIL import Image
+
+    return np.array(Image.fromarray(image).resize((size, size), Image.Resampling.LANCZOS))
+
+
+def make(args: argparse.Namespace) -> Model:
+    """The model that the command line asks for.
+
+    Raises:
+        CutcalError: Its packages are missing, or an option is.
+    """
+    try:
+        if args.model == "openvla":
+            return OpenVLA(args.weights, args.key, args.device)
+        if args.model == "octo":
+            return Octo(args.weights, args.key)
+        if args.root is None or args.statistics is None:
+            raise CutcalError("rdt: give --root, its repository, and --statistics, statistics.json of the export")
+        return RDT(args.weights, args.root, args.statistics)
+    except ImportError as e:
+        raise CutcalError(
+            f"{args.model}: {e.name} is not installed; begin this in the environment of its authors"
+        ) from None
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Serve a model until Ctrl-C."""
+    p = argparse.ArgumentParser(
+        prog="python -m intsim.policy.vla_adapters", description="Serve a published model as a policy."
+    )
+    p.add_argument("model", choices=("rdt", "octo", "openvla"))
+    p.add_argument("--weights", required=True, help="fine-tuned weights: a folder, a file or a name")
+    p.add_argument("--key", default="", help="data set whose statistics scale the actions back (openvla, octo)")
+    p.add_argument("--root", help="repository of rdt")
+    p.add_argument("--statistics", help="statistics.json of the export that rdt was fine-tuned on")
+    p.add_argument("--device", default="cuda:0", help="of openvla (default cuda:0)")
+    p.add_argument("--host", default="127.0.0.1", help="(default 127.0.0.1)")
+    p.add_argument("--port", type=int, default=8000, help="(default 8000)")
+    args = p.parse_args(words)
+    try:
+        server = Server(make(args), args.host, args.port)
+    except (CutcalError, OSError) as e:
+        sys.stderr.write(f"error: {e}\n")
+        return 1
+    sys.stderr.write(f"{args.model} answers at http://{args.host}:{server.server_port}\n")
+    try:
+        server.serve_forever()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        server.server_close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""The cut inside the robot simulator."""

@@ -1,0 +1,170 @@
+"""What there is to see beside the robot: board, table, light, and the food as the solver has moved it; needs the extra ``[robot]``."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import sapien
+
+from intsim.data.manifest import BACKGROUNDS
+from intsim.sim.coupling import Coupling
+from intsim.task.targets import Item, TaskError
+from mpm.output.surface import half_of
+
+TABLE, BOARD, THICK = (0.8, 1.2), (0.4, 0.5), 0.02  # sizes along x, y and the board's thickness [m]
+AWAY = 3.0  # of the walls from the board [m]
+RING = 3e-3  # distance of the rings of a food's outline beside the cut [m]
+#: Skin and flesh by food, red, green, blue: for the eye only.
+COLOURS = {
+    "banana": ((0.88, 0.75, 0.2), (0.96, 0.92, 0.72)),
+    "cucumber": ((0.15, 0.4, 0.15), (0.8, 0.9, 0.65)),
+    "apple": ((0.75, 0.12, 0.12), (0.96, 0.93, 0.8)),
+    "peach": ((0.95, 0.6, 0.4), (0.98, 0.8, 0.5)),
+    "melon": ((0.7, 0.75, 0.45), (0.98, 0.75, 0.45)),
+    "orange": ((0.95, 0.5, 0.1), (0.98, 0.65, 0.2)),
+    "strawberry": ((0.85, 0.1, 0.15), (0.98, 0.7, 0.7)),
+    "pear": ((0.75, 0.78, 0.3), (0.96, 0.95, 0.82)),
+    "kiwi": ((0.45, 0.33, 0.18), (0.55, 0.75, 0.25)),
+    "tomato": ((0.85, 0.15, 0.1), (0.92, 0.4, 0.3)),
+    "lemon": ((0.95, 0.87, 0.2), (0.98, 0.95, 0.65)),
+    "grape": ((0.35, 0.12, 0.35), (0.7, 0.75, 0.5)),
+    "shine_muscat": ((0.65, 0.78, 0.3), (0.85, 0.9, 0.6)),
+    "plum": ((0.4, 0.1, 0.3), (0.9, 0.7, 0.3)),
+    "cherry": ((0.55, 0.03, 0.1), (0.75, 0.2, 0.25)),
+    "potato": ((0.7, 0.55, 0.35), (0.95, 0.9, 0.7)),
+}
+PLAIN = ((0.8, 0.6, 0.4), (0.95, 0.9, 0.8))
+
+
+class Scenery:
+    """One background.
+
+    Args:
+        number: Which, from 0 to 14.
+
+    Raises:
+        TaskError: There is none of this number.
+    """
+
+    def __init__(self, number: int = 0) -> None:
+        if not 0 <= number < BACKGROUNDS:
+            raise TaskError(f"scenery {number}: give a number from 0 to {BACKGROUNDS - 1}")
+        rng = np.random.default_rng([number, zlib.crc32(b"scenery")])
+        self.number = number
+        plain = number == 0
+        self.table = np.array([0.75, 0.72, 0.68]) if plain else rng.uniform(0.15, 0.95, 3)
+        self.board = np.array([0.72, 0.53, 0.34]) if plain else rng.uniform(0.2, 0.95, 3)
+        self.wall = np.array([0.82, 0.84, 0.86]) if plain else rng.uniform(0.2, 0.95, 3)
+        self.ambient = 0.35 if plain else float(rng.uniform(0.2, 0.5))
+        turn = np.pi / 4 if plain else rng.uniform(0, 2 * np.pi)
+        self.direction = np.array([np.cos(turn), np.sin(turn), -1.0 if plain else -rng.uniform(0.6, 2.0)])
+        self.strength = 1.0 if plain else float(rng.uniform(0.6, 1.6))
+        self._foods: list[sapien.Entity] = []
+        self._shown: list[Any] = []
+
+    def build(self, scene: Any) -> None:
+        """Board, its top at z = 0, and table."""
+        for name, size, top, colour in (
+            ("board", (*BOARD, THICK), 0.0, self.board),
+            ("table", (*TABLE, THICK), -THICK, self.table),
+        ):
+            builder = scene.create_actor_builder()
+            half = [s / 2 for s in size]
+            builder.add_box_collision(half_size=half)
+            if scene.can_render():
+                builder.add_box_visual(half_size=half, material=material(colour))
+            builder.initial_pose = sapien.Pose(p=[0.0, 0.0, top - THICK / 2])
+            builder.build_kinematic(name=name)
+        if scene.can_render():
+            for axis in (0, 1):
+                for side in (-1.0, 1.0):
+                    self._wall(scene, axis, side)
+
+    def _wall(self, scene: Any, axis: int, side: float) -> None:
+        """A wall of the room, for the eye only."""
+        builder = scene.create_actor_builder()
+        half, place = [AWAY, AWAY, AWAY], [0.0, 0.0, 0.0]
+        half[axis], place[axis] = THICK, side * AWAY
+        builder.add_box_visual(half_size=half, material=material(self.wall))
+        builder.initial_pose = sapien.Pose(p=place)
+        builder.build_kinematic(name=f"wall {axis} {side:+.0f}")
+
+    def light(self, scene: Any) -> None:
+        """Light of this background."""
+        scene.set_ambient_light([self.ambient] * 3)
+        scene.add_directional_light(self.direction.tolist(), [self.strength] * 3)
+        scene.add_directional_light([0.0, 0.0, -1.0], [0.6] * 3)
+
+    def serve(self, scene: Any, items: Sequence[Item]) -> None:
+        """Put the foods of an episode on the board, in place of those of the last one."""
+        if not scene.can_render():
+            return
+        own = scene.sub_scenes[0]
+        for old in self._foods:
+            own.remove_entity(old)
+        self._foods, self._shown = [], []
+        for item in items:
+            entity = sapien.Entity()
+            entity.name = f"food {item.name}"
+            body = _body(*_whole(item), item.name)
+            entity.add_component(body)
+            own.add_entity(entity)
+            self._foods.append(entity)
+            self._shown.append(body)
+
+    def follow(self, scene: Any, coupling: Coupling) -> None:
+        """Show the food under the knife as it is now."""
+        if not scene.can_render():
+            return
+        mesh = coupling.mesh()
+        if mesh is None:
+            return
+        which, points, triangles, flesh = mesh
+        self.show(which, points, triangles, flesh, coupling.items[which].name)
+
+    def show(self, which: int, points: np.ndarray, triangles: np.ndarray, flesh: np.ndarray, name: str) -> None:
+        """Show a food as this mesh: vertices in the world [m] (m, 3), triangles (t, 3), which vertices are flesh (m,)."""
+        entity = self._foods[which]
+        entity.remove_component(self._shown[which])
+        self._shown[which] = _body(points, triangles, flesh, name)
+        entity.add_component(self._shown[which])
+
+
+def material(colour: np.ndarray) -> sapien.render.RenderMaterial:
+    """A dull material of a colour."""
+    return sapien.render.RenderMaterial(base_color=[*map(float, colour), 1.0], roughness=0.9, specular=0.1)
+
+
+def _whole(item: Item) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices in the world, triangles, and which are flesh, of a food that nothing has touched."""
+    half = half_of(replace(item.shape, cut=0.0), RING)
+    points = np.concatenate([half.points * [1.0, -1.0, 1.0], half.points])
+    triangles = np.concatenate([half.triangles[:, ::-1], half.triangles + len(half.points)])
+    return item.placed(points, 0.0), triangles, np.zeros(len(points), bool)
+
+
+def _body(points: np.ndarray, triangles: np.ndarray, flesh: np.ndarray, name: str) -> sapien.render.RenderBodyComponent:
+    """What SAPIEN shows of a mesh: a palette of two colours, skin and flesh."""
+    skin, inner = COLOURS.get(name, PLAIN)
+    palette = np.zeros((2, 4, 4), np.uint8)
+    palette[:, :2] = [*(round(255 * c) for c in skin), 255]
+    palette[:, 2:] = [*(round(255 * c) for c in inner), 255]
+    paint = sapien.render.RenderMaterial(roughness=0.8, specular=0.2)
+    paint.base_color_texture = sapien.render.RenderTexture2D(palette, "R8G8B8A8Unorm")
+    uv = np.stack([np.where(flesh, 0.875, 0.125), np.full(len(points), 0.5)], axis=1)
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    faces = np.cross(b - a, c - a)
+    normals = np.zeros_like(points)
+    for k in range(3):
+        np.add.at(normals, triangles[:, k], faces)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+    shape = sapien.render.RenderShapeTriangleMesh(
+        points.astype(np.float32), triangles.astype(np.uint32), normals.astype(np.float32), uv.astype(np.float32), paint
+    )
+    body = sapien.render.RenderBodyComponent()
+    body.attach(shape)
+    return body

@@ -1,0 +1,1 @@
+"""Cutting tasks: words, targets, plans, success."""

@@ -1,0 +1,214 @@
+"""Cutting tasks in words, and words back into tasks.
+
+A small grammar: templates with slots for ratio, food and side, each filled from a pool of words that mean the same. Templates for
+training and templates that a policy has never seen are disjoint. Every sentence that is made can be read back into its task, which
+is what makes an evaluation of language more than a lottery.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from intsim.task.targets import CutSpec, TaskError
+
+T = TypeVar("T")
+VARIANTS = 5
+"""Sentences for each trajectory, at least."""
+TRAINING = (
+    "cut {ratio} of the {item} {side}",
+    "cut the {item} at {ratio} {side}",
+    "slice {ratio} off the {item} {side}",
+    "take the knife and cut {ratio} off the {item} {side}",
+    "separate {ratio} of the {item} {side}",
+    "with the knife, cut off {ratio} of the {item}, measured {side}",
+)
+UNSEEN = (
+    "please remove {ratio} of the {item} {side}",
+    "I would like {ratio} of the {item} cut away {side}",
+    "bring the blade down on the {item} at {ratio} {side}",
+    "chop {ratio} from the {item}, counting {side}",
+    "part the {item} so that {ratio} comes off {side}",
+)
+TRAINING_SPLIT = (
+    "divide the {item} into {count} equal pieces",
+    "cut the {item} into {count} equal parts",
+    "slice the {item} into {count} pieces of the same size",
+    "split the {item} into {count} equal pieces with the knife",
+    "make {count} equal pieces of the {item}",
+)
+UNSEEN_SPLIT = (
+    "portion the {item} evenly for {count} people",
+    "I need {count} equal portions of the {item}",
+    "chop up the {item} so that there are {count} even parts",
+    "share the {item} out into {count} like parts",
+    "turn the {item} into {count} identical chunks",
+)
+SIDES = {
+    "left": ("from the left", "from the left end", "on the left side", "starting at the left"),
+    "right": ("from the right", "from the right end", "on the right side", "starting at the right"),
+    "centre": ("in the middle", "at the centre", "right through the middle", "across its middle"),
+}
+NUMBERS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
+PARTS = {
+    2: "half",
+    3: "third",
+    4: "quarter",
+    5: "fifth",
+    6: "sixth",
+    7: "seventh",
+    8: "eighth",
+    9: "ninth",
+    10: "tenth",
+}
+NAMES = {"shine_muscat": ("shine muscat", "shine muscat grape"), "kiwi": ("kiwi", "kiwifruit")}
+"""Other words for a food; the others go by their names."""
+
+
+def words_of_item(name: str) -> tuple[str, ...]:
+    """Words for a food."""
+    return NAMES.get(name, (name.replace("_", " "),))
+
+
+def words_of_ratio(ratio: Fraction | float) -> tuple[str, ...]:
+    """Words for a part of a food: of a Fraction its words, digits and multiples, of another number its digits."""
+    if not isinstance(ratio, Fraction):
+        return (f"{ratio:.2f}", f"{100 * ratio:.0f}%", f"{100 * ratio:.0f} percent")
+    n, d = ratio.numerator, ratio.denominator
+    out = [f"{n}/{d}"]
+    if 100 % d == 0:
+        out += [f"{100 * n // d}%", f"{100 * n // d} percent"]
+    if d in PARTS and n < len(NUMBERS):
+        plural = {"half": "halves"}.get(PARTS[d], PARTS[d] + "s")
+        out += [f"one {PARTS[d]}", "half" if d == 2 else f"a {PARTS[d]}"] if n == 1 else [f"{NUMBERS[n]} {plural}"]
+    for k in (2, 3):
+        if k * n < len(NUMBERS) and k * d in PARTS:
+            out.append(f"{NUMBERS[k * n]} {PARTS[k * d]}s")
+    return tuple(out)
+
+
+def words_of_count(count: int) -> tuple[str, ...]:
+    """Words for a number of pieces."""
+    return (NUMBERS[count], str(count)) if count < len(NUMBERS) else (str(count),)
+
+
+def sentences(spec: CutSpec, *, unseen: bool = False) -> Iterator[str]:
+    """All sentences for a task, those of the templates that are kept for testing with ``unseen``."""
+    for template in (UNSEEN_SPLIT if unseen else TRAINING_SPLIT) if spec.pieces else (UNSEEN if unseen else TRAINING):
+        for item in words_of_item(spec.item):
+            if spec.pieces:
+                for count in words_of_count(spec.pieces):
+                    yield template.format(item=item, count=count)
+                continue
+            for ratio in words_of_ratio(spec.ratio):
+                for side in SIDES[spec.side]:
+                    yield template.format(item=item, ratio=ratio, side=side)
+
+
+def instructions(spec: CutSpec, seed: int, count: int = VARIANTS, *, unseen: bool = False) -> list[str]:
+    """Different sentences for a task, drawn from templates in turn.
+
+    Raises:
+        TaskError: There are not as many.
+    """
+    pool: dict[str, list[str]] = {}
+    templates = (UNSEEN_SPLIT if unseen else TRAINING_SPLIT) if spec.pieces else (UNSEEN if unseen else TRAINING)
+    all_of_them = list(sentences(spec, unseen=unseen))
+    for k, template in enumerate(templates):
+        part = len(all_of_them) // len(templates)
+        pool[template] = all_of_them[k * part : (k + 1) * part]
+    rng = np.random.default_rng(seed)
+    order = rng.permutation(len(templates))
+    out: list[str] = []
+    while len(out) < count and any(pool.values()):
+        for k in order:
+            left = pool[templates[k]]
+            if left and len(out) < count:
+                out.append(left.pop(int(rng.integers(len(left)))))
+    if len(out) < count:
+        raise TaskError(f"task: only {len(out)} sentences for it, {count} are asked for")
+    return out
+
+
+def parse(sentence: str, items: Sequence[str], camera: str = "front") -> CutSpec:
+    """The task that a sentence asks for.
+
+    Args:
+        sentence: Made by this grammar, or in its words.
+        items: Names of the foods that may be meant.
+        camera: Name of the camera for left and right.
+
+    Raises:
+        TaskError: A food, ratio or side that is not said, or said in two ways.
+    """
+    text = " " + re.sub(r"[,.!?]+(?=\s|$)", " ", sentence.lower()) + " "
+    named: set[str] = set()
+    for word, name in sorted(((w, n) for n in items for w in words_of_item(n)), key=lambda pair: -len(pair[0])):
+        if f" {word} " in text:  # the longest words first: a shine muscat grape is no grape
+            named.add(name)
+            text = text.replace(f" {word} ", " # ")
+    item = _only("food", sentence, named)
+    if not re.search(r"\b(left|right|middle|cent(re|er))\b", text):
+        counts = {n for n in range(2, 100) for w in words_of_count(n) if f" {w} " in text}
+        if counts:
+            return CutSpec(item, camera=camera, pieces=_only("number of pieces", sentence, counts))
+    side = _only("side", sentence, {s for s, words in SIDES.items() if any(f" {w} " in text for w in words)})
+    for words in SIDES.values():
+        for word in sorted(words, key=len, reverse=True):
+            text = text.replace(f" {word} ", " # ")
+    return CutSpec(item, _only("ratio", sentence, _ratios(text)), side, camera)
+
+
+def _ratios(text: str) -> set[Fraction | float]:
+    """Parts that a text names."""
+    found: set[Fraction | float] = {Fraction(int(a), int(b)) for a, b in re.findall(r" (\d+)/([1-9]\d*) ", text)}
+    for digits in re.findall(r" (\d+)\s?(?:%|percent) ", text):
+        found.add(Fraction(int(digits), 100))
+    found |= {float(digits) for digits in re.findall(r" (0\.\d+) ", text)}
+    for d, part in PARTS.items():
+        plural = "halves" if part == "half" else part + "s"
+        for n, number in enumerate(NUMBERS):
+            if n > 0 and (f" {number} {plural if n > 1 else part} " in text):
+                found.add(Fraction(n, d))
+        if f" a {part} " in text or (d == 2 and re.search(r"(?<!one) half ", text)):
+            found.add(Fraction(1, d))
+    return found
+
+
+def _only(what: str, sentence: str, found: set[T]) -> T:
+    if len(found) != 1:
+        said = "says no" if not found else f"says {len(found)} of"
+        raise TaskError(f"task: {sentence!r} {said} {what}")
+    return found.pop()
+
+
+def read_paraphrases(path: Path | str, spec: CutSpec, items: Sequence[str]) -> list[str]:
+    """Sentences of somebody else for a task, a line each; those that the grammar cannot read are the file's word for it.
+
+    Raises:
+        TaskError: The file cannot be read, or a line that the grammar reads means another task.
+    """
+    try:
+        lines = [line.strip() for line in Path(path).read_text(encoding="utf-8").splitlines() if line.strip()]
+    except (OSError, UnicodeDecodeError) as e:
+        raise TaskError(f"{path}: cannot be read as text ({e})") from None
+    for k, line in enumerate(lines, 1):
+        try:
+            meant = parse(line, items, spec.camera)
+        except TaskError:
+            continue
+        if not same(meant, spec):
+            raise TaskError(f"{path}, line {k}: {line!r} asks for another cut")
+    return lines
+
+
+def same(a: CutSpec, b: CutSpec) -> bool:
+    """Whether two tasks are the same: a ratio that was said with two digits is the one that it rounds."""
+    close = abs(float(a.ratio) - float(b.ratio)) < 0.005 + 1e-9
+    return close and replace(a, ratio=b.ratio) == b

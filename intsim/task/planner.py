@@ -1,0 +1,104 @@
+"""The way of the blade for a cut: approach, contact, cut, hold, retract, in four styles."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from intsim.task.targets import Item, TaskError
+
+STYLES = ("press", "slice", "rock", "saw")
+PHASES = ("approach", "contact", "cut", "hold", "retract")
+RATE = 20.0  # control steps a second
+HOME = (-0.25, 0.0, 0.25)  # where the middle of the edge begins [m]
+ABOVE = 0.02  # height above the food at which the descent begins [m]
+SPEED = 0.04  # of the descent [m/s]
+APPROACH = 2.0  # time from home to above the food, and back up [s]
+DRAW = 1.0  # way along the edge over the way down, of a slice
+ROCKED = math.radians(8.0)  # angle of the edge to the board at which a rock begins
+STROKE, BEAT = 0.015, 1.5  # amplitude of a saw along the edge [m], strokes a second
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Poses of the edge's middle at the rate of control.
+
+    Attributes:
+        pose: x, y, z [m], yaw of the edge and its angle to the board [rad], shape (n, 5).
+        phase: Which of ``PHASES`` each belongs to, shape (n,).
+    """
+
+    pose: np.ndarray
+    phase: np.ndarray
+
+
+def minimum_jerk(n: int) -> np.ndarray:
+    """Part of the way after each of n steps of a motion from rest to rest with the least jerk (Flash and Hogan 1985), shape (n,)."""
+    t = np.arange(1, n + 1) / n
+    out: np.ndarray = t**3 * (10 - 15 * t + 6 * t**2)
+    return out
+
+
+def plan(
+    item: Item,
+    along: float,
+    *,
+    style: str = "press",
+    start: np.ndarray | None = None,
+    yaw: float | None = None,
+    place: np.ndarray | None = None,
+    depth: float = 0.0,
+    hold: float = 0.0,
+    speed: float = SPEED,
+) -> Path:
+    """The way of the blade for one cut.
+
+    Args:
+        item: The food.
+        along: Where along its axis it is cut [m].
+        style: ``press`` straight down, ``slice`` with a draw along the edge, ``rock`` from a raised end, ``saw`` to and fro.
+        start: Pose from which it begins, shape (5,); home without it.
+        yaw: Direction of the edge [rad]; across the food without it.
+        place: Where on the table the middle of the edge comes down [m], shape (2,); on the food's axis without it.
+        depth: Height of the edge at the end [m]; negative to command it into the board, for an arm that yields.
+        hold: Time that it is held there [s].
+        speed: Of the descent [m/s].
+
+    Raises:
+        TaskError: An unknown style, or a speed that is no positive number.
+    """
+    if style not in STYLES:
+        raise TaskError(f"plan: style {style!r} is none of {', '.join(STYLES)}")
+    if not (math.isfinite(speed) and speed > 0):
+        raise TaskError(f"plan: a descent of {speed:g} m/s; give a positive speed")
+    turn = item.yaw + math.pi / 2 if yaw is None else yaw
+    turn = (turn + math.pi / 2) % math.pi - math.pi / 2  # an edge has no direction
+    begin = np.array([*HOME, turn, 0.0]) if start is None else np.asarray(start, float)
+    edge = np.array([math.cos(turn), math.sin(turn)])
+    centre, high = item.at(along) if place is None else place, item.shape.height + ABOVE
+    steps = max(2, math.ceil((high - depth) / speed * RATE))
+    down = high + (depth - high) * np.arange(1, steps + 1) / steps
+    passed = (high - down) / (high - depth)
+    shift, tilt = np.zeros(steps), np.zeros(steps)
+    if style == "slice":
+        shift = DRAW * (high - depth) * (passed - 0.5)
+    elif style == "rock":
+        tilt = ROCKED * (1 - passed)
+    elif style == "saw":
+        shift = STROKE * np.sin(2 * math.pi * BEAT * np.arange(1, steps + 1) / RATE)
+    cut = np.column_stack([centre + shift[:, None] * edge, down, np.full(steps, turn), tilt])
+    above = np.array(
+        [*centre + (shift[0] if style == "slice" else 0.0) * edge, high, turn, ROCKED if style == "rock" else 0.0]
+    )
+    part = minimum_jerk(round(APPROACH * RATE))[:, None]
+    reach = begin + part * (above - begin)
+    end = cut[-1]
+    rest = np.repeat(end[None], round(hold * RATE), axis=0)
+    back = end + part * (np.array([end[0], end[1], HOME[2], turn, 0.0]) - end)
+    touching = down <= item.shape.height
+    first = int(np.argmax(touching))
+    phase = ["approach"] * (len(reach) + first) + ["contact"] + ["cut"] * (steps - first - 1)
+    phase += ["hold"] * len(rest) + ["retract"] * len(back)
+    return Path(np.concatenate([reach, cut, rest, back]), np.array(phase))

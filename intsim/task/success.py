@@ -1,0 +1,124 @@
+"""Whether an episode was a success: the four published criteria, stricter ones, and pieces."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from intsim.task.kinematic_table import Rollout, crossing, uncut
+from intsim.task.targets import CutSpec, Item, TaskError, spread, target
+
+TIP, STRICT_TIP = 0.05, 0.005  # height of the edge above the table that counts as reaching it, published and strict [m]
+ANGLE = math.radians(10.0)  # most that the edge may deviate from across the food
+PLACE = 0.1  # most error of the place, over the size of the food
+EVEN = 0.1  # most spread of the lengths of equal pieces, over their mean
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What was found.
+
+    Attributes:
+        height: Lowest height of the edge above the table [m].
+        angle: Between the edge and across the food, in plan, at the lowest point [rad]; NaN where the food was not met.
+        offset: Place of the cut less the one asked for, over the food's length [-]; NaN where it was not met.
+        pieces: Pieces of the food at the end, in plain geometry.
+        spread: Standard deviation of the lengths of the pieces over their mean; NaN for one piece.
+        criteria: ``tip``, ``region``, ``angle``, ``place`` as published; ``strict_tip``; for equal pieces ``count`` and ``even``.
+    """
+
+    height: float
+    angle: float
+    offset: float
+    pieces: int
+    spread: float
+    criteria: Mapping[str, bool]
+
+    @property
+    def published(self) -> bool:
+        """The four published criteria together."""
+        return all(self.criteria[name] for name in ("tip", "region", "angle", "place"))
+
+    @property
+    def strict(self) -> bool:
+        """The same with an edge that comes within 5 mm of the table, and as many equal pieces as asked for."""
+        return self.published and all(self.criteria.values())
+
+
+def judge(spec: CutSpec, item: Item, rollout: Rollout, after: Item) -> Judged:
+    """Judge an episode.
+
+    The published criteria are read so that each fails by itself: the tip's error is its height above the table, the region is the
+    food, the place is along its axis. A tip within 50 mm of the table says nothing of a grape 25 mm high: ``strict_tip`` asks for 5 mm.
+    For equal pieces every cut counts against the piece that was there: the worst angle and place.
+
+    Args:
+        spec: What was asked for.
+        item: The food at the beginning.
+        rollout: What happened.
+        after: The food at the end.
+    """
+    poses = np.array(rollout.pose)
+    low = int(np.argmin(poses[:, 2]))
+    height = float(poses[low, 2])
+    made = [(was, along) for was, along in rollout.cuts if (was.name, was.x, was.y) == (item.name, item.x, item.y)]
+    if spec.pieces:
+        tries = made
+        errors = [_offset(spec, was, along) for was, along in made]
+        angles = [_angle(item, rollout, k) for k in range(len(made))]
+    else:
+        place = crossing(uncut(item), poses[low])
+        tries = [(item, place)] if place is not None else []
+        errors = [_offset(spec, was, along) for was, along in tries]
+        angles = [_from_across(item, poses[low])] if tries else []
+    offset = max(errors, key=abs) if errors else math.nan
+    angle = max(angles) if angles else math.nan
+    lengths = [p.length for p in after.pieces]
+    even = spread(lengths) if len(lengths) > 1 else math.nan
+    criteria = {
+        "tip": height < TIP,
+        "region": bool(tries),
+        "angle": angle <= ANGLE,
+        "place": abs(offset) <= PLACE,
+        "strict_tip": height < STRICT_TIP,
+    }
+    if spec.pieces:
+        criteria |= {"count": len(lengths) == spec.pieces, "even": even <= EVEN}
+    return Judged(height, angle, offset, len(lengths), even, criteria)
+
+
+def _offset(spec: CutSpec, was: Item, along: float) -> float:
+    """Error of a cut over the length of what was cut: the whole food, or for equal pieces the piece that was left."""
+    try:
+        wanted = target(spec, was)
+    except TaskError:  # in as many pieces as asked for: one cut too many
+        return math.inf
+    length = was.shape.length
+    if spec.pieces:
+        length = max(p.length for p in was.pieces)
+    return (along - wanted) / length
+
+
+def _from_across(item: Item, pose: np.ndarray) -> float:
+    edge = np.array([math.cos(pose[3]), math.sin(pose[3])])
+    return math.asin(min(1.0, abs(float(edge @ item.axis))))
+
+
+def _angle(item: Item, rollout: Rollout, k: int) -> float:
+    """Of the k-th cut: the pose in which the edge was lowest while it was down for it."""
+    down = np.array([pose[2] for pose in rollout.pose]) < STRICT_TIP
+    starts = np.flatnonzero(down & ~np.concatenate([[False], down[:-1]]))
+    return _from_across(item, rollout.pose[starts[min(k, len(starts) - 1)]])
+
+
+def wilson(successes: int, trials: int, z: float = 1.959964) -> tuple[float, float]:
+    """95 % interval of a rate of success (Wilson 1927, J. Am. Stat. Assoc. 22:209)."""
+    if trials == 0:
+        return 0.0, 1.0
+    p, n = successes / trials, trials
+    middle = (p + z * z / (2 * n)) / (1 + z * z / n)
+    half = z / (1 + z * z / n) * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+    return max(middle - half, 0.0), min(middle + half, 1.0)

@@ -1,0 +1,145 @@
+"""Episodes of an evaluation: what is on the table, what is asked for, and in which words; all from seeds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+
+from calib.material.food import FoodSpec, load_foods
+from intsim.task.language import instructions
+from intsim.task.targets import ALONG_VIEW, CutSpec, Item, TaskError
+from mpm.shapes import Shape
+
+FOODS = (
+    "banana", "cucumber", "apple", "peach", "melon", "orange", "strawberry", "pear", "kiwi", "tomato", "lemon", "grape",
+    "shine_muscat", "plum", "cherry",
+)  # fmt: skip
+"""The fifteen foods of the published data set."""
+TEST = 1_000_000
+"""First seed of the tests; those of training are below."""
+FRACTIONS = tuple(Fraction(*r) for r in ((1, 2), (1, 3), (1, 4), (1, 6), (2, 3), (3, 4)))
+SCALE = 0.1  # most that a food's size deviates from its usual one, part of it
+REACH_X, REACH_Y = (-0.08, 0.08), (-0.12, 0.12)  # where a food may lie [m]
+ROOM = 0.03  # between foods [m]
+MOST_PIECES = 4
+TRIES = 200
+
+
+@dataclass(frozen=True)
+class Episode:
+    """One test. Attributes: suite; seed; spec; item, the food that is meant; others; instruction."""
+
+    suite: str
+    seed: int
+    spec: CutSpec
+    item: Item
+    others: tuple[Item, ...]
+    instruction: str
+
+
+def place(food: FoodSpec, rng: np.random.Generator) -> Item:
+    """A food of a random size, place and direction; its ends can be told apart in the front camera's picture."""
+    scale = 1 + rng.uniform(-SCALE, SCALE)
+    usual = food.to_scene_food().shape
+    shape = Shape(usual.kind, scale * usual.length, scale * usual.width, scale * usual.height)
+    turn = math.pi / 2 - 1.2 * ALONG_VIEW
+    yaw = math.pi / 2 + rng.uniform(-turn, turn)
+    return Item(food.name, shape, float(rng.uniform(*REACH_X)), float(rng.uniform(*REACH_Y)), float(yaw))
+
+
+def crowd(item: Item, foods: dict[str, FoodSpec], count: int, rng: np.random.Generator) -> tuple[Item, ...]:
+    """Other foods beside it, no two of a kind and none touching another.
+
+    Raises:
+        TaskError: There is no room for them.
+    """
+    names = [n for n in foods if n != item.name]
+    rng.shuffle(names)
+    out: list[Item] = []
+    for _ in range(TRIES):
+        if len(out) == count:
+            break
+        new = place(foods[names[len(out)]], rng)
+        new = replace(new, x=float(rng.uniform(-0.2, 0.2)), y=float(rng.uniform(-0.35, 0.35)))
+        if all(math.hypot(new.x - o.x, new.y - o.y) > _reach(new) + _reach(o) + ROOM for o in (item, *out)):
+            out.append(new)
+    if len(out) < count:
+        raise TaskError(f"suite: no room for {count} foods beside the {item.name}")
+    return tuple(out)
+
+
+def _reach(item: Item) -> float:
+    return math.hypot(item.shape.length, item.shape.width) / 2
+
+
+def _fraction(rng: np.random.Generator, name: str) -> CutSpec:
+    ratio = FRACTIONS[rng.integers(len(FRACTIONS))]
+    side = ("left", "right")[rng.integers(2)]
+    return CutSpec(name, ratio, "centre" if ratio == Fraction(1, 2) and rng.random() < 0.5 else side)
+
+
+def _continuous(rng: np.random.Generator, name: str) -> CutSpec:
+    return CutSpec(name, round(float(rng.uniform(0.1, 0.9)), 2), ("left", "right")[rng.integers(2)])
+
+
+def _split(rng: np.random.Generator, name: str) -> CutSpec:
+    return CutSpec(name, pieces=int(rng.integers(2, MOST_PIECES + 1)))
+
+
+def _flip(rng: np.random.Generator, name: str) -> CutSpec:
+    ratio = (Fraction(1, 4), Fraction(3, 4))[rng.integers(2)]
+    return CutSpec(name, ratio, ("left", "right")[rng.integers(2)])
+
+
+@dataclass(frozen=True)
+class Suite:
+    """A kind of test. Attributes: what, in words; task, drawn from a generator for a food; crowd, most other foods; unseen, words that
+    were kept for testing."""
+
+    what: str
+    task: Callable[[np.random.Generator, str], CutSpec] = _fraction
+    crowd: int = 0
+    unseen: bool = False
+
+
+SUITES = {
+    "seeds": Suite("places and sizes that training has not seen"),
+    "objects": Suite("other foods on the table", crowd=3),
+    "language": Suite("sentences that training has not seen", unseen=True),
+    "continuous": Suite("any part from 0.1 to 0.9", task=_continuous),
+    "split": Suite("two to four equal pieces", task=_split),
+    "flips": Suite("a quarter and three quarters from either end", task=_flip),
+}
+"""Suites by name. Leave one food out by naming it: a suite of a policy that was trained without it."""
+
+
+def draw(suite: str, seed: int, foods: dict[str, FoodSpec]) -> Episode:
+    """The episode of a suite with this seed; the same seed is the same episode.
+
+    Args:
+        suite: Name in ``SUITES``.
+        seed: From ``TEST`` on for a test.
+        foods: Foods that may be asked for, by name.
+
+    Raises:
+        TaskError: No such suite.
+    """
+    if suite not in SUITES:
+        raise TaskError(f"suite: {suite!r} is none of {', '.join(SUITES)}")
+    kind = SUITES[suite]
+    rng = np.random.default_rng([seed, *suite.encode()])
+    names = list(foods)
+    name = names[rng.integers(len(names))]
+    item, spec = place(foods[name], rng), kind.task(rng, name)
+    others: tuple[Item, ...] = ()
+    if kind.crowd:
+        item = replace(item, x=float(np.clip(item.x, -0.05, 0.05)), y=float(np.clip(item.y, -0.05, 0.05)))
+        others = crowd(
+            item, load_foods() if len(foods) <= kind.crowd else foods, int(rng.integers(1, kind.crowd + 1)), rng
+        )
+    words = instructions(spec, int(rng.integers(2**31)), unseen=kind.unseen)
+    return Episode(suite, seed, spec, item, others, words[0])

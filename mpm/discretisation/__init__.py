@@ -1,0 +1,1 @@
+"""Particles and grid of a scene."""

@@ -1,0 +1,1 @@
+"""The time step in Taichi's language."""

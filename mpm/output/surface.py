@@ -1,0 +1,162 @@
+"""The food's surface, which a picture shows: triangles of either half that move with the particles.
+
+The outline is a stack of rings around sections of the shape, closed by the face of the cut and by the far end. A vertex goes with
+the particles of its own half that are nearest to it at rest: by a moving least-squares fit that is exact for any affine motion
+(Lancaster and Salkauskas 1981, Math. Comp. 37:141), while a stress, which must not overshoot, is their weighted mean.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mpm.discretisation.particles import Seeds
+from mpm.output.snapshot import Snapshot
+from mpm.shapes import FLAT_TOP, Shape, half_width, surface
+
+NEAR = 16  # particles that a vertex goes with
+AROUND = 64  # vertices of a ring
+DISCS = 12  # rings of the face of the cut and of the far end, besides their middle
+ROUNDING = 1e-9  # part by which vertices on the rim of a shape are moved inwards, where it has a height
+SLOPE = 1e-8  # part of the spread of the neighbours that is added to it, in case they lie in a plane
+
+
+@dataclass(frozen=True, eq=False)
+class Half:
+    """One half of the food at rest.
+
+    Attributes:
+        points: Vertices [m], shape (m, 3).
+        triangles: Vertices of each triangle, seen from outside against the clock, shape (t, 3).
+    """
+
+    points: np.ndarray
+    triangles: np.ndarray
+
+
+def half_of(shape: Shape, spacing: float) -> Half:
+    """The surface of the part at y >= 0, whose cut face is y = 0.
+
+    Args:
+        shape: The outline.
+        spacing: Distance of the rings beside the cut [m].
+    """
+    b = shape.ends[1]
+    count = max(int(np.ceil(np.pi / 2 * b / spacing)), 4)
+    rings = [_ring(shape, b * float(np.sin(np.pi / 2 * t))) for t in np.linspace(0.0, 1.0, count + 1)]
+    middle = [np.array([[0.0, ring[0, 1], ring[:, 2].mean()]]) for ring in (rings[0], rings[-1])]
+    face, end = (
+        [centre + (ring - centre) * part for part in np.arange(1, DISCS) / DISCS]
+        for ring, centre in zip((rings[0], rings[-1]), middle, strict=True)
+    )
+    # from the middle of the cut face to its rim, over the outline to the far end's rim and to its middle
+    whole = [*face, *rings, *reversed(end)]
+    points = np.concatenate([middle[0], *whole, middle[1]])
+    first = 1 + AROUND * np.arange(len(whole))
+    around, after = np.arange(AROUND), np.roll(np.arange(AROUND), -1)
+    last = len(points) - 1
+    triangles = [np.stack([np.zeros(AROUND, int), first[0] + after, first[0] + around], axis=1)]
+    for low, high in zip(first[:-1], first[1:], strict=True):
+        triangles.append(np.stack([low + around, low + after, high + after], axis=1))
+        triangles.append(np.stack([low + around, high + after, high + around], axis=1))
+    triangles.append(np.stack([np.full(AROUND, last), first[-1] + around, first[-1] + after], axis=1))
+    return Half(points, np.concatenate(triangles)[:, ::-1])
+
+
+def _ring(shape: Shape, y: float) -> np.ndarray:
+    """Vertices (AROUND, 3) around the section at y: over its top towards -x, down, below it towards +x, and up."""
+    w = half_width(shape, y)
+    upright = AROUND // 4 if shape.kind in FLAT_TOP else 0  # vertices of each side, where there are sides
+    part = np.arange(AROUND // 2 - upright) / (AROUND // 2 - upright)
+    side = np.arange(upright) / max(upright, 1)
+    x = w * np.cos(np.pi * part)
+    inner = (1 - ROUNDING) * np.array([x, np.full_like(x, y)])
+    floor, roof = surface(shape, *inner)
+    low, high = np.nan_to_num([floor[0], roof[0]], nan=shape.height / 2)
+    below = surface(shape, -inner[0], inner[1])[0]
+    parts = [
+        (x, np.nan_to_num(roof, nan=low)),
+        (np.full_like(side, -w), high + (low - high) * side),
+        (-x, np.nan_to_num(below, nan=low)),
+        (np.full_like(side, w), low + (high - low) * side),
+    ]
+    return np.concatenate([np.stack([a, np.full_like(a, y), z], axis=1) for a, z in parts])
+
+
+class Surface:
+    """Both halves of the food, at rest and as the particles have moved.
+
+    Args:
+        shape: The outline.
+        seeds: The particles at rest.
+        mirrors: Whether x = 0 and y = 0 are mirrors of them.
+
+    Attributes:
+        rest: Vertices at rest [m], shape (m, 3).
+        triangles: Vertices of each triangle, seen from outside against the clock, shape (t, 3).
+    """
+
+    def __init__(self, shape: Shape, seeds: Seeds, mirrors: tuple[bool, bool]) -> None:
+        left, right = (half_of(replace(shape, cut=side * shape.cut), seeds.spacing) for side in (-1.0, 1.0))
+        places = {-1.0: left.points * [1.0, -1.0, 1.0], 1.0: right.points}
+        self._mirrored = mirrors[1]
+        sides = (-1.0,) if self._mirrored else (-1.0, 1.0)
+        self._carried = [_Carried(places[side], seeds.x, side, mirrors[0]) for side in sides]
+        self.triangles = np.concatenate([left.triangles[:, ::-1], right.triangles + len(left.points)])
+        self.rest = np.concatenate(list(places.values()))
+
+    def points(self, now: Snapshot) -> np.ndarray:
+        """Places of the vertices [m], shape (m, 3)."""
+        halves = [half.points(now.x) for half in self._carried]
+        if self._mirrored:
+            halves.append(halves[0] * [1.0, -1.0, 1.0])
+        return np.concatenate(halves)
+
+    def values(self, of_particles: np.ndarray) -> np.ndarray:
+        """What the particles have, shape (n,), at the vertices, shape (m,)."""
+        halves = [half.values(of_particles) for half in self._carried]
+        return np.concatenate(halves * 2 if self._mirrored else halves)
+
+
+class _Carried:
+    """Vertices of one half and the particles they go with."""
+
+    def __init__(self, points: np.ndarray, x: np.ndarray, side: float, mirrored: bool) -> None:
+        own = np.flatnonzero(x[:, 1] * side > 0)
+        near, flip = x[own], np.ones(len(own))
+        if mirrored:  # the images of the particles across x = 0
+            near = np.concatenate([near, near * [-1.0, 1.0, 1.0]])
+            own, flip = np.concatenate([own, own]), np.concatenate([flip, -flip])
+        distance, which = cKDTree(near).query(points, k=min(NEAR, len(near)))
+        self._points, self._own = points, own[which]
+        self._flip = np.stack([flip[which], np.ones_like(distance), np.ones_like(distance)], axis=2)
+        self._rest = x[self._own] * self._flip
+        weight = np.exp(-((1.5 * distance / distance[:, -1:]) ** 2))
+        self._mean = weight / weight.sum(axis=1, keepdims=True)
+        self._fit = self._least_squares()
+
+    def _least_squares(self) -> np.ndarray:
+        """Weights (m, k) of the neighbours' displacements in that of each vertex: those of a weighted linear fit."""
+        arm = self._rest - self._points[:, None]
+        basis = np.concatenate([np.ones((*arm.shape[:2], 1)), arm], axis=2)
+        gram = np.einsum("mki,mk,mkj->mij", basis, self._mean, basis)
+        spread = np.trace(gram[:, 1:, 1:], axis1=1, axis2=2)
+        gram[:, 1:, 1:] += SLOPE * spread[:, None, None] * np.eye(3)
+        first = np.zeros((len(arm), 4, 1))
+        first[:, 0] = 1.0
+        chosen = np.linalg.solve(gram, first)[:, :, 0]
+        out: np.ndarray = np.einsum("mi,mki,mk->mk", chosen, basis, self._mean)
+        return out
+
+    def points(self, x: np.ndarray) -> np.ndarray:
+        """Places of the vertices (m, 3) where the particles are at x (n, 3)."""
+        moved = x[self._own] * self._flip - self._rest
+        out: np.ndarray = self._points + np.einsum("mk,mkd->md", self._fit, moved)
+        return out
+
+    def values(self, of_particles: np.ndarray) -> np.ndarray:
+        """What the particles have (n,) at the vertices (m,)."""
+        out: np.ndarray = (self._mean * of_particles[self._own]).sum(axis=1)
+        return out

@@ -1,0 +1,144 @@
+"""A cut as one HTML file that needs no network: the food to turn around, a slider over the stroke, the forces beside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from calib.errors import OutputError
+from reports.base.scene_render import COLOURS, EYE, FRAME, INK, STEEL, WOOD, Film, blade_at
+
+PER_METRE = 1e5  # whole numbers of the file in a metre: hundredths of a millimetre
+HOVER = "%{x:.1f} mm, %{y:.2f} N<extra></extra>"
+LIGHT = {"ambient": 0.55, "diffuse": 0.7, "specular": 0.15}
+TITLES = ("von Mises stress [kPa]", "stroke [mm]", "force on the knife [N]")
+
+
+def page(film: Film, path: Path, title: str) -> None:
+    """Write a self-contained page of a cut.
+
+    Args:
+        film: What to show; each of its looks makes the file 0.15 MB larger.
+        path: The file.
+        title: Its heading.
+
+    Raises:
+        OutputError: plotly is not installed, or the file cannot be written.
+    """
+    try:
+        import plotly.graph_objects as go
+        from plotly.subplots import make_subplots
+    except ImportError:
+        raise OutputError("a page needs plotly: pip install 'cutcal[view]', or leave the option out") from None
+    figure = make_subplots(
+        rows=1, cols=2, column_widths=[0.66, 0.34], specs=[[{"type": "scene"}, {"type": "xy"}]], horizontal_spacing=0.07
+    )
+    figure.add_trace(_board(film, go), row=1, col=1)
+    for part, column in zip(_moving(film, 0, go, whole=True), (1, 1, 2), strict=True):
+        figure.add_trace(part, row=1, col=column)
+    curve = go.Scatter(x=film.stroke * 1e3, y=film.force, mode="lines", line={"color": INK}, hovertemplate=HOVER)
+    figure.add_trace(curve, row=1, col=2)
+    figure.frames = [
+        go.Frame(data=_moving(film, k, go, whole=False), traces=[1, 2, 3], name=str(k)) for k in range(len(film.looks))
+    ]
+    figure.update_layout(**_layout(film, title))
+    figure.update_xaxes(title=TITLES[1], zeroline=False)
+    figure.update_yaxes(title=TITLES[2], rangemode="tozero")
+    text = figure.to_html(include_plotlyjs=True, full_html=True, auto_play=False, config={"displaylogo": False})
+    try:
+        draft = path.with_name(f"{path.name}.draft")
+        draft.write_text(text, encoding="utf-8")
+        draft.replace(path)
+    except OSError as e:
+        raise OutputError(f"{path}: cannot be written ({e.strerror or e})") from None
+
+
+def _board(film: Film, go: Any) -> Any:
+    """The top of the board."""
+    shape = film.scene.food.shape
+    near = FRAME * max(shape.width, shape.height)
+    a, b = 0.7 * near, 0.55 * max(shape.length, 2 * near)
+    x, y = np.array([-a, a, a, -a]), np.array([-b, -b, b, b])
+    corners = np.column_stack([x, y, np.full(4, -1e-4)])
+    faces = _faces(np.array([[0, 1, 2], [0, 2, 3]]))
+    return go.Mesh3d(**_corners(corners), **faces, color=WOOD, lighting=LIGHT, hoverinfo="skip")
+
+
+def _moving(film: Film, k: int, go: Any, *, whole: bool) -> list[Any]:
+    """Food, blade and the place on the curve at one look: all of them, or what changes."""
+    look, surface = film.looks[k], film.surface
+    points, triangles = blade_at(film.scene, look)
+    stress = np.round(surface.values(look.mises) / 1e3, 3).astype(np.float32)
+    food, knife = {"intensity": stress, **_corners(surface.points(look))}, _corners(points)
+    now = {"x": [look.stroke * 1e3], "y": [film.force_at(look)]}
+    if not whole:
+        return [go.Mesh3d(**food), go.Mesh3d(**knife), go.Scatter(**now)]
+    bar = {"title": {"text": TITLES[0], "side": "right"}, "x": -0.04, "len": 0.6, "thickness": 14}
+    colours = {"cmin": 0.0, "cmax": film.largest / 1e3, "colorscale": COLOURS, "colorbar": bar}
+    return [
+        go.Mesh3d(
+            **food,
+            **_faces(surface.triangles),
+            **colours,
+            lighting=LIGHT,
+            hovertemplate="%{intensity:.3g} kPa<extra></extra>",
+        ),
+        go.Mesh3d(**knife, **_faces(triangles), color=STEEL, flatshading=True, lighting=LIGHT, hoverinfo="skip"),
+        go.Scatter(**now, mode="markers", marker={"size": 11, "color": INK}, hovertemplate=HOVER),
+    ]
+
+
+def _corners(points: np.ndarray) -> dict[str, np.ndarray]:
+    """Places [m] as short integers in hundredths of a millimetre, which is a quarter of the file."""
+    limit = np.iinfo(np.int16).max
+    short = np.clip(np.round(points * PER_METRE), -limit, limit).astype(np.int16)
+    return dict(zip("xyz", short.T, strict=True))
+
+
+def _faces(triangles: np.ndarray) -> dict[str, np.ndarray]:
+    return dict(zip("ijk", triangles.astype(np.int32).T, strict=True))
+
+
+def _layout(film: Film, title: str) -> dict[str, Any]:
+    """Axes, camera and slider."""
+    shape = film.scene.food.shape
+    reach = PER_METRE * FRAME * max(shape.width, shape.height)
+    long, top = PER_METRE * 0.6 * max(shape.length, 2 * shape.width), PER_METRE * 1.6 * shape.height
+    ranges = {"xaxis": [-reach, reach], "yaxis": [-long, long]}
+    scene: dict[str, Any] = {
+        name: {"range": limits, "visible": False} for name, limits in (ranges | {"zaxis": [-0.01 * top, top]}).items()
+    }
+    eye = 2.1 * EYE / np.linalg.norm(EYE)
+    scene |= {"aspectmode": "data", "camera": {"eye": dict(zip("xyz", map(float, eye), strict=True))}}
+    step = {"frame": {"duration": 0, "redraw": True}, "mode": "immediate", "transition": {"duration": 0}}
+    play = {"frame": {"duration": 120, "redraw": True}, "fromcurrent": True, "transition": {"duration": 0}}
+    return {
+        "title": {"text": title, "x": 0.5},
+        "showlegend": False,
+        "template": "plotly_white",
+        "scene": scene,
+        "margin": {"l": 70, "r": 20, "t": 60, "b": 20},
+        "sliders": [
+            {
+                "currentvalue": {"prefix": f"{TITLES[1]} "},
+                "steps": [
+                    {"args": [[str(k)], step], "label": f"{look.stroke * 1e3:.1f}", "method": "animate"}
+                    for k, look in enumerate(film.looks)
+                ],
+            }
+        ],
+        "updatemenus": [
+            {
+                "type": "buttons",
+                "direction": "left",
+                "x": 0.0,
+                "y": 1.08,
+                "buttons": [
+                    {"label": "play", "method": "animate", "args": [None, play]},
+                    {"label": "stop", "method": "animate", "args": [[None], step]},
+                ],
+            }
+        ],
+    }

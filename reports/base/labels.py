@@ -1,0 +1,54 @@
+"""Names of files and codes in words: what a reader sees in place of a key of ``summary.json``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from calib.material.properties import PROPERTIES
+from reports.base.format import breakable, count, listed, quantity
+
+#: Names of the files in words; what is not here loses its underscores.
+WORDS = {
+    "ramp": "straight ramp (1 number)",
+    "half_sine": "half sine (1 number)",
+    "three_term": "three-term curve (7 numbers)",
+    "weak": "weakly identified",
+    "one_sided": "one-sided",
+    "only_as_product": "only as a product with the width",
+    "not_seen": "not seen",
+    "at_bound": "at its bound",
+    "unknown": "not determined",
+    "paper_table2": "paper, Table 2",
+}
+
+
+def shown(x: Any, unit: str, digits: int | None) -> str:
+    """A value or limit of any type as text."""
+    if isinstance(x, bool):
+        return "yes" if x else "no"
+    if isinstance(x, int) and unit == "-":
+        return count(x)
+    if x is None or isinstance(x, (int, float)):
+        return quantity(x, unit, digits=digits)
+    return breakable(listed([str(i) for i in x]) if isinstance(x, list) else str(x))
+
+
+def meaning(name: str) -> str:
+    """What a property of the material is; nothing where the name is not one."""
+    return PROPERTIES[name].meaning if name in PROPERTIES else ""
+
+
+def capital(text: str) -> str:
+    """A sentence with a capital, unless it begins with a name: of a property, a file or a column."""
+    first = text.split(" ", 1)[0]
+    return text[:1].upper() + text[1:] if first.isalpha() and first not in PROPERTIES else text
+
+
+def words(name: str) -> str:
+    """A key of the files in words."""
+    return WORDS.get(name, name.replace("_", " "))
+
+
+def short(text: str, letters: int) -> str:
+    """Text of this many letters at most."""
+    return text if len(text) <= letters else text[: letters - 1] + "…"

@@ -1,0 +1,139 @@
+"""The picture of the cut: the food across the blade's middle, early, at the largest force and at the end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
+
+from mpm.output.section import Section
+from reports.base.figures import BLACK, LIGHT, WIDTH, svg
+
+EARLY = 0.2
+"""Part of the stroke at which the first picture is taken."""
+BRIGHT = 99.0
+"""Percentile of the stress at which the colours end: few particles at the edge would darken all others."""
+COLOURS = "cividis_r"  # as light as grey in print, and the same to readers who are colour-blind
+DOTS = 220  # dots per inch of the particles, which are no vector graphics: some ten thousand of them
+ABOUT = 0.8  # distance from the blade to which a glance goes, in heights of the food
+MARGIN = 0.12  # room around the food, of its height
+FILLING = 1.2  # of a particle's square, so that there are no gaps where the food is stretched
+TALLEST = 52.0  # of one picture [mm]
+BESIDE = 26.0  # axes, labels and the scale of colours, of the figure's height [mm]
+
+
+Glance = Callable[[Axes], None]
+
+
+def moments(section: Section, stroke: np.ndarray, force: np.ndarray) -> list[tuple[int, str]]:
+    """Which looks are shown, and what each is called: early, at the largest force, at the end; none twice.
+
+    Args:
+        section: The looks.
+        stroke: Strokes of the force curve [m], shape (n,).
+        force: Simulated force [N], shape (n,).
+    """
+    peak = float(stroke[int(np.argmax(force))])
+    wanted = ((EARLY * float(section.stroke[-1]), ""), (peak, "largest force"), (math.inf, "at the end"))
+    found: dict[int, str] = {}
+    for at, name in wanted:
+        k = int(np.argmin(np.abs(section.stroke - min(at, float(section.stroke[-1])))))
+        found[k] = name or found.get(k, "")
+    return sorted(found.items())
+
+
+def cut(section: Section, knife: Mapping[str, Any], height: float, stroke: np.ndarray, force: np.ndarray) -> bytes:
+    """Pictures of the food under the blade, coloured by its von Mises stress.
+
+    Args:
+        section: The food across the blade's middle.
+        knife: ``spine`` [m], ``angle`` [rad] and ``height`` [m] of the blade.
+        height: Height of the food [m].
+        stroke, force: The simulated curve [m], [N].
+    """
+    shown = moments(section, stroke, force)
+    half = float(np.abs(section.y[[k for k, _ in shown]]).max()) + MARGIN * height
+    top = height * (1 + 3 * MARGIN)
+    tall = min((WIDTH - 14.0) * (top + MARGIN * height) / (2 * half), TALLEST)
+    most = float(np.percentile(section.mises[[k for k, _ in shown]], BRIGHT)) or 1.0
+
+    def draw(figure: Figure) -> None:
+        grid = figure.subplots(len(shown), squeeze=False, sharex=True).ravel()
+        colour = ScalarMappable(Normalize(0.0, most / 1e3), COLOURS)
+        for axes, (k, name) in zip(grid, shown, strict=True):
+            _food(axes, section, k, colour)
+            _tools(axes, knife, height - float(section.stroke[k]), top, half)
+            at = 1e3 * float(section.stroke[k])
+            axes.set_title(f"{at:.1f} mm deep" + (f", {name}" if name else ""))
+            axes.set(xlim=(-1e3 * half, 1e3 * half), ylim=(-1e3 * MARGIN * height, 1e3 * top), aspect="equal")
+            axes.grid(visible=False)
+            axes.set_ylabel("height [mm]")
+        grid[-1].set_xlabel("across the blade [mm]")
+        figure.colorbar(
+            colour, ax=grid, location="bottom", shrink=0.5, aspect=40, extend="max", label="von Mises stress [kPa]"
+        )
+
+    return svg(draw, len(shown) * (tall + 9.0) + BESIDE)
+
+
+def glance(section: Section, knife: Mapping[str, Any], height: float, stroke: np.ndarray, force: np.ndarray) -> Glance:
+    """What draws the food about the blade at the largest force into given axes.
+
+    Args:
+        section: The food across the blade's middle.
+        knife: ``spine`` [m], ``angle`` [rad] and ``height`` [m] of the blade.
+        height: Height of the food [m].
+        stroke, force: The simulated curve [m], [N].
+    """
+    k = int(np.argmin(np.abs(section.stroke - float(stroke[int(np.argmax(force))]))))
+    half = min(float(np.abs(section.y[k]).max()) + MARGIN * height, ABOUT * height)
+    near = np.abs(section.y[k]) < half
+
+    def draw(axes: Axes) -> None:
+        colour = ScalarMappable(
+            Normalize(0.0, (float(np.percentile(section.mises[k][near], BRIGHT)) or 1.0) / 1e3), COLOURS
+        )
+        top = height * (1 + 3 * MARGIN)
+        _food(axes, section, k, colour)
+        _tools(axes, knife, height - float(section.stroke[k]), top, half)
+        axes.set(xlim=(-1e3 * half, 1e3 * half), ylim=(-1e3 * MARGIN * height, 1e3 * top), aspect="equal")
+        axes.set(xlabel="across the blade [mm]", ylabel="height [mm]")
+        axes.set_title(f"largest force, {1e3 * float(section.stroke[k]):.1f} mm deep")
+        axes.grid(visible=False)
+        axes.figure.colorbar(
+            colour, ax=axes, location="bottom", shrink=0.9, aspect=25, extend="max", label="von Mises stress [kPa]"
+        )
+
+    return draw
+
+
+def _food(axes: Axes, section: Section, k: int, colour: ScalarMappable) -> None:
+    y, z, half = 1e3 * section.y[k], 1e3 * section.z[k], FILLING * 1e3 * section.size.T / 2
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    shades = colour.to_rgba(section.mises[k] / 1e3)
+    for sign in (1.0, -1.0) if section.mirrored else (1.0,):
+        squares = np.stack([sign * y, z], axis=1)[:, None] + half[:, None] * corners
+        axes.add_collection(
+            PolyCollection(squares, facecolors=shades, edgecolors=shades, linewidths=0.2, rasterized=True)
+        )
+
+
+def _tools(axes: Axes, knife: Mapping[str, Any], edge: float, top: float, half: float) -> None:
+    """Blade above its edge, and the board."""
+    spine = float(knife["spine"]) / 2
+    full = min(spine / math.tan(float(knife["angle"]) / 2), float(knife["height"]))
+    up = min(edge + float(knife["height"]), 2 * top)
+    outline = [(0.0, edge), (spine, edge + full), (spine, up), (-spine, up), (-spine, edge + full)]
+    axes.add_patch(
+        Polygon([(1e3 * y, 1e3 * z) for y, z in outline], facecolor="white", edgecolor=BLACK, lw=0.7, zorder=3)
+    )
+    axes.axhspan(-1e3 * top, 0.0, color=LIGHT, lw=0, zorder=0)
+    axes.axhline(0.0, color=BLACK, lw=0.7, zorder=3)

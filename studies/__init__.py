@@ -1,0 +1,1 @@
+"""Studies of the solver that no fit needs: verification, convergence, stability, regression, speed."""

@@ -1,0 +1,1 @@
+"""Convergence over the grid: the study, and the grid convergence index."""

@@ -1,0 +1,1 @@
+"""Regression: recorded force curves, and what a cut gives today against them."""

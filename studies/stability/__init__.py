@@ -1,0 +1,1 @@
+"""Stability: where the solver is stable, and why it ends where it is not."""

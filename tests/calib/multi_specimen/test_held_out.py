@@ -1,0 +1,90 @@
+"""What the band of a held-out cut is drawn from: flesh of other specimens, and what its own specimen then has for itself."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import calib.multi_specimen.held_out
+from calib.fit.multistart import calibrate
+from calib.fit.options import FitOptions
+from calib.multi_specimen.held_out import _adapted, _drawn, _Specimen
+from calib.problem.parameters import ParameterSet
+from tests.calib.fake import FIVE, Fake, goal, three_terms
+
+FLESH = {"E": 4e5, "yield_stress": 5e4, "R": 350.0, "mu": 0.25}
+SKIN = 450.0
+
+
+def fitted(specimens: int) -> Any:
+    """A joint fit of some specimens whose posterior is a point."""
+    names = tuple("abc"[:specimens])
+    z = FIVE.to_vector(FLESH | {"R_skin": SKIN})
+    return SimpleNamespace(
+        names=names,
+        doubt=SimpleNamespace(uncertainty=None),
+        result=SimpleNamespace(surrogate=object(), best=SimpleNamespace(z=z)),
+        objective=SimpleNamespace(parameters=FIVE),
+        flesh=lambda point: {n: x for n, x in FIVE.to_dict(point).items() if n in FLESH},
+    )
+
+
+@pytest.mark.parametrize("specimens", [1, 3])
+def test_flesh_of_another_specimen_scatters_about_the_mean_of_the_fitted_ones(
+    specimens: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the root of 1 + 1/n of the scatter, in the logarithm; friction is the blade's as well and stays; without scatter nothing moves."""
+    monkeypatch.setattr(calib.multi_specimen.held_out, "DRAWS", 4000)
+    monkeypatch.setattr(calib.multi_specimen.held_out, "materials", lambda s, z, u, random: np.tile(z, (4000, 1)))
+    drawn = _drawn(fitted(specimens), 0.25, 0)
+    assert len(drawn) == 4000 and {d["mu"] for d in drawn} == {FLESH["mu"]}
+    for name in ("E", "yield_stress", "R"):
+        logs = np.log([d[name] for d in drawn])
+        assert logs.std() == pytest.approx(0.25 * np.sqrt(1.0 + 1.0 / specimens), rel=0.05)
+        assert logs.mean() == pytest.approx(np.log(FLESH[name]), abs=0.02)
+    assert all(d == pytest.approx(FLESH) for d in _drawn(fitted(specimens), 0.0, 0))
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_the_specimens_own_values_are_fitted_to_each_flesh(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a fifth more or less stiffness or resistance the skin goes at least two fifths of the way to what would be fitted anew; a
+    run that breaks down on coarse cells leaves the best one.
+    """
+    monkeypatch.setattr(
+        calib.multi_specimen.held_out, "uncertainty", lambda parameters, data: SimpleNamespace(alone=1e-18 * np.eye(1))
+    )
+    objective = goal(FLESH | {"R_skin": SKIN}, ParameterSet((FIVE.items[3],)))
+    inner = Fake(lambda p: three_terms({**FLESH, **p}), noisy=0.001)
+    result = calibrate(objective, inner, options=FitOptions(budget=20, design=5))
+    assert result.best.evaluation.parameters["R_skin"] == pytest.approx(SKIN, rel=0.05)
+    coarse = Fake(three_terms, noisy=0.001, breaks=lambda p: p["E"] > 1e6)
+    asked: list[tuple[str, str]] = []
+
+    def evaluator(scene: object, name: str, fidelity: str) -> Fake:
+        asked.append((name, fidelity))
+        return coarse
+
+    specimens: Any = SimpleNamespace(
+        setups={"b": SimpleNamespace(coarse=None)}, evaluator=evaluator, study=SimpleNamespace(seed=0)
+    )
+    others = [FLESH | {name: FLESH[name] * k} for name in ("E", "R") for k in (0.8, 1.2)] + [FLESH | {"E": 2e6}]
+    found = _adapted(specimens, _Specimen(objective, result), FLESH, others, "b")
+    assert asked == [("b", "coarse")] and all(set(own) == {"R_skin"} for own in found)
+    best = result.best.evaluation.parameters
+
+    def anew(flesh: dict[str, float]) -> float:
+        """Skin of least misfit with this flesh."""
+        skins = best["R_skin"] * np.exp(np.linspace(-0.5, 0.5, 201))
+        runs = Fake(lambda p: three_terms({**flesh, **p}), noisy=0.0, backwards=False).evaluate(
+            [{"R_skin": s} for s in skins]
+        )
+        return float(skins[np.argmin([np.sum(objective.trial(run).residual ** 2) for run in runs])])
+
+    for x, own in zip(others[:-1], found[:-1], strict=True):
+        way = np.log(anew(x) / anew(FLESH))
+        assert np.log(own["R_skin"] / best["R_skin"]) == pytest.approx(way, abs=0.6 * abs(way) + 0.005)
+    assert found[-1]["R_skin"] == pytest.approx(best["R_skin"], rel=1e-6)
+    assert _adapted(specimens, None, FLESH, others, "b") == [{}] * len(others)

@@ -1,0 +1,186 @@
+"""The interface in Python: what docs/python.md says runs as it stands there, and errors are those of the command line."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import calib
+from calib import Calibration, Food, Trace
+from calib.material.food import FoodSpec, load_food
+from calib.problem.request import Request
+from calib.problem.setup import conditioned
+from mpm.errors import CutcalError
+from tests.data_dir import ROOT
+
+BANANA = ROOT / "force_data" / "banana_reconstructed.csv"
+# A coarse grid and two parameters, and a file to see that the script is run once.
+SMALL = """
+import pathlib
+from dataclasses import dataclass
+import calib.api as module
+
+print("began", file=pathlib.Path("began").open("a"))
+
+@dataclass(frozen=True, eq=False)
+class Small(module.Calibration):
+    fit: object = ("E", "R")
+    dx: object = 4.1e-3
+    budget: object = 14
+
+module.Calibration = Small
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which the blocks of docs/python.md were run as one plain script, on a coarse grid."""
+    folder = tmp_path_factory.mktemp("python")
+    (folder / "force_data").mkdir()
+    shutil.copy(BANANA, folder / "force_data")
+    text = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    (folder / "script.py").write_text(SMALL + "\n".join(blocks), encoding="utf-8")
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "script.py"], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    (folder / "said").write_text(done.stdout)
+    return folder
+
+
+@pytest.mark.slow
+def test_the_documented_script_runs(folder: Path) -> None:
+    """All blocks, without a guard for worker processes: they do not run the script again."""
+    assert (folder / "began").read_text() == "began\n"
+    said = (folder / "said").read_text()
+    assert "report.pdf" in said and "verdict" in said and "J/m^2" in said
+
+
+@pytest.mark.slow
+def test_results_load_back(folder: Path) -> None:
+    """A finished folder gives summary, tables, food and report, and says how it was made."""
+    result = Calibration.load(folder / "runs" / "banana")
+    summary = json.loads((folder / "runs" / "banana" / "summary.json").read_text())
+    assert result.summary == summary and result.passed is summary["passed"]
+    assert list(result.parameters.index) == ["E", "R"]
+    assert result.parameters.loc["R", "value"] == summary["parameters"]["R"]["value"]
+    assert result.curves["real_N"].max() == pytest.approx(summary["peak_real_N"], rel=0.01)
+    assert isinstance(result.material, Food) and result.material.value("R") == pytest.approx(
+        result.parameters["value"]["R"]
+    )
+    assert result.report.read_bytes().startswith(b"%PDF")
+    assert summary["trace"]["source"] == "banana_reconstructed.csv"
+    call = "Calibration('banana', trace=Trace('banana_reconstructed.csv'), height=0.033).run('runs/banana')"
+    assert summary["command"] == [call]
+    assert len(repr(result)) < 200
+
+
+def test_a_folder_without_a_calibration(tmp_path: Path) -> None:
+    """Missing, damaged, and of another command: each is said with the file."""
+    with pytest.raises(CutcalError, match="summary.json: cannot be read .*finished calibration"):
+        Calibration.load(tmp_path)
+    for content, words in (
+        ("{", "damaged"),
+        ('{"peak_N": 3}', "not of a calibration .food"),
+        ("[]", "not of a calibration"),
+    ):
+        (tmp_path / "summary.json").write_text(content)
+        with pytest.raises(CutcalError, match=f"summary.json: {words}"):
+            Calibration.load(tmp_path)
+
+
+def test_the_request_is_that_of_the_command_line() -> None:
+    """The same values, whatever the form of food and trace; columns are chosen where the trace is read."""
+    frame = pd.read_csv(BANANA, comment="#")
+    forms: list[Any] = [BANANA, str(BANANA), Trace.read(BANANA), frame]
+    for trace in forms:
+        request = Calibration(load_food("banana"), trace, air=trace, height=0.03, fit=["E", "R"], workers=1).request()
+        assert isinstance(request, Request)
+        assert (request.food.name, request.sizing.height, request.fit) == ("banana", 0.03, ("E", "R"))
+        (cut, air), curve = request.records(), conditioned(Calibration("banana", trace).request())[0]
+        assert air is not None and air.sha256 == cut.sha256 and len(cut.sha256) == 64
+        np.testing.assert_array_equal(cut.force, forms[2].force)
+        assert curve.trace.source == ("DataFrame" if trace is frame else "banana_reconstructed.csv")
+
+
+def test_arrays_have_a_hash_and_a_name_of_their_own() -> None:
+    """A trace made of arrays is told from a file: by its name, and by a hash that follows every number."""
+    trace = Trace.read(BANANA)
+    made = Trace(trace.time, trace.force, source="lab 3")
+    cut, _ = Calibration("banana", made).request().records()
+    assert cut.source == "lab 3 (arrays)" and len(cut.sha256) == 64 and cut.sha256 != trace.sha256
+    other = Calibration("banana", Trace(trace.time, 1.001 * trace.force)).request().records()[0]
+    assert other.sha256 != cut.sha256
+    request = Calibration("banana", made, air=made, fit=["E"], dx=3e-3).request("out")
+    assert request.air_source == "lab 3 (arrays)" and request.stem == "lab 3 (arrays)"
+    (call,) = request.command
+    assert call == "Calibration('banana', trace=Trace('lab 3'), air=Trace('lab 3'), fit=['E'], dx=0.003).run('out')"
+
+
+def test_groups_of_a_file_are_named_whole() -> None:
+    """The summary names file and group of an air run, and the default folder the group."""
+    request = Request(food=load_food("banana"), trace=Path("cuts.h5:/cut 3"), air=Path("cuts.h5:/air"))
+    assert request.air_source == "cuts.h5:/air"
+    assert request.stem == "cut 3"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"food": "bananna"}, "did you mean 'banana'"),
+        ({"food": "nowhere.yaml"}, "nowhere.yaml: no such file"),
+        ({"trace": "nowhere.csv"}, "nowhere.csv: no such file"),
+        ({"trace": 3}, "a int is no record"),
+        ({"height": -1.0}, "height = -1.0 m must be a number between 0.001 and 1 m"),
+        ({"height": "33 mm"}, "height = '33 mm' m must be a number"),
+        ({"speed": float("nan")}, "speed = nan m/s must be"),
+        ({"budget": 0}, "budget = 0"),
+        ({"workers": 0}, "workers = 0; give a whole number of at least 1"),
+        ({"seed": 1.5}, "seed = 1.5; give a whole number"),
+        ({"shape": "banana"}, "shape = banana is none of block"),
+        ({"arch": "tpu"}, "arch = tpu is none of"),
+        ({"fit": "E,R"}, "fit = E,R is text; give a list"),
+    ],
+)
+def test_impossible_values_are_one_line(change: dict[str, Any], words: str) -> None:
+    """Each is refused before anything is computed, with value and limits."""
+    with pytest.raises(CutcalError) as caught:
+        Calibration(**{"food": "banana", "trace": BANANA, **change})
+    assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_foods_by_name_and_by_file(tmp_path: Path) -> None:
+    """``Food.load`` takes both, and is the class that the loaders give."""
+    assert Food is FoodSpec and Food.load("banana") == load_food("banana")
+    path = tmp_path / "mine.yaml"
+    path.write_text(json.dumps({"mine": load_food("banana").as_dict()}))
+    assert Food.load(path).name == Food.load(str(path)).name == "mine"
+
+
+def test_names_are_loaded_when_they_are_used() -> None:
+    """``import calib`` loads no pandas, no Taichi and no plotting; Trace needs no pandas either; other names are errors."""
+    code = (
+        "import sys, calib\n"
+        "heavy = {'taichi', 'matplotlib', 'pandas', 'numpy', 'yaml', 'scipy', 'h5py'} & set(sys.modules)\n"
+        "assert not heavy, heavy\n"
+        "from calib import Trace\n"
+        "heavy = {'taichi', 'matplotlib', 'pandas', 'h5py'} & set(sys.modules)\n"
+        "assert not heavy, heavy\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert set(calib.__all__) <= set(dir(calib))
+    with pytest.raises(AttributeError, match="no attribute 'Knife'"):
+        calib.Knife  # noqa: B018

@@ -1,0 +1,70 @@
+"""``cutcal simulate`` from the command line to its files."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from calib.trace.trace import read_trace
+from cutcal.main import main
+from tests.calib.documents import valid
+
+
+def test_simulate_writes_a_force_record_that_reads_back(tmp_path: Path, capsys):
+    """force.csv and summary.json hold the contract, agree with each other, and the CSV is itself a trace."""
+    out = tmp_path / "cut"
+    argv = ["simulate", "--food", "strawberry", "--knife", "edc", "--stroke", "0.012", "--threads", "1", "--json"]
+    assert main([*argv, "--out", str(out)]) == 0
+    summary = valid(json.loads(capsys.readouterr().out))
+    contract = "peak_N work_J work_per_area_J_m2 dx_m particles wall_s momentum_residual ke_over_ie severed components"
+    assert not [k for k in contract.split() if k not in summary]
+    c = pd.read_csv(out / "force.csv")
+    assert {"stroke_m", "time_s", "knife_fx_N", "knife_fz_N", "board_fz_N"} <= set(c.columns)
+    work = np.sum(c["knife_fz_N"] * np.diff(c["stroke_m"], prepend=0))
+    np.testing.assert_allclose(summary["work_J"], work, rtol=1e-6)
+    assert summary["momentum_residual"] < 1e-9 and summary["severed"] is False
+    back = read_trace(out / "force.csv")
+    np.testing.assert_allclose(back.force, c["knife_fz_N"])
+    assert main([*argv, "--out", str(out)]) == 1
+    assert "never overwritten" in capsys.readouterr().err
+
+
+def test_simulate_cuts_where_it_is_told(tmp_path: Path, capsys):
+    """A strawberry at a quarter of its length parts into caps of a quarter's height and the rest (5/32 of an ellipsoid)."""
+    argv = ["simulate", "--food", "strawberry", "--knife", "edc", "--at", "0.25", "--threads", "1", "--json"]
+    assert main([*argv, "--out", str(tmp_path / "cut")]) == 0
+    summary = valid(json.loads(capsys.readouterr().out))
+    large, small = summary["volumes_m3"]
+    assert summary["severed"] and small / (large + small) == pytest.approx(5 / 32, abs=0.01)
+    assert main([*argv[:-3], "--at", "0.99", "--out", str(tmp_path / "end")]) != 0
+    assert "leaves a slice of" in capsys.readouterr().err
+
+
+def test_simulate_says_what_was_not_cut(tmp_path: Path, capsys):
+    """A cherry that parts has nothing said of it; one that yields first is pressed away, which is said and in the document."""
+    argv = ["simulate", "--food", "cherry", "--knife", "edc", "--dx", "2e-3", "--threads", "1", "--json"]
+    for name, more, pressed in (("cut", [], False), ("pressed", ["--set", "yield_stress=2e3"], True)):
+        assert main([*argv, *more, "--out", str(tmp_path / name)]) == 0
+        out, err = capsys.readouterr()
+        summary = valid(json.loads(out))
+        assert (summary["parted"] < 0.8) is pressed
+        assert ("pressed away rather than cut" in err) is pressed
+        assert any("pressed away" in text for text in summary["warnings"]) is pressed
+
+
+def test_simulate_draws_what_is_asked_for(tmp_path: Path, capsys, monkeypatch):
+    """Three pictures and a page beside the record; what cannot be drawn is one line, and the record is there."""
+    argv = ["simulate", "--food", "strawberry", "--knife", "edc", "--stroke", "0.004", "--threads", "1"]
+    assert main([*argv, "--pictures", "--page", "--out", str(tmp_path / "cut")]) == 0
+    names = {p.name for p in (tmp_path / "cut").iterdir()}
+    assert names == {"force.csv", "summary.json", "contact.png", "peak.png", "end.png", "cut.html"}
+    assert "drawing contact" in capsys.readouterr().err
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    assert main([*argv, "--video", "--out", str(tmp_path / "film")]) == 1
+    assert "pip install 'cutcal[view]'" in capsys.readouterr().err
+    assert {p.name for p in (tmp_path / "film").iterdir()} == {"force.csv", "summary.json"}

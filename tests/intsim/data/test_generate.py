@@ -1,0 +1,238 @@
+"""Datasets: which episodes there are, what is stored of them, and that a stopped one goes on."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from calib.errors import OutputError
+from calib.simulation.workers import Workers
+from cutcal.main import main
+from intsim.data import generate as g
+from intsim.data.demonstrate import Track
+from intsim.data.manifest import JITTER, TASKS, Manifest
+from intsim.data.shards import META, pack, trajectories
+from intsim.task.language import instructions, parse
+from intsim.task.planner import PHASES, RATE
+from intsim.task.suites import FOODS, TEST
+from intsim.task.targets import TaskError
+from tests.calib.documents import valid
+
+
+def track(steps: int = 12, seed: int = 0) -> Track:
+    """A made-up trajectory with contact from its fifth step on, and two cuts."""
+    rng = np.random.default_rng(seed)
+    t = Track()
+    for k in range(steps + 1):
+        t.qpos.append(rng.random(9))
+        t.qvel.append(rng.random(9))
+        t.edge.append(rng.random(5))
+        if k == steps:
+            break
+        t.command.append(rng.random(5))
+        t.action.append(rng.random(8))
+        t.phase.append(PHASES[k % 5])
+        t.force.append(rng.random((5, 3)) if k > 4 else np.zeros((5, 3)))
+        t.touching.append(k > 4)
+        t.uncut.append(1 - k / steps)
+        t.pieces.append(1 + (k > 8))
+        t.published.append(k > 8)
+        t.severed.append(k > 8)
+        if k in (5, 6, 9, 10):
+            vertices = rng.random((30 if k < 8 else 40, 3))
+            t.meshes.append((k + 1, 0, vertices, np.array([[0, 1, 2]]), np.zeros(len(vertices), bool)))
+    return t
+
+
+def test_the_manifest_counts_the_whole_product_and_draws_each_once():
+    """21,000 x 15 x 5 samples, none stored; every index is another triple; a number beyond is none."""
+    whole = Manifest()
+    assert len(whole) == 1_575_000
+    small = Manifest(trajectories=4, backgrounds=3, instructions=2)
+    assert len({(s.trajectory, s.background, s.instruction) for s in small}) == len(small) == 24
+    last = whole[len(whole) - 1]
+    assert (last.trajectory, last.background, last.instruction) == (20_999, 14, 4)
+    with pytest.raises(IndexError):
+        whole[len(whole)]
+
+
+def test_a_trajectory_is_drawn_from_its_number_alone():
+    """Same number, same episode; all foods and tasks come in turn; values stay within their ranges and differ; no seed of a test."""
+    m = Manifest(trajectories=80)
+    draws = [m.draw(k) for k in range(80)]
+    assert m.draw(7) == draws[7]
+    assert [d.food.name for d in draws[:15]] == list(FOODS)
+    assert {d.suite for d in draws[:15]} == set(TASKS)
+    assert len({(d.suite, d.food.name) for d in draws[:75]}) == 75
+    assert {d.style for d in draws} == {"press", "slice", "rock", "saw"}
+    assert max(d.seed for d in draws) < TEST
+    for d in draws:
+        names = [d.episode.item.name, *(o.name for o in d.episode.others)]
+        found = parse(d.episode.instruction, names)
+        assert float(found.ratio) == pytest.approx(float(d.episode.spec.ratio))
+        assert replace(found, ratio=d.episode.spec.ratio) == d.episode.spec
+        assert set(d.values) <= set(JITTER) and d.values["R"] > 0
+    assert len({d.values["R"] for d in draws if d.food.name == "banana"}) > 1
+
+
+@pytest.mark.parametrize("how", [{"trajectories": 0}, {"suites": ("none",)}, {"seed": TEST}, {"foods": ()}])
+def test_an_impossible_manifest_is_an_error(how):
+    """Nothing to draw, an unknown task, seeds of the tests."""
+    with pytest.raises(TaskError, match="dataset"):
+        Manifest(**{"trajectories": 10, **how})
+
+
+class Inline(Workers):
+    """Jobs one after the other, in this process, until so many are made."""
+
+    def __init__(self, most: int = 1000) -> None:
+        super().__init__(1, "cpu", 1)
+        self.most = most
+
+    def close(self) -> None:
+        """Nothing to end."""
+
+    def each(self, work, jobs) -> Iterator[tuple[int, dict]]:
+        """A made-up episode for each."""
+        for k, (draw, *_) in enumerate(jobs):
+            if self.most == 0:
+                raise KeyboardInterrupt
+            self.most -= 1
+            yield k, made(draw)
+
+
+def made(draw) -> dict:
+    """What a worker sends back."""
+    t = track(seed=draw.seed)
+    about = {
+        "episode_seed": draw.seed,
+        "index": draw.index,
+        "instruction": draw.episode.instruction,
+        "instructions": instructions(draw.episode.spec, draw.seed),
+        "suite": draw.suite,
+        "demos": "sustained",
+        "task": {
+            "ratio": float(draw.episode.spec.ratio),
+            "side": draw.episode.spec.side,
+            "pieces": draw.episode.spec.pieces,
+        },
+        "elapsed_steps": len(t.action),
+        "food": draw.food.name,
+        "style": draw.style,
+        "status": "done",
+        "success": True,
+        "published": True,
+        "severed": True,
+        "peak_N": 1.0,
+        "seconds": {"solver": 2.0, "robot": 1.0, "start": 0.0},
+    }
+    return {"about": about, "content": pack(t, about, {"food": draw.food.name, "material": "{}"})}
+
+
+@pytest.fixture(autouse=True)
+def no_simulator(monkeypatch):
+    """These tests make episodes up."""
+    monkeypatch.setattr(g, "available", lambda: None)
+
+
+def test_a_stopped_dataset_goes_on_and_comes_out_the_same(tmp_path):
+    """Stopped after 4 of 7 and begun again: nothing is made twice, and the shards are those of one go; parts are gone."""
+    m = Manifest(trajectories=7)
+    with pytest.raises(KeyboardInterrupt):
+        g.generate(m, tmp_path / "a", Inline(4), shard=3)
+    (tmp_path / "a" / "part-000001.h5").touch()  # killed when its shard was written and the part not yet removed
+    rest = Inline(3)
+    document = valid(g.generate(m, tmp_path / "a", rest, shard=3, resume=True))
+    assert rest.most == 0 and document["trajectories"] == 7
+    g.generate(m, tmp_path / "b", Inline(), shard=3)
+    assert sorted(p.name for p in (tmp_path / "a").iterdir()) == sorted(p.name for p in (tmp_path / "b").iterdir())
+    assert not list((tmp_path / "a").glob("part-*"))
+    for one, two in zip(trajectories(tmp_path / "a"), trajectories(tmp_path / "b"), strict=True):
+        assert one.about == two.about
+        assert np.array_equal(one.group["actions"], two.group["actions"])
+    assert document["core_hours_of_21000"] == pytest.approx(21_000 * 3.0 / 3600)
+
+
+def test_what_is_stored_has_maniskills_layout_and_keeps_the_force_apart(tmp_path):
+    """Shapes as documented; force and impulse agree; no name outside ``mpm`` has a force in it; the surface comes back to a tenth of a millimetre."""
+    g.generate(Manifest(trajectories=2), tmp_path / "d", Inline(), shard=2)
+    listed = json.loads((tmp_path / "d" / "shard-0000.json").read_text())
+    assert [e["episode_id"] for e in listed["episodes"]] == [0, 1] and listed["env_info"]["env_id"] == "CutFood-v1"
+    for k, stored in enumerate(trajectories(tmp_path / "d")):
+        t, file = track(seed=k), stored.group
+        n = len(t.action)
+        assert file["actions"].shape == (n, 8) and file["obs/agent/qpos"].shape == (n + 1, 9)
+        assert file["control/delta"].shape == (n, 7) and file["mpm/force"].shape == (n, 5, 3)
+        assert np.allclose(file["mpm/impulse"][-1], file["mpm/force"][()].mean(axis=1).sum(axis=0) / RATE, rtol=1e-5)
+        assert np.allclose(
+            file["control/delta"][:, :3], (np.array(t.command) - np.array(t.edge)[:-1])[:, :3], atol=1e-6
+        )
+        assert file["mpm"].attrs["contact_step"] == 5
+        names: list[str] = []
+        file.visit(names.append)
+        assert not [name for name in names if not name.startswith("mpm") and ("force" in name or "impulse" in name)]
+        assert list(file["mpm/surface"]) == ["0", "1"]
+        first = file["mpm/surface/0"]
+        assert first["step"][()].tolist() == [6, 7]
+        assert np.allclose(first["vertices"][0] + first.attrs["origin"], t.meshes[0][2], atol=3e-4)
+
+
+def test_a_folder_that_is_taken_or_damaged_is_an_error(tmp_path):
+    """Another dataset, no --resume, no shards, a broken file: one line each."""
+    out = tmp_path / "d"
+    g.generate(Manifest(trajectories=1), out, Inline())
+    with pytest.raises(OutputError, match="--resume"):
+        g.generate(Manifest(trajectories=1), out, Inline())
+    with pytest.raises(OutputError, match="another dataset"):
+        g.generate(Manifest(trajectories=2), out, Inline(), resume=True)
+    with pytest.raises(OutputError, match="no shards"):
+        next(trajectories(tmp_path))
+    with h5py.File(out / "shard-0000.h5", "w"):
+        pass
+    with pytest.raises(OutputError, match="damaged"):
+        list(trajectories(out))
+    (out / META).write_text("{")
+    with pytest.raises(OutputError, match="damaged"):
+        g.generate(Manifest(trajectories=1), out, Inline(), resume=True)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("generate", "--out"),
+        ("generate runs/x --out y", "too much"),
+        ("generate --food bread --out y", "bread"),
+        ("generate --task cook --out y", "cook"),
+        ("generate --seed 999990 --out y", "for tests"),
+        ("generate --knife spoon --out y", "spoon"),
+        ("export --out y", "name the folder"),
+        ("export nowhere --out y", "no shards"),
+        ("export nowhere --out y --scenes 1,b", "numbers of backgrounds"),
+        ("export nowhere --out y --scenes 99", "0 to 14"),
+    ],
+)
+def test_wrong_words_on_the_command_line_are_one_line(words, says, capsys, tmp_path, monkeypatch):
+    """What was wrong, before anything is made."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("intsim.data.generate.available", lambda: None)
+    if words.startswith("export nowhere"):
+        pytest.importorskip("pyarrow", reason="the extra [data] is not installed")
+        pytest.importorskip("av", reason="the extra [data] is not installed")
+    assert main(["dataset", *words.split()]) == 1
+    error = capsys.readouterr().err.strip()
+    assert says in error and "\n" not in error and error.startswith("cutcal: ")
+    assert not list((tmp_path).glob("y/shard*"))
+
+
+def test_without_the_robot_simulator_it_says_what_to_install(monkeypatch, tmp_path: Path):
+    """One line that names the extra."""
+    monkeypatch.undo()
+    monkeypatch.setitem(__import__("sys").modules, "mani_skill", None)
+    with pytest.raises(Exception, match=r"cutcal\[robot\]"):
+        g.generate(Manifest(trajectories=1), tmp_path / "d", Inline())

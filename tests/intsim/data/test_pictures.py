@@ -1,0 +1,180 @@
+"""Pictures of a dataset: each made once and kept, whatever stops it, and only where there is something to render with."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calib.errors import OutputError
+from cutcal.main import main
+from intsim.data import generate as g
+from intsim.data import lerobot, rdt, rlds
+from intsim.data.manifest import Manifest
+from intsim.data.pictures import VIEWS, available, pictures_of, render
+from intsim.data.shards import META, trajectories
+from intsim.data.views import views
+from mpm.errors import CutcalError
+from tests.calib.documents import valid
+from tests.intsim.data.test_generate import Inline
+from tests.intsim.painter import PIXELS, Here, Painter, paint_with
+
+pytest.importorskip("PIL.Image", reason="the extra [data] is not installed")
+COUNT, SHARD = 5, 2
+
+
+@pytest.fixture
+def made(tmp_path, monkeypatch) -> Path:
+    """Five made-up trajectories in shards of two, and a painter."""
+    monkeypatch.setattr(g, "available", lambda: None)
+    paint_with(Painter, monkeypatch)
+    g.generate(Manifest(trajectories=COUNT), tmp_path / "set", Inline(), shard=SHARD)
+    return tmp_path / "set"
+
+
+def files(folder: Path) -> list[str]:
+    """Names of what holds pictures."""
+    return sorted(p.name for p in folder.iterdir() if p.name.startswith("picture"))
+
+
+def test_what_was_rendered_comes_back_pixel_by_pixel(made):
+    """Of every trajectory before every background, from files beside their shard; dataset.json says what it took."""
+    found = render(made, [0, 2], PIXELS, Here())
+    assert files(made) == [f"pictures-32-{scene:02d}-{n:04d}.h5" for scene in (0, 2) for n in range(3)]
+    document = valid(json.loads((made / META).read_text()))
+    steps = document["steps"]
+    assert document["pictures"] == found and found["scenes"] == [0, 2] and found["number"] == 2 * 3 * steps
+    assert (
+        found["core_hours_of_315000"] == pytest.approx(21_000 * 15 * found["seconds_per_episode"] / 3600)
+        and found["bytes"] > 0
+    )
+    for stored in trajectories(made):
+        for scene in (0, 2):
+            wanted = Painter(scene, PIXELS).pictures(stored)
+            seen = pictures_of(made, stored, scene, PIXELS)
+            assert set(seen) == set(VIEWS) and all(np.array_equal(seen[view], wanted[view]) for view in VIEWS)
+
+
+@pytest.mark.parametrize("stop", [1, COUNT - 1, COUNT, 2 * COUNT - 1])
+def test_stopped_anywhere_it_goes_on_and_renders_nothing_twice(made, stop):
+    """Parts outlive a stop and are gone afterwards; a part that was left beside its complete file as well."""
+    with pytest.raises(KeyboardInterrupt):
+        render(made, [0, 2], PIXELS, Here(stop))
+    rest = Here(2 * COUNT - stop)
+    render(made, [0, 2], PIXELS, rest)
+    assert rest.most == 0 and len(files(made)) == 6
+    (made / "picture-32-02-000004.h5").touch()  # killed before it was removed
+    render(made, [0, 2], PIXELS, Here(0))
+    assert len(files(made)) == 6 and len(list(views(made, [0, 2], PIXELS))) == 2 * COUNT
+
+
+def test_a_further_background_or_size_is_added_and_physics_never_made_again(made):
+    """Each is in files of its own; making the dataset again leaves them and what they took."""
+    render(made, [1], PIXELS, Here())
+    said: list[str] = []
+    one = render(made, [1, 3], PIXELS, Here(COUNT), said.append)
+    assert said[0] == "pictures of 5 of 10 are there already" and len(said) == 1 + COUNT
+    render(made, [1], 16, Here(COUNT))
+    again = g.generate(Manifest(trajectories=COUNT), made, Inline(0), shard=SHARD, resume=True)
+    assert len(files(made)) == 9 and one["scenes"] == [1, 3]
+    assert again["pictures"]["pixels"] == 16 and valid(again)
+
+
+def test_pictures_stay_with_their_shard_where_one_before_it_is_still_missing(made):
+    """Rendered of a dataset that is not finished, they are those of the same trajectories when it is."""
+    late = [made / f"shard-0001{end}" for end in (".h5", ".json")]
+    kept = [path.read_bytes() for path in late]
+    for path in late:
+        path.unlink()
+    render(made, [0], PIXELS, Here())
+    for path, content in zip(late, kept, strict=True):
+        path.write_bytes(content)
+    assert files(made) == ["pictures-32-00-0000.h5", "pictures-32-00-0002.h5"]
+    render(made, [0], PIXELS, Here(SHARD))
+    assert [one.shard for one in trajectories(made)] == [0, 0, 1, 1, 2] and len(list(views(made, [0], PIXELS))) == COUNT
+
+
+def test_one_command_makes_trajectories_and_pictures(tmp_path, monkeypatch, capsys):
+    """``generate --scenes``: both, with what each costs; an export then renders nothing."""
+    monkeypatch.setattr(g, "available", lambda: None)
+    paint_with(Painter, monkeypatch)
+
+    class Both(Here):
+        """Made-up episodes, painted pictures."""
+
+        def each(self, work, jobs):
+            yield from Inline().each(work, jobs) if work is g.make else super().each(work, jobs)
+
+    monkeypatch.setattr("cutcal.commands.dataset.dataset.workers_of", lambda args, say: Both())
+    out = tmp_path / "set"
+    words = ["dataset", "generate", "--episodes", "3", "--scenes", "0,2,0", "--pixels", "32", "--out", str(out)]
+    assert main(words) == 0
+    told = capsys.readouterr().out
+    assert "216 pictures before 2 backgrounds" in told and "core hours" in told
+    assert main([*words, "--resume", "--json"]) == 0
+    assert valid(json.loads(capsys.readouterr().out))["pictures"]["scenes"] == [0, 2]
+    monkeypatch.setattr("cutcal.commands.dataset.dataset.workers_of", lambda args, say: Here(0))
+    pytest.importorskip("pyarrow", reason="the extra [data] is not installed")
+    pytest.importorskip("av", reason="the extra [data] is not installed")
+    export = ["dataset", "export", str(out), "--scenes", "0,2", "--pixels", "32", "--out"]
+    assert (
+        main([*export, str(tmp_path / "lerobot")]) == 0
+        and main([*export, str(tmp_path / "rlds"), "--format", "rlds"]) == 0
+    )
+
+
+@pytest.mark.parametrize("kind", [lerobot, rlds, rdt])
+def test_an_export_that_is_stopped_while_it_renders_can_be_asked_for_again(made, tmp_path, kind):
+    """Its folder is made when the pictures are there, and the second time renders the rest alone."""
+    pytest.importorskip("pyarrow", reason="the extra [data] is not installed")
+    pytest.importorskip("av", reason="the extra [data] is not installed")
+    with pytest.raises(KeyboardInterrupt):
+        kind.export(made, tmp_path / "out", scenes=[0], pixels=PIXELS, pool=Here(2))
+    assert not (tmp_path / "out").exists()
+    rest = Here(COUNT - 2)
+    kind.export(made, tmp_path / "out", scenes=[0], pixels=PIXELS, pool=rest)
+    assert rest.most == 0
+
+
+def test_without_a_renderer_nothing_is_simulated(made, monkeypatch, tmp_path, capsys):
+    """What is missing is said before the first trajectory; so is a renderer that ends its process, and a background that does not exist."""
+
+    class Blind(Painter):
+        """There is nothing to render with."""
+
+        def __init__(self, scene: int, pixels: int) -> None:
+            raise CutcalError("dataset: no pictures without a renderer")
+
+    class Killed(Here):
+        """Each job takes its process along."""
+
+        def each(self, work, jobs):
+            yield from ((k, None) for k, _ in enumerate(jobs))
+
+    paint_with(Blind, monkeypatch)
+    monkeypatch.setattr("cutcal.commands.dataset.dataset.workers_of", lambda args, say: Here())
+    assert main(["dataset", "generate", "--scenes", "0", "--out", str(tmp_path / "new")]) == 1
+    assert "no pictures without a renderer" in capsys.readouterr().err and not (tmp_path / "new").exists()
+    with pytest.raises(OutputError, match="cutcal doctor"):
+        available(Killed(), [0], PIXELS)
+    with pytest.raises(OutputError, match="killed twice"):
+        render(made, [0], PIXELS, Killed())
+    for scenes in ([15], [-1]):
+        with pytest.raises(OutputError, match="0 to 14"):
+            available(Here(), scenes, PIXELS)
+
+
+def test_pictures_that_are_not_there_or_damaged_are_an_error(made):
+    """Named, with what to do; of a folder whose document is gone nothing is rendered."""
+    with pytest.raises(OutputError, match="pictures-32-00-0000.h5"):
+        next(views(made, [0], PIXELS))
+    render(made, [0], PIXELS, Here())
+    (made / "pictures-32-00-0001.h5").write_bytes(b"none")
+    with pytest.raises(OutputError, match=r"pictures-32-00-0001.h5.*remove it"):
+        list(views(made, [0], PIXELS))
+    for broken in ("{", None):
+        (made / META).unlink() if broken is None else (made / META).write_text(broken)
+        with pytest.raises(OutputError, match=r"dataset.json.*make the dataset again"):
+            render(made, [1], PIXELS, Here(0))

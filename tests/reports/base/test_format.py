@@ -1,0 +1,87 @@
+"""Numbers as people read them: units, digits, uncertainties, and words that may break."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from reports.base.format import DASH, breakable, count, duration, interval, listed, quantity, uncertain
+from tests.reports.sample import spaced
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (3.2e5, "Pa", "320 kPa"), (999.6, "Pa", "1.00 kPa"), (2.5e6, "Pa", "2.50 MPa"),
+        (0.033, "m", "33.0 mm"), (1e-3, "m", "1.00 mm"), (6.7e-5, "m", "67.0 µm"), (1.5, "m", "1.50 m"),
+        (12.53, "N", "12.5 N"), (0.06, "N", "0.0600 N"), (-3.0, "N", "−3.00 N"), (0.2931, "J", "293 mJ"),
+        (1200.0, "J/m^2", "1200 J/m²"), (12345.0, "J/m^2", "12.3 kJ/m²"), (455.0, "N/m", "455 N/m"),
+        (960.0, "kg/m^3", "960 kg/m³"), (math.radians(11.0), "rad", "11.0°"), (0.011, "m/s", "11.0 mm/s"),
+        (0.0496, "fraction", "4.96 %"), (-0.1234, "fraction", "−12.3 %"), (-2.2e-5, "fraction", "0.00 %"),
+        (0.35, "-", "0.350"), (1.2345e-9, "-", "1.23 × 10⁻⁹"), (0.0, "Pa", "0 Pa"), (0.0, "-", "0"),
+        (5.0, "m^3/s^2", "5.00 m³/s²"), (None, "Pa", DASH), (math.nan, "N", DASH), (math.inf, "N", DASH),
+    ],
+)  # fmt: skip
+def test_quantity(value: float | None, unit: str, text: str) -> None:
+    """SI values come out in the unit people use, with three digits."""
+    assert spaced(quantity(value, unit)) == text
+
+
+def test_quantity_keeps_the_value() -> None:
+    """Reading the text back gives the value to three digits, over twelve decades."""
+    scales = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9}
+    for value in 10.0 ** np.arange(-3.0, 9.0, 0.37):
+        number, unit = spaced(quantity(value, "Pa")).split(" ")
+        assert float(number) * scales[unit] == pytest.approx(value, rel=0.006)
+
+
+def test_signs_limits_and_digits() -> None:
+    """A signed value shows its sign, zero has none, and a limit is as short as it was written."""
+    assert quantity(0.012, "fraction", signed=True).startswith("+1.20")
+    assert spaced(quantity(1e-6, "fraction", signed=True)) == "0.00 %"
+    assert spaced(quantity(0.05, "fraction", digits=None)) == "5 %"
+    assert spaced(quantity(3e-4, "m", digits=None)) == "0.3 mm"
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "unit", "text"),
+    [
+        (8e5, 2e6, "Pa", "0.8 to 2 MPa"), (5e4, 2e6, "Pa", "50 kPa to 2 MPa"), (0.0, 0.6, "-", "0 to 0.6"),
+        (100.0, 1200.0, "J/m^2", "100 to 1200 J/m²"), (None, 2e6, "Pa", "below 2 MPa"),
+        (3.0, math.inf, "N", "above 3 N"), (None, None, "Pa", DASH), (0.1, 0.1, "fraction", "10 %"),
+    ],
+)  # fmt: skip
+def test_interval(low: float | None, high: float | None, unit: str, text: str) -> None:
+    """Both ends share a unit unless that hides the lower one; an open end is a bound."""
+    assert spaced(interval(low, high, unit)) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "sd", "unit", "text"),
+    [
+        (12.5271, 0.112, "N", "12.53 ± 0.11 N"), (0.812, 0.0061, "s", "0.8120 ± 0.0061 s"),
+        (0.0331, 0.00042, "m", "33.10 ± 0.42 mm"), (0.1, 0.02, "fraction", "(10.0 ± 2.0) %"),
+        (12.5, None, "N", "12.5 N"), (12.5, 0.0, "N", "12.5 N"), (12.5, 1e-9, "N", "12.5 N ± 1.0 × 10⁻⁹ N"),
+    ],
+)  # fmt: skip
+def test_uncertain(value: float, sd: float | None, unit: str, text: str) -> None:
+    """Value and uncertainty end at the same digit; without an uncertainty there is no ±."""
+    assert spaced(uncertain(value, sd, unit)) == text
+
+
+def test_counts_durations_and_lists() -> None:
+    """Small helpers of sentences."""
+    assert [spaced(count(n)) for n in (0, 999, 1234567, None)] == ["0", "999", "1 234 567", DASH]
+    times = [spaced(duration(t)) for t in (42.31, 2531.0, 3725.0, None)]
+    assert times == ["42.3 s", "42 min", "1 h 02 min", DASH]
+    assert [listed(x) for x in (["a"], ["a", "b"], ["a", "b", "c"])] == ["a", "a and b", "a, b and c"]
+
+
+def test_breaks_are_only_in_long_words() -> None:
+    """What a reader may copy stays whole; a long path breaks after its separators, a long word anywhere."""
+    assert breakable("out/banana --trace run_03.csv") == "out/banana --trace run_03.csv"
+    path = "folder/" * 6 + "trace.csv"
+    assert breakable(path).split("\u200b") == ["folder/"] * 6 + ["trace.", "csv"]
+    assert max(len(part) for part in breakable("x" * 100).split("\u200b")) <= 20
