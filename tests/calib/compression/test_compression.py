@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from calib.compression.measured import Measured, read_repeats, slope, strain_grid
-from calib.compression.modulus import fit, sensitivity
+from calib.compression.measured import MeasuredCompression, read_repeats, slope, strain_grid
+from calib.compression.modulus import fit_modulus, modulus_at_other_nu
+from calib.compression.modulus_calibration import acceptance_lines
 from calib.compression.press import UnitCurve, homogeneous, press_scene, solver_error, unit_curve
-from calib.compression.study import judge
 from cutcal.main import main
 from mpm.runtime import Runtime
 from mpm.shapes import Shape
@@ -111,7 +111,7 @@ def test_the_truth_is_found(tmp_path, coarse):
     """Modulus within 2 % from synthetic repeats; the interval is Student's; the offset of the load does not matter."""
     moduli = (4.8e4, 5e4, 5.2e4)
     measured = read_repeats([synthetic(tmp_path / "a.csv", moduli)], CUBE, 0.2)
-    found = fit(measured, coarse)
+    found = fit_modulus(measured, coarse.stress)
     assert found.mean == pytest.approx(5e4, rel=0.02)
     assert found.E == pytest.approx(moduli, rel=0.02)
     assert found.sd == pytest.approx(2e3, rel=0.05)
@@ -146,22 +146,23 @@ def test_units_of_columns_and_shapes_give_the_same(tmp_path):
 def test_sensitivity_refits_at_other_poissons_ratios():
     """Data of nu 0.4 and E 1 fitted with 0.45: the modulus at 0.4 is 1; at the top nu stays below 0.5."""
     grid = strain_grid(0.4)
-    data = Measured(grid, homogeneous(0.4, grid)[None], np.ones(1), ["a"], [])
-    at_45 = float(fit(data, UnitCurve(grid, homogeneous(0.45, grid), {})).mean)
-    below, above = sensitivity(data, 0.45, at_45)
-    assert below["nu"] == pytest.approx(0.4) and below["E_Pa"] == pytest.approx(1.0, rel=1e-9)
-    assert above["nu"] == pytest.approx(0.499) and above["E_Pa"] < at_45 < below["E_Pa"]
+    data = MeasuredCompression(grid, homogeneous(0.4, grid)[None], np.ones(1), ["a"], ())
+    at_45 = float(fit_modulus(data, homogeneous(0.45, grid)).mean)
+    below, above = modulus_at_other_nu(data, 0.45, at_45)
+    assert below.nu == pytest.approx(0.4) and below.E_Pa == pytest.approx(1.0, rel=1e-9)
+    assert above.nu == pytest.approx(0.499) and above.E_Pa < at_45 < below.E_Pa
 
 
 def test_one_repeat_has_no_interval():
     """Neither deviation nor interval, and the modulus all the same."""
     grid = strain_grid(0.4)
-    unit = UnitCurve(grid, homogeneous(NU, grid), {})
-    found = fit(Measured(grid, 3e4 * unit.stress[None], np.array([slope(grid, 3e4 * unit.stress)]), ["a"], []), unit)
+    unit = homogeneous(NU, grid)
+    one = MeasuredCompression(grid, 3e4 * unit[None], np.array([slope(grid, 3e4 * unit)]), ["a"], ())
+    found = fit_modulus(one, unit)
     assert found.mean == pytest.approx(3e4)
     assert math.isnan(found.sd) and math.isnan(found.low) and math.isnan(found.high)
-    assert [line.passed for line in judge(found, -0.031, None)] == [True, True, False]
-    assert [line.passed for line in judge(found, None, 0.029)] == [True, True, True]
+    assert [line.passed for line in acceptance_lines(found, -0.031, None)] == [True, True, False]
+    assert [line.passed for line in acceptance_lines(found, None, 0.029)] == [True, True, True]
 
 
 @pytest.mark.slow
@@ -201,7 +202,7 @@ def test_a_curve_that_does_not_fit_is_exit_code_2(tmp_path, capsys, monkeypatch)
     assert {"curve error (NRMSE)", "modulus 0-5 %, fitted against measured"} <= failed
     assert document["E"]["sd_Pa"] is None and not document["passed"]
     good = synthetic(tmp_path / "good.csv", (5e4,))
-    monkeypatch.setattr("calib.compression.study.SOLVER_LIMIT", 1e-6)
+    monkeypatch.setattr("calib.compression.modulus_calibration.SOLVER_ERROR_LIMIT", 1e-6)
     assert main(["compress", "--trace", str(good), *FAST, "--out", str(tmp_path / "b")]) == 2
     assert "raise --cells" in capsys.readouterr().out
 
@@ -212,7 +213,7 @@ def test_bonded_plates_are_judged_by_a_coarser_grid(tmp_path, capsys, monkeypatc
     command = ["compress", "--trace", str(trace), *FAST, "--bonded", "--out", str(tmp_path / "a")]
     assert main([*command, "--cells", "5"]) == 1
     assert "--cells 5" in capsys.readouterr().err
-    monkeypatch.setattr("calib.compression.study.SOLVER_LIMIT", 1e-6)
+    monkeypatch.setattr("calib.compression.modulus_calibration.SOLVER_ERROR_LIMIT", 1e-6)
     assert main([*command, "--json"]) == 2
     document = valid(json.loads(capsys.readouterr().out))
     assert document["solver_error"] is None and document["sensitivity"] is None
@@ -310,7 +311,8 @@ def test_thirteen_silicones():
     errors = []
     with index.open() as file:
         for row in csv.DictReader(file):
-            found = fit(read_repeats([index.parent / f"{row['phantom']}.csv"], PUCK, 0.4), unit)
+            measured = read_repeats([index.parent / f"{row['phantom']}.csv"], PUCK, 0.4)
+            found = fit_modulus(measured, unit.stress)
             assert len(found.E) == int(row["n_replicates"])
             assert found.nrmse <= 0.05
             errors.append(abs(found.slope / (1e3 * float(row["E_published_kPa"])) - 1))
