@@ -12,6 +12,7 @@ from calib.errors import CurveError, TraceError
 from calib.trace.columns import candidates, choose, numbers
 from calib.trace.table import Table, read_table
 from calib.trace.trace import MIN_SAMPLES
+from mpm.arrays import FloatArray
 from mpm.shapes import Shape, volume
 
 STRAIN_STEP = 0.001
@@ -44,14 +45,14 @@ class MeasuredCompression:
         files: The files.
     """
 
-    strain: np.ndarray
-    stress: np.ndarray
-    slope: np.ndarray
+    strain: FloatArray
+    stress: FloatArray
+    slope: FloatArray
     names: list[str]
     files: tuple[MeasuredFile, ...]
 
     @property
-    def mean(self) -> np.ndarray:
+    def mean(self) -> FloatArray:
         """Mean stress of the repeats [Pa], shape (n,)."""
         return self.stress.mean(axis=0)
 
@@ -61,7 +62,7 @@ def area(shape: Shape) -> float:
     return volume(shape) / shape.height
 
 
-def strain_grid(strain: float) -> np.ndarray:
+def strain_grid(strain: float) -> FloatArray:
     """Strains from 0 to ``strain`` [-].
 
     Raises:
@@ -74,7 +75,7 @@ def strain_grid(strain: float) -> np.ndarray:
     return np.linspace(0.0, strain, round(strain / STRAIN_STEP) + 1)
 
 
-def slope(strain: np.ndarray, stress: np.ndarray) -> float:
+def slope(strain: FloatArray, stress: FloatArray) -> float:
     """Slope of the least-squares line through stress over 0 to 5 % strain; its offset is free [Pa]."""
     on = strain <= SMALL_STRAIN * (1 + 1e-9)
     return float(np.polyfit(strain[on], stress[on], 1)[0])
@@ -145,8 +146,8 @@ def _repeats(table: Table) -> list[tuple[str, np.ndarray]]:
 
 
 def _loading(
-    where: str, way: np.ndarray, load: np.ndarray, shape: Shape, strain: float
-) -> tuple[np.ndarray, np.ndarray]:
+    where: str, way: FloatArray, load: FloatArray, shape: Shape, strain: float
+) -> tuple[FloatArray, FloatArray]:
     """Strain and stress of the first loading of a repeat, strain increasing and reaching ``strain``.
 
     Args:

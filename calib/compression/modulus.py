@@ -10,6 +10,7 @@ from scipy.stats import t as student
 
 from calib.compression.measured import MeasuredCompression, slope
 from calib.compression.press import homogeneous, largest_error
+from mpm.arrays import FloatArray
 
 NU_STEP = 0.05
 """Change of Poisson's ratio whose effect on the modulus is reported [-]."""
@@ -34,12 +35,12 @@ class ModulusFit:
         force_error_at: Strain where it is [-].
     """
 
-    E: np.ndarray
+    E: FloatArray
     mean: float
     sd: float
     low: float
     high: float
-    stress: np.ndarray
+    stress: FloatArray
     slope: float
     slope_error: float
     nrmse: float
@@ -47,12 +48,12 @@ class ModulusFit:
     force_error_at: float
 
 
-def scaled_modulus(unit: np.ndarray, stress: np.ndarray) -> np.ndarray:
+def scaled_modulus(unit: FloatArray, stress: FloatArray) -> FloatArray:
     """Least-squares modulus of one or several stresses, shapes (n,) and (..., n) [Pa]."""
     return stress @ unit / (unit @ unit)
 
 
-def fit_modulus(measured: MeasuredCompression, unit: np.ndarray) -> ModulusFit:
+def fit_modulus(measured: MeasuredCompression, unit: FloatArray) -> ModulusFit:
     """Fit Young's modulus to each repeat.
 
     Args:

@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from calib.compression.measured import area, strain_grid
 from calib.errors import CurveError
 from calib.io.progress import clock
+from mpm.arrays import FloatArray
 from mpm.errors import SimulationError
 from mpm.material import Material
 from mpm.runtime import Runtime
@@ -73,12 +74,12 @@ class UnitCurve:
         run: The simulation.
     """
 
-    strain: np.ndarray
-    stress: np.ndarray
+    strain: FloatArray
+    stress: FloatArray
     run: PressRun
 
 
-def homogeneous(nu: float, strain: np.ndarray) -> np.ndarray:
+def homogeneous(nu: float, strain: FloatArray) -> FloatArray:
     """Stress / E of the press between frictionless plates, closed form of the solver's corotated law.
 
     The press is homogeneous: the height changes by the factor l = 1 - strain, both widths by s, the volume by
@@ -202,7 +203,7 @@ def grid_change(unit: UnitCurve, coarse: UnitCurve) -> float:
     return largest_error(unit.strain, unit.stress, coarse.stress)[0]
 
 
-def largest_error(strain: np.ndarray, got: np.ndarray, want: np.ndarray) -> tuple[float, float]:
+def largest_error(strain: FloatArray, got: FloatArray, want: FloatArray) -> tuple[float, float]:
     """Largest relative error beyond 2 % strain, with its sign, and the strain where it is [-].
 
     Args:

@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
 
-import numpy as np
-import numpy.typing as npt
 import pandas as pd
 
 from calib.compression.measured import MeasuredFile
@@ -17,9 +15,8 @@ from calib.compression.press import PressRun
 from calib.io.folder import write_csv, write_json
 from calib.io.typed_document import FLAT, to_document
 from calib.validation.acceptance import Verdict
+from mpm.arrays import FloatArray
 from mpm.shapes import Shape
-
-FloatArray = npt.NDArray[np.float64]
 
 RESULT_FILE, CURVES_FILE = "compress.json", "curves.csv"
 

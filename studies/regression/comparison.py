@@ -14,16 +14,14 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from calib.errors import CurveError
 from calib.io.provenance import code_key, versions
 from calib.validation.metrics import compare
+from mpm.arrays import FloatArray
 from studies.regression.baseline import KEY_LENGTH, SAME, BaselineCut, CutOutcome, cut_numbers, scales
 from studies.regression.reference_curves import CHECKED, Reference
 from studies.regression.result import CutComparison, LargestDeviation, NumberChange, NumberChanges
-
-FloatArray = npt.NDArray[np.float64]
 
 UNCHANGED = 1e-6
 """Part of a column's largest value below which a record is kept as it is: what rounding and the digits of a file leave."""

@@ -8,14 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
 
-import numpy as np
-import numpy.typing as npt
-
 from calib.io.folder import write_csv, write_json
 from calib.io.typed_document import to_document
+from mpm.arrays import FloatArray
 from studies.regression.reference_curves import DIGITS
-
-FloatArray = npt.NDArray[np.float64]
 
 RESULT_FILE = "regress.json"
 VERDICT_MEANINGS = {

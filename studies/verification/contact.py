@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from mpm.arrays import FloatArray
 from mpm.material import Material
 from mpm.scene import Board, Food, Motion, Press, Scene
 from mpm.shapes import Shape
@@ -112,7 +113,7 @@ def tilted(options: SuiteOptions) -> Iterator[Comparison]:
         yield Comparison(name, "force on the board [N]", -normal, float(force[2]), 0.01, "m g cos")
 
 
-def _constant(pull: np.ndarray, time: float) -> np.ndarray:
+def _constant(pull: FloatArray, time: float) -> FloatArray:
     return pull
 
 
@@ -141,11 +142,11 @@ def _meet(options: SuiteOptions, dx: float) -> tuple[float, float, float]:
     radius, thick, apart, speed = 0.02, 0.01, 0.016, 0.5
     material = Material(E=1e5, nu=0.3, rho=1000.0)
 
-    def place(x: np.ndarray) -> np.ndarray:
+    def place(x: FloatArray) -> FloatArray:
         upper = x[:, 2] > thick
         return x + np.where(upper[:, None], [apart, apart, -thick], [-apart, -apart, 0.0])
 
-    def velocity(x: np.ndarray) -> np.ndarray:
+    def velocity(x: FloatArray) -> FloatArray:
         return np.where(x[:, :1] + x[:, 1:2] > 0, [-speed, -speed, 0.0], [speed, speed, 0.0])
 
     body = options.body(

@@ -11,6 +11,7 @@ import numpy as np
 
 from calib.validation.acceptance import unbooked
 from fem_reference.slit import cleave
+from mpm.arrays import FloatArray
 from mpm.material import Material
 from mpm.output.record import ForceRecord
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
@@ -155,11 +156,11 @@ def slit(options: SuiteOptions) -> Iterator[Comparison]:
         length: cleave(block, food, WEDGE, lead, stroke + lead) for length, block in blocks.items()
     }  # their middle rises
 
-    def mean(stroke: np.ndarray, force: np.ndarray) -> float:
+    def mean(stroke: FloatArray, force: FloatArray) -> float:
         at = np.linspace(5e-3, 8.5e-3, 50)
         return float(np.interp(at, stroke, force).mean())
 
-    def rate(stroke: np.ndarray, energy: np.ndarray) -> float:
+    def rate(stroke: FloatArray, energy: FloatArray) -> float:
         low, high = np.interp([4e-3, 8.5e-3], stroke, energy)
         return float(high - low) / (0.016 * 4.5e-3)
 

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import spherical_jn
 
+from mpm.arrays import FloatArray
 from mpm.material import Material
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
 from mpm.shapes import Shape
@@ -137,7 +138,7 @@ def _swing(options: SuiteOptions, dx: float, ppc: int, swings: int) -> tuple[tup
     bar = Shape("block", 0.078, 0.012, 0.012)
     k = math.pi / bar.length
 
-    def velocity(x: np.ndarray) -> np.ndarray:
+    def velocity(x: FloatArray) -> FloatArray:
         return 0.02 * np.outer(-np.sin(k * x[:, 1]), [0.0, 1.0, 0.0])
 
     body = options.body(bar, SOFT, numerics(dx, room=0.1, ppc=ppc), InitialState(velocity=velocity))
@@ -162,7 +163,7 @@ def breathing(options: SuiteOptions) -> Iterator[Comparison]:
     x = brentq(lambda s: math.sin(s) * (1 - s * s / (4 * ratio)) - s * math.cos(s), 0.6 * math.pi, 0.99 * math.pi)
     period = 2 * math.pi * radius / (x * material.p_wave)
 
-    def velocity(places: np.ndarray) -> np.ndarray:
+    def velocity(places: FloatArray) -> FloatArray:
         r = places - [0.0, 0.0, radius]
         s = x * np.linalg.norm(r, axis=1, keepdims=True) / radius
         return 0.05 * r / np.linalg.norm(r, axis=1, keepdims=True) * spherical_jn(1, s)
@@ -181,7 +182,7 @@ def breathing(options: SuiteOptions) -> Iterator[Comparison]:
     yield Comparison("ball breathes", "period [s]", period, got, 0.03 if options.quick else 0.02, source)
 
 
-def _period(t: np.ndarray, a: np.ndarray) -> tuple[float, np.ndarray]:
+def _period(t: FloatArray, a: FloatArray) -> tuple[float, FloatArray]:
     """Period of an oscillation and the times at which it crosses zero upwards [s]."""
     up = np.flatnonzero((a[:-1] < 0) & (a[1:] >= 0))
     zeros = t[up] - a[up] * (t[up + 1] - t[up]) / (a[up + 1] - a[up])

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference.press import press
+from mpm.arrays import FloatArray
 from mpm.material import Material
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
 from mpm.shapes import Shape
@@ -131,7 +132,7 @@ PRESS_TESTS = (
 
 def particles(
     options: SuiteOptions, test: PressTest, dx: float, *, material: Material = PRESSED_MATERIAL, mach: float = MACH
-) -> np.ndarray:
+) -> FloatArray:
     """Force of the particles at the strokes of a test [N], shape (n,)."""
     friction = STICKS if test.bonded else 0.0
     end = test.strokes[-1] * (1 + WINDOW)
@@ -150,7 +151,7 @@ def particles(
     return np.array([_at(middle, record.face[1:, 2], s, near) for s in test.strokes])
 
 
-def _at(stroke: np.ndarray, force: np.ndarray, s: float, near: float) -> float:
+def _at(stroke: FloatArray, force: FloatArray, s: float, near: float) -> float:
     """Force at a stroke from a parabola through what is near it: without the ringing of the body between the tools [N]."""
     on = np.abs(stroke - s) < near
     return float(np.polyfit(stroke[on] - s, force[on], 2)[2])
