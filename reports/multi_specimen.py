@@ -125,7 +125,10 @@ def first(done: FinishedStudy) -> str:
 
 
 def picture(done: FinishedStudy, name: str) -> bytes:
-    """Measured, simulated and predicted force of a trace with their bands, beside the food about the blade where it was fitted."""
+    """Forces of a trace with their bands: measured, simulated, predicted; beside them the food about the blade.
+
+    The food about the blade is shown where the trace was fitted.
+    """
     curves, s = done.curves[name], done.summary
     held, fitted = s["hold_out"].get(name), s["traces"].get(name)
 
@@ -267,7 +270,8 @@ def _caption(s: Data, name: str) -> str:
         return "Fitted with the others: in-sample."
     own = listed(list(held.get("fitted", {}))) or "nothing"
     return breakable(
-        f"Predicted with the flesh of {listed(held['trained_on'])}. Fitted to this cut: {own}, and one factor on its force."
+        f"Predicted with the flesh of {listed(held['trained_on'])}. "
+        f"Fitted to this cut: {own}, and one factor on its force."
     )
 
 
@@ -280,8 +284,9 @@ def _parameter(name: str, p: Data) -> list[str]:
     unit = p["unit"]
     shared = "all cuts" if p.get("shared", True) else "one cut"
     return [
-        breakable(name), meaning(_property_of(name)), quantity(p["value"], unit), interval(p["low95"], p["high95"], unit),
-        interval(p["prior_low"], p["prior_high"], unit), words(p["verdict"]), shared,
+        breakable(name), meaning(_property_of(name)), quantity(p["value"], unit),
+        interval(p["low95"], p["high95"], unit), interval(p["prior_low"], p["prior_high"], unit), words(p["verdict"]),
+        shared,
     ]  # fmt: skip
 
 

@@ -70,7 +70,8 @@ def strain_grid(strain: float) -> FloatArray:
     """
     if strain < SMALL_STRAIN:
         raise CurveError(
-            f"--strain {strain:g}: the modulus over 0 to {SMALL_STRAIN:g} is part of the result; give {SMALL_STRAIN:g} or more"
+            f"--strain {strain:g}: the modulus over 0 to {SMALL_STRAIN:g} is part of the result; give {SMALL_STRAIN:g} "
+            "or more"
         )
     return np.linspace(0.0, strain, round(strain / STRAIN_STEP) + 1)
 
@@ -167,7 +168,8 @@ def _loading(
     if way[last] >= shape.height:
         raise TraceError(
             f"{where}: a compression of {way[last]:g} m is more than the height of {shape.height:g} m; if it is in "
-            "millimetres call the column compression_mm, and check that --compression-col and --force-col are not swapped"
+            "millimetres call the column compression_mm, and check that --compression-col and --force-col are not "
+            "swapped"
         )
     if way[last] < strain * shape.height * (1 - 1e-9):
         raise TraceError(
@@ -179,8 +181,8 @@ def _loading(
     ahead[int(np.argmax(e >= strain * (1 - 1e-9))) + 1 :] = False
     if np.count_nonzero(ahead) < MIN_SAMPLES:
         raise TraceError(
-            f"{where}: {np.count_nonzero(ahead)} samples of loading up to a strain of {strain:g}, at least {MIN_SAMPLES} "
-            "are needed; record at a higher rate"
+            f"{where}: {np.count_nonzero(ahead)} samples of loading up to a strain of {strain:g}, at least "
+            f"{MIN_SAMPLES} are needed; record at a higher rate"
         )
     e, s = e[ahead], load[ahead] / area(shape)
     part = len(s) // 10 + 1
@@ -194,7 +196,7 @@ def _loading(
         )
     if np.count_nonzero(e <= SMALL_STRAIN) < 3:
         raise TraceError(
-            f"{where}: fewer than 3 samples up to a strain of {SMALL_STRAIN:g}, where the small-strain modulus is taken; "
-            "record at a higher rate"
+            f"{where}: fewer than 3 samples up to a strain of {SMALL_STRAIN:g}, where the small-strain modulus is "
+            "taken; record at a higher rate"
         )
     return e, s

@@ -1,4 +1,4 @@
-"""The press as it is simulated: one unit curve, its closed form between frictionless plates, and the errors of the grid."""
+"""The press as it is simulated: a unit curve, its closed form between frictionless plates, the errors of the grid."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ TELL_EVERY = 5.0
 RECORD_ROWS = 400
 """Rows of the record of a press."""
 SMOOTHING_DEGREE = 5
-"""Degree of the polynomial through the origin that smooths force times (1 - strain)^2, which takes out the ringing after
-the plate has met the food. See docs/theory.md, "Measured choices"."""
+"""Degree of the polynomial through the origin that smooths force times (1 - strain)^2, which takes out the ringing
+after the plate has met the food. See docs/theory.md, "Measured choices"."""
 
 Say = Callable[[str], None]
 

@@ -11,8 +11,8 @@ A class may say more about its document in two class variables:
 * ``DOCUMENT`` is the name of the document. It becomes the first key, ``schema``.
 * ``KEYS`` lists the keys in their order, where these are not just the fields: properties may be among them.
 
-A field with the metadata :data:`FLAT` is a mapping or another dataclass. Its keys stand beside those of the result; where
-it may be None, they may all be missing.
+A field with the metadata :data:`FLAT` is a mapping or another dataclass. Its keys stand beside those of the result;
+where it may be None, they may all be missing.
 """
 
 from __future__ import annotations

@@ -90,8 +90,8 @@ class CutSimulator:
             fine, coarse = self.simulate(cut, [values], FINE)[0], self.simulate(cut, [values])[0]
             if fine is None or coarse is None:
                 raise PublishedError(
-                    f"{cut.name}: its cut breaks down at {_shown(values)}; the food is squashed before it is cut: give a "
-                    "stiffer E or yield_stress, or a lower R_initiation, under 'properties'"
+                    f"{cut.name}: its cut breaks down at {_shown(values)}; the food is squashed before it is cut: "
+                    "give a stiffer E or yield_stress, or a lower R_initiation, under 'properties'"
                 )
             for quantity, x in fine.items():
                 step = x - coarse[quantity]

@@ -15,8 +15,8 @@ from calib.scalars.published_data import PublishedData
 from mpm.arrays import FloatArray
 
 START_STRIDE = 1.0
-"""Standard deviations of the prior to either side of a first fit, where further fits start: a peak where the cut begins and
-one in its middle are two minima."""
+"""Standard deviations of the prior to either side of a first fit, where further fits start: a peak where the cut begins
+and one in its middle are two minima."""
 CORRECTION_ROUNDS = 4  # fits, each corrected by the default grid at the end of the one before, at most
 CORRECTION_TOLERANCE = 0.005  # change of the corrections below which they stand, in logarithms
 
@@ -51,7 +51,7 @@ def given_values(
         simulator: Where it is simulated.
         parameters: The fitted properties.
         fixed: Values [SI] of other properties, of each descent.
-        asked: Number of the descent and point (p,) that it asks for.
+        asked: Number of the descent, and internal coordinates [-] that it asks for, shape (p,).
 
     Returns:
         Logarithms of the given numbers (n,) at each point; None for a breakdown.

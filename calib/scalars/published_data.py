@@ -1,7 +1,7 @@
 """Published numbers of cuts without a curve: a largest force, an energy per cut area, and the specimen they are of.
 
-A file names the food, what is known of it beyond ``materials.yaml``, the knife, and specimens; each number of a specimen is
-either given, so that it is fitted to, or predicted, so that it is compared with what the others predict of it.
+A file names the food, what is known of it beyond ``materials.yaml``, the knife, and specimens. Each number of a
+specimen is either given or predicted: it is fitted to, or compared with what the fit to the others gives.
 """
 
 from __future__ import annotations
@@ -30,8 +30,9 @@ ERROR_LIMIT = 0.2  # error of a prediction that passes: two specimens of a food 
 LARGEST_RELATIVE_SD = 1.0
 SIZE_KEYS = {"width": "width_m", "height": "height_m", "length": "length_m"}
 _SYNONYMS = {
-    "peak": PEAK_FORCE, "force": PEAK_FORCE, "force_n": PEAK_FORCE, "max_force": PEAK_FORCE, "energy": CUT_ENERGY, "specific_energy": CUT_ENERGY,
-    "energy_j": CUT_ENERGY, "work": CUT_ENERGY, "sd": "relative_sd", "spread": "relative_sd", "uncertainty": "relative_sd",
+    "peak": PEAK_FORCE, "force": PEAK_FORCE, "force_n": PEAK_FORCE, "max_force": PEAK_FORCE,
+    "energy": CUT_ENERGY, "specific_energy": CUT_ENERGY, "energy_j": CUT_ENERGY, "work": CUT_ENERGY,
+    "sd": "relative_sd", "spread": "relative_sd", "uncertainty": "relative_sd",
     "diameter": "width_m", "diameter_m": "width_m", "width": "width_m", "height": "height_m", "length": "length_m",
     "kind": "shape", "predict": "predicted", "measured": "given", "tolerance": "limit",
 }  # fmt: skip
@@ -39,7 +40,13 @@ _SYNONYMS = {
 
 @dataclass(frozen=True)
 class PublishedNumber:
-    """One published number. Attributes: quantity, one of ``QUANTITIES``; value in its unit; relative_sd, of its mean [-]."""
+    """One published number.
+
+    Attributes:
+        quantity: One of :data:`QUANTITIES`.
+        value: Its value [unit of the quantity].
+        relative_sd: Standard deviation of its mean, a fraction of it [-].
+    """
 
     quantity: str
     value: float
@@ -115,7 +122,8 @@ class PublishedData:
             raise PublishedError("specimens: no number is given, so there is nothing to fit to; move one to 'given'")
         if len(self.fit) > len(self.given):
             raise PublishedError(
-                f"fit: {len(self.given)} given numbers do not determine {', '.join(self.fit)}; fit at most {len(self.given)}"
+                f"fit: {len(self.given)} given numbers do not determine {', '.join(self.fit)}; "
+                f"fit at most {len(self.given)}"
             )
         for names in (self.fit, self.vary):
             if names:

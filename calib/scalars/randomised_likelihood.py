@@ -94,7 +94,7 @@ def _best_ends(
     problems: Sequence[LeastSquaresProblem],
     centres: Sequence[FloatArray],
 ) -> dict[int, Minimum]:
-    """The better end of a fit from the best values and, where that does not meet the numbers, of one from its centre."""
+    """Ends of fits from the best values; where one does not meet the numbers, also from its centre: the better one."""
     parameters = simulator.published.fitted
     ends: dict[int, Minimum] = {}
     starts: Sequence[FloatArray] = [best.z] * len(problems)

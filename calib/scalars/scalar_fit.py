@@ -1,8 +1,8 @@
 """From the published numbers of one cut to those of another: properties are fitted to the given ones, predict the rest.
 
-The fit runs on the coarse grid that a calibration screens with; a run on the default grid at its end corrects each number,
-and the fit goes on until that correction stands (:mod:`calib.scalars.given_numbers_fit`). A band comes from draws of what
-is not fitted (:mod:`calib.scalars.randomised_likelihood`).
+The fit runs on the coarse grid that a calibration screens with; a run on the default grid at its end corrects each
+number, and the fit goes on until that correction stands (:mod:`calib.scalars.given_numbers_fit`). A band comes from
+draws of what is not fitted (:mod:`calib.scalars.randomised_likelihood`).
 """
 
 from __future__ import annotations

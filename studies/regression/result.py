@@ -79,7 +79,8 @@ class CutComparison:
         recorded: Whether a new reference was written.
         because: What is another than when the reference was recorded.
         results: Peak and work; None where the cut broke down.
-        shape_error: Difference of the curves, each over its own peak [-]; NaN where one has no force, None without curves.
+        shape_error: Difference of the curves, each over its own peak [-]; NaN where one has no force, None without
+            curves.
         nrmse: Root mean square difference of the curves over the recorded peak [-]; the same.
         verdict: One of :data:`VERDICT_MEANINGS`.
         largest: The largest deviation; None where there is nothing to compare.

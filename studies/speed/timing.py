@@ -1,7 +1,7 @@
 """Simulations that are timed: kept with their kernels, and run in turns.
 
-All ratios are of runs that take turns in one process, the least time of each: a machine that is slow for a while is slow
-for both. Compilation is not counted; the time of the first run, with it, is given apart.
+All ratios are of runs that take turns in one process, the least time of each: a machine that is slow for a while is
+slow for both. Compilation is not counted; the time of the first run, with it, is given apart.
 """
 
 from __future__ import annotations

@@ -50,9 +50,18 @@ def elements() -> tuple[FloatArray, FloatArray]:
 
 
 def particles(options: SuiteOptions, dx: float, ppc: int) -> tuple[float, float]:
-    """A section near the end: its place from the middle [m] and its way down against the middle [m].
+    """A section near the end of a beam of particles.
 
-    The beam lies across the blade and bends along x, where the grid has room; a quarter of a cell takes the mirror across x away.
+    The beam lies across the blade and bends along x, where the grid has room; a quarter of a cell takes the mirror
+    across x away.
+
+    Args:
+        options: Seed and device.
+        dx: Cell size [m].
+        ppc: Particles per cell and direction.
+
+    Returns:
+        Its place from the middle [m], and its way down against the middle [m].
     """
     grid = replace(numerics(dx, room=1.5, ppc=ppc), mirror=True, grid_shift=(0.25, 0.0, 0.0))
     body = options.body(Shape("block", 2 * HALF, DEPTH, WIDTH), BEAM_MATERIAL, grid)
@@ -70,7 +79,8 @@ def particles(options: SuiteOptions, dx: float, ppc: int) -> tuple[float, float]
 def sagging(options: SuiteOptions) -> Iterator[Comparison]:
     """A beam held in its middle, whose ends hang down.
 
-    Of a food that is bent far, the sum over the particles is noisier than at rest and the beam softer: less so with more.
+    Of a food that is bent far, the sum over the particles is noisier than at rest and the beam softer; less so with
+    more particles.
     """
     places, sag = elements()
     dx = DEPTH / 8

@@ -20,6 +20,9 @@ from studies.verification.result import Comparison
 
 G = 9.81
 DAMPED = replace(SOFT, loss_factor=0.5)
+CONTACT_SHARE = 0.1
+"""Half the width of a Hertzian contact over the radius [-], small enough for Hertz's formula. See docs/theory.md,
+"Measured choices"."""
 
 
 def resting(options: SuiteOptions) -> Iterator[Comparison]:
@@ -118,7 +121,7 @@ def _constant(pull: FloatArray, time: float) -> FloatArray:
 
 
 def discs(options: SuiteOptions) -> Iterator[Comparison]:
-    """Two discs that meet on a shared grid feel each other before they touch, and the transfers take energy from them."""
+    """Two discs that meet on a shared grid feel each other before they touch; the transfers take energy from them."""
     source = "two discs (Sulsky, Chen and Schreyer 1994)"
     losses = []
     for cells in (20,) if options.quick else (20, 40):
@@ -176,10 +179,10 @@ def _meet(options: SuiteOptions, dx: float) -> tuple[float, float, float]:
 def hertz(options: SuiteOptions) -> Iterator[Comparison]:
     """A plate on half a lying cylinder of nu = 0, for which plane strain and free ends are the same.
 
-    Not on a ball, whose far side Hertz leaves out: at a contact of a fifth of the radius finite elements give 7 % more. For a
-    cylinder it is in the formula.
+    Not on a ball, whose far side Hertz leaves out; for a cylinder it is in the formula. See docs/theory.md, "Measured
+    choices".
     """
-    radius, share = 0.04, 0.1  # at 0.2 the force of finite elements is 4 % below Hertz's, as that of the particles is
+    radius, share = 0.04, CONTACT_SHARE
     for cells in (4,) if options.quick else (4, 8):
         half = share * radius  # half the width of the contact
         dx = half / cells

@@ -27,6 +27,14 @@ def manufactured(cells: int, order: int, law: Law) -> tuple[float, float]:
 
     u = size sin(pi x) sin(pi y) sin(pi z) (1, -0.5, 0.7), zero on the faces; the force is the divergence of the law's
     stress by central differences.
+
+    Args:
+        cells: Hexahedra along each edge of the cube.
+        order: Order of the elements.
+        law: The law.
+
+    Returns:
+        Error of the displacement [m], and of its gradient [-].
     """
     direction = np.array([1.0, -0.5, 0.7])
 

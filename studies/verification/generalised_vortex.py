@@ -35,7 +35,11 @@ def profile(r: FloatArray) -> FloatArray:
 class Vortex:
     """The motion and its body force.
 
-    Attributes: radius, mean radius of the ring [m]; material; angle, largest rotation [rad]; span, time of half a swing [s].
+    Attributes:
+        radius: Mean radius of the ring [m].
+        material: Its constants.
+        angle: Largest rotation [rad].
+        span: Time of half a swing [s].
     """
 
     def __init__(self, radius: float, material: Material, angle: float, span: float) -> None:
@@ -76,13 +80,16 @@ class Vortex:
 
 
 def errors(options: SuiteOptions, cells: int, *, angle: float = 0.5, swing: float = 0.5) -> tuple[float, float]:
-    """Root-mean-square and largest error of place of the ring's particles, over its mean radius [-].
+    """Error of place of the ring's particles, over its mean radius.
 
     Args:
         options: Seed and device.
         cells: Grid cells across the ring.
         angle: Largest rotation [rad].
         swing: Part of half a swing that is simulated, 0.5 up to the largest rotation.
+
+    Returns:
+        Root mean square of the error, and its largest value [-].
     """
     radius = 0.04
     dx = (OUTER - INNER) * radius / cells

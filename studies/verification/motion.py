@@ -25,7 +25,18 @@ SHEAR = np.array([[0.2, 3.0, -1.0], [-2.0, 0.5, 0.7], [1.1, -0.4, -0.6]])
 
 
 def numerics(dx: float = DX, gravity: float = 0.0, room: float = 0.5, safety: float = 0.7, ppc: int = 2) -> Numerics:
-    """A grid for a whole body."""
+    """A grid for a whole body.
+
+    Args:
+        dx: Cell size [m].
+        gravity: Acceleration downwards [m/s^2].
+        room: Room beside the body, over its size [-].
+        safety: Time step over its limit [-].
+        ppc: Particles per cell and direction.
+
+    Returns:
+        The grid.
+    """
     return Numerics(dx=dx, gravity=gravity, room=room, mirror=False, safety=safety, ppc=ppc)
 
 
@@ -116,8 +127,8 @@ def falling(options: SuiteOptions) -> Iterator[Comparison]:
 def vibrating(options: SuiteOptions) -> Iterator[Comparison]:
     """A free bar swings lengthwise in its first mode.
 
-    Particles at random places make the bar softer by the noise of the sum over them, which falls with their number and
-    not with the cells: the period is 1 % long with 8 particles a cell and 0.3 % with 27.
+    Particles at random places make the bar softer by the noise of the sum over them, which falls with their number in a
+    cell and not with the cells. See docs/theory.md, "Measured choices".
     """
     period, loss = _swing(options, 3e-3, 3, 2)
     yield Comparison(

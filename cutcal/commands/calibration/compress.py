@@ -69,8 +69,8 @@ def run(args: argparse.Namespace) -> int:
     shape = shape_of(args)
     if args.nu is None:
         raise CurveError(
-            "--nu is missing: a compression force alone does not tell Young's modulus from Poisson's ratio; give it, for "
-            "instance 0.49 for a gel or a rubber, 0.2 to 0.4 for a food with pores"
+            "--nu is missing: a compression force alone does not tell Young's modulus from Poisson's ratio; give it, "
+            "for instance 0.49 for a gel or a rubber, 0.2 to 0.4 for a food with pores"
         )
     out = Path(args.out or f"cutcal-compress-{Path(args.trace[0]).stem}")
     test = CompressionTest(args.trace, shape, args.nu, args.strain, args.bonded, args.compression_col, args.force_col)

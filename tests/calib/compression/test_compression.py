@@ -45,7 +45,7 @@ def relaxed(high: float, nu: float) -> float:
 
 @pytest.mark.parametrize("nu", [-0.2, 0.0, 0.35, 0.49, 0.499])
 def test_the_closed_form_is_the_slope_of_the_least_energy(nu):
-    """Force of the homogeneous press = derivative of the energy that is left when the sides are free; E at no strain."""
+    """Force of the homogeneous press = derivative of the energy that is left with free sides; E at no strain."""
     for strain in (0.01, 0.2, 0.4):
         h = 1e-4
         want = (relaxed(1 - strain - h, nu) - relaxed(1 - strain + h, nu)) / (2 * h)
@@ -176,8 +176,12 @@ def test_a_calibration_end_to_end(tmp_path, capsys):
     for word in ("kPa over 0-20% strain", "95 % interval", "modulus 0-5 %", "bonded plates", "nu = 0.4 is assumed"):
         assert word in text
     document = valid(json.loads((out / "compress.json").read_text()))
-    for key in ("command", "specimen", "assumed", "E", "slope", "nrmse", "force_error", "solver_error", "grid_change", "sensitivity",
-                "bracket", "repeats", "verdicts", "passed", "not_shown", "simulation", "files", "versions", "git"):  # fmt: skip
+    keys = (
+        "command", "specimen", "assumed", "E", "slope", "nrmse", "force_error", "solver_error", "grid_change",
+        "sensitivity", "bracket", "repeats", "verdicts", "passed", "not_shown", "simulation", "files", "versions",
+        "git",
+    )  # fmt: skip
+    for key in keys:
         assert key in document
     assert document["passed"] is True and document["E"]["window"] == [0.0, 0.2]
     assert document["E"]["mean_Pa"] == pytest.approx(5.05e4, rel=0.02)
@@ -192,7 +196,9 @@ def test_a_calibration_end_to_end(tmp_path, capsys):
 
 
 def test_a_curve_that_does_not_fit_is_exit_code_2(tmp_path, capsys, monkeypatch):
-    """A load with the square of strain; the failing lines are named. A solver that is not accurate enough fails with the hint."""
+    """A load with the square of strain; the failing lines are named.
+    A solver that is not accurate enough fails with the hint.
+    """
     bent = synthetic(tmp_path / "bent.csv", (5e4,), power=1.0)
     assert main(["compress", "--trace", str(bent), *FAST, "--out", str(tmp_path / "a")]) == 2
     text = capsys.readouterr().out
@@ -229,7 +235,9 @@ BAD: dict[str, tuple[dict[str, object] | None, tuple[str, ...], tuple[str, ...]]
     "missing": (None, (), ("no such file", "t.csv")),
     "no load column": ({"compression_mm": WAY, "temperature": LOAD}, (), ("no force column", "--force-col")),
     "no compression column": ({"time_s": WAY, "load_N": LOAD}, (), ("no compression column", "--compression-col")),
-    "named column": ({"compression_mm": WAY, "load_N": LOAD}, ("--force-col", "lod_N"), ("lod_N", "did you mean 'load_N'")),
+    "named column": (
+        {"compression_mm": WAY, "load_N": LOAD}, ("--force-col", "lod_N"), ("lod_N", "did you mean 'load_N'")
+    ),
     "NaN": ({"compression_mm": WAY, "load_N": np.r_[np.nan, LOAD[1:]]}, (), ("row 2", "load_N", "not finite")),
     "no load": ({"compression_mm": WAY, "load_N": 0 * LOAD}, (), ("no load", "--force-col")),
     "noise": (
@@ -243,7 +251,11 @@ BAD: dict[str, tuple[dict[str, object] | None, tuple[str, ...], tuple[str, ...]]
         ("--force-col", "compression_mm", "--compression-col", "load_N"),
         ("look swapped",),
     ),
-    "millimetres": ({"compression": WAY, "load_N": LOAD}, ("--compression-col", "compression"), ("more than the height", "compression_mm")),
+    "millimetres": (
+        {"compression": WAY, "load_N": LOAD},
+        ("--compression-col", "compression"),
+        ("more than the height", "compression_mm"),
+    ),
     "few samples": ({"compression_mm": WAY[::4], "load_N": LOAD[::4]}, (), ("15 samples", "at least 20")),
     "few of one repeat": (
         {"compression_mm": np.r_[WAY, WAY[::4]], "load_N": np.r_[LOAD, LOAD[::4]], "replicate": ["a"] * N + ["b"] * 15},
@@ -303,8 +315,8 @@ def test_a_file_twice_is_refused(tmp_path, capsys):
 
 @pytest.mark.long
 def test_thirteen_silicones():
-    """One simulation at nu 0.49 between frictionless plates, fitted over 0 to 40 % strain: the fitted modulus over 0 to 5 %
-    is within 10 % of each published one, which is that slope, and within 5 % in the middle; NRMSE up to 5 %."""
+    """One simulation at nu 0.49 between frictionless plates, fitted over 0 to 40 % strain: the fitted modulus over 0 to
+    5 % is within 10 % of each published one, which is that slope, and within 5 % in the middle; NRMSE up to 5 %."""
     index = data_file("silicone_phantom_compression", "index.csv")
     unit = unit_curve(press_scene(PUCK, 0.49, 0.4, cells=10, bonded=False), 0.4)
     assert abs(solver_error(unit, 0.49)) < 0.01

@@ -1,4 +1,6 @@
-"""Published numbers: the file, least squares with few evaluations, closed forms, a study killed and resumed, Kachru 1995."""
+"""Published numbers: the file, least squares with few evaluations, closed forms,
+a study killed and resumed, Kachru 1995.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,8 @@ KACHRU = ROOT / "force_data" / "kachru1995.yaml"
 PATIENCE_S = 120.0
 R = 400.0  # J/m^2
 WIDTH = 0.024  # m
-# A blade of 0.1 mm between frictionless faces; R_initiation = R, so that the force is R times the width from start to end.
+# A blade of 0.1 mm between frictionless faces; R_initiation = R, so that the force is R times the width from start to
+# end.
 KNIFE = """thin:
   spine: {value: 1.0e-4, unit: m}
   angle: {value: 0.2, unit: deg}
@@ -71,7 +74,9 @@ def prism(tmp_path):
 
 
 def test_kachru_is_what_the_abstract_says():
-    """Both slices with their numbers; the largest over the mean force is 1.34 and 1.78, where a round section has 4 / pi."""
+    """Both slices with their numbers; the largest over the mean force is 1.34 and 1.78,
+    where a round section has 4 / pi.
+    """
     published = load_published(KACHRU)
     nendran, dwarf = published.cuts
     assert [(s.quantity, s.value) for s in nendran.given] == [(PEAK_FORCE, 28.2), (CUT_ENERGY, 724.46)]
@@ -249,7 +254,9 @@ def test_correction_takes_the_coarse_grid_out(prism, grid):
 
 
 def test_numbers_that_contradict_each_other_are_told(prism):
-    """A peak of R w and an energy of 0.7 R cannot both be: both given, no R meets them; the same numbers alone, each has its R."""
+    """A peak of R w and an energy of 0.7 R cannot both be: both given, no R meets them;
+    the same numbers alone, each has its R.
+    """
     published = load_published(prism)
     (cut,) = published.cuts
     lower = replace(cut.predicted[0], value=0.7 * R)
@@ -264,7 +271,9 @@ def test_numbers_that_contradict_each_other_are_told(prism):
 
 
 def test_band_is_of_what_is_drawn_and_of_the_given_numbers(prism):
-    """Without an effect of what is drawn the band of the energy is that of the given peak; draws that cannot meet it are out."""
+    """Without an effect of what is drawn the band of the energy is that of the given peak;
+    draws that cannot meet it are out.
+    """
     published = load_published(prism)
     energy = fitted(published, draws=64).numbers[1]
     half = (energy.high95 - energy.low95) / 2 / R
@@ -303,7 +312,9 @@ def known(journal):
 
 @pytest.mark.slow
 def test_solver_recovers_R_of_a_prism_after_a_kill(prism, tmp_path, capsys):
-    """A thin frictionless blade through a block: peak = R w gives R, and energy = R; killed, resumed, nothing run twice."""
+    """A thin frictionless blade through a block: peak = R w gives R, and energy = R;
+    killed, resumed, nothing run twice.
+    """
     out = tmp_path / "out"
     words = ["scalars", str(prism), "--draws", "1", "--workers", "1", "--out", str(out)]
     process = subprocess.Popen(
