@@ -26,7 +26,8 @@ class ModulusFit:
         E: Modulus of each repeat [Pa], shape (repeats,).
         mean: Mean modulus [Pa].
         sd: Standard deviation between the repeats [Pa], NaN for one.
-        low, high: Ends of the 95 % interval of the mean (Student's t) [Pa], NaN for one repeat.
+        low: Lower end of the 95 % interval of the mean (Student's t) [Pa], NaN for one repeat.
+        high: Its upper end [Pa].
         stress: Fitted stress [Pa], shape (n,).
         slope: Its slope over 0 to 5 % strain [Pa].
         slope_error: That slope over the measured one, less 1 [-].

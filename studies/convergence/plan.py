@@ -51,7 +51,13 @@ class CutDescription:
 
 @dataclass(frozen=True)
 class PlannedRun:
-    """One run. Attributes: axis that is varied (``repeat``: particles and the grid's place), its value, the scene."""
+    """One run.
+
+    Attributes:
+        axis: What is varied: ``dx``, or one of :data:`AXES`.
+        value: Its value; cell sizes in [m], of ``repeat`` the number of the run.
+        scene: The cut.
+    """
 
     axis: str
     value: float

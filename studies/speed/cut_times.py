@@ -23,7 +23,14 @@ SIZE_ABLATIONS = ("cells of two thirds", "27 particles a cell", "whole instead o
 
 @dataclass(frozen=True)
 class Variant:
-    """A way of simulating the same cut. Attributes: name; scene; runtime; physics: whether it is another food."""
+    """A way of simulating the same cut.
+
+    Attributes:
+        name: What is changed.
+        scene: The cut.
+        runtime: Device and threads.
+        physics: Whether it is another food, for which the reference is none.
+    """
 
     name: str
     scene: Scene

@@ -21,7 +21,13 @@ bounces faster than that; instability stays."""
 
 @dataclass(frozen=True)
 class Conservation:
-    """Attributes: reason, empty for a sound run; energy_gain [-]; momentum residual over the largest force [-]."""
+    """What was conserved in a run.
+
+    Attributes:
+        reason: Why the run is not sound, empty where it is.
+        energy_gain: Largest energy from nothing over what was put in [-], NaN where a number is not finite.
+        momentum: Momentum residual over the largest force [-], NaN where a number is not finite.
+    """
 
     reason: str
     energy_gain: float
