@@ -20,6 +20,7 @@ from typing import Any
 from calib._version import __version__
 from calib.material.food import load_foods
 from calib.material.knife import load_knives
+from cutcal.installation import overwritten
 from mpm.errors import CutcalError
 from mpm.material import Material
 from mpm.scene import EdgeLaw, Food, Knife, Motion, Numerics, Scene
@@ -81,6 +82,7 @@ def examine(folder: Path) -> Iterator[Finding]:
     """
     yield Finding("cutcal", "ok", f"{__version__}, Python {platform.python_version()}, {platform.platform()}")
     yield packages()
+    yield own_packages()
     yield _tried("foods and knives", _data, "install cutcal again")
     cpu, cache = device("cpu", "solver")
     yield cpu
@@ -115,6 +117,12 @@ def packages() -> Finding:
         return Finding("packages", "fail", f"missing: pip install {' '.join(missing)}")
     absent = f"; absent: {', '.join(without)}" if without else ""
     return Finding("packages", "ok", f"all {needed} are installed{absent}")
+
+
+def own_packages() -> Finding:
+    """Whether no other distribution has overwritten one of cutcal's packages."""
+    found = overwritten()
+    return Finding("own packages", "fail" if found else "ok", found.sentence() if found else "none is overwritten")
 
 
 def _installed(name: str) -> bool:
