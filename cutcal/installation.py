@@ -1,4 +1,7 @@
-"""Whether the packages of cutcal are still its own: two distributions may install files of one name, and pip says nothing of it."""
+"""Whether the packages of cutcal are still its own.
+
+Two distributions may install files of one name: the later one overwrites the earlier, and pip says nothing of it.
+"""
 
 from __future__ import annotations
 
