@@ -40,7 +40,7 @@ WANTED = FLESH.R * CUT.food.shape.width
 CLOSE = 0.05
 """Error of that force that passes; on the few coarse cells it is 1 %."""
 PATIENCE = 180.0
-"""Seconds after which a device that has not answered is given up; to compile for the first time takes a twentieth of it."""
+"""Seconds after which a device that has not answered is given up; compiling for the first time takes a twentieth."""
 DEVICES = {"cuda": "CUDA", "vulkan": "Vulkan"}
 EXTRAS = {
     "cluster": "--scheduler",
@@ -171,8 +171,8 @@ def robot() -> Finding:
             name, "absent", "ManiSkill is not installed; everything else works (pip install 'cutcal[robot]')"
         )
     remedy = (
-        "states and forces work, pictures do not: SAPIEN needs Vulkan with descriptorBindingPartiallyBound. Mesa 25 has "
-        "it (mesa-vulkan-drivers of Debian 13, or of Debian 12's backports), Debian 12's own 22.3 has not"
+        "states and forces work, pictures do not: SAPIEN needs Vulkan with descriptorBindingPartiallyBound. Mesa 25 "
+        "has it (mesa-vulkan-drivers of Debian 13, or of Debian 12's backports), Debian 12's own 22.3 has not"
     )
     code = "import sapien; sapien.render.RenderMaterial(); print('ManiSkill is installed and SAPIEN renders')"
     return _optional(name, code, remedy)
@@ -211,8 +211,8 @@ def device(arch: str, name: str) -> tuple[Finding, Path | None]:
     cache = Path(found["cache"]) if found["cache"] else None
     error = found["force_N"] / WANTED - 1
     words = (
-        f"a small cut needs {found['force_N']:.3g} N where R times the width is {WANTED:.3g} N; {whole:.0f} s with start "
-        f"and compilation, {found['seconds']:.1f} s without"
+        f"a small cut needs {found['force_N']:.3g} N where R times the width is {WANTED:.3g} N; {whole:.0f} s with "
+        f"start and compilation, {found['seconds']:.1f} s without"
     )
     if not (abs(error) <= CLOSE and found["balance"] < 1e-3):
         return Finding(name, "fail", f"{words}: this device computes wrongly; do not use it"), cache

@@ -38,7 +38,7 @@ class Misused(CutcalError):
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors are those of everything else: one line and exit code 1; 2 is of what ran and did not pass."""
+    """A parser whose errors are those of everything else: one line and exit code 1; 2 is what ran and did not pass."""
 
     def __init__(self, **how: Any) -> None:
         super().__init__(**{"formatter_class": Formatter, "add_help": False, **how})
