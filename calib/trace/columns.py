@@ -86,7 +86,10 @@ def choose(table: Table, role: str, wanted: str | None) -> Column:
     Args:
         table: The table.
         role: ``time``, ``force``, ``position`` or ``compression``.
-        wanted: Name of a column, or None.
+        wanted: Name of a column, or None to choose one by its name and unit.
+
+    Returns:
+        The column, with the factor that its unit and its name stand for.
 
     Raises:
         TraceError: There is no such column, no single one whose name fits, or a unit that is none of the role.
@@ -114,7 +117,14 @@ def choose(table: Table, role: str, wanted: str | None) -> Column:
 
 
 def numbers(table: Table, column: Column) -> np.ndarray:
-    """The numbers of a column in SI, shape (rows,).
+    """The numbers of a column.
+
+    Args:
+        table: The table.
+        column: One of its columns.
+
+    Returns:
+        The numbers in SI with our sign, shape (n,) for n rows [s], [N] or [m] by the column's role.
 
     Raises:
         TraceError: A cell holds no finite number, or one that is too large; the message names the first one.

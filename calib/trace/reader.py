@@ -26,6 +26,9 @@ def read_table(path: str | Path) -> Table:
         path: A CSV file with a header line, a JSON file of lists or records, or an HDF5 file (``file.h5``, or
             ``file.h5:/group`` for a group or data set in it).
 
+    Returns:
+        The table, its cells as the file holds them.
+
     Raises:
         TraceError: There is no such file, or it holds no table.
     """

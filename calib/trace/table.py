@@ -1,4 +1,4 @@
-"""Tables of measured columns as a file holds them; CSV, JSON and HDF5 have modules of their own."""
+"""A table of measured columns as a file holds it, and what the readers of all kinds of files share."""
 
 from __future__ import annotations
 
@@ -12,7 +12,12 @@ import numpy as np
 from calib.errors import TraceError
 from calib.io.wording import quoted
 
-LABELS = ("measured", "reconstructed")
+MEASURED, RECONSTRUCTED = "measured", "reconstructed"
+TRACE_LABELS = (MEASURED, RECONSTRUCTED)
+"""What a trace is said to be; nothing fitted to a reconstruction is validated."""
+
+Cells = Sequence[Any] | np.ndarray
+"""Cells of a column as a file holds them: text, numbers or whatever else."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +26,7 @@ class Table:
 
     Attributes:
         source: What errors call the table: file name, with the group of an HDF5 file.
-        columns: Cells of each column by name, as the file holds them: text, numbers or whatever else, n of each.
+        columns: Cells of each column by name, n of each.
         rows: What the file calls each row: line of a CSV file, index of a JSON list or of a data set, n of them.
         row: What such a number is: ``row`` or ``index``.
         sha256: SHA-256 of the file.
@@ -32,11 +37,11 @@ class Table:
     """
 
     source: str
-    columns: Mapping[str, Sequence[Any] | np.ndarray]
+    columns: Mapping[str, Cells]
     rows: Sequence[Any]
     row: str
     sha256: str
-    label: str = LABELS[0]
+    label: str = MEASURED
     units: Mapping[str, str] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -58,6 +63,14 @@ def as_float(cell: Any) -> float | None:
 
 def decoded(source: str, raw: bytes, kind: str) -> str:
     """The text of a file.
+
+    Args:
+        source: What errors call the file.
+        raw: Its content.
+        kind: What it should be, such as ``CSV``, for errors.
+
+    Returns:
+        The text, without a byte order mark.
 
     Raises:
         TraceError: It is not text.
