@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -76,7 +76,8 @@ class Case:
         shape, _ = specimen(self.food, None, Sizing())
         screening = cut_scene(self.food, shape, self.knife, coarse=True).numerics.dx
         dx = CELL_PER_ZONE * UNEVEN * max(screening, shape.height / MOST_CELLS)
-        return cut_scene(self.food, shape, self.knife, dx=dx, coarse=True, contact=self.contact, seed=seed)
+        scene = cut_scene(self.food, shape, self.knife, dx=dx, coarse=True, seed=seed)
+        return replace(scene, numerics=replace(scene.numerics, contact=self.contact))
 
     @property
     def cost(self) -> float:

@@ -25,7 +25,15 @@ from calib.io.folder import prepare, write_json
 from calib.io.provenance import code_key, key_of, versions
 from calib.material.food import load_food, load_foods
 from calib.material.knife import load_knife
-from calib.material.scene import Sizing, cut_scene, elsewhere, height_range, place, specimen, windowed
+from calib.material.scene import (
+    Sizing,
+    at_fitted_height,
+    cut_scene,
+    height_range,
+    specimen,
+    windowed,
+    with_other_particles,
+)
 from calib.problem.setup import fit_parameters, set_up
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_store import EvaluationStore, Header
@@ -111,7 +119,7 @@ def test_a_food_is_cut_where_it_is_asked_for():
     measured, _ = specimen(cucumber, None, Sizing(length=0.4, at=0.75))
     assert (measured.length, measured.cut) == pytest.approx((0.4, 0.1))
     scene = cut_scene(strawberry, berry, load_knife("kitchen"))
-    higher, _ = place(scene, {"height": 1.1 * berry.height})
+    higher, _ = at_fitted_height(scene, {"height": 1.1 * berry.height})
     assert higher.food.shape.cut == pytest.approx(1.1 * berry.cut)
 
 
@@ -120,7 +128,7 @@ def test_fitted_height_takes_the_other_sizes_along():
     food = load_food("cucumber")
     shape, _ = specimen(food, None, Sizing())
     scene = cut_scene(food, shape, load_knife("kitchen"), stroke=0.02)
-    higher, values = place(scene, {"E": 1e6, "height": 1.2 * shape.height}, kept=("width",))
+    higher, values = at_fitted_height(scene, {"E": 1e6, "height": 1.2 * shape.height}, kept=("width",))
     grown = higher.food.shape
     assert values == {"E": 1e6}
     assert (grown.height, grown.length) == pytest.approx((1.2 * shape.height, 1.2 * shape.length))
@@ -128,9 +136,9 @@ def test_fitted_height_takes_the_other_sizes_along():
     assert scene.numerics.far is not None
     assert higher.numerics == replace(scene.numerics, dx=1.2 * scene.numerics.dx, far=1.2 * scene.numerics.far)
     assert (higher.motion, higher.edge) == (scene.motion, scene.edge)
-    free, _ = place(scene, {"height": 1.2 * shape.height})
+    free, _ = at_fitted_height(scene, {"height": 1.2 * shape.height})
     assert len(seed(free).x) == len(seed(scene).x)
-    assert place(scene, {"E": 1e6}) == (scene, {"E": 1e6})
+    assert at_fitted_height(scene, {"E": 1e6}) == (scene, {"E": 1e6})
 
 
 def test_the_mean_over_a_cell_has_its_whole_window_up_to_the_end_of_the_trace(tmp_path):
@@ -142,7 +150,7 @@ def test_the_mean_over_a_cell_has_its_whole_window_up_to_the_end_of_the_trace(tm
     length, heights = setup.curve.stroke_length_m, setup.objective.parameters["height"]
     for scene in (setup.fine, setup.coarse):
         for height in (heights.low, heights.value, heights.high):
-            placed, _ = place(scene, {"height": height})
+            placed, _ = at_fitted_height(scene, {"height": height})
             assert length + 0.5 * placed.numerics.dx <= placed.motion.stroke * (1 + 1e-9)
             assert placed.motion.stroke <= height * (1 + 1e-9)
     measured = set_up(Calibration("cucumber", path, height=length + 1e-4).request())
@@ -231,16 +239,16 @@ def test_elsewhere_moves_the_grid_but_not_the_blades_plane():
     """
     food = load_food("banana")
     scene = cut_scene(food, specimen(food, None, Sizing())[0], load_knife("kitchen"))
-    moved = [elsewhere(scene, k) for k in (1, 2, 3)]
+    moved = [with_other_particles(scene, k) for k in (1, 2, 3)]
     for one in moved:
         x, y, z = one.numerics.grid_shift
         assert 0 < x < 1 and y == 0 and 0 < z < 1
         assert one.mirrors == (True, True) and one.mirrored_between
         assert replace(one, numerics=scene.numerics) == scene
     assert len({one.numerics.grid_shift for one in moved}) == len({one.numerics.seed for one in moved}) == 3
-    assert elsewhere(moved[0], 1).numerics.grid_shift[0] == 0.0
+    assert with_other_particles(moved[0], 1).numerics.grid_shift[0] == 0.0
     sliced = replace(scene, motion=replace(scene.motion, slice_ratio=1.0))
-    assert len({elsewhere(sliced, k).numerics.grid_shift[0] for k in (1, 2, 3)} - {0.0, 0.5}) == 3
+    assert len({with_other_particles(sliced, k).numerics.grid_shift[0] for k in (1, 2, 3)} - {0.0, 0.5}) == 3
 
 
 def test_verdicts_fail_what_fails():

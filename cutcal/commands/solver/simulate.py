@@ -109,21 +109,24 @@ def run(args: argparse.Namespace) -> int:
         knife,
         stroke=args.stroke,
         dx=args.dx,
-        mach=args.mach,
-        contact=args.contact,
-        grid_shift=(0.0, args.offset, 0.0),
         seed=args.seed,
     )
     scene = replace(
         scene,
         motion=replace(
             scene.motion,
+            mach=args.mach,
             slice_ratio=args.slice_ratio,
             tilt=math.radians(args.tilt),
             retract=args.retract,
             speed=args.speed,
         ),
-        numerics=replace(scene.numerics, grid_turn=math.radians(args.turn)),
+        numerics=replace(
+            scene.numerics,
+            contact=args.contact,
+            grid_shift=(0.0, args.offset, 0.0),
+            grid_turn=math.radians(args.turn),
+        ),
         arm=Arm(args.arm_stiffness, args.force_limit),
     )
     prepare(out, resume=False)

@@ -102,7 +102,7 @@ def test_words_are_those_of_the_code():
     assert set(of["intervalWord"]) == set(get_args(intervals.Verdict))
     assert set(of["verdictWord"]) == set(of["intervalWord"]) | {"only_as_product", summary.UNKNOWN}
     assert (of["shapeKind"], of["device"]) == (list(SHAPE_KINDS), list(ARCHES))
-    assert set(of["status"]) == {*properties.LITERATURE, *properties.OWN}
+    assert set(of["status"]) == {*properties.LITERATURE_STATUSES, *properties.OTHER_STATUSES}
     assert list(parts["energy"]["properties"]) == list(ENERGIES)
     assert schema("converge")["properties"]["verdict"]["enum"] == list(gci.VERDICTS)
     assert schema("simulate")["properties"]["contact"]["enum"] == list(CONTACTS)
