@@ -16,7 +16,7 @@ from calib.io.progress import Countdown
 from calib.io.provenance import code_key, git_commit, key_of, versions
 from calib.io.schema import tag
 from calib.material.scene import with_other_particles
-from calib.simulation.evaluation import PARTED, Evaluation, pressed_away
+from calib.simulation.evaluation import FULLY_PARTED, Evaluation, pressed_away
 from calib.simulation.evaluation_store import EvaluationStore, Header, content_key
 from calib.simulation.workers import Workers
 from calib.trace.filters import filter_simulated
@@ -120,7 +120,7 @@ def run(
     with EvaluationStore(out / "evaluations.h5", Header("", key_of(scene.as_dict())), resume=resume) as store:
         results = _evaluate(todo, store, pool, say)
     document = {"schema": tag("converge"), **about, **_conclude(todo, results, out)}
-    least = min((r.parted for r in results if r.parted < PARTED), default=None)
+    least = min((r.parted for r in results if r.parted < FULLY_PARTED), default=None)
     if least is not None:
         say(f"note: {pressed_away(least)}")
         document["warnings"] = [*about["warnings"], pressed_away(least)]

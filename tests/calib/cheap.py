@@ -13,6 +13,7 @@ import numpy as np
 from calib.io.provenance import key_of
 from calib.simulation import workers
 from calib.simulation.dask_cluster import Cluster
+from calib.simulation.evaluation import Evaluation
 from calib.simulation.process_pool import Pool
 from mpm.output.record import ForceRecord
 from mpm.scene import Scene
@@ -46,9 +47,9 @@ def cut(scene: Scene) -> ForceRecord:
     )
 
 
-def run(scene: Scene, values: dict[str, Any], arch: str, threads: int) -> dict[str, Any]:
+def run(scene: Scene, values: dict[str, Any], arch: str, threads: int) -> Evaluation:
     """In place of the candidate of a search."""
-    return workers.plain(_noted("run", scene.with_material(**values)))
+    return workers.evaluation_of(_noted("run", scene.with_material(**values)))
 
 
 def whole(scene: Scene, arch: str, threads: int) -> ForceRecord:

@@ -38,7 +38,7 @@ from calib.problem.setup import fit_parameters, set_up
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_store import EvaluationStore, Header
 from calib.simulation.process_pool import Pool
-from calib.simulation.workers import DIED, Errand, SceneEvaluator, plain
+from calib.simulation.workers import DIED, Errand, SceneEvaluator, evaluation_of
 from calib.trace.conditioning import condition
 from calib.trace.trace import Trace
 from calib.validation.acceptance import balances, changes, judge, limits, remedied, spent, unbooked
@@ -390,8 +390,7 @@ class FlakyPool(Pool):
             future.set_exception(BrokenProcessPool("killed"))
             return future
         curve = np.linspace(0, 1, 5)
-        done = {"status": "ok", "reason": "", "fraction": 1.0, "stroke": curve, "scalars": {}, "seconds": 0.1}
-        results = [done | {"force": job[1].get("E", 0.0) * curve} for job in jobs]
+        results = [Evaluation(0, {}, "ok", "", 1.0, curve, job[1].get("E", 0.0) * curve, {}, 0.1) for job in jobs]
         future.set_result(results if together else results[0])
         return future
 
@@ -413,9 +412,9 @@ def test_last_bits_of_a_force_are_not_kept() -> None:
     other = replace(record, edge=record.edge * (1 + 2e-15), stroke=record.stroke * (1 - 2e-16))
     assert (other.resolved != record.resolved).any() and (other.stroke != record.stroke).any()
     for key in ("stroke", "force"):
-        np.testing.assert_array_equal(plain(other)[key], plain(record)[key])
-    felt = plain(replace(record, edge=record.edge * (1 + 1e-6)))["force"]
-    assert np.abs(felt - plain(record)["force"]).max() == pytest.approx(1e-6 * record.edge.max(), rel=0.2)
+        np.testing.assert_array_equal(getattr(evaluation_of(other), key), getattr(evaluation_of(record), key))
+    felt = evaluation_of(replace(record, edge=record.edge * (1 + 1e-6))).force
+    assert np.abs(felt - evaluation_of(record).force).max() == pytest.approx(1e-6 * record.edge.max(), rel=0.2)
 
 
 def test_a_gpu_gets_all_that_is_asked_for_at_a_time() -> None:
