@@ -36,7 +36,7 @@ FETCH_S = 30.0  # time in which the result of a run that has ended must arrive
 DESERTED_S = 120.0  # time without any worker after which a command gives up; a nanny needs seconds to start another
 GREETINGS = 5  # attempts to be greeted by a scheduler that tells its clients news (docs/theory.md, "Measured choices")
 KILLS = 2  # workers that a job may kill
-EXECUTED = ("mpm", "calib", "fem_reference", "robot")  # packages whose code runs in workers
+EXECUTED = ("mpm", "fem_reference", "calib", "studies", "intsim")  # packages whose code runs in workers
 LOST = object()  # in place of the result of a job that did not come to its end
 
 
