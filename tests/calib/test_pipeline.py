@@ -107,7 +107,8 @@ def test_a_food_is_simulated_as_long_as_it_matters():
 
 
 def test_a_food_is_cut_where_it_is_asked_for():
-    """At a part of its length; of parallel sides no more than two heights on either side, and a fitted height moves the blade along."""
+    """At a part of its length; of parallel sides no more than two heights on either side, and a fitted height moves the
+    blade along."""
     cucumber, strawberry = load_food("cucumber"), load_food("strawberry")
     whole = cucumber.dims["length"].value
     shape, _ = specimen(cucumber, None, Sizing(at=0.25))
@@ -142,8 +143,8 @@ def test_fitted_height_takes_the_other_sizes_along():
 
 
 def test_the_mean_over_a_cell_has_its_whole_window_up_to_the_end_of_the_trace(tmp_path):
-    """Half a cell more is simulated than a trace that ends under load shows, at every height that is possible; one that cut through has the
-    food's whole height."""
+    """Half a cell more is simulated than a trace that ends under load shows, at every height that is possible; one that
+    cut through has the food's whole height."""
     path, raw = tmp_path / "loaded.csv", recorded(loaded=True)
     pd.DataFrame({"time_s": raw.time, "force_N": raw.force, "position_m": raw.position}).to_csv(path, index=False)
     setup = set_up(Calibration("cucumber", path).request())
@@ -160,7 +161,8 @@ def test_the_mean_over_a_cell_has_its_whole_window_up_to_the_end_of_the_trace(tm
 
 
 def test_a_repeated_run_is_compared_over_the_stroke_of_the_trace(tmp_path):
-    """What happens beyond the trace's end changes neither peak nor work; a run that broke down or felt nothing is said to."""
+    """What happens beyond the trace's end changes neither peak nor work; a run that broke down or felt nothing is said
+    to."""
     stroke = np.linspace(0.001, 0.02, 20)
     scalars = {"work_J": 1.0, "unbooked_J": 0.1}
     own = Evaluation(0, {}, "ok", "", 1.0, stroke, np.where(stroke < 0.0155, 10.0, 90.0), scalars)
@@ -213,7 +215,8 @@ def test_every_food_makes_a_scene_that_can_run(name):
 
 
 def test_scouts_differ_from_the_answer_in_cell_and_speed_alone():
-    """What a search learns from coarse runs is about the same specimen, edge and material; they are at four times the speed."""
+    """What a search learns from coarse runs is about the same specimen, edge and material; they are at four times the
+    speed."""
     setup = set_up(Calibration("banana", ROOT / "force_data" / "banana_reconstructed.csv").request())
     fine, coarse = setup.fine, setup.coarse
     assert coarse.motion == replace(fine.motion, mach=4 * fine.motion.mach)
@@ -346,7 +349,8 @@ def test_keys_follow_the_content():
 
 
 def test_code_is_the_same_in_a_checkout_and_installed(tmp_path, monkeypatch):
-    """The key of the code follows every module of the packages that are named, and not the data an installed one holds."""
+    """The key of the code follows every module of the packages that are named, and not the data an installed one
+    holds."""
     (tmp_path / "calib" / "part").mkdir(parents=True)
     (tmp_path / "calib" / "__init__.py").write_text("")
     monkeypatch.setattr("calib.io.provenance.PACKAGE", tmp_path / "calib")
@@ -405,8 +409,8 @@ def test_killed_worker_is_tried_once_more():
 
 
 def test_last_bits_of_a_force_are_not_kept() -> None:
-    """Another build of the solver, whose forces and strokes differ by rounding, gives a search the very same curve; a millionth of the peak
-    is still felt.
+    """Another build of the solver, whose forces and strokes differ by rounding, gives a search the very same curve; a
+    millionth of the peak is still felt.
     """
     record = cheap_cut(PRISM)
     other = replace(record, edge=record.edge * (1 + 2e-15), stroke=record.stroke * (1 - 2e-16))
@@ -418,8 +422,8 @@ def test_last_bits_of_a_force_are_not_kept() -> None:
 
 
 def test_a_gpu_gets_all_that_is_asked_for_at_a_time() -> None:
-    """Five candidates, four at a time: two launches in one process, each result with its own values. Where the first kills its process
-    twice, its four are tried by themselves, and nothing is lost.
+    """Five candidates, four at a time: two launches in one process, each result with its own values. Where the first
+    kills its process twice, its four are tried by themselves, and nothing is lost.
     """
     batch = [{"E": float(k)} for k in range(5)]
     for deaths, sizes in ((0, [4, 1]), (2, [4, 4, 1, 1, 1, 1, 1])):
@@ -501,8 +505,8 @@ def test_what_a_worker_has_compiled_is_kept(tmp_path, monkeypatch):
 
 
 def test_killed_last_run_is_made_once_more():
-    """The full record of the best values survives one death; after two the message says what is kept and what to do. A check
-    that is killed twice is kept as one that broke down."""
+    """The full record of the best values survives one death; after two the message says what is kept and what to do. A
+    check that is killed twice is kept as one that broke down."""
     kept: list[Any] = []
     LastRun(1).errands([Errand(PRISM, kept.append, whole=True)])
     assert kept == ["the record"]
@@ -514,8 +518,8 @@ def test_killed_last_run_is_made_once_more():
 
 
 def test_an_errand_that_was_begun_is_made_once(tmp_path, monkeypatch):
-    """Beside other runs, kept when it is there, not asked for again; dropped where it is not wanted; made again where its process
-    was killed."""
+    """Beside other runs, kept when it is there, not asked for again; dropped where it is not wanted; made again where
+    its process was killed."""
     log = tmp_path / "log"
     monkeypatch.setenv(LOG, str(log))
     monkeypatch.setenv(SECONDS, "0.3")
@@ -605,10 +609,12 @@ def _alive(process: int) -> bool:
 
 
 def test_imports_stay_light():
-    """Importing calib and mpm loads neither Taichi nor any plotting nor Dask; nothing is printed, and Taichi will call nobody."""
+    """Importing calib and mpm loads neither Taichi nor any plotting nor Dask; nothing is printed, and Taichi will call
+    nobody."""
     code = (
         "import os, sys, cutcal.main\n"
-        "again = {'numpy', 'pandas', 'mpm', 'cutcal.commands.calibration.calibrate'} & set(sys.modules)\n"  # in every worker, as its program
+        # in every worker, as its program
+        "again = {'numpy', 'pandas', 'mpm', 'cutcal.commands.calibration.calibrate'} & set(sys.modules)\n"
         "assert not again, again\n"
         "import calib, mpm, calib.calibration.run\n"
         "assert os.environ['TI_SKIP_VERSION_CHECK'] == 'ON'\n"

@@ -25,7 +25,8 @@ def test_another_search_is_told_as_part_of_all() -> None:
 
 
 def test_time_left_is_that_of_default_runs() -> None:
-    """Coarse runs take less of the time than of the budget, and the rest may be spent on default ones; with no such run yet they tell."""
+    """Coarse runs take less of the time than of the budget, and the rest may be spent on default ones; with no such run
+    yet they tell."""
     runs = [
         SimpleNamespace(coarse=coarse, evaluation=SimpleNamespace(seconds=s))
         for coarse, s in ((True, 0.5), (True, 0.7), (False, 6.0), (False, 8.0))

@@ -145,7 +145,8 @@ def test_calibrations_of_every_end_are_documents(kind):
 
 @pytest.mark.parametrize("name", DOCUMENTS)
 def test_what_is_wrong_in_one_place_is_refused(name):
-    """No key may be missing or be another one's; a number is no text with a unit and no NaN, a word none that nobody knows."""
+    """No key may be missing or be another one's; a number is no text with a unit and no NaN, a word none that nobody
+    knows."""
     document = valid(DOCUMENTS[name]())
     own, good = schema(name), validator(name).is_valid
     maps = {k for k, part in own["properties"].items() if isinstance(part.get("additionalProperties"), dict)}
@@ -219,7 +220,8 @@ def test_a_written_report_is_a_document(printed, tmp_path, monkeypatch):
 
 
 def test_schemas_are_listed_and_printed(capsys):
-    """``cutcal schema`` lists them; a name or the tag of a document prints one that needs no other file; a slip is named."""
+    """``cutcal schema`` lists them; a name or the tag of a document prints one that needs no other file; a slip is
+    named."""
     assert main(["schema"]) == 0
     assert capsys.readouterr().out.split() == names()
     for name in ("stress", tag("stress")):

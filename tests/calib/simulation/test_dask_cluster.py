@@ -1,4 +1,5 @@
-"""A real Dask cluster on this machine: the same bits as here, nothing lost with a worker, one clear error for the rest."""
+"""A real Dask cluster on this machine: the same bits as here, nothing lost with a worker, one clear error for the
+rest."""
 
 from __future__ import annotations
 
