@@ -16,7 +16,7 @@ from calib.errors import OutputError
 from calib.io.progress import Progress
 from calib.io.wording import brief
 from calib.material.food import FoodSpec, load_material_file
-from calib.material.scene import MIDDLE, Sizing
+from calib.material.scene import MID_LENGTH, Sizing
 from calib.problem.request import Request
 from calib.trace.trace import Trace, read_trace
 from mpm.errors import CutcalError, check_number
@@ -73,7 +73,7 @@ class Calibration:
     height: float | None = None
     width: float | None = None
     length: float | None = None
-    at: float = MIDDLE
+    at: float = MID_LENGTH
     fit: Sequence[str] | None = None
     dx: float | None = None
     budget: float = 100

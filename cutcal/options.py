@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 
 from calib.io.folder import finite
 from calib.material.food import FoodSpec, check_override, load_food, load_material_file
-from calib.material.scene import MIDDLE, Sizing
+from calib.material.scene import MID_LENGTH, Sizing
 from calib.simulation.dask_cluster import Cluster
 from calib.simulation.process_pool import Pool
 from calib.simulation.workers import Workers
@@ -127,7 +127,7 @@ def add_food(p: Group, *, cell: bool = True, required: bool = True) -> None:
     p.add_argument(
         "--at",
         type=number(0, 1, ""),
-        default=MIDDLE,
+        default=MID_LENGTH,
         metavar="PART",
         help="place of the blade, part of the length (default 0.5)",
     )

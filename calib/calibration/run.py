@@ -17,7 +17,7 @@ from calib.io.folder import prepare, write_csv, write_json
 from calib.io.progress import Progress
 from calib.io.provenance import code_key, key_of
 from calib.material.food import FoodSpec, dump_material
-from calib.material.scene import place
+from calib.material.scene import at_fitted_height
 from calib.problem.request import Request, Setup
 from calib.problem.setup import set_up
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, Header
@@ -82,7 +82,7 @@ def run(
 
         def begin(found: FitResult) -> None:
             """The longest of the last simulations, beside those of the intervals."""
-            scene, values = place(setup.fine, found.best.evaluation.parameters, setup.kept)
+            scene, values = at_fitted_height(setup.fine, found.best.evaluation.parameters, setup.kept)
             for errand in sorted(check_errands(scene.with_material(**values), store), key=lambda e: e.haste)[:1]:
                 pool.begin(errand)
 
@@ -97,7 +97,7 @@ def run(
             say=say,
             found=begin,
         )
-        scene, values = place(setup.fine, result.best.evaluation.parameters, setup.kept)
+        scene, values = at_fitted_height(setup.fine, result.best.evaluation.parameters, setup.kept)
         first, setup = setup, replace(setup, fine=scene)
         scene = scene.with_material(**values)
         errands, ended = record_errands(scene, out / "record.h5"), result.status != "interrupted"
@@ -121,7 +121,7 @@ def _literature(setup: Setup) -> dict[str, float]:
 def _start_errands(setup: Setup, fine: CachedEvaluator) -> list[Errand]:
     """The simulation of the literature values, where the search has not made it."""
     keep = fine.keeper(_literature(setup))
-    scene, values = place(setup.fine, _literature(setup), setup.kept)
+    scene, values = at_fitted_height(setup.fine, _literature(setup), setup.kept)
     return [] if keep is None else [Errand(scene.with_material(**values), keep)]
 
 
@@ -163,7 +163,7 @@ def _write(
 
 def _fitted_food(request: Request, setup: Setup, parameters: Mapping[str, float]) -> FoodSpec:
     """The food with the fitted values, and the specimen's height (and width, unless measured) where it was fitted."""
-    _, values = place(setup.fine, parameters)
+    _, values = at_fitted_height(setup.fine, parameters)
     how = {"status": "fitted", "source": f"fitted to {setup.curve.trace.source}"}
     food = request.food.with_values(values, **how)
     if len(values) == len(parameters):

@@ -13,21 +13,20 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
+from calib.fit.budget import progress_of_all
 from calib.fit.options import FitOptions
 from calib.fit.search import CAUTION_NEAR, ELSEWHERE, Search
 from calib.fit.surrogate import Surrogate
-from calib.io.progress import Progress, onward
+from calib.io.progress import Progress
 from calib.problem.joint_objective import JointObjective
 from calib.problem.objective import Objective, Trial
 from calib.problem.parameters import ParameterSet
 from calib.simulation.evaluation import Evaluator
+from mpm.arrays import FloatArray
 from mpm.errors import SimulationError
-
-FloatArray = npt.NDArray[np.float64]
 
 #: Runs among which the answer is chosen by a second run of each, slower and with other particles: two batches of two.  They
 #: may be expected to be worse than the best by what the noise of two runs makes.
@@ -144,7 +143,7 @@ def _afresh(search: Search, evaluator: Evaluator, coarse: Evaluator | None) -> s
     rest = options.budget - search.spent
     if rest < least or search.idle or search.best.misfit <= chi2.median(goal.effective_rows):
         return "stalled"
-    first, told = search.best, onward(search.progress, search.trials, search.best, options)
+    first, told = search.best, progress_of_all(search.progress, search.trials, search.best, options)
     other = Search(goal, evaluator, coarse, replace(options, budget=rest, seed=options.seed + AFRESH), told)
     try:
         status = other.run()

@@ -30,20 +30,19 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import minimize_scalar
 from scipy.stats import chi2, qmc
 
+from calib.fit.budget import longest_time_left, progress_of_all
 from calib.fit.options import FitOptions
 from calib.fit.surrogate import Surrogate, coordinate_unit
-from calib.io.progress import Progress, at_most, onward
+from calib.io.progress import Progress
 from calib.problem.joint_objective import JointObjective, residual
 from calib.problem.objective import Objective, Trial
 from calib.simulation.evaluation import Evaluation, Evaluator
 from calib.uncertainty.intervals import EXPLAINED
+from mpm.arrays import FloatArray
 from mpm.errors import SimulationError
-
-FloatArray = npt.NDArray[np.float64]
 
 #: Points are rounded to this part of a coordinate unit (0.1 % of a log parameter): far below the noise of a
 #: run, and a resumed fit asks for exactly the points that are in the store.
@@ -212,7 +211,7 @@ class Search:
             budget=min(self.options.budget, rest / SCREENING),
             seed=self.options.seed + ANOTHER * self.anew,
         )
-        told = onward(self.progress, self.trials, self.best, self.options)
+        told = progress_of_all(self.progress, self.trials, self.best, self.options)
         other = Search(self.objective, self.fine, self.coarse, own, told, self.enough)
         try:
             points = other._screen([])
@@ -381,7 +380,7 @@ class Search:
                 budget=self.options.budget,
                 failed=sum(not t.ok for t in self.trials),
                 misfit=misfit,
-                eta_s=at_most(self.trials, self.options.budget - self.spent, self.options),
+                eta_s=longest_time_left(self.trials, self.options.budget - self.spent, self.options),
                 stage=f"{stage} on coarse cells" if self.trials[-1].coarse else stage,
             )
         )

@@ -1,8 +1,8 @@
 """The JSON documents of the command line: which there are, and the schema of each.
 
-A document that is an object says in ``schema`` which one it is, as ``cutcal/NAME/VERSION``; the lists of names cannot. The version
-rises when a key is taken away or comes to mean something else, not when one is added. The schemas are closed: an object whose keys
-are listed has no others.
+A document that is an object says in ``schema`` which one it is, as ``cutcal/NAME/VERSION``; the lists of names cannot.
+The version rises when a key is taken away or comes to mean something else, not when one is added. The schemas are
+closed: an object whose keys are listed has no others.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from calib.io.progress import Progress
 from calib.io.provenance import git_commit, key_of, versions
 from calib.io.schema import tag
 from calib.material.food import FoodSpec, dump_material
-from calib.material.scene import place
+from calib.material.scene import at_fitted_height
 from calib.multi_specimen.held_out import Prediction, predict
 from calib.multi_specimen.specimens import Fitted, Specimens, pressed, set_ups
 from calib.multi_specimen.study_file import Study
@@ -131,7 +131,7 @@ def _always_out(specimens: Specimens) -> tuple[str, ...]:
 def _scene(specimens: Specimens, fitted: Fitted, name: str) -> Scene:
     """One fitted cut at the values of the fit."""
     setup = specimens.setups[name]
-    scene, values = place(setup.fine, fitted.values(name), setup.kept)
+    scene, values = at_fitted_height(setup.fine, fitted.values(name), setup.kept)
     return scene.with_material(**values)
 
 

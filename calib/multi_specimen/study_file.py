@@ -21,10 +21,10 @@ from typing import Any
 
 from calib.errors import MaterialError
 from calib.io.progress import Progress
-from calib.io.yaml_checks import Place, check_keys, choice, mapping, number, read_yaml, text
+from calib.io.yaml_checks import Place, check_keys, choice, finite_number, mapping, read_yaml, text
 from calib.material.food import FoodSpec, load_food, load_material_file
 from calib.material.properties import check_override
-from calib.material.scene import MIDDLE, Sizing
+from calib.material.scene import MID_LENGTH, Sizing
 from calib.problem.parameters import OF
 from calib.problem.request import Request
 
@@ -141,8 +141,8 @@ def read_study(path: Path | str) -> Study:
         trace=folder,
         fit=_names(top.at("fit"), content.get("fit")),
         dx=_number(top, content, "dx"),
-        seed=int(number(top.at("seed"), content.get("seed", 0))),
-        budget=number(top.at("budget"), content.get("budget", 100)),
+        seed=int(finite_number(top.at("seed"), content.get("seed", 0))),
+        budget=finite_number(top.at("budget"), content.get("budget", 100)),
         scaled=True,
         knife=text(top.at("knife"), content.get("knife", "kitchen")),
     )
@@ -186,7 +186,9 @@ def _food(top: Place, content: Mapping[str, Any], folder: Path) -> FoodSpec:
     if given is None:
         return food
     place = top.at("set")
-    return food.with_values({n: check_override(n, number(place.at(n), x)) for n, x in mapping(place, given).items()})
+    return food.with_values(
+        {n: check_override(n, finite_number(place.at(n), x)) for n, x in mapping(place, given).items()}
+    )
 
 
 def _request(place: Place, given: Mapping[str, Any], folder: Path, base: Request) -> Request:
@@ -200,7 +202,9 @@ def _request(place: Place, given: Mapping[str, Any], folder: Path, base: Request
         air=None if air is None else folder / text(place.at("air"), air),
         columns={n: words[n] for n in ("time_col", "force_col", "position_col", "depth_col", "sign")},
         knife=_knife(words["knife"] or base.knife, folder),
-        sizing=Sizing(words["shape"], numbers["height"], numbers["width"], numbers["length"], numbers["at"] or MIDDLE),
+        sizing=Sizing(
+            words["shape"], numbers["height"], numbers["width"], numbers["length"], numbers["at"] or MID_LENGTH
+        ),
         speed=numbers["speed"],
         t_end=numbers["t_end"],
         gain_sd=numbers["gain_sd"],
@@ -217,10 +221,10 @@ def _press(place: Place, name: str, given: Mapping[str, Any], folder: Path) -> P
     check_keys(place, given, ("kind", "trace", "height", "nu"), SIZES)
     raw = given["trace"] if isinstance(given["trace"], list) else [given["trace"]]
     files = tuple(folder / text(place.at("trace"), entry) for entry in raw)
-    sizes = {n: number(place.at(n), given[n]) for n in SIZES if n in given}
+    sizes = {n: finite_number(place.at(n), given[n]) for n in SIZES if n in given}
     if ("diameter" in sizes) == ("width" in sizes and "length" in sizes):
         raise place.error("give height and diameter of an upright cylinder, or height, width and length of a block [m]")
-    return Press(name, files, sizes, number(place.at("nu"), given["nu"]))
+    return Press(name, files, sizes, finite_number(place.at("nu"), given["nu"]))
 
 
 def _hold_out(place: Place, given: Any, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -236,7 +240,7 @@ def _hold_out(place: Place, given: Any, names: tuple[str, ...]) -> tuple[str, ..
 
 
 def _scatter(place: Place, given: Any) -> float:
-    x = number(place, given)
+    x = finite_number(place, given)
     if not 0.0 <= x <= MOST_SCATTER:
         raise place.error(f"is {x:g}; give 0 to {MOST_SCATTER:g}, the standard deviation of a logarithm")
     return x
@@ -253,7 +257,7 @@ def _names(place: Place, given: Any) -> tuple[str, ...] | None:
 def _number(place: Place, given: Mapping[str, Any], name: str) -> float | None:
     if given.get(name) is None:
         return None
-    x = number(place.at(name), given[name])
+    x = finite_number(place.at(name), given[name])
     if not x > 0.0:
         raise place.at(name).error(f"is {x:g}; it must be positive")
     return x

@@ -11,7 +11,7 @@ from calib.material.food import FoodSpec
 from calib.material.scene import Sizing
 from calib.problem.objective import ErrorModel, Objective
 from calib.trace.conditioning import Conditioned
-from calib.trace.table import split_address
+from calib.trace.reader import split_address
 from calib.trace.trace import Trace, read_trace
 from mpm.scene import Scene
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from calib.errors import PublishedError
-from calib.io.yaml_checks import Place, check_keys, choice, mapping, number, read_yaml, text
+from calib.io.yaml_checks import Place, check_keys, choice, finite_number, mapping, read_yaml, text
 from calib.material.food import FoodSpec, load_food, read_property
 from calib.material.knife import load_knife
 from calib.material.properties import DIMENSIONS, Rule
@@ -237,7 +237,7 @@ def _scalars(place: Place, raw: Any) -> tuple[Scalar, ...]:
         here = place.at(quantity)
         one = mapping(here, entry)
         check_keys(here, one, ("value", "relative_sd"), ("source",), _SYNONYMS)
-        value = number(here.at("value"), one["value"])
+        value = finite_number(here.at("value"), one["value"])
         if value <= 0:
             raise here.at("value").error(f"is {value:g}; {QUANTITIES[quantity]} of a cut is positive")
         if "source" in one:
@@ -248,7 +248,7 @@ def _scalars(place: Place, raw: Any) -> tuple[Scalar, ...]:
 
 def _size(place: Place, raw: Any, rule: Rule) -> float:
     """A size of a specimen [m]."""
-    value = number(place, raw)
+    value = finite_number(place, raw)
     if not rule.low <= value <= rule.high:
         raise place.error(f"is {value:g} m, but must lie between {rule.low:g} and {rule.high:g} m; write metres")
     return value
@@ -256,7 +256,7 @@ def _size(place: Place, raw: Any, rule: Rule) -> float:
 
 def _within(place: Place, raw: Any, high: float) -> float:
     """A positive fraction."""
-    value = number(place, raw)
+    value = finite_number(place, raw)
     if not 0.0 < value <= high:
         raise place.error(f"is {value:g}, but must lie above 0 and at most at {high:g} (0.05 is 5 %)")
     return value

@@ -14,15 +14,15 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
+from calib.fit.budget import progress_of_all
 from calib.fit.multistart import FitResult, calibrate
 from calib.fit.options import FitOptions
 from calib.fit.search import Search
 from calib.fit.surrogate import Surrogate
-from calib.io.progress import Progress, onward
+from calib.io.progress import Progress
 from calib.problem.joint_objective import JointObjective
 from calib.problem.objective import Objective, Trial
 from calib.problem.parameters import ParameterSet, plain
@@ -30,9 +30,8 @@ from calib.simulation.evaluation import Evaluator
 from calib.uncertainty.analysis import Doubt, as_good, at_first_sight, doubt_of
 from calib.uncertainty.intervals import EXPLAINED, Interval
 from calib.uncertainty.profile_likelihood import RISE
+from mpm.arrays import FloatArray
 from mpm.errors import SimulationError
-
-FloatArray = npt.NDArray[np.float64]
 
 PROVEN = ("R", "R_skin")
 """Properties that a fit may claim: of 100 made-up bananas 28 of 28 and 15 of 15 such intervals held the truth. Of E, yield stress and initiation
@@ -162,7 +161,7 @@ def _searched(
     progress: Callable[[Progress], None] | None,
 ) -> FitResult:
     """The fit with the runs of a second search, for a food with one of the claimed parameters elsewhere."""
-    told = onward(progress, first.history, first.best, options)
+    told = progress_of_all(progress, first.history, first.best, options)
     own = replace(options, budget=options.budget - options.cost(first.history), seed=options.seed + OTHERWISE)
     barred = replace(objective, parameters=_barred(objective.parameters, claimed))
     search = Search(barred, fine, coarse, own, told, first.best.misfit + RISE)

@@ -9,7 +9,7 @@ from typing import Any
 
 from calib.problem.nuisance import OUTSIDE
 from calib.problem.parameters import plain
-from calib.simulation.evaluation import PARTED
+from calib.simulation.evaluation import FULLY_PARTED
 from calib.validation.metrics import Metrics
 from calib.validation.numerical_checks import FINER, FINER_GRID, Check
 
@@ -22,7 +22,7 @@ SHAPE_LIMIT = 0.08
 MOMENTUM_LIMIT = 0.01
 CHANGE_LIMIT = 0.05  # of peak and work by numerical choices: as much as the peak may miss the trace
 LOSS_LIMIT = 0.05  # energy lost by the discretisation, of all work: the force is too large by about that
-PRESSED, PRESSED_LIMIT = "food pressed away, not parted", round(1.0 - PARTED, 6)
+PRESSED, PRESSED_LIMIT = "food pressed away, not parted", round(1.0 - FULLY_PARTED, 6)
 KINETIC_LIMIT = 0.10  # explicit quasi-static practice: kinetic energy below 5 to 10 % of internal energy
 # Ends of what is physically possible: a fit that ends there found a one-sided answer (the cut shows no friction, say),
 # whereas one that ends on a bound of ours asks for a value that it was not allowed.

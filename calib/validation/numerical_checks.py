@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from calib.io.provenance import code_key
-from calib.material.scene import elsewhere
+from calib.material.scene import with_other_particles
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_store import EvaluationStore, content_key
 from calib.simulation.workers import Errand
@@ -28,13 +28,13 @@ def _finer(scene: Scene) -> Scene:
 
 def otherwise(scene: Scene) -> Scene:
     """The scene at half the speed, with other particles and the grid elsewhere: what an answer should not depend on."""
-    return elsewhere(_slower(scene), 2)
+    return with_other_particles(_slower(scene), 2)
 
 
 FINER_GRID = "cells of two thirds"
 VARIANTS: Mapping[str, Callable[[Scene], Scene]] = {
     "half the simulated speed": _slower,
-    "grid and particles elsewhere": lambda scene: elsewhere(scene, 1),
+    "grid and particles elsewhere": lambda scene: with_other_particles(scene, 1),
     FINER_GRID: _finer,
 }
 """What should not matter, by name. The order of convergence, and an uncertainty, are the business of a convergence study."""

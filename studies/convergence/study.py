@@ -15,8 +15,8 @@ from calib.io.folder import prepare, write_csv, write_json
 from calib.io.progress import Countdown
 from calib.io.provenance import code_key, git_commit, key_of, versions
 from calib.io.schema import tag
-from calib.material.scene import elsewhere
-from calib.simulation.evaluation import PARTED, Evaluation, pressed_away
+from calib.material.scene import with_other_particles
+from calib.simulation.evaluation import FULLY_PARTED, Evaluation, pressed_away
 from calib.simulation.evaluation_store import EvaluationStore, Header, content_key
 from calib.simulation.workers import Workers
 from calib.trace.filters import filter_simulated
@@ -82,7 +82,7 @@ def cases(scene: Scene, axes: Mapping[str, Sequence[float]], repeats: int) -> li
         out.append(Case("offset", value, replace(base, numerics=shifted)))
     own = out[min(1, len(cells) - 2)].scene
     for k in range(1, repeats + 1):
-        out.append(Case("repeat", k, elsewhere(own, k)))
+        out.append(Case("repeat", k, with_other_particles(own, k)))
     return out
 
 
@@ -120,7 +120,7 @@ def run(
     with EvaluationStore(out / "evaluations.h5", Header("", key_of(scene.as_dict())), resume=resume) as store:
         results = _evaluate(todo, store, pool, say)
     document = {"schema": tag("converge"), **about, **_conclude(todo, results, out)}
-    least = min((r.parted for r in results if r.parted < PARTED), default=None)
+    least = min((r.parted for r in results if r.parted < FULLY_PARTED), default=None)
     if least is not None:
         say(f"note: {pressed_away(least)}")
         document["warnings"] = [*about["warnings"], pressed_away(least)]

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import t as student
 
 from calib.io.provenance import key_of
 from calib.material.food import FoodSpec
 from calib.material.scene import CELL_PER_ZONE, Sizing, cut_scene, specimen
+from mpm.arrays import FloatArray
 from mpm.output.record import ForceRecord
 from mpm.scene import CONTACTS, Knife, Scene
 from mpm.shapes import volume
 from studies.convergence.gci import REPEATABILITY
 from studies.regression.reference_curves import CHECKED
-
-FloatArray = npt.NDArray[np.float64]
 
 KNIFE = "kitchen"  # of every recorded cut
 MOST_CELLS = 12
@@ -78,7 +76,8 @@ class Case:
         shape, _ = specimen(self.food, None, Sizing())
         screening = cut_scene(self.food, shape, self.knife, coarse=True).numerics.dx
         dx = CELL_PER_ZONE * UNEVEN * max(screening, shape.height / MOST_CELLS)
-        return cut_scene(self.food, shape, self.knife, dx=dx, coarse=True, contact=self.contact, seed=seed)
+        scene = cut_scene(self.food, shape, self.knife, dx=dx, coarse=True, seed=seed)
+        return replace(scene, numerics=replace(scene.numerics, contact=self.contact))
 
     @property
     def cost(self) -> float:

@@ -15,7 +15,7 @@ from calib.io.provenance import git_commit, versions
 from calib.io.schema import tag
 from calib.material.knife import load_knife
 from calib.material.scene import cut_scene, specimen
-from calib.simulation.evaluation import PARTED, pressed_away
+from calib.simulation.evaluation import FULLY_PARTED, pressed_away
 from calib.validation.acceptance import spent, unbooked
 from cutcal.options import (
     add_food,
@@ -109,21 +109,24 @@ def run(args: argparse.Namespace) -> int:
         knife,
         stroke=args.stroke,
         dx=args.dx,
-        mach=args.mach,
-        contact=args.contact,
-        grid_shift=(0.0, args.offset, 0.0),
         seed=args.seed,
     )
     scene = replace(
         scene,
         motion=replace(
             scene.motion,
+            mach=args.mach,
             slice_ratio=args.slice_ratio,
             tilt=math.radians(args.tilt),
             retract=args.retract,
             speed=args.speed,
         ),
-        numerics=replace(scene.numerics, grid_turn=math.radians(args.turn)),
+        numerics=replace(
+            scene.numerics,
+            contact=args.contact,
+            grid_shift=(0.0, args.offset, 0.0),
+            grid_turn=math.radians(args.turn),
+        ),
         arm=Arm(args.arm_stiffness, args.force_limit),
     )
     prepare(out, resume=False)
@@ -144,7 +147,7 @@ def run(args: argparse.Namespace) -> int:
     if sys.stderr.isatty():
         print(file=sys.stderr)
     write_csv(out / "force.csv", record.columns())
-    if record.parted < PARTED:
+    if record.parted < FULLY_PARTED:
         assumed.append(pressed_away(record.parted))
         note(assumed[-1])
     summary = {

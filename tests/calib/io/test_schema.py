@@ -102,7 +102,7 @@ def test_words_are_those_of_the_code():
     assert set(of["intervalWord"]) == set(get_args(intervals.Verdict))
     assert set(of["verdictWord"]) == set(of["intervalWord"]) | {"only_as_product", summary.UNKNOWN}
     assert (of["shapeKind"], of["device"]) == (list(SHAPE_KINDS), list(ARCHES))
-    assert set(of["status"]) == {*properties.LITERATURE, *properties.OWN}
+    assert set(of["status"]) == {*properties.LITERATURE_STATUSES, *properties.OTHER_STATUSES}
     assert list(parts["energy"]["properties"]) == list(ENERGIES)
     assert schema("converge")["properties"]["verdict"]["enum"] == list(gci.VERDICTS)
     assert schema("simulate")["properties"]["contact"]["enum"] == list(CONTACTS)
@@ -145,7 +145,8 @@ def test_calibrations_of_every_end_are_documents(kind):
 
 @pytest.mark.parametrize("name", DOCUMENTS)
 def test_what_is_wrong_in_one_place_is_refused(name):
-    """No key may be missing or be another one's; a number is no text with a unit and no NaN, a word none that nobody knows."""
+    """No key may be missing or be another one's; a number is no text with a unit and no NaN, a word none that nobody
+    knows."""
     document = valid(DOCUMENTS[name]())
     own, good = schema(name), validator(name).is_valid
     maps = {k for k, part in own["properties"].items() if isinstance(part.get("additionalProperties"), dict)}
@@ -219,7 +220,8 @@ def test_a_written_report_is_a_document(printed, tmp_path, monkeypatch):
 
 
 def test_schemas_are_listed_and_printed(capsys):
-    """``cutcal schema`` lists them; a name or the tag of a document prints one that needs no other file; a slip is named."""
+    """``cutcal schema`` lists them; a name or the tag of a document prints one that needs no other file; a slip is
+    named."""
     assert main(["schema"]) == 0
     assert capsys.readouterr().out.split() == names()
     for name in ("stress", tag("stress")):

@@ -14,7 +14,7 @@ import pytest
 
 import cutcal.commands.calibration.calibrate
 from calib.material.food import load_material_file
-from calib.material.scene import place
+from calib.material.scene import at_fitted_height
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.workers import Errand, Workers
 from cutcal.main import main
@@ -244,6 +244,6 @@ def test_a_fake_scene_is_a_real_one() -> None:
 
     food = load_food("banana")
     scene = cut_scene(food, specimen(food, None, Sizing())[0], Knife("k", 2e-3, 0.2, 0.02, 0.1))
-    taller, rest = place(scene, {"height": 0.04, "R": 300.0})
+    taller, rest = at_fitted_height(scene, {"height": 0.04, "R": 300.0})
     assert rest == {"R": 300.0} and taller.food.shape.height == 0.04
     assert replace(scene, food=taller.food) != scene
