@@ -57,7 +57,7 @@ def run(
     Raises:
         CutcalError: Anything wrong with the input; nothing that was computed is lost.
     """
-    from reports.study import write_report
+    from reports.multi_specimen import write_report
 
     say = say or (lambda text: None)
     began = time.monotonic()

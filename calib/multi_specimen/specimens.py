@@ -7,13 +7,13 @@ predicted with the flesh of the others: only what its own specimen has for itsel
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
-from calib.compression.measured import area, read_repeats, strain_grid
-from calib.compression.modulus import fit
-from calib.compression.press import UnitCurve, homogeneous
+from calib.compression.measured import read_repeats, strain_grid
+from calib.compression.modulus import fit_modulus
+from calib.compression.press import homogeneous
 from calib.fit.multistart import FitResult
 from calib.fit.options import FitOptions
 from calib.io.progress import Progress
@@ -67,9 +67,9 @@ def pressed(press: Press) -> Pressed:
     shape = Shape(kind, sizes.get("length", wide), wide, sizes["height"])
     measured = read_repeats(press.traces, shape, PRESS_STRAIN)
     grid = strain_grid(PRESS_STRAIN)
-    found = fit(measured, UnitCurve(grid, homogeneous(press.nu, grid), {"area_m2": area(shape)}))
+    found = fit_modulus(measured, homogeneous(press.nu, grid))
     spread = float(np.hypot(found.sd / found.mean if len(found.E) > 1 else 0.0, PLATES))
-    return Pressed(press.name, found.mean, spread, len(found.E), press.nu, measured.files)
+    return Pressed(press.name, found.mean, spread, len(found.E), press.nu, [asdict(f) for f in measured.files])
 
 
 def pinned(parameters: ParameterSet, tests: Sequence[Pressed]) -> ParameterSet:

@@ -38,8 +38,12 @@ def writer(folder: Path) -> Callable[[Path], Path]:
     Raises:
         ReportError: The folder is missing, or holds no finished run.
     """
-    from reports import bench, convergence, stability, study, verification
+    from reports import multi_specimen
     from reports.calibration import report
+    from studies.convergence import result as convergence
+    from studies.speed import result as bench
+    from studies.stability import result as stability
+    from studies.verification import result as verification
 
     found: dict[str, Callable[[Path], Path]] = {
         "converge.json": convergence.write_report,
@@ -56,4 +60,4 @@ def writer(folder: Path) -> Callable[[Path], Path]:
     if not summary.exists():
         names = ", ".join(("summary.json", *found))
         raise ReportError(f"{folder}: holds none of {names}; give the --out of a finished run")
-    return study.write_report if study.is_study(summary) else report.write_report
+    return multi_specimen.write_report if multi_specimen.is_study(summary) else report.write_report
