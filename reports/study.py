@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from calib.problem.parameters import plain as property_of
+from calib.problem.parameters import property_of
 from mpm.output.section import Section
 from reports import ReportError
 from reports.base.figures import BLACK, BLUE, MEASURED, SIMULATED, next_to, predictive, stroke_axis, svg

@@ -16,7 +16,7 @@ from calib.errors import OutputError
 from calib.fit.multistart import FitResult
 from calib.io.provenance import git_commit, versions
 from calib.io.schema import tag
-from calib.problem.parameters import STRESS_LIKE, plain
+from calib.problem.parameters import STRESS_LIKE, property_of
 from calib.problem.request import Request, Setup
 from calib.trace.conditioning import Conditioned
 from calib.uncertainty.analysis import Doubt
@@ -163,7 +163,11 @@ def _parameters(request: Request, result: FitResult, doubt: Uncertainty | None) 
                 if name in tie.combination.split() and out[name]["verdict"] in ("identified", "weak"):
                     out[name]["verdict"] = "only_as_product"
         for name, part in doubt.known_width().items():
-            if part < WITH_WIDTH and plain(name) in STRESS_LIKE and out[name]["verdict"] in ("identified", "weak"):
+            if (
+                part < WITH_WIDTH
+                and property_of(name) in STRESS_LIKE
+                and out[name]["verdict"] in ("identified", "weak")
+            ):
                 out[name]["verdict"] = "only_as_product"
     return out
 

@@ -22,8 +22,9 @@ from calib.fit.search import CAUTION_NEAR, ELSEWHERE, Search
 from calib.fit.surrogate import Surrogate
 from calib.io.progress import Progress, onward
 from calib.problem.joint_objective import JointObjective
-from calib.problem.objective import Objective, Trial
+from calib.problem.objective import Objective
 from calib.problem.parameters import ParameterSet
+from calib.problem.scored_run import ScoredRun
 from calib.simulation.evaluation import Evaluator
 from mpm.errors import SimulationError
 
@@ -55,12 +56,12 @@ class FitResult:
     """
 
     status: str
-    best: Trial
+    best: ScoredRun
     parameters: ParameterSet
     jacobian: FloatArray | None
     repeatability: float
-    history: tuple[Trial, ...]
-    replicates: tuple[Trial, ...] = ()
+    history: tuple[ScoredRun, ...]
+    replicates: tuple[ScoredRun, ...] = ()
     surrogate: Surrogate | None = None
 
     @property
@@ -111,8 +112,8 @@ def calibrate(
     options = FitOptions() if options is None else options
     options.check(len(objective.parameters))
     search = Search(objective, evaluator, coarse, options, progress)
-    best: Trial | None = None
-    replicates: list[Trial] = []
+    best: ScoredRun | None = None
+    replicates: list[ScoredRun] = []
     # the workers have the cores, and sums in another order would ask for other points
     with threadpool_limits(1, "blas"):
         try:
@@ -155,7 +156,7 @@ def _afresh(search: Search, evaluator: Evaluator, coarse: Evaluator | None) -> s
     return status if search.best is not first else "stalled"
 
 
-def _choose(search: Search, replicate: Evaluator) -> tuple[Trial, list[Trial]]:
+def _choose(search: Search, replicate: Evaluator) -> tuple[ScoredRun, list[ScoredRun]]:
     """Run the most promising runs once more, slower and with other particles; the one of least mean chi-square, and those runs.
 
     A run whose repetition breaks down is not the answer; where all break down, the next ones are repeated, promising or not.
@@ -163,10 +164,10 @@ def _choose(search: Search, replicate: Evaluator) -> tuple[Trial, list[Trial]]:
     process = search.process()
     order = sorted(search.finished, key=lambda t: process.expected(t.z, CAUTION_NEAR))
     limit = process.expected(order[0].z, CAUTION_NEAR) + NOISES * max(process.luck, 1.0)
-    tried: list[Trial] = []
-    replicates: list[Trial] = []
+    tried: list[ScoredRun] = []
+    replicates: list[ScoredRun] = []
     for bound in (limit, math.inf):
-        finalists: list[Trial] = []
+        finalists: list[ScoredRun] = []
         for trial in [search.best, *order]:
             apart = all(np.abs((trial.z - t.z) / search.unit).max() > ELSEWHERE for t in (*tried, *finalists))
             if apart and len(finalists) < FINALISTS and process.expected(trial.z, CAUTION_NEAR) <= bound:
@@ -178,14 +179,14 @@ def _choose(search: Search, replicate: Evaluator) -> tuple[Trial, list[Trial]]:
             left = [t for t in batch if _may_win(t, process, tried, replicates)]
             runs = sorted(replicate.evaluate([t.evaluation.parameters for t in left]), key=lambda e: e.index)
             tried += left
-            replicates += (search.objective.trial(e, stage="replicate") for e in runs)
+            replicates += (search.objective.score(e, stage="replicate") for e in runs)
         sound = [(t.misfit + r.misfit, k) for k, (t, r) in enumerate(zip(tried, replicates, strict=True)) if r.ok]
         if sound:
             return tried[min(sound)[1]], replicates
     return search.best, replicates
 
 
-def _may_win(trial: Trial, process: Surrogate, tried: list[Trial], replicates: list[Trial]) -> bool:
+def _may_win(trial: ScoredRun, process: Surrogate, tried: list[ScoredRun], replicates: list[ScoredRun]) -> bool:
     """Whether a second run of a finalist may make it the answer: not if it would have to gain more over what is expected of it than
     those run twice so far have gained, on average, and the noise (a race: Maron & Moore 1994, NIPS 6:59)."""
     sound = [(t, again) for t, again in zip(tried, replicates, strict=True) if again.ok]
@@ -196,7 +197,7 @@ def _may_win(trial: Trial, process: Surrogate, tried: list[Trial], replicates: l
     return trial.misfit + least < min(t.misfit + again.misfit for t, again in sound)
 
 
-def _result(search: Search, status: str, best: Trial, replicates: list[Trial]) -> FitResult:
+def _result(search: Search, status: str, best: ScoredRun, replicates: list[ScoredRun]) -> FitResult:
     """What was found, with a Jacobian if there are runs enough for one."""
     jacobian, repeatability, process = None, math.nan, None
     if sum(t.ok for t in search.trials) > len(search.parameters):

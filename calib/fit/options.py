@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from calib.errors import MaterialError
 
 if TYPE_CHECKING:
-    from calib.problem.objective import Trial
+    from calib.problem.scored_run import ScoredRun
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class FitOptions:
         if min(self.budget, self.batch, self.design, self.coarse_cost, self.tolerance) <= 0 or self.seed < 0:
             raise ValueError(f"{self} has a number that is not positive; give positive ones.")
 
-    def cost(self, trials: Iterable[Trial]) -> float:
+    def cost(self, trials: Iterable[ScoredRun]) -> float:
         """What some runs have taken of the budget."""
         return sum(self.coarse_cost if t.coarse else 1.0 for t in trials)
 

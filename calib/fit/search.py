@@ -38,7 +38,8 @@ from calib.fit.options import FitOptions
 from calib.fit.surrogate import Surrogate, coordinate_unit
 from calib.io.progress import Progress, at_most, onward
 from calib.problem.joint_objective import JointObjective, residual
-from calib.problem.objective import Objective, Trial
+from calib.problem.objective import Objective
+from calib.problem.scored_run import ScoredRun
 from calib.simulation.evaluation import Evaluation, Evaluator
 from calib.uncertainty.intervals import EXPLAINED
 from mpm.errors import SimulationError
@@ -109,7 +110,7 @@ class Search:
         self.enough = chi2.ppf(EXPLAINED, objective.effective_rows) if enough is None else enough
         self.parameters = objective.parameters
         self.fine, self.coarse = evaluator, coarse
-        self.trials: list[Trial] = []
+        self.trials: list[ScoredRun] = []
         self.random = np.random.default_rng(options.seed)
         self.unit = coordinate_unit(self.parameters)
         self.hyper: list[FloatArray] | None = None
@@ -125,13 +126,13 @@ class Search:
         self.designs = np.split(sample, DESIGNS)
 
     @property
-    def finished(self) -> list[Trial]:
+    def finished(self) -> list[ScoredRun]:
         """Finished runs on the fine evaluator, while screening those on the coarse one; those that cut the food, if any."""
         runs = [t for t in self.trials if t.ok and t.coarse == self.screening]
         return [t for t in runs if t.cut] or runs
 
     @property
-    def best(self) -> Trial:
+    def best(self) -> ScoredRun:
         """Best of ``finished``; there is one after the design."""
         return min(self.finished, key=lambda t: t.misfit)
 
@@ -244,7 +245,7 @@ class Search:
             fraction=furthest.fraction,
         )
 
-    def _scaled(self, trial: Trial) -> tuple[float, FloatArray]:
+    def _scaled(self, trial: ScoredRun) -> tuple[float, FloatArray]:
         """Least chi-square that jointly scaled stress-like parameters would give, and the point of it."""
         along = self.parameters.stress_like()
         curves = [t.curve for t in trial.each]
@@ -328,7 +329,7 @@ class Search:
         good = cost < max(process.best.misfit, cost.min()) + PROBE_COST
         return [points[i] for i in np.argsort(np.where(good, -doubt, 0.0))[:count]]
 
-    def process(self, best: Trial | None = None) -> Surrogate:
+    def process(self, best: ScoredRun | None = None) -> Surrogate:
         """The process through all runs so far, about the best one or another."""
         trials = [t.as_fine() for t in self.trials] if self.screening else self.trials  # one evaluator: no offset
         process = Surrogate(self.objective, trials, best or self.best, self.hyper)
@@ -358,7 +359,7 @@ class Search:
         batch = batch[:most]
         first, order = len(self.trials), []
         for evaluation in self._simulate([self.parameters.to_dict(z) for z in batch], coarse):
-            self.trials.append(self.objective.trial(evaluation, coarse=coarse, stage=stage))
+            self.trials.append(self.objective.score(evaluation, coarse=coarse, stage=stage))
             order.append(evaluation.index)
             self._report(stage)
         self.trials[first:] = [self.trials[first + i] for i in np.argsort(order)]

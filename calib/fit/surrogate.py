@@ -16,8 +16,9 @@ from scipy.linalg import cho_factor, cho_solve, eigh
 from scipy.optimize import least_squares, minimize
 
 from calib.problem.joint_objective import JointObjective, residuals
-from calib.problem.objective import LARGEST_DIFFERENCE, Objective, Trial
+from calib.problem.objective import LARGEST_DIFFERENCE, Objective
 from calib.problem.parameters import LINEAR_STEP, ParameterSet
+from calib.problem.scored_run import ScoredRun
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -83,7 +84,7 @@ class CurveProcess:
     """
 
     def __init__(
-        self, objective: Objective, trials: Sequence[Trial], best: Trial, guess: FloatArray | None = None
+        self, objective: Objective, trials: Sequence[ScoredRun], best: ScoredRun, guess: FloatArray | None = None
     ) -> None:
         self.objective, self.best = objective, best
         law = objective.parameters.stress_like()
@@ -223,16 +224,16 @@ class Surrogate:
     def __init__(
         self,
         objective: Objective | JointObjective,
-        trials: Sequence[Trial],
-        best: Trial,
+        trials: Sequence[ScoredRun],
+        best: ScoredRun,
         guess: Sequence[FloatArray] | None = None,
     ) -> None:
         self.objective, self.best = objective, best
         self.unit = coordinate_unit(objective.parameters)
-        guesses: Sequence[FloatArray | None] = guess or [None] * len(objective.cases)
+        guesses: Sequence[FloatArray | None] = guess or [None] * len(objective.terms)
         self.each = [
             CurveProcess(c.objective, [t.each[k] for t in trials], best.each[k], g)
-            for k, (c, g) in enumerate(zip(objective.cases, guesses, strict=True))
+            for k, (c, g) in enumerate(zip(objective.terms, guesses, strict=True))
         ]
 
     @property
@@ -257,7 +258,7 @@ class Surrogate:
             z: Internal coordinates.
             caution: Weight of not knowing the curves: a row more for each trace; None: none.
         """
-        cases = self.objective.cases
+        cases = self.objective.terms
         found = [process.predict_all(z[:, c.index]) for process, c in zip(self.each, cases, strict=True)]
         curves, sds, fractions = zip(*found, strict=True)
         rows = residuals(self.objective, curves, np.array(fractions), z)
@@ -311,7 +312,7 @@ class Surrogate:
         beside = self.residuals(np.concatenate([z + moves, z - moves]))
         rows = (beside[: len(z)] - beside[len(z) :]).T / (2.0 * steps)
         first = 0
-        for process, case in zip(self.each, self.objective.cases, strict=True):
+        for process, case in zip(self.each, self.objective.terms, strict=True):
             part = slice(first, first + case.objective.data_rows)
             data = rows[part]
             data[-1] = 0.0  # the penalty of a failure is no measurement

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TextIO
 
 if TYPE_CHECKING:
     from calib.fit.options import FitOptions
-    from calib.problem.objective import Trial
+    from calib.problem.scored_run import ScoredRun
 
 #: Width of the bar in characters.
 BAR = 20
@@ -57,7 +57,7 @@ class Progress:
         return ", ".join(parts)
 
 
-def at_most(trials: Sequence[Trial], rest: float, options: FitOptions) -> float:
+def at_most(trials: Sequence[ScoredRun], rest: float, options: FitOptions) -> float:
     """Time that the rest of a budget takes at most [s]: were it all spent on default runs. Before there is one, by what coarse ones take."""
     default = [t.evaluation.seconds for t in trials if not t.coarse]
     each = default or [t.evaluation.seconds / COARSE_TIME for t in trials]
@@ -65,7 +65,7 @@ def at_most(trials: Sequence[Trial], rest: float, options: FitOptions) -> float:
 
 
 def onward(
-    report: Callable[[Progress], None] | None, trials: Sequence[Trial], best: Trial, options: FitOptions
+    report: Callable[[Progress], None] | None, trials: Sequence[ScoredRun], best: ScoredRun, options: FitOptions
 ) -> Callable[[Progress], None] | None:
     """The progress of one more search, told as that of all of them.
 

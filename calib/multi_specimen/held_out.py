@@ -18,7 +18,7 @@ from calib.fit.multistart import FitResult, calibrate
 from calib.fit.options import FitOptions
 from calib.multi_specimen.specimens import Fitted, Specimens
 from calib.problem.objective import Objective
-from calib.problem.parameters import ParameterSet, plain
+from calib.problem.parameters import ParameterSet, property_of
 from calib.simulation.evaluation import Evaluation
 from calib.trace.filters import filter_simulated
 from calib.uncertainty.intervals import evidence, uncertainty
@@ -190,7 +190,7 @@ def _adapted(
         return [dict(best)] * len(others)
     evaluator = specimens.evaluator(specimens.setups[name].coarse, name, "coarse")
     runs = sorted(evaluator.evaluate([{**x, **best} for x in (flesh, *others)]), key=lambda e: e.index)
-    own, *trials = (goal.trial(e, coarse=True) for e in runs)
+    own, *trials = (goal.score(e, coarse=True) for e in runs)
     sd = np.linalg.cholesky(uncertainty(result.parameters, evidence(goal, result.best, result.jacobian)).alone)
     steps = np.random.default_rng(specimens.study.seed).standard_normal((len(others), len(sd))) @ sd.T
     low, high = goal.parameters.box
@@ -218,7 +218,7 @@ def _drawn(fitted: Fitted, scatter: float, seed: int) -> list[dict[str, float]]:
     random = np.random.default_rng(seed)
     points = materials(fitted.result.surrogate, fitted.result.best.z, fitted.doubt.uncertainty, random)[:DRAWS]
     parameters = fitted.objective.parameters
-    moved = np.array([p.log and p.name == plain(p.name) for p in parameters])
+    moved = np.array([p.log and p.name == property_of(p.name) for p in parameters])
     apart = scatter * math.sqrt(1.0 + 1.0 / len(fitted.names))
     steps = apart * random.standard_normal(points.shape) * moved
     return [fitted.flesh(parameters.clip(z)) for z in points + steps]

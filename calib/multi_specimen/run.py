@@ -18,7 +18,7 @@ from calib.material.scene import place
 from calib.multi_specimen.held_out import Prediction, predict
 from calib.multi_specimen.specimens import Fitted, Specimens, pressed, set_ups
 from calib.multi_specimen.study_file import Study
-from calib.problem.parameters import plain
+from calib.problem.parameters import property_of
 from calib.problem.request import Setup
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_store import EvaluationStore, Header
@@ -217,8 +217,10 @@ def _parameters(study: Study, fitted: Fitted) -> dict[str, Any]:
         else:
             entry = {"value": p.value, "unit": p.unit, "low95": None, "high95": None}
             entry |= {"prior_low": p.prior_low, "prior_high": p.prior_high, "verdict": "unknown"}
-        known = study.food.dims["height"] if plain(p.name) == "height" else study.food.properties[plain(p.name)]
-        out[p.name] = entry | {"status": known.status, "source": known.source, "shared": p.name == plain(p.name)}
+        known = (
+            study.food.dims["height"] if property_of(p.name) == "height" else study.food.properties[property_of(p.name)]
+        )
+        out[p.name] = entry | {"status": known.status, "source": known.source, "shared": p.name == property_of(p.name)}
     return out
 
 

@@ -20,7 +20,7 @@ from calib.io.progress import Progress
 from calib.io.provenance import code_key
 from calib.multi_specimen.study_file import Press, Study
 from calib.problem.joint_objective import JointEvaluator, JointObjective
-from calib.problem.parameters import Z95, Parameter, ParameterSet, own, plain
+from calib.problem.parameters import Z95, Parameter, ParameterSet, parameter_of, property_of
 from calib.problem.request import Setup
 from calib.problem.setup import set_up
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore
@@ -113,12 +113,16 @@ class Fitted:
     def flesh(self, z: FloatArray | None = None) -> dict[str, float]:
         """Shared values [SI] by property: the best ones, or those at internal coordinates ``z`` (p,)."""
         values = self.result.best.evaluation.parameters if z is None else self.objective.parameters.to_dict(z)
-        return {name: x for name, x in values.items() if name == plain(name)}
+        return {name: x for name, x in values.items() if name == property_of(name)}
 
     def values(self, name: str) -> dict[str, float]:
         """All values [SI] of one trace by property."""
         values = self.result.best.evaluation.parameters
-        return {plain(n): x for n, x in values.items() if n == plain(n) or n == own(plain(n), name)}
+        return {
+            property_of(n): x
+            for n, x in values.items()
+            if n == property_of(n) or n == parameter_of(property_of(n), name)
+        }
 
 
 @dataclass

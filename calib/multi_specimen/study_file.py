@@ -25,7 +25,7 @@ from calib.io.yaml_checks import Place, check_keys, choice, mapping, number, rea
 from calib.material.food import FoodSpec, load_food, load_material_file
 from calib.material.properties import check_override
 from calib.material.scene import MIDDLE, Sizing
-from calib.problem.parameters import OF
+from calib.problem.parameters import OF_TRACE
 from calib.problem.request import Request
 
 CUT, COMPRESSION = "cut", "compression"
@@ -149,8 +149,8 @@ def read_study(path: Path | str) -> Study:
     requests, presses = {}, []
     for name, raw in traces.items():
         place = top.at("traces").at(name)
-        if OF in name or "," in name:
-            raise place.error(f"a name of a trace may not hold {OF!r} or a comma; write letters, digits and _")
+        if OF_TRACE in name or "," in name:
+            raise place.error(f"a name of a trace may not hold {OF_TRACE!r} or a comma; write letters, digits and _")
         given = mapping(place, raw)
         if choice(place.at("kind"), given.get("kind", CUT), (CUT, COMPRESSION)) == COMPRESSION:
             presses.append(_press(place, name, given, folder))

@@ -9,7 +9,8 @@ from typing import Any
 
 from calib.material.food import FoodSpec
 from calib.material.scene import Sizing
-from calib.problem.objective import ErrorModel, Objective
+from calib.problem.objective import Objective
+from calib.problem.target import ErrorModel
 from calib.trace.conditioning import Conditioned
 from calib.trace.table import split_address
 from calib.trace.trace import Trace, read_trace

@@ -16,9 +16,10 @@ from calib.material.knife import load_knife
 from calib.material.properties import rule_of
 from calib.material.scene import cut_scene, height_range, specimen, windowed
 from calib.problem.nuisance import nuisances, sensor_of
-from calib.problem.objective import Objective, Target
+from calib.problem.objective import Objective
 from calib.problem.parameters import Z95, Parameter, ParameterSet
 from calib.problem.request import Request, Setup
+from calib.problem.target import Target
 from calib.trace.conditioning import Conditioned, condition
 from calib.trace.filters import filter_simulated
 from mpm.scene import Scene

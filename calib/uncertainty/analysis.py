@@ -13,7 +13,8 @@ from calib.fit.multistart import FitResult
 from calib.fit.surrogate import Surrogate
 from calib.problem.joint_objective import JointObjective
 from calib.problem.nuisance import NuisanceEstimate
-from calib.problem.objective import Objective, Trial
+from calib.problem.objective import Objective
+from calib.problem.scored_run import ScoredRun
 from calib.simulation.evaluation import Evaluator
 from calib.uncertainty.intervals import Uncertainty, evidence, uncertainty
 from calib.uncertainty.posterior import Posterior, sampled
@@ -127,14 +128,14 @@ def at_first_sight(objective: Objective | JointObjective, result: FitResult) -> 
     return with_profiles(found, walked, [t.z for t in as_good(result, found)])
 
 
-def as_good(result: FitResult, found: Uncertainty) -> list[Trial]:
+def as_good(result: FitResult, found: Uncertainty) -> list[ScoredRun]:
     """The runs that count and whose chi-square, as the intervals see it, is within the rise at their ends of the best one's."""
     runs = [result.best, *(t for t in result.history if t.cut and not t.coarse)]
     size = np.sum(found.rows(np.array([t.residual for t in runs])) ** 2, axis=1)
     return [t for t, own in zip(runs, size, strict=True) if own <= size[0] + RISE]
 
 
-def _better(result: FitResult, runs: list[Trial], luck: float) -> Trial | None:
+def _better(result: FitResult, runs: list[ScoredRun], luck: float) -> ScoredRun | None:
     """A run at the end of an interval that is better than the answer of the search by more than the noise of a run, ``luck``."""
     judged = (t for t in runs[len(result.history) :] if t.cut and not t.coarse)
     best = min(judged, key=lambda t: t.misfit, default=None)
@@ -158,7 +159,7 @@ def _ends(
     return [z for p in chosen for z in p.frontier(alone)]
 
 
-def _new(objective: Objective | JointObjective, points: list[FloatArray], runs: list[Trial]) -> list[FloatArray]:
+def _new(objective: Objective | JointObjective, points: list[FloatArray], runs: list[ScoredRun]) -> list[FloatArray]:
     """Points that are not close to each other or to a run."""
     sd = objective.parameters.prior_sd
     chosen: list[FloatArray] = []
@@ -171,11 +172,11 @@ def _new(objective: Objective | JointObjective, points: list[FloatArray], runs: 
 
 def _run(
     objective: Objective | JointObjective, evaluator: Evaluator, points: list[FloatArray], coarse: bool
-) -> list[Trial]:
+) -> list[ScoredRun]:
     """Trials at some points, in their order."""
     batch = [objective.parameters.to_dict(z) for z in points]
     found = sorted(evaluator.evaluate(batch), key=lambda e: e.index)
-    return [objective.trial(e, coarse=coarse, stage="profile") for e in found]
+    return [objective.score(e, coarse=coarse, stage="profile") for e in found]
 
 
 def _nuisances(
@@ -184,7 +185,7 @@ def _nuisances(
     """Searched ones given the best curves, the others with the parameters free beside them."""
     out: list[NuisanceEstimate] = []
     beside = iter(found.unsearched)
-    for case, trial in zip(objective.cases, result.best.each, strict=True):
+    for case, trial in zip(objective.terms, result.best.each, strict=True):
         for e, n in zip(case.objective.nuisance_estimates(trial.curve), case.objective.nuisances, strict=True):
             if not n.searched:
                 mean, sd = next(beside)

@@ -24,8 +24,9 @@ from calib.fit.search import Search
 from calib.fit.surrogate import Surrogate
 from calib.io.progress import Progress, onward
 from calib.problem.joint_objective import JointObjective
-from calib.problem.objective import Objective, Trial
-from calib.problem.parameters import ParameterSet, plain
+from calib.problem.objective import Objective
+from calib.problem.parameters import ParameterSet, property_of
+from calib.problem.scored_run import ScoredRun
 from calib.simulation.evaluation import Evaluator
 from calib.uncertainty.analysis import Doubt, as_good, at_first_sight, doubt_of
 from calib.uncertainty.intervals import EXPLAINED, Interval
@@ -137,10 +138,10 @@ def _repeated(objective: Objective | JointObjective, fit: FitResult, again: Eval
     if _second_run(fit) is not None:
         return fit
     run = next(iter(again.evaluate([fit.best.evaluation.parameters])))
-    return replace(fit, replicates=(*fit.replicates, objective.trial(run, stage="replicate")))
+    return replace(fit, replicates=(*fit.replicates, objective.score(run, stage="replicate")))
 
 
-def _second_run(fit: FitResult) -> Trial | None:
+def _second_run(fit: FitResult) -> ScoredRun | None:
     """That of the answer, slower and with other particles."""
     return next((t for t in fit.replicates if np.array_equal(t.z, fit.best.z)), None)
 
@@ -169,7 +170,7 @@ def _searched(
     with threadpool_limits(1, "blas"):
         with suppress(SimulationError):  # no run of this design ends its stroke
             search.run()
-        more = [objective.trial(t.evaluation, coarse=t.coarse, stage=t.stage) for t in search.trials]
+        more = [objective.score(t.evaluation, coarse=t.coarse, stage=t.stage) for t in search.trials]
         runs = (*first.history, *more)
         assert first.surrogate is not None  # or nothing would be claimed
         found = min((t for t in more if t.cut and not t.coarse), key=lambda t: t.misfit, default=first.best)
@@ -222,7 +223,7 @@ def _unclaimed(doubt: Doubt, why: str, lost: Callable[[Interval], bool] = lambda
 
 
 def _proven(interval: Interval) -> bool:
-    return plain(interval.parameter.name) in PROVEN
+    return property_of(interval.parameter.name) in PROVEN
 
 
 def _names(intervals: Sequence[Interval], between: str = ", ") -> str:

@@ -27,8 +27,9 @@ from scipy.stats import t as student
 
 from calib.problem.joint_objective import JointObjective
 from calib.problem.nuisance import Whitening
-from calib.problem.objective import Objective, Trial
+from calib.problem.objective import Objective
 from calib.problem.parameters import Z95, Parameter, ParameterSet
+from calib.problem.scored_run import ScoredRun
 
 FloatArray = npt.NDArray[np.float64]
 Verdict = Literal["identified", "weak", "one_sided", "not_seen", "at_bound"]
@@ -201,7 +202,7 @@ def correlation_length(residual: FloatArray, determined: float, assumed: float) 
     return float(assumed ** (1.0 - trust) * alone**trust)
 
 
-def evidence(objective: Objective | JointObjective, best: Trial, jacobian: FloatArray) -> Evidence:
+def evidence(objective: Objective | JointObjective, best: ScoredRun, jacobian: FloatArray) -> Evidence:
     """The data rows of a fit, weighted by the correlation length that their residuals show.
 
     Args:
@@ -212,7 +213,7 @@ def evidence(objective: Objective | JointObjective, best: Trial, jacobian: Float
     first, rows, lengths = 0, 0.0, []
     weights, open_ended = [], []
     prior = objective.parameters.prior_jacobian()
-    for trial, case in zip(best.each, objective.cases, strict=True):
+    for trial, case in zip(best.each, objective.terms, strict=True):
         goal = case.objective
         part = slice(first, first + goal.data_rows)
         first = part.stop

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from calib.problem.nuisance import OUTSIDE
-from calib.problem.parameters import plain
+from calib.problem.parameters import property_of
 from calib.simulation.evaluation import PARTED
 from calib.validation.metrics import Metrics
 from calib.validation.numerical_checks import FINER, FINER_GRID, Check
@@ -220,9 +220,9 @@ def limits(
             f"The trace hardly sees {', '.join(unseen)}: these values are the literature's as much as the trace's."
         )
     held = [
-        f"{HELD_WEAK[plain(n)]:.0%} for {n}"
+        f"{HELD_WEAK[property_of(n)]:.0%} for {n}"
         for n, p in parameters.items()
-        if p["verdict"] == "weak" and plain(n) in HELD_WEAK
+        if p["verdict"] == "weak" and property_of(n) in HELD_WEAK
     ]
     if held:
         said.append(

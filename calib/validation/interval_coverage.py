@@ -27,9 +27,9 @@ from calib.io.schema import tag
 from calib.material.food import FoodSpec
 from calib.material.knife import load_knife
 from calib.material.scene import Sizing, cut_scene, specimen
-from calib.problem.objective import ErrorModel
 from calib.problem.request import Request
 from calib.problem.setup import fit_parameters, set_up
+from calib.problem.target import ErrorModel
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, Header
 from calib.simulation.workers import Workers
 from calib.uncertainty.global_search import infer

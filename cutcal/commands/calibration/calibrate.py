@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from calib.io.progress import ProgressBar
-from calib.problem.objective import ErrorModel
 from calib.problem.request import Request
+from calib.problem.target import ErrorModel
 from calib.validation.acceptance import Verdict, remedied
 from calib.validation.metrics import IsoRating
 from cutcal.commands.calibration.describe import description

@@ -17,8 +17,10 @@ from calib.fit.multistart import AFRESH, NOISES, FitResult, _may_win, calibrate
 from calib.fit.options import FitOptions
 from calib.fit.search import AFAR, ANEW, CAUTION_NEAR, FAR_OFF, LUCK, SCREENING, Search
 from calib.io.progress import Progress
-from calib.problem.objective import Objective, Target, Trial
+from calib.problem.objective import Objective
 from calib.problem.parameters import Parameter, ParameterSet
+from calib.problem.scored_run import ScoredRun
+from calib.problem.target import Target
 from calib.simulation.evaluation import Evaluation, Evaluator
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, Header
 from calib.uncertainty.intervals import EXPLAINED, evidence, uncertainty
@@ -56,7 +58,7 @@ def two_goal() -> Objective:
 def noise_free(objective: Objective, values: Mapping[str, float]) -> float:
     """Chi-square without the noise of the run at the given values."""
     run = Evaluation(0, dict(values), "ok", "", 1.0, STROKE, three_terms(values))
-    return objective.trial(run).misfit
+    return objective.score(run).misfit
 
 
 def values(result: FitResult) -> dict[str, float]:
@@ -484,7 +486,7 @@ def test_a_finalist_that_cannot_win_is_not_run_twice() -> None:
     process = search.process()
     best, *_, worst = sorted(search.finished, key=lambda t: t.misfit)
 
-    def of(trial: Trial, misfit: float) -> Trial:
+    def of(trial: ScoredRun, misfit: float) -> ScoredRun:
         return replace(trial, residual=trial.residual * math.sqrt(misfit / trial.misfit))
 
     expected = process.expected(best.z, CAUTION_NEAR)
@@ -505,8 +507,8 @@ def test_a_run_that_presses_the_food_away_counts_as_one_that_broke_down() -> Non
         assert replace(run, scalars={"parted": parted}).completed == pytest.approx(completed)
     assert replace(run, status="failed", fraction=0.3, scalars={"parted": 1.0}).completed == 0.3
     goal = two_goal()
-    whole = goal.trial(replace(run, parameters=TWO_TRUTH, force=two_terms(TWO_TRUTH)))
-    pressed = goal.trial(replace(whole.evaluation, scalars={"parted": 0.65}))
+    whole = goal.score(replace(run, parameters=TWO_TRUTH, force=two_terms(TWO_TRUTH)))
+    pressed = goal.score(replace(whole.evaluation, scalars={"parted": 0.65}))
     half = goal.residual(whole.curve, 0.5, whole.z)
     assert whole.cut and not pressed.cut and pressed.ok
     np.testing.assert_allclose(pressed.residual, half)

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from calib.fit.surrogate import Surrogate
-from calib.problem.objective import Objective, Target, Trial
+from calib.problem.objective import Objective
 from calib.problem.parameters import Parameter, ParameterSet
+from calib.problem.scored_run import ScoredRun
+from calib.problem.target import Target
 from calib.simulation.evaluation import Evaluation
 from calib.uncertainty.intervals import evidence, uncertainty
 from tests.calib.synthetic import X, correlated_noise
@@ -36,14 +38,14 @@ def goal() -> Objective:
     return Objective(target, THREE)
 
 
-def trials(count: int, noise: float, spread: float = 0.3, seed: int = 2) -> list[Trial]:
+def trials(count: int, noise: float, spread: float = 0.3, seed: int = 2) -> list[ScoredRun]:
     """Runs at and about the values, with correlated noise (part of the peak)."""
     random, objective = np.random.default_rng(seed), goal()
     points = THREE.start + spread * random.standard_normal((count, 3)) * (np.arange(count) > 0)[:, None]
     out = []
     for z in points:
         force = cut(z) * (1.0 + noise * correlated_noise(random))
-        out.append(objective.trial(Evaluation(0, THREE.to_dict(z), "ok", "", 1.0, 0.04 * X, force)))
+        out.append(objective.score(Evaluation(0, THREE.to_dict(z), "ok", "", 1.0, 0.04 * X, force)))
     return out
 
 
@@ -111,7 +113,7 @@ def test_coarse_runs_inform_through_their_common_offset() -> None:
     """Coarse curves that are all 8 % too strong teach the response without moving the fine curve."""
     runs = trials(1, noise=0.0)
     for t in trials(15, noise=0.0, seed=3)[1:]:
-        runs.append(Trial(t.z, t.evaluation, 1.08 * t.curve, t.residual, coarse=True))
+        runs.append(ScoredRun(t.z, t.evaluation, 1.08 * t.curve, t.residual, coarse=True))
     process = Surrogate(goal(), runs, runs[0])
     z = THREE.start + np.array([0.0, 0.25, 0.0])
     assert np.abs(process.each[0].predict(THREE.start)[0] - cut(THREE.start)).max() < 0.015 * PEAK
@@ -124,7 +126,7 @@ def test_broken_runs_are_expected_to_break_again() -> None:
     z = THREE.start + np.array([0.0, 0.0, 1.5])
     part = slice(0, 96)
     broken = Evaluation(0, THREE.to_dict(z), "failed", "inverted", 0.4, 0.04 * X[part], cut(z)[part])
-    runs.append(goal().trial(broken))
+    runs.append(goal().score(broken))
     process = Surrogate(goal(), runs, runs[0])
     assert process.each[0].predict(z)[2] < 0.8 and process.each[0].predict(THREE.start)[2] == 1.0
     assert process.expected(z, 0.0) > process.expected(THREE.start, 0.0) + 100.0
@@ -136,7 +138,7 @@ def test_a_failure_is_no_measurement() -> None:
     z = THREE.start + np.array([0.0, 0.0, 1.5])
     part = slice(0, 96)
     broken = Evaluation(0, THREE.to_dict(z), "failed", "inverted", 0.4, 0.04 * X[part], cut(z)[part])
-    process = Surrogate(goal(), [*runs, goal().trial(broken)], runs[0])
+    process = Surrogate(goal(), [*runs, goal().score(broken)], runs[0])
     assert process.residual(z)[goal().data_rows - 1] > 10.0
     assert np.all(process.jacobian(z)[goal().data_rows - 1] == 0.0)
 
@@ -153,14 +155,14 @@ def test_least_stays_within_bounds_and_radius() -> None:
     assert np.all(z >= THREE.lower) and np.all(z <= THREE.upper)
 
 
-def coarse_trials(count: int, slope: float) -> list[Trial]:
+def coarse_trials(count: int, slope: float) -> list[ScoredRun]:
     """Coarse runs about the values: 5 % too much, and ``slope`` more for each unit by which the depth grows."""
     random, objective = np.random.default_rng(5), goal()
     out = []
     for step in 0.5 * random.standard_normal((count, 3)):
         z = THREE.start + step
         evaluation = Evaluation(0, THREE.to_dict(z), "ok", "", 1.0, 0.04 * X, cut(z) * (1.05 + slope * step[1]))
-        out.append(objective.trial(evaluation, coarse=True))
+        out.append(objective.score(evaluation, coarse=True))
     return out
 
 

@@ -81,7 +81,7 @@ def test_the_specimens_own_values_are_fitted_to_each_flesh(monkeypatch: pytest.M
         runs = Fake(lambda p: three_terms({**flesh, **p}), noisy=0.0, backwards=False).evaluate(
             [{"R_skin": s} for s in skins]
         )
-        return float(skins[np.argmin([np.sum(objective.trial(run).residual ** 2) for run in runs])])
+        return float(skins[np.argmin([np.sum(objective.score(run).residual ** 2) for run in runs])])
 
     for x, own in zip(others[:-1], found[:-1], strict=True):
         way = np.log(anew(x) / anew(FLESH))

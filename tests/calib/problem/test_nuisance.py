@@ -16,9 +16,10 @@ from calib.material.food import load_food
 from calib.material.knife import load_knife
 from calib.material.scene import Sizing, cut_scene, specimen
 from calib.problem.nuisance import GAIN_SD, TORQUE_GAIN_SD, Nuisance, Sensor, Whitening, nuisances, sensor_of
-from calib.problem.objective import Objective, Target
+from calib.problem.objective import Objective
 from calib.problem.parameters import Parameter, ParameterSet
 from calib.problem.setup import numerical
+from calib.problem.target import Target
 from calib.trace.conditioning import Conditioned, condition
 from calib.trace.trace import Trace
 from mpm.errors import CutcalError

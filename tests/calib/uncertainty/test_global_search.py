@@ -12,8 +12,9 @@ from calib.fit.multistart import FitResult, calibrate
 from calib.fit.options import FitOptions
 from calib.fit.surrogate import Surrogate
 from calib.io.progress import Progress
-from calib.problem.objective import Objective, Target
+from calib.problem.objective import Objective
 from calib.problem.parameters import Parameter, ParameterSet
+from calib.problem.target import Target
 from calib.uncertainty import global_search
 from calib.uncertainty.analysis import Doubt, at_first_sight, doubt_of
 from calib.uncertainty.global_search import infer
@@ -87,7 +88,7 @@ def test_what_no_other_food_refutes_is_claimed_still(seed):
     more = [t for t in result.history if t.stage != "profile"]
     assert len(more) > first and doubt.said == ()
     goal = objective(onefold)
-    assert all(t.misfit == goal.trial(t.evaluation).misfit for t in result.history)
+    assert all(t.misfit == goal.score(t.evaluation).misfit for t in result.history)
     assert told[-1].done == len(more)
     assert all(b.done >= a.done and b.spent >= a.spent for a, b in zip(told[:-1], told[1:], strict=True))
     assert {p.budget for p in told} == {100}
@@ -111,7 +112,7 @@ def stuck(goal: Objective, fake: Fake, shift: float) -> FitResult:
     """A fit whose search has ended at an R so many times the right one, with no better run in its history."""
     right = calibrate(goal, fake, coarse=fake, replicate=fake, options=FitOptions(seed=0))
     values = dict(right.best.evaluation.parameters)
-    poor = goal.trial(next(iter(fake.evaluate([values | {"R": shift * values["R"]}]))), stage="round")
+    poor = goal.score(next(iter(fake.evaluate([values | {"R": shift * values["R"]}]))), stage="round")
     history = (*(t for t in right.history if t.misfit > poor.misfit), poor)
     surrogate = Surrogate(goal, history, poor)
     return replace(
@@ -142,7 +143,7 @@ def test_a_better_food_becomes_the_answer():
     assert "better, by" in found.said[0] and verdicts(found)["R"] == "weak", "the first answer lies outside"
     assert "the food of the first search had another" in found.said[1]
     assert found.uncertainty.intervals[1].low95 == doubt.uncertainty.intervals[1].low95
-    near = replace(first, best=goal.trial(replace(result.best.evaluation)))
+    near = replace(first, best=goal.score(replace(result.best.evaluation)))
     assert verdicts(global_search._weighed(doubt, near, result, [narrow]))["R"] == "identified"
 
 

@@ -12,8 +12,9 @@ import pytest
 from calib.fit.multistart import FitResult, calibrate
 from calib.fit.options import FitOptions
 from calib.fit.surrogate import Surrogate
-from calib.problem.objective import Objective, Target
+from calib.problem.objective import Objective
 from calib.problem.parameters import Z95, Parameter, ParameterSet
+from calib.problem.target import Target
 from calib.simulation.evaluation import Evaluation
 from calib.uncertainty.analysis import CLOSE, JUDGED, Doubt, doubt_of
 from calib.uncertainty.intervals import evidence
@@ -104,7 +105,7 @@ def test_a_better_run_at_the_end_of_an_interval_becomes_the_best(one_sided: tupl
     """Where the process was wrong and a run at an end is better than the answer of the search, values and intervals are about it."""
     objective, result, _ = one_sided
     values = dict(result.best.evaluation.parameters)
-    poor = objective.trial(next(iter(Fake(elastic).evaluate([values | {"R": 1.15 * values["R"]}]))), stage="round")
+    poor = objective.score(next(iter(Fake(elastic).evaluate([values | {"R": 1.15 * values["R"]}]))), stage="round")
     history = (*result.history, poor)
     assert result.surrogate is not None and poor.misfit > result.best.misfit + 10.0
     before = replace(result, best=poor, history=history, surrogate=Surrogate(objective, history, poor))
