@@ -12,14 +12,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from calib.problem.objective import Objective, ObjectiveTerm
 from calib.problem.parameters import Parameter, ParameterSet, parameter_of, property_of
 from calib.problem.scored_run import ScoredRun
 from calib.simulation.evaluation import Evaluation, Evaluator
-
-FloatArray = npt.NDArray[np.float64]
+from mpm.arrays import FloatArray
 
 
 def residual(

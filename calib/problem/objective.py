@@ -44,8 +44,7 @@ from calib.problem.parameters import ParameterSet
 from calib.problem.scored_run import ScoredRun
 from calib.problem.target import ErrorModel, Target
 from calib.simulation.evaluation import Evaluation
-
-FloatArray = npt.NDArray[np.float64]
+from mpm.arrays import FloatArray
 
 #: Simulated forces, and differences between curves in the surrogate, beyond this many peaks count as that many [-]: a
 #: spike of a run that blows up must not overflow the sum of squares.

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-import numpy.typing as npt
-
 from calib.simulation.evaluation import Evaluation
-
-FloatArray = npt.NDArray[np.float64]
+from mpm.arrays import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,11 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from calib.errors import TraceError
-
-FloatArray = npt.NDArray[np.float64]
+from mpm.arrays import FloatArray
 
 #: Smooths a simulated record like the real one was: (grid [m] (n,), stroke [m] (k,), force [N] (k,)) -> force [N] (n,).
 Smoother = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
