@@ -16,10 +16,11 @@ import numpy as np
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
+from calib.fit.budget import progress_of_all
 from calib.fit.options import FitOptions
 from calib.fit.search import CAUTION_NEAR, ELSEWHERE, Search
 from calib.fit.surrogate import Surrogate
-from calib.io.progress import Progress, onward
+from calib.io.progress import Progress
 from calib.problem.joint_objective import JointObjective
 from calib.problem.objective import Objective
 from calib.problem.parameters import ParameterSet
@@ -143,7 +144,7 @@ def _afresh(search: Search, evaluator: Evaluator, coarse: Evaluator | None) -> s
     rest = options.budget - search.spent
     if rest < least or search.idle or search.best.misfit <= chi2.median(goal.effective_rows):
         return "stalled"
-    first, told = search.best, onward(search.progress, search.trials, search.best, options)
+    first, told = search.best, progress_of_all(search.progress, search.trials, search.best, options)
     other = Search(goal, evaluator, coarse, replace(options, budget=rest, seed=options.seed + AFRESH), told)
     try:
         status = other.run()

@@ -33,9 +33,10 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.stats import chi2, qmc
 
+from calib.fit.budget import longest_time_left, progress_of_all
 from calib.fit.options import FitOptions
 from calib.fit.surrogate import Surrogate, coordinate_unit
-from calib.io.progress import Progress, at_most, onward
+from calib.io.progress import Progress
 from calib.problem.joint_objective import JointObjective, residual
 from calib.problem.objective import Objective
 from calib.problem.scored_run import ScoredRun
@@ -211,7 +212,7 @@ class Search:
             budget=min(self.options.budget, rest / SCREENING),
             seed=self.options.seed + ANOTHER * self.anew,
         )
-        told = onward(self.progress, self.trials, self.best, self.options)
+        told = progress_of_all(self.progress, self.trials, self.best, self.options)
         other = Search(self.objective, self.fine, self.coarse, own, told, self.enough)
         try:
             points = other._screen([])
@@ -380,7 +381,7 @@ class Search:
                 budget=self.options.budget,
                 failed=sum(not t.ok for t in self.trials),
                 misfit=misfit,
-                eta_s=at_most(self.trials, self.options.budget - self.spent, self.options),
+                eta_s=longest_time_left(self.trials, self.options.budget - self.spent, self.options),
                 stage=f"{stage} on coarse cells" if self.trials[-1].coarse else stage,
             )
         )

@@ -12,7 +12,7 @@ from calib.material.scene import Sizing
 from calib.problem.objective import Objective
 from calib.problem.target import ErrorModel
 from calib.trace.conditioning import Conditioned
-from calib.trace.table import split_address
+from calib.trace.reader import split_address
 from calib.trace.trace import Trace, read_trace
 from mpm.scene import Scene
 

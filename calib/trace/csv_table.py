@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 from calib.errors import TraceError
 from calib.io.wording import brief, quoted
-from calib.trace.columns import is_unit
 from calib.trace.table import LABELS, Table, as_float, check_names, decoded
+from calib.trace.units import is_unit
 
 SEPARATORS = ",;\t"
 MOST_ABOVE = 60

@@ -12,7 +12,8 @@ import numpy as np
 from calib.errors import TraceError
 from calib.io.wording import brief, quoted
 from calib.trace.columns import Column, candidates, choose, numbers
-from calib.trace.table import LABELS, Table, read_table
+from calib.trace.reader import read_table
+from calib.trace.table import LABELS, Table
 
 if TYPE_CHECKING:
     import pandas

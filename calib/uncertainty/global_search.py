@@ -17,11 +17,12 @@ import numpy as np
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
+from calib.fit.budget import progress_of_all
 from calib.fit.multistart import FitResult, calibrate
 from calib.fit.options import FitOptions
 from calib.fit.search import Search
 from calib.fit.surrogate import Surrogate
-from calib.io.progress import Progress, onward
+from calib.io.progress import Progress
 from calib.problem.joint_objective import JointObjective
 from calib.problem.objective import Objective
 from calib.problem.parameters import ParameterSet, property_of
@@ -161,7 +162,7 @@ def _searched(
     progress: Callable[[Progress], None] | None,
 ) -> FitResult:
     """The fit with the runs of a second search, for a food with one of the claimed parameters elsewhere."""
-    told = onward(progress, first.history, first.best, options)
+    told = progress_of_all(progress, first.history, first.best, options)
     own = replace(options, budget=options.budget - options.cost(first.history), seed=options.seed + OTHERWISE)
     barred = replace(objective, parameters=_barred(objective.parameters, claimed))
     search = Search(barred, fine, coarse, own, told, first.best.misfit + RISE)
