@@ -16,7 +16,8 @@ from calib.fit.multistart import FitResult
 from calib.io.provenance import git_commit, versions
 from calib.io.schema import tag
 from calib.problem.parameters import STRESS_LIKE, property_of
-from calib.problem.request import Request, Setup
+from calib.problem.request import Request
+from calib.problem.setup import Setup
 from calib.trace.conditioning import Conditioned
 from calib.uncertainty.analysis import Doubt
 from calib.uncertainty.intervals import Uncertainty

@@ -19,7 +19,7 @@ from calib.multi_specimen.held_out import Prediction, predict
 from calib.multi_specimen.specimens import Fitted, Specimens, pressed, set_ups
 from calib.multi_specimen.study_file import Study
 from calib.problem.parameters import property_of
-from calib.problem.request import Setup
+from calib.problem.setup import Setup
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_store import EvaluationStore, Header
 from calib.simulation.record_file import record_errands

@@ -21,13 +21,11 @@ from calib.io.provenance import code_key
 from calib.multi_specimen.study_file import Press, Study
 from calib.problem.joint_objective import JointEvaluator, JointObjective
 from calib.problem.parameters import Z95, Parameter, ParameterSet, parameter_of, property_of
-from calib.problem.request import Setup
-from calib.problem.setup import set_up
+from calib.problem.setup import Setup, replicated, set_up
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore
 from calib.simulation.workers import Workers
 from calib.uncertainty.analysis import Doubt
 from calib.uncertainty.global_search import infer
-from calib.validation.numerical_checks import otherwise
 from mpm.arrays import FloatArray
 from mpm.scene import Scene
 from mpm.shapes import Shape
@@ -180,7 +178,7 @@ class Specimens:
             for fidelity, scene in (
                 ("fine", lambda s: s.fine),
                 ("coarse", lambda s: s.coarse),
-                ("again", lambda s: otherwise(s.fine)),
+                ("again", lambda s: replicated(s.fine)),
             )
         )
         options = FitOptions(budget=self.study.budget, batch=self.pool.batch, seed=self.study.seed)

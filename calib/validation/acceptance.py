@@ -205,7 +205,7 @@ def limits(
     baseline_kind: str,
     verdicts: list[Verdict],
     parameters: Mapping[str, Mapping[str, Any]],
-    assumptions: list[str],
+    assumptions: Sequence[str],
     fracture: Mapping[str, float] | None = None,
 ) -> list[str]:
     """What the calibration does not show, one sentence each."""

@@ -27,13 +27,13 @@ from calib.io.schema import tag
 from calib.material.food import FoodSpec
 from calib.material.knife import load_knife
 from calib.material.scene import Sizing, cut_scene, specimen
+from calib.problem.food_parameters import fit_parameters
 from calib.problem.request import Request
-from calib.problem.setup import fit_parameters, set_up
+from calib.problem.setup import replicated, set_up
 from calib.problem.target import ErrorModel
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, Header
 from calib.simulation.workers import Workers
 from calib.uncertainty.global_search import infer
-from calib.validation.numerical_checks import otherwise
 from mpm.errors import CutcalError
 from mpm.scene import Scene
 
@@ -179,7 +179,7 @@ def _one(
             CachedEvaluator(
                 pool.evaluator(scene, setup.kept), store, scene=scene.as_dict(), code=code_key(), fidelity=name
             )
-            for name, scene in (("fine", setup.fine), ("coarse", setup.coarse), ("again", otherwise(setup.fine)))
+            for name, scene in (("fine", setup.fine), ("coarse", setup.coarse), ("again", replicated(setup.fine)))
         ]
         options = FitOptions(budget=request.budget, batch=pool.batch, seed=k)
         fine, coarse, again = evaluators

@@ -8,15 +8,11 @@ from typing import Any
 
 from calib.io.provenance import code_key
 from calib.material.scene import elsewhere
+from calib.problem.setup import slower
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_store import EvaluationStore, content_key
 from calib.simulation.workers import Errand
 from mpm.scene import Scene
-
-
-def _slower(scene: Scene) -> Scene:
-    return replace(scene, motion=replace(scene.motion, mach=scene.motion.mach / 2))
-
 
 FINER = 2 / 3
 """Cell of the finer grid over that of the calibration: five times the cost of the cut."""
@@ -26,14 +22,9 @@ def _finer(scene: Scene) -> Scene:
     return replace(scene, numerics=replace(scene.numerics, dx=FINER * scene.numerics.dx))
 
 
-def otherwise(scene: Scene) -> Scene:
-    """The scene at half the speed, with other particles and the grid elsewhere: what an answer should not depend on."""
-    return elsewhere(_slower(scene), 2)
-
-
 FINER_GRID = "cells of two thirds"
 VARIANTS: Mapping[str, Callable[[Scene], Scene]] = {
-    "half the simulated speed": _slower,
+    "half the simulated speed": slower,
     "grid and particles elsewhere": lambda scene: elsewhere(scene, 1),
     FINER_GRID: _finer,
 }

@@ -26,7 +26,8 @@ from calib.io.provenance import code_key, key_of, versions
 from calib.material.food import load_food, load_foods
 from calib.material.knife import load_knife
 from calib.material.scene import Sizing, cut_scene, elsewhere, height_range, place, specimen, windowed
-from calib.problem.setup import fit_parameters, set_up
+from calib.problem.food_parameters import fit_parameters
+from calib.problem.setup import set_up
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_store import EvaluationStore, Header
 from calib.simulation.process_pool import Pool

@@ -16,9 +16,9 @@ from calib.material.food import load_food
 from calib.material.knife import load_knife
 from calib.material.scene import Sizing, cut_scene, specimen
 from calib.problem.nuisance import GAIN_SD, TORQUE_GAIN_SD, Nuisance, Sensor, Whitening, nuisances, sensor_of
+from calib.problem.numerical_uncertainty import numerical_uncertainty
 from calib.problem.objective import Objective
 from calib.problem.parameters import Parameter, ParameterSet
-from calib.problem.setup import numerical
 from calib.problem.target import Target
 from calib.trace.conditioning import Conditioned, condition
 from calib.trace.trace import Trace
@@ -156,7 +156,7 @@ def test_numerical_uncertainty_enters_at_equal_parts_of_stroke_and_peak(tmp_path
     """2 to 4 % of the study's peak become 2 to 4 % of the trace's, and add to the errors of each point in squares."""
     curve, food = cut(), load_food("banana")
     scene = cut_scene(food, specimen(food, None, Sizing())[0], load_knife("kitchen"), dx=3e-3)
-    found = numerical(study_of(tmp_path), "banana", scene, curve)
+    found = numerical_uncertainty(study_of(tmp_path), "banana", scene, curve)
     peak = float(curve.curve.max())
     assert found[[0, -1]] == pytest.approx([0.02 * peak, 0.04 * peak], rel=1e-6)
     plain = Objective(Target(curve.stroke, curve.curve, 0.0, 0.1, np.interp), ONE)
@@ -181,4 +181,4 @@ def test_a_study_of_something_else_is_refused(tmp_path: Path, changes: dict[str,
     food = load_food("banana")
     scene = cut_scene(food, specimen(food, None, Sizing())[0], load_knife("kitchen"), dx=3e-3)
     with pytest.raises(CutcalError, match=said):
-        numerical(study_of(tmp_path, **changes), "banana", scene, cut())
+        numerical_uncertainty(study_of(tmp_path, **changes), "banana", scene, cut())
