@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib.fit.multistart import FitResult, calibrate
+from calib.fit.multistart import FitResult, multistart_search
 from calib.fit.options import FitOptions
 from calib.multi_specimen.specimens import Fitted, Specimens
 from calib.problem.objective import Objective
@@ -166,7 +166,7 @@ def _specimen(specimens: Specimens, flesh: Mapping[str, float], name: str) -> _S
         for fidelity, scene in (("fine", setup.fine), ("coarse", setup.coarse))
     )
     options = FitOptions(budget=BUDGET, batch=specimens.pool.batch, design=DESIGN, seed=specimens.study.seed)
-    result = calibrate(
+    result = multistart_search(
         goal, fine, coarse=coarse, options=options, progress=specimens.staged(f"specimen of {name}, held out")
     )
     if result.status == "interrupted":

@@ -102,7 +102,7 @@ def doubt_of(
                 runs += _run(objective, evaluator, asked, coarse)
                 surrogate = Surrogate(objective, runs, result.best, surrogate.hyper)
                 found, walked = _walk(objective, result, surrogate, surrogate.jacobian(result.best.z))
-        better = _better(result, runs, surrogate.luck)
+        better = _better(result, runs, surrogate.noise_misfit)
         if better is not None:
             result = replace(
                 result, best=better, parameters=result.parameters.with_values(better.evaluation.parameters)

@@ -18,7 +18,7 @@ from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
 from calib.fit.budget import progress_of_all
-from calib.fit.multistart import FitResult, calibrate
+from calib.fit.multistart import FitResult, multistart_search
 from calib.fit.options import FitOptions
 from calib.fit.search import Search
 from calib.fit.surrogate import Surrogate
@@ -93,9 +93,9 @@ def infer(
         The fit, and what it does not know: None where it ended too early for that.
 
     Raises:
-        As :func:`calib.fit.multistart.calibrate` and :func:`calib.uncertainty.analysis.doubt_of`.
+        As :func:`calib.fit.multistart.multistart_search` and :func:`calib.uncertainty.analysis.doubt_of`.
     """
-    first = calibrate(objective, fine, coarse=coarse, replicate=again, options=options, progress=progress)
+    first = multistart_search(objective, fine, coarse=coarse, replicate=again, options=options, progress=progress)
     if first.status == "interrupted":
         return first, doubt_of(objective, first, seed=options.seed, sample=sample)
     alone = at_first_sight(objective, first)
@@ -169,11 +169,11 @@ def _searched(
     with threadpool_limits(1, "blas"):
         with suppress(SimulationError):  # no run of this design ends its stroke
             search.run()
-        more = [objective.score(t.evaluation, coarse=t.coarse, stage=t.stage) for t in search.trials]
+        more = [objective.score(t.evaluation, coarse=t.coarse, stage=t.stage) for t in search.runs]
         runs = (*first.history, *more)
         assert first.surrogate is not None  # or nothing would be claimed
         found = min((t for t in more if t.cut and not t.coarse), key=lambda t: t.misfit, default=first.best)
-        best = found if found.misfit < first.best.misfit - first.surrogate.luck else first.best
+        best = found if found.misfit < first.best.misfit - first.surrogate.noise_misfit else first.best
         surrogate = Surrogate(objective, runs, best, first.surrogate.hyper)
         parameters = first.parameters.with_values(best.evaluation.parameters)
         jacobian = surrogate.jacobian(best.z)

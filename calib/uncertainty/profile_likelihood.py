@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from calib.fit.surrogate import STEP, Surrogate, slopes
+from calib.fit.surrogate import JACOBIAN_STEP, Surrogate, slopes
 from calib.problem.parameters import Z95, Parameter, ParameterSet
 from calib.uncertainty.intervals import IDENTIFIED, NOT_SEEN, Interval, Uncertainty, Verdict
 from calib.uncertainty.posterior import Posterior
@@ -192,12 +192,12 @@ class _Walker:
     def one_run(self) -> float:
         """Chi-square of the difference that the noise of one simulated curve makes [-]."""
         parts = zip(self.surrogate.each, self.found.data.lengths, strict=True)
-        return math.fsum(process.luck / (length * self.found.widened) for process, length in parts)
+        return math.fsum(process.noise_misfit / (length * self.found.widened) for process, length in parts)
 
     @property
     def steps(self) -> FloatArray:
         """Small steps along each parameter (p, p), diagonal."""
-        return np.diag(STEP * self.surrogate.unit)
+        return np.diag(JACOBIAN_STEP * self.surrogate.unit)
 
 
 def with_profiles(found: Uncertainty, walked: Sequence[Profile], beside: Sequence[FloatArray] = ()) -> Uncertainty:

@@ -65,7 +65,8 @@ def test_process_goes_through_the_runs_and_knows_where_it_does_not() -> None:
     process = Surrogate(goal(), runs, runs[0])
     z = THREE.start + np.array([0.15, -0.1, 0.1])
     assert np.abs(process.each[0].predict(z)[0] - cut(z)).max() < 0.01 * PEAK
-    assert process.doubt(z) < 0.3 * process.doubt(z + 3.0)
+    unknown, far = (process.expected(x, 1.0) - process.expected(x, 0.0) for x in (z, z + 3.0))
+    assert unknown < 0.3**2 * far
 
 
 def test_process_scales_force_with_stress_exactly() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import calib.multi_specimen.held_out
-from calib.fit.multistart import calibrate
+from calib.fit.multistart import multistart_search
 from calib.fit.options import FitOptions
 from calib.multi_specimen.held_out import _adapted, _drawn, _Specimen
 from calib.problem.parameters import ParameterSet
@@ -58,7 +58,7 @@ def test_the_specimens_own_values_are_fitted_to_each_flesh(monkeypatch: pytest.M
     )
     objective = goal(FLESH | {"R_skin": SKIN}, ParameterSet((FIVE.items[3],)))
     inner = Fake(lambda p: three_terms({**FLESH, **p}), noisy=0.001)
-    result = calibrate(objective, inner, options=FitOptions(budget=20, design=5))
+    result = multistart_search(objective, inner, options=FitOptions(budget=20, design=5))
     assert result.best.evaluation.parameters["R_skin"] == pytest.approx(SKIN, rel=0.05)
     coarse = Fake(three_terms, noisy=0.001, breaks=lambda p: p["E"] > 1e6)
     asked: list[tuple[str, str]] = []

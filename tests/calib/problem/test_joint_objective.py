@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib.fit.multistart import calibrate
+from calib.fit.multistart import multistart_search
 from calib.fit.options import FitOptions
 from calib.fit.surrogate import Surrogate
 from calib.problem.joint_objective import JointEvaluator, JointObjective
@@ -71,7 +71,7 @@ def test_shared_flesh_is_found_through_two_specimens() -> None:
     """Skins over R and the narrower specimen's factor are found, although only proportions are known: to 20 and 10 %."""
     joint = JointObjective.of(objectives(scaled=True), SHARED)
     fakes = [Fake(), Fake()]
-    result = calibrate(joint, JointEvaluator(joint, fakes), options=FitOptions(budget=60))
+    result = multistart_search(joint, JointEvaluator(joint, fakes), options=FitOptions(budget=60))
     values = result.best.evaluation.parameters
     for name, skin in SKINS.items():
         assert values[f"R_skin@{name}"] / values["R"] == pytest.approx(skin / FLESH["R"], rel=0.2)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib.fit.multistart import FitResult, calibrate
+from calib.fit.multistart import FitResult, multistart_search
 from calib.fit.options import FitOptions
 from calib.fit.surrogate import Surrogate
 from calib.io.progress import Progress
@@ -51,7 +51,7 @@ def inferred(force, seed: int, budget: float = 100, told: list[Progress] | None 
     """A fit with its second search, and how many runs the first one took."""
     fake, options = Fake(force, noisy=0.002), FitOptions(budget=budget, seed=seed)
     goal = objective(force)
-    first = calibrate(goal, fake, coarse=fake, replicate=fake, options=options)
+    first = multistart_search(goal, fake, coarse=fake, replicate=fake, options=options)
     alone = doubt_of(goal, first, scout=fake, judge=fake, seed=seed)
     report = None if told is None else told.append
     result, doubt = infer(goal, fake, coarse=fake, again=fake, options=options, progress=report)
@@ -110,7 +110,7 @@ def test_what_is_claimed_is_barred():
 
 def stuck(goal: Objective, fake: Fake, shift: float) -> FitResult:
     """A fit whose search has ended at an R so many times the right one, with no better run in its history."""
-    right = calibrate(goal, fake, coarse=fake, replicate=fake, options=FitOptions(seed=0))
+    right = multistart_search(goal, fake, coarse=fake, replicate=fake, options=FitOptions(seed=0))
     values = dict(right.best.evaluation.parameters)
     poor = goal.score(next(iter(fake.evaluate([values | {"R": shift * values["R"]}]))), stage="round")
     history = (*(t for t in right.history if t.misfit > poor.misfit), poor)
@@ -162,7 +162,7 @@ def test_what_is_not_proven_is_not_claimed():
     fake = Fake(lambda p: onefold({"R_skin": p["E"] ** 6 / named["E"] ** 5, "R": p["R"]}), noisy=0.002)
     target = Target(GRID, np.interp(GRID, STROKE, onefold(TRUTH)), 0.05, 0.05, np.interp)
     goal = Objective(target, ParameterSet((stiff, TWO.items[1])))
-    alone = at_first_sight(goal, calibrate(goal, fake, coarse=fake, replicate=fake, options=FitOptions(seed=0)))
+    alone = at_first_sight(goal, multistart_search(goal, fake, coarse=fake, replicate=fake, options=FitOptions(seed=0)))
     assert alone is not None and alone.intervals[0].verdict == "identified"
     _, doubt = infer(goal, fake, coarse=fake, again=fake, options=FitOptions(seed=0))
     assert doubt is not None and verdicts(doubt) == {"E": "weak", "R": "identified"}
@@ -174,7 +174,7 @@ def test_what_numerics_decide_is_not_claimed():
     goal, fake = objective(onefold), Fake(onefold, noisy=0.002)
     other = Fake(lambda p: onefold(p) + 0.9 * np.sin(STROKE / 0.003), noisy=0.002)
     result, doubt = infer(goal, fake, coarse=fake, again=other, options=FitOptions(seed=0))
-    first = calibrate(goal, fake, coarse=fake, replicate=other, options=FitOptions(seed=0))
+    first = multistart_search(goal, fake, coarse=fake, replicate=other, options=FitOptions(seed=0))
     assert doubt is not None and verdicts(doubt)["R"] == "weak" and result.best.misfit < 2.0
     assert [t.stage for t in result.history[len(first.history) :]] == ["profile"] * (
         len(result.history) - len(first.history)

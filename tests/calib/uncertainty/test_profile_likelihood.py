@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from calib.fit.multistart import FitResult, calibrate
+from calib.fit.multistart import FitResult, multistart_search
 from calib.fit.options import FitOptions
 from calib.fit.surrogate import Surrogate
 from calib.problem.objective import Objective
@@ -68,7 +68,7 @@ def one_sided() -> tuple[Objective, FitResult, Doubt]:
     curve = np.interp(GRID, STROKE, elastic(truth))
     objective = Objective(Target(GRID, curve, 0.05, 0.05, np.interp), ONE_SIDED)
     simulator = Fake(elastic, noisy=0.004)
-    result = calibrate(objective, simulator, coarse=simulator, options=FitOptions(budget=60))
+    result = multistart_search(objective, simulator, coarse=simulator, options=FitOptions(budget=60))
     doubt = doubt_of(objective, result, scout=simulator, judge=simulator)
     assert doubt is not None
     return objective, result, doubt
@@ -202,7 +202,7 @@ def test_errors_have_the_size_and_the_length_that_they_should() -> None:
 def test_an_interrupted_search_has_no_doubt() -> None:
     """Fewer runs than parameters: nothing is said instead of something wrong."""
     objective = goal({"E": 3e5, "yield_stress": 4e4, "R": 500.0, "R_skin": 200.0, "mu": 0.2})
-    result = calibrate(objective, Fake(interrupt_after=3), options=FitOptions(budget=60))
+    result = multistart_search(objective, Fake(interrupt_after=3), options=FitOptions(budget=60))
     assert result.status == "interrupted" and doubt_of(objective, result) is None
 
 
