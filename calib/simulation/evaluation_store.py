@@ -37,12 +37,9 @@ from typing import Any, BinaryIO
 
 import h5py
 import numpy as np
-import numpy.typing as npt
 
 from calib.errors import OutputError
 from calib.simulation.evaluation import Evaluation, Evaluator
-
-FloatArray = npt.NDArray[np.float64]
 
 #: Version of both layouts; a file with another one is refused.
 SCHEMA = 1
