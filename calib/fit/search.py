@@ -37,9 +37,8 @@ from calib.fit.options import FitOptions
 from calib.fit.surrogate import Surrogate, coordinate_unit
 from calib.io.progress import Progress, at_most, onward
 from calib.problem.joint_objective import JointObjective, residual
-from calib.problem.objective import Objective, Trial
+from calib.problem.objective import EXPLAINED, Objective, Trial
 from calib.simulation.evaluation import Evaluation, Evaluator
-from calib.uncertainty.intervals import EXPLAINED
 from mpm.arrays import FloatArray
 from mpm.errors import SimulationError
 

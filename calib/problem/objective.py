@@ -55,6 +55,11 @@ CORRELATION = 0.05
 #: 2.5 sd.
 PEAK = 0.02
 
+#: A curve counts as explained when the right material would leave a larger chi-square than its own in one of a hundred
+#: cuts. Where it is not, the model or the search is wrong, and nothing is called identified
+#: (docs/theory.md, "Measured choices").
+EXPLAINED = 0.99
+
 #: Samples further than this many real peaks from the real curve count as that far: a spike of a run that
 #: blows up must not overflow the sum of squares.
 LARGEST_DIFFERENCE = 10.0

@@ -23,11 +23,11 @@ from calib.fit.search import Search
 from calib.fit.surrogate import Surrogate
 from calib.io.progress import Progress, onward
 from calib.problem.joint_objective import JointObjective
-from calib.problem.objective import Objective, Trial
+from calib.problem.objective import EXPLAINED, Objective, Trial
 from calib.problem.parameters import ParameterSet, plain
 from calib.simulation.evaluation import Evaluator
 from calib.uncertainty.analysis import Doubt, as_good, at_first_sight, doubt_of
-from calib.uncertainty.intervals import EXPLAINED, Interval
+from calib.uncertainty.intervals import Interval
 from calib.uncertainty.profile_likelihood import RISE
 from mpm.arrays import FloatArray
 from mpm.errors import SimulationError

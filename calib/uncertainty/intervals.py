@@ -26,7 +26,7 @@ from scipy.stats import t as student
 
 from calib.problem.joint_objective import JointObjective
 from calib.problem.nuisance import Whitening
-from calib.problem.objective import Objective, Trial
+from calib.problem.objective import EXPLAINED, Objective, Trial
 from calib.problem.parameters import Z95, Parameter, ParameterSet
 from mpm.arrays import FloatArray
 
@@ -39,10 +39,6 @@ IDENTIFIED, NOT_SEEN = 0.5, 0.9
 ON_BOUND = 0.1
 #: Two parameters that correlate more are only known together.
 TIED = 0.95
-#: A curve counts as explained when the right material would leave a larger chi-square than its in one of a hundred cuts. In one
-#: that is not, the model or the search is wrong, and nothing is called identified: of 33 made-up cuts whose model was right, five
-#: searches ended so, at up to twenty times the chi-square of the truth.
-EXPLAINED = 0.99
 #: Part of the posterior within an interval.
 COVERED = 0.95
 #: Residuals that keep their sign over more than this part of the stroke are a wrong model, not noise.

@@ -17,11 +17,11 @@ from calib.fit.multistart import AFRESH, NOISES, FitResult, _may_win, calibrate
 from calib.fit.options import FitOptions
 from calib.fit.search import AFAR, ANEW, CAUTION_NEAR, FAR_OFF, LUCK, SCREENING, Search
 from calib.io.progress import Progress
-from calib.problem.objective import Objective, Target, Trial
+from calib.problem.objective import EXPLAINED, Objective, Target, Trial
 from calib.problem.parameters import Parameter, ParameterSet
 from calib.simulation.evaluation import Evaluation, Evaluator
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, Header
-from calib.uncertainty.intervals import EXPLAINED, evidence, uncertainty
+from calib.uncertainty.intervals import evidence, uncertainty
 from mpm.errors import SimulationError
 from tests.calib.fake import (
     FIVE,
