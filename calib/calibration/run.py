@@ -20,13 +20,14 @@ from calib.material.food import FoodSpec, dump_material
 from calib.material.scene import place
 from calib.problem.request import Request, Setup
 from calib.problem.setup import set_up
+from calib.simulation.evaluation import Evaluators
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, Header
 from calib.simulation.record_file import read_record, record_errands
 from calib.simulation.workers import Errand, Workers
 from calib.trace.conditioning import Conditioned
 from calib.trace.filters import filter_simulated
-from calib.uncertainty.analysis import Doubt
-from calib.uncertainty.global_search import infer
+from calib.uncertainty.analysis import UncertaintyAnalysis
+from calib.uncertainty.global_search import Listener, fit_with_uncertainty
 from calib.uncertainty.sobol import sensitivity
 from calib.validation.metrics import compare
 from calib.validation.null_models import NullModel, null_models
@@ -86,16 +87,12 @@ def run(
             for errand in sorted(check_errands(scene.with_material(**values), store), key=lambda e: e.haste)[:1]:
                 pool.begin(errand)
 
-        result, doubt = infer(
+        result, analysis = fit_with_uncertainty(
             setup.objective,
-            fine,
-            coarse=coarse,
-            again=again,
-            options=options,
+            Evaluators(fine, coarse, again),
+            options,
             sample=request.sample,
-            progress=progress,
-            say=say,
-            found=begin,
+            listener=Listener(progress, say, begin),
         )
         scene, values = place(setup.fine, result.best.evaluation.parameters, setup.kept)
         first, setup = setup, replace(setup, fine=scene)
@@ -110,7 +107,7 @@ def run(
         checks = check(scene, result.best.evaluation, store, setup.curve.stroke_length_m) if ended else []
         start = _start_curve(first, fine) if ended else np.full_like(setup.curve.stroke, np.nan)
     add_conditioning(out / "evaluations.h5", setup.curve)
-    return _write(request, setup, result, doubt, record, checks, start, out, time.monotonic() - began)
+    return _write(request, setup, result, analysis, record, checks, start, out, time.monotonic() - began)
 
 
 def _literature(setup: Setup) -> dict[str, float]:
@@ -137,7 +134,7 @@ def _write(
     request: Request,
     setup: Setup,
     result: FitResult,
-    doubt: Doubt | None,
+    analysis: UncertaintyAnalysis | None,
     record: ForceRecord,
     checks: Sequence[Check],
     start: np.ndarray,
@@ -150,9 +147,9 @@ def _write(
     curve, best = setup.curve, result.best
     metrics = compare(curve.stroke, curve.curve, best.curve)
     nulls = null_models(curve.stroke, curve.curve)
-    summary = summarise(request, setup, result, record, metrics, nulls, doubt, checks)
+    summary = summarise(request, setup, result, record, metrics, nulls, analysis, checks)
     summary |= {"sensitivity": sensitivity(setup.objective, result, seed=request.seed), "wall_s": wall}
-    write_csv(out / "curves.csv", _curves(curve, best.curve, record, start, nulls, doubt))
+    write_csv(out / "curves.csv", _curves(curve, best.curve, record, start, nulls, analysis))
     fitted = _fitted_food(request, setup, best.evaluation.parameters)
     keep = ("created", "trace_sha256", "passed", "peak_error", "nrmse", "shape_error", "git", "versions")
     dump_material(fitted, out / "material.yaml", {k: summary[k] for k in keep} | {"trace": curve.trace.label})
@@ -179,7 +176,7 @@ def _curves(
     record: ForceRecord,
     start: np.ndarray,
     nulls: Mapping[str, NullModel],
-    doubt: Doubt | None,
+    analysis: UncertaintyAnalysis | None,
 ) -> dict[str, np.ndarray]:
     """Columns of curves.csv, all on the trace's stroke grid."""
     parts = {
@@ -187,5 +184,5 @@ def _curves(
         "face_N": filter_simulated(curve.stroke, record.stroke, record.resolved_face),
     }
     columns = {"stroke_m": curve.stroke, "real_N": curve.curve, "sim_N": best, "residual_N": best - curve.curve}
-    band = {} if doubt is None else {"band_low_N": doubt.bands[0].low, "band_high_N": doubt.bands[0].high}
+    band = {} if analysis is None else {"band_low_N": analysis.bands[0].low, "band_high_N": analysis.bands[0].high}
     return columns | parts | {"start_N": start} | {f"{name}_N": n.curve for name, n in nulls.items()} | band
