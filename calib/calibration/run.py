@@ -1,7 +1,7 @@
 """One calibration from files to files. The command line is a thin layer over it.
 
-:func:`run` conditions the trace and decides the problem (:mod:`calib.problem.setup`), searches and quantifies what the fit
-does not know (:mod:`calib.uncertainty.global_search`), repeats the best values for their whole record and the numerical
+:func:`run` conditions the trace and decides the problem (:mod:`calib.problem.setup`), fits and quantifies the uncertainty of
+the fit (:mod:`calib.uncertainty.global_search`), repeats the best values for their whole record and the numerical
 checks, judges, and writes.
 """
 
@@ -23,13 +23,13 @@ from calib.io.folder import prepare, write_csv, write_json
 from calib.io.progress import Progress
 from calib.material.food import FoodSpec, dump_material
 from calib.problem.request import Request
-from calib.problem.setup import Evaluators, Setup, set_up
+from calib.problem.setup import FINE, Setup, set_up
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore
 from calib.simulation.record_file import read_record, record_errands
 from calib.simulation.workers import Errand, Workers
 from calib.trace.filters import filter_simulated
-from calib.uncertainty.analysis import Doubt
-from calib.uncertainty.global_search import infer
+from calib.uncertainty.analysis import UncertaintyAnalysis
+from calib.uncertainty.global_search import Listener, fit_with_uncertainty
 from calib.uncertainty.sobol import sensitivity
 from calib.validation.metrics import Metrics, compare
 from calib.validation.null_models import NullModel, null_models
@@ -77,9 +77,9 @@ def run(
     options.check(len(setup.objective.parameters))
     prepare(out, resume=resume)
     with EvaluationStore(out / STORE, setup.header, resume=resume) as store:
-        work = _Calibration(setup, setup.evaluators(pool, store), store, pool, out, say)
-        fit, doubt = work.inferred(options, progress)
-        calibrated = work.repeated(fit, doubt)
+        work = _Calibration(setup, pool, store, out, say)
+        fit, analysis = work.fitted(options, progress)
+        calibrated = work.repeated(fit, analysis)
     add_conditioning(out / STORE, setup.curve)
     return _write(calibrated, out, began)
 
@@ -91,7 +91,7 @@ class Calibrated:
     Attributes:
         setup: What was decided before; its fine cut has the fitted height.
         fit: The search and its best run.
-        doubt: What the fit does not know; None where it ended too early for that.
+        analysis: Its uncertainty; None where it ended too early for that.
         record: Whole record of the best values.
         checks: What numerical choices change; none where the search was interrupted.
         start: Smoothed curve of the literature's values [N] (n,), NaN where that run broke down or was not made.
@@ -99,7 +99,7 @@ class Calibrated:
 
     setup: Setup
     fit: FitResult
-    doubt: Doubt | None
+    analysis: UncertaintyAnalysis | None
     record: ForceRecord
     checks: list[Check]
     start: FloatArray
@@ -123,8 +123,8 @@ class Calibrated:
         columns["face_N"] = filter_simulated(curve.stroke, record.stroke, record.resolved_face)
         columns["start_N"] = self.start
         columns |= {f"{name}_N": null.curve for name, null in self.nulls.items()}
-        if self.doubt is not None:
-            columns |= {"band_low_N": self.doubt.bands[0].low, "band_high_N": self.doubt.bands[0].high}
+        if self.analysis is not None:
+            columns |= {"band_low_N": self.analysis.bands[0].low, "band_high_N": self.analysis.bands[0].high}
         return columns
 
     def food(self) -> FoodSpec:
@@ -144,31 +144,25 @@ class Calibrated:
 class _Calibration:
     """A calibration while its simulations run.
 
-    Attributes: what was decided; what runs the simulations of the search; where all of them are kept and made; the output
-    folder; and who is told of each stage.
+    Attributes: what was decided; where the simulations run and where they are kept; the output folder; and who is told of
+    each stage.
     """
 
     setup: Setup
-    evaluators: Evaluators[CachedEvaluator]
-    store: EvaluationStore
     pool: Workers
+    store: EvaluationStore
     out: Path
     say: Callable[[str], None]
 
-    def inferred(
+    def fitted(
         self, options: FitOptions, progress: Callable[[Progress], None] | None
-    ) -> tuple[FitResult, Doubt | None]:
-        """The fit, and what it does not know."""
-        return infer(
-            self.setup.objective,
-            self.evaluators.fine,
-            coarse=self.evaluators.coarse,
-            again=self.evaluators.replicate,
-            options=options,
-            sample=self.setup.request.sample,
-            progress=progress,
-            say=self.say,
-            found=self._begin_longest_check,
+    ) -> tuple[FitResult, UncertaintyAnalysis | None]:
+        """The fit, and its uncertainty."""
+        setup = self.setup
+        evaluators = setup.evaluators(self.pool, self.store)
+        listener = Listener(progress, self.say, self._begin_longest_check)
+        return fit_with_uncertainty(
+            setup.objective, evaluators, options, sample=setup.request.sample, listener=listener
         )
 
     def _begin_longest_check(self, fit: FitResult) -> None:
@@ -177,7 +171,7 @@ class _Calibration:
         for errand in sorted(check_errands(scene, self.store), key=lambda e: e.haste)[:1]:
             self.pool.begin(errand)
 
-    def repeated(self, fit: FitResult, doubt: Doubt | None) -> Calibrated:
+    def repeated(self, fit: FitResult, analysis: UncertaintyAnalysis | None) -> Calibrated:
         """The best values simulated once more, whole and otherwise, and those of the literature."""
         setup, best, path = self.setup, fit.best.evaluation, self.out / RECORD
         scene, ended = setup.scene(best.parameters), fit.status != "interrupted"
@@ -190,18 +184,22 @@ class _Calibration:
         record = read_record(scene, path)
         checks = check(scene, best, self.store, setup.curve.stroke_length_m) if ended else []
         start = self._start_curve() if ended else np.full_like(setup.curve.stroke, np.nan)
-        return Calibrated(setup.sized(best.parameters), fit, doubt, record, checks, start)
+        return Calibrated(setup.sized(best.parameters), fit, analysis, record, checks, start)
+
+    @cached_property
+    def _fine(self) -> CachedEvaluator:
+        return self.setup.evaluator(self.setup.fine, self.pool, self.store, FINE)
 
     def _start_errands(self) -> list[Errand]:
         """The simulation of the literature's values, where the search has not made it."""
         values = self.setup.start_values
-        keep = self.evaluators.fine.keeper(values)
+        keep = self._fine.keeper(values)
         return [] if keep is None else [Errand(self.setup.scene(values), keep)]
 
     def _start_curve(self) -> FloatArray:
         """Smoothed curve of the literature's values [N] (n,); NaN where that run broke down."""
         stroke = self.setup.curve.stroke
-        run = next(iter(self.evaluators.fine.evaluate([self.setup.start_values])))
+        run = next(iter(self._fine.evaluate([self.setup.start_values])))
         return filter_simulated(stroke, run.stroke, run.force) if run.ok else np.full_like(stroke, np.nan)
 
 
@@ -210,7 +208,7 @@ def _write(done: Calibrated, out: Path, began: float) -> dict[str, Any]:
     from reports.calibration.report import write_report
 
     setup, request = done.setup, done.setup.request
-    summary = summarise(request, setup, done.fit, done.record, done.metrics, done.nulls, done.doubt, done.checks)
+    summary = summarise(request, setup, done.fit, done.record, done.metrics, done.nulls, done.analysis, done.checks)
     summary["sensitivity"] = sensitivity(setup.objective, done.fit, seed=request.seed)
     summary["wall_s"] = time.monotonic() - began
     write_csv(out / "curves.csv", done.curves())

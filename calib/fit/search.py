@@ -40,10 +40,9 @@ from calib.fit.options import FitOptions
 from calib.fit.surrogate import Surrogate, coordinate_unit
 from calib.io.progress import Progress
 from calib.problem.joint_objective import JointObjective, residual
-from calib.problem.objective import Objective
+from calib.problem.objective import EXPLAINED, Objective
 from calib.problem.scored_run import ScoredRun
 from calib.simulation.evaluation import Evaluation, Evaluator
-from calib.uncertainty.intervals import EXPLAINED
 from mpm.arrays import FloatArray
 from mpm.errors import SimulationError
 

@@ -21,8 +21,8 @@ from calib.problem.objective import Objective
 from calib.problem.parameters import ParameterSet, property_of
 from calib.simulation.evaluation import Evaluation
 from calib.trace.filters import filter_simulated
-from calib.uncertainty.intervals import evidence, uncertainty
-from calib.uncertainty.predictive import Band, band_of, errors, materials
+from calib.uncertainty.intervals import linearised_likelihood, uncertainty
+from calib.uncertainty.predictive import Band, error_draws, pointwise_band, posterior_draws
 from calib.validation.acceptance import Verdict, balances
 from calib.validation.metrics import Metrics, compare
 from calib.validation.null_models import null_models
@@ -190,7 +190,9 @@ def _adapted(
     evaluator = specimens.evaluator(specimens.setups[name].coarse, name, "coarse")
     runs = sorted(evaluator.evaluate([{**x, **best} for x in (flesh, *others)]), key=lambda e: e.index)
     own, *trials = (goal.score(e, coarse=True) for e in runs)
-    sd = np.linalg.cholesky(uncertainty(result.parameters, evidence(goal, result.best, result.jacobian)).alone)
+    sd = np.linalg.cholesky(
+        uncertainty(result.parameters, linearised_likelihood(goal, result.best, result.jacobian)).alone
+    )
     steps = np.random.default_rng(specimens.study.seed).standard_normal((len(others), len(sd))) @ sd.T
     low, high = goal.parameters.box
     out = []
@@ -212,10 +214,10 @@ def _drawn(fitted: Fitted, scatter: float, seed: int) -> list[dict[str, float]]:
 
     The fitted flesh is the mean of n specimens, from which another one differs by a variance of 1 + 1/n of theirs.
     """
-    if fitted.doubt is None or fitted.result.surrogate is None:
+    if fitted.analysis is None or fitted.result.surrogate is None:
         return []
     random = np.random.default_rng(seed)
-    points = materials(fitted.result.surrogate, fitted.result.best.z, fitted.doubt.uncertainty, random)[:DRAWS]
+    points = posterior_draws(fitted.result.surrogate, fitted.result.best.z, fitted.analysis.uncertainty, random)[:DRAWS]
     parameters = fitted.objective.parameters
     moved = np.array([p.log and p.name == property_of(p.name) for p in parameters])
     apart = scatter * math.sqrt(1.0 + 1.0 / len(fitted.names))
@@ -235,8 +237,10 @@ def _mean(specimens: Specimens, names: tuple[str, ...], held: str) -> FloatArray
 def _band(goal: Objective, curves: list[FloatArray], fitted: Fitted, seed: int) -> Band:
     """Band of the simulated curves, each with its own factor, and of errors as the fit showed them."""
     random = np.random.default_rng(seed)
-    doubt = fitted.doubt
-    widened = 1.0 if doubt is None else float(np.sqrt(doubt.uncertainty.widened))
-    length = goal.errors.correlation if doubt is None else float(np.mean(doubt.uncertainty.data.lengths))
-    drawn = [goal.factor(c) * c + error for c in curves for error in errors(goal, length, widened, REPEATED, random)]
-    return band_of(np.array(drawn), goal.target.curve)
+    analysis = fitted.analysis
+    widened = 1.0 if analysis is None else float(np.sqrt(analysis.uncertainty.widened))
+    length = goal.errors.correlation if analysis is None else float(np.mean(analysis.uncertainty.data.lengths))
+    drawn = [
+        goal.factor(c) * c + error for c in curves for error in error_draws(goal, length, widened, REPEATED, random)
+    ]
+    return pointwise_band(np.array(drawn), goal.target.curve)

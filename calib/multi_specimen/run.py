@@ -165,9 +165,12 @@ def _summary(
         "hold_out": predicted,
         "traces": traces,
         "parameters": _parameters(study, fitted),
-        "reduced_chi2": None if fitted.doubt is None else fitted.doubt.uncertainty.reduced_chi2,
+        "reduced_chi2": None if fitted.analysis is None else fitted.analysis.uncertainty.reduced_chi2,
         "failed_simulations": fitted.result.failed,
-        "limits": [*(() if fitted.doubt is None else fitted.doubt.said), *_limits(held, setups, study.scatter)],
+        "limits": [
+            *(() if fitted.analysis is None else fitted.analysis.remarks),
+            *_limits(held, setups, study.scatter),
+        ],
     }
 
 
@@ -188,7 +191,7 @@ def _trace(setup: Setup, fitted: Fitted, name: str, checks: list[Check], scene: 
         "metrics": metrics.as_dict(),
         "factor": scale,
         "nuisances": {e.name: e.as_dict() for e in setup.objective.nuisance_estimates(trial.curve)},
-        "predictive_inside": None if fitted.doubt is None else fitted.doubt.bands[k].inside,
+        "predictive_inside": None if fitted.analysis is None else fitted.analysis.bands[k].inside,
         "null_models": {n: {"R": m.metrics.iso18571.R, "nrmse": m.metrics.nrmse} for n, m in _nulls(curve).items()},
         "numerical_checks": [c.as_dict() for c in checks],
         "scalars": scalars,
@@ -212,8 +215,8 @@ def _parameters(study: Study, fitted: Fitted) -> dict[str, Any]:
     """Value, interval and verdict of each parameter, shared and own."""
     out: dict[str, Any] = {}
     for k, p in enumerate(fitted.result.parameters):
-        if fitted.doubt is not None:
-            entry: dict[str, Any] = dict(fitted.doubt.uncertainty.intervals[k].as_dict())
+        if fitted.analysis is not None:
+            entry: dict[str, Any] = dict(fitted.analysis.uncertainty.intervals[k].as_dict())
         else:
             entry = {"value": p.value, "unit": p.unit, "low95": None, "high95": None}
             entry |= {"prior_low": p.prior_low, "prior_high": p.prior_high, "verdict": "unknown"}
@@ -253,8 +256,8 @@ def _curves(setup: Setup, fitted: Fitted, held: Prediction | None, name: str) ->
         k = fitted.names.index(name)
         curve = fitted.result.best.each[k].curve
         columns["sim_N"] = setup.objective.factor(curve) * curve
-        if fitted.doubt is not None:
-            columns |= {"band_low_N": fitted.doubt.bands[k].low, "band_high_N": fitted.doubt.bands[k].high}
+        if fitted.analysis is not None:
+            columns |= {"band_low_N": fitted.analysis.bands[k].low, "band_high_N": fitted.analysis.bands[k].high}
     if held is not None:
         columns |= {
             "predicted_N": held.curve,

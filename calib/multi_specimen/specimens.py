@@ -21,11 +21,12 @@ from calib.io.provenance import code_key
 from calib.multi_specimen.study_file import Press, Study
 from calib.problem.joint_objective import JointEvaluator, JointObjective
 from calib.problem.parameters import Z95, Parameter, ParameterSet, parameter_of, property_of
-from calib.problem.setup import Setup, replicated, set_up
+from calib.problem.setup import Setup, repeated, set_up
+from calib.simulation.evaluation import Evaluators
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore
 from calib.simulation.workers import Workers
-from calib.uncertainty.analysis import Doubt
-from calib.uncertainty.global_search import infer
+from calib.uncertainty.analysis import UncertaintyAnalysis
+from calib.uncertainty.global_search import Listener, fit_with_uncertainty
 from mpm.arrays import FloatArray
 from mpm.scene import Scene
 from mpm.shapes import Shape
@@ -99,13 +100,13 @@ class Fitted:
         names: Its traces.
         objective: What was fitted.
         result: How.
-        doubt: What it does not know, None where it ended too early.
+        analysis: Its uncertainty, None where it ended too early.
     """
 
     names: tuple[str, ...]
     objective: JointObjective
     result: FitResult
-    doubt: Doubt | None
+    analysis: UncertaintyAnalysis | None
 
     def flesh(self, z: FloatArray | None = None) -> dict[str, float]:
         """Shared values [SI] by property: the best ones, or those at internal coordinates ``z`` (p,)."""
@@ -178,16 +179,18 @@ class Specimens:
             for fidelity, scene in (
                 ("fine", lambda s: s.fine),
                 ("coarse", lambda s: s.coarse),
-                ("again", lambda s: replicated(s.fine)),
+                ("again", lambda s: repeated(s.fine)),
             )
         )
         options = FitOptions(budget=self.study.budget, batch=self.pool.batch, seed=self.study.seed)
         words = f"fit of {', '.join(names)}"
         staged = self.staged(words)
-        result, doubt = infer(joint, fine, coarse=coarse, again=again, options=options, progress=staged, say=self.say)
+        result, analysis = fit_with_uncertainty(
+            joint, Evaluators(fine, coarse, again), options, listener=Listener(staged, self.say)
+        )
         if result.status == "interrupted":
             raise KeyboardInterrupt
-        return Fitted(tuple(names), joint, result, doubt)
+        return Fitted(tuple(names), joint, result, analysis)
 
     def staged(self, words: str) -> Callable[[Progress], None] | None:
         """The progress callback with what is being fitted before each stage."""

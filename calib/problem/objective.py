@@ -46,6 +46,11 @@ from calib.problem.target import ErrorModel, Target
 from calib.simulation.evaluation import Evaluation
 from mpm.arrays import FloatArray
 
+#: A curve counts as explained when the right material would leave a larger chi-square than its own in one of a hundred
+#: cuts. Where it is not, the model or the search is wrong, and nothing is called identified
+#: (docs/theory.md, "Measured choices").
+EXPLAINED = 0.99
+
 #: Simulated forces, and differences between curves in the surrogate, beyond this many peaks count as that many [-]: a
 #: spike of a run that blows up must not overflow the sum of squares.
 LARGEST_DIFFERENCE = 10.0

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
 
 from calib.io.provenance import code_key, key_of
 from calib.material.knife import load_knife
@@ -16,7 +15,7 @@ from calib.problem.numerical_uncertainty import numerical_uncertainty
 from calib.problem.objective import Objective
 from calib.problem.request import Request
 from calib.problem.target import Target
-from calib.simulation.evaluation import Evaluator
+from calib.simulation.evaluation import Evaluators
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, Header
 from calib.simulation.workers import Workers
 from calib.trace.conditioning import Conditioned, condition
@@ -26,25 +25,10 @@ from mpm.scene import Scene
 COARSE_SPEED = 2.0
 """Speed of a search's coarse simulations over that of a screening scene [-] (docs/theory.md, "Surrogate and search"). The
 surrogate takes their common offset from the fine ones away."""
-REPLICATE = 2
-"""Which of the shifted grids, with its own particles, a replicate has; the numerical checks take another one."""
-
-Kind = TypeVar("Kind", bound=Evaluator, covariant=True)
-
-
-@dataclass(frozen=True)
-class Evaluators(Generic[Kind]):
-    """What runs the simulations of a search, by their fidelity.
-
-    Attributes:
-        fine: At the resolution that counts.
-        coarse: On coarser cells and faster, for what need not count.
-        replicate: As ``fine``, with what should not matter changed: half the speed, other particles, the grid elsewhere.
-    """
-
-    fine: Kind
-    coarse: Kind
-    replicate: Kind
+FINE, COARSE, AGAIN = "fine", "coarse", "again"
+"""What the fidelities of a search are called in its store; that of repeated runs is the last."""
+REPEAT = 2
+"""Which of the shifted grids, with its own particles, a repeated run has; the numerical checks take another one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +83,7 @@ class Setup:
         scene, material = place(self.fine, values, self.kept)
         return scene.with_material(**material)
 
-    def evaluators(self, pool: Workers, store: EvaluationStore, label: str = "") -> Evaluators[CachedEvaluator]:
+    def evaluators(self, pool: Workers, store: EvaluationStore, label: str = "") -> Evaluators:
         """What runs the simulations of a search for this trace.
 
         Args:
@@ -111,9 +95,9 @@ class Setup:
             An evaluator for each fidelity.
         """
         return Evaluators(
-            self.evaluator(self.fine, pool, store, f"{label}fine"),
-            self.evaluator(self.coarse, pool, store, f"{label}coarse"),
-            self.evaluator(replicated(self.fine), pool, store, f"{label}again"),
+            self.evaluator(self.fine, pool, store, label + FINE),
+            self.evaluator(self.coarse, pool, store, label + COARSE),
+            self.evaluator(repeated(self.fine), pool, store, label + AGAIN),
         )
 
     def evaluator(self, scene: Scene, pool: Workers, store: EvaluationStore, fidelity: str) -> CachedEvaluator:
@@ -198,6 +182,6 @@ def slower(scene: Scene) -> Scene:
     return replace(scene, motion=replace(scene.motion, mach=scene.motion.mach / 2))
 
 
-def replicated(scene: Scene) -> Scene:
+def repeated(scene: Scene) -> Scene:
     """The scene at half the speed, with other particles and the grid elsewhere: what an answer should not depend on."""
-    return elsewhere(slower(scene), REPLICATE)
+    return elsewhere(slower(scene), REPEAT)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import calib
+import cutcal
 import mpm
 from calib.material.food import load_material_file
 from calib.material.knife import load_knife
@@ -63,8 +63,8 @@ DOCUMENTED = re.findall(r"^\.\. auto\w+:: (\S+)", read(DOCS / "api.md"), flags=r
 
 
 def test_every_public_name_is_documented() -> None:
-    """What ``calib`` and ``mpm`` offer is on the page of the interface."""
-    offered = {f"{package.__name__}.{name}" for package in (calib, mpm) for name in package.__all__}
+    """What ``cutcal`` and ``mpm`` offer is on the page of the interface."""
+    offered = {f"{package.__name__}.{name}" for package in (cutcal, mpm) for name in package.__all__}
     assert offered - set(DOCUMENTED) == set()
 
 

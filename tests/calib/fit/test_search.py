@@ -25,13 +25,13 @@ from calib.fit.search import (
     Search,
 )
 from calib.io.progress import Progress
-from calib.problem.objective import Objective
+from calib.problem.objective import EXPLAINED, Objective
 from calib.problem.parameters import Parameter, ParameterSet
 from calib.problem.scored_run import ScoredRun
 from calib.problem.target import Target
 from calib.simulation.evaluation import Evaluation, Evaluator
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, Header
-from calib.uncertainty.intervals import EXPLAINED, evidence, uncertainty
+from calib.uncertainty.intervals import linearised_likelihood, uncertainty
 from mpm.errors import SimulationError
 from tests.calib.fake import (
     FIVE,
@@ -91,7 +91,7 @@ def test_recovers_five_parameters_within_eighty_runs(truth: dict[str, float]) ->
     for name in ("E", "R", "R_skin"):
         assert values(result)[name] == pytest.approx(truth[name], rel=0.2)
     assert result.jacobian is not None
-    found = uncertainty(result.parameters, evidence(objective, result.best, result.jacobian))
+    found = uncertainty(result.parameters, linearised_likelihood(objective, result.best, result.jacobian))
     assert sum(i.low95 <= truth[i.parameter.name] <= i.high95 for i in found.intervals) >= 4
     assert found.intervals[2].verdict == "identified"
     assert result.repeatability == pytest.approx(NOISE, rel=0.4)

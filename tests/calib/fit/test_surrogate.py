@@ -13,7 +13,7 @@ from calib.problem.parameters import Parameter, ParameterSet
 from calib.problem.scored_run import ScoredRun
 from calib.problem.target import Target
 from calib.simulation.evaluation import Evaluation
-from calib.uncertainty.intervals import evidence, uncertainty
+from calib.uncertainty.intervals import linearised_likelihood, uncertainty
 from tests.calib.synthetic import X, correlated_noise
 
 PEAK = 10.0
@@ -99,13 +99,13 @@ def test_noise_does_not_pass_for_information() -> None:
     for seed in range(10):
         runs = trials(25, noise=0.02, seed=seed)
         jacobian = Surrogate(goal(), runs, runs[0]).jacobian(THREE.start)
-        found = uncertainty(THREE, evidence(goal(), runs[0], jacobian))
+        found = uncertainty(THREE, linearised_likelihood(goal(), runs[0], jacobian))
         unseen += found.intervals[2].verdict == "not_seen"
         assert found.intervals[0].verdict == "identified"
         plain = jacobian.copy()
         change = trials(1, noise=0.02, seed=100 + seed)[0].residual - runs[0].residual
         plain[:-3, 2] = change[:-3] / math.log(1.1)
-        naive = uncertainty(THREE, evidence(goal(), runs[0], plain))
+        naive = uncertainty(THREE, linearised_likelihood(goal(), runs[0], plain))
         claimed += naive.intervals[2].verdict == "identified"
     assert unseen >= 9 and claimed >= 9
 

@@ -25,7 +25,7 @@ def fitted(specimens: int) -> Any:
     z = FIVE.to_vector(FLESH | {"R_skin": SKIN})
     return SimpleNamespace(
         names=names,
-        doubt=SimpleNamespace(uncertainty=None),
+        analysis=SimpleNamespace(uncertainty=None),
         result=SimpleNamespace(surrogate=object(), best=SimpleNamespace(z=z)),
         objective=SimpleNamespace(parameters=FIVE),
         flesh=lambda point: {n: x for n, x in FIVE.to_dict(point).items() if n in FLESH},
@@ -38,7 +38,7 @@ def test_flesh_of_another_specimen_scatters_about_the_mean_of_the_fitted_ones(
 ) -> None:
     """By the root of 1 + 1/n of the scatter, in the logarithm; friction is the blade's as well and stays; without scatter nothing moves."""
     monkeypatch.setattr(calib.multi_specimen.held_out, "DRAWS", 4000)
-    monkeypatch.setattr(calib.multi_specimen.held_out, "materials", lambda s, z, u, random: np.tile(z, (4000, 1)))
+    monkeypatch.setattr(calib.multi_specimen.held_out, "posterior_draws", lambda s, z, u, random: np.tile(z, (4000, 1)))
     drawn = _drawn(fitted(specimens), 0.25, 0)
     assert len(drawn) == 4000 and {d["mu"] for d in drawn} == {FLESH["mu"]}
     for name in ("E", "yield_stress", "R"):
