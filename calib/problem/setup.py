@@ -23,8 +23,8 @@ from calib.trace.filters import filter_simulated
 from mpm.scene import Scene
 
 COARSE_SPEED = 2.0
-"""Speed of a search's coarse simulations over that of a screening scene [-] (docs/theory.md, "Surrogate and search"). The
-surrogate takes their common offset from the fine ones away."""
+"""Speed of a search's coarse simulations over that of a screening scene [-] (docs/theory.md, "Surrogate and search").
+The surrogate takes their common offset from the fine ones away."""
 FINE, COARSE, AGAIN = "fine", "coarse", "again"
 """What the fidelities of a search are called in its store; that of repeated runs is the last."""
 REPEAT = 2
@@ -79,7 +79,7 @@ class Setup:
         return replace(self, fine=scene)
 
     def scene(self, values: Mapping[str, float]) -> Scene:
-        """The fine cut at some values [SI] by name: those of the material, and the specimen's height where it is fitted."""
+        """The fine cut at some values [SI] by name: the material's, and the specimen's height where that is fitted."""
         scene, material = place(self.fine, values, self.kept)
         return scene.with_material(**material)
 
