@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from calib.io.provenance import code_key
+from calib.io.typed_document import NULL
 from calib.material.scene import elsewhere
 from calib.problem.setup import slower
 from calib.simulation.evaluation import Evaluation
@@ -58,7 +59,7 @@ class Check:
     reason: str | None
     peak_change: float | None
     work_change: float | None
-    unbooked_change: float | None = None
+    unbooked_change: float | None = field(default=None, metadata=NULL)
 
     @property
     def change(self) -> float | None:
