@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mpm.errors import CutcalError
+from mpm.errors import OutputError as OutputError
 
 
 class TraceError(CutcalError):
@@ -23,10 +24,6 @@ class PublishedError(CutcalError):
 
 class RegressionError(CutcalError):
     """A recorded force curve that is missing or damaged, or that cannot be replaced."""
-
-
-class OutputError(CutcalError):
-    """An output folder or file that cannot be written, or that belongs to another calibration."""
 
 
 class DocumentError(CutcalError):

@@ -13,6 +13,10 @@ class SceneError(CutcalError):
     """A scene (food, knife, board, motion, numerics) that cannot be simulated as asked."""
 
 
+class OutputError(CutcalError):
+    """An output folder or file that cannot be written, or that belongs to another run."""
+
+
 class SimulationError(CutcalError):
     """A run that broke down after it had started.
 

@@ -15,10 +15,11 @@ from calib.errors import OutputError
 from calib.fit.multistart import FitResult
 from calib.io.provenance import git_commit, versions
 from calib.io.schema import tag
-from calib.problem.parameters import STRESS_LIKE, plain
-from calib.problem.request import Request, Setup
+from calib.problem.parameters import STRESS_LIKE, property_of
+from calib.problem.request import Request
+from calib.problem.setup import Setup
 from calib.trace.conditioning import Conditioned
-from calib.uncertainty.analysis import Doubt
+from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.intervals import Uncertainty
 from calib.validation.acceptance import judge, limits
 from calib.validation.metrics import Metrics
@@ -38,7 +39,7 @@ def summarise(
     record: ForceRecord,
     metrics: Metrics,
     nulls: Mapping[str, NullModel],
-    doubt: Doubt | None,
+    analysis: UncertaintyAnalysis | None,
     checks: Sequence[Check],
 ) -> dict[str, Any]:
     """All figures of a calibration but its run time.
@@ -50,13 +51,13 @@ def summarise(
         record: Full record of the best values.
         metrics: Best curve against the trace.
         nulls: Null models against the trace.
-        doubt: What the fit does not know; None when it ended too early for that.
+        analysis: What the fit does not know; None when it ended too early for that.
         checks: What numerical choices change.
     """
-    parameters = _parameters(request, result, None if doubt is None else doubt.uncertainty)
-    for name, ends in ({} if doubt is None else doubt.sampled).items():
+    parameters = _parameters(request, result, None if analysis is None else analysis.uncertainty)
+    for name, ends in ({} if analysis is None else analysis.sampled).items():
         parameters[name]["sampled95"] = list(ends)
-    open_ends = {} if doubt is None else {e.name: e.as_dict() for e in doubt.nuisances}
+    open_ends = {} if analysis is None else {e.name: e.as_dict() for e in analysis.nuisances}
     verdicts = judge(
         metrics,
         {n: m.metrics for n, m in nulls.items()},
@@ -91,14 +92,14 @@ def summarise(
         "peak_real_sd_N": setup.curve.peak_sd_N,
         "parameters": parameters,
         "nuisances": open_ends,
-        **_doubt(setup, doubt),
-        "correlations": _correlations(result, None if doubt is None else doubt.uncertainty),
+        **_uncertainty(setup, analysis),
+        "correlations": _correlations(result, None if analysis is None else analysis.uncertainty),
         "fixed_parameters": _fixed(request, parameters),
         **_runs(result),
         **_numerics(request, setup, record),
         "numerical_checks": [c.as_dict() for c in checks],
         "warnings": [*request.food.warnings(), *setup.curve.warnings],
-        "limits": [*(() if doubt is None else doubt.said), *said],
+        "limits": [*(() if analysis is None else analysis.remarks), *said],
     }
 
 
@@ -146,33 +147,37 @@ def _agreement(metrics: Metrics, nulls: Mapping[str, NullModel]) -> dict[str, An
     }
 
 
-def _parameters(request: Request, result: FitResult, doubt: Uncertainty | None) -> dict[str, dict[str, Any]]:
+def _parameters(request: Request, result: FitResult, found: Uncertainty | None) -> dict[str, dict[str, Any]]:
     out: dict[str, dict[str, Any]] = {}
     for k, p in enumerate(result.parameters):
-        if doubt is not None:
-            entry: dict[str, Any] = dict(doubt.intervals[k].as_dict())
+        if found is not None:
+            entry: dict[str, Any] = dict(found.intervals[k].as_dict())
         else:
             entry = {"value": p.value, "unit": p.unit, "low95": None, "high95": None}
             entry |= {"prior_low": p.prior_low, "prior_high": p.prior_high, "verdict": UNKNOWN}
         known = (request.food.dims if p.name == "height" else request.food.properties)[p.name]
         out[p.name] = entry | {"status": known.status, "source": known.source}
-    if doubt is not None:
+    if found is not None:
         names = result.parameters.names
-        for tie in doubt.only_as_product:
+        for tie in found.only_as_product:
             for name in names:
                 if name in tie.combination.split() and out[name]["verdict"] in ("identified", "weak"):
                     out[name]["verdict"] = "only_as_product"
-        for name, part in doubt.known_width().items():
-            if part < WITH_WIDTH and plain(name) in STRESS_LIKE and out[name]["verdict"] in ("identified", "weak"):
+        for name, part in found.known_width().items():
+            if (
+                part < WITH_WIDTH
+                and property_of(name) in STRESS_LIKE
+                and out[name]["verdict"] in ("identified", "weak")
+            ):
                 out[name]["verdict"] = "only_as_product"
     return out
 
 
-def _doubt(setup: Setup, doubt: Doubt | None) -> dict[str, Any]:
+def _uncertainty(setup: Setup, analysis: UncertaintyAnalysis | None) -> dict[str, Any]:
     """Profiles, the size and correlation of the errors, and how much of the trace lies in the predictive band."""
-    if doubt is None:
+    if analysis is None:
         return {"profiles": {}, "reduced_chi2": None, "correlation_length_m": None, "predictive_inside": None}
-    found = doubt.uncertainty
+    found = analysis.uncertainty
     chosen = setup.objective.parameters
     return {
         "profiles": {
@@ -181,19 +186,19 @@ def _doubt(setup: Setup, doubt: Doubt | None) -> dict[str, Any]:
                 "rise": [float(x) for x in p.rise],
                 "trace_alone": [float(x) for x in p.data],
             }
-            for p in doubt.profiles
+            for p in analysis.profiles
         },
         "reduced_chi2": found.reduced_chi2,
         "correlation_length_m": found.data.lengths[0] * setup.curve.stroke_length_m,
-        "predictive_inside": doubt.bands[0].inside,
+        "predictive_inside": analysis.bands[0].inside,
     }
 
 
-def _correlations(result: FitResult, doubt: Uncertainty | None) -> dict[str, float]:
-    if doubt is None:
+def _correlations(result: FitResult, found: Uncertainty | None) -> dict[str, float]:
+    if found is None:
         return {}
     n = result.parameters.names
-    return {f"{n[i]},{n[j]}": float(doubt.correlation[i, j]) for i in range(len(n)) for j in range(i)}
+    return {f"{n[i]},{n[j]}": float(found.correlation[i, j]) for i in range(len(n)) for j in range(i)}
 
 
 def _fixed(request: Request, fitted: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

@@ -2,7 +2,8 @@
 
 The fields of a result have the names of the document's keys, units included. Two rules say what a missing number is:
 
-* A field whose default is None stands for a key that may be missing: while it is None the key is left out.
+* A field whose default is None stands for a key that may be missing: while it is None the key is left out. With the
+  metadata :data:`NULL` it is missing in older documents alone: today it is written as null.
 * NaN and infinity are written as null, because JSON has no word for them. A null is read back as None where the type
   allows None and the key may not be missing, else as NaN.
 
@@ -32,9 +33,16 @@ from mpm.errors import CutcalError
 
 FLAT: Mapping[str, Any] = {"flat": True}
 """Metadata of a field whose keys stand beside those of the result that has it."""
+NULL: Mapping[str, Any] = {"null": True}
+"""Metadata of a field whose default is None and which is written all the same, as null."""
 REMEDY = "run the same command again"
 
 Result = TypeVar("Result")
+
+
+def left_out(field: Field[Any]) -> bool:
+    """Whether the key of a field is left out while it is None."""
+    return field.default is None and not field.metadata.get("null")
 
 
 def to_document(result: Any) -> dict[str, Any]:
@@ -51,7 +59,7 @@ def to_document(result: Any) -> dict[str, Any]:
     known = {f.name: f for f in fields(result)}
     for key in getattr(kind, "KEYS", tuple(known)):
         value = getattr(result, key)
-        if value is None and key in known and known[key].default is None:
+        if value is None and key in known and left_out(known[key]):
             continue
         if key in known and known[key].metadata.get("flat"):
             out |= _plain(value)
@@ -184,8 +192,7 @@ def _typed(hint: Any, value: Any, place: str, of: Field[Any] | None = None) -> A
 def _optional(kinds: tuple[Any, ...], value: Any, place: str, of: Field[Any] | None) -> Any:
     """A value that may be one of several types; the first that fits."""
     if value is None and NoneType in kinds:
-        left_out = of is not None and of.default is None
-        return math.nan if left_out and float in kinds else None
+        return math.nan if of is not None and left_out(of) and float in kinds else None
     wrong: list[DocumentError] = []
     for one in kinds:
         try:

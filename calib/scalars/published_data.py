@@ -17,8 +17,8 @@ from calib.material.food import FoodSpec, load_food, read_property
 from calib.material.knife import load_knife
 from calib.material.properties import DIMENSIONS, Rule
 from calib.material.scene import LENGTH_PER_HEIGHT, PRISMS
+from calib.problem.food_parameters import fit_parameters
 from calib.problem.parameters import ParameterSet
-from calib.problem.setup import fit_parameters
 from mpm.errors import CutcalError, SceneError
 from mpm.scene import Knife
 from mpm.shapes import SHAPE_KINDS, Shape, section_area

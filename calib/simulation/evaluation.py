@@ -109,3 +109,18 @@ class Evaluator(Protocol):
 
     def evaluate(self, batch: Sequence[Mapping[str, float]]) -> Iterator[Evaluation]:
         """Run each set of ``batch``; yield in order of completion, ``index`` = place in the batch."""
+
+
+@dataclass(frozen=True)
+class Evaluators:
+    """What runs the simulations of a fit.
+
+    Attributes:
+        fine: Simulations at the resolution that counts.
+        coarse: Cheaper ones, on coarse cells.
+        repeat: Those of ``fine`` with what should not matter changed: speed, particles and the place of the grid.
+    """
+
+    fine: Evaluator
+    coarse: Evaluator
+    repeat: Evaluator

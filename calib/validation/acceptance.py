@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from calib.problem.nuisance import OUTSIDE
-from calib.problem.parameters import plain
+from calib.problem.parameters import property_of
 from calib.simulation.evaluation import FULLY_PARTED
 from calib.validation.metrics import Metrics
 from calib.validation.numerical_checks import FINER, FINER_GRID, Check
@@ -74,32 +74,7 @@ def _nuisance(name: str, n: Mapping[str, Any]) -> Verdict:
     return Verdict(JUDGED[name], size, OUTSIDE, "sd", not n["outside"], note)
 
 
-SPENT = {
-    "parting": "parting the food",
-    "friction": "friction",
-    "plastic": "flow",
-    "damage": "damage",
-    "viscous": "loss factor",
-    "elastic": "elastic",
-    "kinetic": "kinetic",
-}
-"""Where the work of a cut goes, in words."""
 WORTH_SAYING = 0.1  # energy released ahead of the edge, over that spent at it
-LEAST = 0.005  # part of the work that is named
-
-
-def spent(energy: Mapping[str, float]) -> str:
-    """Where the work of a cut has gone, in words, largest first; what is less than half a per cent is left out."""
-    total = sum(energy.values())
-    parts = {words: energy[name] / total for name, words in SPENT.items()} if total > 0 else {}
-    large = sorted((part, words) for words, part in parts.items() if part >= LEAST)
-    return ", ".join(f"{words} {part:.0%}" for part, words in reversed(large))
-
-
-def unbooked(energy: Mapping[str, float]) -> float | None:
-    """Part of the work of a cut that no law has taken [-]; None where no work was done."""
-    total = sum(energy.values())
-    return energy["unbooked"] / total if total > 0 and "unbooked" in energy else None
 
 
 def _loss(finer: Check) -> Verdict:
@@ -205,7 +180,7 @@ def limits(
     baseline_kind: str,
     verdicts: list[Verdict],
     parameters: Mapping[str, Mapping[str, Any]],
-    assumptions: list[str],
+    assumptions: Sequence[str],
     fracture: Mapping[str, float] | None = None,
 ) -> list[str]:
     """What the calibration does not show, one sentence each."""
@@ -220,9 +195,9 @@ def limits(
             f"The trace hardly sees {', '.join(unseen)}: these values are the literature's as much as the trace's."
         )
     held = [
-        f"{HELD_WEAK[plain(n)]:.0%} for {n}"
+        f"{HELD_WEAK[property_of(n)]:.0%} for {n}"
         for n, p in parameters.items()
-        if p["verdict"] == "weak" and plain(n) in HELD_WEAK
+        if p["verdict"] == "weak" and property_of(n) in HELD_WEAK
     ]
     if held:
         said.append(

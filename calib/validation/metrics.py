@@ -6,12 +6,13 @@ simulated one the model m; integrals are trapezium sums over the stroke. Errors 
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
 from calib.errors import CurveError
+from calib.io.typed_document import NULL
 
 ISO_SAMPLES = 240
 """Samples to which curves are brought for the ISO rating; its slope part changes by 0.07 from 80 to 600."""
@@ -79,7 +80,7 @@ class IsoRating:
     R: float
     shift: int
     at_bound: bool
-    without_phase: float | None = None
+    without_phase: float | None = field(default=None, metadata=NULL)
 
     @property
     def caveat(self) -> str:

@@ -25,8 +25,8 @@ from calib.io.provenance import code_key, git_commit, key_of
 from calib.io.schema import tag
 from calib.material.food import FoodSpec
 from calib.material.scene import Sizing, cut_scene, specimen
+from calib.problem.food_parameters import fit_parameters
 from calib.problem.parameters import ParameterSet
-from calib.problem.setup import fit_parameters
 from calib.simulation.evaluation import FULLY_PARTED, Evaluation
 from calib.simulation.evaluation_store import EvaluationStore, Header, content_key
 from calib.simulation.workers import Workers

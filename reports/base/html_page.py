@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from calib.errors import OutputError
+from mpm.errors import OutputError
 from mpm.files import write_atomic
 from reports.base.scene_render import COLOURS, EYE, FRAME, INK, STEEL, WOOD, Film, blade_at
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from calib.errors import OutputError
+from mpm.errors import OutputError
 from mpm.files import replacing
 from mpm.output.snapshot import Snapshot
 from mpm.output.surface import Surface
