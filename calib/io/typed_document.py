@@ -11,7 +11,8 @@ A class may say more about its document in two class variables:
 * ``DOCUMENT`` is the name of the document. It becomes the first key, ``schema``.
 * ``KEYS`` lists the keys in their order, where these are not just the fields: properties may be among them.
 
-A field with the metadata :data:`FLAT` is a mapping or another dataclass. Its keys stand beside those of the result itself.
+A field with the metadata :data:`FLAT` is a mapping or another dataclass. Its keys stand beside those of the result; where
+it may be None, they may all be missing.
 """
 
 from __future__ import annotations
@@ -142,16 +143,20 @@ def _keys(kind: Any) -> frozenset[str]:
     """Keys of a document that are not of a flat mapping in it."""
     own = {"schema", *getattr(kind, "KEYS", ()), *(f.name for f in fields(kind))}
     for one in fields(kind):
-        inner: Any = _hints(kind)[one.name]
-        if one.metadata.get("flat") and hasattr(inner, "__dataclass_fields__"):
-            own |= _keys(inner)
+        if one.metadata.get("flat"):
+            hint: Any = _hints(kind)[one.name]
+            inner: list[Any] = [part for part in (hint, *get_args(hint)) if is_dataclass(part)]
+            own |= {key for part in inner for key in _keys(part)}
     return frozenset(own)
 
 
 def _flat(hint: Any, content: dict[str, Any], place: str, known: frozenset[str]) -> Any:
-    """The part of a document whose keys stand beside the others."""
-    if isinstance(hint, type) and is_dataclass(hint):
-        return from_document(hint, content, place)
+    """The part of a document whose keys stand beside the others; None where it may be missing and has no key."""
+    kinds = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+    kind = next((one for one in kinds if isinstance(one, type) and is_dataclass(one)), None)
+    if kind is not None:
+        absent = NoneType in kinds and not any(f.name in content for f in fields(kind))
+        return None if absent else from_document(kind, content, place)
     each = get_args(hint)[1]
     return {name: _typed(each, value, _at(place, name)) for name, value in content.items() if name not in known}
 

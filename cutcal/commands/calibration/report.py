@@ -38,8 +38,12 @@ def writer(folder: Path) -> Callable[[Path], Path]:
     Raises:
         ReportError: The folder is missing, or holds no finished run.
     """
-    from reports import bench, convergence, stability, study, verification
+    from reports import study
     from reports.calibration import report
+    from studies.convergence import result as convergence
+    from studies.speed import result as bench
+    from studies.stability import result as stability
+    from studies.verification import result as verification
 
     found: dict[str, Callable[[Path], Path]] = {
         "converge.json": convergence.write_report,

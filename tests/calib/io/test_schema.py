@@ -22,7 +22,7 @@ from mpm.runtime import ARCHES
 from mpm.scene import CONTACTS
 from mpm.shapes import SHAPE_KINDS
 from studies.convergence import gci
-from studies.stability.study import REASONS
+from studies.stability.result import REASONS
 from tests.calib.documents import at, changed, faults, places, valid, validator
 from tests.data_dir import ROOT
 from tests.reports import sample, study_sample
@@ -104,7 +104,7 @@ def test_words_are_those_of_the_code():
     assert (of["shapeKind"], of["device"]) == (list(SHAPE_KINDS), list(ARCHES))
     assert set(of["status"]) == {*properties.LITERATURE, *properties.OWN}
     assert list(parts["energy"]["properties"]) == list(ENERGIES)
-    assert schema("converge")["properties"]["verdict"]["enum"] == list(gci.VERDICTS)
+    assert schema("converge")["properties"]["verdict"]["enum"] == list(gci.TRENDS)
     assert schema("simulate")["properties"]["contact"]["enum"] == list(CONTACTS)
     assert set(of["runState"]) - {"done"} <= set(REASONS)
     assert set(schema("food")["$defs"]["common"]["$defs"]) == set(parts)
@@ -213,7 +213,7 @@ def test_lists_and_single_foods_and_knives(printed):
 
 def test_a_written_report_is_a_document(printed, tmp_path, monkeypatch):
     """``report --json`` names the file."""
-    monkeypatch.setattr("reports.stability.write_report", lambda folder: folder / "report.pdf")
+    monkeypatch.setattr("studies.stability.result.write_report", lambda folder: folder / "report.pdf")
     (tmp_path / "stress.json").touch()
     assert valid(printed("report", str(tmp_path)))["report"] == str(tmp_path / "report.pdf")
 
