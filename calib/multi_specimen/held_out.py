@@ -26,7 +26,7 @@ from calib.uncertainty.predictive import Band, error_draws, pointwise_band, post
 from calib.validation.acceptance import Verdict, balances
 from calib.validation.metrics import Metrics, compare
 from calib.validation.null_models import null_models
-from calib.validation.prediction import NRMSE_LIMIT, RATING_LIMIT
+from calib.validation.prediction import PREDICTION_NRMSE_LIMIT, PREDICTION_RATING_LIMIT
 from mpm.arrays import FloatArray
 from mpm.errors import SimulationError
 
@@ -77,7 +77,11 @@ class Prediction:
         m = self.metrics
         if any(v.passed is False for v in self.balances):
             return False
-        return m.nrmse <= NRMSE_LIMIT and m.iso18571.R >= RATING_LIMIT and self.band.inside >= INSIDE_LIMIT
+        return (
+            m.nrmse <= PREDICTION_NRMSE_LIMIT
+            and m.iso18571.R >= PREDICTION_RATING_LIMIT
+            and self.band.inside >= INSIDE_LIMIT
+        )
 
     @property
     def beaten(self) -> tuple[str, ...]:
@@ -94,7 +98,7 @@ class Prediction:
             "factor": self.factor,
             "fitted": {n: self.values[n] for n in self.fitted},
             "predictive_inside": self.band.inside,
-            "limits": {"nrmse": NRMSE_LIMIT, "rating": RATING_LIMIT, "inside": INSIDE_LIMIT},
+            "limits": {"nrmse": PREDICTION_NRMSE_LIMIT, "rating": PREDICTION_RATING_LIMIT, "inside": INSIDE_LIMIT},
             "null_models": {
                 n: {"nrmse": x.nrmse, "shape_error": x.shape_error, "R": x.iso18571.R} for n, x in self.nulls.items()
             },

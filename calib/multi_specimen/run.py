@@ -14,6 +14,7 @@ from calib.io.progress import Progress
 from calib.io.provenance import git_commit, key_of, versions
 from calib.io.schema import tag
 from calib.material.food import FoodSpec, dump_material
+from calib.material.properties import MEANINGS
 from calib.material.scene import place
 from calib.multi_specimen.held_out import Prediction, predict
 from calib.multi_specimen.specimens import Fitted, Specimens, pressed, set_ups
@@ -98,7 +99,7 @@ def run(
     }
     dump_material(_food(study, fitted), out / "material.yaml", _provenance(study, summary))
     write_json(out / "summary.json", summary)
-    write_report(out)
+    write_report(out, MEANINGS)
     return summary
 
 
