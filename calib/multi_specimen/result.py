@@ -20,7 +20,7 @@ from calib.problem.setup import Setup
 from calib.validation.acceptance import Verdict
 from calib.validation.metrics import Metrics
 from calib.validation.numerical_checks import Check
-from calib.validation.prediction import NRMSE_LIMIT, RATING_LIMIT
+from calib.validation.prediction import PREDICTION_NRMSE_LIMIT, PREDICTION_RATING_LIMIT
 from mpm.scene import Knife
 from mpm.shapes import Shape
 
@@ -69,8 +69,8 @@ class HeldOutNull:
 class HeldOutLimits:
     """What a prediction has to reach: largest curve error, least rating, least part within the band [-]."""
 
-    nrmse: float = NRMSE_LIMIT
-    rating: float = RATING_LIMIT
+    nrmse: float = PREDICTION_NRMSE_LIMIT
+    rating: float = PREDICTION_RATING_LIMIT
     inside: float = INSIDE_LIMIT
 
 

@@ -17,6 +17,7 @@ from calib.io.folder import prepare, write_csv
 from calib.io.progress import Progress
 from calib.io.provenance import git_commit, key_of, versions
 from calib.material.food import FoodSpec, dump_material
+from calib.material.properties import MEANINGS
 from calib.multi_specimen.compression_modulus import CompressionModulus, compression_modulus
 from calib.multi_specimen.fitted_cuts import FittedCut, fitted_cuts
 from calib.multi_specimen.held_out import HeldOutPrediction, predict
@@ -202,7 +203,7 @@ def _write(done: Finished, out: Path, began: float) -> StudyResult:
     provenance = {"passed": result.passed, "git": result.git, "versions": result.versions}
     dump_material(done.food(), out / "material.yaml", {"study": result.study, "traces": hashes, **provenance})
     write_result(result, out)
-    write_report(out)
+    write_report(out, MEANINGS)
     return result
 
 

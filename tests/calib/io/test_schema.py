@@ -9,12 +9,11 @@ from typing import Any, get_args
 import pytest
 from jsonschema import Draft202012Validator
 
-from calib.calibration import summary
 from calib.io.folder import write_json
 from calib.io.provenance import versions
 from calib.io.schema import COMMON, FOLDER, names, schema, tag
 from calib.material import properties
-from calib.uncertainty import intervals
+from calib.uncertainty import estimates, intervals
 from cutcal.main import COMMANDS, main
 from cutcal.options import print_json
 from mpm.output.record import ENERGIES
@@ -100,7 +99,7 @@ def test_words_are_those_of_the_code():
     parts = common()["$defs"]
     of = {name: part["enum"] for name, part in parts.items() if "enum" in part}
     assert set(of["intervalWord"]) == set(get_args(intervals.Identifiability))
-    assert set(of["verdictWord"]) == set(of["intervalWord"]) | {"only_as_product", summary.UNKNOWN}
+    assert set(of["verdictWord"]) == set(of["intervalWord"]) | {"only_as_product", estimates.UNKNOWN}
     assert (of["shapeKind"], of["device"]) == (list(SHAPE_KINDS), list(ARCHES))
     assert set(of["status"]) == {*properties.LITERATURE_STATUSES, *properties.OTHER_STATUSES}
     assert list(parts["energy"]["properties"]) == list(ENERGIES)
