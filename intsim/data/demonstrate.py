@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from calib.material.knife import load_knife
-from intsim.task.planner import HOME, PHASES, RATE, SPEED, minimum_jerk, plan
+from intsim.task.planner import GRIPPER_CLOSED, HOME, PHASES, RATE, SPEED, minimum_jerk, plan
 from intsim.task.targets import TaskError, target
 
 REACHED = 2e-4  # height of the edge at which it is on the board [m]
@@ -19,7 +19,6 @@ LONGEST = 40  # steps in which it is turned at most: as many as the way down to 
 LOW = 5e-4  # height of the lower end of the blade at which it is there [m], half of what the middle hangs above it (1.1 mm, banana)
 HOLD = 0.3  # time that the edge is held on the board [s]
 RETRACT = 1.5  # time of the way back up [s]
-OPEN = -1.0  # of the gripper's action: closed on the handle
 OFF = 1e-3  # error of the inverse kinematics that is too large [m]
 
 
@@ -115,7 +114,7 @@ def _step(env: Any, track: Track, pose: np.ndarray, phase: str, meshes: bool) ->
     joints, off = env.kinematics.joints(pose, near)
     if off > OFF:
         track.status = f"the arm does not reach {np.round(pose[:3], 3).tolist()}"
-    action = np.array([*joints[:7], OPEN], np.float32)
+    action = np.array([*joints[:7], GRIPPER_CLOSED], np.float32)
     _, _, _, _, info = env.step(action)
     assert phase in PHASES
     track.command.append(np.array(pose, float))

@@ -15,11 +15,10 @@ import numpy as np
 
 from calib.errors import OutputError
 from calib.simulation.workers import Workers
-from intsim.data.demonstrate import OPEN
 from intsim.data.pictures import VIEWS
 from intsim.data.shards import Stored
 from intsim.data.views import View, check, views
-from intsim.task.planner import RATE
+from intsim.task.planner import GRIPPER_CLOSED, RATE
 
 VERSION = "v3.0"
 FILE_FRAMES = 50_000  # frames of a file of data or video
@@ -54,7 +53,8 @@ def columns(stored: Stored) -> dict[str, np.ndarray]:
     g = stored.group
     n = len(g["actions"])
     edge = g["obs/extra/edge"][()][:n]
-    state = np.column_stack([edge[:, :3], np.zeros(n), edge[:, 4], edge[:, 3], np.zeros(n), np.full(n, OPEN)])
+    zero, gripper = np.zeros(n), np.full(n, GRIPPER_CLOSED)
+    state = np.column_stack([edge[:, :3], zero, edge[:, 4], edge[:, 3], zero, gripper])
     return {
         "observation.state": state.astype(np.float32),
         "action": g["control/delta"][()],

@@ -35,8 +35,8 @@ import numpy as np
 
 from calib.errors import OutputError
 from calib.io.folder import finite
-from intsim.data.demonstrate import OPEN, Track
-from intsim.task.planner import PHASES, RATE
+from intsim.data.demonstrate import Track
+from intsim.task.planner import GRIPPER_CLOSED, PHASES, RATE
 from intsim.task.targets import Item
 from mpm.shapes import Shape
 
@@ -62,7 +62,8 @@ def pack(track: Track, about: Mapping[str, Any], mpm: Mapping[str, Any]) -> byte
         mean = force.mean(axis=1)
         command, edge = np.array(track.command), np.array(track.edge)
         change = command - edge[:-1]
-        delta = np.column_stack([change[:, :3], np.zeros(n), change[:, 4], change[:, 3], np.full(n, OPEN)])
+        gripper = np.full(n, GRIPPER_CLOSED)
+        delta = np.column_stack([change[:, :3], np.zeros(n), change[:, 4], change[:, 3], gripper])
         last = np.arange(n) == n - 1
         columns = {
             "actions": np.array(track.action, np.float32),

@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 
 from calib.errors import OutputError
-from intsim.policy.oracles import OPEN
-from intsim.task.planner import HOME
+from intsim.task.planner import GRIPPER_CLOSED, HOME
 from intsim.task.targets import Item
 
 CHUNK = 8  # commanded poses in one piece: 0.4 s
@@ -104,7 +103,7 @@ class Clone:
         goal = self._todo.pop(0)
         change = goal - pose
         turn = (change[3] + math.pi / 2) % math.pi - math.pi / 2
-        return np.array([*change[:3], 0.0, change[4], turn, OPEN])
+        return np.array([*change[:3], 0.0, change[4], turn, GRIPPER_CLOSED])
 
     def _forward(self, x: Array) -> Array:
         for k, (matrix, vector) in enumerate(self.weights):

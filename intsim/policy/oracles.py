@@ -9,10 +9,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from intsim.task.language import parse
-from intsim.task.planner import HOME, plan
+from intsim.task.planner import GRIPPER_CLOSED, HOME, plan
 from intsim.task.targets import CutSpec, Item, TaskError, boxed_target, target
 
-OPEN = 0.0  # of the gripper: closed on the handle
 SHORT = 7e-3
 """Height at which the shallow oracle stops [m]: what 12.5 N, the paper's banana, leave of a cut under ManiSkill's arm (0.57 mm/N)."""
 
@@ -69,7 +68,7 @@ class Oracle:
         if not self._todo:
             return None
         change = self._todo.pop(0) - obs["pose"]
-        return np.array([*change[:3], 0.0, change[4], change[3], OPEN])
+        return np.array([*change[:3], 0.0, change[4], change[3], GRIPPER_CLOSED])
 
     def _plan(self, obs: dict[str, Any], instruction: str) -> None:
         items: tuple[Item, ...] = obs["items"]
@@ -114,7 +113,7 @@ class Wanderer:
         if not self._todo:
             return None
         change = self._todo.pop(0) - obs["pose"]
-        return np.array([*change[:3], 0.0, change[4], change[3], OPEN])
+        return np.array([*change[:3], 0.0, change[4], change[3], GRIPPER_CLOSED])
 
 
 POLICIES: dict[str, tuple[Callable[[float], Policy], str]] = {

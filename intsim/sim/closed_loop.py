@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 from calib.material.food import FoodSpec
-from intsim.data.demonstrate import OPEN
 from intsim.policy.oracles import Policy
 from intsim.sim.severing import Severed
 from intsim.task.kinematic_table import Rollout, guard
-from intsim.task.planner import RATE
+from intsim.task.planner import GRIPPER_CLOSED, RATE
 from intsim.task.suites import draw
 from mpm.errors import CutcalError
 
@@ -134,7 +133,7 @@ def follow(env: Any, policy: Policy, seed: int) -> Severed:
             velocity, clipped = kept.delta[:3] * RATE, kept.clipped
             command = command + [*kept.delta[:3], kept.delta[5], kept.delta[4]]
             joints, _ = env.kinematics.joints(command, np.array([*joints[:7], 0.0, 0.0]))
-        env.step(np.array([*joints[:7], OPEN], np.float32))
+        env.step(np.array([*joints[:7], GRIPPER_CLOSED], np.float32))
         env.table.rollout.clipped[-1] = clipped
         peak = max(peak, float(env.forces[:, 2].max()))
         way.append(env.pose[:3])

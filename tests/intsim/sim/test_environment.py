@@ -26,7 +26,7 @@ from intsim.evaluate import evaluate
 from intsim.policy.oracles import make as make_policy
 from intsim.sim import environment
 from intsim.sim.closed_loop import World, environment, follow
-from intsim.task.planner import PHASES, plan
+from intsim.task.planner import GRIPPER_CLOSED, PHASES, plan
 from intsim.task.suites import draw
 from intsim.task.targets import target
 from mpm.errors import CutcalError
@@ -64,7 +64,7 @@ def cut(env, seed: int, depth: float = 0.0, hold: float = 0.0) -> dict[str, floa
     info = {}
     for pose in path.pose:
         joints, off = env.kinematics.joints(pose, joints)
-        _, _, _, _, info = env.step(np.array([*joints[:7], -1.0], np.float32))
+        _, _, _, _, info = env.step(np.array([*joints[:7], GRIPPER_CLOSED], np.float32))
         worst, peak = max(worst, off), max(peak, float(env.forces[:, 2].max()))
         low = min(low, float(env.pose[2]))
     flags = {name: float(info[name].item()) for name in ("success", "severed", "uncut")}
@@ -120,13 +120,26 @@ def test_every_control_mode_takes_a_step(mode):
     size = 8 if mode == "pd_joint_pos" else 7
     assert env.single_action_space.shape == (size,)
     action = (
-        np.array([*env.agent.robot.get_qpos()[0, :7].numpy(), -1.0], np.float32)
+        np.array([*env.agent.robot.get_qpos()[0, :7].numpy(), GRIPPER_CLOSED], np.float32)
         if size == 8
         else np.zeros(7, np.float32)
     )
     obs, reward, _, _, info = env.step(action)
     assert obs.shape[1] >= 9 + 9 + 5 and info["success"].shape == (1,) and float(reward) == 0
     assert info["force"].abs().sum() == 0
+    env.close()
+
+
+@pytest.mark.parametrize("mode", ["pd_joint_pos", "pd_ee_delta_pose"])
+def test_the_gripper_stays_closed_on_the_handle(mode):
+    """At what every action sends the fingers stay together; at 0 the same controller opens each by 15 mm."""
+    env = made(control_mode=mode)
+    for gripper, apart in ((GRIPPER_CLOSED, 0.0), (0.0, 0.015)):
+        env.reset(seed=SEED)
+        arm = env.agent.robot.get_qpos()[0, :7].numpy() if mode == "pd_joint_pos" else np.zeros(6)
+        for _ in range(20):
+            env.step(np.array([*arm, gripper], np.float32))
+        assert env.agent.robot.get_qpos()[0, 7:].numpy() == pytest.approx([apart] * 2, abs=1e-4)
     env.close()
 
 
@@ -153,7 +166,7 @@ def test_the_force_of_the_food_is_what_lifts_the_knife():
         env._force = np.array([0.0, 0.0, force])
         for _ in range(40):
             env._point = env.pose[:3]
-            env.step(np.array([*joints[:7], -1.0], np.float32))
+            env.step(np.array([*joints[:7], GRIPPER_CLOSED], np.float32))
         risen.append(float(env.pose[2]))
     env.close()
     assert risen[1] - risen[0] == pytest.approx(0.57e-3 * 10, rel=0.1)
@@ -175,7 +188,7 @@ def test_the_moment_of_the_food_turns_the_knife():
         env.coupling.torque = np.array([0.0, -(1 - part) * off * force, 0.0])  # raises the end at +x
         for _ in range(40):
             env._point = env.pose[:3] + [part * off, 0.0, 0.0]
-            env.step(np.array([*joints[:7], -1.0], np.float32))
+            env.step(np.array([*joints[:7], GRIPPER_CLOSED], np.float32))
         yaw, tilt = env.pose[3:]
         tilts.append(float(tilt if np.cos(yaw) > 0 else -tilt))
     env.close()
