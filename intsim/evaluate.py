@@ -19,10 +19,10 @@ from calib.io.schema import tag
 from calib.material.food import FoodSpec
 from calib.material.knife import load_knife
 from calib.simulation.workers import Workers
-from intsim.policy.oracles import Policy
-from intsim.sim.closed_loop import World
 from intsim.sim.severing import ARM, Severed, sever
-from intsim.task.kinematic_table import Rollout, Table
+from intsim.sim.world import World
+from intsim.task.kinematic_table import Table
+from intsim.task.rollout import Policy, Rollout
 from intsim.task.success import PLACE, Judged, judge, wilson
 from intsim.task.suites import SUITES, TEST, Episode, draw
 from intsim.task.targets import target

@@ -18,7 +18,8 @@ from calib.material.knife import load_knife
 from calib.simulation.workers import Workers
 from intsim.data.manifest import Draw, Manifest
 from intsim.data.shards import META, PART, SHARD, episodes_of, keep, pack, write_shard
-from intsim.sim.closed_loop import ENV, World, environment
+from intsim.sim.closed_loop import environment
+from intsim.sim.world import ENV_ID, World
 from intsim.task.language import instructions
 from intsim.task.planner import RATE
 
@@ -148,7 +149,7 @@ def generate(
     if len(todo) < manifest.trajectories:
         say(f"{manifest.trajectories - len(todo)} of {manifest.trajectories} trajectories are there already")
     rest, done, left = Countdown(max(len(todo), 1)), 0, set(todo)
-    info = {"env_id": ENV, "env_kwargs": {"knife": knife, "stiffness": stiffness}, "control_freq": RATE}
+    info = {"env_id": ENV_ID, "env_kwargs": {"knife": knife, "stiffness": stiffness}, "control_freq": RATE}
     _close(out, groups, info)
     for group in groups:
         own = [k for k in group if k in left]

@@ -15,7 +15,7 @@ import numpy as np
 
 from calib.errors import OutputError
 from calib.simulation.workers import Workers
-from intsim.data.pictures import VIEWS
+from intsim.data.cameras import CAMERA_NAMES
 from intsim.data.shards import Stored
 from intsim.data.views import View, check, views
 from intsim.task.planner import GRIPPER_CLOSED, RATE
@@ -250,7 +250,7 @@ class _Writer:
             for name, (kind, names) in FEATURES.items()
         }
         if self.pixels:
-            features |= {f"observation.images.{view}": self._video_feature() for view in VIEWS}
+            features |= {f"observation.images.{view}": self._video_feature() for view in CAMERA_NAMES}
         info = {
             "codebase_version": VERSION,
             "robot_type": "panda",

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from calib.material.food import FoodSpec, load_food
+from intsim.sim.background import BACKGROUNDS
 from intsim.task.language import VARIANTS
 from intsim.task.planner import STYLES
 from intsim.task.suites import FOODS, SUITES, TEST, Episode, draw
@@ -19,8 +20,6 @@ JITTER = {"E": 0.2, "R": 0.1, "yield_stress": 0.1, "mu": 0.2}
 stiffness and less for strength."""
 TASKS = ("seeds", "continuous", "split", "flips", "objects")
 """Suites that training may see, in turn; the sentences of ``language`` and every seed from a million on are for tests."""
-BACKGROUNDS = 15
-"""Procedural backgrounds: colours of table, board and walls, light and its direction; 0 is plain."""
 PRESSED = 0.5  # part of the episodes that press; the other styles share the rest
 
 

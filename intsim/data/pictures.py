@@ -21,10 +21,9 @@ from calib.errors import OutputError
 from calib.io.folder import write_json
 from calib.io.progress import Countdown
 from calib.simulation.workers import Workers
-from intsim.data.manifest import BACKGROUNDS
 from intsim.data.shards import META, Stored, episodes_of, keep, number_of, put_together, shards_of
+from intsim.sim.background import BACKGROUNDS
 
-VIEWS = ("front", "side", "wrist")
 FILE = "pictures-{:d}-{:02d}-{:04d}.h5"  # pixels, background, shard
 PART = "picture-{:d}-{:02d}-{:06d}.h5"  # pixels, background, trajectory: until the file is complete
 NEEDED = ("obs/agent/qpos", "mpm/surface")  # of a trajectory, for its pictures

@@ -8,10 +8,10 @@ import gymnasium
 import numpy as np
 
 import intsim.sim.environment  # noqa: F401
-from intsim.data.pictures import VIEWS
+from intsim.data.cameras import CAMERA_NAMES
 from intsim.data.shards import Stored, item_of
-from intsim.sim.closed_loop import ENV
 from intsim.sim.scenery import COLOURS
+from intsim.sim.world import ENV_ID
 from intsim.task.suites import Episode
 from intsim.task.targets import CutSpec
 from mpm.errors import CutcalError
@@ -31,7 +31,7 @@ class Renderer:
     def __init__(self, scene: int, pixels: int) -> None:
         try:
             made = gymnasium.make(
-                ENV,
+                ENV_ID,
                 sim_backend="physx_cpu",
                 render_backend="cpu",
                 obs_mode="rgb",
@@ -69,7 +69,7 @@ class Renderer:
             )
             meshes |= {int(step): (k, *parts) for k, step in enumerate(cut["step"][()])}
         steps = len(qpos) - 1
-        out = {view: np.empty((steps, env.pixels, env.pixels, 3), np.uint8) for view in VIEWS}
+        out = {view: np.empty((steps, env.pixels, env.pixels, 3), np.uint8) for view in CAMERA_NAMES}
         for t in range(steps):
             env.agent.robot.set_qpos(qpos[t])
             if t in meshes:
@@ -77,6 +77,6 @@ class Renderer:
                 name = items[which].name if items[which].name in COLOURS else ""
                 env.scenery.show(which, vertices[k].astype(float) + origin, triangles, flesh, name)
             seen = env.get_obs()["sensor_data"]
-            for view in VIEWS:
+            for view in CAMERA_NAMES:
                 out[view][t] = seen[view]["rgb"][0].numpy()
         return out

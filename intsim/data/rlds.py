@@ -16,8 +16,8 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from calib.simulation.workers import Workers
+from intsim.data.cameras import CAMERA_NAMES
 from intsim.data.lerobot import columns
-from intsim.data.pictures import VIEWS
 from intsim.data.views import View, check_pictured, views
 
 NAME, VERSION = "cutcal", "1.0.0"
@@ -104,7 +104,7 @@ def episode(view: View) -> dict[str, list[bytes] | np.ndarray]:
     step = np.arange(n)
     out: dict[str, list[bytes] | np.ndarray] = {
         f"steps/observation/{name}": [_jpeg(picture) for picture in view.pictures[camera]]
-        for camera, name in zip(VIEWS, ("image", "side_image", "wrist_image"), strict=True)
+        for camera, name in zip(CAMERA_NAMES, ("image", "side_image", "wrist_image"), strict=True)
     }
     done = (step == n - 1) & bool(view.stored.about["success"])
     return out | {

@@ -4,26 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from intsim.task.language import parse
 from intsim.task.planner import GRIPPER_CLOSED, HOME, plan
+from intsim.task.rollout import Policy
 from intsim.task.targets import CutSpec, Item, TaskError, boxed_target, target
 
 SHORT = 7e-3
 """Height at which the shallow oracle stops [m]: what 12.5 N, the paper's banana, leave of a cut under ManiSkill's arm (0.57 mm/N)."""
-
-
-class Policy(Protocol):
-    """What an evaluation needs of a policy."""
-
-    def reset(self, seed: int) -> None:
-        """A new episode begins."""
-
-    def act(self, obs: dict[str, Any], instruction: str) -> np.ndarray | None:
-        """The next change of pose x, y, z [m], roll, pitch, yaw [rad] and gripper, shape (7,); None when it has done what it was told."""
 
 
 class Oracle:

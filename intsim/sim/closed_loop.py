@@ -3,42 +3,23 @@
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from calib.material.food import FoodSpec
-from intsim.policy.oracles import Policy
 from intsim.sim.severing import Severed
-from intsim.task.kinematic_table import Rollout, guard
+from intsim.sim.world import ENV_ID, EPISODE_STEPS, World
+from intsim.task.kinematic_table import guard
 from intsim.task.planner import GRIPPER_CLOSED, RATE
+from intsim.task.rollout import Policy, Rollout
 from intsim.task.suites import draw
 from mpm.errors import CutcalError
 
-ENV = "CutFood-v1"
-STEPS = 400  # of an episode, at most: 20 s
 STILL, MOVED = 30, 1e-3  # steps within which an edge that has not moved so far [m] is stuck, and the episode over
 FASTEST_JOINTS = np.array([2.175] * 4 + [2.61] * 3)
 """Speeds of a Franka arm's joints at most [rad/s] (Franka control interface)."""
 _kept: dict[str, Any] = {}
-
-
-@dataclass(frozen=True)
-class World:
-    """Where a policy is evaluated.
-
-    Attributes:
-        coupled: Whether the food resists.
-        stiffness: Of the arm's joints [N m/rad]; ManiSkill's own (1000) without it.
-        knife: Name of the knife.
-        pixels: Width and height of the pictures that a policy is given; 0 for none, which needs no renderer.
-    """
-
-    coupled: bool = True
-    stiffness: float | None = None
-    knife: str = "kitchen"
-    pixels: int = 0
 
 
 def environment(world: World) -> Any:
@@ -58,7 +39,7 @@ def environment(world: World) -> Any:
         blind = {"render_backend": "none", "obs_mode": "state"}
         try:
             made = gymnasium.make(
-                ENV,
+                ENV_ID,
                 sim_backend="physx_cpu",
                 control_mode="pd_joint_pos",
                 knife=world.knife,
@@ -114,7 +95,7 @@ def follow(env: Any, policy: Policy, seed: int) -> Severed:
     command, velocity = env.pose, np.zeros(3)
     way: list[np.ndarray] = []
     joints, peak, short = env.agent.robot.get_qpos()[0].numpy().astype(float), 0.0, 0.0
-    for _ in range(STEPS):
+    for _ in range(EPISODE_STEPS):
         food = env.coupling if env.coupled else env.table
         own = env.agent.robot.get_qpos()[0].numpy().astype(float)
         obs = {"pose": env.pose, "joints": own, "items": tuple(food.items), "images": _images(env)}

@@ -20,9 +20,11 @@ from mani_skill.utils.registration import register_env
 from mani_skill.utils.structs.types import SimConfig
 
 from calib.material.food import FoodSpec, load_food
+from intsim.sim.background import Background
 from intsim.sim.coupling import Coupling
 from intsim.sim.panda import BASE, BLADE, EDGE, Kinematics, PandaKnife, pose_of
 from intsim.sim.scenery import Scenery
+from intsim.sim.world import ENV_ID, EPISODE_STEPS
 from intsim.task.kinematic_table import Table
 from intsim.task.planner import HOME, RATE
 from intsim.task.success import judge
@@ -31,11 +33,10 @@ from intsim.task.targets import CAMERAS
 from mpm.errors import CutcalError
 
 PHYSICS = 100  # steps of the robot's physics a second
-STEPS = 400  # of an episode, at most
 PIXELS, HUMAN_PIXELS = 128, 512
 
 
-@register_env("CutFood-v1", max_episode_steps=STEPS)
+@register_env(ENV_ID, max_episode_steps=EPISODE_STEPS)
 class CutFoodEnv(BaseEnv):
     """Cut the food that the instruction names, where it says.
 
@@ -53,7 +54,7 @@ class CutFoodEnv(BaseEnv):
         stiffness, damping: Of the arm's joints [N m/rad, N m s/rad]; ManiSkill's own without it.
         criterion: What ``info["success"]`` is: ``published`` for the four published criteria, ``severed`` for pieces in the solver too.
         pixels: Width and height of the cameras' pictures.
-        scenery: Which background, see :mod:`intsim.sim.scenery`.
+        scenery: Which background, see :mod:`intsim.sim.background`.
 
     Attributes:
         solver_s: Time that the solver has taken so far [s].
@@ -84,7 +85,7 @@ class CutFoodEnv(BaseEnv):
         self.suite, self.knife, self.coupled, self.coarse, self.draws = suite, knife, coupled, coarse, draws
         self.foods = dict(foods) if foods is not None else {name: load_food(name) for name in FOODS}
         self.criterion, self.pixels = criterion, pixels
-        self.scenery = Scenery(scenery)
+        self.scenery = Scenery(Background.of(scenery))
         self.solver_s = 0.0
         self._gains = {k: v for k, v in (("arm_stiffness", stiffness), ("arm_damping", damping)) if v is not None}
         self.episode: Episode | None = None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -10,9 +9,9 @@ from typing import Any
 import numpy as np
 import sapien
 
-from intsim.data.manifest import BACKGROUNDS
+from intsim.sim.background import Background
 from intsim.sim.coupling import Coupling
-from intsim.task.targets import Item, TaskError
+from intsim.task.targets import Item
 from mpm.output.surface import half_of
 
 TABLE, BOARD, THICK = (0.8, 1.2), (0.4, 0.5), 0.02  # sizes along x, y and the board's thickness [m]
@@ -41,36 +40,22 @@ PLAIN = ((0.8, 0.6, 0.4), (0.95, 0.9, 0.8))
 
 
 class Scenery:
-    """One background.
+    """What is around the robot before one background.
 
     Args:
-        number: Which, from 0 to 14.
-
-    Raises:
-        TaskError: There is none of this number.
+        background: Colours and light.
     """
 
-    def __init__(self, number: int = 0) -> None:
-        if not 0 <= number < BACKGROUNDS:
-            raise TaskError(f"scenery {number}: give a number from 0 to {BACKGROUNDS - 1}")
-        rng = np.random.default_rng([number, zlib.crc32(b"scenery")])
-        self.number = number
-        plain = number == 0
-        self.table = np.array([0.75, 0.72, 0.68]) if plain else rng.uniform(0.15, 0.95, 3)
-        self.board = np.array([0.72, 0.53, 0.34]) if plain else rng.uniform(0.2, 0.95, 3)
-        self.wall = np.array([0.82, 0.84, 0.86]) if plain else rng.uniform(0.2, 0.95, 3)
-        self.ambient = 0.35 if plain else float(rng.uniform(0.2, 0.5))
-        turn = np.pi / 4 if plain else rng.uniform(0, 2 * np.pi)
-        self.direction = np.array([np.cos(turn), np.sin(turn), -1.0 if plain else -rng.uniform(0.6, 2.0)])
-        self.strength = 1.0 if plain else float(rng.uniform(0.6, 1.6))
+    def __init__(self, background: Background) -> None:
+        self.background = background
         self._foods: list[sapien.Entity] = []
         self._shown: list[Any] = []
 
     def build(self, scene: Any) -> None:
         """Board, its top at z = 0, and table."""
         for name, size, top, colour in (
-            ("board", (*BOARD, THICK), 0.0, self.board),
-            ("table", (*TABLE, THICK), -THICK, self.table),
+            ("board", (*BOARD, THICK), 0.0, self.background.board),
+            ("table", (*TABLE, THICK), -THICK, self.background.table),
         ):
             builder = scene.create_actor_builder()
             half = [s / 2 for s in size]
@@ -89,14 +74,15 @@ class Scenery:
         builder = scene.create_actor_builder()
         half, place = [AWAY, AWAY, AWAY], [0.0, 0.0, 0.0]
         half[axis], place[axis] = THICK, side * AWAY
-        builder.add_box_visual(half_size=half, material=material(self.wall))
+        builder.add_box_visual(half_size=half, material=material(self.background.wall))
         builder.initial_pose = sapien.Pose(p=place)
         builder.build_kinematic(name=f"wall {axis} {side:+.0f}")
 
     def light(self, scene: Any) -> None:
         """Light of this background."""
-        scene.set_ambient_light([self.ambient] * 3)
-        scene.add_directional_light(self.direction.tolist(), [self.strength] * 3)
+        own = self.background
+        scene.set_ambient_light([own.ambient] * 3)
+        scene.add_directional_light(own.direction.tolist(), [own.strength] * 3)
         scene.add_directional_light([0.0, 0.0, -1.0], [0.6] * 3)
 
     def serve(self, scene: Any, items: Sequence[Item]) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from intsim.task.planner import HOME, RATE
+from intsim.task.rollout import Rollout
 from intsim.task.targets import Item
 
 FASTEST, TURNING, PUSHING = 1.7, 2.5, 13.0
@@ -48,23 +49,6 @@ def guard(delta: np.ndarray, before: np.ndarray, rate: float = RATE) -> Guarded:
         out[3:] *= TURNING / turn
         clipped.append("turn")
     return Guarded(out, tuple(clipped))
-
-
-@dataclass(eq=False)
-class Rollout:
-    """What an episode left.
-
-    Attributes:
-        command: Commanded poses x, y, z, yaw, pitch [m, rad], one for each step.
-        pose: Poses that the edge had: not below the board.
-        clipped: Limits met in each step.
-        cuts: Foods as they were, and where along the axis the edge came down, for each cut in order.
-    """
-
-    command: list[np.ndarray] = field(default_factory=list)
-    pose: list[np.ndarray] = field(default_factory=list)
-    clipped: list[tuple[str, ...]] = field(default_factory=list)
-    cuts: list[tuple[Item, float]] = field(default_factory=list)
 
 
 class Table:

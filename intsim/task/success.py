@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from intsim.task.kinematic_table import Rollout, crossing, uncut
+from intsim.task.kinematic_table import crossing, uncut
+from intsim.task.rollout import Rollout
 from intsim.task.targets import CutSpec, Item, TaskError, spread, target
 
 TIP, STRICT_TIP = 0.05, 0.005  # height of the edge above the table that counts as reaching it, published and strict [m]

@@ -15,7 +15,8 @@ from cutcal.main import main
 from intsim.evaluate import evaluate, expected, roll_out, run_episode
 from intsim.policy.oracles import POLICIES, SHORT, make
 from intsim.sim.severing import ARM, scene_of, sever
-from intsim.task.kinematic_table import Rollout, Table
+from intsim.task.kinematic_table import Table
+from intsim.task.rollout import Rollout
 from intsim.task.success import TIP, judge, wilson
 from intsim.task.suites import FOODS, SUITES, TEST, Episode, draw
 from intsim.task.targets import CutSpec, Item, TaskError, target

@@ -14,8 +14,8 @@ from mpm.errors import CutcalError
 
 if TYPE_CHECKING:
     from calib.simulation.workers import Workers
-    from intsim.policy.oracles import Policy
-    from intsim.sim.closed_loop import World
+    from intsim.sim.world import World
+    from intsim.task.rollout import Policy
 
 HELP = "evaluate a policy that cuts what it is told, geometrically and in the solver"
 DESCRIPTION = """Rolls a policy out in suites of tasks in words, and counts its successes: the
@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     from intsim.policy.behaviour_cloning import Clone
     from intsim.policy.oracles import POLICIES, make
     from intsim.policy.remote import Remote
-    from intsim.sim.closed_loop import World
+    from intsim.sim.world import World
     from intsim.task.suites import FOODS, SUITES
 
     if args.policy == "list" or args.suite == ["list"]:

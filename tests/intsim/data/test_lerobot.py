@@ -9,9 +9,9 @@ import pytest
 
 from calib.errors import OutputError
 from intsim.data import generate as g
+from intsim.data.cameras import CAMERA_NAMES
 from intsim.data.lerobot import FEATURES, columns, export, statistics, together
 from intsim.data.manifest import Manifest
-from intsim.data.pictures import VIEWS
 from intsim.data.shards import trajectories
 from intsim.task.planner import RATE
 from tests.intsim.data.test_generate import Inline
@@ -54,7 +54,7 @@ def test_the_columns_are_what_was_stored(stored, painted):
     stats = json.loads((out / "meta/stats.json").read_text())
     plain = set(table)
     assert plain == set(FEATURES) and set(info["features"]) == set(stats) == plain | {
-        f"observation.images.{v}" for v in VIEWS
+        f"observation.images.{v}" for v in CAMERA_NAMES
     }
     for name, feature in info["features"].items():
         if feature["dtype"] not in ("video", "bool"):
@@ -74,7 +74,7 @@ def test_pictures_are_found_by_their_time(painted):
     """Frame n of a video is at n / fps; each episode's begin where the table of episodes says, before its own background."""
     out, info = painted
     episodes = pq.read_table(out / "meta/episodes/chunk-000/file-000.parquet").to_pylist()
-    for view in VIEWS:
+    for view in CAMERA_NAMES:
         key = f"observation.images.{view}"
         with av.open(str(out / f"videos/{key}/chunk-000/file-000.mp4")) as file:
             frames = [(float(f.time), f.to_ndarray(format="rgb24")) for f in file.decode(video=0)]
@@ -91,7 +91,7 @@ def test_force_is_nothing_that_a_policy_learns_from(painted):
     """LeRobot takes ``observation*`` for inputs and ``action*`` for outputs: pose, pictures and commanded change alone are."""
     _, info = painted
     learned = {n for n in info["features"] if n.startswith(("observation", "action"))}
-    assert learned == {"observation.state", "action", *(f"observation.images.{v}" for v in VIEWS)}
+    assert learned == {"observation.state", "action", *(f"observation.images.{v}" for v in CAMERA_NAMES)}
     assert {"contact.force", "contact.impulse", "extra.qpos"} <= set(info["features"])
 
 

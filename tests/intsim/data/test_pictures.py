@@ -12,8 +12,9 @@ from calib.errors import OutputError
 from cutcal.main import main
 from intsim.data import generate as g
 from intsim.data import lerobot, rdt, rlds
+from intsim.data.cameras import CAMERA_NAMES
 from intsim.data.manifest import Manifest
-from intsim.data.pictures import VIEWS, available, pictures_of, render
+from intsim.data.pictures import available, pictures_of, render
 from intsim.data.shards import META, trajectories
 from intsim.data.views import views
 from mpm.errors import CutcalError
@@ -54,7 +55,9 @@ def test_what_was_rendered_comes_back_pixel_by_pixel(made):
         for scene in (0, 2):
             wanted = Painter(scene, PIXELS).pictures(stored)
             seen = pictures_of(made, stored, scene, PIXELS)
-            assert set(seen) == set(VIEWS) and all(np.array_equal(seen[view], wanted[view]) for view in VIEWS)
+            assert set(seen) == set(CAMERA_NAMES) and all(
+                np.array_equal(seen[view], wanted[view]) for view in CAMERA_NAMES
+            )
 
 
 @pytest.mark.parametrize("stop", [1, COUNT - 1, COUNT, 2 * COUNT - 1])

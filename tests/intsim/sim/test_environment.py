@@ -25,7 +25,8 @@ from intsim.data.shards import Stored
 from intsim.evaluate import evaluate
 from intsim.policy.oracles import make as make_policy
 from intsim.sim import environment
-from intsim.sim.closed_loop import World, environment, follow
+from intsim.sim.closed_loop import environment, follow
+from intsim.sim.world import World
 from intsim.task.planner import GRIPPER_CLOSED, PHASES, plan
 from intsim.task.suites import draw
 from intsim.task.targets import target
