@@ -19,26 +19,26 @@ from calib.io.schema import tag
 from calib.material.food import FoodSpec
 from calib.material.knife import load_knife
 from calib.simulation.workers import Workers
-from intsim.sim.severing import ARM, Severed, sever
+from intsim.sim.severing import PANDA_ARM, SeveringOutcome, simulate_severing
 from intsim.sim.world import World
-from intsim.task.kinematic_table import Table
+from intsim.task.kinematic_table import KinematicTable
 from intsim.task.rollout import Policy, Rollout
-from intsim.task.success import PLACE, Judged, judge, wilson
-from intsim.task.suites import SUITES, TEST, Episode, draw
+from intsim.task.success import PLACE_TOLERANCE, GeometricOutcome, judge_geometry, wilson
+from intsim.task.suites import FIRST_TEST_SEED, SUITES, Episode, sample_episode
 from intsim.task.targets import target
 from mpm.scene import Arm
 
-STEPS = 2000  # of an episode, at most: 100 s
-ROWS = "evaluate.jsonl"
+TABLE_STEPS = 2000  # of an episode, at most: 100 s
+ROWS_FILE = "evaluate.jsonl"
 
 Say = Callable[[str], None]
 
 
-def roll_out(policy: Policy, episode: Episode) -> tuple[Rollout, Table]:
+def roll_out(policy: Policy, episode: Episode) -> tuple[Rollout, KinematicTable]:
     """One episode on the plain table."""
-    table = Table([episode.item, *episode.others])
+    table = KinematicTable([episode.item, *episode.others])
     policy.reset(zlib.crc32(f"{episode.suite} {episode.seed}".encode()))
-    for _ in range(STEPS):
+    for _ in range(TABLE_STEPS):
         action = policy.act(table.observe(), episode.instruction)
         if action is None:
             break
@@ -51,14 +51,14 @@ def run_episode(
 ) -> dict[str, Any]:
     """One row of the evaluation: what was asked for, what was found."""
     rollout, table = roll_out(policy, episode)
-    judged = judge(episode.spec, episode.item, rollout, table.items[0])
+    judged = judge_geometry(episode.spec, episode.item, rollout, table.items[0])
     row = _row(episode, rollout, judged)
     if severing and not episode.spec.pieces:
         row["severing"] = _sever(episode, rollout, judged, foods, knife, arm).as_dict()
     return row
 
 
-def _row(episode: Episode, rollout: Rollout, judged: Judged) -> dict[str, Any]:
+def _row(episode: Episode, rollout: Rollout, judged: GeometricOutcome) -> dict[str, Any]:
     """What was asked for, and what geometry says of it."""
     return {
         "suite": episode.suite,
@@ -85,19 +85,21 @@ def _finite(x: float) -> float | None:
 
 
 def _sever(
-    episode: Episode, rollout: Rollout, judged: Judged, foods: Mapping[str, FoodSpec], knife: str, arm: Arm
-) -> Severed:
+    episode: Episode, rollout: Rollout, judged: GeometricOutcome, foods: Mapping[str, FoodSpec], knife: str, arm: Arm
+) -> SeveringOutcome:
     """The cut in the solver, where the edge came down over the food."""
     if not judged.criteria["region"] or not math.isfinite(judged.offset):
-        return Severed(False, why="the edge does not come down on the food")
+        return SeveringOutcome(False, why="the edge does not come down on the food")
     along = target(episode.spec, episode.item) + judged.offset * episode.item.shape.length
-    found, _ = sever(episode.item, along, np.array(rollout.command), foods[episode.item.name], knife=knife, arm=arm)
+    found, _ = simulate_severing(
+        episode.item, along, np.array(rollout.command), foods[episode.item.name], knife=knife, arm=arm
+    )
     return found
 
 
-def expected(length: float, sigma: float) -> float:
+def expected_place_rate(length: float, sigma: float) -> float:
     """Chance that a cut whose place has a normal error [m] is within the published tolerance [-]: erf(0.1 L / (sigma sqrt 2))."""
-    return math.erf(PLACE * length / (sigma * math.sqrt(2.0)))
+    return math.erf(PLACE_TOLERANCE * length / (sigma * math.sqrt(2.0)))
 
 
 def evaluate(
@@ -112,7 +114,7 @@ def evaluate(
     sigma: float | None = None,
     severing: bool = False,
     knife: str = "kitchen",
-    arm: Arm = ARM,
+    arm: Arm = PANDA_ARM,
     world: World | None = None,
     pool: Workers | None = None,
     resume: bool = False,
@@ -128,7 +130,7 @@ def evaluate(
         suites: Names in :data:`intsim.task.suites.SUITES`.
         episodes: Of each suite.
         out: Folder of the results.
-        seed: Of the first episode of each suite, above :data:`intsim.task.suites.TEST`.
+        seed: Of the first episode of each suite, above :data:`intsim.task.suites.FIRST_TEST_SEED`.
         sigma: Standard deviation of the noisy oracle [m]: its closed form is given beside what was found.
         severing: Simulate single cuts in the solver too; on the table.
         knife: Name of the knife.
@@ -157,10 +159,15 @@ def evaluate(
         "arm": vars(arm),
         "world": None if world is None else {"coupled": world.coupled, "stiffness": world.stiffness},
     }
-    rows = _rows(out / ROWS, about)
+    rows = _rows(out / ROWS_FILE, about)
     done = {(r["suite"], r["seed"]) for r in rows}
-    todo = [(s, TEST + seed + k) for s in suites for k in range(episodes) if (s, TEST + seed + k) not in done]
-    with (out / ROWS).open("a", encoding="utf-8") as file:
+    todo = [
+        (s, FIRST_TEST_SEED + seed + k)
+        for s in suites
+        for k in range(episodes)
+        if (s, FIRST_TEST_SEED + seed + k) not in done
+    ]
+    with (out / ROWS_FILE).open("a", encoding="utf-8") as file:
         if not rows and file.tell() == 0:
             file.write(json.dumps(about) + "\n")
 
@@ -169,7 +176,7 @@ def evaluate(
                 yield from _in_world(policy, todo, foods, world, pool)
                 return
             for suite, at in todo:
-                episode = draw(suite, at, dict(foods))
+                episode = sample_episode(suite, at, dict(foods))
                 yield run_episode(policy, episode, foods, severing=severing, knife=knife, arm=arm)
 
         rest = Countdown(max(len(todo), 1))
@@ -180,7 +187,7 @@ def evaluate(
             left = rest.left(1)
             if severing or world is not None or k % 100 == 0:
                 say(f"{k} of {len(todo)} episodes: {row['suite']}, {row['food']}, {_words(row)}; {left}")
-    wanted = {(s, TEST + seed + k) for s in suites for k in range(episodes)}
+    wanted = {(s, FIRST_TEST_SEED + seed + k) for s in suites for k in range(episodes)}
     document = {
         "schema": tag("evaluate"),
         **about,
@@ -197,17 +204,19 @@ def _in_world(
     policy: Policy, todo: Sequence[tuple[str, int]], foods: Mapping[str, FoodSpec], world: World, pool: Workers
 ) -> Iterator[dict[str, Any]]:
     """Rows of episodes in IntSim, in order of completion."""
-    from intsim.sim.closed_loop import episode_of
+    from intsim.sim.closed_loop import closed_loop_episode
 
-    for k, result in pool.each(episode_of, [(policy, suite, seed, dict(foods), world) for suite, seed in todo]):
+    for k, result in pool.each(
+        closed_loop_episode, [(policy, suite, seed, dict(foods), world) for suite, seed in todo]
+    ):
         suite, seed = todo[k]
         if result is None:
             raise OutputError(
                 f"{suite} {seed}: its process was killed twice, perhaps for lack of memory; free some and add --resume"
             )
         rollout, after, found = result
-        episode = draw(suite, seed, dict(foods))
-        judged = judge(episode.spec, episode.item, rollout, after)
+        episode = sample_episode(suite, seed, dict(foods))
+        judged = judge_geometry(episode.spec, episode.item, rollout, after)
         row = _row(episode, rollout, judged)
         yield row | {"severing": found.as_dict()} if world.coupled else row
 
@@ -238,31 +247,31 @@ def _count(rows: Sequence[Mapping[str, Any]], sigma: float | None) -> dict[str, 
     """Rates of success of a suite."""
     out: dict[str, Any] = {
         "what": SUITES[rows[0]["suite"]].what if rows else "",
-        "published": rate([r["published"] for r in rows]),
-        "strict": rate([r["strict"] for r in rows]),
+        "published": success_rate([r["published"] for r in rows]),
+        "strict": success_rate([r["strict"] for r in rows]),
         "criteria": {},
         "clipped_steps": sum(r["clipped"] for r in rows),
     }
     for name in ("tip", "region", "angle", "place", "strict_tip", "count", "even"):
         found = [r["criteria"][name] for r in rows if name in r["criteria"]]
         if found:
-            out["criteria"][name] = rate(found)
+            out["criteria"][name] = success_rate(found)
     cut = [r["severing"]["severed"] for r in rows if "severing" in r]
     if cut:
-        out["severing"] = rate([c for c in cut if c is not None])
+        out["severing"] = success_rate([c for c in cut if c is not None])
         out["not_simulated"] = sum(c is None for c in cut)
         both = [
             r["published"] and r["severing"]["severed"]
             for r in rows
             if "severing" in r and r["severing"]["severed"] is not None
         ]
-        out["published_and_severed"] = rate(both)
+        out["published_and_severed"] = success_rate(both)
     if sigma is not None and rows and not any(r["pieces"] for r in rows):
-        out["expected_place"] = sum(expected(r["length_m"], sigma) for r in rows) / len(rows)
+        out["expected_place"] = sum(expected_place_rate(r["length_m"], sigma) for r in rows) / len(rows)
     return out
 
 
-def rate(found: Sequence[bool]) -> dict[str, float | int]:
+def success_rate(found: Sequence[bool]) -> dict[str, float | int]:
     """Successes, trials, rate and its 95 % interval."""
     n, k = len(found), sum(bool(f) for f in found)
     low, high = wilson(k, n)

@@ -8,22 +8,22 @@ from typing import Any
 import numpy as np
 
 from calib.material.knife import load_knife
-from intsim.task.planner import GRIPPER_CLOSED, HOME, PHASES, RATE, SPEED, minimum_jerk, plan
+from intsim.task.planner import CONTROL_RATE, DESCENT_SPEED, GRIPPER_CLOSED, HOME, PHASES, minimum_jerk, plan_cut
 from intsim.task.targets import TaskError, target
 
-REACHED = 2e-4  # height of the edge at which it is on the board [m]
-DEEPEST = 0.08  # way below the board that is commanded at most [m]: 140 N behind the Panda's own gains
-LEVELLED = 0.2  # part of the edge's tilt by which a step of pressing on turns the command back where one end of it is on the board [-]: in a quarter of a
+BOARD_REACHED = 2e-4  # height of the edge at which it is on the board [m]
+MAX_COMMAND_DEPTH = 0.08  # way below the board that is commanded at most [m]: 140 N behind the Panda's own gains
+LEVELLING_GAIN = 0.2  # part of the edge's tilt by which a step of pressing on turns the command back where one end of it is on the board [-]: in a quarter of a
 # second, after the arm, which lags by a tenth
-LONGEST = 40  # steps in which it is turned at most: as many as the way down to the deepest command takes
-LOW = 5e-4  # height of the lower end of the blade at which it is there [m], half of what the middle hangs above it (1.1 mm, banana)
-HOLD = 0.3  # time that the edge is held on the board [s]
-RETRACT = 1.5  # time of the way back up [s]
-OFF = 1e-3  # error of the inverse kinematics that is too large [m]
+MAX_LEVELLING_STEPS = 40  # steps in which it is turned at most: as many as the way down to the deepest command takes
+BLADE_END_REACHED = 5e-4  # height of the lower end of the blade at which it is there [m], half of what the middle hangs above it (1.1 mm, banana)
+HOLD_TIME = 0.3  # time that the edge is held on the board [s]
+RETRACT_TIME = 1.5  # time of the way back up [s]
+MAX_IK_ERROR = 1e-3  # error of the inverse kinematics that is too large [m]
 
 
 @dataclass(eq=False)
-class Track:
+class Demonstration:
     """What was done and seen, step by step.
 
     Attributes:
@@ -55,7 +55,7 @@ class Track:
     status: str = "done"
 
 
-def demonstrate(env: Any, *, style: str = "press", sustained: bool = True, meshes: bool = True) -> Track:
+def demonstrate(env: Any, *, style: str = "press", sustained: bool = True, meshes: bool = True) -> Demonstration:
     """Cut what the environment's episode asks for.
 
     Args:
@@ -66,7 +66,7 @@ def demonstrate(env: Any, *, style: str = "press", sustained: bool = True, meshe
             the food does.
         meshes: Whether the food's surface is kept.
     """
-    track, episode, half = Track(), env.episode, load_knife(env.knife).length / 2
+    track, episode, half = Demonstration(), env.episode, load_knife(env.knife).length / 2
     _see(env, track)
     for _ in range(episode.spec.cuts):
         item = (env.coupling if env.coupled else env.table).items[0]
@@ -74,7 +74,7 @@ def demonstrate(env: Any, *, style: str = "press", sustained: bool = True, meshe
             along = target(episode.spec, item)
         except TaskError:
             break
-        path = plan(item, along, style=style, start=env.pose)
+        path = plan_cut(item, along, style=style, start=env.pose)
         for pose, phase in zip(path.pose, path.phase, strict=True):
             if phase != "retract":
                 _step(env, track, pose, str(phase), meshes)
@@ -83,36 +83,36 @@ def demonstrate(env: Any, *, style: str = "press", sustained: bool = True, meshe
             whole, turned = len(item.pieces), 0
             while (
                 len(env.coupling.items[0].pieces) == whole
-                and env.pose[2] > REACHED
-                and pose[2] > -DEEPEST
-                and turned < LONGEST
+                and env.pose[2] > BOARD_REACHED
+                and pose[2] > -MAX_COMMAND_DEPTH
+                and turned < MAX_LEVELLING_STEPS
             ):
-                if env.pose[2] - half * abs(np.sin(env.pose[4])) < LOW:
-                    pose[4] -= LEVELLED * env.pose[4]
+                if env.pose[2] - half * abs(np.sin(env.pose[4])) < BLADE_END_REACHED:
+                    pose[4] -= LEVELLING_GAIN * env.pose[4]
                     turned += 1
                 else:
-                    pose[2] -= SPEED / RATE
+                    pose[2] -= DESCENT_SPEED / CONTROL_RATE
                 _step(env, track, pose, "cut", meshes)
-            for _ in range(round(HOLD * RATE)):
+            for _ in range(round(HOLD_TIME * CONTROL_RATE)):
                 _step(env, track, pose, "hold", meshes)
         up = np.array([*pose[:2], HOME[2], pose[3], 0.0])
-        for part in minimum_jerk(round(RETRACT * RATE)):
+        for part in minimum_jerk(round(RETRACT_TIME * CONTROL_RATE)):
             _step(env, track, pose + part * (up - pose), "retract", meshes)
     return track
 
 
-def _see(env: Any, track: Track) -> None:
+def _see(env: Any, track: Demonstration) -> None:
     robot = env.agent.robot
     track.qpos.append(robot.get_qpos()[0].numpy().astype(np.float32))
     track.qvel.append(robot.get_qvel()[0].numpy().astype(np.float32))
     track.edge.append(env.pose)
 
 
-def _step(env: Any, track: Track, pose: np.ndarray, phase: str, meshes: bool) -> None:
+def _step(env: Any, track: Demonstration, pose: np.ndarray, phase: str, meshes: bool) -> None:
     """One control step towards a pose."""
     near = np.array([*track.action[-1][:7], 0.0, 0.0]) if track.action else track.qpos[-1].astype(float)
     joints, off = env.kinematics.joints(pose, near)
-    if off > OFF:
+    if off > MAX_IK_ERROR:
         track.status = f"the arm does not reach {np.round(pose[:3], 3).tolist()}"
     action = np.array([*joints[:7], GRIPPER_CLOSED], np.float32)
     _, _, _, _, info = env.step(action)

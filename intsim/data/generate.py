@@ -16,21 +16,21 @@ from calib.io.provenance import code_key, git_commit, key_of, versions
 from calib.io.schema import tag
 from calib.material.knife import load_knife
 from calib.simulation.workers import Workers
-from intsim.data.manifest import Draw, Manifest
-from intsim.data.shards import META, PART, SHARD, episodes_of, keep, pack, write_shard
-from intsim.sim.closed_loop import environment
+from intsim.data.manifest import Manifest, TrajectorySpec
+from intsim.data.shards import DATASET_FILE, EPISODE_PART, SHARD_NAME, keep, pack_episode, shard_entries, write_shard
+from intsim.sim.closed_loop import make_environment
 from intsim.sim.world import ENV_ID, World
 from intsim.task.language import instructions
-from intsim.task.planner import RATE
+from intsim.task.planner import CONTROL_RATE
 
-DEMOS = ("sustained", "planned", "kinematic")
+DEMONSTRATION_KINDS = ("sustained", "planned", "kinematic")
 """Demonstrations: ``sustained`` goes on until the food is in pieces, ``planned`` is the motion that geometry plans, whatever the food does, and
 ``kinematic`` the same without food that resists: nothing is in pieces then but in geometry."""
-DRAWN = ("slice", "rock", "saw")  # styles whose way along the edge and tilt the solver follows
+DRAWN_STYLES = ("slice", "rock", "saw")  # styles whose way along the edge and tilt the solver follows
 WHOLE_SET = 21_000  # trajectories of the published data set
 
 
-def available() -> None:
+def require_simulator() -> None:
     """Whether the robot simulator is here.
 
     Raises:
@@ -44,11 +44,13 @@ def available() -> None:
         ) from None
 
 
-def make(draw: Draw, demos: str, knife: str, stiffness: float | None, arch: str, threads: int) -> dict[str, Any]:
+def make_episode(
+    spec: TrajectorySpec, demos: str, knife: str, stiffness: float | None, arch: str, threads: int
+) -> dict[str, Any]:
     """One episode in a worker: its bytes, and what it took.
 
     Args:
-        draw: What is done.
+        spec: What is done.
         demos: Kind of demonstration.
         knife: Name of the knife.
         stiffness: Of the arm's joints [N m/rad]; ManiSkill's own without it.
@@ -58,47 +60,47 @@ def make(draw: Draw, demos: str, knife: str, stiffness: float | None, arch: str,
     from intsim.data.demonstrate import demonstrate
 
     began = time.perf_counter()
-    env = environment(World(demos != "kinematic", stiffness, knife))
+    env = make_environment(World(demos != "kinematic", stiffness, knife))
     start = time.perf_counter() - began
-    episode, before = draw.episode, env.solver_s
-    env.foods = {**env.foods, draw.food.name: draw.food}
-    env.reset(seed=draw.seed, options={"episode": episode, "draws": draw.style in DRAWN})
-    track = demonstrate(env, style=draw.style, sustained=demos == "sustained")
+    episode, before = spec.episode, env.solver_s
+    env.foods = {**env.foods, spec.food.name: spec.food}
+    env.reset(seed=spec.seed, options={"episode": episode, "draws": spec.style in DRAWN_STYLES})
+    track = demonstrate(env, style=spec.style, sustained=demos == "sustained")
     solver = env.solver_s - before
-    material = vars(draw.food.to_scene_food().material)
+    material = vars(spec.food.to_scene_food().material)
     about = {
-        "episode_seed": draw.seed,
-        "reset_kwargs": {"seed": draw.seed},
+        "episode_seed": spec.seed,
+        "reset_kwargs": {"seed": spec.seed},
         "control_mode": "pd_joint_pos",
         "elapsed_steps": len(track.action),
         "success": track.published[-1] and track.severed[-1],
         "published": track.published[-1],
         "severed": track.severed[-1],
         "status": track.status,
-        "index": draw.index,
-        "suite": draw.suite,
-        "style": draw.style,
+        "index": spec.index,
+        "suite": spec.suite,
+        "style": spec.style,
         "demos": demos,
-        "food": draw.food.name,
+        "food": spec.food.name,
         "instruction": episode.instruction,
-        "instructions": instructions(episode.spec, draw.seed),
+        "instructions": instructions(episode.spec, spec.seed),
         "task": {**asdict(episode.spec), "ratio": float(episode.spec.ratio)},
         "items": [
             {"name": i.name, "x": i.x, "y": i.y, "yaw": i.yaw, **vars(i.shape)} for i in (episode.item, *episode.others)
         ],
-        "values": draw.values,
+        "values": spec.values,
         "peak_N": max((float(f[:, 2].max()) for f in track.force), default=0.0),
         "seconds": {"solver": solver, "robot": time.perf_counter() - began - start - solver, "start": start},
     }
     mpm = {
-        "food": draw.food.name,
+        "food": spec.food.name,
         "material": json.dumps(material),
         "material_sha256": key_of(material),
         "solver_sha256": code_key(),
         "knife": knife,
         "arm": json.dumps({"stiffness": stiffness}),
     }
-    return {"about": about, "content": pack(track, about, mpm)}
+    return {"about": about, "content": pack_episode(track, about, mpm)}
 
 
 def generate(
@@ -120,7 +122,7 @@ def generate(
         manifest: Which.
         out: Folder.
         pool: Where they are made.
-        demos: Kind of demonstration, in :data:`DEMOS`.
+        demos: Kind of demonstration, in :data:`DEMONSTRATION_KINDS`.
         knife: Name of the knife.
         stiffness: Of the arm's joints [N m/rad]; ManiSkill's own without it.
         shard: Trajectories of a file.
@@ -134,7 +136,7 @@ def generate(
     Raises:
         CutcalError: The folder is taken or holds another dataset, or ManiSkill is not installed.
     """
-    available()
+    require_simulator()
     load_knife(knife)
     about = {"manifest": manifest.as_dict(), "demos": demos, "knife": knife, "stiffness": stiffness, "shard": shard}
     _claim(out, about, resume)
@@ -142,24 +144,24 @@ def generate(
     todo = [
         k
         for n, group in enumerate(groups)
-        if not (out / f"{SHARD.format(n)}.h5").exists()
+        if not (out / f"{SHARD_NAME.format(n)}.h5").exists()
         for k in group
-        if not (out / PART.format(k)).exists()
+        if not (out / EPISODE_PART.format(k)).exists()
     ]
     if len(todo) < manifest.trajectories:
         say(f"{manifest.trajectories - len(todo)} of {manifest.trajectories} trajectories are there already")
     rest, done, left = Countdown(max(len(todo), 1)), 0, set(todo)
-    info = {"env_id": ENV_ID, "env_kwargs": {"knife": knife, "stiffness": stiffness}, "control_freq": RATE}
+    info = {"env_id": ENV_ID, "env_kwargs": {"knife": knife, "stiffness": stiffness}, "control_freq": CONTROL_RATE}
     _close(out, groups, info)
     for group in groups:
         own = [k for k in group if k in left]
-        jobs = [(manifest.draw(k), demos, knife, stiffness) for k in own]
-        for place, made in pool.each(make, jobs):
+        jobs = [(manifest.trajectory(k), demos, knife, stiffness) for k in own]
+        for place, made in pool.each(make_episode, jobs):
             if made is None:
                 raise OutputError(
                     f"trajectory {own[place]}: its process was killed twice, perhaps for lack of memory; add --resume"
                 )
-            keep(out / PART.format(own[place]), made["content"])
+            keep(out / EPISODE_PART.format(own[place]), made["content"])
             done += 1
             say(_told(made["about"], f"{done} of {len(todo)}, {rest.left(1)}"))
         _close(out, groups, info)
@@ -177,7 +179,7 @@ def _told(a: dict[str, Any], rest: str) -> str:
 
 def _claim(out: Path, about: dict[str, Any], resume: bool) -> None:
     """Make the folder, or see that it holds the same dataset."""
-    path = out / META
+    path = out / DATASET_FILE
     if path.exists() or any(out.glob("shard-*")):
         if not resume:
             raise OutputError(
@@ -200,8 +202,8 @@ def _claim(out: Path, about: dict[str, Any], resume: bool) -> None:
 def _close(out: Path, groups: list[range], info: dict[str, Any]) -> None:
     """Write the shards whose episodes are all there."""
     for n, group in enumerate(groups):
-        parts = [out / PART.format(k) for k in group]
-        if (out / f"{SHARD.format(n)}.h5").exists():
+        parts = [out / EPISODE_PART.format(k) for k in group]
+        if (out / f"{SHARD_NAME.format(n)}.h5").exists():
             for part in parts:  # of a process that was killed when the shard was there
                 part.unlink(missing_ok=True)
         elif all(part.exists() for part in parts):
@@ -210,8 +212,8 @@ def _close(out: Path, groups: list[range], info: dict[str, Any]) -> None:
 
 def _conclude(out: Path, about: dict[str, Any], command: tuple[str, ...]) -> dict[str, Any]:
     """The document, with what an episode takes and what the whole published set would."""
-    episodes = [one for path in sorted(out.glob("shard-*.h5")) for one in episodes_of(path)]
-    before = json.loads((out / META).read_text(encoding="utf-8"))
+    episodes = [one for path in sorted(out.glob("shard-*.h5")) for one in shard_entries(path)]
+    before = json.loads((out / DATASET_FILE).read_text(encoding="utf-8"))
     n = max(len(episodes), 1)
     mean = {part: sum(e["seconds"][part] for e in episodes) / n for part in ("solver", "robot")}
     document = {
@@ -232,5 +234,5 @@ def _conclude(out: Path, about: dict[str, Any], command: tuple[str, ...]) -> dic
         "versions": versions(),
         "git": git_commit(),
     }
-    write_json(out / META, document)
+    write_json(out / DATASET_FILE, document)
     return document

@@ -16,22 +16,22 @@ import numpy as np
 from calib.errors import OutputError
 from calib.simulation.workers import Workers
 from intsim.data.cameras import CAMERA_NAMES
-from intsim.data.shards import Stored
-from intsim.data.views import View, check, views
-from intsim.task.planner import GRIPPER_CLOSED, RATE
+from intsim.data.export_episodes import ExportEpisode, check_target, export_episodes
+from intsim.data.shards import StoredTrajectory
+from intsim.task.planner import CONTROL_RATE, GRIPPER_CLOSED
 
-VERSION = "v3.0"
+CODEBASE_VERSION = "v3.0"
 FILE_FRAMES = 50_000  # frames of a file of data or video
-SAMPLED = 32  # pictures of an episode from which its statistics are found
+SAMPLED_PICTURES = 32  # pictures of an episode from which its statistics are found
 QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
-POSE = ("x", "y", "z", "roll", "pitch", "yaw")
-JOINTS = tuple(f"panda_joint{k}" for k in range(1, 8))
+POSE_NAMES = ("x", "y", "z", "roll", "pitch", "yaw")
+JOINT_NAMES = tuple(f"panda_joint{k}" for k in range(1, 8))
 #: Name: type, names of the components.
 FEATURES: dict[str, tuple[str, tuple[str, ...] | None]] = {
-    "observation.state": ("float32", (*POSE, "pad", "gripper")),
-    "action": ("float32", (*(f"d{name}" for name in POSE), "gripper")),
-    "extra.qpos": ("float32", (*JOINTS, "finger1", "finger2")),
-    "extra.joint_target": ("float32", (*JOINTS, "gripper")),
+    "observation.state": ("float32", (*POSE_NAMES, "pad", "gripper")),
+    "action": ("float32", (*(f"d{name}" for name in POSE_NAMES), "gripper")),
+    "extra.qpos": ("float32", (*JOINT_NAMES, "finger1", "finger2")),
+    "extra.joint_target": ("float32", (*JOINT_NAMES, "gripper")),
     "contact.force": ("float32", ("x", "y", "z")),
     "contact.impulse": ("float32", ("x", "y", "z")),
     "contact.phase": ("int64", None),
@@ -48,7 +48,7 @@ FEATURES: dict[str, tuple[str, tuple[str, ...] | None]] = {
 }
 
 
-def columns(stored: Stored) -> dict[str, np.ndarray]:
+def episode_columns(stored: StoredTrajectory) -> dict[str, np.ndarray]:
     """Features of one trajectory, a row for each step, without what depends on its place in the dataset."""
     g = stored.group
     n = len(g["actions"])
@@ -68,7 +68,7 @@ def columns(stored: Stored) -> dict[str, np.ndarray]:
         "cut.n_pieces": g["mpm/pieces"][()].astype(np.int64),
         "next.done": np.arange(n) == n - 1,
         "next.success": g["success"][()],
-        "timestamp": (np.arange(n) / RATE).astype(np.float32),
+        "timestamp": (np.arange(n) / CONTROL_RATE).astype(np.float32),
         "frame_index": np.arange(n),
     }
 
@@ -83,12 +83,12 @@ def statistics(values: np.ndarray) -> dict[str, list[Any]]:
 
 def picture_statistics(frames: np.ndarray) -> dict[str, list[Any]]:
     """The same of pictures (n, h, w, 3) by colour, in parts of 255; shape (3, 1, 1)."""
-    some = frames[np.linspace(0, len(frames) - 1, min(SAMPLED, len(frames))).round().astype(int)]
+    some = frames[np.linspace(0, len(frames) - 1, min(SAMPLED_PICTURES, len(frames))).round().astype(int)]
     found = statistics(some.reshape(-1, 3) / 255)
     return {n: v if n == "count" else [[[x]] for x in v] for n, v in (found | {"count": [len(some)]}).items()}
 
 
-def together(parts: Sequence[dict[str, list[Any]]]) -> dict[str, list[Any]]:
+def merge_statistics(parts: Sequence[dict[str, list[Any]]]) -> dict[str, list[Any]]:
     """Statistics of several episodes as one; quantiles are the weighted means of theirs, as LeRobot's are."""
     counts = np.array([p["count"][0] for p in parts], float)
     weight = counts / counts.sum()
@@ -110,7 +110,7 @@ def together(parts: Sequence[dict[str, list[Any]]]) -> dict[str, list[Any]]:
     return {name: v.tolist() for name, v in out.items()} | {"count": [int(counts.sum())]}
 
 
-def export(
+def export_lerobot(
     folder: Path,
     out: Path,
     *,
@@ -143,9 +143,9 @@ def export(
         import pyarrow  # noqa: F401
     except ImportError as e:
         raise OutputError(f"dataset export: {e.name} is not installed; pip install 'cutcal[data]'") from None
-    check(out, scenes)
+    check_target(out, scenes)
     writer = _Writer(out, pixels if scenes else 0)
-    for view in views(folder, scenes, pixels, pool, say):
+    for view in export_episodes(folder, scenes, pixels, pool, say):
         writer.add(view)
     return writer.close()
 
@@ -168,10 +168,10 @@ class _Writer:
         self.frames, self.file, self.in_file = 0, 0, 0
         self.videos: dict[str, _Video] = {}
 
-    def add(self, one: View) -> None:
+    def add(self, one: ExportEpisode) -> None:
         """An episode."""
         stored, sentence, pictures, scene = one.stored, one.sentence, one.pictures, one.scene
-        found = columns(stored)
+        found = episode_columns(stored)
         n = len(found["timestamp"])
         if self.in_file and self.in_file + n > FILE_FRAMES:
             self._roll()
@@ -201,8 +201,8 @@ class _Writer:
             row |= {
                 f"videos/{key}/chunk_index": 0,
                 f"videos/{key}/file_index": self.file,
-                f"videos/{key}/from_timestamp": self.in_file / RATE,
-                f"videos/{key}/to_timestamp": (self.in_file + n) / RATE,
+                f"videos/{key}/from_timestamp": self.in_file / CONTROL_RATE,
+                f"videos/{key}/to_timestamp": (self.in_file + n) / CONTROL_RATE,
             }
             self.videos[key].add(frames)
             own[key] = picture_statistics(frames)
@@ -252,7 +252,7 @@ class _Writer:
         if self.pixels:
             features |= {f"observation.images.{view}": self._video_feature() for view in CAMERA_NAMES}
         info = {
-            "codebase_version": VERSION,
+            "codebase_version": CODEBASE_VERSION,
             "robot_type": "panda",
             "total_episodes": len(self.episodes),
             "total_frames": self.frames,
@@ -260,7 +260,7 @@ class _Writer:
             "chunks_size": 1000,
             "data_files_size_in_mb": 100,
             "video_files_size_in_mb": 200,
-            "fps": round(RATE),
+            "fps": round(CONTROL_RATE),
             "splits": {"train": f"0:{len(self.episodes)}"},
             "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
             "video_path": "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
@@ -285,7 +285,7 @@ class _Writer:
         ]
         _parquet(meta / "tasks.parquet", tasks.replace_schema_metadata({b"pandas": json.dumps(index).encode()}))
         _parquet(meta / "culinary.parquet", pa.Table.from_pylist(self.side))
-        stats = {name: together(parts) for name, parts in self.parts.items()}
+        stats = {name: merge_statistics(parts) for name, parts in self.parts.items()}
         (meta / "stats.json").write_text(json.dumps(stats, indent=1) + "\n", encoding="utf-8")
         (meta / "info.json").write_text(json.dumps(info, indent=1) + "\n", encoding="utf-8")
         return info
@@ -297,7 +297,7 @@ class _Writer:
             "video.codec": "h264",
             "video.pix_fmt": "yuv420p",
             "video.is_depth_map": False,
-            "video.fps": round(RATE),
+            "video.fps": round(CONTROL_RATE),
             "video.channels": 3,
             "has_audio": False,
         }
@@ -336,7 +336,7 @@ class _Video:
 
         path.parent.mkdir(parents=True, exist_ok=True)
         self._file = av.open(str(path), "w")
-        self._stream = self._file.add_stream("libx264", rate=round(RATE), options={"crf": "18", "g": "2"})
+        self._stream = self._file.add_stream("libx264", rate=round(CONTROL_RATE), options={"crf": "18", "g": "2"})
         self._stream.width = self._stream.height = pixels
         self._stream.pix_fmt = "yuv420p"
         self._count = 0

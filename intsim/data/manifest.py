@@ -10,21 +10,21 @@ import numpy as np
 
 from calib.material.food import FoodSpec, load_food
 from intsim.sim.background import BACKGROUNDS
-from intsim.task.language import VARIANTS
+from intsim.task.language import SENTENCES_PER_TASK
 from intsim.task.planner import STYLES
-from intsim.task.suites import FOODS, SUITES, TEST, Episode, draw
+from intsim.task.suites import FIRST_TEST_SEED, FOODS, SUITES, Episode, sample_episode
 from intsim.task.targets import TaskError
 
-JITTER = {"E": 0.2, "R": 0.1, "yield_stress": 0.1, "mu": 0.2}
+PROPERTY_SCATTER = {"E": 0.2, "R": 0.1, "yield_stress": 0.1, "mu": 0.2}
 """Standard deviation of the logarithm of properties that differ from item to item [-]: assumed, a third of what gripped fruit scatters in
 stiffness and less for strength."""
-TASKS = ("seeds", "continuous", "split", "flips", "objects")
+TRAINING_SUITES = ("seeds", "continuous", "split", "flips", "objects")
 """Suites that training may see, in turn; the sentences of ``language`` and every seed from a million on are for tests."""
-PRESSED = 0.5  # part of the episodes that press; the other styles share the rest
+PRESS_SHARE = 0.5  # part of the episodes that press; the other styles share the rest
 
 
 @dataclass(frozen=True)
-class Draw:
+class TrajectorySpec:
     """One trajectory. Attributes: index; suite; seed; style of the motion; episode; food, with its own values."""
 
     index: int
@@ -62,9 +62,9 @@ class Manifest:
 
     trajectories: int = 21_000
     backgrounds: int = BACKGROUNDS
-    instructions: int = VARIANTS
+    instructions: int = SENTENCES_PER_TASK
     foods: Sequence[str] = FOODS
-    suites: Sequence[str] = TASKS
+    suites: Sequence[str] = TRAINING_SUITES
     seed: int = 0
     styles: Sequence[str] = STYLES
 
@@ -78,9 +78,9 @@ class Manifest:
             for name in given:
                 if name not in known:
                     raise TaskError(f"dataset: {what} {name!r} is none of {', '.join(known)}")
-        if self.seed < 0 or self.seed + self.trajectories > TEST:
+        if self.seed < 0 or self.seed + self.trajectories > FIRST_TEST_SEED:
             raise TaskError(
-                f"dataset: seeds {self.seed} to {self.seed + self.trajectories}; those from {TEST} on are for tests"
+                f"dataset: seeds {self.seed} to {self.seed + self.trajectories}; those from {FIRST_TEST_SEED} on are for tests"
             )
 
     def __len__(self) -> int:
@@ -95,7 +95,7 @@ class Manifest:
     def __iter__(self) -> Iterator[Sample]:
         return (self[k] for k in range(len(self)))
 
-    def draw(self, index: int) -> Draw:
+    def trajectory(self, index: int) -> TrajectorySpec:
         """A trajectory: food and task in turn, all else from its seed."""
         seed = self.seed + index
         name = self.foods[index % len(self.foods)]
@@ -103,15 +103,17 @@ class Manifest:
         food = load_food(name)
         rng = np.random.default_rng([seed, *b"dataset"])
         values = {}
-        for prop, sd in JITTER.items():
+        for prop, sd in PROPERTY_SCATTER.items():
             if prop in food.properties:
                 found = food.properties[prop]
                 values[prop] = float(np.clip(found.value * np.exp(sd * rng.standard_normal()), found.low, found.high))
         others = [style for style in self.styles if style != STYLES[0]]
-        pressed = STYLES[0] in self.styles and rng.random() < PRESSED
+        pressed = STYLES[0] in self.styles and rng.random() < PRESS_SHARE
         style = STYLES[0] if pressed or not others else others[int(rng.integers(len(others)))]
-        episode = draw(suite, seed, {name: food})
-        return Draw(index, suite, seed, style, episode, food.with_values(values, source="drawn for a dataset"), values)
+        episode = sample_episode(suite, seed, {name: food})
+        return TrajectorySpec(
+            index, suite, seed, style, episode, food.with_values(values, source="drawn for a dataset"), values
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """As plain data."""

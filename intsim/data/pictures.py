@@ -21,18 +21,26 @@ from calib.errors import OutputError
 from calib.io.folder import write_json
 from calib.io.progress import Countdown
 from calib.simulation.workers import Workers
-from intsim.data.shards import META, Stored, episodes_of, keep, number_of, put_together, shards_of
+from intsim.data.shards import (
+    DATASET_FILE,
+    StoredTrajectory,
+    keep,
+    put_together,
+    shard_entries,
+    shard_number,
+    shard_paths,
+)
 from intsim.sim.background import BACKGROUNDS
 
-FILE = "pictures-{:d}-{:02d}-{:04d}.h5"  # pixels, background, shard
-PART = "picture-{:d}-{:02d}-{:06d}.h5"  # pixels, background, trajectory: until the file is complete
-NEEDED = ("obs/agent/qpos", "mpm/surface")  # of a trajectory, for its pictures
+PICTURE_FILE = "pictures-{:d}-{:02d}-{:04d}.h5"  # pixels, background, shard
+PICTURE_PART = "picture-{:d}-{:02d}-{:06d}.h5"  # pixels, background, trajectory: until the file is complete
+RENDERED_GROUPS = ("obs/agent/qpos", "mpm/surface")  # of a trajectory, for its pictures
 WHOLE_SET = 21_000 * BACKGROUNDS  # trajectories of the published data set, before each background
 
 _renderer: tuple[tuple[int, int], Any] | None = None  # of this process: there is one scene at a time
 
 
-def render(
+def render_dataset(
     folder: Path,
     scenes: Sequence[int],
     pixels: int,
@@ -55,9 +63,9 @@ def render(
     Raises:
         CutcalError: A background that does not exist, there is no renderer, the folder holds no dataset or cannot be written.
     """
-    check_scenes(scenes)
+    check_backgrounds(scenes)
     about = _about(folder)
-    shards = {number_of(path): (path, episodes_of(path)) for path in shards_of(folder)}
+    shards = {shard_number(path): (path, shard_entries(path)) for path in shard_paths(folder)}
     todo = {
         n: [(scene, k) for scene in scenes for k, one in enumerate(listed) if not _there(folder, pixels, scene, n, one)]
         for n, (_, listed) in shards.items()
@@ -67,14 +75,16 @@ def render(
         say(f"pictures of {total - count} of {total} are there already")
     rest, done = Countdown(max(count, 1)), 0
     for n, (path, listed) in shards.items():
-        for place, made in pool.each(paint, [(_slim(path, k), listed[k], scene, pixels) for scene, k in todo[n]]):
+        for place, made in pool.each(
+            render_trajectory, [(_slim(path, k), listed[k], scene, pixels) for scene, k in todo[n]]
+        ):
             scene, k = todo[n][place]
             if made is None:
                 raise OutputError(
                     f"pictures of trajectory {listed[k]['index']}: their process was killed twice, perhaps for lack of memory; "
                     "what was rendered before is kept"
                 )
-            keep(folder / PART.format(pixels, scene, listed[k]["index"]), made)
+            keep(folder / PICTURE_PART.format(pixels, scene, listed[k]["index"]), made)
             done += 1
             say(
                 f"pictures of trajectory {listed[k]['index']} before background {scene}: {done} of {count}, {rest.left(1)}"
@@ -82,17 +92,17 @@ def render(
         for scene in scenes:
             _close(folder, pixels, scene, n, listed)
     found = _summed(folder, scenes, pixels)
-    write_json(folder / META, about | {"pictures": found})
+    write_json(folder / DATASET_FILE, about | {"pictures": found})
     return found
 
 
-def available(pool: Workers, scenes: Sequence[int], pixels: int) -> None:
+def require_renderer(pool: Workers, scenes: Sequence[int], pixels: int) -> None:
     """Whether there is a renderer, before hours of simulation.
 
     Raises:
         CutcalError: There is none, or it ends its process; or a background does not exist.
     """
-    check_scenes(scenes)
+    check_backgrounds(scenes)
     for _, found in pool.each(_ready, [(scenes[0], pixels)]):
         if found is None:
             raise OutputError("dataset: the renderer ends its process; cutcal doctor says what is missing")
@@ -104,17 +114,17 @@ def _ready(scene: int, pixels: int, arch: str, threads: int) -> bool:
     return True
 
 
-def check_scenes(scenes: Sequence[int]) -> None:
+def check_backgrounds(scenes: Sequence[int]) -> None:
     """Raise OutputError where a background does not exist."""
     if any(not 0 <= k < BACKGROUNDS for k in scenes):
         raise OutputError(f"--scenes {','.join(map(str, scenes))}: give numbers from 0 to {BACKGROUNDS - 1}")
 
 
-def paint(content: bytes, about: dict[str, Any], scene: int, pixels: int, arch: str, threads: int) -> bytes:
+def render_trajectory(content: bytes, about: dict[str, Any], scene: int, pixels: int, arch: str, threads: int) -> bytes:
     """Pictures of one trajectory before one background, in a worker: the bytes of an HDF5 file with the content of its group.
 
     Args:
-        content: HDF5 file with what is shown (:data:`NEEDED`).
+        content: HDF5 file with what is shown (:data:`RENDERED_GROUPS`).
         about: Entry of the trajectory in its JSON file.
         scene: Background.
         pixels: Width and height.
@@ -125,7 +135,7 @@ def paint(content: bytes, about: dict[str, Any], scene: int, pixels: int, arch: 
 
     began = time.perf_counter()
     with h5py.File(io.BytesIO(content)) as file:
-        seen = _rendering(scene, pixels, threads).pictures(Stored(file, about))
+        seen = _rendering(scene, pixels, threads).pictures(StoredTrajectory(file, about))
     out = io.BytesIO()
     with h5py.File(out, "w") as file:
         for view, frames in seen.items():
@@ -138,7 +148,7 @@ def paint(content: bytes, about: dict[str, Any], scene: int, pixels: int, arch: 
     return out.getvalue()
 
 
-def pictures_of(folder: Path, stored: Stored, scene: int, pixels: int) -> dict[str, np.ndarray]:
+def load_pictures(folder: Path, stored: StoredTrajectory, scene: int, pixels: int) -> dict[str, np.ndarray]:
     """Pictures that were made, by camera (T, pixels, pixels, 3).
 
     Raises:
@@ -146,7 +156,7 @@ def pictures_of(folder: Path, stored: Stored, scene: int, pixels: int) -> dict[s
     """
     from PIL import Image
 
-    path = folder / FILE.format(pixels, scene, stored.shard)
+    path = folder / PICTURE_FILE.format(pixels, scene, stored.shard)
     try:
         with h5py.File(path) as file:
             group = file[f"traj_{stored.about['episode_id']}"]
@@ -174,7 +184,7 @@ def _rendering(scene: int, pixels: int, threads: int) -> Any:
 
 def _there(folder: Path, pixels: int, scene: int, shard: int, about: dict[str, Any]) -> bool:
     """Whether the pictures of a trajectory were made."""
-    names = (FILE.format(pixels, scene, shard), PART.format(pixels, scene, about["index"]))
+    names = (PICTURE_FILE.format(pixels, scene, shard), PICTURE_PART.format(pixels, scene, about["index"]))
     return any((folder / name).exists() for name in names)
 
 
@@ -183,7 +193,7 @@ def _slim(path: Path, k: int) -> bytes:
     stream = io.BytesIO()
     with h5py.File(path) as shard, h5py.File(stream, "w") as file:
         group = shard[f"traj_{k}"]
-        for name in NEEDED:
+        for name in RENDERED_GROUPS:
             if name in group:
                 group.copy(name, file.require_group(name.rsplit("/", 1)[0]))
     return stream.getvalue()
@@ -191,8 +201,8 @@ def _slim(path: Path, k: int) -> bytes:
 
 def _close(folder: Path, pixels: int, scene: int, shard: int, listed: Sequence[dict[str, Any]]) -> None:
     """Put the pictures of a shard together and remove their parts, those too of a process that was killed in between."""
-    path = folder / FILE.format(pixels, scene, shard)
-    parts = [folder / PART.format(pixels, scene, one["index"]) for one in listed]
+    path = folder / PICTURE_FILE.format(pixels, scene, shard)
+    parts = [folder / PICTURE_PART.format(pixels, scene, one["index"]) for one in listed]
     if not path.exists():
         put_together(path, parts)
         return
@@ -202,11 +212,11 @@ def _close(folder: Path, pixels: int, scene: int, shard: int, listed: Sequence[d
 
 def _about(folder: Path) -> dict[str, Any]:
     """What dataset.json says, before anything is rendered."""
-    shards_of(folder)  # or it is no dataset at all
+    shard_paths(folder)  # or it is no dataset at all
     try:
-        found: dict[str, Any] = json.loads((folder / META).read_text(encoding="utf-8"))
+        found: dict[str, Any] = json.loads((folder / DATASET_FILE).read_text(encoding="utf-8"))
     except (OSError, ValueError) as e:
-        raise OutputError(f"{folder / META}: not there or damaged ({e}); make the dataset again") from None
+        raise OutputError(f"{folder / DATASET_FILE}: not there or damaged ({e}); make the dataset again") from None
     return found
 
 

@@ -9,8 +9,8 @@ import numpy as np
 
 import intsim.sim.environment  # noqa: F401
 from intsim.data.cameras import CAMERA_NAMES
-from intsim.data.shards import Stored, item_of
-from intsim.sim.scenery import COLOURS
+from intsim.data.shards import StoredTrajectory, stored_item
+from intsim.sim.scenery import FOOD_COLOURS
 from intsim.sim.world import ENV_ID
 from intsim.task.suites import Episode
 from intsim.task.targets import CutSpec
@@ -50,10 +50,10 @@ class Renderer:
         """Give the renderer back."""
         self._env.close()
 
-    def pictures(self, stored: Stored) -> dict[str, np.ndarray]:
+    def pictures(self, stored: StoredTrajectory) -> dict[str, np.ndarray]:
         """What each camera sees before every step, shape (T, pixels, pixels, 3), 8 bits."""
         env, about, group = self._env, stored.about, stored.group
-        items = [item_of(one) for one in about["items"]]
+        items = [stored_item(one) for one in about["items"]]
         spec = CutSpec(items[0].name, about["task"]["ratio"], about["task"]["side"], about["task"]["camera"])
         episode = Episode(about["suite"], about["episode_seed"], spec, items[0], tuple(items[1:]), about["instruction"])
         env.reset(seed=about["episode_seed"], options={"episode": episode})
@@ -74,7 +74,7 @@ class Renderer:
             env.agent.robot.set_qpos(qpos[t])
             if t in meshes:
                 k, vertices, origin, triangles, flesh, which = meshes[t]
-                name = items[which].name if items[which].name in COLOURS else ""
+                name = items[which].name if items[which].name in FOOD_COLOURS else ""
                 env.scenery.show(which, vertices[k].astype(float) + origin, triangles, flesh, name)
             seen = env.get_obs()["sensor_data"]
             for view in CAMERA_NAMES:

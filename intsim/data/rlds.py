@@ -17,17 +17,17 @@ import numpy as np
 
 from calib.simulation.workers import Workers
 from intsim.data.cameras import CAMERA_NAMES
-from intsim.data.lerobot import columns
-from intsim.data.views import View, check_pictured, views
+from intsim.data.export_episodes import ExportEpisode, check_pictured_target, export_episodes
+from intsim.data.lerobot import episode_columns
 
-NAME, VERSION = "cutcal", "1.0.0"
-VALIDATION = 20  # every so many-th trajectory is kept for validation
-QUALITY = 95  # of the JPEG pictures
-MASK = 0xA282EAD8  # of TFRecord's checksums
-CLASS = "tensorflow_datasets.core.features."
+DATASET_NAME, DATASET_VERSION = "cutcal", "1.0.0"
+VALIDATION_STRIDE = 20  # every so many-th trajectory is kept for validation
+JPEG_QUALITY = 95  # of the JPEG pictures
+CRC_MASK = 0xA282EAD8  # of TFRecord's checksums
+FEATURE_CLASS = "tensorflow_datasets.core.features."
 
 
-def export(
+def export_rlds(
     folder: Path,
     out: Path,
     *,
@@ -56,16 +56,16 @@ def export(
     Raises:
         CutcalError: A package or the renderer is missing, no background is named, the folder is taken or holds no dataset.
     """
-    check_pictured(out, scenes, "RLDS", "google_crc32c", "PIL")
-    shown = views(folder, scenes, pixels, pool, say)
-    home = out / NAME / VERSION
+    check_pictured_target(out, scenes, "RLDS", "google_crc32c", "PIL")
+    shown = export_episodes(folder, scenes, pixels, pool, say)
+    home = out / DATASET_NAME / DATASET_VERSION
     home.mkdir(parents=True)
     counts, sizes = {"train": 0, "val": 0}, {"train": 0, "val": 0}
     files = {split: (home / _file(split)).open("wb") for split in counts}
     try:
         for view in shown:
-            split = "val" if view.stored.about["index"] % VALIDATION == VALIDATION - 1 else "train"
-            sizes[split] += write_record(files[split], example(episode(view)))
+            split = "val" if view.stored.about["index"] % VALIDATION_STRIDE == VALIDATION_STRIDE - 1 else "train"
+            sizes[split] += write_record(files[split], encode_example(episode_lists(view)))
             counts[split] += 1
     finally:
         for file in files.values():
@@ -73,8 +73,8 @@ def export(
     for split in [s for s, n in counts.items() if n == 0]:
         (home / _file(split)).unlink()
     info = {
-        "name": NAME,
-        "version": VERSION,
+        "name": DATASET_NAME,
+        "version": DATASET_VERSION,
         "description": "Cuts of food by a simulated Panda, told in words.",
         "fileFormat": "tfrecord",
         "splits": [
@@ -94,12 +94,12 @@ def export(
 
 
 def _file(split: str) -> str:
-    return f"{NAME}-{split}.tfrecord-00000-of-00001"
+    return f"{DATASET_NAME}-{split}.tfrecord-00000-of-00001"
 
 
-def episode(view: View) -> dict[str, list[bytes] | np.ndarray]:
+def episode_lists(view: ExportEpisode) -> dict[str, list[bytes] | np.ndarray]:
     """The lists of one episode by name."""
-    found = columns(view.stored)
+    found = episode_columns(view.stored)
     n = len(found["timestamp"])
     step = np.arange(n)
     out: dict[str, list[bytes] | np.ndarray] = {
@@ -124,11 +124,11 @@ def _jpeg(picture: np.ndarray) -> bytes:
     from PIL import Image
 
     stream = io.BytesIO()
-    Image.fromarray(picture).save(stream, format="JPEG", quality=QUALITY)
+    Image.fromarray(picture).save(stream, format="JPEG", quality=JPEG_QUALITY)
     return stream.getvalue()
 
 
-def example(lists: Mapping[str, list[bytes] | np.ndarray]) -> bytes:
+def encode_example(lists: Mapping[str, list[bytes] | np.ndarray]) -> bytes:
     """A ``tf.train.Example`` as protocol buffer: bytes, floats, or integers and flags by name."""
     entries = b""
     for name, values in lists.items():
@@ -167,16 +167,16 @@ def _checksum(content: bytes) -> bytes:
     import google_crc32c
 
     crc = google_crc32c.value(content)
-    return struct.pack("<I", ((crc >> 15 | crc << 17) + MASK) & 0xFFFFFFFF)
+    return struct.pack("<I", ((crc >> 15 | crc << 17) + CRC_MASK) & 0xFFFFFFFF)
 
 
 def features(pixels: int) -> dict[str, Any]:
     """Content of features.json: what TFDS builds its reader from."""
     picture = {
-        "pythonClassName": CLASS + "image_feature.Image",
+        "pythonClassName": FEATURE_CLASS + "image_feature.Image",
         "image": {"shape": _shape(pixels, pixels, 3), "dtype": "uint8", "encodingFormat": "jpeg"},
     }
-    text = {"pythonClassName": CLASS + "text_feature.Text", "text": {}}
+    text = {"pythonClassName": FEATURE_CLASS + "text_feature.Text", "text": {}}
     observation = {"image": picture, "side_image": picture, "wrist_image": picture, "state": _tensor("float32", 8)}
     flags = {name: _tensor("bool") for name in ("is_first", "is_last", "is_terminal")}
     steps = {
@@ -188,7 +188,7 @@ def features(pixels: int) -> dict[str, Any]:
         "language_instruction": text,
     }
     sequence = {"feature": _dictionary(steps), "length": "-1"}
-    dataset = {"pythonClassName": CLASS + "dataset_feature.Dataset", "sequence": sequence}
+    dataset = {"pythonClassName": FEATURE_CLASS + "dataset_feature.Dataset", "sequence": sequence}
     return _dictionary({"steps": dataset, "episode_metadata": _dictionary({"file_path": text})})
 
 
@@ -198,8 +198,11 @@ def _shape(*sizes: int) -> dict[str, Any]:
 
 def _tensor(kind: str, *sizes: int) -> dict[str, Any]:
     name = "tensor_feature.Tensor" if sizes else "scalar.Scalar"
-    return {"pythonClassName": CLASS + name, "tensor": {"shape": _shape(*sizes), "dtype": kind, "encoding": "none"}}
+    return {
+        "pythonClassName": FEATURE_CLASS + name,
+        "tensor": {"shape": _shape(*sizes), "dtype": kind, "encoding": "none"},
+    }
 
 
 def _dictionary(parts: Mapping[str, Any]) -> dict[str, Any]:
-    return {"pythonClassName": CLASS + "features_dict.FeaturesDict", "featuresDict": {"features": dict(parts)}}
+    return {"pythonClassName": FEATURE_CLASS + "features_dict.FeaturesDict", "featuresDict": {"features": dict(parts)}}

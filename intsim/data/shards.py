@@ -35,18 +35,18 @@ import numpy as np
 
 from calib.errors import OutputError
 from calib.io.folder import finite
-from intsim.data.demonstrate import Track
-from intsim.task.planner import GRIPPER_CLOSED, PHASES, RATE
+from intsim.data.demonstrate import Demonstration
+from intsim.task.planner import CONTROL_RATE, GRIPPER_CLOSED, PHASES
 from intsim.task.targets import Item
 from mpm.shapes import Shape
 
-SHARD = "shard-{:04d}"
-PART = "part-{:06d}.h5"  # an episode whose shard is not complete
+SHARD_NAME = "shard-{:04d}"
+EPISODE_PART = "part-{:06d}.h5"  # an episode whose shard is not complete
 ABOUT = "about"  # attribute of such a file: the entry in the JSON file
-META = "dataset.json"
+DATASET_FILE = "dataset.json"
 
 
-def pack(track: Track, about: Mapping[str, Any], mpm: Mapping[str, Any]) -> bytes:
+def pack_episode(track: Demonstration, about: Mapping[str, Any], mpm: Mapping[str, Any]) -> bytes:
     """An episode as the bytes of an HDF5 file with the content of its group.
 
     Args:
@@ -78,7 +78,7 @@ def pack(track: Track, about: Mapping[str, Any], mpm: Mapping[str, Any]) -> byte
             "control/phase": np.array([PHASES.index(p) for p in track.phase], np.int8),
             "mpm/force": force,
             "mpm/force_control": mean,
-            "mpm/impulse": np.cumsum(mean, axis=0) / np.float32(RATE),
+            "mpm/impulse": np.cumsum(mean, axis=0) / np.float32(CONTROL_RATE),
             "mpm/touching": np.array(track.touching),
             "mpm/uncut": np.array(track.uncut, np.float32),
             "mpm/pieces": np.array(track.pieces, np.int16),
@@ -95,7 +95,7 @@ def pack(track: Track, about: Mapping[str, Any], mpm: Mapping[str, Any]) -> byte
     return stream.getvalue()
 
 
-def _surface(file: h5py.File, track: Track) -> None:
+def _surface(file: h5py.File, track: Demonstration) -> None:
     """The food's surface in each step of a cut; each cut has triangles of its own."""
     cuts: list[list[int]] = []
     for k, (step, which, points, _, _) in enumerate(track.meshes):
@@ -174,7 +174,7 @@ def write_shard(out: Path, number: int, indices: Sequence[int], env_info: Mappin
     Raises:
         OutputError: The disk is full, or the like.
     """
-    path = out / f"{SHARD.format(number)}.h5"
+    path = out / f"{SHARD_NAME.format(number)}.h5"
     head = {"env_info": dict(env_info), "source_type": "motionplanning", "source_desc": "cutcal"}
 
     def beside(listed: list[dict[str, Any]]) -> None:
@@ -183,11 +183,11 @@ def write_shard(out: Path, number: int, indices: Sequence[int], env_info: Mappin
         )
         path.with_suffix(".json").write_text(text + "\n", encoding="utf-8")
 
-    put_together(path, [out / PART.format(index) for index in indices], beside)
+    put_together(path, [out / EPISODE_PART.format(index) for index in indices], beside)
 
 
 @dataclass(frozen=True, eq=False)
-class Stored:
+class StoredTrajectory:
     """One trajectory of a dataset. Attributes: group, open while it is looked at; about, its entry in the JSON file; number of its shard."""
 
     group: h5py.Group
@@ -195,7 +195,7 @@ class Stored:
     shard: int = 0
 
 
-def shards_of(folder: Path) -> list[Path]:
+def shard_paths(folder: Path) -> list[Path]:
     """The shards in a folder, in order.
 
     Raises:
@@ -209,12 +209,12 @@ def shards_of(folder: Path) -> list[Path]:
     return shards
 
 
-def number_of(shard: Path) -> int:
+def shard_number(shard: Path) -> int:
     """The number in the name of a shard: those before it may still be missing."""
     return int(shard.stem.removeprefix("shard-"))
 
 
-def episodes_of(shard: Path) -> list[dict[str, Any]]:
+def shard_entries(shard: Path) -> list[dict[str, Any]]:
     """What the JSON file of a shard says of each trajectory.
 
     Raises:
@@ -227,23 +227,23 @@ def episodes_of(shard: Path) -> list[dict[str, Any]]:
     return listed
 
 
-def trajectories(folder: Path) -> Iterator[Stored]:
+def trajectories(folder: Path) -> Iterator[StoredTrajectory]:
     """All trajectories of the shards in a folder, in order.
 
     Raises:
         OutputError: There is no complete shard, or one is damaged.
     """
-    for path in shards_of(folder):
-        listed = episodes_of(path)
+    for path in shard_paths(folder):
+        listed = shard_entries(path)
         try:
             with h5py.File(path) as file:
                 for about in listed:
-                    yield Stored(file[f"traj_{about['episode_id']}"], about, number_of(path))
+                    yield StoredTrajectory(file[f"traj_{about['episode_id']}"], about, shard_number(path))
         except (OSError, KeyError, ValueError) as e:
             raise OutputError(f"{path}: damaged ({e}); make the dataset again") from None
 
 
-def item_of(listed: dict[str, Any]) -> Item:
+def stored_item(listed: dict[str, Any]) -> Item:
     """A food as a dataset lists it."""
     shape = {name: value for name, value in listed.items() if name not in ("name", "x", "y", "yaw")}
     return Item(listed["name"], Shape(**shape), listed["x"], listed["y"], listed["yaw"])

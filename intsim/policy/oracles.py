@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from intsim.task.language import parse
-from intsim.task.planner import GRIPPER_CLOSED, HOME, plan
+from intsim.task.language import parse_instruction
+from intsim.task.planner import GRIPPER_CLOSED, HOME, plan_cut
 from intsim.task.rollout import Policy
 from intsim.task.targets import CutSpec, Item, TaskError, boxed_target, target
 
-SHORT = 7e-3
+SHALLOW_HEIGHT = 7e-3
 """Height at which the shallow oracle stops [m]: what 12.5 N, the paper's banana, leave of a cut under ManiSkill's arm (0.57 mm/N)."""
 
 
@@ -26,7 +26,7 @@ class Oracle:
         wrong_item: Cut another food where there is one.
         depth: Height of the edge at the end of each cut [m].
         hold: Time that it is held there [s].
-        style: Of :func:`intsim.task.planner.plan`.
+        style: Of :func:`intsim.task.planner.plan_cut`.
         boxed: Know the food's bounding box alone, as the published planner does.
     """
 
@@ -64,7 +64,7 @@ class Oracle:
     def _plan(self, obs: dict[str, Any], instruction: str) -> None:
         items: tuple[Item, ...] = obs["items"]
         if self._spec is None:
-            self._spec = parse(instruction, [i.name for i in items])
+            self._spec = parse_instruction(instruction, [i.name for i in items])
         if self._cuts == self._spec.cuts:
             return
         self._cuts += 1
@@ -79,13 +79,13 @@ class Oracle:
         if self.wrong_side and not self._spec.pieces:
             along = -along
         along += self.sigma * float(self._rng.standard_normal())
-        path = plan(
+        path = plan_cut(
             item, along, style=self.style, start=obs["pose"], yaw=yaw, place=place, depth=self.depth, hold=self.hold
         )
         self._todo = list(path.pose)
 
 
-class Wanderer:
+class RandomPolicy:
     """Moves at random around its home: what success without any knowledge looks like."""
 
     def __init__(self) -> None:
@@ -112,18 +112,18 @@ POLICIES: dict[str, tuple[Callable[[float], Policy], str]] = {
     "noisy": (lambda sigma: Oracle(sigma=sigma), "misses the place along the food by a normal error (--sigma)"),
     "wrong-side": (lambda sigma: Oracle(wrong_side=True), "takes left for right"),
     "wrong-item": (lambda sigma: Oracle(wrong_item=True), "cuts another food where there is one"),
-    "shallow": (lambda sigma: Oracle(depth=SHORT), "stops 7 mm above the board"),
+    "shallow": (lambda sigma: Oracle(depth=SHALLOW_HEIGHT), "stops 7 mm above the board"),
     "overdrive": (
         lambda sigma: Oracle(depth=-0.03, hold=0.5),
         "commands the edge 30 mm into the board and holds it for half a second",
     ),
     "boxed": (lambda sigma: Oracle(boxed=True), "knows the bounding box alone, as the published planner does"),
-    "random": (lambda sigma: Wanderer(), "comes down somewhere"),
+    "random": (lambda sigma: RandomPolicy(), "comes down somewhere"),
 }
 """Policies by name, each from a standard deviation [m], and what they do."""
 
 
-def make(name: str, sigma: float = 0.01) -> Policy:
+def make_policy(name: str, sigma: float = 0.01) -> Policy:
     """A policy by its name.
 
     Raises:

@@ -29,16 +29,16 @@ import numpy as np
 from mpm.errors import CutcalError
 
 PROTOCOL = 1
-NUMBERS = {"pose": 7, "joints": 8}
+ACTION_SIZES = {"pose": 7, "joints": 8}
 """Kinds of action, and how many numbers each has."""
-PATIENCE_S = 600.0  # until an answer; the first one may load a network
-LARGEST = 100_000_000  # bytes of a question
+ANSWER_TIMEOUT_S = 600.0  # until an answer; the first one may load a network
+MAX_REQUEST_BYTES = 100_000_000  # bytes of a question
 
 
 class Model(Protocol):
     """What a server asks: a policy as its authors' code has it.
 
-    Attributes: name; action, a kind of :data:`NUMBERS`; cameras, the pictures it wants.
+    Attributes: name; action, a kind of :data:`ACTION_SIZES`; cameras, the pictures it wants.
     """
 
     name: str
@@ -65,11 +65,11 @@ class Remote:
         CutcalError: Nothing answers there, or something else.
     """
 
-    def __init__(self, address: str, patience: float = PATIENCE_S) -> None:
+    def __init__(self, address: str, patience: float = ANSWER_TIMEOUT_S) -> None:
         self.address, self.patience = address.rstrip("/"), patience
         about = self._ask("about", None)
         kind = about.get("action")
-        if about.get("protocol") != PROTOCOL or kind not in NUMBERS:
+        if about.get("protocol") != PROTOCOL or kind not in ACTION_SIZES:
             raise CutcalError(f"--server {address}: is no policy server of protocol {PROTOCOL} ({str(about)[:80]})")
         self.name, self.action, self.cameras = str(about.get("name")), str(kind), list(about.get("cameras", []))
         self._todo: list[np.ndarray] = []
@@ -96,7 +96,7 @@ class Remote:
                     "instruction": instruction,
                     "pose": np.asarray(obs["pose"], float).tolist(),
                     "joints": None if joints is None else np.asarray(joints, float).tolist(),
-                    "images": {name: packed(self._image(obs, name)) for name in self.cameras},
+                    "images": {name: encode_png(self._image(obs, name)) for name in self.cameras},
                 },
             )
             self._done = bool(answer.get("done"))
@@ -119,10 +119,10 @@ class Remote:
             actions = np.array(given, float)
         except (TypeError, ValueError):
             actions = np.empty(0)
-        if actions.ndim != 2 or actions.shape[1] != NUMBERS[self.action] or not np.isfinite(actions).all():
+        if actions.ndim != 2 or actions.shape[1] != ACTION_SIZES[self.action] or not np.isfinite(actions).all():
             raise CutcalError(
                 f"--server {self.address}: {self.name} answers with actions {str(given)[:80]}; {self.action} actions are rows of "
-                f"{NUMBERS[self.action]} finite numbers"
+                f"{ACTION_SIZES[self.action]} finite numbers"
             )
         return list(actions)
 
@@ -144,7 +144,7 @@ class Remote:
         return found
 
 
-def packed(image: np.ndarray) -> str:
+def encode_png(image: np.ndarray) -> str:
     """A picture (h, w, 3) as PNG in base64."""
     from PIL import Image
 
@@ -153,8 +153,8 @@ def packed(image: np.ndarray) -> str:
     return base64.b64encode(stream.getvalue()).decode()
 
 
-def unpacked(text: str) -> np.ndarray:
-    """A picture (h, w, 3) from :func:`packed`."""
+def decode_png(text: str) -> np.ndarray:
+    """A picture (h, w, 3) from :func:`encode_png`."""
     from PIL import Image
 
     return np.array(Image.open(io.BytesIO(base64.b64decode(text))).convert("RGB"))
@@ -196,7 +196,7 @@ class _Handler(BaseHTTPRequestHandler):
         """Reset, or act."""
         try:
             size = int(self.headers.get("Content-Length", 0))
-            if not 0 < size <= LARGEST:
+            if not 0 < size <= MAX_REQUEST_BYTES:
                 raise ValueError(f"a question of {size} bytes")
             asked = json.loads(self.rfile.read(size))
             answer = self._answer(asked)
@@ -215,7 +215,7 @@ class _Handler(BaseHTTPRequestHandler):
             if pose.shape != (5,) or not all(math.isfinite(v) for v in pose):
                 raise ValueError(f"pose {asked['pose']}; five finite numbers")
             joints = None if asked.get("joints") is None else np.array(asked["joints"], float)
-            images = {name: unpacked(text) for name, text in asked["images"].items()}
+            images = {name: decode_png(text) for name, text in asked["images"].items()}
             actions = np.atleast_2d(model.act(str(asked["instruction"]), pose, joints, images))
             return {"actions": actions.tolist() if actions.size else [], "done": actions.size == 0}
         return None

@@ -22,10 +22,10 @@ import numpy as np
 from intsim.policy.remote import Model, Server
 from mpm.errors import CutcalError
 
-FRONT = "front"  # the picture that all three are given
-STRIDE = 4  # RDT's actions are interpolated four times finer than its control
+FRONT_CAMERA = "front"  # the picture that all three are given
+ACTION_STRIDE = 4  # RDT's actions are interpolated four times finer than its control
 HISTORY = 2  # pictures that RDT and Octo remember
-PRIMARY, WRIST = 256, 128  # sizes of Octo's pictures
+PRIMARY_PIXELS, WRIST_PIXELS = 256, 128  # sizes of Octo's pictures
 
 
 class OpenVLA:
@@ -38,7 +38,7 @@ class OpenVLA:
     """
 
     name, action = "openvla", "pose"
-    cameras: Sequence[str] = (FRONT,)
+    cameras: Sequence[str] = (FRONT_CAMERA,)
 
     def __init__(self, weights: str, key: str, device: str = "cuda:0") -> None:
         import torch
@@ -60,7 +60,7 @@ class OpenVLA:
         from PIL import Image
 
         asked = f"In: What action should the robot take to {instruction.lower()}?\nOut:"
-        given = self.processor(asked, Image.fromarray(images[FRONT])).to(self.device, dtype=self.kind)
+        given = self.processor(asked, Image.fromarray(images[FRONT_CAMERA])).to(self.device, dtype=self.kind)
         found = self.network.predict_action(**given, unnorm_key=self.key, do_sample=False)
         return np.asarray(found, float).reshape(1, 7)
 
@@ -74,7 +74,7 @@ class Octo:
     """
 
     name, action = "octo", "pose"
-    cameras: Sequence[str] = (FRONT, "wrist")
+    cameras: Sequence[str] = (FRONT_CAMERA, "wrist")
 
     def __init__(self, weights: str, key: str = "") -> None:
         from octo.model.octo_model import OctoModel
@@ -98,7 +98,10 @@ class Octo:
         """Some actions, (n, 7)."""
         import jax
 
-        now = {"image_primary": _sized(images[FRONT], PRIMARY), "image_wrist": _sized(images["wrist"], WRIST)}
+        now = {
+            "image_primary": _sized(images[FRONT_CAMERA], PRIMARY_PIXELS),
+            "image_wrist": _sized(images["wrist"], WRIST_PIXELS),
+        }
         self.seen.append(now)
         missing = HISTORY - len(self.seen)
         window = [self.seen[0]] * missing + list(self.seen)
@@ -120,7 +123,7 @@ class RDT:
     """
 
     name, action = "rdt", "joints"
-    cameras: Sequence[str] = (FRONT,)
+    cameras: Sequence[str] = (FRONT_CAMERA,)
 
     def __init__(
         self,
@@ -164,11 +167,11 @@ class RDT:
 
         if joints is None:
             raise ValueError("joints are missing: RDT is evaluated with --world intsim")
-        self.seen.append(Image.fromarray(images[FRONT]))
+        self.seen.append(Image.fromarray(images[FRONT_CAMERA]))
         shown = [one for picture in self.seen for one in (picture, None, None)]  # its wrist cameras are not there
         own = torch.tensor(joints[None, :-1], dtype=torch.float32)
         found = self.network.step(own, shown, self.words).squeeze(0).cpu().numpy()
-        return np.asarray(found, float)[::STRIDE]
+        return np.asarray(found, float)[::ACTION_STRIDE]
 
 
 def _sized(image: np.ndarray, size: int) -> np.ndarray:
@@ -178,7 +181,7 @@ def _sized(image: np.ndarray, size: int) -> np.ndarray:
     return np.array(Image.fromarray(image).resize((size, size), Image.Resampling.LANCZOS))
 
 
-def make(args: argparse.Namespace) -> Model:
+def load_model(args: argparse.Namespace) -> Model:
     """The model that the command line asks for.
 
     Raises:
@@ -213,7 +216,7 @@ def main(words: Sequence[str] | None = None) -> int:
     p.add_argument("--port", type=int, default=8000, help="(default 8000)")
     args = p.parse_args(words)
     try:
-        server = Server(make(args), args.host, args.port)
+        server = Server(load_model(args), args.host, args.port)
     except (CutcalError, OSError) as e:
         sys.stderr.write(f"error: {e}\n")
         return 1

@@ -8,21 +8,22 @@ from typing import Any
 import numpy as np
 
 from calib.material.food import FoodSpec
-from intsim.sim.severing import Severed
+from intsim.sim.severing import SeveringOutcome
 from intsim.sim.world import ENV_ID, EPISODE_STEPS, World
-from intsim.task.kinematic_table import guard
-from intsim.task.planner import GRIPPER_CLOSED, RATE
+from intsim.task.kinematic_table import limit_command
+from intsim.task.planner import CONTROL_RATE, GRIPPER_CLOSED
 from intsim.task.rollout import Policy, Rollout
-from intsim.task.suites import draw
+from intsim.task.suites import sample_episode
 from mpm.errors import CutcalError
 
-STILL, MOVED = 30, 1e-3  # steps within which an edge that has not moved so far [m] is stuck, and the episode over
-FASTEST_JOINTS = np.array([2.175] * 4 + [2.61] * 3)
+STALL_STEPS, STALL_DISTANCE = 30, 1e-3
+"""Steps within which an edge that has not moved so far [m] is stuck, and the episode over."""
+MAX_JOINT_SPEEDS = np.array([2.175] * 4 + [2.61] * 3)
 """Speeds of a Franka arm's joints at most [rad/s] (Franka control interface)."""
-_kept: dict[str, Any] = {}
+_environments: dict[str, Any] = {}
 
 
-def environment(world: World) -> Any:
+def make_environment(world: World) -> Any:
     """The environment of a world; a process keeps the last one.
 
     Raises:
@@ -33,8 +34,8 @@ def environment(world: World) -> Any:
     import intsim.sim.environment  # noqa: F401
 
     key = repr(world)
-    if key not in _kept:
-        _kept.clear()
+    if key not in _environments:
+        _environments.clear()
         seen = {"render_backend": "cpu", "obs_mode": "rgb", "pixels": world.pixels}
         blind = {"render_backend": "none", "obs_mode": "state"}
         try:
@@ -51,13 +52,13 @@ def environment(world: World) -> Any:
             if not world.pixels:
                 raise
             raise CutcalError(f"no pictures without a renderer ({e}); cutcal doctor says what is missing") from None
-        _kept[key] = made.unwrapped
-    return _kept[key]
+        _environments[key] = made.unwrapped
+    return _environments[key]
 
 
-def episode_of(
+def closed_loop_episode(
     policy: Policy, suite: str, seed: int, foods: dict[str, FoodSpec], world: World, arch: str, threads: int
-) -> tuple[Rollout, Any, Severed]:
+) -> tuple[Rollout, Any, SeveringOutcome]:
     """One episode, in a worker.
 
     Args:
@@ -71,15 +72,15 @@ def episode_of(
         The rollout, the food in plain geometry at its end, and what the solver has found.
     """
     del arch, threads
-    env = environment(world)
+    env = make_environment(world)
     env.foods = foods
-    episode = draw(suite, seed, foods)
+    episode = sample_episode(suite, seed, foods)
     env.reset(seed=seed, options={"episode": episode})
-    found = follow(env, policy, zlib.crc32(f"{suite} {seed}".encode()))
+    found = roll_out_closed_loop(env, policy, zlib.crc32(f"{suite} {seed}".encode()))
     return env.table.rollout, env.table.items[0], found
 
 
-def follow(env: Any, policy: Policy, seed: int) -> Severed:
+def roll_out_closed_loop(env: Any, policy: Policy, seed: int) -> SeveringOutcome:
     """Let a policy act until it has done what it was told, or the edge has been stuck for a second and a half.
 
     Its changes of pose (7 numbers) are taken from where the edge is, as in ``pd_ee_delta_pose`` in metres, and what is commanded keeps within the
@@ -102,16 +103,16 @@ def follow(env: Any, policy: Policy, seed: int) -> Severed:
         action = policy.act(obs, env.instruction)
         if action is None:
             break
-        if len(action) == len(FASTEST_JOINTS) + 1:
+        if len(action) == len(MAX_JOINT_SPEEDS) + 1:
             turn = np.asarray(action[:-1], float) - joints[:7]
-            slow = np.clip(turn, -FASTEST_JOINTS / RATE, FASTEST_JOINTS / RATE)
+            slow = np.clip(turn, -MAX_JOINT_SPEEDS / CONTROL_RATE, MAX_JOINT_SPEEDS / CONTROL_RATE)
             joints, clipped = np.array([*(joints[:7] + slow), 0.0, 0.0]), ("joint",) * bool((slow != turn).any())
             command = env.kinematics.pose(joints)
         else:
             x, y, z, _, pitch, yaw = np.asarray(action, float)[:6]
             change = env.pose + [x, y, z, yaw, pitch] - command
-            kept = guard(np.array([*change[:3], 0.0, change[4], change[3]]), velocity)
-            velocity, clipped = kept.delta[:3] * RATE, kept.clipped
+            kept = limit_command(np.array([*change[:3], 0.0, change[4], change[3]]), velocity)
+            velocity, clipped = kept.delta[:3] * CONTROL_RATE, kept.clipped
             command = command + [*kept.delta[:3], kept.delta[5], kept.delta[4]]
             joints, _ = env.kinematics.joints(command, np.array([*joints[:7], 0.0, 0.0]))
         env.step(np.array([*joints[:7], GRIPPER_CLOSED], np.float32))
@@ -120,15 +121,20 @@ def follow(env: Any, policy: Policy, seed: int) -> Severed:
         way.append(env.pose[:3])
         if way[-1][2] == min(there[2] for there in way):
             short = float(way[-1][2] - command[2])
-        if len(way) > STILL and np.linalg.norm(np.array(way[-STILL:]) - way[-1], axis=1).max() < MOVED:
+        if (
+            len(way) > STALL_STEPS
+            and np.linalg.norm(np.array(way[-STALL_STEPS:]) - way[-1], axis=1).max() < STALL_DISTANCE
+        ):
             break
     env.coupling.end()
     done = env.coupling.done
     broken = [d.why for d in done if d.severed is None]
     if broken or not env.coupled:
-        return Severed(None, peak=peak, short=short, why=broken[0] if broken else "the food does not resist here")
+        return SeveringOutcome(
+            None, peak=peak, short=short, why=broken[0] if broken else "the food does not resist here"
+        )
     severed = len(env.coupling.items[0].pieces) > env.episode.spec.cuts
-    return Severed(
+    return SeveringOutcome(
         severed, env.coupling.uncut(), peak, short, done[-1].why if done else "the edge does not reach the food"
     )
 

@@ -8,28 +8,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib.material.food import FoodSpec
-from intsim.sim.severing import cut_place
-from intsim.task.kinematic_table import crossing
-from intsim.task.planner import SPEED
+from intsim.sim.severing import cut_scene_at
+from intsim.task.kinematic_table import axis_crossing
+from intsim.task.planner import DESCENT_SPEED
 from intsim.task.targets import Item
 from mpm.errors import SceneError, SimulationError
 from mpm.live import LiveCut
 from mpm.output.record import ForceRecord
 from mpm.scene import Scene
 
-ROOM = 2.0  # empty grid around the food, over half its size: a knife that comes back takes pieces along
-REST = 1e-4  # height at which the edge is on the board [m]
-STANDS = 1e-3  # speed of the edge below which it stands [m/s], a fortieth of that of a press: one end of the blade on the board, say, and the middle above it
-NEAR = 0.01  # height of the edge above the food at which its cut is made ready [m]
-TOUCH = 1e-3  # force from which on the knife touches the food, over the weight of the food [-]
-CELLS = 14
+GRID_MARGIN = 2.0  # empty grid around the food, over half its size: a knife that comes back takes pieces along
+ON_BOARD_HEIGHT = 1e-4  # height at which the edge is on the board [m]
+STALL_SPEED = 1e-3  # speed of the edge below which it stands [m/s], a fortieth of that of a press: one end of the blade on the board, say, and the middle above it
+READY_CLEARANCE = 0.01  # height of the edge above the food at which its cut is made ready [m]
+TOUCH_FORCE = 1e-3  # force from which on the knife touches the food, over the weight of the food [-]
+MAX_CELLS = 14
 """Cells over a food at most. It concerns peach, pear, orange and melon, whose largest force is then off by +1.4, +1.1, +0.5 and -2.0 % of that of default
 cells (those of a screening run: +2.5, +1.5, +3.2 and +2.0 %), their work by +1.1, +0.5, +0.9 and -1.3 %."""
-DRAWN = 1.0  # way along the edge over the way down that a scene is made ready for [-]
+READY_SLICE_RATIO = 1.0  # way along the edge over the way down that a scene is made ready for [-]
 
 
 @dataclass(frozen=True, eq=False)
-class Done:
+class FinishedCut:
     """A cut that has ended.
 
     Attributes:
@@ -63,7 +63,7 @@ class Coupling:
         items: The foods.
         foods: Their properties, by name.
         knife: Name of the knife.
-        coarse: Cells of a screening run, of a large food larger ones (:data:`CELLS`).
+        coarse: Cells of a screening run, of a large food larger ones (:data:`MAX_CELLS`).
         draws: Whether the knife is drawn along its edge or rocks; without it the food has a mirror plane more and costs half.
         speed: Usual speed of the descent [m/s].
 
@@ -86,12 +86,12 @@ class Coupling:
         knife: str = "kitchen",
         coarse: bool = True,
         draws: bool = False,
-        speed: float = SPEED,
+        speed: float = DESCENT_SPEED,
     ) -> None:
         self.items, self.foods = list(items), foods
         self.knife, self.coarse, self.draws, self.speed = knife, coarse, draws, speed
         self.live: LiveCut | None = None
-        self.done: list[Done] = []
+        self.done: list[FinishedCut] = []
         self.force, self.torque, self.impulse, self.touching = np.zeros(3), np.zeros(3), np.zeros(3), False
         self.aside = self.pitch = 0.0
         self._which, self._along, self._begin = 0, 0.0, np.zeros(5)
@@ -153,9 +153,9 @@ class Coupling:
             return
         record = live.record()
         if live.status != "done" or record.pieces is None:
-            found = Done(item, self._along, None, 1.0, record, f"the simulation stopped: {live.status}")
+            found = FinishedCut(item, self._along, None, 1.0, record, f"the simulation stopped: {live.status}")
         else:
-            found = Done(item, self._along, record.pieces.complete, live.uncut, record, record.pieces.words())
+            found = FinishedCut(item, self._along, record.pieces.complete, live.uncut, record, record.pieces.words())
         self.done.append(found)
         if found.severed:
             self.items[self._which] = item.cut_at(self._along)
@@ -167,9 +167,9 @@ class Coupling:
             k: pose[2] - item.shape.height - item.shape.width / 2 * abs(np.tan(pose[4]))
             for k, item in enumerate(self.items)
         }
-        self._ready |= {k for k in over if over[k] > NEAR}
-        down = [k for k in sorted(self._ready) if over[k] <= NEAR]
-        met = [(k, along) for k in down if (along := crossing(self.items[k], pose)) is not None]
+        self._ready |= {k for k in over if over[k] > READY_CLEARANCE}
+        down = [k for k in sorted(self._ready) if over[k] <= READY_CLEARANCE]
+        met = [(k, along) for k in down if (along := axis_crossing(self.items[k], pose)) is not None]
         self._ready -= {k for k in down if over[k] < 0}
         if met:
             self._which, self._along = met[0]
@@ -179,14 +179,14 @@ class Coupling:
             try:
                 self.live = LiveCut(self._scene(item, self._along))
             except SceneError as e:
-                self.done.append(Done(item, self._along, None, 1.0, None, str(e)))
+                self.done.append(FinishedCut(item, self._along, None, 1.0, None, str(e)))
 
     def _scene(self, item: Item, along: float) -> Scene:
         """The cut of a food there."""
-        cells = CELLS if self.coarse else None
-        scene = cut_place(item, along, self.foods[item.name], knife=self.knife, coarse=self.coarse, cells=cells)
-        motion = replace(scene.motion, speed=self.speed, slice_ratio=DRAWN if self.draws else 0.0)
-        return replace(scene, motion=motion, numerics=replace(scene.numerics, room=ROOM))
+        cells = MAX_CELLS if self.coarse else None
+        scene = cut_scene_at(item, along, self.foods[item.name], knife=self.knife, coarse=self.coarse, cells=cells)
+        motion = replace(scene.motion, speed=self.speed, slice_ratio=READY_SLICE_RATIO if self.draws else 0.0)
+        return replace(scene, motion=motion, numerics=replace(scene.numerics, room=GRID_MARGIN))
 
     def _lying(self, pose: np.ndarray) -> tuple[np.ndarray, float]:
         """Direction of the edge as the cut began, along x of the cut's scene, shape (2,), and how much its end there is risen [rad]."""
@@ -221,8 +221,10 @@ class Coupling:
         self.force = np.array([*(along * edge), up])
         self.torque = self.live.moment * np.array([edge[1], -edge[0], 0.0])
         weight = self.live.weight
-        self.touching = bool(np.linalg.norm(self.force) > TOUCH * weight)
-        above = pose[2] > item.shape.height + NEAR and (self.live.begun or pose[2] > self._begin[2] + NEAR)
+        self.touching = bool(np.linalg.norm(self.force) > TOUCH_FORCE * weight)
+        above = pose[2] > item.shape.height + READY_CLEARANCE and (
+            self.live.begun or pose[2] > self._begin[2] + READY_CLEARANCE
+        )
         if above or (
             self.live.begun and self.live.uncut == 0 and self._through(before - self.live.height, pose[2], span)
         ):
@@ -231,6 +233,6 @@ class Coupling:
     def _through(self, down: float, height: float, span: float) -> bool:
         """Whether an edge that has passed the whole section is done: in a span of time it went ``down`` as far as the board let it, to ``height`` [m]."""
         assert self.live is not None
-        if height < REST or down < 0:
+        if height < ON_BOARD_HEIGHT or down < 0:
             return True
-        return down < STANDS * span and self.live.pieces().complete
+        return down < STALL_SPEED * span and self.live.pieces().complete

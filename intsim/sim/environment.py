@@ -22,17 +22,17 @@ from mani_skill.utils.structs.types import SimConfig
 from calib.material.food import FoodSpec, load_food
 from intsim.sim.background import Background
 from intsim.sim.coupling import Coupling
-from intsim.sim.panda import BASE, BLADE, EDGE, Kinematics, PandaKnife, pose_of
+from intsim.sim.panda import BASE_POSITION, BLADE_LINK, EDGE_LINK, Kinematics, PandaKnife, edge_pose
 from intsim.sim.scenery import Scenery
 from intsim.sim.world import ENV_ID, EPISODE_STEPS
-from intsim.task.kinematic_table import Table
-from intsim.task.planner import HOME, RATE
-from intsim.task.success import judge
-from intsim.task.suites import FOODS, Episode, draw
+from intsim.task.kinematic_table import KinematicTable
+from intsim.task.planner import CONTROL_RATE, HOME
+from intsim.task.success import judge_geometry
+from intsim.task.suites import FOODS, Episode, sample_episode
 from intsim.task.targets import CAMERAS
 from mpm.errors import CutcalError
 
-PHYSICS = 100  # steps of the robot's physics a second
+PHYSICS_RATE = 100  # steps of the robot's physics a second
 PIXELS, HUMAN_PIXELS = 128, 512
 
 
@@ -94,7 +94,7 @@ class CutFoodEnv(BaseEnv):
 
     @property
     def _default_sim_config(self) -> SimConfig:
-        return SimConfig(sim_freq=PHYSICS, control_freq=round(RATE))
+        return SimConfig(sim_freq=PHYSICS_RATE, control_freq=round(CONTROL_RATE))
 
     @property
     def _default_sensor_configs(self) -> list[CameraConfig]:
@@ -124,12 +124,12 @@ class CutFoodEnv(BaseEnv):
         try:  # ManiSkill makes the agent itself, from its class
             for name, value in own.items():
                 setattr(PandaKnife, name, value)
-            super()._load_agent(options, sapien.Pose(p=list(BASE)))
+            super()._load_agent(options, sapien.Pose(p=list(BASE_POSITION)))
         finally:
             for name, value in before.items():
                 setattr(PandaKnife, name, value)
         links = self.agent.robot.links_map
-        self._edge, self._blade = links[EDGE]._objs[0], links[BLADE]._objs[0]
+        self._edge, self._blade = links[EDGE_LINK]._objs[0], links[BLADE_LINK]._objs[0]
         self.kinematics = Kinematics(self.agent.robot)
 
     def _load_scene(self, options: dict[str, Any]) -> None:
@@ -141,17 +141,17 @@ class CutFoodEnv(BaseEnv):
     def _initialize_episode(self, env_idx: torch.Tensor, options: dict[str, Any]) -> None:
         del env_idx
         seed = int(self._episode_seed[0])
-        episode = options.get("episode") or draw(self.suite, seed, self.foods)
+        episode = options.get("episode") or sample_episode(self.suite, seed, self.foods)
         self.episode = episode
         items = [episode.item, *episode.others]
-        self.table = Table(items)
+        self.table = KinematicTable(items)
         self.coupling = Coupling(
             items, self.foods, knife=self.knife, coarse=self.coarse, draws=options.get("draws", self.draws)
         )
         rest = self.agent.keyframes["rest"].qpos.astype(float)
         joints, _ = self.kinematics.joints(np.array([*HOME, 0.0, 0.0]), rest)
         self.agent.reset(joints)
-        self.agent.robot.set_pose(sapien.Pose(p=list(BASE)))
+        self.agent.robot.set_pose(sapien.Pose(p=list(BASE_POSITION)))
         self._force, self._point = np.zeros(3), np.zeros(3)
         self._forces: list[np.ndarray] = []
         self.scenery.serve(self.scene, items)
@@ -166,7 +166,7 @@ class CutFoodEnv(BaseEnv):
     def pose(self) -> np.ndarray:
         """The edge's middle x, y, z [m], its direction and its angle to the board [rad], shape (5,)."""
         there = self._edge.entity_pose
-        return pose_of(np.array(there.p, float), there.to_transformation_matrix()[:3, 0].astype(float))
+        return edge_pose(np.array(there.p, float), there.to_transformation_matrix()[:3, 0].astype(float))
 
     def _before_control_step(self) -> None:
         self._forces = []
@@ -181,7 +181,7 @@ class CutFoodEnv(BaseEnv):
         pose = self.pose
         if self.coupled:
             began = time.perf_counter()
-            self._force = self.coupling.move(pose, 1 / PHYSICS)
+            self._force = self.coupling.move(pose, 1 / PHYSICS_RATE)
             self.solver_s += time.perf_counter() - began
             self._point = self.coupling.point(pose)
         self._forces.append(self._force)
@@ -198,7 +198,7 @@ class CutFoodEnv(BaseEnv):
         no = torch.zeros(1, dtype=torch.bool)
         info: dict[str, Any] = {"success": no, "published": no, "severed": no}
         if self.table.rollout.pose:
-            judged = judge(self.episode.spec, self.episode.item, self.table.rollout, self.table.items[0])
+            judged = judge_geometry(self.episode.spec, self.episode.item, self.table.rollout, self.table.items[0])
             severed = len(self.coupling.items[0].pieces) > max(self.episode.spec.cuts, 1)
             info["severed"] = torch.tensor([severed])
             published = (

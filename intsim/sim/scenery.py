@@ -14,11 +14,11 @@ from intsim.sim.coupling import Coupling
 from intsim.task.targets import Item
 from mpm.output.surface import half_of
 
-TABLE, BOARD, THICK = (0.8, 1.2), (0.4, 0.5), 0.02  # sizes along x, y and the board's thickness [m]
-AWAY = 3.0  # of the walls from the board [m]
-RING = 3e-3  # distance of the rings of a food's outline beside the cut [m]
+TABLE_SIZE, BOARD_SIZE, THICKNESS = (0.8, 1.2), (0.4, 0.5), 0.02  # sizes along x, y and the board's thickness [m]
+WALL_DISTANCE = 3.0  # of the walls from the board [m]
+OUTLINE_STEP = 3e-3  # distance of the rings of a food's outline beside the cut [m]
 #: Skin and flesh by food, red, green, blue: for the eye only.
-COLOURS = {
+FOOD_COLOURS = {
     "banana": ((0.88, 0.75, 0.2), (0.96, 0.92, 0.72)),
     "cucumber": ((0.15, 0.4, 0.15), (0.8, 0.9, 0.65)),
     "apple": ((0.75, 0.12, 0.12), (0.96, 0.93, 0.8)),
@@ -36,7 +36,7 @@ COLOURS = {
     "cherry": ((0.55, 0.03, 0.1), (0.75, 0.2, 0.25)),
     "potato": ((0.7, 0.55, 0.35), (0.95, 0.9, 0.7)),
 }
-PLAIN = ((0.8, 0.6, 0.4), (0.95, 0.9, 0.8))
+OTHER_COLOURS = ((0.8, 0.6, 0.4), (0.95, 0.9, 0.8))
 
 
 class Scenery:
@@ -54,15 +54,15 @@ class Scenery:
     def build(self, scene: Any) -> None:
         """Board, its top at z = 0, and table."""
         for name, size, top, colour in (
-            ("board", (*BOARD, THICK), 0.0, self.background.board),
-            ("table", (*TABLE, THICK), -THICK, self.background.table),
+            ("board", (*BOARD_SIZE, THICKNESS), 0.0, self.background.board),
+            ("table", (*TABLE_SIZE, THICKNESS), -THICKNESS, self.background.table),
         ):
             builder = scene.create_actor_builder()
             half = [s / 2 for s in size]
             builder.add_box_collision(half_size=half)
             if scene.can_render():
-                builder.add_box_visual(half_size=half, material=material(colour))
-            builder.initial_pose = sapien.Pose(p=[0.0, 0.0, top - THICK / 2])
+                builder.add_box_visual(half_size=half, material=dull_material(colour))
+            builder.initial_pose = sapien.Pose(p=[0.0, 0.0, top - THICKNESS / 2])
             builder.build_kinematic(name=name)
         if scene.can_render():
             for axis in (0, 1):
@@ -72,9 +72,9 @@ class Scenery:
     def _wall(self, scene: Any, axis: int, side: float) -> None:
         """A wall of the room, for the eye only."""
         builder = scene.create_actor_builder()
-        half, place = [AWAY, AWAY, AWAY], [0.0, 0.0, 0.0]
-        half[axis], place[axis] = THICK, side * AWAY
-        builder.add_box_visual(half_size=half, material=material(self.background.wall))
+        half, place = [WALL_DISTANCE, WALL_DISTANCE, WALL_DISTANCE], [0.0, 0.0, 0.0]
+        half[axis], place[axis] = THICKNESS, side * WALL_DISTANCE
+        builder.add_box_visual(half_size=half, material=dull_material(self.background.wall))
         builder.initial_pose = sapien.Pose(p=place)
         builder.build_kinematic(name=f"wall {axis} {side:+.0f}")
 
@@ -120,14 +120,14 @@ class Scenery:
         entity.add_component(self._shown[which])
 
 
-def material(colour: np.ndarray) -> sapien.render.RenderMaterial:
+def dull_material(colour: np.ndarray) -> sapien.render.RenderMaterial:
     """A dull material of a colour."""
     return sapien.render.RenderMaterial(base_color=[*map(float, colour), 1.0], roughness=0.9, specular=0.1)
 
 
 def _whole(item: Item) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Vertices in the world, triangles, and which are flesh, of a food that nothing has touched."""
-    half = half_of(replace(item.shape, cut=0.0), RING)
+    half = half_of(replace(item.shape, cut=0.0), OUTLINE_STEP)
     points = np.concatenate([half.points * [1.0, -1.0, 1.0], half.points])
     triangles = np.concatenate([half.triangles[:, ::-1], half.triangles + len(half.points)])
     return item.placed(points, 0.0), triangles, np.zeros(len(points), bool)
@@ -135,7 +135,7 @@ def _whole(item: Item) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _body(points: np.ndarray, triangles: np.ndarray, flesh: np.ndarray, name: str) -> sapien.render.RenderBodyComponent:
     """What SAPIEN shows of a mesh: a palette of two colours, skin and flesh."""
-    skin, inner = COLOURS.get(name, PLAIN)
+    skin, inner = FOOD_COLOURS.get(name, OTHER_COLOURS)
     palette = np.zeros((2, 4, 4), np.uint8)
     palette[:, :2] = [*(round(255 * c) for c in skin), 255]
     palette[:, 2:] = [*(round(255 * c) for c in inner), 255]

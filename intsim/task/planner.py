@@ -11,7 +11,7 @@ from intsim.task.targets import Item, TaskError
 
 STYLES = ("press", "slice", "rock", "saw")
 PHASES = ("approach", "contact", "cut", "hold", "retract")
-RATE = 20.0  # control steps a second
+CONTROL_RATE = 20.0  # control steps a second
 HOME = (-0.25, 0.0, 0.25)  # where the middle of the edge begins [m]
 GRIPPER_CLOSED = -1.0
 """Gripper's part of an action: closed on the handle.
@@ -19,16 +19,16 @@ GRIPPER_CLOSED = -1.0
 ManiSkill's Panda maps -1 to 1 onto finger joints from -0.01 to 0.04 m, so that -1 presses the fingers together and 0 holds them
 15 mm apart.
 """
-ABOVE = 0.02  # height above the food at which the descent begins [m]
-SPEED = 0.04  # of the descent [m/s]
-APPROACH = 2.0  # time from home to above the food, and back up [s]
-DRAW = 1.0  # way along the edge over the way down, of a slice
-ROCKED = math.radians(8.0)  # angle of the edge to the board at which a rock begins
-STROKE, BEAT = 0.015, 1.5  # amplitude of a saw along the edge [m], strokes a second
+CLEARANCE = 0.02  # height above the food at which the descent begins [m]
+DESCENT_SPEED = 0.04  # of the descent [m/s]
+APPROACH_TIME = 2.0  # time from home to above the food, and back up [s]
+SLICE_RATIO = 1.0  # way along the edge over the way down, of a slice
+ROCK_ANGLE = math.radians(8.0)  # angle of the edge to the board at which a rock begins
+SAW_AMPLITUDE, SAW_FREQUENCY = 0.015, 1.5  # amplitude of a saw along the edge [m], strokes a second
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class BladeTrajectory:
     """Poses of the edge's middle at the rate of control.
 
     Attributes:
@@ -47,7 +47,7 @@ def minimum_jerk(n: int) -> np.ndarray:
     return out
 
 
-def plan(
+def plan_cut(
     item: Item,
     along: float,
     *,
@@ -57,8 +57,8 @@ def plan(
     place: np.ndarray | None = None,
     depth: float = 0.0,
     hold: float = 0.0,
-    speed: float = SPEED,
-) -> Path:
+    speed: float = DESCENT_SPEED,
+) -> BladeTrajectory:
     """The way of the blade for one cut.
 
     Args:
@@ -83,28 +83,28 @@ def plan(
     turn = (turn + math.pi / 2) % math.pi - math.pi / 2  # an edge has no direction
     begin = np.array([*HOME, turn, 0.0]) if start is None else np.asarray(start, float)
     edge = np.array([math.cos(turn), math.sin(turn)])
-    centre, high = item.at(along) if place is None else place, item.shape.height + ABOVE
-    steps = max(2, math.ceil((high - depth) / speed * RATE))
+    centre, high = item.at(along) if place is None else place, item.shape.height + CLEARANCE
+    steps = max(2, math.ceil((high - depth) / speed * CONTROL_RATE))
     down = high + (depth - high) * np.arange(1, steps + 1) / steps
     passed = (high - down) / (high - depth)
     shift, tilt = np.zeros(steps), np.zeros(steps)
     if style == "slice":
-        shift = DRAW * (high - depth) * (passed - 0.5)
+        shift = SLICE_RATIO * (high - depth) * (passed - 0.5)
     elif style == "rock":
-        tilt = ROCKED * (1 - passed)
+        tilt = ROCK_ANGLE * (1 - passed)
     elif style == "saw":
-        shift = STROKE * np.sin(2 * math.pi * BEAT * np.arange(1, steps + 1) / RATE)
+        shift = SAW_AMPLITUDE * np.sin(2 * math.pi * SAW_FREQUENCY * np.arange(1, steps + 1) / CONTROL_RATE)
     cut = np.column_stack([centre + shift[:, None] * edge, down, np.full(steps, turn), tilt])
     above = np.array(
-        [*centre + (shift[0] if style == "slice" else 0.0) * edge, high, turn, ROCKED if style == "rock" else 0.0]
+        [*centre + (shift[0] if style == "slice" else 0.0) * edge, high, turn, ROCK_ANGLE if style == "rock" else 0.0]
     )
-    part = minimum_jerk(round(APPROACH * RATE))[:, None]
+    part = minimum_jerk(round(APPROACH_TIME * CONTROL_RATE))[:, None]
     reach = begin + part * (above - begin)
     end = cut[-1]
-    rest = np.repeat(end[None], round(hold * RATE), axis=0)
+    rest = np.repeat(end[None], round(hold * CONTROL_RATE), axis=0)
     back = end + part * (np.array([end[0], end[1], HOME[2], turn, 0.0]) - end)
     touching = down <= item.shape.height
     first = int(np.argmax(touching))
     phase = ["approach"] * (len(reach) + first) + ["contact"] + ["cut"] * (steps - first - 1)
     phase += ["hold"] * len(rest) + ["retract"] * len(back)
-    return Path(np.concatenate([reach, cut, rest, back]), np.array(phase))
+    return BladeTrajectory(np.concatenate([reach, cut, rest, back]), np.array(phase))

@@ -8,18 +8,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from intsim.task.kinematic_table import crossing, uncut
+from intsim.task.kinematic_table import axis_crossing
 from intsim.task.rollout import Rollout
-from intsim.task.targets import CutSpec, Item, TaskError, spread, target
+from intsim.task.targets import CutSpec, Item, TaskError, coefficient_of_variation, target
 
-TIP, STRICT_TIP = 0.05, 0.005  # height of the edge above the table that counts as reaching it, published and strict [m]
-ANGLE = math.radians(10.0)  # most that the edge may deviate from across the food
-PLACE = 0.1  # most error of the place, over the size of the food
-EVEN = 0.1  # most spread of the lengths of equal pieces, over their mean
+TIP_HEIGHT, STRICT_TIP_HEIGHT = 0.05, 0.005
+"""Height of the edge above the table that counts as reaching it, published and strict [m]."""
+ANGLE_TOLERANCE = math.radians(10.0)  # most that the edge may deviate from across the food
+PLACE_TOLERANCE = 0.1  # most error of the place, over the size of the food
+LENGTH_VARIATION_LIMIT = 0.1  # most spread of the lengths of equal pieces, over their mean
 
 
 @dataclass(frozen=True)
-class Judged:
+class GeometricOutcome:
     """What was found.
 
     Attributes:
@@ -35,7 +36,7 @@ class Judged:
     angle: float
     offset: float
     pieces: int
-    spread: float
+    coefficient_of_variation: float
     criteria: Mapping[str, bool]
 
     @property
@@ -49,7 +50,7 @@ class Judged:
         return self.published and all(self.criteria.values())
 
 
-def judge(spec: CutSpec, item: Item, rollout: Rollout, after: Item) -> Judged:
+def judge_geometry(spec: CutSpec, item: Item, rollout: Rollout, after: Item) -> GeometricOutcome:
     """Judge an episode.
 
     The published criteria are read so that each fails by itself: the tip's error is its height above the table, the region is the
@@ -71,24 +72,24 @@ def judge(spec: CutSpec, item: Item, rollout: Rollout, after: Item) -> Judged:
         errors = [_offset(spec, was, along) for was, along in made]
         angles = [_angle(item, rollout, k) for k in range(len(made))]
     else:
-        place = crossing(uncut(item), poses[low])
+        place = axis_crossing(item.whole, poses[low])
         tries = [(item, place)] if place is not None else []
         errors = [_offset(spec, was, along) for was, along in tries]
         angles = [_from_across(item, poses[low])] if tries else []
     offset = max(errors, key=abs) if errors else math.nan
     angle = max(angles) if angles else math.nan
     lengths = [p.length for p in after.pieces]
-    even = spread(lengths) if len(lengths) > 1 else math.nan
+    even = coefficient_of_variation(lengths) if len(lengths) > 1 else math.nan
     criteria = {
-        "tip": height < TIP,
+        "tip": height < TIP_HEIGHT,
         "region": bool(tries),
-        "angle": angle <= ANGLE,
-        "place": abs(offset) <= PLACE,
-        "strict_tip": height < STRICT_TIP,
+        "angle": angle <= ANGLE_TOLERANCE,
+        "place": abs(offset) <= PLACE_TOLERANCE,
+        "strict_tip": height < STRICT_TIP_HEIGHT,
     }
     if spec.pieces:
-        criteria |= {"count": len(lengths) == spec.pieces, "even": even <= EVEN}
-    return Judged(height, angle, offset, len(lengths), even, criteria)
+        criteria |= {"count": len(lengths) == spec.pieces, "even": even <= LENGTH_VARIATION_LIMIT}
+    return GeometricOutcome(height, angle, offset, len(lengths), even, criteria)
 
 
 def _offset(spec: CutSpec, was: Item, along: float) -> float:
@@ -110,7 +111,7 @@ def _from_across(item: Item, pose: np.ndarray) -> float:
 
 def _angle(item: Item, rollout: Rollout, k: int) -> float:
     """Of the k-th cut: the pose in which the edge was lowest while it was down for it."""
-    down = np.array([pose[2] for pose in rollout.pose]) < STRICT_TIP
+    down = np.array([pose[2] for pose in rollout.pose]) < STRICT_TIP_HEIGHT
     starts = np.flatnonzero(down & ~np.concatenate([[False], down[:-1]]))
     return _from_across(item, rollout.pose[starts[min(k, len(starts) - 1)]])
 

@@ -13,11 +13,11 @@ from mpm.errors import CutcalError
 from mpm.shapes import Shape, half_width, section_area
 
 SIDES = ("left", "right", "centre")
-ALONG_VIEW = math.radians(15.0)
+MIN_VIEW_ANGLE = math.radians(15.0)
 """Least angle between a food's axis and the direction in which the camera looks, seen from above: nearer to it the two ends lie behind
 each other, and left and right say nothing."""
-SAMPLES = 64  # sections from which the volume of a piece is found
-APART = 4e-3  # way that the two sides of a cut slide apart [m]
+VOLUME_SECTIONS = 64  # sections from which the volume of a piece is found
+CUT_OPENING = 4e-3  # way that the two sides of a cut slide apart [m]
 
 
 class TaskError(CutcalError):
@@ -87,6 +87,11 @@ class Item:
             object.__setattr__(self, "pieces", (Piece(-self.shape.length / 2, self.shape.length / 2),))
 
     @property
+    def whole(self) -> Item:
+        """The food before any cut."""
+        return replace(self, pieces=())
+
+    @property
     def axis(self) -> np.ndarray:
         """Direction of its axis, shape (2,)."""
         return np.array([math.cos(self.yaw), math.sin(self.yaw)])
@@ -132,7 +137,9 @@ class Item:
         place = along - old.shift
         halves = (Piece(old.low, place, old.shift), Piece(place, old.high, old.shift))
         parts = (*self.pieces[:k], *halves, *self.pieces[k + 1 :])
-        moved = tuple(replace(p, shift=p.shift + (APART / 2 if i > k else -APART / 2)) for i, p in enumerate(parts))
+        moved = tuple(
+            replace(p, shift=p.shift + (CUT_OPENING / 2 if i > k else -CUT_OPENING / 2)) for i, p in enumerate(parts)
+        )
         return replace(self, pieces=moved)
 
     def half_width(self, along: float) -> float:
@@ -144,7 +151,7 @@ class Item:
         """Volumes of its pieces [m^3], from sections."""
         out = []
         for p in self.pieces:
-            places = p.low + (np.arange(SAMPLES) + 0.5) / SAMPLES * p.length
+            places = p.low + (np.arange(VOLUME_SECTIONS) + 0.5) / VOLUME_SECTIONS * p.length
             areas = [section_area(replace(self.shape, cut=float(y))) for y in places]
             out.append(float(np.mean(areas)) * p.length)
         return out
@@ -193,7 +200,7 @@ def from_left(spec: CutSpec, item: Item) -> float:
         TaskError: The axis lies along the direction of view, so that neither end is the left one.
     """
     across = float(item.axis @ CAMERAS[spec.camera].right)
-    if spec.side != "centre" and abs(across) < math.sin(ALONG_VIEW):
+    if spec.side != "centre" and abs(across) < math.sin(MIN_VIEW_ANGLE):
         raise TaskError(
             f"task: the {item.name} points to the camera {spec.camera!r} ({math.degrees(math.asin(abs(across))):.0f} degrees across its view), "
             "which sees no left and right end; name another camera"
@@ -240,7 +247,7 @@ def boxed_target(spec: CutSpec, item: Item) -> tuple[np.ndarray, float]:
     return whole.at(target(replace(spec, pieces=0), whole)), 0.0 if along_y else math.pi / 2
 
 
-def spread(values: Sequence[float]) -> float:
+def coefficient_of_variation(values: Sequence[float]) -> float:
     """Standard deviation over the mean [-]: 0 for equal pieces."""
     a = np.asarray(values, float)
     return float(a.std() / a.mean())

@@ -92,8 +92,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _generate(args: argparse.Namespace) -> dict[str, Any]:
     from intsim.data import pictures
-    from intsim.data.generate import available, generate
-    from intsim.data.manifest import TASKS, Manifest
+    from intsim.data.generate import generate, require_simulator
+    from intsim.data.manifest import TRAINING_SUITES, Manifest
     from intsim.task.planner import STYLES
     from intsim.task.suites import FOODS
 
@@ -106,15 +106,15 @@ def _generate(args: argparse.Namespace) -> dict[str, Any]:
     manifest = Manifest(
         args.episodes,
         foods=args.food or FOODS,
-        suites=args.task or TASKS,
+        suites=args.task or TRAINING_SUITES,
         seed=args.seed,
         styles=args.style or STYLES,
     )
-    available()
+    require_simulator()
     args.arch = "cpu"
     with workers_of(args, say) as pool:
         if scenes:
-            pictures.available(pool, scenes, args.pixels)
+            pictures.require_renderer(pool, scenes, args.pixels)
         found = generate(
             manifest,
             Path(args.out),
@@ -129,7 +129,7 @@ def _generate(args: argparse.Namespace) -> dict[str, Any]:
         )
         if scenes:
             pool.renew()
-            found["pictures"] = pictures.render(Path(args.out), scenes, args.pixels, pool, say)
+            found["pictures"] = pictures.render_dataset(Path(args.out), scenes, args.pixels, pool, say)
     if not args.json:
         s = found["seconds_per_episode"]
         print(
@@ -186,9 +186,9 @@ def _export(args: argparse.Namespace) -> dict[str, Any]:
         )
     scenes = _scenes(args)
     exports: dict[str, Callable[..., dict[str, Any]]] = {
-        "lerobot": lerobot.export,
-        "rlds": rlds.export,
-        "rdt": rdt.export,
+        "lerobot": lerobot.export_lerobot,
+        "rlds": rlds.export_rlds,
+        "rdt": rdt.export_rdt,
     }
     args.arch = "cpu"
     with workers_of(args, say) if scenes else nullcontext() as pool:

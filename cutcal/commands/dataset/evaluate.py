@@ -70,9 +70,9 @@ def add_args(p: Group) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Evaluate and write."""
-    from intsim.data.generate import available
+    from intsim.data.generate import require_simulator
     from intsim.policy.behaviour_cloning import Clone
-    from intsim.policy.oracles import POLICIES, make
+    from intsim.policy.oracles import POLICIES, make_policy
     from intsim.policy.remote import Remote
     from intsim.sim.world import World
     from intsim.task.suites import FOODS, SUITES
@@ -112,14 +112,14 @@ def run(args: argparse.Namespace) -> int:
         policy = server = Remote(args.server)
         name = f"remote {server.name}"
     else:
-        policy = make(args.policy, args.sigma or 0.0)
+        policy = make_policy(args.policy, args.sigma or 0.0)
     calibrated = {food.name: food for food in map(load_material_file, args.material)}
     names = args.food or (list(calibrated) if args.material else FOODS)
     foods = {name: calibrated.get(name) or load_food(name) for name in names}
     out = Path(args.out or f"cutcal-evaluate-{args.policy}")
     world = None if args.world == "table" else World(args.world == "intsim", args.stiffness, args.knife, args.pixels)
     if world is not None:
-        available()
+        require_simulator()
     args.arch = "cpu"
     with nullcontext() if world is None else workers_of(args, say) as pool:
         document = _evaluate(args, policy, name, foods, suites, out, world, pool)
@@ -143,7 +143,7 @@ def _evaluate(
 ) -> dict[str, Any]:
     """What the options ask for."""
     from intsim.evaluate import evaluate
-    from intsim.sim.severing import ARM
+    from intsim.sim.severing import PANDA_ARM
     from mpm.scene import Arm
 
     return evaluate(
@@ -157,7 +157,7 @@ def _evaluate(
         sigma=args.sigma,
         severing=args.severing,
         knife=args.knife,
-        arm=ARM if args.arm_stiffness is None else Arm(args.arm_stiffness),
+        arm=PANDA_ARM if args.arm_stiffness is None else Arm(args.arm_stiffness),
         world=world,
         pool=pool,
         resume=args.resume,

@@ -15,20 +15,20 @@ from calib.errors import OutputError
 from calib.simulation.workers import Workers
 from cutcal.main import main
 from intsim.data import generate as g
-from intsim.data.demonstrate import Track
-from intsim.data.manifest import JITTER, TASKS, Manifest
-from intsim.data.shards import META, pack, trajectories
-from intsim.task.language import instructions, parse
-from intsim.task.planner import PHASES, RATE
-from intsim.task.suites import FOODS, TEST
+from intsim.data.demonstrate import Demonstration
+from intsim.data.manifest import PROPERTY_SCATTER, TRAINING_SUITES, Manifest
+from intsim.data.shards import DATASET_FILE, pack_episode, trajectories
+from intsim.task.language import instructions, parse_instruction
+from intsim.task.planner import CONTROL_RATE, PHASES
+from intsim.task.suites import FIRST_TEST_SEED, FOODS
 from intsim.task.targets import TaskError
 from tests.calib.documents import valid
 
 
-def track(steps: int = 12, seed: int = 0) -> Track:
+def track(steps: int = 12, seed: int = 0) -> Demonstration:
     """A made-up trajectory with contact from its fifth step on, and two cuts."""
     rng = np.random.default_rng(seed)
-    t = Track()
+    t = Demonstration()
     for k in range(steps + 1):
         t.qpos.append(rng.random(9))
         t.qvel.append(rng.random(9))
@@ -65,23 +65,23 @@ def test_the_manifest_counts_the_whole_product_and_draws_each_once():
 def test_a_trajectory_is_drawn_from_its_number_alone():
     """Same number, same episode; all foods and tasks come in turn; values stay within their ranges and differ; no seed of a test."""
     m = Manifest(trajectories=80)
-    draws = [m.draw(k) for k in range(80)]
-    assert m.draw(7) == draws[7]
+    draws = [m.trajectory(k) for k in range(80)]
+    assert m.trajectory(7) == draws[7]
     assert [d.food.name for d in draws[:15]] == list(FOODS)
-    assert {d.suite for d in draws[:15]} == set(TASKS)
+    assert {d.suite for d in draws[:15]} == set(TRAINING_SUITES)
     assert len({(d.suite, d.food.name) for d in draws[:75]}) == 75
     assert {d.style for d in draws} == {"press", "slice", "rock", "saw"}
-    assert max(d.seed for d in draws) < TEST
+    assert max(d.seed for d in draws) < FIRST_TEST_SEED
     for d in draws:
         names = [d.episode.item.name, *(o.name for o in d.episode.others)]
-        found = parse(d.episode.instruction, names)
+        found = parse_instruction(d.episode.instruction, names)
         assert float(found.ratio) == pytest.approx(float(d.episode.spec.ratio))
         assert replace(found, ratio=d.episode.spec.ratio) == d.episode.spec
-        assert set(d.values) <= set(JITTER) and d.values["R"] > 0
+        assert set(d.values) <= set(PROPERTY_SCATTER) and d.values["R"] > 0
     assert len({d.values["R"] for d in draws if d.food.name == "banana"}) > 1
 
 
-@pytest.mark.parametrize("how", [{"trajectories": 0}, {"suites": ("none",)}, {"seed": TEST}, {"foods": ()}])
+@pytest.mark.parametrize("how", [{"trajectories": 0}, {"suites": ("none",)}, {"seed": FIRST_TEST_SEED}, {"foods": ()}])
 def test_an_impossible_manifest_is_an_error(how):
     """Nothing to draw, an unknown task, seeds of the tests."""
     with pytest.raises(TaskError, match="dataset"):
@@ -100,31 +100,31 @@ class Inline(Workers):
 
     def each(self, work, jobs) -> Iterator[tuple[int, dict]]:
         """A made-up episode for each."""
-        for k, (draw, *_) in enumerate(jobs):
+        for k, (spec, *_) in enumerate(jobs):
             if self.most == 0:
                 raise KeyboardInterrupt
             self.most -= 1
-            yield k, made(draw)
+            yield k, made(spec)
 
 
-def made(draw) -> dict:
+def made(spec) -> dict:
     """What a worker sends back."""
-    t = track(seed=draw.seed)
+    t = track(seed=spec.seed)
     about = {
-        "episode_seed": draw.seed,
-        "index": draw.index,
-        "instruction": draw.episode.instruction,
-        "instructions": instructions(draw.episode.spec, draw.seed),
-        "suite": draw.suite,
+        "episode_seed": spec.seed,
+        "index": spec.index,
+        "instruction": spec.episode.instruction,
+        "instructions": instructions(spec.episode.spec, spec.seed),
+        "suite": spec.suite,
         "demos": "sustained",
         "task": {
-            "ratio": float(draw.episode.spec.ratio),
-            "side": draw.episode.spec.side,
-            "pieces": draw.episode.spec.pieces,
+            "ratio": float(spec.episode.spec.ratio),
+            "side": spec.episode.spec.side,
+            "pieces": spec.episode.spec.pieces,
         },
         "elapsed_steps": len(t.action),
-        "food": draw.food.name,
-        "style": draw.style,
+        "food": spec.food.name,
+        "style": spec.style,
         "status": "done",
         "success": True,
         "published": True,
@@ -132,13 +132,13 @@ def made(draw) -> dict:
         "peak_N": 1.0,
         "seconds": {"solver": 2.0, "robot": 1.0, "start": 0.0},
     }
-    return {"about": about, "content": pack(t, about, {"food": draw.food.name, "material": "{}"})}
+    return {"about": about, "content": pack_episode(t, about, {"food": spec.food.name, "material": "{}"})}
 
 
 @pytest.fixture(autouse=True)
 def no_simulator(monkeypatch):
     """These tests make episodes up."""
-    monkeypatch.setattr(g, "available", lambda: None)
+    monkeypatch.setattr(g, "require_simulator", lambda: None)
 
 
 def test_a_stopped_dataset_goes_on_and_comes_out_the_same(tmp_path):
@@ -169,7 +169,9 @@ def test_what_is_stored_has_maniskills_layout_and_keeps_the_force_apart(tmp_path
         n = len(t.action)
         assert file["actions"].shape == (n, 8) and file["obs/agent/qpos"].shape == (n + 1, 9)
         assert file["control/delta"].shape == (n, 7) and file["mpm/force"].shape == (n, 5, 3)
-        assert np.allclose(file["mpm/impulse"][-1], file["mpm/force"][()].mean(axis=1).sum(axis=0) / RATE, rtol=1e-5)
+        assert np.allclose(
+            file["mpm/impulse"][-1], file["mpm/force"][()].mean(axis=1).sum(axis=0) / CONTROL_RATE, rtol=1e-5
+        )
         assert np.allclose(
             file["control/delta"][:, :3], (np.array(t.command) - np.array(t.edge)[:-1])[:, :3], atol=1e-6
         )
@@ -197,7 +199,7 @@ def test_a_folder_that_is_taken_or_damaged_is_an_error(tmp_path):
         pass
     with pytest.raises(OutputError, match="damaged"):
         list(trajectories(out))
-    (out / META).write_text("{")
+    (out / DATASET_FILE).write_text("{")
     with pytest.raises(OutputError, match="damaged"):
         g.generate(Manifest(trajectories=1), out, Inline(), resume=True)
 
@@ -220,7 +222,7 @@ def test_a_folder_that_is_taken_or_damaged_is_an_error(tmp_path):
 def test_wrong_words_on_the_command_line_are_one_line(words, says, capsys, tmp_path, monkeypatch):
     """What was wrong, before anything is made."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("intsim.data.generate.available", lambda: None)
+    monkeypatch.setattr("intsim.data.generate.require_simulator", lambda: None)
     if words.startswith("export nowhere"):
         pytest.importorskip("pyarrow", reason="the extra [data] is not installed")
         pytest.importorskip("av", reason="the extra [data] is not installed")

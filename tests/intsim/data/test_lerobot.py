@@ -10,10 +10,10 @@ import pytest
 from calib.errors import OutputError
 from intsim.data import generate as g
 from intsim.data.cameras import CAMERA_NAMES
-from intsim.data.lerobot import FEATURES, columns, export, statistics, together
+from intsim.data.lerobot import FEATURES, episode_columns, export_lerobot, merge_statistics, statistics
 from intsim.data.manifest import Manifest
 from intsim.data.shards import trajectories
-from intsim.task.planner import RATE
+from intsim.task.planner import CONTROL_RATE
 from tests.intsim.data.test_generate import Inline
 from tests.intsim.painter import PIXELS, Here, Painter, paint_with
 
@@ -24,7 +24,7 @@ av = pytest.importorskip("av", reason="the extra [data] is not installed")
 @pytest.fixture
 def stored(tmp_path, monkeypatch):
     """Three made-up trajectories."""
-    monkeypatch.setattr(g, "available", lambda: None)
+    monkeypatch.setattr(g, "require_simulator", lambda: None)
     g.generate(Manifest(trajectories=3), tmp_path / "set", Inline(), shard=2)
     return tmp_path / "set"
 
@@ -33,7 +33,7 @@ def stored(tmp_path, monkeypatch):
 def painted(stored, tmp_path, monkeypatch):
     """Their export before two backgrounds."""
     paint_with(Painter, monkeypatch)
-    info = export(stored, tmp_path / "lr", scenes=[0, 2], pixels=PIXELS, pool=Here())
+    info = export_lerobot(stored, tmp_path / "lr", scenes=[0, 2], pixels=PIXELS, pool=Here())
     return tmp_path / "lr", info
 
 
@@ -67,7 +67,7 @@ def test_the_columns_are_what_was_stored(stored, painted):
 
 def trajectories_of(folder) -> list[dict[str, np.ndarray]]:
     """Columns of each, while its file is open."""
-    return [columns(one) for one in trajectories(folder)]
+    return [episode_columns(one) for one in trajectories(folder)]
 
 
 def test_pictures_are_found_by_their_time(painted):
@@ -79,9 +79,9 @@ def test_pictures_are_found_by_their_time(painted):
         with av.open(str(out / f"videos/{key}/chunk-000/file-000.mp4")) as file:
             frames = [(float(f.time), f.to_ndarray(format="rgb24")) for f in file.decode(video=0)]
         assert len(frames) == info["total_frames"]
-        assert np.allclose([t for t, _ in frames], np.arange(len(frames)) / RATE, atol=1e-4)
+        assert np.allclose([t for t, _ in frames], np.arange(len(frames)) / CONTROL_RATE, atol=1e-4)
         for e in episodes:
-            begin = round(e[f"videos/{key}/from_timestamp"] * RATE)
+            begin = round(e[f"videos/{key}/from_timestamp"] * CONTROL_RATE)
             scene = 0 if e["episode_index"] < 3 else 2
             for k in (0, e["length"] - 1):
                 assert frames[begin + k][1].mean() == pytest.approx((10 * k + 40 * scene) % 256, abs=3)
@@ -110,7 +110,7 @@ def test_tasks_are_looked_up_by_their_row(painted):
 
 def test_without_pictures_there_are_no_videos(stored, tmp_path):
     """No renderer is asked for."""
-    info = export(stored, tmp_path / "bare")
+    info = export_lerobot(stored, tmp_path / "bare")
     assert info["video_path"] is None and not (tmp_path / "bare/videos").exists()
     assert not [n for n in info["features"] if "images" in n]
 
@@ -119,7 +119,7 @@ def test_statistics_of_parts_are_those_of_the_whole():
     """Mean and standard deviation exactly, least and largest too."""
     rng = np.random.default_rng(0)
     parts = [rng.normal(k, 1 + k, (10 * (k + 1), 2)) for k in range(3)]
-    both, whole = together([statistics(p) for p in parts]), statistics(np.concatenate(parts))
+    both, whole = merge_statistics([statistics(p) for p in parts]), statistics(np.concatenate(parts))
     for name in ("min", "max", "mean", "std", "count"):
         assert both[name] == pytest.approx(whole[name])
 
@@ -127,9 +127,9 @@ def test_statistics_of_parts_are_those_of_the_whole():
 def test_a_wrong_scene_or_a_taken_folder_is_an_error(stored, tmp_path):
     """Before anything is written."""
     with pytest.raises(OutputError, match="0 to 14"):
-        export(stored, tmp_path / "x", scenes=[15])
+        export_lerobot(stored, tmp_path / "x", scenes=[15])
     (tmp_path / "full").mkdir()
     (tmp_path / "full/file").touch()
     with pytest.raises(OutputError, match="never overwritten"):
-        export(stored, tmp_path / "full")
+        export_lerobot(stored, tmp_path / "full")
     assert not (tmp_path / "x").exists()

@@ -14,7 +14,7 @@ import pytest
 from cutcal.main import main
 from intsim.policy import vla_adapters
 from intsim.policy.oracles import Oracle
-from intsim.policy.remote import Remote, Server, packed, unpacked
+from intsim.policy.remote import Remote, Server, decode_png, encode_png
 from intsim.policy.vla_adapters import RDT, Octo, OpenVLA
 from mpm.errors import CutcalError
 
@@ -87,7 +87,7 @@ def test_actions_come_in_their_order_and_end(served):
 def test_a_picture_comes_back():
     """PNG loses nothing."""
     image = np.random.default_rng(0).integers(0, 256, (5, 7, 3), np.uint8)
-    assert np.array_equal(unpacked(packed(image)), image)
+    assert np.array_equal(decode_png(encode_png(image)), image)
 
 
 def test_what_is_wrong_is_said(served):
@@ -154,9 +154,9 @@ class Asked:
 def test_an_evaluation_asks_a_server(served, tmp_path, capsys):
     """From the command line, on the table: an oracle behind the protocol is still one."""
     from calib.material.food import load_food
-    from intsim.task.suites import TEST, draw
+    from intsim.task.suites import FIRST_TEST_SEED, sample_episode
 
-    episode = draw("seeds", TEST, {"plum": load_food("plum")})
+    episode = sample_episode("seeds", FIRST_TEST_SEED, {"plum": load_food("plum")})
     address = served(Asked((episode.item,)))
     words = ["evaluate", "--policy", "remote", "--server", address, "--suite", "seeds", "--food", "plum"]
     assert main([*words, "--episodes", "1", "--out", str(tmp_path / "e"), "--json"]) == 0
@@ -289,7 +289,7 @@ def test_the_adapters_command_line(monkeypatch, capsys):
     assert "is not installed" in capsys.readouterr().err
     assert vla_adapters.main(["rdt", "--weights", "w"]) == 1
     assert "--root" in capsys.readouterr().err
-    monkeypatch.setattr(vla_adapters, "make", lambda args: Counting())
+    monkeypatch.setattr(vla_adapters, "load_model", lambda args: Counting())
     monkeypatch.setattr(Server, "serve_forever", lambda self: (_ for _ in ()).throw(KeyboardInterrupt))
     assert vla_adapters.main(["octo", "--weights", "w", "--port", "0"]) == 0
     assert "answers at http://127.0.0.1:" in capsys.readouterr().err

@@ -18,17 +18,17 @@ import sapien
 
 from calib.errors import OutputError
 from calib.material.food import load_food
-from intsim.data.demonstrate import DEEPEST, LEVELLED, demonstrate
-from intsim.data.generate import make
+from intsim.data.demonstrate import LEVELLING_GAIN, MAX_COMMAND_DEPTH, demonstrate
+from intsim.data.generate import make_episode
 from intsim.data.manifest import Manifest
-from intsim.data.shards import Stored
+from intsim.data.shards import StoredTrajectory
 from intsim.evaluate import evaluate
-from intsim.policy.oracles import make as make_policy
-from intsim.sim import environment
-from intsim.sim.closed_loop import environment, follow
+from intsim.policy.oracles import make_policy
+from intsim.sim import environment as robot_environment
+from intsim.sim.closed_loop import make_environment, roll_out_closed_loop
 from intsim.sim.world import World
-from intsim.task.planner import GRIPPER_CLOSED, PHASES, plan
-from intsim.task.suites import draw
+from intsim.task.planner import GRIPPER_CLOSED, PHASES, plan_cut
+from intsim.task.suites import sample_episode
 from intsim.task.targets import target
 from mpm.errors import CutcalError
 from tests.calib.documents import valid
@@ -60,7 +60,7 @@ def cut(env, seed: int, depth: float = 0.0, hold: float = 0.0) -> dict[str, floa
     """One planned cut by joint targets: what came of it."""
     env.reset(seed=seed)
     episode = env.episode
-    path = plan(episode.item, target(episode.spec, episode.item), start=env.pose, depth=depth, hold=hold)
+    path = plan_cut(episode.item, target(episode.spec, episode.item), start=env.pose, depth=depth, hold=hold)
     joints, worst, peak, low = env.agent.robot.get_qpos()[0].numpy().astype(float), 0.0, 0.0, np.inf
     info = {}
     for pose in path.pose:
@@ -76,9 +76,9 @@ def test_it_resets_to_the_same_episode_and_to_a_given_one():
     """A seed is an episode of the suite; the edge begins at home, level."""
     env = made()
     env.reset(seed=SEED)
-    assert env.episode == draw("seeds", SEED, FOODS) and env.instruction == env.episode.instruction
+    assert env.episode == sample_episode("seeds", SEED, FOODS) and env.instruction == env.episode.instruction
     assert env.pose == pytest.approx([-0.25, 0.0, 0.25, 0.0, 0.0], abs=1e-3)
-    other = draw("flips", 5, FOODS)
+    other = sample_episode("flips", 5, FOODS)
     env.reset(seed=1, options={"episode": other})
     assert env.episode is other
     env.close()
@@ -110,7 +110,7 @@ def test_a_stiffer_arm_comes_nearer_to_the_board():
     weak.close()
     stiff.close()
     assert b["low"] < a["low"] / 2
-    assert environment.PandaKnife.arm_stiffness == 1e3
+    assert robot_environment.PandaKnife.arm_stiffness == 1e3
 
 
 @pytest.mark.parametrize("mode", ["pd_joint_pos", "pd_ee_delta_pose", "pd_ee_target_delta_pose", "pd_ee_pose"])
@@ -228,26 +228,26 @@ def test_a_sustained_demonstration_parts_what_a_planned_one_leaves_whole():
 
 def test_pressing_on_levels_the_blade(monkeypatch):
     """The load turns the hand and one end of the blade rests on the board: turned back, the other end parts the rest; without that it hangs."""
-    draw_ = Manifest(trajectories=1, foods=("banana",), suites=("seeds",), styles=("press",)).draw(0)
-    env = environment(World())
+    draw_ = Manifest(trajectories=1, foods=("banana",), suites=("seeds",), styles=("press",)).trajectory(0)
+    env = make_environment(World())
     env.foods = {**env.foods, "banana": draw_.food}
     found = {}
-    for part in (LEVELLED, 0.0):
-        monkeypatch.setattr("intsim.data.demonstrate.LEVELLED", part)
+    for part in (LEVELLING_GAIN, 0.0):
+        monkeypatch.setattr("intsim.data.demonstrate.LEVELLING_GAIN", part)
         env.reset(seed=draw_.seed, options={"episode": draw_.episode})
         found[part] = demonstrate(env, meshes=False)
     level, hanging = found.values()
     assert level.severed[-1] and level.published[-1] and not hanging.severed[-1] and hanging.uncut[-1] > 0.01
     turned = [p[4] for p in level.command if p[4] != level.command[0][4]]
-    assert 0 < len(turned) and min(p[2] for p in level.command) > -DEEPEST / 2
+    assert 0 < len(turned) and min(p[2] for p in level.command) > -MAX_COMMAND_DEPTH / 2
 
 
 def test_a_drawn_cut_ends_when_the_food_is_in_pieces():
     """With one end of the blade on the board the middle is above it and stands, and the cut ends as soon as nothing holds; with the way of the
     commanded middle in place of what the board lets it go, that took nine steps more, in which the pieces were dragged along.
     """
-    draw_ = Manifest(trajectories=1, foods=("cucumber",), suites=("seeds",), styles=("slice",)).draw(0)
-    env = environment(World())
+    draw_ = Manifest(trajectories=1, foods=("cucumber",), suites=("seeds",), styles=("slice",)).trajectory(0)
+    env = make_environment(World())
     env.foods = {**env.foods, "cucumber": draw_.food}
     env.reset(seed=draw_.seed, options={"episode": draw_.episode, "draws": True})
     track = demonstrate(env, style="slice", meshes=False)
@@ -275,8 +275,8 @@ def test_replaying_the_actions_gives_the_same_path_and_force():
 
 def test_a_worker_makes_an_episode_that_can_be_read(tmp_path):
     """What `dataset generate` stores of a real one: layout, task and the time that it took."""
-    draw = Manifest(trajectories=1, foods=("strawberry",), suites=("seeds",)).draw(0)
-    found = make(draw, "sustained", "kitchen", None, "cpu", 1)
+    spec = Manifest(trajectories=1, foods=("strawberry",), suites=("seeds",)).trajectory(0)
+    found = make_episode(spec, "sustained", "kitchen", None, "cpu", 1)
     (tmp_path / "part.h5").write_bytes(found["content"])
     with h5py.File(tmp_path / "part.h5") as file:
         n = found["about"]["elapsed_steps"]
@@ -292,11 +292,11 @@ def test_pictures_of_a_stored_trajectory_show_what_was_simulated(tmp_path):
     """Rendered from what is stored: the same view twice is the same picture, another background is another, and the cut opens the food."""
     from intsim.data.rendering import Renderer
 
-    draw = Manifest(trajectories=1, foods=("strawberry",), suites=("seeds",)).draw(0)
-    found = make(draw, "sustained", "kitchen", None, "cpu", 1)
+    spec = Manifest(trajectories=1, foods=("strawberry",), suites=("seeds",)).trajectory(0)
+    found = make_episode(spec, "sustained", "kitchen", None, "cpu", 1)
     (tmp_path / "part.h5").write_bytes(found["content"])
     with h5py.File(tmp_path / "part.h5") as file:
-        stored = Stored(file, found["about"])
+        stored = StoredTrajectory(file, found["about"])
         one, two = Renderer(0, 64), Renderer(5, 64)
         plain, again, other = one.pictures(stored), one.pictures(stored), two.pictures(stored)
         one.close()
@@ -371,21 +371,21 @@ class Replay:
 
 def test_joint_targets_do_what_they_did_and_keep_within_their_speeds():
     """A demonstration's own actions part the food again, with the same force; a target that is far away is approached at the joint's speed."""
-    env = environment(World())
+    env = make_environment(World())
     env.foods = {"strawberry": FOODS["strawberry"]}
     env.reset(seed=SEED)
     track = demonstrate(env, meshes=False)
     assert track.severed[-1]
     env.reset(seed=SEED)
     policy = Replay(track.action)
-    found = follow(env, policy, 0)
+    found = roll_out_closed_loop(env, policy, 0)
     assert found.severed and found.peak == pytest.approx(max(f[:, 2].max() for f in track.force), rel=0.02)
     assert np.allclose([o["pose"] for o in policy.seen[: len(track.edge)]], track.edge[: len(policy.seen)], atol=1e-3)
     assert policy.seen[0]["joints"].shape == (9,) and policy.seen[0]["images"] == {}
     env.reset(seed=SEED)
     far = track.action[0].copy()
     far[0] += 1.0
-    follow(env, Replay([far]), 0)
+    roll_out_closed_loop(env, Replay([far]), 0)
     assert env.table.rollout.clipped == [("joint",)]
 
 
@@ -393,10 +393,10 @@ def test_joint_targets_do_what_they_did_and_keep_within_their_speeds():
 @pytest.mark.skipif(not VULKAN, reason="SAPIEN finds no device that it can render with")
 def test_a_policy_is_given_pictures_where_it_wants_them():
     """Three cameras, 8 bits, the size that was asked for."""
-    env = environment(World(pixels=32))
+    env = make_environment(World(pixels=32))
     env.reset(seed=SEED)
     policy = Replay([env.agent.robot.get_qpos()[0].numpy()[:8]])
-    follow(env, policy, 0)
+    roll_out_closed_loop(env, policy, 0)
     images = policy.seen[0]["images"]
     assert sorted(images) == ["front", "side", "wrist"]
     assert all(i.shape == (32, 32, 3) and i.dtype == np.uint8 and i.std() > 5 for i in images.values())
