@@ -8,7 +8,16 @@ from typing import Any
 import numpy as np
 
 from calib.material.knife import load_knife
-from intsim.task.planner import CONTROL_RATE, DESCENT_SPEED, GRIPPER_CLOSED, HOME, PHASES, minimum_jerk, plan_cut
+from intsim.task.planner import (
+    CONTROL_RATE,
+    DESCENT_SPEED,
+    GRIPPER_CLOSED,
+    HOME,
+    PHASES,
+    Descent,
+    minimum_jerk,
+    plan_cut,
+)
 from intsim.task.targets import TaskError, target
 
 BOARD_REACHED = 2e-4  # height of the edge at which it is on the board [m]
@@ -74,7 +83,7 @@ def demonstrate(env: Any, *, style: str = "press", sustained: bool = True, meshe
             along = target(episode.spec, item)
         except TaskError:
             break
-        path = plan_cut(item, along, style=style, start=env.pose)
+        path = plan_cut(item, along, Descent(style), start=env.pose)
         for pose, phase in zip(path.pose, path.phase, strict=True):
             if phase != "retract":
                 _step(env, track, pose, str(phase), meshes)

@@ -27,7 +27,7 @@ from intsim.policy.oracles import make_policy
 from intsim.sim import environment as robot_environment
 from intsim.sim.closed_loop import make_environment, roll_out_closed_loop
 from intsim.sim.world import World
-from intsim.task.planner import GRIPPER_CLOSED, PHASES, plan_cut
+from intsim.task.planner import GRIPPER_CLOSED, PHASES, Descent, plan_cut
 from intsim.task.suites import sample_episode
 from intsim.task.targets import target
 from mpm.errors import CutcalError
@@ -60,7 +60,7 @@ def cut(env, seed: int, depth: float = 0.0, hold: float = 0.0) -> dict[str, floa
     """One planned cut by joint targets: what came of it."""
     env.reset(seed=seed)
     episode = env.episode
-    path = plan_cut(episode.item, target(episode.spec, episode.item), start=env.pose, depth=depth, hold=hold)
+    path = plan_cut(episode.item, target(episode.spec, episode.item), Descent(depth=depth, hold=hold), start=env.pose)
     joints, worst, peak, low = env.agent.robot.get_qpos()[0].numpy().astype(float), 0.0, 0.0, np.inf
     info = {}
     for pose in path.pose:
