@@ -29,5 +29,9 @@ class OutputError(CutcalError):
     """An output folder or file that cannot be written, or that belongs to another calibration."""
 
 
+class DocumentError(CutcalError):
+    """A JSON document of a finished run that is missing, damaged or incomplete."""
+
+
 class ClusterError(CutcalError):
     """A Dask cluster that cannot be reached, has no workers, or such as cannot be used."""
