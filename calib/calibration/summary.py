@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import shutil
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timezone
@@ -25,6 +24,7 @@ from calib.validation.acceptance import judge, limits
 from calib.validation.metrics import Metrics
 from calib.validation.null_models import NullModel
 from calib.validation.numerical_checks import Check
+from mpm.files import replacing
 from mpm.output.record import ForceRecord
 
 WITH_WIDTH = 0.5  # an interval that a measured width would halve belongs to the product with it
@@ -258,15 +258,14 @@ def add_conditioning(path: Path, curve: Conditioned) -> None:
         OutputError: The file cannot be written.
     """
     columns = {"time_s": curve.time, "raw_N": curve.trace.force, "tared_N": curve.force}
-    draft = path.with_name(path.name + ".part")
     try:
-        shutil.copyfile(path, draft)
-        with h5py.File(draft, "a") as file:
-            if "conditioning" in file:
-                del file["conditioning"]
-            group = file.create_group("conditioning")
-            for name, values in columns.items():
-                group[name] = values
-        os.replace(draft, path)
+        with replacing(path) as draft:
+            shutil.copyfile(path, draft)
+            with h5py.File(draft, "a") as file:
+                if "conditioning" in file:
+                    del file["conditioning"]
+                group = file.create_group("conditioning")
+                for name, values in columns.items():
+                    group[name] = values
     except OSError as e:
         raise OutputError(f"{path}: cannot be written ({e}); check the disk") from None

@@ -13,7 +13,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
@@ -25,9 +24,8 @@ from calib.problem.joint_objective import JointObjective
 from calib.problem.objective import Objective, Trial
 from calib.problem.parameters import ParameterSet
 from calib.simulation.evaluation import Evaluator
+from mpm.arrays import FloatArray
 from mpm.errors import SimulationError
-
-FloatArray = npt.NDArray[np.float64]
 
 #: Runs among which the answer is chosen by a second run of each, slower and with other particles: two batches of two.  They
 #: may be expected to be worse than the best by what the noise of two runs makes.

@@ -30,7 +30,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import minimize_scalar
 from scipy.stats import chi2, qmc
 
@@ -41,9 +40,8 @@ from calib.problem.joint_objective import JointObjective, residual
 from calib.problem.objective import Objective, Trial
 from calib.simulation.evaluation import Evaluation, Evaluator
 from calib.uncertainty.intervals import EXPLAINED
+from mpm.arrays import FloatArray
 from mpm.errors import SimulationError
-
-FloatArray = npt.NDArray[np.float64]
 
 #: Points are rounded to this part of a coordinate unit (0.1 % of a log parameter): far below the noise of a
 #: run, and a resumed fit asks for exactly the points that are in the store.

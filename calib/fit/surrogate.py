@@ -11,15 +11,13 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve, eigh
 from scipy.optimize import least_squares, minimize
 
 from calib.problem.joint_objective import JointObjective, residuals
 from calib.problem.objective import LARGEST_DIFFERENCE, Objective, Trial
 from calib.problem.parameters import LINEAR_STEP, ParameterSet
-
-FloatArray = npt.NDArray[np.float64]
+from mpm.arrays import FloatArray
 
 #: Standard deviations in the process, parts of the peak: what a broken-down and a coarse run say about the
 #: curve of a whole, fine one; the offset common to all coarse curves; the offset of the best curve by its own

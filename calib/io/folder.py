@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 import pandas as pd
 
 from calib.errors import OutputError
+from mpm.files import write_atomic
 
 MARKS = (
     "summary.json",
@@ -71,10 +71,8 @@ def write_csv(path: Path, columns: Mapping[str, Any], *, head: Sequence[str] = (
 
 
 def _replace(path: Path, text: str) -> None:
-    temporary = path.with_name(path.name + ".part")
     try:
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
+        write_atomic(path, text)
     except OSError as e:
         raise OutputError(f"{path}: cannot be written ({e.strerror})") from None
 

@@ -7,7 +7,6 @@ where they disagree.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -29,6 +28,7 @@ from calib.material.properties import (
     check_override,
     rule_of,
 )
+from mpm.files import write_atomic
 from mpm.shapes import SHAPE_KINDS
 
 if TYPE_CHECKING:
@@ -273,10 +273,8 @@ def dump_material(food: FoodSpec, path: Path | str, provenance: Mapping[str, Any
     except yaml.representer.RepresenterError as e:
         raise OutputError(f"{path}: the provenance holds {e.args[-1]!r}; give plain data only") from None
     head = "# One calibrated food in the layout of materials.yaml. All values in SI units.\n"
-    temporary = path.with_name(path.name + ".part")
     try:
-        temporary.write_text(head + body, encoding="utf-8")
-        os.replace(temporary, path)
+        write_atomic(path, head + body)
     except OSError as e:
         raise OutputError(f"{path}: cannot be written ({e.strerror}); choose another folder") from None
 

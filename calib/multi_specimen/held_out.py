@@ -27,9 +27,8 @@ from calib.validation.acceptance import Verdict, balances
 from calib.validation.metrics import Metrics, compare
 from calib.validation.null_models import null_models
 from calib.validation.prediction import NRMSE_LIMIT, RATING_LIMIT
+from mpm.arrays import FloatArray
 from mpm.errors import SimulationError
-
-FloatArray = np.ndarray
 
 BUDGET = 40.0
 """Simulations at most for the few parameters of a specimen."""

@@ -28,10 +28,9 @@ from calib.simulation.workers import Workers
 from calib.uncertainty.analysis import Doubt
 from calib.uncertainty.global_search import infer
 from calib.validation.numerical_checks import otherwise
+from mpm.arrays import FloatArray
 from mpm.scene import Scene
 from mpm.shapes import Shape
-
-FloatArray = np.ndarray
 
 PRESS_STRAIN = 0.2
 """Strain up to which a compression test is fitted [-]: flesh yields beyond."""

@@ -12,13 +12,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from calib.problem.objective import Case, Objective, Trial
 from calib.problem.parameters import Parameter, ParameterSet, own, plain
 from calib.simulation.evaluation import Evaluation, Evaluator
-
-FloatArray = npt.NDArray[np.float64]
+from mpm.arrays import FloatArray
 
 
 def residual(

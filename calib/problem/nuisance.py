@@ -23,12 +23,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from calib.errors import TraceError
 from calib.trace.conditioning import Conditioned
-
-FloatArray = npt.NDArray[np.float64]
+from mpm.arrays import FloatArray
 
 #: Relative standard deviation of the gain of a calibrated force sensor, where nothing is said of it.  Assumed: no source was found
 #: that holds for all; give --gain-sd from the sensor's own calibration.

@@ -36,8 +36,7 @@ from calib.errors import TraceError
 from calib.problem.nuisance import Nuisance, NuisanceEstimate, Whitening, estimate
 from calib.problem.parameters import ParameterSet
 from calib.simulation.evaluation import Evaluation
-
-FloatArray = npt.NDArray[np.float64]
+from mpm.arrays import FloatArray
 
 #: Smooths a raw record like the real one was: (grid [m] (n,), stroke [m] (k,), force [N] (k,)) -> force [N]
 #: (n,).

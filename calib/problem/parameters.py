@@ -15,11 +15,10 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from calib.errors import MaterialError
+from mpm.arrays import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
 Scale = Literal["log", "linear"]
 
 #: Half width of a normal distribution's central 95 % in standard deviations.

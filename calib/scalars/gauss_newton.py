@@ -10,12 +10,11 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import lsq_linear
 
 from calib.problem.parameters import ParameterSet
+from mpm.arrays import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
 #: Points (p,) out, their values (n,) in; None for one that broke down.
 Descent = Generator[list[FloatArray], list[FloatArray | None], "Minimum"]
 

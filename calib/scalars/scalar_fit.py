@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import norm, qmc
 
 from calib._version import __version__
@@ -34,9 +33,9 @@ from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, Header
 from calib.simulation.workers import Workers
 from calib.validation.prior_predictive import draw
+from mpm.arrays import FloatArray
 from mpm.scene import Scene
 
-FloatArray = npt.NDArray[np.float64]
 Values = Mapping[str, float]
 
 DRAWS = 32

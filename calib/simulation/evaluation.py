@@ -8,10 +8,8 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-
+from mpm.arrays import FloatArray
 
 PARTED, PUSHED = 0.8, 0.5
 """Least energy of the edge over R times the new area for a run to be a cut, and where it is none at all [-]. Fifteen foods at

@@ -37,12 +37,10 @@ from typing import Any, BinaryIO
 
 import h5py
 import numpy as np
-import numpy.typing as npt
 
 from calib.errors import OutputError
 from calib.simulation.evaluation import Evaluation, Evaluator
-
-FloatArray = npt.NDArray[np.float64]
+from mpm.files import replacing
 
 #: Version of both layouts; a file with another one is refused.
 SCHEMA = 1
@@ -245,14 +243,10 @@ class EvaluationStore:
 
     def _compact(self) -> None:
         """Write everything into the HDF5 file under another name, rename it, and remove the journal."""
-        draft = self.path.with_name(self.path.name + ".draft")
         try:
-            with h5py.File(draft, "w") as file:
+            with replacing(self.path, sync=True) as draft, h5py.File(draft, "w") as file:
                 file.attrs.update(asdict(self.header))
                 _write_records(file, list(self))
-            with draft.open("rb+") as stream:
-                os.fsync(stream.fileno())
-            os.replace(draft, self.path)
             if self._stream is not None:
                 self._stream.close()
                 self._stream = None

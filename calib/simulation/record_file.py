@@ -7,7 +7,6 @@ attributes, ``counters`` and ``pieces`` as JSON, and ``key``, the SHA-256 of sce
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from calib.errors import OutputError
 from calib.io.provenance import code_key
 from calib.simulation.evaluation_store import content_key
 from calib.simulation.workers import Errand
+from mpm.files import replacing
 from mpm.output.record import ForceRecord
 from mpm.output.section import Section
 from mpm.output.topology import Topology
@@ -56,10 +56,9 @@ def _key(scene: Scene) -> str:
 
 
 def _write(path: Path, key: str, record: ForceRecord) -> None:
-    """Write a file under another name and rename it: a kill leaves the old one or none."""
-    draft = path.with_name(path.name + ".draft")
+    """Write the file of a record; a kill leaves the old one or none."""
     try:
-        with h5py.File(draft, "w") as file:
+        with replacing(path) as draft, h5py.File(draft, "w") as file:
             file.attrs["key"] = key
             for name, value in asdict(record).items():
                 if isinstance(value, np.ndarray):
@@ -69,7 +68,6 @@ def _write(path: Path, key: str, record: ForceRecord) -> None:
                         file[f"{SECTION}/{part}"] = content
                 else:
                     file.attrs[name] = json.dumps(value) if name in JSON else value
-        os.replace(draft, path)
     except OSError as e:
         raise OutputError(f"{path}: cannot be written ({e}); check the disk") from None
 

@@ -6,7 +6,6 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
 from calib.fit.multistart import FitResult
@@ -19,8 +18,7 @@ from calib.uncertainty.intervals import Uncertainty, evidence, uncertainty
 from calib.uncertainty.posterior import Posterior, sampled
 from calib.uncertainty.predictive import Band, bands
 from calib.uncertainty.profile_likelihood import RISE, Profile, profiles, with_profiles
-
-FloatArray = npt.NDArray[np.float64]
+from mpm.arrays import FloatArray
 
 JUDGED = 3
 """Times that the ends of intervals are simulated as they count, after the first those of what is called identified alone: each run may

@@ -14,7 +14,6 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
@@ -30,9 +29,8 @@ from calib.simulation.evaluation import Evaluator
 from calib.uncertainty.analysis import Doubt, as_good, at_first_sight, doubt_of
 from calib.uncertainty.intervals import EXPLAINED, Interval
 from calib.uncertainty.profile_likelihood import RISE
+from mpm.arrays import FloatArray
 from mpm.errors import SimulationError
-
-FloatArray = npt.NDArray[np.float64]
 
 PROVEN = ("R", "R_skin")
 """Properties that a fit may claim: of 100 made-up bananas 28 of 28 and 15 of 15 such intervals held the truth. Of E, yield stress and initiation

@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import block_diag
 from scipy.stats import chi2
 from scipy.stats import t as student
@@ -29,8 +28,8 @@ from calib.problem.joint_objective import JointObjective
 from calib.problem.nuisance import Whitening
 from calib.problem.objective import Objective, Trial
 from calib.problem.parameters import Z95, Parameter, ParameterSet
+from mpm.arrays import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
 Verdict = Literal["identified", "weak", "one_sided", "not_seen", "at_bound"]
 
 #: A parameter is identified when its posterior is narrower than this part of its prior, and not seen when it

@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from calib.errors import CurveError
 from calib.fit.surrogate import Surrogate
 from calib.problem.parameters import ParameterSet
 from calib.uncertainty.intervals import COVERED, Uncertainty
-
-FloatArray = npt.NDArray[np.float64]
+from mpm.arrays import FloatArray
 
 WALKERS = 4
 """Walkers of the ensemble for each parameter."""

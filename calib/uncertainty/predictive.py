@@ -12,13 +12,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from calib.fit.surrogate import Surrogate
 from calib.problem.objective import Objective
 from calib.uncertainty.intervals import COVERED, Uncertainty
-
-FloatArray = npt.NDArray[np.float64]
+from mpm.arrays import FloatArray
 
 DRAWS = 400
 """Materials drawn: the ends of a 95 % band are then known to a tenth of their distance."""

@@ -18,15 +18,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import least_squares
 
 from calib.fit.surrogate import STEP, Surrogate, slopes
 from calib.problem.parameters import Z95, Parameter, ParameterSet
 from calib.uncertainty.intervals import IDENTIFIED, NOT_SEEN, Interval, Uncertainty, Verdict
 from calib.uncertainty.posterior import Posterior
-
-FloatArray = npt.NDArray[np.float64]
+from mpm.arrays import FloatArray
 
 RISE = Z95**2
 """Rise of chi-square at the ends of a 95 % interval: 3.84."""

@@ -11,12 +11,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from calib.fit.multistart import FitResult
 from calib.problem.objective import Objective
+from mpm.arrays import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
 Indices = dict[str, dict[str, dict[str, float]]]
 
 BASE = 128

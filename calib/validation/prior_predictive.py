@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import qmc, truncnorm
 
 from calib._version import __version__
@@ -32,10 +31,9 @@ from calib.simulation.evaluation import PARTED, Evaluation
 from calib.simulation.evaluation_store import EvaluationStore, Header, content_key
 from calib.simulation.workers import Workers
 from calib.trace.filters import N_STROKE, filter_simulated
+from mpm.arrays import FloatArray
 from mpm.scene import Knife, Scene
 from mpm.shapes import volume
-
-FloatArray = npt.NDArray[np.float64]
 
 DRAWS = 32
 QUANTILES: Mapping[str, float] = {"q025": 0.025, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q975": 0.975}

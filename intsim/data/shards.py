@@ -24,7 +24,6 @@ from __future__ import annotations
 
 import io
 import json
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +37,7 @@ from calib.io.folder import finite
 from intsim.data.demonstrate import Demonstration
 from intsim.task.planner import CONTROL_RATE, GRIPPER_CLOSED, PHASES
 from intsim.task.targets import Item
+from mpm.files import replacing, write_atomic
 from mpm.shapes import Shape
 
 SHARD_NAME = "shard-{:04d}"
@@ -124,13 +124,8 @@ def keep(path: Path, content: bytes) -> None:
     Raises:
         OutputError: The disk is full, or the like.
     """
-    draft = path.with_suffix(".draft")
     try:
-        with draft.open("wb") as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.replace(draft, path)
+        write_atomic(path, content, sync=True)
     except OSError as e:
         raise OutputError(f"{path}: cannot be written ({e.strerror}); what was made before is there") from None
 
@@ -148,20 +143,19 @@ def put_together(
     Raises:
         OutputError: The disk is full, or the like.
     """
-    draft = path.with_suffix(".draft")
     listed = []
     try:
-        with h5py.File(draft, "w") as file:
-            for k, name in enumerate(parts):
-                with h5py.File(name) as own:
-                    group = file.create_group(f"traj_{k}")
-                    for child in own:
-                        own.copy(child, group)
-                    for key in set(own.attrs) - {ABOUT}:
-                        group.attrs[key] = own.attrs[key]
-                    listed.append(json.loads(own.attrs.get(ABOUT, "{}")))
-        beside(listed)
-        os.replace(draft, path)
+        with replacing(path) as draft:
+            with h5py.File(draft, "w") as file:
+                for k, name in enumerate(parts):
+                    with h5py.File(name) as own:
+                        group = file.create_group(f"traj_{k}")
+                        for child in own:
+                            own.copy(child, group)
+                        for key in set(own.attrs) - {ABOUT}:
+                            group.attrs[key] = own.attrs[key]
+                        listed.append(json.loads(own.attrs.get(ABOUT, "{}")))
+            beside(listed)
         for part in parts:
             part.unlink()
     except OSError as e:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import re
 import tempfile
 from collections.abc import Mapping
@@ -20,6 +19,7 @@ from typing import Any
 import matplotlib
 import typst
 
+from mpm.files import write_atomic
 from reports import ReportError
 
 NBSP = "\u00a0"
@@ -210,12 +210,9 @@ def publish(
         ReportError: The file cannot be written.
     """
     pdf = _typeset(template, content, figures, date)
-    part = target.with_name(target.name + ".part")
     try:
-        part.write_bytes(pdf)
-        os.replace(part, target)
+        write_atomic(target, pdf)
     except OSError as e:
-        part.unlink(missing_ok=True)
         raise ReportError(
             f"{target}: cannot be written ({e.strerror}); free the disk or the permission, then make the "
             "report again with cutcal report"

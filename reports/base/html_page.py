@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from calib.errors import OutputError
+from mpm.files import write_atomic
 from reports.base.scene_render import COLOURS, EYE, FRAME, INK, STEEL, WOOD, Film, blade_at
 
 PER_METRE = 1e5  # whole numbers of the file in a metre: hundredths of a millimetre
@@ -48,9 +49,7 @@ def page(film: Film, path: Path, title: str) -> None:
     figure.update_yaxes(title=TITLES[2], rangemode="tozero")
     text = figure.to_html(include_plotlyjs=True, full_html=True, auto_play=False, config={"displaylogo": False})
     try:
-        draft = path.with_name(f"{path.name}.draft")
-        draft.write_text(text, encoding="utf-8")
-        draft.replace(path)
+        write_atomic(path, text)
     except OSError as e:
         raise OutputError(f"{path}: cannot be written ({e.strerror or e})") from None
 

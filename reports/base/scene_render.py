@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from calib.errors import OutputError
+from mpm.files import replacing
 from mpm.output.snapshot import Snapshot
 from mpm.output.surface import Surface
 from mpm.scene import Knife, Scene
@@ -201,8 +202,8 @@ def video(film: Film, path: Path, progress: Callable[[int], None] = lambda done:
         from imageio_ffmpeg import write_frames
     except ImportError:
         raise OutputError("a video needs imageio-ffmpeg: pip install 'cutcal[view]', or leave the option out") from None
-    draft = path.with_name(f"draft-{path.name}")
-    with _drawing(path), Stage(film, VIDEO_SIZE) as stage:
+    own = path.with_name(f"draft-{path.name}")  # the encoder knows the format by the suffix
+    with _drawing(path), replacing(path, draft=own) as draft, Stage(film, VIDEO_SIZE) as stage:
         writer = write_frames(str(draft), VIDEO_SIZE, fps=RATE, quality=7, ffmpeg_log_level="error")
         writer.send(None)
         try:
@@ -211,7 +212,6 @@ def video(film: Film, path: Path, progress: Callable[[int], None] = lambda done:
                 progress(done)
         finally:
             writer.close()
-        draft.replace(path)
 
 
 @contextmanager

@@ -8,19 +8,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import t as student
 
 from calib.io.provenance import key_of
 from calib.material.food import FoodSpec
 from calib.material.scene import CELL_PER_ZONE, Sizing, cut_scene, specimen
+from mpm.arrays import FloatArray
 from mpm.output.record import ForceRecord
 from mpm.scene import CONTACTS, Knife, Scene
 from mpm.shapes import volume
 from studies.convergence.gci import REPEATABILITY
 from studies.regression.reference_curves import CHECKED
-
-FloatArray = npt.NDArray[np.float64]
 
 KNIFE = "kitchen"  # of every recorded cut
 MOST_CELLS = 12

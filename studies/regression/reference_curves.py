@@ -17,14 +17,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 
 from calib.errors import RegressionError
 from calib.io.folder import write_csv, write_json
 from calib.io.yaml_checks import PACKAGE, data_path
-
-FloatArray = npt.NDArray[np.float64]
+from mpm.arrays import FloatArray
 
 COLUMNS = ("stroke_m", "knife_N", "edge_N", "face_N", "work_J")
 CHECKED = COLUMNS[1:]

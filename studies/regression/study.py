@@ -13,17 +13,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from calib.errors import CurveError, RegressionError
 from calib.io.progress import Countdown
 from calib.io.provenance import code_key, git_commit, versions
 from calib.simulation.workers import DIED, Workers
 from calib.validation.metrics import compare
+from mpm.arrays import FloatArray
 from studies.regression.baseline import KEY_LENGTH, OTHERS, SAME, SEED, Case, cut, repeatability, results, scales
 from studies.regression.reference_curves import CHECKED, Reference, References
 
-FloatArray = npt.NDArray[np.float64]
 Say = Callable[[str], None]
 
 UNCHANGED = 1e-6

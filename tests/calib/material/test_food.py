@@ -321,7 +321,7 @@ def test_round_trip(name: str, tmp_path: Path, foods: dict[str, FoodSpec]) -> No
         "gpu": None,
     }
     assert load_foods(path) == {name: food}
-    assert not list(tmp_path.glob("*.part"))
+    assert not list(tmp_path.glob("*.draft"))
 
 
 @pytest.mark.parametrize("odd", ["1e5", "-2.E+03", "no", "2026-11-21", "1:30", "null", "0x1f", " a ", "ü: #"])

@@ -387,7 +387,7 @@ def test_an_older_report_survives_a_failure(tmp_path: Path) -> None:
     with pytest.raises(ReportError):
         write_report(run)
     assert (run / "report.pdf").read_bytes() == before
-    assert not list(run.glob("*.part"))
+    assert not list(run.glob("*.draft"))
 
 
 def test_report_that_cannot_be_written(tmp_path: Path) -> None:
@@ -396,7 +396,7 @@ def test_report_that_cannot_be_written(tmp_path: Path) -> None:
     (run / "report.pdf").mkdir()
     with pytest.raises(ReportError, match=r"report\.pdf: cannot be written"):
         write_report(run)
-    assert not list(run.glob("*.part"))
+    assert not list(run.glob("*.draft"))
 
 
 def test_reports_is_cheap_to_import() -> None:
