@@ -16,6 +16,8 @@ TIP_HEIGHT, STRICT_TIP_HEIGHT = 0.05, 0.005
 """Height of the edge above the table that counts as reaching it, published and strict [m]."""
 ANGLE_TOLERANCE = math.radians(10.0)  # most that the edge may deviate from across the food
 PLACE_TOLERANCE = 0.1  # most error of the place, over the size of the food
+CRITERIA = ("tip", "region", "angle", "place", "strict_tip", "count", "even")
+"""All criteria; the first four are published, the last two are of equal pieces alone."""
 LENGTH_VARIATION_LIMIT = 0.1  # most spread of the lengths of equal pieces, over their mean
 
 
@@ -42,7 +44,7 @@ class GeometricOutcome:
     @property
     def published(self) -> bool:
         """The four published criteria together."""
-        return all(self.criteria[name] for name in ("tip", "region", "angle", "place"))
+        return all(self.criteria[name] for name in CRITERIA[:4])
 
     @property
     def strict(self) -> bool:

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from calib.errors import OutputError
+from calib.io.typed_document import read_document
 from calib.material.food import dump_material, load_food
 from cutcal.main import main
-from intsim.evaluate import evaluate, expected_place_rate, roll_out, run_episode
+from intsim.evaluate import RESULT_FILE, Evaluation, evaluate, roll_out, run_episode
+from intsim.outcomes import EvaluationResult, expected_place_rate
 from intsim.policy.oracles import POLICIES, SHALLOW_HEIGHT, make_policy
 from intsim.sim.severing import PANDA_ARM, commanded_scene, simulate_severing
 from intsim.task.kinematic_table import KinematicTable
@@ -30,12 +35,19 @@ HALF = Episode("seeds", 0, CutSpec("strawberry"), BERRY, (), "cut half of the st
 FEW = 30
 
 
+def document(evaluation: Evaluation, out: Path) -> dict[str, Any]:
+    """What an evaluation writes; it is read back as what it returns."""
+    result = evaluate(evaluation, out)
+    assert read_document(out / RESULT_FILE, EvaluationResult) == result
+    return valid(json.loads((out / RESULT_FILE).read_text()))
+
+
 @pytest.fixture(scope="module")
 def found(tmp_path_factory) -> dict[str, dict]:
     """What the evaluation says of each policy."""
     out = tmp_path_factory.mktemp("evaluate")
     names = ("oracle", "wrong-side", "wrong-item", "shallow", "random")
-    return {name: valid(evaluate(make_policy(name), name, ALL, list(SUITES), FEW, out / name)) for name in names}
+    return {name: document(Evaluation(make_policy(name), name, ALL, list(SUITES), FEW), out / name) for name in names}
 
 
 def test_the_oracle_succeeds_everywhere(found):
@@ -61,10 +73,8 @@ def test_each_wrong_oracle_fails_in_its_own_way(found):
 
 def test_noise_succeeds_as_often_as_its_closed_form_says(tmp_path):
     """erf(0.1 L / (sigma sqrt 2)) of the place, averaged over foods of all lengths, within three standard deviations of 600 trials."""
-    document = valid(
-        evaluate(make_policy("noisy", 0.01), "noisy", ALL, ["seeds", "language"], 300, tmp_path / "e", sigma=0.01)
-    )
-    for suite in document["suites"].values():
+    noisy = Evaluation(make_policy("noisy", 0.01), "noisy", ALL, ["seeds", "language"], 300, sigma=0.01)
+    for suite in document(noisy, tmp_path / "e")["suites"].values():
         p = suite["expected_place"]
         assert 0.3 < p < 0.7
         assert suite["criteria"]["place"]["rate"] == pytest.approx(p, abs=3 * math.sqrt(p * (1 - p) / 300))
@@ -94,13 +104,16 @@ def test_criteria_turn_at_their_thresholds(pose, failed):
 def test_a_knife_that_stops_short_meets_the_published_criteria_and_severs_nothing():
     """7 mm above the board is within the published 50 mm; the solver finds the food in one piece, and in two under the full cut."""
     rows = {
-        name: run_episode(make_policy(name), HALF, ALL, severing=True, knife="edc", arm=Arm())
+        name: run_episode(
+            Evaluation(make_policy(name), name, ALL, ["seeds"], 1, severing=True, knife="edc", arm=Arm()), HALF
+        )
         for name in ("shallow", "oracle")
     }
     short, whole = rows["shallow"], rows["oracle"]
-    assert short["published"] and not short["strict"] and short["severing"]["severed"] is False
-    assert short["severing"]["uncut"] > 0.1 and short["height_m"] == pytest.approx(SHALLOW_HEIGHT, abs=1e-6)
-    assert whole["strict"] and whole["severing"]["severed"] is True and whole["severing"]["uncut"] == 0.0
+    assert short.severing is not None and whole.severing is not None
+    assert short.published and not short.strict and short.severing.severed is False
+    assert short.severing.uncut > 0.1 and short.height_m == pytest.approx(SHALLOW_HEIGHT, abs=1e-6)
+    assert whole.strict and whole.severing.severed is True and whole.severing.uncut == 0.0
 
 
 @pytest.mark.slow
@@ -137,9 +150,10 @@ def test_what_the_solver_cannot_cut_counts_as_neither():
 
 def test_an_evaluation_that_was_stopped_goes_on(tmp_path, monkeypatch):
     """What was done is not done again, a line that was cut off is, and another evaluation is not mixed in."""
-    whole = evaluate(make_policy("oracle"), "oracle", ALL, ["seeds"], 6, tmp_path / "whole")
+    six = Evaluation(make_policy("oracle"), "oracle", ALL, ["seeds"], 6)
+    whole = evaluate(six, tmp_path / "whole")
     out = tmp_path / "stopped"
-    evaluate(make_policy("oracle"), "oracle", ALL, ["seeds"], 3, out)
+    evaluate(replace(six, episodes=3), out)
     (out / "evaluate.json").unlink()
     with (out / "evaluate.jsonl").open("a") as file:
         file.write('{"suite": "se')
@@ -148,10 +162,10 @@ def test_an_evaluation_that_was_stopped_goes_on(tmp_path, monkeypatch):
         "intsim.evaluate.sample_episode",
         lambda suite, seed, foods: done.append(seed) or sample_episode(suite, seed, foods),
     )
-    assert evaluate(make_policy("oracle"), "oracle", ALL, ["seeds"], 6, out, resume=True)["suites"] == whole["suites"]
+    assert evaluate(six, out, resume=True).suites == whole.suites
     assert done == [FIRST_TEST_SEED + 3, FIRST_TEST_SEED + 4, FIRST_TEST_SEED + 5]
     with pytest.raises(OutputError, match="something else"):
-        evaluate(make_policy("shallow"), "shallow", ALL, ["seeds"], 6, out, resume=True)
+        evaluate(replace(six, policy=make_policy("shallow"), name="shallow"), out, resume=True)
 
 
 def test_episodes_repeat_with_their_seed_and_differ_between_suites():

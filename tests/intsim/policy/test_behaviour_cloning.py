@@ -13,7 +13,7 @@ from cutcal.main import main
 from intsim.data.demonstrate import Demonstration
 from intsim.data.manifest import Manifest
 from intsim.data.shards import EPISODE_PART, keep, pack_episode, write_shard
-from intsim.evaluate import evaluate, roll_out
+from intsim.evaluate import Evaluation, evaluate, roll_out
 from intsim.policy.behaviour_cloning import (
     ACTION_CHUNK,
     Clone,
@@ -168,8 +168,8 @@ def test_it_learns_to_do_what_is_demonstrated(tmp_path):
     dataset(tmp_path / "d", 60)
     clone = train(tmp_path / "d", keep="published")
     assert clone.about["trajectories"] == 59
-    found = evaluate(clone, "clone", ORANGE, ["seeds"], 60, tmp_path / "e")["suites"]["seeds"]
-    assert found["published"]["rate"] > 0.6 and found["criteria"]["angle"]["rate"] > 0.9
+    found = evaluate(Evaluation(clone, "clone", ORANGE, ["seeds"], 60), tmp_path / "e").suites["seeds"]
+    assert found.published.rate > 0.6 and found.criteria["angle"].rate > 0.9
     few = train(tmp_path / "d", keep="severed", most=3)
     again = train(tmp_path / "d", keep="severed", most=3)
     assert few.about["trajectories"] == 3

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ from intsim.data.demonstrate import LEVELLING_GAIN, MAX_COMMAND_DEPTH, demonstra
 from intsim.data.generate import make_episode
 from intsim.data.manifest import Manifest
 from intsim.data.shards import StoredTrajectory
-from intsim.evaluate import evaluate
+from intsim.evaluate import Evaluation, evaluate
 from intsim.policy.oracles import make_policy
 from intsim.sim import environment as robot_environment
 from intsim.sim.closed_loop import make_environment, roll_out_closed_loop
@@ -319,39 +320,21 @@ def test_a_policy_is_judged_in_closed_loop_with_the_food(tmp_path):
         ("deep", "overdrive", World()),
     ):
         out = tmp_path / name
-        found[name] = valid(evaluate(make_policy(policy), policy, food, ["seeds"], 2, out, world=world, pool=Here()))
+        evaluate(Evaluation(make_policy(policy), policy, food, ["seeds"], 2, world=world), out, pool=Here())
+        valid(json.loads((out / "evaluate.json").read_text()))
         rows = [json.loads(line) for line in (out / "evaluate.jsonl").read_text().splitlines()[1:]]
-        found[name]["rows"] = rows
+        found[name] = rows
         assert all(r["published"] for r in rows) and not any(r["clipped"] for r in rows)
-    free, planned, deep = (found[name]["rows"] for name in ("free", "planned", "deep"))
+    free, planned, deep = (found[name] for name in ("free", "planned", "deep"))
     for a, b, c in zip(free, planned, deep, strict=True):
         assert "severing" not in a and a["height_m"] < 2e-3
         assert b["height_m"] > a["height_m"] and b["severing"]["peak"] > 1
         assert c["severing"]["severed"] and c["height_m"] < 1e-3
-    more = evaluate(
-        make_policy("oracle"),
-        "oracle",
-        food,
-        ["seeds"],
-        3,
-        tmp_path / "free",
-        world=World(coupled=False),
-        pool=Here(),
-        resume=True,
-    )
-    assert more["suites"]["seeds"]["published"]["trials"] == 3
+    again = Evaluation(make_policy("oracle"), "oracle", food, ["seeds"], 3, world=World(coupled=False))
+    more = evaluate(again, tmp_path / "free", pool=Here(), resume=True)
+    assert more.suites["seeds"].published.trials == 3
     with pytest.raises(OutputError, match="something else"):
-        evaluate(
-            make_policy("oracle"),
-            "oracle",
-            food,
-            ["seeds"],
-            3,
-            tmp_path / "free",
-            world=World(),
-            pool=Here(),
-            resume=True,
-        )
+        evaluate(replace(again, world=World()), tmp_path / "free", pool=Here(), resume=True)
 
 
 class Replay:
