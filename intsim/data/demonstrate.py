@@ -22,10 +22,17 @@ from intsim.task.targets import TaskError, target
 
 BOARD_REACHED = 2e-4  # height of the edge at which it is on the board [m]
 MAX_COMMAND_DEPTH = 0.08  # way below the board that is commanded at most [m]: 140 N behind the Panda's own gains
-LEVELLING_GAIN = 0.2  # part of the edge's tilt by which a step of pressing on turns the command back where one end of it is on the board [-]: in a quarter of a
-# second, after the arm, which lags by a tenth
+LEVELLING_GAIN = 0.2
+"""Part of the edge's tilt by which a step of pressing on turns the command back where one end of it is on the board [-].
+
+It levels the edge in a quarter of a second, after the arm, which lags by a tenth.
+"""
 MAX_LEVELLING_STEPS = 40  # steps in which it is turned at most: as many as the way down to the deepest command takes
-BLADE_END_REACHED = 5e-4  # height of the lower end of the blade at which it is there [m], half of what the middle hangs above it (1.1 mm, banana)
+BLADE_END_REACHED = 5e-4
+"""Height of the lower end of the blade at which it is on the board [m]: half of what the middle of a banana's hangs above it.
+
+See docs/robot.md, "What it shows".
+"""
 HOLD_TIME = 0.3  # time that the edge is held on the board [s]
 RETRACT_TIME = 1.5  # time of the way back up [s]
 MAX_IK_ERROR = 1e-3  # error of the inverse kinematics that is too large [m]
@@ -69,77 +76,88 @@ def demonstrate(env: Any, *, style: str = "press", sustained: bool = True, meshe
 
     Args:
         env: A :class:`intsim.sim.environment.CutFoodEnv` that was reset, in joint positions.
-        style: Of the motion.
-        sustained: Whether the edge is commanded deeper until the food is in pieces or the board reached, and held there; the load turns the hand, and
-            where one end of the blade then rests on the board and the other hangs, it is turned back. Without it the motion is the planned one, whatever
-            the food does.
+        style: Of the motion, in :data:`intsim.task.planner.STYLES`.
+        sustained: Whether the edge is commanded deeper until the food is in pieces or the board reached, and held there. The load
+            turns the hand; where one end of the blade then rests on the board and the other hangs, the command turns it back.
+            Without it the motion is the planned one, whatever the food does.
         meshes: Whether the food's surface is kept.
+
+    Returns:
+        What was done and seen, step by step; its status says whether the solver and the arm followed.
     """
-    track, episode, half = Demonstration(), env.episode, load_knife(env.knife).length / 2
-    _see(env, track)
+    demo, episode = Demonstration(), env.episode
+    _see(env, demo)
     for _ in range(episode.spec.cuts):
         item = (env.coupling if env.coupled else env.table).items[0]
         try:
             along = target(episode.spec, item)
         except TaskError:
             break
-        path = plan_cut(item, along, Descent(style), start=env.pose)
-        for pose, phase in zip(path.pose, path.phase, strict=True):
+        planned = plan_cut(item, along, Descent(style), start=env.pose)
+        for pose, phase in zip(planned.pose, planned.phase, strict=True):
             if phase != "retract":
-                _step(env, track, pose, str(phase), meshes)
-        pose = track.command[-1].copy()
+                _step(env, demo, pose, str(phase), meshes)
+        pose = demo.command[-1].copy()
         if sustained:
-            whole, turned = len(item.pieces), 0
-            while (
-                len(env.coupling.items[0].pieces) == whole
-                and env.pose[2] > BOARD_REACHED
-                and pose[2] > -MAX_COMMAND_DEPTH
-                and turned < MAX_LEVELLING_STEPS
-            ):
-                if env.pose[2] - half * abs(np.sin(env.pose[4])) < BLADE_END_REACHED:
-                    pose[4] -= LEVELLING_GAIN * env.pose[4]
-                    turned += 1
-                else:
-                    pose[2] -= DESCENT_SPEED / CONTROL_RATE
-                _step(env, track, pose, "cut", meshes)
-            for _ in range(round(HOLD_TIME * CONTROL_RATE)):
-                _step(env, track, pose, "hold", meshes)
+            _press_on(env, demo, pose, len(item.pieces), meshes)
         up = np.array([*pose[:2], HOME[2], pose[3], 0.0])
         for part in minimum_jerk(round(RETRACT_TIME * CONTROL_RATE)):
-            _step(env, track, pose + part * (up - pose), "retract", meshes)
-    return track
+            _step(env, demo, pose + part * (up - pose), "retract", meshes)
+    return demo
 
 
-def _see(env: Any, track: Demonstration) -> None:
+def _press_on(env: Any, demo: Demonstration, pose: np.ndarray, pieces: int, meshes: bool) -> None:
+    """Command the edge deeper, and level it, until the food has more pieces or the board is reached; then hold it there.
+
+    The commanded pose (5,) is changed.
+    """
+    half, turned = load_knife(env.knife).length / 2, 0
+    while (
+        len(env.coupling.items[0].pieces) == pieces
+        and env.pose[2] > BOARD_REACHED
+        and pose[2] > -MAX_COMMAND_DEPTH
+        and turned < MAX_LEVELLING_STEPS
+    ):
+        if env.pose[2] - half * abs(np.sin(env.pose[4])) < BLADE_END_REACHED:
+            pose[4] -= LEVELLING_GAIN * env.pose[4]
+            turned += 1
+        else:
+            pose[2] -= DESCENT_SPEED / CONTROL_RATE
+        _step(env, demo, pose, "cut", meshes)
+    for _ in range(round(HOLD_TIME * CONTROL_RATE)):
+        _step(env, demo, pose, "hold", meshes)
+
+
+def _see(env: Any, demo: Demonstration) -> None:
     robot = env.agent.robot
-    track.qpos.append(robot.get_qpos()[0].numpy().astype(np.float32))
-    track.qvel.append(robot.get_qvel()[0].numpy().astype(np.float32))
-    track.edge.append(env.pose)
+    demo.qpos.append(robot.get_qpos()[0].numpy().astype(np.float32))
+    demo.qvel.append(robot.get_qvel()[0].numpy().astype(np.float32))
+    demo.edge.append(env.pose)
 
 
-def _step(env: Any, track: Demonstration, pose: np.ndarray, phase: str, meshes: bool) -> None:
+def _step(env: Any, demo: Demonstration, pose: np.ndarray, phase: str, meshes: bool) -> None:
     """One control step towards a pose."""
-    near = np.array([*track.action[-1][:7], 0.0, 0.0]) if track.action else track.qpos[-1].astype(float)
+    near = np.array([*demo.action[-1][:7], 0.0, 0.0]) if demo.action else demo.qpos[-1].astype(float)
     joints, off = env.kinematics.joints(pose, near)
     if off > MAX_IK_ERROR:
-        track.status = f"the arm does not reach {np.round(pose[:3], 3).tolist()}"
+        demo.status = f"the arm does not reach {np.round(pose[:3], 3).tolist()}"
     action = np.array([*joints[:7], GRIPPER_CLOSED], np.float32)
     _, _, _, _, info = env.step(action)
     assert phase in PHASES
-    track.command.append(np.array(pose, float))
-    track.action.append(action)
-    track.phase.append(phase)
-    track.force.append(env.forces)
-    track.touching.append(bool(info["touching"]))
-    track.uncut.append(float(info["uncut"]))
-    track.pieces.append(len(env.coupling.items[0].pieces))
-    track.published.append(bool(info["published"]))
-    track.severed.append(bool(info["severed"]))
-    _see(env, track)
+    demo.command.append(np.array(pose, float))
+    demo.action.append(action)
+    demo.phase.append(phase)
+    demo.force.append(env.forces)
+    demo.touching.append(bool(info["touching"]))
+    demo.uncut.append(float(info["uncut"]))
+    demo.pieces.append(len(env.coupling.items[0].pieces))
+    demo.published.append(bool(info["published"]))
+    demo.severed.append(bool(info["severed"]))
+    _see(env, demo)
     broken = next((d.why for d in env.coupling.done if d.severed is None), "")
     if broken:
-        track.status = broken
+        demo.status = broken
     mesh = env.coupling.mesh() if meshes else None
     if mesh is not None:
         which, points, triangles, flesh = mesh
-        track.meshes.append((len(track.action), which, points, triangles, flesh))
+        demo.meshes.append((len(demo.action), which, points, triangles, flesh))

@@ -18,20 +18,28 @@ from intsim.data.shards import StoredTrajectory, trajectories
 
 @dataclass(frozen=True, eq=False)
 class ExportEpisode:
-    """A trajectory before a background. Attributes: stored; scene, None without pictures; sentence; pictures by camera (T, h, w, 3)."""
+    """A trajectory before a background.
+
+    Attributes:
+        stored: The trajectory.
+        background: Number of the background; None without pictures.
+        sentence: What was asked for, in words.
+        pictures: By camera, 8 bits, shape (T, h, w, 3) each; empty without pictures.
+    """
 
     stored: StoredTrajectory
-    scene: int | None
+    background: int | None
     sentence: str
     pictures: dict[str, np.ndarray]
 
 
-def check_pictured_target(out: Path, scenes: Sequence[int], kind: str, *packages: str) -> None:
-    """The same for an export that is nothing without pictures.
+def check_pictured_target(out: Path, backgrounds: Sequence[int], kind: str, *packages: str) -> None:
+    """Check the target of an export that is nothing without pictures, before anything is written.
 
     Args:
-        out, scenes: As in :func:`check_target`.
-        kind: What it is called.
+        out: Folder that will be made.
+        backgrounds: Numbers of the backgrounds.
+        kind: What the export is called.
         packages: Names of the modules that it is written with.
 
     Raises:
@@ -40,25 +48,25 @@ def check_pictured_target(out: Path, scenes: Sequence[int], kind: str, *packages
     for name in packages:
         if find_spec(name) is None:
             raise OutputError(f"dataset export: {name} is not installed; pip install 'cutcal[data]'")
-    if not scenes:
+    if not backgrounds:
         raise OutputError(f"dataset export: {kind} is pictures and actions; name backgrounds, such as --scenes 0,1,2")
-    check_target(out, scenes)
+    check_target(out, backgrounds)
 
 
-def check_target(out: Path, scenes: Sequence[int]) -> None:
-    """Before anything is written.
+def check_target(out: Path, backgrounds: Sequence[int]) -> None:
+    """Check the target of an export, before anything is written.
 
     Raises:
         OutputError: A background that does not exist, or a folder that is taken.
     """
-    check_backgrounds(scenes)
+    check_backgrounds(backgrounds)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise OutputError(f"--out {out}: exists already and is never overwritten; choose another folder")
 
 
 def export_episodes(
     folder: Path,
-    scenes: Sequence[int],
+    backgrounds: Sequence[int],
     pixels: int,
     pool: Workers | None = None,
     say: Callable[[str], None] = lambda text: None,
@@ -67,26 +75,29 @@ def export_episodes(
 
     Args:
         folder: A dataset of :func:`intsim.data.generate.generate`.
-        scenes: Backgrounds; without any each trajectory comes once, without pictures.
+        backgrounds: Their numbers; without any each trajectory comes once, without pictures.
         pixels: Width and height of the pictures.
         pool: Where those are rendered that are not in the folder yet; they are kept there.
         say: Called with a line after each.
 
+    Returns:
+        The episodes, one background after the other.
+
     Raises:
         CutcalError: There is no renderer, or the folder holds no dataset, or not the pictures and there is no pool.
     """
-    if scenes and pool is not None:
-        render_dataset(folder, scenes, pixels, pool, say)
-    return _each(folder, scenes, pixels, say)
+    if backgrounds and pool is not None:
+        render_dataset(folder, backgrounds, pixels, pool, say)
+    return _each(folder, backgrounds, pixels, say)
 
 
-def _each(folder: Path, scenes: Sequence[int], pixels: int, say: Callable[[str], None]) -> Iterator[ExportEpisode]:
-    total = sum(1 for _ in trajectories(folder)) * max(len(scenes), 1)
+def _each(folder: Path, backgrounds: Sequence[int], pixels: int, say: Callable[[str], None]) -> Iterator[ExportEpisode]:
+    total = sum(1 for _ in trajectories(folder)) * max(len(backgrounds), 1)
     rest, done = Countdown(max(total, 1)), 0
-    for place, scene in enumerate(scenes or [None]):
+    for turn, background in enumerate(backgrounds or [None]):
         for k, stored in enumerate(trajectories(folder)):
-            sentences = stored.about["instructions"]
-            pictures = {} if scene is None else load_pictures(folder, stored, scene, pixels)
-            yield ExportEpisode(stored, scene, sentences[(k + place) % len(sentences)], pictures)
+            sentences = stored.entry["instructions"]
+            pictures = {} if background is None else load_pictures(folder, stored, background, pixels)
+            yield ExportEpisode(stored, background, sentences[(k + turn) % len(sentences)], pictures)
             done += 1
             say(f"episode {done} of {total}, {rest.left(1)}")

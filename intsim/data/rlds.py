@@ -1,7 +1,7 @@
-"""Export as RLDS, the TFDS layout that OpenVLA and Octo read; needs the extras ``[data]`` and ``[robot]``, and Vulkan, but no TensorFlow.
+"""Export as RLDS, the TFDS layout that OpenVLA and Octo read; needs the extras ``[data]`` and ``[robot]``, and Vulkan.
 
-A record is a ``tf.train.Example`` for each episode, its steps end to end, written here by hand: a message of one map from names to lists, and
-TFRecord's frame of length and checksum. The force is not in it.
+It needs no TensorFlow. A record is a ``tf.train.Example`` for each episode, its steps end to end, written here by hand: a message
+of one map from names to lists, and TFRecord's frame of length and checksum. The force is not in it.
 """
 
 from __future__ import annotations
@@ -31,21 +31,21 @@ def export_rlds(
     folder: Path,
     out: Path,
     *,
-    scenes: Sequence[int],
+    backgrounds: Sequence[int],
     pixels: int = 128,
     pool: Workers | None = None,
     say: Callable[[str], None] = lambda text: None,
 ) -> dict[str, Any]:
     """Write ``cutcal/1.0.0`` with the splits train and val.
 
-    Each step has the observation (pictures ``image``, ``side_image``, ``wrist_image`` and ``state``: x y z roll pitch yaw pad gripper), the action
-    (change of pose [m, rad] and gripper), reward, discount, the flags of its place, and the sentence. ``val`` are whole trajectories, before every
-    background.
+    Each step has the observation, the action (change of pose [m, rad] and gripper), reward, discount, the flags of its place, and
+    the sentence. The observation is the pictures ``image``, ``side_image`` and ``wrist_image``, and ``state``: x y z roll pitch yaw
+    pad gripper. ``val`` are whole trajectories, before every background.
 
     Args:
         folder: A dataset of :func:`intsim.data.generate.generate`.
         out: Folder that is made.
-        scenes: Backgrounds that are rendered, at least one.
+        backgrounds: Numbers of those that are rendered, at least one.
         pixels: Width and height of the pictures.
         pool: Where pictures are rendered that the dataset does not have yet.
         say: Called with a line after each episode.
@@ -56,23 +56,32 @@ def export_rlds(
     Raises:
         CutcalError: A package or the renderer is missing, no background is named, the folder is taken or holds no dataset.
     """
-    check_pictured_target(out, scenes, "RLDS", "google_crc32c", "PIL")
-    shown = export_episodes(folder, scenes, pixels, pool, say)
+    check_pictured_target(out, backgrounds, "RLDS", "google_crc32c", "PIL")
+    shown = export_episodes(folder, backgrounds, pixels, pool, say)
     home = out / DATASET_NAME / DATASET_VERSION
     home.mkdir(parents=True)
     counts, sizes = {"train": 0, "val": 0}, {"train": 0, "val": 0}
     files = {split: (home / _file(split)).open("wb") for split in counts}
     try:
-        for view in shown:
-            split = "val" if view.stored.about["index"] % VALIDATION_STRIDE == VALIDATION_STRIDE - 1 else "train"
-            sizes[split] += write_record(files[split], encode_example(episode_lists(view)))
+        for episode in shown:
+            last = episode.stored.entry["index"] % VALIDATION_STRIDE == VALIDATION_STRIDE - 1
+            split = "val" if last else "train"
+            sizes[split] += write_record(files[split], encode_example(episode_lists(episode)))
             counts[split] += 1
     finally:
         for file in files.values():
             file.close()
     for split in [s for s, n in counts.items() if n == 0]:
         (home / _file(split)).unlink()
-    info = {
+    info = _info(counts, sizes)
+    (home / "dataset_info.json").write_text(json.dumps(info, indent=2) + "\n", encoding="utf-8")
+    (home / "features.json").write_text(json.dumps(features(pixels), indent=2) + "\n", encoding="utf-8")
+    return info
+
+
+def _info(counts: Mapping[str, int], sizes: Mapping[str, int]) -> dict[str, Any]:
+    """Content of dataset_info.json, from the number of episodes and bytes of each split."""
+    return {
         "name": DATASET_NAME,
         "version": DATASET_VERSION,
         "description": "Cuts of food by a simulated Panda, told in words.",
@@ -88,25 +97,22 @@ def export_rlds(
             if n
         ],
     }
-    (home / "dataset_info.json").write_text(json.dumps(info, indent=2) + "\n", encoding="utf-8")
-    (home / "features.json").write_text(json.dumps(features(pixels), indent=2) + "\n", encoding="utf-8")
-    return info
 
 
 def _file(split: str) -> str:
     return f"{DATASET_NAME}-{split}.tfrecord-00000-of-00001"
 
 
-def episode_lists(view: ExportEpisode) -> dict[str, list[bytes] | np.ndarray]:
+def episode_lists(episode: ExportEpisode) -> dict[str, list[bytes] | np.ndarray]:
     """The lists of one episode by name."""
-    found = episode_columns(view.stored)
+    found = episode_columns(episode.stored)
     n = len(found["timestamp"])
-    step = np.arange(n)
+    step, index = np.arange(n), episode.stored.entry["index"]
     out: dict[str, list[bytes] | np.ndarray] = {
-        f"steps/observation/{name}": [_jpeg(picture) for picture in view.pictures[camera]]
+        f"steps/observation/{name}": [_jpeg(picture) for picture in episode.pictures[camera]]
         for camera, name in zip(CAMERA_NAMES, ("image", "side_image", "wrist_image"), strict=True)
     }
-    done = (step == n - 1) & bool(view.stored.about["success"])
+    done = (step == n - 1) & bool(episode.stored.entry["success"])
     return out | {
         "steps/observation/state": found["observation.state"],
         "steps/action": found["action"],
@@ -115,8 +121,8 @@ def episode_lists(view: ExportEpisode) -> dict[str, list[bytes] | np.ndarray]:
         "steps/is_first": step == 0,
         "steps/is_last": step == n - 1,
         "steps/is_terminal": done,
-        "steps/language_instruction": [view.sentence.encode()] * n,
-        "episode_metadata/file_path": [f"trajectory {view.stored.about['index']}, background {view.scene}".encode()],
+        "steps/language_instruction": [episode.sentence.encode()] * n,
+        "episode_metadata/file_path": [f"trajectory {index}, background {episode.background}".encode()],
     }
 
 

@@ -42,70 +42,69 @@ from mpm.shapes import Shape
 
 SHARD_NAME = "shard-{:04d}"
 EPISODE_PART = "part-{:06d}.h5"  # an episode whose shard is not complete
-ABOUT = "about"  # attribute of such a file: the entry in the JSON file
-DATASET_FILE = "dataset.json"
+ENTRY = "about"  # attribute of such a file: the entry in the JSON file
 
 
-def pack_episode(track: Demonstration, about: Mapping[str, Any], mpm: Mapping[str, Any]) -> bytes:
+def pack_episode(demo: Demonstration, entry: Mapping[str, Any], mpm: Mapping[str, Any]) -> bytes:
     """An episode as the bytes of an HDF5 file with the content of its group.
 
     Args:
-        track: What was done.
-        about: Its entry in the JSON file.
+        demo: What was done.
+        entry: Its entry in the JSON file.
         mpm: Attributes of its group ``mpm``.
     """
     stream = io.BytesIO()
     with h5py.File(stream, "w") as file:
-        file.attrs[ABOUT] = json.dumps(finite(dict(about)))
-        n = len(track.action)
-        force = np.array(track.force, np.float32).reshape(n, -1, 3)
+        file.attrs[ENTRY] = json.dumps(finite(dict(entry)))
+        n = len(demo.action)
+        force = np.array(demo.force, np.float32).reshape(n, -1, 3)
         mean = force.mean(axis=1)
-        command, edge = np.array(track.command), np.array(track.edge)
+        command, edge = np.array(demo.command), np.array(demo.edge)
         change = command - edge[:-1]
         gripper = np.full(n, GRIPPER_CLOSED)
         delta = np.column_stack([change[:, :3], np.zeros(n), change[:, 4], change[:, 3], gripper])
         last = np.arange(n) == n - 1
         columns = {
-            "actions": np.array(track.action, np.float32),
-            "obs/agent/qpos": np.array(track.qpos, np.float32),
-            "obs/agent/qvel": np.array(track.qvel, np.float32),
+            "actions": np.array(demo.action, np.float32),
+            "obs/agent/qpos": np.array(demo.qpos, np.float32),
+            "obs/agent/qvel": np.array(demo.qvel, np.float32),
             "obs/extra/edge": edge.astype(np.float32),
-            "success": np.array(track.published) & np.array(track.severed),
+            "success": np.array(demo.published) & np.array(demo.severed),
             "terminated": np.zeros(n, bool),
             "truncated": last,
             "control/command": command.astype(np.float32),
             "control/delta": delta.astype(np.float32),
-            "control/phase": np.array([PHASES.index(p) for p in track.phase], np.int8),
+            "control/phase": np.array([PHASES.index(p) for p in demo.phase], np.int8),
             "mpm/force": force,
             "mpm/force_control": mean,
             "mpm/impulse": np.cumsum(mean, axis=0) / np.float32(CONTROL_RATE),
-            "mpm/touching": np.array(track.touching),
-            "mpm/uncut": np.array(track.uncut, np.float32),
-            "mpm/pieces": np.array(track.pieces, np.int16),
-            "mpm/severed": np.array(track.severed),
-            "mpm/published": np.array(track.published),
+            "mpm/touching": np.array(demo.touching),
+            "mpm/uncut": np.array(demo.uncut, np.float32),
+            "mpm/pieces": np.array(demo.pieces, np.int16),
+            "mpm/severed": np.array(demo.severed),
+            "mpm/published": np.array(demo.published),
         }
         for name, values in columns.items():
             file.create_dataset(name, data=values, compression="gzip", shuffle=True)
-        _surface(file, track)
-        touched = np.flatnonzero(track.touching)
+        _surface(file, demo)
+        touched = np.flatnonzero(demo.touching)
         attributes = {**mpm, "contact_step": int(touched[0]) if len(touched) else -1}
         for name, value in attributes.items():
             file["mpm"].attrs[name] = value
     return stream.getvalue()
 
 
-def _surface(file: h5py.File, track: Demonstration) -> None:
+def _surface(file: h5py.File, demo: Demonstration) -> None:
     """The food's surface in each step of a cut; each cut has triangles of its own."""
     cuts: list[list[int]] = []
-    for k, (step, which, points, _, _) in enumerate(track.meshes):
-        before = track.meshes[k - 1] if k else None
+    for k, (step, which, points, _, _) in enumerate(demo.meshes):
+        before = demo.meshes[k - 1] if k else None
         if before is None or before[0] != step - 1 or before[1] != which or len(before[2]) != len(points):
             cuts.append([])
         cuts[-1].append(k)
     for n, frames in enumerate(cuts):
         group = file.create_group(f"mpm/surface/{n}")
-        shown = [track.meshes[k] for k in frames]
+        shown = [demo.meshes[k] for k in frames]
         group.attrs["food"] = shown[0][1]
         group["step"] = np.array([s[0] for s in shown], np.int32)
         origin = shown[0][2].mean(axis=0)
@@ -118,7 +117,7 @@ def _surface(file: h5py.File, track: Demonstration) -> None:
         group.create_dataset("flesh", data=shown[0][4])
 
 
-def keep(path: Path, content: bytes) -> None:
+def write_part(path: Path, content: bytes) -> None:
     """Write a file whole or not at all.
 
     Raises:
@@ -130,8 +129,8 @@ def keep(path: Path, content: bytes) -> None:
         raise OutputError(f"{path}: cannot be written ({e.strerror}); what was made before is there") from None
 
 
-def put_together(
-    path: Path, parts: Sequence[Path], beside: Callable[[list[dict[str, Any]]], None] = lambda about: None
+def merge_parts(
+    path: Path, parts: Sequence[Path], beside: Callable[[list[dict[str, Any]]], None] = lambda entries: None
 ) -> None:
     """Make one file of several, each of them the group ``traj_k`` of it; a kill leaves them or the file.
 
@@ -152,9 +151,9 @@ def put_together(
                         group = file.create_group(f"traj_{k}")
                         for child in own:
                             own.copy(child, group)
-                        for key in set(own.attrs) - {ABOUT}:
+                        for key in set(own.attrs) - {ENTRY}:
                             group.attrs[key] = own.attrs[key]
-                        listed.append(json.loads(own.attrs.get(ABOUT, "{}")))
+                        listed.append(json.loads(own.attrs.get(ENTRY, "{}")))
             beside(listed)
         for part in parts:
             part.unlink()
@@ -173,19 +172,19 @@ def write_shard(out: Path, number: int, indices: Sequence[int], env_info: Mappin
 
     def beside(listed: list[dict[str, Any]]) -> None:
         text = json.dumps(
-            {**head, "episodes": [{"episode_id": k, **about} for k, about in enumerate(listed)]}, indent=1
+            {**head, "episodes": [{"episode_id": k, **entry} for k, entry in enumerate(listed)]}, indent=1
         )
         path.with_suffix(".json").write_text(text + "\n", encoding="utf-8")
 
-    put_together(path, [out / EPISODE_PART.format(index) for index in indices], beside)
+    merge_parts(path, [out / EPISODE_PART.format(index) for index in indices], beside)
 
 
 @dataclass(frozen=True, eq=False)
 class StoredTrajectory:
-    """One trajectory of a dataset. Attributes: group, open while it is looked at; about, its entry in the JSON file; number of its shard."""
+    """One trajectory of a dataset. Attributes: group, open while it is looked at; entry, in the JSON file; number of its shard."""
 
     group: h5py.Group
-    about: dict[str, Any]
+    entry: dict[str, Any]
     shard: int = 0
 
 
@@ -231,8 +230,8 @@ def trajectories(folder: Path) -> Iterator[StoredTrajectory]:
         listed = shard_entries(path)
         try:
             with h5py.File(path) as file:
-                for about in listed:
-                    yield StoredTrajectory(file[f"traj_{about['episode_id']}"], about, shard_number(path))
+                for entry in listed:
+                    yield StoredTrajectory(file[f"traj_{entry['episode_id']}"], entry, shard_number(path))
         except (OSError, KeyError, ValueError) as e:
             raise OutputError(f"{path}: damaged ({e}); make the dataset again") from None
 

@@ -93,13 +93,13 @@ def _examples(
     for stored in _kept(folder, keep):
         if most is not None and len(x) == most:
             break
-        item = stored_item(stored.about["items"][0])
+        item = stored_item(stored.entry["items"][0])
         edge, command = (np.asarray(stored.group[name], float) for name in ("obs/extra/edge", "control/command"))
         n = len(command)
         ahead = np.minimum(np.arange(n)[:, None] + np.arange(ACTION_CHUNK), n - 1)
         x.append(observed_features(edge[:-1], edge[np.maximum(np.arange(n) - 1, 0)], item))
         y.append(to_food_frame(command, item)[ahead].reshape(n, -1))
-        sentences.append(list(stored.about["instructions"]))
+        sentences.append(list(stored.entry["instructions"]))
     if not x:
         raise TaskError(f"clone: no trajectory of {folder} is kept ({keep}); make more, or keep others")
     return x, sentences, y, len(x)
@@ -109,6 +109,6 @@ def _kept(folder: Path, keep: str) -> Iterator[StoredTrajectory]:
     if keep not in KEEP_KINDS:
         raise TaskError(f"clone: keep {keep!r} is none of {', '.join(KEEP_KINDS)}")
     for stored in trajectories(folder):
-        a = stored.about
+        a = stored.entry
         if a["status"] == "done" and (keep == "all" or (a["published"] and (keep != "severed" or a["severed"]))):
             yield stored

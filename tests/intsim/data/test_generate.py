@@ -15,9 +15,10 @@ from calib.errors import OutputError
 from calib.simulation.workers import Workers
 from cutcal.main import main
 from intsim.data import generate as g
+from intsim.data.dataset_document import DATASET_FILE, DatasetDocument, DatasetSpec, PictureTotals
 from intsim.data.demonstrate import Demonstration
 from intsim.data.manifest import PROPERTY_SCATTER, TRAINING_SUITES, Manifest
-from intsim.data.shards import DATASET_FILE, pack_episode, trajectories
+from intsim.data.shards import pack_episode, trajectories
 from intsim.task.language import instructions, parse_instruction
 from intsim.task.planner import CONTROL_RATE, PHASES
 from intsim.task.suites import FIRST_TEST_SEED, FOODS
@@ -98,7 +99,7 @@ class Inline(Workers):
     def close(self) -> None:
         """Nothing to end."""
 
-    def each(self, work, jobs) -> Iterator[tuple[int, dict]]:
+    def each(self, work, jobs) -> Iterator[tuple[int, g.PackedEpisode]]:
         """A made-up episode for each."""
         for k, (spec, *_) in enumerate(jobs):
             if self.most == 0:
@@ -107,10 +108,10 @@ class Inline(Workers):
             yield k, made(spec)
 
 
-def made(spec) -> dict:
+def made(spec) -> g.PackedEpisode:
     """What a worker sends back."""
     t = track(seed=spec.seed)
-    about = {
+    entry = {
         "episode_seed": spec.seed,
         "index": spec.index,
         "instruction": spec.episode.instruction,
@@ -132,7 +133,7 @@ def made(spec) -> dict:
         "peak_N": 1.0,
         "seconds": {"solver": 2.0, "robot": 1.0, "start": 0.0},
     }
-    return {"about": about, "content": pack_episode(t, about, {"food": spec.food.name, "material": "{}"})}
+    return g.PackedEpisode(entry, pack_episode(t, entry, {"food": spec.food.name, "material": "{}"}))
 
 
 @pytest.fixture(autouse=True)
@@ -143,25 +144,38 @@ def no_simulator(monkeypatch):
 
 def test_a_stopped_dataset_goes_on_and_comes_out_the_same(tmp_path):
     """Stopped after 4 of 7 and begun again: nothing is made twice, and the shards are those of one go; parts are gone."""
-    m = Manifest(trajectories=7)
+    m = DatasetSpec(Manifest(trajectories=7), shard=3)
     with pytest.raises(KeyboardInterrupt):
-        g.generate(m, tmp_path / "a", Inline(4), shard=3)
+        g.generate(m, tmp_path / "a", Inline(4))
     (tmp_path / "a" / "part-000001.h5").touch()  # killed when its shard was written and the part not yet removed
     rest = Inline(3)
-    document = valid(g.generate(m, tmp_path / "a", rest, shard=3, resume=True))
-    assert rest.most == 0 and document["trajectories"] == 7
-    g.generate(m, tmp_path / "b", Inline(), shard=3)
+    document = g.generate(m, tmp_path / "a", rest, resume=True)
+    assert DatasetDocument.read(tmp_path / "a") == document and valid(document.as_dict())
+    assert document.totals is not None and rest.most == 0 and document.totals.trajectories == 7
+    g.generate(m, tmp_path / "b", Inline())
     assert sorted(p.name for p in (tmp_path / "a").iterdir()) == sorted(p.name for p in (tmp_path / "b").iterdir())
     assert not list((tmp_path / "a").glob("part-*"))
     for one, two in zip(trajectories(tmp_path / "a"), trajectories(tmp_path / "b"), strict=True):
-        assert one.about == two.about
+        assert one.entry == two.entry
         assert np.array_equal(one.group["actions"], two.group["actions"])
-    assert document["core_hours_of_21000"] == pytest.approx(21_000 * 3.0 / 3600)
+    assert document.totals.core_hours_of_21000 == pytest.approx(21_000 * 3.0 / 3600)
+
+
+def test_a_dataset_that_is_not_finished_has_a_document(tmp_path):
+    """What it is, with a stiffness that nobody gave as null; what its pictures took may be said before it is finished."""
+    spec = DatasetSpec(Manifest(trajectories=7, foods=["plum"]), demos="planned")
+    pictures = PictureTotals((0, 3), 64, 12, 1.5, 10.0, 1000)
+    for document in (DatasetDocument(spec), DatasetDocument(spec, pictures=pictures)):
+        document.write(tmp_path)
+        assert DatasetDocument.read(tmp_path) == document
+    plain = json.loads((tmp_path / DATASET_FILE).read_text())
+    assert list(plain) == ["schema", "manifest", "demos", "knife", "stiffness", "shard", "pictures"]
+    assert plain["stiffness"] is None and plain["manifest"]["foods"] == ["plum"]
 
 
 def test_what_is_stored_has_maniskills_layout_and_keeps_the_force_apart(tmp_path):
     """Shapes as documented; force and impulse agree; no name outside ``mpm`` has a force in it; the surface comes back to a tenth of a millimetre."""
-    g.generate(Manifest(trajectories=2), tmp_path / "d", Inline(), shard=2)
+    g.generate(DatasetSpec(Manifest(trajectories=2), shard=2), tmp_path / "d", Inline())
     listed = json.loads((tmp_path / "d" / "shard-0000.json").read_text())
     assert [e["episode_id"] for e in listed["episodes"]] == [0, 1] and listed["env_info"]["env_id"] == "CutFood-v1"
     for k, stored in enumerate(trajectories(tmp_path / "d")):
@@ -188,11 +202,11 @@ def test_what_is_stored_has_maniskills_layout_and_keeps_the_force_apart(tmp_path
 def test_a_folder_that_is_taken_or_damaged_is_an_error(tmp_path):
     """Another dataset, no --resume, no shards, a broken file: one line each."""
     out = tmp_path / "d"
-    g.generate(Manifest(trajectories=1), out, Inline())
+    g.generate(DatasetSpec(Manifest(trajectories=1)), out, Inline())
     with pytest.raises(OutputError, match="--resume"):
-        g.generate(Manifest(trajectories=1), out, Inline())
+        g.generate(DatasetSpec(Manifest(trajectories=1)), out, Inline())
     with pytest.raises(OutputError, match="another dataset"):
-        g.generate(Manifest(trajectories=2), out, Inline(), resume=True)
+        g.generate(DatasetSpec(Manifest(trajectories=2)), out, Inline(), resume=True)
     with pytest.raises(OutputError, match="no shards"):
         next(trajectories(tmp_path))
     with h5py.File(out / "shard-0000.h5", "w"):
@@ -201,7 +215,7 @@ def test_a_folder_that_is_taken_or_damaged_is_an_error(tmp_path):
         list(trajectories(out))
     (out / DATASET_FILE).write_text("{")
     with pytest.raises(OutputError, match="damaged"):
-        g.generate(Manifest(trajectories=1), out, Inline(), resume=True)
+        g.generate(DatasetSpec(Manifest(trajectories=1)), out, Inline(), resume=True)
 
 
 @pytest.mark.parametrize(
@@ -237,4 +251,4 @@ def test_without_the_robot_simulator_it_says_what_to_install(monkeypatch, tmp_pa
     monkeypatch.undo()
     monkeypatch.setitem(__import__("sys").modules, "mani_skill", None)
     with pytest.raises(Exception, match=r"cutcal\[robot\]"):
-        g.generate(Manifest(trajectories=1), tmp_path / "d", Inline())
+        g.generate(DatasetSpec(Manifest(trajectories=1)), tmp_path / "d", Inline())

@@ -10,6 +10,7 @@ import pytest
 from calib.errors import OutputError
 from intsim.data import generate as g
 from intsim.data.cameras import CAMERA_NAMES
+from intsim.data.dataset_document import DatasetSpec
 from intsim.data.lerobot import FEATURES, episode_columns, export_lerobot, merge_statistics, statistics
 from intsim.data.manifest import Manifest
 from intsim.data.shards import trajectories
@@ -25,7 +26,7 @@ av = pytest.importorskip("av", reason="the extra [data] is not installed")
 def stored(tmp_path, monkeypatch):
     """Three made-up trajectories."""
     monkeypatch.setattr(g, "require_simulator", lambda: None)
-    g.generate(Manifest(trajectories=3), tmp_path / "set", Inline(), shard=2)
+    g.generate(DatasetSpec(Manifest(trajectories=3), shard=2), tmp_path / "set", Inline())
     return tmp_path / "set"
 
 
@@ -33,7 +34,7 @@ def stored(tmp_path, monkeypatch):
 def painted(stored, tmp_path, monkeypatch):
     """Their export before two backgrounds."""
     paint_with(Painter, monkeypatch)
-    info = export_lerobot(stored, tmp_path / "lr", scenes=[0, 2], pixels=PIXELS, pool=Here())
+    info = export_lerobot(stored, tmp_path / "lr", backgrounds=[0, 2], pixels=PIXELS, pool=Here())
     return tmp_path / "lr", info
 
 
@@ -127,7 +128,7 @@ def test_statistics_of_parts_are_those_of_the_whole():
 def test_a_wrong_scene_or_a_taken_folder_is_an_error(stored, tmp_path):
     """Before anything is written."""
     with pytest.raises(OutputError, match="0 to 14"):
-        export_lerobot(stored, tmp_path / "x", scenes=[15])
+        export_lerobot(stored, tmp_path / "x", backgrounds=[15])
     (tmp_path / "full").mkdir()
     (tmp_path / "full/file").touch()
     with pytest.raises(OutputError, match="never overwritten"):

@@ -9,16 +9,18 @@ import numpy as np
 import pytest
 
 from calib.errors import OutputError
+from calib.io.typed_document import to_document
 from cutcal.main import main
 from intsim.data import generate as g
 from intsim.data.cameras import CAMERA_NAMES
+from intsim.data.dataset_document import DATASET_FILE, DatasetDocument, DatasetSpec
 from intsim.data.export_episodes import export_episodes
 from intsim.data.lerobot import export_lerobot
 from intsim.data.manifest import Manifest
 from intsim.data.pictures import load_pictures, render_dataset, require_renderer
 from intsim.data.rdt import export_rdt
 from intsim.data.rlds import export_rlds
-from intsim.data.shards import DATASET_FILE, trajectories
+from intsim.data.shards import trajectories
 from mpm.errors import CutcalError
 from tests.calib.documents import valid
 from tests.intsim.data.test_generate import Inline
@@ -33,7 +35,7 @@ def made(tmp_path, monkeypatch) -> Path:
     """Five made-up trajectories in shards of two, and a painter."""
     monkeypatch.setattr(g, "require_simulator", lambda: None)
     paint_with(Painter, monkeypatch)
-    g.generate(Manifest(trajectories=COUNT), tmp_path / "set", Inline(), shard=SHARD)
+    g.generate(DatasetSpec(Manifest(trajectories=COUNT), shard=SHARD), tmp_path / "set", Inline())
     return tmp_path / "set"
 
 
@@ -48,11 +50,10 @@ def test_what_was_rendered_comes_back_pixel_by_pixel(made):
     assert files(made) == [f"pictures-32-{scene:02d}-{n:04d}.h5" for scene in (0, 2) for n in range(3)]
     document = valid(json.loads((made / DATASET_FILE).read_text()))
     steps = document["steps"]
-    assert document["pictures"] == found and found["scenes"] == [0, 2] and found["number"] == 2 * 3 * steps
-    assert (
-        found["core_hours_of_315000"] == pytest.approx(21_000 * 15 * found["seconds_per_episode"] / 3600)
-        and found["bytes"] > 0
-    )
+    assert document["pictures"] == to_document(found)
+    assert found.scenes == (0, 2) and found.number == 2 * 3 * steps
+    assert found.core_hours_of_315000 == pytest.approx(21_000 * 15 * found.seconds_per_episode / 3600)
+    assert found.bytes > 0 and DatasetDocument.read(made).pictures == found
     for stored in trajectories(made):
         for scene in (0, 2):
             wanted = Painter(scene, PIXELS).pictures(stored)
@@ -82,9 +83,9 @@ def test_a_further_background_or_size_is_added_and_physics_never_made_again(made
     one = render_dataset(made, [1, 3], PIXELS, Here(COUNT), said.append)
     assert said[0] == "pictures of 5 of 10 are there already" and len(said) == 1 + COUNT
     render_dataset(made, [1], 16, Here(COUNT))
-    again = g.generate(Manifest(trajectories=COUNT), made, Inline(0), shard=SHARD, resume=True)
-    assert len(files(made)) == 9 and one["scenes"] == [1, 3]
-    assert again["pictures"]["pixels"] == 16 and valid(again)
+    again = g.generate(DatasetSpec(Manifest(trajectories=COUNT), shard=SHARD), made, Inline(0), resume=True)
+    assert len(files(made)) == 9 and one.scenes == (1, 3)
+    assert again.pictures is not None and again.pictures.pixels == 16 and valid(again.as_dict())
 
 
 def test_pictures_stay_with_their_shard_where_one_before_it_is_still_missing(made):
@@ -138,10 +139,10 @@ def test_an_export_that_is_stopped_while_it_renders_can_be_asked_for_again(made,
     pytest.importorskip("pyarrow", reason="the extra [data] is not installed")
     pytest.importorskip("av", reason="the extra [data] is not installed")
     with pytest.raises(KeyboardInterrupt):
-        export(made, tmp_path / "out", scenes=[0], pixels=PIXELS, pool=Here(2))
+        export(made, tmp_path / "out", backgrounds=[0], pixels=PIXELS, pool=Here(2))
     assert not (tmp_path / "out").exists()
     rest = Here(COUNT - 2)
-    export(made, tmp_path / "out", scenes=[0], pixels=PIXELS, pool=rest)
+    export(made, tmp_path / "out", backgrounds=[0], pixels=PIXELS, pool=rest)
     assert rest.most == 0
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from calib.errors import OutputError
 from intsim.data import generate as g
+from intsim.data.dataset_document import DatasetSpec
 from intsim.data.manifest import Manifest
 from intsim.data.rdt import STATISTICS_FILE, TASKS_FILE, export_rdt, task_name
 from intsim.data.shards import trajectories
@@ -25,9 +26,11 @@ Image = pytest.importorskip("PIL.Image", reason="the extra [data] is not install
 def exported(tmp_path, monkeypatch):
     """Made-up trajectories of two foods before two backgrounds."""
     monkeypatch.setattr(g, "require_simulator", lambda: None)
-    g.generate(Manifest(trajectories=10, foods=("plum", "kiwi"), suites=("flips",)), tmp_path / "set", Inline())
+    g.generate(
+        DatasetSpec(Manifest(trajectories=10, foods=("plum", "kiwi"), suites=("flips",))), tmp_path / "set", Inline()
+    )
     paint_with(Painter, monkeypatch)
-    tasks = export_rdt(tmp_path / "set", tmp_path / "rdt", scenes=[0, 2], pixels=PIXELS, pool=Here())
+    tasks = export_rdt(tmp_path / "set", tmp_path / "rdt", backgrounds=[0, 2], pixels=PIXELS, pool=Here())
     return tmp_path / "set", tmp_path / "rdt", tasks
 
 
@@ -87,6 +90,6 @@ def test_what_cannot_be_exported_is_an_error(exported, tmp_path):
     """No background, a folder that is taken."""
     folder, out, _ = exported
     with pytest.raises(OutputError, match="--scenes"):
-        export_rdt(folder, tmp_path / "more", scenes=[])
+        export_rdt(folder, tmp_path / "more", backgrounds=[])
     with pytest.raises(OutputError, match="never overwritten"):
-        export_rdt(folder, out, scenes=[0])
+        export_rdt(folder, out, backgrounds=[0])

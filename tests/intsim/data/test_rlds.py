@@ -11,6 +11,7 @@ import pytest
 
 from calib.errors import OutputError
 from intsim.data import generate as g
+from intsim.data.dataset_document import DatasetSpec
 from intsim.data.lerobot import episode_columns
 from intsim.data.manifest import Manifest
 from intsim.data.rlds import VALIDATION_STRIDE, _varint, export_rlds
@@ -78,9 +79,9 @@ def read(record: bytes) -> dict:
 def exported(tmp_path, monkeypatch):
     """Twenty-one made-up trajectories before two backgrounds."""
     monkeypatch.setattr(g, "require_simulator", lambda: None)
-    g.generate(Manifest(trajectories=VALIDATION_STRIDE + 1), tmp_path / "set", Inline(), shard=30)
+    g.generate(DatasetSpec(Manifest(trajectories=VALIDATION_STRIDE + 1), shard=30), tmp_path / "set", Inline())
     paint_with(Painter, monkeypatch)
-    export_rlds(tmp_path / "set", tmp_path / "rlds", scenes=[0, 2], pixels=PIXELS, pool=Here())
+    export_rlds(tmp_path / "set", tmp_path / "rlds", backgrounds=[0, 2], pixels=PIXELS, pool=Here())
     return tmp_path / "set", tmp_path / "rlds" / "cutcal" / "1.0.0"
 
 
@@ -144,4 +145,4 @@ def test_numbers_of_any_size_are_written_as_protocol_buffers_have_them():
 def test_without_a_background_it_says_so(tmp_path):
     """Such a policy looks at pictures."""
     with pytest.raises(OutputError, match="--scenes"):
-        export_rlds(tmp_path, tmp_path / "x", scenes=[])
+        export_rlds(tmp_path, tmp_path / "x", backgrounds=[])

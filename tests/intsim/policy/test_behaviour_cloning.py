@@ -12,7 +12,7 @@ from calib.material.food import load_food
 from cutcal.main import main
 from intsim.data.demonstrate import Demonstration
 from intsim.data.manifest import Manifest
-from intsim.data.shards import EPISODE_PART, keep, pack_episode, write_shard
+from intsim.data.shards import EPISODE_PART, pack_episode, write_part, write_shard
 from intsim.evaluate import Evaluation, evaluate, roll_out
 from intsim.policy.behaviour_cloning import (
     ACTION_CHUNK,
@@ -154,7 +154,7 @@ def dataset(folder, count: int) -> None:
             "items": [{"name": i.name, "x": i.x, "y": i.y, "yaw": i.yaw, **vars(i.shape)}],
             "instructions": instructions(episode.spec, k),
         }
-        keep(folder / EPISODE_PART.format(k), pack_episode(track, about, {}))
+        write_part(folder / EPISODE_PART.format(k), pack_episode(track, about, {}))
     write_shard(folder, 0, range(count), {})
     assert manifest.trajectory(1).style == "press"
 

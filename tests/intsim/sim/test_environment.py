@@ -277,14 +277,14 @@ def test_replaying_the_actions_gives_the_same_path_and_force():
 def test_a_worker_makes_an_episode_that_can_be_read(tmp_path):
     """What `dataset generate` stores of a real one: layout, task and the time that it took."""
     spec = Manifest(trajectories=1, foods=("strawberry",), suites=("seeds",)).trajectory(0)
-    found = make_episode(spec, "sustained", "kitchen", None, "cpu", 1)
-    (tmp_path / "part.h5").write_bytes(found["content"])
+    found = make_episode(spec, "sustained", World(), "cpu", 1)
+    (tmp_path / "part.h5").write_bytes(found.content)
     with h5py.File(tmp_path / "part.h5") as file:
-        n = found["about"]["elapsed_steps"]
+        n = found.entry["elapsed_steps"]
         assert file["actions"].shape == (n, 8) and file["mpm/force"].shape == (n, 5, 3)
         assert file["mpm"].attrs["contact_step"] > 0 and file["mpm"].attrs["food"] == "strawberry"
-        assert file["mpm/force"][()].max() == pytest.approx(found["about"]["peak_N"], rel=1e-6)
-    assert found["about"]["seconds"]["solver"] > 0 and len(found["about"]["instructions"]) >= 5
+        assert file["mpm/force"][()].max() == pytest.approx(found.entry["peak_N"], rel=1e-6)
+    assert found.entry["seconds"]["solver"] > 0 and len(found.entry["instructions"]) >= 5
 
 
 # A picture needs a renderer; everything else of a stored trajectory is tested without one above.
@@ -294,16 +294,16 @@ def test_pictures_of_a_stored_trajectory_show_what_was_simulated(tmp_path):
     from intsim.data.rendering import Renderer
 
     spec = Manifest(trajectories=1, foods=("strawberry",), suites=("seeds",)).trajectory(0)
-    found = make_episode(spec, "sustained", "kitchen", None, "cpu", 1)
-    (tmp_path / "part.h5").write_bytes(found["content"])
+    found = make_episode(spec, "sustained", World(), "cpu", 1)
+    (tmp_path / "part.h5").write_bytes(found.content)
     with h5py.File(tmp_path / "part.h5") as file:
-        stored = StoredTrajectory(file, found["about"])
+        stored = StoredTrajectory(file, found.entry)
         one, two = Renderer(0, 64), Renderer(5, 64)
         plain, again, other = one.pictures(stored), one.pictures(stored), two.pictures(stored)
         one.close()
         two.close()
     for view, frames in plain.items():
-        assert frames.shape == (found["about"]["elapsed_steps"], 64, 64, 3) and frames.std() > 10
+        assert frames.shape == (found.entry["elapsed_steps"], 64, 64, 3) and frames.std() > 10
         assert np.array_equal(frames, again[view])
         assert np.abs(frames.astype(int) - other[view]).mean() > 5
 
