@@ -1,4 +1,4 @@
-"""What an evaluation finds: of each episode, of each suite, and together; written to evaluate.jsonl and evaluate.json."""
+"""What an evaluation finds: of each episode, of each suite, and together; evaluate.jsonl and evaluate.json."""
 
 from __future__ import annotations
 
@@ -249,7 +249,9 @@ class SuiteResult:
 
 
 def expected_place_rate(length: float, sigma: float) -> float:
-    """Chance that a cut whose place has a normal error is within the published tolerance [-]: erf(0.1 L / (sigma sqrt 2)).
+    """Chance that a cut whose place has a normal error is within the published tolerance [-].
+
+    It is erf(0.1 L / (sigma sqrt 2)).
 
     Args:
         length: L, length of the food [m].

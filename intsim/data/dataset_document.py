@@ -1,4 +1,4 @@
-"""dataset.json: what a dataset is, what it holds, and what its pictures took; one way to write it and one to read it back."""
+"""dataset.json: what a dataset is, what it holds, and what its pictures took; written and read back."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ from intsim.sim.world import World
 
 DATASET_FILE = "dataset.json"
 DEMONSTRATION_KINDS = ("sustained", "planned", "kinematic")
-"""Kinds of demonstration: ``sustained`` goes on until the food is in pieces, ``planned`` is the motion that geometry plans,
-whatever the food does, and ``kinematic`` the same without food that resists: nothing is in pieces then but in geometry."""
+"""Kinds of demonstration.
+
+``sustained`` goes on until the food is in pieces. ``planned`` is the motion that geometry plans, whatever the food
+does. ``kinematic`` is the same in food that does not resist: it is in pieces in geometry alone.
+"""
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,12 @@ class DatasetSpec:
 
 @dataclass(frozen=True)
 class BrokenTrajectory:
-    """A trajectory in which the solver or the arm did not follow. Attributes: index, its number; status, what went wrong."""
+    """A trajectory in which the solver or the arm did not follow.
+
+    Attributes:
+        index: Its number.
+        status: What went wrong.
+    """
 
     index: int
     status: str
@@ -62,7 +70,12 @@ class BrokenTrajectory:
 
 @dataclass(frozen=True)
 class CoreSeconds:
-    """Mean time of one core for an episode [s]. Attributes: solver, in the cutting solver; robot, in everything else."""
+    """Mean time of one core for an episode.
+
+    Attributes:
+        solver: In the cutting solver [s].
+        robot: In the robot simulator and everything else [s].
+    """
 
     solver: float
     robot: float

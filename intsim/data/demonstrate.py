@@ -23,15 +23,15 @@ from intsim.task.targets import TaskError, target
 BOARD_REACHED = 2e-4  # height of the edge at which it is on the board [m]
 MAX_COMMAND_DEPTH = 0.08  # way below the board that is commanded at most [m]: 140 N behind the Panda's own gains
 LEVELLING_GAIN = 0.2
-"""Part of the edge's tilt by which a step of pressing on turns the command back where one end of it is on the board [-].
+"""Part of the edge's tilt by which a step of pressing on turns the command back, one end being on the board [-].
 
 It levels the edge in a quarter of a second, after the arm, which lags by a tenth.
 """
 MAX_LEVELLING_STEPS = 40  # steps in which it is turned at most: as many as the way down to the deepest command takes
 BLADE_END_REACHED = 5e-4
-"""Height of the lower end of the blade at which it is on the board [m]: half of what the middle of a banana's hangs above it.
+"""Height of the lower end of the blade at which it is on the board [m].
 
-See docs/robot.md, "What it shows".
+It is half of what the middle hangs above the board then (docs/robot.md, "What it shows").
 """
 HOLD_TIME = 0.3  # time that the edge is held on the board [s]
 RETRACT_TIME = 1.5  # time of the way back up [s]
@@ -49,7 +49,8 @@ class Demonstration:
         action: Joint targets and gripper (n, 8).
         phase: Phase of each step (n,).
         force: Force of the food on the knife in each step of the robot's physics [N] (n, 5, 3).
-        touching, uncut, pieces: Whether food presses on the knife, part of the section that holds, pieces of the food (n,).
+        touching: Whether food presses on the knife (n,).
+        uncut, pieces: Part of the section that holds, and pieces of the food (n,).
         published, severed: Success by the published criteria, and in pieces (n,).
         meshes: Steps after which the food under the knife was kept, which food, its vertices, triangles and flesh.
         status: ``done``, or what went wrong.
@@ -77,9 +78,9 @@ def demonstrate(env: Any, *, style: str = "press", sustained: bool = True, meshe
     Args:
         env: A :class:`intsim.sim.environment.CutFoodEnv` that was reset, in joint positions.
         style: Of the motion, in :data:`intsim.task.planner.STYLES`.
-        sustained: Whether the edge is commanded deeper until the food is in pieces or the board reached, and held there. The load
-            turns the hand; where one end of the blade then rests on the board and the other hangs, the command turns it back.
-            Without it the motion is the planned one, whatever the food does.
+        sustained: Whether the edge is commanded deeper until the food is in pieces or the board reached, and held
+            there. The load turns the hand; where one end of the blade then rests on the board and the other hangs, the
+            command turns it back. Without it the motion is the planned one, whatever the food does.
         meshes: Whether the food's surface is kept.
 
     Returns:
@@ -107,9 +108,9 @@ def demonstrate(env: Any, *, style: str = "press", sustained: bool = True, meshe
 
 
 def _press_on(env: Any, demo: Demonstration, pose: np.ndarray, pieces: int, meshes: bool) -> None:
-    """Command the edge deeper, and level it, until the food has more pieces or the board is reached; then hold it there.
+    """Command the edge deeper until the food has more pieces or the board is reached, and hold it there.
 
-    The commanded pose (5,) is changed.
+    Where one end of the blade is on the board, it is levelled in place of pressed. The commanded pose (5,) is changed.
     """
     half, turned = load_knife(env.knife).length / 2, 0
     while (

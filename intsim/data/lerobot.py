@@ -1,7 +1,7 @@
 """Export as a LeRobotDataset v3.0; needs the extra ``[data]``, for pictures ``[robot]`` and Vulkan too.
 
-LeRobot takes every ``observation*`` for an input of the policy and every ``action*`` for its output. The force is therefore ``contact.*``,
-and joints are ``extra.*``: in the data, and in no policy that was not told to look at them.
+LeRobot takes every ``observation*`` for an input of the policy and every ``action*`` for its output. The force is
+therefore ``contact.*``, and joints are ``extra.*``: in the data, and in no policy that was not told to look at them.
 """
 
 from __future__ import annotations
@@ -127,8 +127,8 @@ def export_lerobot(
 ) -> dict[str, Any]:
     """Write a LeRobotDataset v3.0.
 
-    Each trajectory is an episode for each background, with one of its sentences in turn; all of its sentences, its task, material and
-    seed are in ``meta/culinary.parquet``.
+    Each trajectory is an episode for each background, with one of its sentences in turn; all of its sentences, its
+    task, material and seed are in ``meta/culinary.parquet``.
 
     Args:
         folder: A dataset of :func:`intsim.data.generate.generate`.

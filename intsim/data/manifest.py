@@ -23,7 +23,10 @@ PROPERTY_SCATTER = {"E": 0.2, "R": 0.1, "yield_stress": 0.1, "mu": 0.2}
 Assumed: a third of what gripped fruit scatters in stiffness, and less for strength.
 """
 TRAINING_SUITES = ("seeds", "continuous", "split", "flips", "objects")
-"""Suites that training may see, in turn; the sentences of ``language`` and every seed from a million on are for tests."""
+"""Suites that training may see, in turn.
+
+The sentences of ``language`` and every seed from a million on are for tests.
+"""
 PRESS_SHARE = 0.5  # part of the episodes that press; the other styles share the rest
 
 

@@ -1,8 +1,8 @@
-"""Pictures of a dataset: each trajectory before each background that is asked for, rendered in worker processes, kept beside it.
+"""Pictures of a dataset: each trajectory before each background, rendered in worker processes and kept beside it.
 
-``pictures-128-01-0000.h5`` belongs to ``shard-0000.h5`` (128 pixels, background 1). For trajectory k it has a group ``traj_k`` with
-``front``, ``side`` and ``wrist`` (T,), a PNG of what each camera sees before each step, and the attribute ``seconds``, what
-rendering took. Nothing is simulated for it.
+``pictures-128-01-0000.h5`` belongs to ``shard-0000.h5`` (128 pixels, background 1). For trajectory k it has a group
+``traj_k`` with ``front``, ``side`` and ``wrist`` (T,), a PNG of what each camera sees before each step, and the
+attribute ``seconds``, what rendering took. Nothing is simulated for it.
 """
 
 from __future__ import annotations
@@ -53,7 +53,8 @@ def render_dataset(
         What ``dataset.json`` then has in ``pictures``.
 
     Raises:
-        CutcalError: A background that does not exist, there is no renderer, the folder holds no dataset or cannot be written.
+        CutcalError: A background that does not exist, there is no renderer, the folder holds no dataset or cannot be
+            written.
     """
     check_backgrounds(backgrounds)
     paths = shard_paths(folder)  # or it is no dataset at all
@@ -215,7 +216,7 @@ def _slim(path: Path, k: int) -> bytes:
 
 
 def _merge(folder: Path, pixels: int, background: int, shard: int, entries: Sequence[Mapping[str, Any]]) -> None:
-    """Put the pictures of a shard together and remove their parts, those too of a process that was killed in between."""
+    """Put the pictures of a shard together and remove their parts, also those that a killed process has left."""
     path = folder / PICTURE_FILE.format(pixels, background, shard)
     parts = [folder / PICTURE_PART.format(pixels, background, one["index"]) for one in entries]
     if not path.exists():

@@ -3,10 +3,10 @@
     TASK/motionplanning/TASK.h5           traj_K/actions (T, 8), traj_K/obs/agent/qpos (T + 1, 9)
     TASK/motionplanning/K//100/K%100/S.png    what the front camera sees before step S, from 1
 
-That loader knows one sentence for a task, which stands in its own source. A task here is one instruction's meaning, such as
-``orange-0_25-left``, and ``tasks.json`` has the sentence and the number of episodes of each. The loader scales by the range of each
-joint and action, and the gripper, closed on the knife throughout, has none. ``statistics.json`` therefore has the ranges that were
-found, and for the gripper that of the mechanism. The force is not in it.
+That loader knows one sentence for a task, which stands in its own source. A task here is one instruction's meaning,
+such as ``orange-0_25-left``, and ``tasks.json`` has the sentence and the number of episodes of each. The loader scales
+by the range of each joint and action, and the gripper, closed on the knife throughout, has none. ``statistics.json``
+therefore has the ranges that were found, and for the gripper that of the mechanism. The force is not in it.
 """
 
 from __future__ import annotations
@@ -53,10 +53,12 @@ def export_rdt(
         say: Called with a line after each episode.
 
     Returns:
-        The content of tasks.json: by task its ``instruction``, all sentences for it in ``instructions``, and how many ``episodes``.
+        The content of tasks.json: by task its ``instruction``, all sentences for it in ``instructions``, and how many
+        ``episodes``.
 
     Raises:
-        CutcalError: A package or the renderer is missing, no background is named, the folder is taken or holds no dataset.
+        CutcalError: A package or the renderer is missing, no background is named, the folder is taken or holds no
+            dataset.
     """
     check_pictured_target(out, backgrounds, "RDT's input", "PIL")
     from PIL import Image

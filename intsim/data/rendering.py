@@ -1,4 +1,4 @@
-"""Pictures of stored trajectories before another background, without any physics; needs the extra ``[robot]`` and Vulkan."""
+"""Pictures of stored trajectories before a background, without physics; needs the extra ``[robot]`` and Vulkan."""
 
 from __future__ import annotations
 

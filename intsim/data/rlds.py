@@ -1,7 +1,7 @@
 """Export as RLDS, the TFDS layout that OpenVLA and Octo read; needs the extras ``[data]`` and ``[robot]``, and Vulkan.
 
-It needs no TensorFlow. A record is a ``tf.train.Example`` for each episode, its steps end to end, written here by hand: a message
-of one map from names to lists, and TFRecord's frame of length and checksum. The force is not in it.
+It needs no TensorFlow. A record is a ``tf.train.Example`` for each episode, its steps end to end, written here by hand:
+a message of one map from names to lists, and TFRecord's frame of length and checksum. The force is not in it.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ def export_rlds(
 ) -> dict[str, Any]:
     """Write ``cutcal/1.0.0`` with the splits train and val.
 
-    Each step has the observation, the action (change of pose [m, rad] and gripper), reward, discount, the flags of its place, and
-    the sentence. The observation is the pictures ``image``, ``side_image`` and ``wrist_image``, and ``state``: x y z roll pitch yaw
-    pad gripper. ``val`` are whole trajectories, before every background.
+    Each step has the observation, the action (change of pose [m, rad] and gripper), reward, discount, the flags of its
+    place, and the sentence. The observation is the pictures ``image``, ``side_image`` and ``wrist_image``, and
+    ``state``: x y z roll pitch yaw pad gripper. ``val`` are whole trajectories, before every background.
 
     Args:
         folder: A dataset of :func:`intsim.data.generate.generate`.
@@ -54,7 +54,8 @@ def export_rlds(
         The content of dataset_info.json.
 
     Raises:
-        CutcalError: A package or the renderer is missing, no background is named, the folder is taken or holds no dataset.
+        CutcalError: A package or the renderer is missing, no background is named, the folder is taken or holds no
+            dataset.
     """
     check_pictured_target(out, backgrounds, "RLDS", "google_crc32c", "PIL")
     shown = export_episodes(folder, backgrounds, pixels, pool, say)

@@ -9,12 +9,17 @@
     control/command (T, 5)             commanded pose of the edge
     control/delta (T, 7)               commanded pose less the present one: x, y, z [m], roll, pitch, yaw [rad], gripper
     control/phase (T,)                 approach 0, contact 1, cut 2, hold 3, retract 4
-    mpm/force (T, 5, 3)                force of the food on the knife, world axes [N], in each step of the robot's physics (100 Hz)
-    mpm/force_control, mpm/impulse (T, 3)   their mean [N], and the impulse so far [N s]
-    mpm/touching, severed, published (T,)   mpm/uncut (T,) part of the section that holds, mpm/pieces (T,)
-    mpm/surface/C/step (F,), vertices (F, m, 3), triangles (t, 3), flesh (m,)   food under the knife in cut C, half precision [m], less
-                                       the attribute origin (3,); flesh tells the face of the cut; attribute food: which one
-    attributes of mpm: food, material (JSON), material_sha256, solver_sha256, knife, arm, contact_step (-1 without contact)
+    mpm/force (T, 5, 3)                force of the food on the knife, world axes [N], in each step of the robot's
+                                       physics (100 Hz)
+    mpm/force_control, impulse (T, 3)  their mean [N], and the impulse so far [N s]
+    mpm/touching, severed, published (T,)
+    mpm/uncut, pieces (T,)             part of the section that holds, pieces of the food
+    mpm/surface/C                      food under the knife in cut C; attribute food: which one
+        step (F,)                      steps after which it was kept
+        vertices (F, m, 3)             half precision [m], less the attribute origin (3,)
+        triangles (t, 3), flesh (m,)   flesh tells the face of the cut
+    attributes of mpm: food, material (JSON), material_sha256, solver_sha256, knife, arm,
+        contact_step (-1 without contact)
 
 ``shard-0000.json`` beside it lists environment and episodes as ManiSkill's does: seeds, sentences, task, success.
 The force is in no group that a loader of observations or actions reads.
@@ -52,6 +57,9 @@ def pack_episode(demo: Demonstration, entry: Mapping[str, Any], mpm: Mapping[str
         demo: What was done.
         entry: Its entry in the JSON file.
         mpm: Attributes of its group ``mpm``.
+
+    Returns:
+        The bytes.
     """
     stream = io.BytesIO()
     with h5py.File(stream, "w") as file:
@@ -164,6 +172,12 @@ def merge_parts(
 def write_shard(out: Path, number: int, indices: Sequence[int], env_info: Mapping[str, Any]) -> None:
     """Put episodes together, in order, and remove their parts.
 
+    Args:
+        out: Folder of the dataset.
+        number: Of the shard.
+        indices: Numbers of its trajectories.
+        env_info: What the JSON file says of the environment.
+
     Raises:
         OutputError: The disk is full, or the like.
     """
@@ -181,7 +195,13 @@ def write_shard(out: Path, number: int, indices: Sequence[int], env_info: Mappin
 
 @dataclass(frozen=True, eq=False)
 class StoredTrajectory:
-    """One trajectory of a dataset. Attributes: group, open while it is looked at; entry, in the JSON file; number of its shard."""
+    """One trajectory of a dataset.
+
+    Attributes:
+        group: Its group in the HDF5 file, open while it is looked at.
+        entry: What the JSON file says of it.
+        shard: Number of its shard.
+    """
 
     group: h5py.Group
     entry: dict[str, Any]

@@ -1,8 +1,9 @@
-"""A behaviour-cloning policy: a small network that does what demonstrations did (trained by :mod:`intsim.policy.training`).
+"""A behaviour-cloning policy: a small network that does what demonstrations did.
 
-It is no vision-language-action model: it is given the place and size of the food in numbers, and the words of the instruction as a bag. What it must
-learn is where the words want the cut, the way there, and how far the edge is commanded. It sees where the edge is and was a step before, no
-force and no command, and gives the next commanded poses in one piece (action chunking: Zhao et al. 2023, arXiv:2304.13705).
+:mod:`intsim.policy.training` trains it. It is no vision-language-action model: it is given the place and size of the
+food in numbers, and the words of the instruction as a bag. It must learn where the words want the cut, the way there,
+and how far the edge is commanded. It sees where the edge is and was a step before, no force and no command, and gives
+the next commanded poses in one piece (action chunking: Zhao et al. 2023, arXiv:2304.13705).
 """
 
 from __future__ import annotations
@@ -35,8 +36,16 @@ def tokens(sentence: str) -> list[str]:
 
 
 def to_food_frame(pose: np.ndarray, item: Item) -> np.ndarray:
-    """Poses (..., 5) as seen from a food: along and across it, height [LENGTH], twice the angle between edge and axis as cosine and sine,
-    shape (..., 5)."""
+    """Poses as seen from a food.
+
+    Args:
+        pose: Poses x, y, z [m], yaw and tilt [rad], shape (..., 5).
+        item: The food.
+
+    Returns:
+        Along and across the food and height [:data:`LENGTH_SCALE`], and cosine and sine of twice the angle between edge
+        and axis [-], shape (..., 5).
+    """
     offset = pose[..., :2] - [item.x, item.y]
     c, s = item.axis
     turn = 2 * (pose[..., 3] - item.yaw)  # an edge has no direction
@@ -47,7 +56,15 @@ def to_food_frame(pose: np.ndarray, item: Item) -> np.ndarray:
 
 
 def from_food_frame(seen: np.ndarray, item: Item) -> np.ndarray:
-    """Poses (..., 5) on the table from :func:`to_food_frame`, level."""
+    """Poses on the table from those of :func:`to_food_frame`, level.
+
+    Args:
+        seen: What that function returns, shape (..., 5) [-].
+        item: The food.
+
+    Returns:
+        Poses x, y, z [m], yaw and tilt [rad], shape (..., 5).
+    """
     c, s = item.axis
     along, across, z = (LENGTH_SCALE * seen[..., k] for k in range(3))
     yaw = item.yaw + np.arctan2(seen[..., 4], seen[..., 3]) / 2
@@ -56,7 +73,16 @@ def from_food_frame(seen: np.ndarray, item: Item) -> np.ndarray:
 
 
 def observed_features(pose: np.ndarray, before: np.ndarray, item: Item) -> np.ndarray:
-    """What the network is given of poses (..., 5), those a step before, and the food: shape (..., 13)."""
+    """What the network is given of a pose and a food, without the words.
+
+    Args:
+        pose: Poses of the edge x, y, z [m], yaw and tilt [rad], shape (..., 5).
+        before: Those a step before [m, rad], shape (..., 5).
+        item: The food.
+
+    Returns:
+        The pose in the food's frame, the way of the last step, and the food's size [-], shape (..., 13).
+    """
     now, then = to_food_frame(pose, item), to_food_frame(before, item)
     size = np.array([item.shape.length, item.shape.width, item.shape.height]) / LENGTH_SCALE
     rest = np.broadcast_to(size, (*now.shape[:-1], 3))
@@ -65,7 +91,7 @@ def observed_features(pose: np.ndarray, before: np.ndarray, item: Item) -> np.nd
 
 @dataclass(eq=False)
 class Clone:
-    """A policy that was learnt.
+    """A behaviour-cloning policy that was trained.
 
     Attributes:
         vocabulary: Words that it knows.

@@ -7,9 +7,10 @@ HTTP, a JSON document each way:
     POST /act     {"instruction": ..., "pose": [x, y, z, yaw, pitch], "joints": [9 numbers] or null,
                    "images": {camera: PNG in base64}} -> {"actions": [[...], ...], "done": false}
 
-``pose`` actions have 7 numbers: change of x, y, z [m], roll, pitch, yaw [rad] from where the edge is, and the gripper; ``joints`` have 8: joint targets
-[rad] and the gripper. All actions of an answer are carried out, one in each step of control, before the next question. Foods are not sent:
-what a policy may know of them is in the pictures.
+``pose`` actions have 7 numbers: change of x, y, z [m], roll, pitch, yaw [rad] from where the edge is, and the gripper.
+``joints`` actions have 8: joint targets [rad] and the gripper. The gripper stays closed, whatever is sent: the knife is
+fixed to the hand. All actions of an answer are carried out, one in each control step, before the next question. Foods
+are not sent: what a policy may know of them is in the pictures.
 """
 
 from __future__ import annotations
@@ -51,7 +52,17 @@ class Model(Protocol):
     def act(
         self, instruction: str, pose: np.ndarray, joints: np.ndarray | None, images: dict[str, np.ndarray]
     ) -> np.ndarray:
-        """The next actions (n, 7 or 8); pictures are (h, w, 3), 8 bits."""
+        """The next actions.
+
+        Args:
+            instruction: What is asked for, in words.
+            pose: Pose of the edge x, y, z [m], yaw and tilt [rad], shape (5,).
+            joints: Arm and fingers [rad, m], shape (9,); None on the plain table.
+            images: Pictures by camera, from 0 to 255 [-], shape (h, w, 3) each.
+
+        Returns:
+            Actions one after the other [m, rad], shape (n, 7) or (n, 8); none when it is done.
+        """
 
 
 class Remote:
@@ -108,8 +119,8 @@ class Remote:
             image: np.ndarray = obs["images"][name]
         except KeyError:
             raise CutcalError(
-                f"--server {self.address}: {self.name} wants pictures of the camera {name!r}; evaluate it with --world intsim and "
-                "--pixels N, which needs Vulkan"
+                f"--server {self.address}: {self.name} wants pictures of the camera {name!r}; evaluate it with "
+                "--world intsim and --pixels N, which needs Vulkan"
             ) from None
         return image
 
@@ -121,8 +132,8 @@ class Remote:
             actions = np.empty(0)
         if actions.ndim != 2 or actions.shape[1] != ACTION_SIZES[self.action] or not np.isfinite(actions).all():
             raise CutcalError(
-                f"--server {self.address}: {self.name} answers with actions {str(given)[:80]}; {self.action} actions are rows of "
-                f"{ACTION_SIZES[self.action]} finite numbers"
+                f"--server {self.address}: {self.name} answers with actions {str(given)[:80]}; "
+                f"{self.action} actions are rows of {ACTION_SIZES[self.action]} finite numbers"
             )
         return list(actions)
 

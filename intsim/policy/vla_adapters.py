@@ -1,10 +1,11 @@
-"""Published vision-language-action models as servers of :mod:`intsim.policy.remote`: RDT, Octo and OpenVLA, each loaded by its authors' own code.
+"""Published vision-language-action models as servers of :mod:`intsim.policy.remote`: RDT, Octo and OpenVLA.
 
     python -m intsim.policy.vla_adapters openvla --weights runs/openvla-cutcal --key cutcal --port 8000
     cutcal evaluate --policy remote --server http://127.0.0.1:8000 --world intsim --pixels 256
 
-Each runs in an environment of its own, with the packages that its authors ask for and a GPU; the evaluation runs in another. They have to be fine-tuned on an
-export of ``cutcal dataset`` first: none has seen a knife. No weights are loaded in the tests, where stand-ins take the place of the packages.
+Each is loaded by its authors' own code and runs in an environment of its own, with the packages that they ask for and a
+GPU; the evaluation runs in another. They have to be fine-tuned on an export of ``cutcal dataset`` first: none has seen
+a knife. No weights are loaded in the tests, where stand-ins take the place of the packages.
 """
 
 from __future__ import annotations
@@ -56,7 +57,17 @@ class OpenVLA:
     def act(
         self, instruction: str, pose: np.ndarray, joints: np.ndarray | None, images: dict[str, np.ndarray]
     ) -> np.ndarray:
-        """One action, (1, 7)."""
+        """Ask for one action.
+
+        Args:
+            instruction: What is asked for, in words.
+            pose: Pose of the edge x, y, z [m], yaw and tilt [rad], shape (5,); not used.
+            joints: Arm and fingers [rad, m], shape (9,); not used.
+            images: Pictures by camera, from 0 to 255 [-], shape (h, w, 3) each.
+
+        Returns:
+            Change of pose [m, rad] and gripper, shape (1, 7).
+        """
         from PIL import Image
 
         asked = f"In: What action should the robot take to {instruction.lower()}?\nOut:"
@@ -95,7 +106,17 @@ class Octo:
     def act(
         self, instruction: str, pose: np.ndarray, joints: np.ndarray | None, images: dict[str, np.ndarray]
     ) -> np.ndarray:
-        """Some actions, (n, 7)."""
+        """Ask for some actions.
+
+        Args:
+            instruction: What is asked for, in words.
+            pose: Pose of the edge x, y, z [m], yaw and tilt [rad], shape (5,); not used.
+            joints: Arm and fingers [rad, m], shape (9,); not used.
+            images: Pictures by camera, from 0 to 255 [-], shape (h, w, 3) each.
+
+        Returns:
+            Changes of pose [m, rad] and gripper, shape (n, 7).
+        """
         import jax
 
         now = {
@@ -113,7 +134,9 @@ class Octo:
 
 
 class RDT:
-    """RDT (Liu et al. 2024, arXiv:2410.07864) by the model of its ManiSkill evaluation: two pictures, joints, a row of joint targets.
+    """RDT (Liu et al. 2024, arXiv:2410.07864): two pictures and joints, a row of joint targets.
+
+    It is asked by the model of its authors' ManiSkill evaluation.
 
     Args:
         weights: Checkpoint, .pt or .safetensors.
@@ -161,7 +184,20 @@ class RDT:
     def act(
         self, instruction: str, pose: np.ndarray, joints: np.ndarray | None, images: dict[str, np.ndarray]
     ) -> np.ndarray:
-        """A row of joint targets and gripper, (n, 8)."""
+        """Ask for a row of joint targets.
+
+        Args:
+            instruction: What is asked for, in words.
+            pose: Pose of the edge x, y, z [m], yaw and tilt [rad], shape (5,); not used.
+            joints: Arm and fingers [rad, m], shape (9,).
+            images: Pictures by camera, from 0 to 255 [-], shape (h, w, 3) each.
+
+        Returns:
+            Joint targets [rad] and gripper, shape (n, 8).
+
+        Raises:
+            ValueError: Joints are missing.
+        """
         import torch
         from PIL import Image
 

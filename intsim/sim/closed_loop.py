@@ -80,63 +80,97 @@ def closed_loop_episode(
     return env.table.rollout, env.table.items[0], found
 
 
+class _ArmCommand:
+    """What the arm is commanded, from one action to the next.
+
+    Args:
+        env: The environment, reset.
+
+    Attributes:
+        pose: Commanded pose of the edge x, y, z [m], yaw and tilt [rad], shape (5,).
+        joints: Commanded joints [rad, m], shape (9,).
+    """
+
+    def __init__(self, env: Any) -> None:
+        self._env, self._velocity = env, np.zeros(3)
+        self.pose, self.joints = env.pose, _joints(env)
+
+    def update(self, action: np.ndarray) -> tuple[str, ...]:
+        """Take in a change of pose (7,) or joint targets (8,), within the arm's limits; returns those that were met."""
+        if len(action) == len(MAX_JOINT_SPEEDS) + 1:
+            turn = np.asarray(action[:-1], float) - self.joints[:7]
+            slow = np.clip(turn, -MAX_JOINT_SPEEDS / CONTROL_RATE, MAX_JOINT_SPEEDS / CONTROL_RATE)
+            self.joints = np.array([*(self.joints[:7] + slow), 0.0, 0.0])
+            self.pose = self._env.kinematics.pose(self.joints)
+            return ("joint",) * bool((slow != turn).any())
+        x, y, z, _, pitch, yaw = np.asarray(action, float)[:6]
+        change = self._env.pose + [x, y, z, yaw, pitch] - self.pose
+        kept = limit_command(np.array([*change[:3], 0.0, change[4], change[3]]), self._velocity)
+        self._velocity = kept.delta[:3] * CONTROL_RATE
+        self.pose = self.pose + [*kept.delta[:3], kept.delta[5], kept.delta[4]]
+        self.joints, _ = self._env.kinematics.joints(self.pose, np.array([*self.joints[:7], 0.0, 0.0]))
+        return kept.clipped
+
+
 def roll_out_closed_loop(env: Any, policy: Policy, seed: int) -> SeveringOutcome:
     """Let a policy act until it has done what it was told, or the edge has been stuck for a second and a half.
 
-    Its changes of pose (7 numbers) are taken from where the edge is, as in ``pd_ee_delta_pose`` in metres, and what is commanded keeps within the
-    arm's limits; the joints for it are found by inverse kinematics. Joint targets (8 numbers) are commanded as they are, each joint within its speed.
-    It is given the edge's ``pose``, the ``joints``, the ``items``, and ``images`` by camera where there are any.
+    Its changes of pose (7 numbers) are taken from where the edge is, as in ``pd_ee_delta_pose`` in metres, and what is
+    commanded keeps within the arm's limits; the joints for it are found by inverse kinematics. Joint targets (8
+    numbers) are commanded as they are, each joint within its speed. The gripper stays closed, whatever the policy
+    sends. It is given the edge's ``pose``, the ``joints``, the ``items``, and ``images`` by camera where there are any.
 
     Args:
         env: A :class:`intsim.sim.environment.CutFoodEnv` that was reset, in joint positions.
         policy: The policy.
-        seed: Its own.
+        seed: Of the policy.
+
+    Returns:
+        What the solver has found.
     """
     policy.reset(seed)
-    command, velocity = env.pose, np.zeros(3)
-    way: list[np.ndarray] = []
-    joints, peak, short = env.agent.robot.get_qpos()[0].numpy().astype(float), 0.0, 0.0
+    command, way, peak, short = _ArmCommand(env), [], 0.0, 0.0
     for _ in range(EPISODE_STEPS):
         food = env.coupling if env.coupled else env.table
-        own = env.agent.robot.get_qpos()[0].numpy().astype(float)
-        obs = {"pose": env.pose, "joints": own, "items": tuple(food.items), "images": _images(env)}
+        obs = {"pose": env.pose, "joints": _joints(env), "items": tuple(food.items), "images": _images(env)}
         action = policy.act(obs, env.instruction)
         if action is None:
             break
-        if len(action) == len(MAX_JOINT_SPEEDS) + 1:
-            turn = np.asarray(action[:-1], float) - joints[:7]
-            slow = np.clip(turn, -MAX_JOINT_SPEEDS / CONTROL_RATE, MAX_JOINT_SPEEDS / CONTROL_RATE)
-            joints, clipped = np.array([*(joints[:7] + slow), 0.0, 0.0]), ("joint",) * bool((slow != turn).any())
-            command = env.kinematics.pose(joints)
-        else:
-            x, y, z, _, pitch, yaw = np.asarray(action, float)[:6]
-            change = env.pose + [x, y, z, yaw, pitch] - command
-            kept = limit_command(np.array([*change[:3], 0.0, change[4], change[3]]), velocity)
-            velocity, clipped = kept.delta[:3] * CONTROL_RATE, kept.clipped
-            command = command + [*kept.delta[:3], kept.delta[5], kept.delta[4]]
-            joints, _ = env.kinematics.joints(command, np.array([*joints[:7], 0.0, 0.0]))
-        env.step(np.array([*joints[:7], GRIPPER_CLOSED], np.float32))
+        clipped = command.update(action)
+        env.step(np.array([*command.joints[:7], GRIPPER_CLOSED], np.float32))
         env.table.rollout.clipped[-1] = clipped
         peak = max(peak, float(env.forces[:, 2].max()))
         way.append(env.pose[:3])
         if way[-1][2] == min(there[2] for there in way):
-            short = float(way[-1][2] - command[2])
-        if (
-            len(way) > STALL_STEPS
-            and np.linalg.norm(np.array(way[-STALL_STEPS:]) - way[-1], axis=1).max() < STALL_DISTANCE
-        ):
+            short = float(way[-1][2] - command.pose[2])
+        if _stuck(way):
             break
     env.coupling.end()
+    return _outcome(env, peak, short)
+
+
+def _joints(env: Any) -> np.ndarray:
+    """Joints of the arm and its fingers as they are [rad, m], shape (9,)."""
+    own: np.ndarray = env.agent.robot.get_qpos()[0].numpy().astype(float)
+    return own
+
+
+def _stuck(way: list[np.ndarray]) -> bool:
+    """Whether the edge, from where it has been (3,) [m], has not moved for :data:`STALL_STEPS`."""
+    last = np.array(way[-STALL_STEPS:])
+    return len(way) > STALL_STEPS and bool(np.linalg.norm(last - way[-1], axis=1).max() < STALL_DISTANCE)
+
+
+def _outcome(env: Any, peak: float, short: float) -> SeveringOutcome:
+    """What the solver has found of an episode that is over."""
     done = env.coupling.done
     broken = [d.why for d in done if d.severed is None]
     if broken or not env.coupled:
-        return SeveringOutcome(
-            None, peak=peak, short=short, why=broken[0] if broken else "the food does not resist here"
-        )
+        why = broken[0] if broken else "the food does not resist here"
+        return SeveringOutcome(None, peak=peak, short=short, why=why)
     severed = len(env.coupling.items[0].pieces) > env.episode.spec.cuts
-    return SeveringOutcome(
-        severed, env.coupling.uncut(), peak, short, done[-1].why if done else "the edge does not reach the food"
-    )
+    why = done[-1].why if done else "the edge does not reach the food"
+    return SeveringOutcome(severed, env.coupling.uncut(), peak, short, why)
 
 
 def _images(env: Any) -> dict[str, np.ndarray]:

@@ -1,7 +1,8 @@
-"""IntSim: a ManiSkill environment in which a Panda cuts food that the cutting solver simulates; needs the extra ``[robot]``.
+"""IntSim: a ManiSkill environment in which a Panda cuts food of the cutting solver; needs the extra ``[robot]``.
 
-The robot's physics (100 Hz) and the solver take turns: the solver follows the edge to where the robot has brought it, and the mean force of that
-interval acts on the knife in the next. Without a renderer it runs all the same, and gives states.
+The robot's physics (100 Hz) and the solver take turns: the solver follows the edge to where the robot has brought it,
+and the mean force of that interval acts on the knife in the next. Without a renderer it runs all the same, and gives
+states.
 """
 
 from __future__ import annotations
@@ -40,9 +41,11 @@ PIXELS, HUMAN_PIXELS = 128, 512
 class CutFoodEnv(BaseEnv):
     """Cut the food that the instruction names, where it says.
 
-    ``reset(seed=...)`` draws the task from a suite; ``reset(options={"episode": episode})`` sets one, with
-    ``draws`` beside it for that episode alone. ``instruction`` is the sentence of the
-    episode. The force of the food is in ``info`` and not among the observations: a real arm of this kind does not feel it.
+    ``reset(seed=...)`` draws the task from a suite; ``reset(options={"episode": episode})`` sets one, with ``draws``
+    beside it for that episode alone. ``instruction`` is the sentence of the episode. The force of the food is in
+    ``info`` and not among the observations: a real arm of this kind does not feel it.
+
+    Its arguments are keywords of ``gymnasium.make``, which is why they are no object.
 
     Args:
         suite: Name in :data:`intsim.task.suites.SUITES`.
@@ -52,7 +55,8 @@ class CutFoodEnv(BaseEnv):
         coarse: Cells of a screening run.
         draws: Whether the knife is drawn along its edge and tilted in the solver as well.
         stiffness, damping: Of the arm's joints [N m/rad, N m s/rad]; ManiSkill's own without it.
-        criterion: What ``info["success"]`` is: ``published`` for the four published criteria, ``severed`` for pieces in the solver too.
+        criterion: What ``info["success"]`` is: ``published`` for the four published criteria, ``severed`` for pieces in
+            the solver too.
         pixels: Width and height of the cameras' pictures.
         scenery: Which background, see :mod:`intsim.sim.background`.
 

@@ -27,11 +27,14 @@ BLADE_LINK = "knife"
 
 @functools.cache
 def urdf(knife: str, *, visible: bool) -> str:
-    """Path of the robot's description with a blade fixed to its hand, along the hand's x axis, the edge away from the hand.
+    """Path of the robot's description with a blade fixed to its hand.
+
+    The blade lies along the hand's x axis, the edge away from the hand.
 
     Args:
         knife: Name of the knife.
-        visible: Without it all that only a renderer needs is left out: where there is no renderer, its materials cannot be made.
+        visible: Without it all that only a renderer needs is left out: where there is no renderer, its materials cannot
+            be made.
     """
     blade = load_knife(knife)
     tree = ElementTree.parse(URDF_SOURCE)
@@ -98,7 +101,7 @@ class PandaKnife(Panda):
 
 
 def hand_rotation(yaw: float, pitch: float = 0.0) -> np.ndarray:
-    """Orientation (3, 3) of a hand that points down, with the edge in this direction, its end risen by the pitch [rad]."""
+    """Orientation (3, 3) of a hand that points down, the edge in a direction and its end risen by a pitch [rad]."""
     c, s, cp, sp = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch)
     x = np.array([c * cp, s * cp, sp])
     y = np.array([s, -c, 0.0])

@@ -1,4 +1,4 @@
-"""What there is to see beside the robot: board, table, light, and the food as the solver has moved it; needs the extra ``[robot]``."""
+"""What there is to see beside the robot: board, table, light, and the deformed food; needs the extra ``[robot]``."""
 
 from __future__ import annotations
 
@@ -113,7 +113,15 @@ class Scenery:
         self.show(which, points, triangles, flesh, coupling.items[which].name)
 
     def show(self, which: int, points: np.ndarray, triangles: np.ndarray, flesh: np.ndarray, name: str) -> None:
-        """Show a food as this mesh: vertices in the world [m] (m, 3), triangles (t, 3), which vertices are flesh (m,)."""
+        """Show a food as a mesh.
+
+        Args:
+            which: Its place among the foods of the episode.
+            points: Vertices in the world [m], shape (m, 3).
+            triangles: Vertices of each triangle, indices [-], shape (t, 3).
+            flesh: Which vertices lie on the face of the cut, truth values [-], shape (m,).
+            name: Food whose colours it has.
+        """
         entity = self._foods[which]
         entity.remove_component(self._shown[which])
         self._shown[which] = _body(points, triangles, flesh, name)

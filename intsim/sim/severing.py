@@ -17,13 +17,16 @@ from mpm.scene import Arm, Scene
 from mpm.solver import Simulation
 
 PANDA_ARM = Arm(1 / 0.57e-3)
-"""ManiSkill's Panda with its own gains gives way by 0.57 mm per N of vertical reaction."""
+"""ManiSkill's Panda with its own gains: it gives way by 0.57 mm per N of vertical reaction."""
 MIN_DESCENT_SPEED = 1e-3  # speed of a descent that still is one [m/s]
 MIN_SLICE_RATIO = 1e-3
 """Speed along the edge over that down below which a cut is a press and keeps its mirror plane [-]."""
 MIN_CELLS = 2  # in the thinner part of the food, as mpm.scene asks
 FINEST_CELL = 1 / 3
-"""Finest cell over the usual one [-]: finer ones cost more than 81 times as much, and an evaluation has hundreds of cuts."""
+"""Finest cell over the usual one [-].
+
+The cost grows with the fourth power of the number of cells over a length, and an evaluation has hundreds of cuts.
+"""
 MIN_CUT_DEPTH = 1e-3  # way into the food that still is a cut [m]
 
 
@@ -69,7 +72,10 @@ def cut_scene_at(
         food: Its properties.
         knife: Name of the knife.
         coarse: Cells and speed of a screening run.
-        cells: Most cells over height and width: a large food has larger ones, and a wider process zone of the edge with them.
+        cells: Most cells over height and width; a large food has larger cells, and with them a wider process zone.
+
+    Returns:
+        The scene of the cut.
 
     Raises:
         SceneError: A cut that the solver cannot make.
@@ -101,19 +107,22 @@ def commanded_scene(
     arm: Arm = PANDA_ARM,
     coarse: bool = True,
 ) -> Scene | None:
-    """The cut that a commanded motion makes, None where it does not reach into the food.
+    """The cut that a commanded motion makes.
 
-    Taken from the motion: the way down from the food's top, its mean speed, the draw along the edge, and how long the lowest place is
-    held.
+    Taken from the motion: the way down from the food's top, its mean speed, the draw along the edge, and how long the
+    lowest place is held.
 
     Args:
         item: The food before the cut, whole.
         along: Where along its axis [m].
-        command: Commanded poses x, y, z, yaw, pitch (n, 5), one for each step of control.
+        command: Commanded poses x, y, z [m], yaw and tilt [rad], one for each control step, shape (n, 5).
         food: Its properties.
         knife: Name of the knife.
         arm: What holds it.
         coarse: Cells and speed of a screening run.
+
+    Returns:
+        The scene; None where the motion does not reach into the food.
 
     Raises:
         SceneError: A cut that the solver cannot make.
@@ -149,7 +158,20 @@ def simulate_severing(
     arm: Arm = PANDA_ARM,
     coarse: bool = True,
 ) -> tuple[SeveringOutcome, ForceRecord | None]:
-    """Simulate a cut; the arguments are those of :func:`commanded_scene`. Returns the finding, and the record where there is one."""
+    """Simulate the cut that a commanded motion makes.
+
+    Args:
+        item: The food before the cut, whole.
+        along: Where along its axis [m].
+        command: Commanded poses x, y, z [m], yaw and tilt [rad], one for each control step, shape (n, 5).
+        food: Its properties.
+        knife: Name of the knife.
+        arm: What holds it.
+        coarse: Cells and speed of a screening run.
+
+    Returns:
+        The finding, and the record; None without a simulation.
+    """
     try:
         scene = commanded_scene(item, along, command, food, knife=knife, arm=arm, coarse=coarse)
         if scene is None:

@@ -1,4 +1,4 @@
-"""Where a policy acts or a demonstration is made: the robot's environment, its name and its settings; needs no simulator."""
+"""Where a policy acts or a demonstration is made: name and settings of the environment; needs no simulator."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A table without a robot simulator: the edge goes where it is sent, within what a Franka arm may do."""
+"""The kinematic table, without a robot simulator: the edge goes where it is sent, within what a Franka arm may do."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ from intsim.task.rollout import Rollout
 from intsim.task.targets import Item
 
 MAX_SPEED, MAX_ANGULAR_SPEED, MAX_ACCELERATION = 1.7, 2.5, 13.0
-"""Limits of a Franka arm's hand in Cartesian motion: speed [m/s], angular speed [rad/s], acceleration [m/s^2] (Franka control interface)."""
-CUT_HEIGHT = 5e-3  # height of the edge above the board at which a food is taken for cut through, in plain geometry [m]
+"""Limits of a Franka arm's hand: speed [m/s], angular speed [rad/s], acceleration [m/s^2].
+
+Source: Franka control interface, limits of Cartesian motion.
+"""
+CUT_HEIGHT = 5e-3  # height of the edge above the board at which a food counts as cut through, in plain geometry [m]
 EDGE_LENGTH = 0.18  # length of the edge [m]
 
 
@@ -27,12 +30,15 @@ class LimitedCommand:
 
 
 def limit_command(delta: np.ndarray, before: np.ndarray, rate: float = CONTROL_RATE) -> LimitedCommand:
-    """Scale a pose change (6,) down to the arm's limits; within them it is returned bit for bit, its direction always kept.
+    """Scale a pose change down to the arm's limits; within them it is returned bit for bit, its direction always kept.
 
     Args:
-        delta: x, y, z [m], rotations [rad] of this step.
+        delta: Change of x, y, z [m] and rotations [rad] in this step, shape (6,).
         before: Velocity in the step before [m/s], shape (3,).
         rate: Steps a second.
+
+    Returns:
+        The change within the limits, and which were met.
     """
     out, clipped = np.array(delta, float), []
     speed = np.linalg.norm(out[:3]) * rate
@@ -74,7 +80,10 @@ class KinematicTable:
         return {"pose": self._pose.copy(), "items": tuple(self.items)}
 
     def step(self, action: np.ndarray) -> None:
-        """Move by x, y, z [m], roll, pitch, yaw [rad] and an absolute gripper, shape (7,), as ``pd_ee_delta_pose`` in metres does."""
+        """Move by x, y, z [m] and roll, pitch, yaw [rad] of an action (7,), as ``pd_ee_delta_pose`` in metres does.
+
+        The gripper, its last number, moves nothing: the knife is fixed to the hand.
+        """
         kept = limit_command(np.asarray(action, float)[:6], self._velocity)
         self._velocity = kept.delta[:3] * CONTROL_RATE
         x, y, z, _, pitch, yaw = kept.delta
@@ -87,8 +96,8 @@ class KinematicTable:
         """Take down where the edge has come to.
 
         Args:
-            command: Where it was sent, shape (5,).
-            there: Where it is, shape (5,).
+            command: Pose x, y, z [m], yaw and tilt [rad] where it was sent, shape (5,).
+            there: Pose [m, rad] where it is, shape (5,).
             clipped: Limits that were met.
         """
         self.rollout.command.append(command)
@@ -108,7 +117,12 @@ class KinematicTable:
 
 
 def axis_crossing(item: Item, pose: np.ndarray) -> float | None:
-    """Where along the axis of a food an edge (5,) crosses it [m], None where it passes beside it or lies along it."""
+    """Where along the axis of a food an edge crosses it [m]; None where the edge passes beside it or lies along it.
+
+    Args:
+        item: The food.
+        pose: Pose of the edge x, y, z [m], yaw and tilt [rad], shape (5,).
+    """
     edge = np.array([np.cos(pose[3]), np.sin(pose[3])])
     offset = pose[:2] - [item.x, item.y]
     if abs(edge @ item.across) < 0.1:

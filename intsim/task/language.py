@@ -1,8 +1,8 @@
 """Cutting tasks in words, and words back into tasks.
 
-A small grammar: templates with slots for ratio, food and side, each filled from a pool of words that mean the same. Templates for
-training and templates that a policy has never seen are disjoint. Every sentence that is made can be read back into its task, which
-is what makes an evaluation of language more than a lottery.
+A small grammar: templates with slots for ratio, food and side, each filled from a pool of words that mean the same.
+Templates for training and those that a policy has never seen are disjoint. Every sentence that is made can be read back
+into its task.
 """
 
 from __future__ import annotations
@@ -124,6 +124,15 @@ def sentences(spec: CutSpec, *, unseen: bool = False) -> Iterator[str]:
 def instructions(spec: CutSpec, seed: int, count: int = SENTENCES_PER_TASK, *, unseen: bool = False) -> list[str]:
     """Different sentences for a task, drawn from templates in turn.
 
+    Args:
+        spec: The task.
+        seed: Of the choice.
+        count: How many.
+        unseen: From the templates that are kept for testing.
+
+    Returns:
+        As many sentences, no two the same.
+
     Raises:
         TaskError: There are not as many.
     """
@@ -153,6 +162,9 @@ def parse_instruction(sentence: str, items: Sequence[str], camera: str = "front"
         sentence: Made by this grammar, or in its words.
         items: Names of the foods that may be meant.
         camera: Name of the camera for left and right.
+
+    Returns:
+        The task.
 
     Raises:
         TaskError: A food, ratio or side that is not said, or said in two ways.
@@ -199,7 +211,15 @@ def _only(what: str, sentence: str, found: set[T]) -> T:
 
 
 def read_paraphrases(path: Path | str, spec: CutSpec, items: Sequence[str]) -> list[str]:
-    """Sentences of somebody else for a task, a line each; those that the grammar cannot read are the file's word for it.
+    """Read somebody else's sentences for a task; those that the grammar cannot read are taken on trust.
+
+    Args:
+        path: Text file with a sentence a line.
+        spec: The task.
+        items: Names of the foods that may be meant.
+
+    Returns:
+        The sentences.
 
     Raises:
         TaskError: The file cannot be read, or a line that the grammar reads means another task.

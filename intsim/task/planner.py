@@ -16,8 +16,8 @@ HOME = (-0.25, 0.0, 0.25)  # where the middle of the edge begins [m]
 GRIPPER_CLOSED = -1.0
 """Gripper's part of an action: closed on the handle.
 
-ManiSkill's Panda maps -1 to 1 onto finger joints from -0.01 to 0.04 m, so that -1 presses the fingers together and 0 holds them
-15 mm apart.
+ManiSkill's Panda maps -1 to 1 onto finger joints from -0.01 to 0.04 m, so that -1 presses the fingers together and 0
+holds them 15 mm apart.
 """
 CLEARANCE = 0.02  # height above the food at which the descent begins [m]
 DESCENT_SPEED = 0.04  # of the descent [m/s]
@@ -32,7 +32,8 @@ class Descent:
     """How the blade comes down.
 
     Attributes:
-        style: ``press`` straight down, ``slice`` with a draw along the edge, ``rock`` from a raised end, ``saw`` to and fro.
+        style: ``press`` straight down, ``slice`` with a draw along the edge, ``rock`` from a raised end, ``saw`` to and
+            fro.
         depth: Height of the edge at the end [m]; negative to command it into the board, for an arm that yields.
         hold: Time that it is held there [s].
         speed: Of the descent [m/s].
@@ -119,7 +120,10 @@ def plan_cut(
 
 
 def _descent(descent: Descent, centre: np.ndarray, high: float, turn: float) -> tuple[np.ndarray, np.ndarray]:
-    """Pose above the cut (5,), and the poses of the way down (n, 5): from a height [m], the edge in a direction [rad]."""
+    """Pose above the cut (5,), and the poses of the way down (n, 5) [m, rad].
+
+    The way down begins at a height above the board [m]; the edge has a direction [rad].
+    """
     edge = np.array([math.cos(turn), math.sin(turn)])
     depth, style = descent.depth, descent.style
     steps = max(2, math.ceil((high - depth) / descent.speed * CONTROL_RATE))

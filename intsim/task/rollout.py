@@ -19,8 +19,8 @@ class Policy(Protocol):
     def act(self, obs: dict[str, Any], instruction: str) -> np.ndarray | None:
         """The next action.
 
-        It is a change of pose x, y, z [m], roll, pitch, yaw [rad] and the gripper, shape (7,), or joint targets [rad] and the
-        gripper, shape (8,), which need the robot; None when the policy has done what it was told.
+        It is a change of pose x, y, z [m], roll, pitch, yaw [rad] and the gripper, shape (7,), or joint targets [rad]
+        and the gripper, shape (8,), which need the robot; None when the policy has done what it was told.
         """
 
 

@@ -23,7 +23,7 @@ LENGTH_VARIATION_LIMIT = 0.1  # most spread of the lengths of equal pieces, over
 
 @dataclass(frozen=True)
 class GeometricOutcome:
-    """What was found.
+    """What geometry says of an episode.
 
     Attributes:
         height: Lowest height of the edge above the table [m].
@@ -31,7 +31,7 @@ class GeometricOutcome:
         offset: Place of the cut less the one asked for, over the food's length [-]; NaN where it was not met.
         pieces: Pieces of the food at the end, in plain geometry.
         spread: Standard deviation of the lengths of the pieces over their mean; NaN for one piece.
-        criteria: ``tip``, ``region``, ``angle``, ``place`` as published; ``strict_tip``; for equal pieces ``count`` and ``even``.
+        criteria: Which of :data:`CRITERIA` are met; ``count`` and ``even`` for equal pieces alone.
     """
 
     height: float
@@ -53,17 +53,21 @@ class GeometricOutcome:
 
 
 def judge_geometry(spec: CutSpec, item: Item, rollout: Rollout, after: Item) -> GeometricOutcome:
-    """Judge an episode.
+    """Judge an episode by geometry.
 
-    The published criteria are read so that each fails by itself: the tip's error is its height above the table, the region is the
-    food, the place is along its axis. A tip within 50 mm of the table says nothing of a grape 25 mm high: ``strict_tip`` asks for 5 mm.
-    For equal pieces every cut counts against the piece that was there: the worst angle and place.
+    The published criteria are read so that each fails by itself: the tip's error is its height above the table, the
+    region is the food, the place is along its axis. A tip within 50 mm of the table says nothing of a grape 25 mm high:
+    ``strict_tip`` asks for 5 mm. For equal pieces every cut counts against the piece that was there: the worst angle
+    and place.
 
     Args:
         spec: What was asked for.
         item: The food at the beginning.
         rollout: What happened.
         after: The food at the end.
+
+    Returns:
+        What was found, and which criteria are met.
     """
     poses = np.array(rollout.pose)
     low = int(np.argmin(poses[:, 2]))
@@ -119,7 +123,16 @@ def _angle(item: Item, rollout: Rollout, k: int) -> float:
 
 
 def wilson(successes: int, trials: int, z: float = 1.959964) -> tuple[float, float]:
-    """95 % interval of a rate of success (Wilson 1927, J. Am. Stat. Assoc. 22:209)."""
+    """95 % interval of a rate of success (Wilson 1927, J. Am. Stat. Assoc. 22:209).
+
+    Args:
+        successes: Successes.
+        trials: Trials.
+        z: Quantile of the normal distribution at 97.5 % [-].
+
+    Returns:
+        Lower and upper end [-]; 0 and 1 without trials.
+    """
     if trials == 0:
         return 0.0, 1.0
     p, n = successes / trials, trials

@@ -31,7 +31,15 @@ PLACEMENT_TRIES = 200
 
 @dataclass(frozen=True)
 class Episode:
-    """One test. Attributes: suite; seed; spec; item, the food that is meant; others; instruction."""
+    """One task on one table.
+
+    Attributes:
+        suite, seed: Which it is.
+        spec: What is asked for.
+        item: The food that is meant.
+        others: Other foods on the table.
+        instruction: What is asked for, in words.
+    """
 
     suite: str
     seed: int
@@ -52,7 +60,16 @@ def random_item(food: FoodSpec, rng: np.random.Generator) -> Item:
 
 
 def distractors(item: Item, foods: dict[str, FoodSpec], count: int, rng: np.random.Generator) -> tuple[Item, ...]:
-    """Other foods beside it, no two of a kind and none touching another.
+    """Other foods beside one, no two of a kind and none touching another.
+
+    Args:
+        item: The food that is there.
+        foods: Foods that they are taken from, by name.
+        count: How many.
+        rng: Generator of the choice and the places.
+
+    Returns:
+        The other foods.
 
     Raises:
         TaskError: There is no room for them.
@@ -97,8 +114,14 @@ def _flip(rng: np.random.Generator, name: str) -> CutSpec:
 
 @dataclass(frozen=True)
 class TaskSuite:
-    """A kind of test. Attributes: what, in words; task, drawn from a generator for a food; crowd, most other foods; unseen, words that
-    were kept for testing."""
+    """A kind of task.
+
+    Attributes:
+        what: What it tests, in words.
+        task: Draws what is asked for from a generator, for a food.
+        distractors: Other foods on the table at most.
+        unseen: Whether the sentences are of those that are kept for testing.
+    """
 
     what: str
     task: Callable[[np.random.Generator, str], CutSpec] = _fraction
@@ -118,12 +141,15 @@ SUITES = {
 
 
 def sample_episode(suite: str, seed: int, foods: dict[str, FoodSpec]) -> Episode:
-    """The episode of a suite with this seed; the same seed is the same episode.
+    """The episode of a suite with a seed; the same seed is the same episode.
 
     Args:
         suite: Name in ``SUITES``.
         seed: From ``TEST`` on for a test.
         foods: Foods that may be asked for, by name.
+
+    Returns:
+        What is on the table, what is asked for, and in which words.
 
     Raises:
         TaskError: No such suite.

@@ -14,8 +14,10 @@ from mpm.shapes import Shape, half_width, section_area
 
 SIDES = ("left", "right", "centre")
 MIN_VIEW_ANGLE = math.radians(15.0)
-"""Least angle between a food's axis and the direction in which the camera looks, seen from above: nearer to it the two ends lie behind
-each other, and left and right say nothing."""
+"""Least angle between a food's axis and the direction in which the camera looks, seen from above [rad].
+
+Nearer to it the two ends lie behind each other, and left and right say nothing.
+"""
 VOLUME_SECTIONS = 64  # sections from which the volume of a piece is found
 CUT_OPENING = 4e-3  # way that the two sides of a cut slide apart [m]
 
@@ -51,7 +53,12 @@ CAMERAS = {
 
 @dataclass(frozen=True)
 class Piece:
-    """A part of a food along its axis. Attributes: low, high, from where to where in the uncut food; shift, how far it has slid along the axis [m]."""
+    """A part of a food along its axis.
+
+    Attributes:
+        low, high: From where to where in the uncut food [m].
+        shift: How far it has slid along the axis [m].
+    """
 
     low: float
     high: float
@@ -117,7 +124,15 @@ class Item:
         return np.array([self.x, self.y]) + along * self.axis
 
     def placed(self, points: np.ndarray, along: float) -> np.ndarray:
-        """Points (n, 3) of a cut's scene, whose blade is at ``along``, on the table [m]: x along the blade, y along the food's axis."""
+        """Points of a cut's scene on the table.
+
+        Args:
+            points: In the scene: x along the blade, y along the food's axis, z up [m], shape (n, 3).
+            along: Where along the food's axis the blade is [m].
+
+        Returns:
+            The same points in the world [m], shape (n, 3).
+        """
         plane = self.at(along) + points[:, :1] * self.across + points[:, 1:2] * self.axis
         return np.column_stack([plane, points[:, 2]])
 
@@ -202,7 +217,8 @@ def from_left(spec: CutSpec, item: Item) -> float:
     across = float(item.axis @ CAMERAS[spec.camera].right)
     if spec.side != "centre" and abs(across) < math.sin(MIN_VIEW_ANGLE):
         raise TaskError(
-            f"task: the {item.name} points to the camera {spec.camera!r} ({math.degrees(math.asin(abs(across))):.0f} degrees across its view), "
+            f"task: the {item.name} points to the camera {spec.camera!r} "
+            f"({math.degrees(math.asin(abs(across))):.0f} degrees across its view), "
             "which sees no left and right end; name another camera"
         )
     return 1.0 if across >= 0 else -1.0
@@ -211,8 +227,9 @@ def from_left(spec: CutSpec, item: Item) -> float:
 def target(spec: CutSpec, item: Item) -> float:
     """Where along the axis the next cut has to go, from the middle of the food [m].
 
-    One cut is measured on the whole food. To make equal pieces, the largest that is left is cut so that what comes off is one of
-    as many equal parts as are still to be made of it: from what it has become, not from what was planned for the whole.
+    One cut is measured on the whole food. To make equal pieces, the largest that is left is cut so that what comes off
+    is one of as many equal parts as are still to be made of it: from what it has become, not from what was planned for
+    the whole.
 
     Raises:
         TaskError: As :func:`from_left`, or there is nothing more to cut.
@@ -231,8 +248,8 @@ def target(spec: CutSpec, item: Item) -> float:
 def boxed_target(spec: CutSpec, item: Item) -> tuple[np.ndarray, float]:
     """Where a planner cuts that knows no more than the food's bounding box, as the published one does.
 
-    It measures the ratio along the side of the box that the camera sees across its view, and cuts across that side. The box of a food
-    that is turned is longer or shorter than the food, and its cut is as oblique as the food lies.
+    It measures the ratio along the side of the box that the camera sees across its view, and cuts across that side. The
+    box of a food that is turned is longer or shorter than the food, and its cut is as oblique as the food lies.
 
     Returns:
         Point of the table (2,) [m], and the direction of the edge [rad].

@@ -58,7 +58,8 @@ def test_the_oracle_succeeds_everywhere(found):
 
 
 def test_each_wrong_oracle_fails_in_its_own_way(found):
-    """The wrong side fails the place alone, the other food the region, a knife that stops short nothing that was published."""
+    """The wrong side fails the place alone, the other food the region, a knife that stops short nothing that was
+    published."""
     for name, suite in found["wrong-side"]["suites"].items():
         failed = {key for key, c in suite["criteria"].items() if c["successes"] < FEW}
         assert failed == (set() if name == "split" else {"place"})
@@ -72,7 +73,8 @@ def test_each_wrong_oracle_fails_in_its_own_way(found):
 
 
 def test_noise_succeeds_as_often_as_its_closed_form_says(tmp_path):
-    """erf(0.1 L / (sigma sqrt 2)) of the place, averaged over foods of all lengths, within three standard deviations of 600 trials."""
+    """erf(0.1 L / (sigma sqrt 2)) of the place, averaged over foods of all lengths, within three standard deviations of
+    600 trials."""
     noisy = Evaluation(make_policy("noisy", 0.01), "noisy", ALL, ["seeds", "language"], 300, sigma=0.01)
     for suite in document(noisy, tmp_path / "e")["suites"].values():
         p = suite["expected_place"]
@@ -102,7 +104,8 @@ def test_criteria_turn_at_their_thresholds(pose, failed):
 
 
 def test_a_knife_that_stops_short_meets_the_published_criteria_and_severs_nothing():
-    """7 mm above the board is within the published 50 mm; the solver finds the food in one piece, and in two under the full cut."""
+    """7 mm above the board is within the published 50 mm; the solver finds the food in one piece, and in two under the
+    full cut."""
     rows = {
         name: run_episode(
             Evaluation(make_policy(name), name, ALL, ["seeds"], 1, severing=True, knife="edc", arm=Arm()), HALF
@@ -118,7 +121,8 @@ def test_a_knife_that_stops_short_meets_the_published_criteria_and_severs_nothin
 
 @pytest.mark.slow
 def test_a_soft_arm_needs_overdrive():
-    """An orange stops ManiSkill's arm above the board: an edge sent to the board leaves it whole, one sent 30 mm deeper parts it."""
+    """An orange stops ManiSkill's arm above the board: an edge sent to the board leaves it whole, one sent 30 mm deeper
+    parts it."""
     shape = ALL["orange"].to_scene_food().shape
     item = Item("orange", shape)
     episode = Episode("seeds", 0, CutSpec("orange"), item, (), "cut half of the orange in the middle")
@@ -133,8 +137,8 @@ def test_a_soft_arm_needs_overdrive():
 
 
 def test_what_the_solver_cannot_cut_counts_as_neither():
-    """A slice of a millimetre would take cells too fine, and says so; one of 3 mm gets finer cells under the same edge; an edge that stays
-    above the food has cut nothing."""
+    """A slice of a millimetre would take cells too fine, and says so; one of 3 mm gets finer cells under the same edge;
+    an edge that stays above the food has cut nothing."""
     down = np.array([[0.0, 0.0, z, 0.0, 0.0] for z in np.linspace(0.05, 0.0, 30)])
     thin, record = simulate_severing(BERRY, 0.019, down, ALL["strawberry"])
     assert thin.severed is None and "slice of 1 mm" in thin.why and record is None

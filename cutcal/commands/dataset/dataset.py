@@ -151,8 +151,8 @@ def table(document: DatasetDocument, *, rendered: bool) -> str:
     ]
     if rendered and pictures is not None:
         lines += [
-            f"  {pictures.number} pictures before {len(pictures.scenes)} backgrounds: {pictures.seconds_per_episode:.1f} s "
-            "of one core for each trajectory and background",
+            f"  {pictures.number} pictures before {len(pictures.scenes)} backgrounds: "
+            f"{pictures.seconds_per_episode:.1f} s of one core for each trajectory and background",
             f"  21,000 before 15: {pictures.core_hours_of_315000:.0f} core hours; {pictures.bytes / 1e6:.1f} MB now",
         ]
     return "\n".join([*lines, *(f"  trajectory {broken.index}: {broken.status}" for broken in found.broken)])

@@ -64,7 +64,8 @@ def test_the_manifest_counts_the_whole_product_and_draws_each_once():
 
 
 def test_a_trajectory_is_drawn_from_its_number_alone():
-    """Same number, same episode; all foods and tasks come in turn; values stay within their ranges and differ; no seed of a test."""
+    """Same number, same episode; all foods and tasks come in turn; values stay within their ranges and differ; no seed
+    of a test."""
     m = Manifest(trajectories=80)
     draws = [m.trajectory(k) for k in range(80)]
     assert m.trajectory(7) == draws[7]
@@ -143,7 +144,8 @@ def no_simulator(monkeypatch):
 
 
 def test_a_stopped_dataset_goes_on_and_comes_out_the_same(tmp_path):
-    """Stopped after 4 of 7 and begun again: nothing is made twice, and the shards are those of one go; parts are gone."""
+    """Stopped after 4 of 7 and begun again: nothing is made twice, and the shards are those of one go; parts are
+    gone."""
     m = DatasetSpec(Manifest(trajectories=7), shard=3)
     with pytest.raises(KeyboardInterrupt):
         g.generate(m, tmp_path / "a", Inline(4))
@@ -162,7 +164,8 @@ def test_a_stopped_dataset_goes_on_and_comes_out_the_same(tmp_path):
 
 
 def test_a_dataset_that_is_not_finished_has_a_document(tmp_path):
-    """What it is, with a stiffness that nobody gave as null; what its pictures took may be said before it is finished."""
+    """What it is, with a stiffness that nobody gave as null; what its pictures took may be said before it is
+    finished."""
     spec = DatasetSpec(Manifest(trajectories=7, foods=["plum"]), demos="planned")
     pictures = PictureTotals((0, 3), 64, 12, 1.5, 10.0, 1000)
     for document in (DatasetDocument(spec), DatasetDocument(spec, pictures=pictures)):
@@ -174,7 +177,8 @@ def test_a_dataset_that_is_not_finished_has_a_document(tmp_path):
 
 
 def test_what_is_stored_has_maniskills_layout_and_keeps_the_force_apart(tmp_path):
-    """Shapes as documented; force and impulse agree; no name outside ``mpm`` has a force in it; the surface comes back to a tenth of a millimetre."""
+    """Shapes as documented; force and impulse agree; no name outside ``mpm`` has a force in it; the surface comes back
+    to a tenth of a millimetre."""
     g.generate(DatasetSpec(Manifest(trajectories=2), shard=2), tmp_path / "d", Inline())
     listed = json.loads((tmp_path / "d" / "shard-0000.json").read_text())
     assert [e["episode_id"] for e in listed["episodes"]] == [0, 1] and listed["env_info"]["env_id"] == "CutFood-v1"

@@ -1,4 +1,5 @@
-"""The export for LeRobot: what its reader needs is there, equal to what was stored, and force is nothing that a policy learns from."""
+"""The export for LeRobot: what its reader needs is there, equal to what was stored, and force is nothing that a policy
+learns from."""
 
 from __future__ import annotations
 
@@ -39,7 +40,8 @@ def painted(stored, tmp_path, monkeypatch):
 
 
 def test_the_columns_are_what_was_stored(stored, painted):
-    """Episode by episode, value by value, with indices that run on; every feature of info.json has its column and statistics."""
+    """Episode by episode, value by value, with indices that run on; every feature of info.json has its column and
+    statistics."""
     out, info = painted
     table = pq.read_table(out / "data/chunk-000/file-000.parquet").to_pydict()
     assert info == json.loads((out / "meta/info.json").read_text())
@@ -72,7 +74,8 @@ def trajectories_of(folder) -> list[dict[str, np.ndarray]]:
 
 
 def test_pictures_are_found_by_their_time(painted):
-    """Frame n of a video is at n / fps; each episode's begin where the table of episodes says, before its own background."""
+    """Frame n of a video is at n / fps; each episode's begin where the table of episodes says, before its own
+    background."""
     out, info = painted
     episodes = pq.read_table(out / "meta/episodes/chunk-000/file-000.parquet").to_pylist()
     for view in CAMERA_NAMES:
@@ -89,7 +92,8 @@ def test_pictures_are_found_by_their_time(painted):
 
 
 def test_force_is_nothing_that_a_policy_learns_from(painted):
-    """LeRobot takes ``observation*`` for inputs and ``action*`` for outputs: pose, pictures and commanded change alone are."""
+    """LeRobot takes ``observation*`` for inputs and ``action*`` for outputs: pose, pictures and commanded change alone
+    are."""
     _, info = painted
     learned = {n for n in info["features"] if n.startswith(("observation", "action"))}
     assert learned == {"observation.state", "action", *(f"observation.images.{v}" for v in CAMERA_NAMES)}
@@ -97,7 +101,8 @@ def test_force_is_nothing_that_a_policy_learns_from(painted):
 
 
 def test_tasks_are_looked_up_by_their_row(painted):
-    """Row n of tasks.parquet is task n, the sentence its index; an episode of another background has another sentence."""
+    """Row n of tasks.parquet is task n, the sentence its index; an episode of another background has another
+    sentence."""
     out, info = painted
     tasks = pq.read_table(out / "meta/tasks.parquet")
     frame = tasks.to_pandas()

@@ -1,4 +1,5 @@
-"""Pictures of a dataset: each made once and kept, whatever stops it, and only where there is something to render with."""
+"""Pictures of a dataset: each made once and kept, whatever stops it, and only where there is something to render
+with."""
 
 from __future__ import annotations
 
@@ -147,7 +148,8 @@ def test_an_export_that_is_stopped_while_it_renders_can_be_asked_for_again(made,
 
 
 def test_without_a_renderer_nothing_is_simulated(made, monkeypatch, tmp_path, capsys):
-    """What is missing is said before the first trajectory; so is a renderer that ends its process, and a background that does not exist."""
+    """What is missing is said before the first trajectory; so is a renderer that ends its process, and a background
+    that does not exist."""
 
     class Blind(Painter):
         """There is nothing to render with."""

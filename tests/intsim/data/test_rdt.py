@@ -35,7 +35,8 @@ def exported(tmp_path, monkeypatch):
 
 
 def test_the_loader_finds_every_picture_and_joint(exported):
-    """One .h5 a task; a picture before each step, in the folder of a hundred episodes; actions one fewer than joints; no force."""
+    """One .h5 a task; a picture before each step, in the folder of a hundred episodes; actions one fewer than joints;
+    no force."""
     folder, out, tasks = exported
     lengths = Counter(len(stored.group["actions"]) for stored in trajectories(folder))
     assert sum(t["episodes"] for t in tasks.values()) == 2 * lengths.total()

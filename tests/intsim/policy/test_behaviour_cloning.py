@@ -69,7 +69,8 @@ def constant(pose: np.ndarray, food: Item, words: tuple[str, ...] = ("cut",)) ->
 
 
 def test_it_goes_where_its_network_says_and_stops_when_it_is_back_up():
-    """Changes are from where the edge is; nothing but pose and foods is looked at; down and up again ends the episode, as the time does."""
+    """Changes are from where the edge is; nothing but pose and foods is looked at; down and up again ends the episode,
+    as the time does."""
     food = item()
     goal = np.array([*food.at(0.01), 0.02, food.yaw - math.pi / 2, 0.0])
     clone = constant(goal, food)
@@ -160,8 +161,8 @@ def dataset(folder, count: int) -> None:
 
 
 def test_it_learns_to_do_what_is_demonstrated(tmp_path):
-    """From 60 planned cuts: most of unseen oranges are cut where they should be, all to the board and across; a broken trajectory and
-    uncut food are left out; the same seed gives the same weights."""
+    """From 60 planned cuts: most of unseen oranges are cut where they should be, all to the board and across; a broken
+    trajectory and uncut food are left out; the same seed gives the same weights."""
     pytest.importorskip("torch", reason="the extra [robot] is not installed")
     from intsim.policy.training import train
 

@@ -19,8 +19,8 @@ from tests.intsim.data.test_generate import track
 
 @pytest.mark.parametrize("name", [*POLICIES, "clone"])
 def test_every_action_closes_the_gripper_as_the_demonstrations_do(name):
-    """ManiSkill's Panda closes its gripper at -1 and holds the fingers 15 mm apart at 0: a policy that sends another number than the
-    dataset stores takes its hand off the knife that the dataset holds.
+    """ManiSkill's Panda closes its gripper at -1 and holds the fingers 15 mm apart at 0: a policy that sends another
+    number than the dataset stores takes its hand off the knife that the dataset holds.
     """
     with h5py.File(io.BytesIO(pack_episode(track(), {}, {}))) as file:
         stored = set(file["control/delta"][:, 6].tolist())

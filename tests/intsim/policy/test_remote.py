@@ -1,4 +1,5 @@
-"""Policies on a server: the protocol both ways, one clear error for each fault, and published models behind stand-ins of their packages."""
+"""Policies on a server: the protocol both ways, one clear error for each fault, and published models behind stand-ins
+of their packages."""
 
 from __future__ import annotations
 
@@ -66,7 +67,8 @@ def served():
 
 
 def test_actions_come_in_their_order_and_end(served):
-    """A question for every three steps, with pose, joints and the picture bit for bit; the model's own end is the policy's."""
+    """A question for every three steps, with pose, joints and the picture bit for bit; the model's own end is the
+    policy's."""
     model = Counting()
     policy = Remote(served(model))
     assert policy.name == "counting"
@@ -91,7 +93,8 @@ def test_a_picture_comes_back():
 
 
 def test_what_is_wrong_is_said(served):
-    """Nobody there, something else there, missing pictures and joints, actions of another kind, an error of the model."""
+    """Nobody there, something else there, missing pictures and joints, actions of another kind, an error of the
+    model."""
     with pytest.raises(CutcalError, match="no answer of a policy server"):
         Remote("http://127.0.0.1:9")
     with pytest.raises(CutcalError, match="--pixels"):
@@ -245,7 +248,8 @@ def test_openvla_is_asked_in_its_own_words(packages, served):
 
 
 def test_octo_remembers_a_picture(packages):
-    """Two steps in a window, the first one masked; sizes of its pictures; another key for each question; nothing left after a reset."""
+    """Two steps in a window, the first one masked; sizes of its pictures; another key for each question; nothing left
+    after a reset."""
     model = Octo("weights", "cutcal")
     model.reset(3, "cut the plum")
     for _ in range(2):
@@ -265,8 +269,8 @@ def test_octo_remembers_a_picture(packages):
 
 
 def test_rdt_gives_joint_targets(packages, tmp_path):
-    """Eight of nine joints, six pictures of which two are there at most, every fourth of its interpolated actions, the statistics of the
-    export in place of its own."""
+    """Eight of nine joints, six pictures of which two are there at most, every fourth of its interpolated actions, the
+    statistics of the export in place of its own."""
     (tmp_path / "configs").mkdir()
     (tmp_path / "configs" / "base.yaml").write_text("common: {}")
     (tmp_path / "statistics.json").write_text(json.dumps({"state_min": [0.0] * 8}))

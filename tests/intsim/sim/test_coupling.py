@@ -21,7 +21,8 @@ STIFF, LAG, SPAN = 1754.0, 0.1, 0.01
 
 
 def follow(coupling: Coupling, poses: np.ndarray) -> tuple[float, float]:
-    """Move along commanded poses behind an arm that yields downwards; the largest force and the lowest place of the edge."""
+    """Move along commanded poses behind an arm that yields downwards; the largest force and the lowest place of the
+    edge."""
     pose, force, most, low = poses[0].copy(), np.zeros(3), 0.0, np.inf
     before = poses[0]
     for command in poses:
@@ -37,7 +38,8 @@ def follow(coupling: Coupling, poses: np.ndarray) -> tuple[float, float]:
 
 
 def test_a_plan_to_the_board_stops_short_and_a_deeper_one_cuts_through():
-    """Behind the arm of ManiSkill's Panda; the cut ends with the food in two and its pieces apart, and the impulse is upwards."""
+    """Behind the arm of ManiSkill's Panda; the cut ends with the food in two and its pieces apart, and the impulse is
+    upwards."""
     short = Coupling([BERRY], FOODS)
     most, low = follow(short, plan_cut(BERRY, 0.004).pose)
     assert low > 1e-3 and len(short.done) == 1
@@ -53,7 +55,8 @@ def test_a_plan_to_the_board_stops_short_and_a_deeper_one_cuts_through():
 
 
 def test_a_cut_ends_where_the_knife_stands_and_nothing_holds():
-    """Not while it comes down, and not where it stands in food that holds: with the food in two it need not reach the board."""
+    """Not while it comes down, and not where it stands in food that holds: with the food in two it need not reach the
+    board."""
     coupling = Coupling([BERRY], FOODS)
     pose = np.array([BERRY.x, BERRY.y, 0.045, BERRY.yaw - np.pi / 2, 0.0])
     while coupling.uncut() > 0:
@@ -96,7 +99,8 @@ def test_a_cut_begins_from_above_alone():
 
 
 def test_a_slice_too_thin_is_said_once():
-    """Where the solver would need cells that take too long, the cut is not simulated, and nothing else is tried until the knife is up."""
+    """Where the solver would need cells that take too long, the cut is not simulated, and nothing else is tried until
+    the knife is up."""
     coupling = Coupling([BERRY], FOODS)
     most, _ = follow(coupling, plan_cut(BERRY, -0.0198).pose)
     assert most == 0
@@ -123,7 +127,8 @@ def test_a_cut_that_breaks_down_is_said_and_not_begun_again(monkeypatch):
 
 
 def test_the_draw_along_the_edge_is_passed_on_only_where_it_is_asked_for():
-    """A slice needs less force than a press where the solver sees the draw; the way across the blade is noted, not simulated."""
+    """A slice needs less force than a press where the solver sees the draw; the way across the blade is noted, not
+    simulated."""
     path = plan_cut(BERRY, 0.0, Descent(style="slice", depth=-0.03)).pose
     pressed, drawn = Coupling([BERRY], FOODS), Coupling([BERRY], FOODS, draws=True)
     hard, _ = follow(pressed, path)
@@ -138,8 +143,8 @@ def test_the_draw_along_the_edge_is_passed_on_only_where_it_is_asked_for():
 
 @pytest.mark.parametrize("flip", [1.0, -1.0])
 def test_a_rock_is_followed_at_the_end_that_is_down(flip):
-    """The lower end cuts first: there the food opens, and there its force pushes, which turns the knife back, whichever direction of the edge its
-    angle is counted in. The edge comes down level and the berry is in two.
+    """The lower end cuts first: there the food opens, and there its force pushes, which turns the knife back, whichever
+    direction of the edge its angle is counted in. The edge comes down level and the berry is in two.
     """
     coupling = Coupling([BERRY], FOODS, draws=True)
     path = plan_cut(BERRY, 0.0, Descent(style="rock", depth=0.0)).pose
@@ -167,8 +172,8 @@ def test_a_rock_is_followed_at_the_end_that_is_down(flip):
 
 
 def test_a_rock_off_the_foods_middle_is_the_same_cut():
-    """The knife's middle beside the food's axis: what counts is the point of the edge above it; the same largest force to 3 %, and the torque is
-    about that point."""
+    """The knife's middle beside the food's axis: what counts is the point of the edge above it; the same largest force
+    to 3 %, and the torque is about that point."""
     found = []
     for off in (0.0, 0.03):
         coupling = Coupling([BERRY], FOODS, draws=True)
@@ -196,7 +201,8 @@ def test_its_mesh_lies_on_the_table():
 
 
 def test_a_large_food_has_larger_cells_and_a_small_one_those_of_a_screening_run():
-    """A melon 14 over its height, with an edge that is not narrower than one; a plum's as in an evaluation; a thin slice finer ones all the same."""
+    """A melon 14 over its height, with an edge that is not narrower than one; a plum's as in an evaluation; a thin
+    slice finer ones all the same."""
     found = {}
     for name, along in (("melon", 0.0), ("plum", 0.0), ("melon", 0.045)):
         food = load_food(name)

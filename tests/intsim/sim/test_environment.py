@@ -86,8 +86,8 @@ def test_it_resets_to_the_same_episode_and_to_a_given_one():
 
 
 def test_the_food_stops_the_arm_and_geometry_does_not_see_it():
-    """A plan to the board: without the food's force the knife gets there; with it the criteria are met and the food holds. Commanded
-    deeper the food parts. Inverse kinematics to a tenth of a millimetre.
+    """A plan to the board: without the food's force the knife gets there; with it the criteria are met and the food
+    holds. Commanded deeper the food parts. Inverse kinematics to a tenth of a millimetre.
     """
     env = made()
     short = cut(env, SEED)
@@ -105,7 +105,8 @@ def test_the_food_stops_the_arm_and_geometry_does_not_see_it():
 
 
 def test_a_stiffer_arm_comes_nearer_to_the_board():
-    """Ten times the stiffness of the joints, a tenth of what is missing, within a millimetre of the lag; the agent's class is left alone."""
+    """Ten times the stiffness of the joints, a tenth of what is missing, within a millimetre of the lag; the agent's
+    class is left alone."""
     weak, stiff = made(), made(stiffness=1e4, damping=1e3)
     a, b = cut(weak, SEED), cut(stiff, SEED)
     weak.close()
@@ -156,8 +157,8 @@ def test_the_force_is_no_observation():
 
 
 def test_the_force_of_the_food_is_what_lifts_the_knife():
-    """A constant force on the held knife: the edge rises by force over the arm's stiffness (1 / 0.57 N/mm, measured apart from this code),
-    and twice as far for twice the force.
+    """A constant force on the held knife: the edge rises by force over the arm's stiffness (1 / 0.57 N/mm, measured
+    apart from this code), and twice as far for twice the force.
     """
     env, risen = made(coupled=False), []
     for force in (0.0, 10.0, 20.0):
@@ -176,8 +177,9 @@ def test_the_force_of_the_food_is_what_lifts_the_knife():
 
 
 def test_the_moment_of_the_food_turns_the_knife():
-    """A force at the middle of the edge and a moment about it tilt the knife as the same force does 50 mm along the edge, towards the end where
-    it pushes; to 3 % of the tilt, since the point moves with the edge and the moment does not.
+    """A force at the middle of the edge and a moment about it tilt the knife as the same force does 50 mm along the
+    edge, towards the end where it pushes; to 3 % of the tilt, since the point moves with the edge and the moment does
+    not.
     """
     env, tilts, force, off = made(coupled=False), [], 20.0, 0.05
     for part in (0.0, 0.5, 1.0):  # of the moment by the place of the force
@@ -207,8 +209,8 @@ def test_a_criterion_that_is_none_is_an_error():
 
 
 def test_a_sustained_demonstration_parts_what_a_planned_one_leaves_whole():
-    """The same episode: as planned the criteria are met and the food holds; sustained it is in pieces, phases in their order, and
-    the force begins with the contact.
+    """The same episode: as planned the criteria are met and the food holds; sustained it is in pieces, phases in their
+    order, and the force begins with the contact.
     """
     env = made()
     env.reset(seed=SEED)
@@ -228,7 +230,8 @@ def test_a_sustained_demonstration_parts_what_a_planned_one_leaves_whole():
 
 
 def test_pressing_on_levels_the_blade(monkeypatch):
-    """The load turns the hand and one end of the blade rests on the board: turned back, the other end parts the rest; without that it hangs."""
+    """The load turns the hand and one end of the blade rests on the board: turned back, the other end parts the rest;
+    without that it hangs."""
     draw_ = Manifest(trajectories=1, foods=("banana",), suites=("seeds",), styles=("press",)).trajectory(0)
     env = make_environment(World())
     env.foods = {**env.foods, "banana": draw_.food}
@@ -244,8 +247,9 @@ def test_pressing_on_levels_the_blade(monkeypatch):
 
 
 def test_a_drawn_cut_ends_when_the_food_is_in_pieces():
-    """With one end of the blade on the board the middle is above it and stands, and the cut ends as soon as nothing holds; with the way of the
-    commanded middle in place of what the board lets it go, that took nine steps more, in which the pieces were dragged along.
+    """With one end of the blade on the board the middle is above it and stands, and the cut ends as soon as nothing
+    holds; with the way of the commanded middle in place of what the board lets it go, that took nine steps more, in
+    which the pieces were dragged along.
     """
     draw_ = Manifest(trajectories=1, foods=("cucumber",), suites=("seeds",), styles=("slice",)).trajectory(0)
     env = make_environment(World())
@@ -290,7 +294,8 @@ def test_a_worker_makes_an_episode_that_can_be_read(tmp_path):
 # A picture needs a renderer; everything else of a stored trajectory is tested without one above.
 @pytest.mark.skipif(not VULKAN, reason="no Vulkan device that SAPIEN can render with")
 def test_pictures_of_a_stored_trajectory_show_what_was_simulated(tmp_path):
-    """Rendered from what is stored: the same view twice is the same picture, another background is another, and the cut opens the food."""
+    """Rendered from what is stored: the same view twice is the same picture, another background is another, and the cut
+    opens the food."""
     from intsim.data.rendering import Renderer
 
     spec = Manifest(trajectories=1, foods=("strawberry",), suites=("seeds",)).trajectory(0)
@@ -309,8 +314,9 @@ def test_pictures_of_a_stored_trajectory_show_what_was_simulated(tmp_path):
 
 
 def test_a_policy_is_judged_in_closed_loop_with_the_food(tmp_path):
-    """The planner's oracle in the robot: its commands are the plan's; where nothing resists the edge reaches the board; with food it
-    meets the published criteria and ends higher by what the force takes; commanded deeper the food parts. Rows go on after a stop.
+    """The planner's oracle in the robot: its commands are the plan's; where nothing resists the edge reaches the board;
+    with food it meets the published criteria and ends higher by what the force takes; commanded deeper the food parts.
+    Rows go on after a stop.
     """
     food = {"strawberry": FOODS["strawberry"]}
     found = {}
@@ -353,7 +359,8 @@ class Replay:
 
 
 def test_joint_targets_do_what_they_did_and_keep_within_their_speeds():
-    """A demonstration's own actions part the food again, with the same force; a target that is far away is approached at the joint's speed."""
+    """A demonstration's own actions part the food again, with the same force; a target that is far away is approached
+    at the joint's speed."""
     env = make_environment(World())
     env.foods = {"strawberry": FOODS["strawberry"]}
     env.reset(seed=SEED)

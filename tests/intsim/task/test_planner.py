@@ -36,7 +36,8 @@ APPLE = Item("apple", Shape("ellipsoid", 0.075, 0.075, 0.07), 0.03, 0.05, math.r
 
 @pytest.mark.parametrize("style", STYLES)
 def test_every_style_reaches_the_place_within_the_arms_limits(style):
-    """Phases follow one another; the edge ends at the depth across the food; speeds and accelerations are those of an arm."""
+    """Phases follow one another; the edge ends at the depth across the food; speeds and accelerations are those of an
+    arm."""
     path = plan_cut(APPLE, 0.01, Descent(style=style, depth=-0.01, hold=0.4))
     seen = [p for k, p in enumerate(path.phase) if k == 0 or path.phase[k - 1] != p]
     assert seen == list(PHASES)
@@ -80,7 +81,8 @@ def test_minimum_jerk_starts_and_ends_at_rest():
 
 @given(st.lists(st.floats(-1, 1), min_size=6, max_size=6), st.lists(st.floats(-1.7, 1.7), min_size=3, max_size=3))
 def test_the_guard_keeps_direction_and_limits(delta, before):
-    """Within the limits a command is unchanged bit for bit; beyond, it is at the limit; twice guarded is once guarded."""
+    """Within the limits a command is unchanged bit for bit; beyond, it is at the limit; twice guarded is once
+    guarded."""
     delta, before = np.array(delta), np.array(before) / 2
     kept = limit_command(delta, before)
     if not kept.clipped:
@@ -99,7 +101,8 @@ def test_the_guard_keeps_direction_and_limits(delta, before):
 
 
 def test_the_table_stops_the_edge_and_logs_what_was_clipped():
-    """A command through the board is kept as a command; the edge stays on it, and too fast a jump is clipped and logged."""
+    """A command through the board is kept as a command; the edge stays on it, and too fast a jump is clipped and
+    logged."""
     table = KinematicTable([APPLE])
     for _ in range(200):
         table.step(np.array([0.0, 0.0, -0.02, 0.0, 0.0, 0.0, 0.0]))

@@ -58,7 +58,8 @@ def test_a_food_that_points_to_the_camera_has_no_left_end():
 
 @given(yaws)
 def test_a_bounding_box_is_not_the_food(yaw):
-    """The planner that knows the box alone measures l |sin| + w |cos| in place of l, along the table's axis that the camera sees across."""
+    """The planner that knows the box alone measures l |sin| + w |cos| in place of l, along the table's axis that the
+    camera sees across."""
     item = replace(BANANA, x=0.0, y=0.0, yaw=yaw)
     c, s = abs(math.cos(yaw)), abs(math.sin(yaw))
     length, width = item.shape.length, item.shape.width
@@ -74,7 +75,8 @@ def test_a_bounding_box_is_not_the_food(yaw):
 @pytest.mark.parametrize("count", [2, 3, 4, 6])
 @pytest.mark.parametrize("kind", ["cylinder", "ellipsoid"])
 def test_equal_pieces_are_cut_from_what_is_left(count, kind):
-    """Each cut is planned from the pieces as they have slid apart, and all come out as long; the volumes add up to the food's."""
+    """Each cut is planned from the pieces as they have slid apart, and all come out as long; the volumes add up to the
+    food's."""
     item = Item("cucumber", Shape(kind, 0.2, 0.045, 0.045))
     spec = CutSpec("cucumber", pieces=count)
     for _ in range(spec.cuts):
