@@ -42,7 +42,7 @@ ROWS_FILE, RESULT_FILE = "evaluate.jsonl", "evaluate.json"
 
 
 @dataclass(frozen=True, eq=False)
-class Evaluation:
+class PolicyEvaluation:
     """What is evaluated.
 
     Attributes:
@@ -104,7 +104,7 @@ def roll_out(policy: Policy, episode: Episode) -> tuple[Rollout, KinematicTable]
     return table.rollout, table
 
 
-def run_episode(evaluation: Evaluation, episode: Episode) -> EpisodeOutcome:
+def run_episode(evaluation: PolicyEvaluation, episode: Episode) -> EpisodeOutcome:
     """One episode on the plain table, its cut simulated where the evaluation asks for it."""
     rollout, table = roll_out(evaluation.policy, episode)
     judged = judge_geometry(episode.spec, episode.item, rollout, table.items[0])
@@ -113,7 +113,9 @@ def run_episode(evaluation: Evaluation, episode: Episode) -> EpisodeOutcome:
     return EpisodeOutcome.of(episode, rollout.clipped, judged, severing)
 
 
-def _simulate(evaluation: Evaluation, episode: Episode, rollout: Rollout, judged: GeometricOutcome) -> SeveringOutcome:
+def _simulate(
+    evaluation: PolicyEvaluation, episode: Episode, rollout: Rollout, judged: GeometricOutcome
+) -> SeveringOutcome:
     """The cut in the solver, where the edge came down over the food."""
     if not judged.criteria["region"] or not math.isfinite(judged.offset):
         return SeveringOutcome(False, why="the edge does not come down on the food")
@@ -124,7 +126,7 @@ def _simulate(evaluation: Evaluation, episode: Episode, rollout: Rollout, judged
 
 
 def evaluate(
-    evaluation: Evaluation,
+    evaluation: PolicyEvaluation,
     out: Path,
     *,
     pool: Workers | None = None,
@@ -171,7 +173,7 @@ def evaluate(
     return result
 
 
-def _by_suite(evaluation: Evaluation, rows: Sequence[EpisodeOutcome]) -> dict[str, SuiteResult]:
+def _by_suite(evaluation: PolicyEvaluation, rows: Sequence[EpisodeOutcome]) -> dict[str, SuiteResult]:
     """Successes by suite of the episodes that were asked for."""
     wanted = set(evaluation.tests)
     kept = [row for row in rows if (row.suite, row.seed) in wanted]
@@ -179,7 +181,7 @@ def _by_suite(evaluation: Evaluation, rows: Sequence[EpisodeOutcome]) -> dict[st
 
 
 def _outcomes(
-    evaluation: Evaluation, todo: Sequence[tuple[str, int]], pool: Workers | None
+    evaluation: PolicyEvaluation, todo: Sequence[tuple[str, int]], pool: Workers | None
 ) -> Iterator[EpisodeOutcome]:
     """Episodes one after the other, on the table or in IntSim."""
     if evaluation.world is not None and pool is not None:
@@ -190,7 +192,7 @@ def _outcomes(
 
 
 def _in_world(
-    evaluation: Evaluation, world: World, todo: Sequence[tuple[str, int]], pool: Workers
+    evaluation: PolicyEvaluation, world: World, todo: Sequence[tuple[str, int]], pool: Workers
 ) -> Iterator[EpisodeOutcome]:
     """Episodes in IntSim, in order of completion."""
     foods = dict(evaluation.foods)

@@ -14,7 +14,7 @@ from intsim.task.planner import (
     GRIPPER_CLOSED,
     HOME,
     PHASES,
-    Descent,
+    BladeDescent,
     minimum_jerk,
     plan_cut,
 )
@@ -94,7 +94,7 @@ def demonstrate(env: Any, *, style: str = "press", sustained: bool = True, meshe
             along = target(episode.spec, item)
         except TaskError:
             break
-        planned = plan_cut(item, along, Descent(style), start=env.pose)
+        planned = plan_cut(item, along, BladeDescent(style), start=env.pose)
         for pose, phase in zip(planned.pose, planned.phase, strict=True):
             if phase != "retract":
                 _step(env, demo, pose, str(phase), meshes)

@@ -47,7 +47,7 @@ from mpm.shapes import Shape
 
 SHARD_NAME = "shard-{:04d}"
 EPISODE_PART = "part-{:06d}.h5"  # an episode whose shard is not complete
-ENTRY = "about"  # attribute of such a file: the entry in the JSON file
+ENTRY_ATTRIBUTE = "about"  # attribute of such a file: the entry in the JSON file
 
 
 def pack_episode(demo: Demonstration, entry: Mapping[str, Any], mpm: Mapping[str, Any]) -> bytes:
@@ -63,7 +63,7 @@ def pack_episode(demo: Demonstration, entry: Mapping[str, Any], mpm: Mapping[str
     """
     stream = io.BytesIO()
     with h5py.File(stream, "w") as file:
-        file.attrs[ENTRY] = json.dumps(finite(dict(entry)))
+        file.attrs[ENTRY_ATTRIBUTE] = json.dumps(finite(dict(entry)))
         n = len(demo.action)
         force = np.array(demo.force, np.float32).reshape(n, -1, 3)
         mean = force.mean(axis=1)
@@ -159,9 +159,9 @@ def merge_parts(
                         group = file.create_group(f"traj_{k}")
                         for child in own:
                             own.copy(child, group)
-                        for key in set(own.attrs) - {ENTRY}:
+                        for key in set(own.attrs) - {ENTRY_ATTRIBUTE}:
                             group.attrs[key] = own.attrs[key]
-                        listed.append(json.loads(own.attrs.get(ENTRY, "{}")))
+                        listed.append(json.loads(own.attrs.get(ENTRY_ATTRIBUTE, "{}")))
             beside(listed)
         for part in parts:
             part.unlink()

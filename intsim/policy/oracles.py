@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from intsim.task.language import parse_instruction
-from intsim.task.planner import GRIPPER_CLOSED, HOME, PRESS, Descent, plan_cut
+from intsim.task.planner import GRIPPER_CLOSED, HOME, PRESS, BladeDescent, plan_cut
 from intsim.task.rollout import Policy
 from intsim.task.targets import CutSpec, Item, TaskError, boxed_target, target
 
@@ -38,7 +38,7 @@ class Oracle:
         wrong_side: bool = False,
         wrong_item: bool = False,
         boxed: bool = False,
-        descent: Descent = PRESS,
+        descent: BladeDescent = PRESS,
     ) -> None:
         self.sigma, self.wrong_side, self.wrong_item, self.boxed = sigma, wrong_side, wrong_item, boxed
         self.descent = descent
@@ -109,9 +109,9 @@ POLICIES: dict[str, tuple[Callable[[float], Policy], str]] = {
     "noisy": (lambda sigma: Oracle(sigma=sigma), "misses the place along the food by a normal error (--sigma)"),
     "wrong-side": (lambda sigma: Oracle(wrong_side=True), "takes left for right"),
     "wrong-item": (lambda sigma: Oracle(wrong_item=True), "cuts another food where there is one"),
-    "shallow": (lambda sigma: Oracle(descent=Descent(depth=SHALLOW_HEIGHT)), "stops 7 mm above the board"),
+    "shallow": (lambda sigma: Oracle(descent=BladeDescent(depth=SHALLOW_HEIGHT)), "stops 7 mm above the board"),
     "overdrive": (
-        lambda sigma: Oracle(descent=Descent(depth=-0.03, hold=0.5)),
+        lambda sigma: Oracle(descent=BladeDescent(depth=-0.03, hold=0.5)),
         "commands the edge 30 mm into the board and holds it for half a second",
     ),
     "boxed": (lambda sigma: Oracle(boxed=True), "knows the bounding box alone, as the published planner does"),

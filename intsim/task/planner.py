@@ -28,7 +28,7 @@ SAW_AMPLITUDE, SAW_FREQUENCY = 0.015, 1.5  # amplitude of a saw along the edge [
 
 
 @dataclass(frozen=True)
-class Descent:
+class BladeDescent:
     """How the blade comes down.
 
     Attributes:
@@ -54,7 +54,7 @@ class Descent:
             raise TaskError(f"plan: a descent of {self.speed:g} m/s; give a positive speed")
 
 
-PRESS = Descent()
+PRESS = BladeDescent()
 """Straight down to the board."""
 
 
@@ -84,7 +84,7 @@ def minimum_jerk(n: int) -> np.ndarray:
 def plan_cut(
     item: Item,
     along: float,
-    descent: Descent = PRESS,
+    descent: BladeDescent = PRESS,
     *,
     start: np.ndarray | None = None,
     yaw: float | None = None,
@@ -119,7 +119,7 @@ def plan_cut(
     return BladeTrajectory(np.concatenate([reach, cut, rest, back]), np.array(phase))
 
 
-def _descent(descent: Descent, centre: np.ndarray, high: float, turn: float) -> tuple[np.ndarray, np.ndarray]:
+def _descent(descent: BladeDescent, centre: np.ndarray, high: float, turn: float) -> tuple[np.ndarray, np.ndarray]:
     """Pose above the cut (5,), and the poses of the way down (n, 5) [m, rad].
 
     The way down begins at a height above the board [m]; the edge has a direction [rad].

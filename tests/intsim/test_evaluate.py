@@ -16,7 +16,7 @@ from calib.errors import OutputError
 from calib.io.typed_document import read_document
 from calib.material.food import dump_material, load_food
 from cutcal.main import main
-from intsim.evaluate import RESULT_FILE, Evaluation, evaluate, roll_out, run_episode
+from intsim.evaluate import RESULT_FILE, PolicyEvaluation, evaluate, roll_out, run_episode
 from intsim.outcomes import EvaluationResult, expected_place_rate
 from intsim.policy.oracles import POLICIES, SHALLOW_HEIGHT, make_policy
 from intsim.sim.severing import PANDA_ARM, commanded_scene, simulate_severing
@@ -35,7 +35,7 @@ HALF = Episode("seeds", 0, CutSpec("strawberry"), BERRY, (), "cut half of the st
 FEW = 30
 
 
-def document(evaluation: Evaluation, out: Path) -> dict[str, Any]:
+def document(evaluation: PolicyEvaluation, out: Path) -> dict[str, Any]:
     """What an evaluation writes; it is read back as what it returns."""
     result = evaluate(evaluation, out)
     assert read_document(out / RESULT_FILE, EvaluationResult) == result
@@ -47,7 +47,9 @@ def found(tmp_path_factory) -> dict[str, dict]:
     """What the evaluation says of each policy."""
     out = tmp_path_factory.mktemp("evaluate")
     names = ("oracle", "wrong-side", "wrong-item", "shallow", "random")
-    return {name: document(Evaluation(make_policy(name), name, ALL, list(SUITES), FEW), out / name) for name in names}
+    return {
+        name: document(PolicyEvaluation(make_policy(name), name, ALL, list(SUITES), FEW), out / name) for name in names
+    }
 
 
 def test_the_oracle_succeeds_everywhere(found):
@@ -75,7 +77,7 @@ def test_each_wrong_oracle_fails_in_its_own_way(found):
 def test_noise_succeeds_as_often_as_its_closed_form_says(tmp_path):
     """erf(0.1 L / (sigma sqrt 2)) of the place, averaged over foods of all lengths, within three standard deviations of
     600 trials."""
-    noisy = Evaluation(make_policy("noisy", 0.01), "noisy", ALL, ["seeds", "language"], 300, sigma=0.01)
+    noisy = PolicyEvaluation(make_policy("noisy", 0.01), "noisy", ALL, ["seeds", "language"], 300, sigma=0.01)
     for suite in document(noisy, tmp_path / "e")["suites"].values():
         p = suite["expected_place"]
         assert 0.3 < p < 0.7
@@ -108,7 +110,7 @@ def test_a_knife_that_stops_short_meets_the_published_criteria_and_severs_nothin
     full cut."""
     rows = {
         name: run_episode(
-            Evaluation(make_policy(name), name, ALL, ["seeds"], 1, severing=True, knife="edc", arm=Arm()), HALF
+            PolicyEvaluation(make_policy(name), name, ALL, ["seeds"], 1, severing=True, knife="edc", arm=Arm()), HALF
         )
         for name in ("shallow", "oracle")
     }
@@ -154,7 +156,7 @@ def test_what_the_solver_cannot_cut_counts_as_neither():
 
 def test_an_evaluation_that_was_stopped_goes_on(tmp_path, monkeypatch):
     """What was done is not done again, a line that was cut off is, and another evaluation is not mixed in."""
-    six = Evaluation(make_policy("oracle"), "oracle", ALL, ["seeds"], 6)
+    six = PolicyEvaluation(make_policy("oracle"), "oracle", ALL, ["seeds"], 6)
     whole = evaluate(six, tmp_path / "whole")
     out = tmp_path / "stopped"
     evaluate(replace(six, episodes=3), out)

@@ -14,7 +14,7 @@ from cutcal.options import KNIFE_HELP, Group, add_workers, number, print_json, s
 from mpm.errors import CutcalError
 
 if TYPE_CHECKING:
-    from intsim.evaluate import Evaluation
+    from intsim.evaluate import PolicyEvaluation
     from intsim.outcomes import EvaluationResult, SuccessRate
     from intsim.task.rollout import Policy
 
@@ -132,9 +132,9 @@ def _check(args: argparse.Namespace) -> None:
         raise CutcalError("--pixels are of a robot's cameras: add --world intsim")
 
 
-def _evaluation(args: argparse.Namespace) -> Evaluation:
+def _evaluation(args: argparse.Namespace) -> PolicyEvaluation:
     """What the options ask for."""
-    from intsim.evaluate import Evaluation
+    from intsim.evaluate import PolicyEvaluation
     from intsim.sim.severing import PANDA_ARM
     from intsim.sim.world import World
     from intsim.task.suites import SUITES
@@ -142,7 +142,7 @@ def _evaluation(args: argparse.Namespace) -> Evaluation:
 
     policy, name = _policy(args)
     world = None if args.world == "table" else World(args.world == "intsim", args.stiffness, args.knife, args.pixels)
-    return Evaluation(
+    return PolicyEvaluation(
         policy,
         name,
         _foods(args),

@@ -13,7 +13,7 @@ from cutcal.main import main
 from intsim.data.demonstrate import Demonstration
 from intsim.data.manifest import Manifest
 from intsim.data.shards import EPISODE_PART, pack_episode, write_part, write_shard
-from intsim.evaluate import Evaluation, evaluate, roll_out
+from intsim.evaluate import PolicyEvaluation, evaluate, roll_out
 from intsim.policy.behaviour_cloning import (
     ACTION_CHUNK,
     Clone,
@@ -169,7 +169,7 @@ def test_it_learns_to_do_what_is_demonstrated(tmp_path):
     dataset(tmp_path / "d", 60)
     clone = train(tmp_path / "d", keep="published")
     assert clone.about["trajectories"] == 59
-    found = evaluate(Evaluation(clone, "clone", ORANGE, ["seeds"], 60), tmp_path / "e").suites["seeds"]
+    found = evaluate(PolicyEvaluation(clone, "clone", ORANGE, ["seeds"], 60), tmp_path / "e").suites["seeds"]
     assert found.published.rate > 0.6 and found.criteria["angle"].rate > 0.9
     few = train(tmp_path / "d", keep="severed", most=3)
     again = train(tmp_path / "d", keep="severed", most=3)

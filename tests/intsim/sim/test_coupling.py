@@ -10,7 +10,7 @@ import pytest
 from calib.material.food import load_food
 from intsim.sim.coupling import MAX_CELLS, READY_CLEARANCE, Coupling
 from intsim.sim.severing import MIN_CELLS, cut_scene_at
-from intsim.task.planner import Descent, plan_cut
+from intsim.task.planner import BladeDescent, plan_cut
 from intsim.task.targets import Item
 from mpm.live import LiveCut
 from mpm.shapes import Shape
@@ -44,7 +44,7 @@ def test_a_plan_to_the_board_stops_short_and_a_deeper_one_cuts_through():
     most, low = follow(short, plan_cut(BERRY, 0.004).pose)
     assert low > 1e-3 and len(short.done) == 1
     through = Coupling([BERRY], FOODS)
-    peak, bottom = follow(through, plan_cut(BERRY, 0.004, Descent(depth=-0.03, hold=0.5)).pose)
+    peak, bottom = follow(through, plan_cut(BERRY, 0.004, BladeDescent(depth=-0.03, hold=0.5)).pose)
     assert bottom < 1e-3 and through.severed and through.uncut() == 0
     assert peak == pytest.approx(most, rel=0.1)
     (done,) = through.done
@@ -84,7 +84,7 @@ def test_a_knife_that_misses_feels_nothing():
 def test_a_cut_begins_from_above_alone():
     """A knife that saws on in the gap, or comes from the side, begins no cut; lifted over the food it does."""
     coupling = Coupling([BERRY], FOODS)
-    poses = plan_cut(BERRY, 0.0, Descent(depth=-0.03, hold=0.5)).pose
+    poses = plan_cut(BERRY, 0.0, BladeDescent(depth=-0.03, hold=0.5)).pose
     low = int(np.argmin(poses[:, 2]))
     follow(coupling, poses[: low + 10])
     assert coupling.severed
@@ -93,7 +93,7 @@ def test_a_cut_begins_from_above_alone():
         coupling.move(on_the_board + [*(way * BERRY.axis), 0, 0, 0], SPAN)
     assert len(coupling.done) == 1 and coupling.live is None
     start = on_the_board + [0, 0, 0.1, 0, 0]
-    second = plan_cut(BERRY, 0.012, Descent(depth=-0.03, hold=0.5), start=start).pose
+    second = plan_cut(BERRY, 0.012, BladeDescent(depth=-0.03, hold=0.5), start=start).pose
     follow(coupling, second)
     assert len(coupling.done) == 2 and len(coupling.items[0].pieces) == 3
 
@@ -129,13 +129,13 @@ def test_a_cut_that_breaks_down_is_said_and_not_begun_again(monkeypatch):
 def test_the_draw_along_the_edge_is_passed_on_only_where_it_is_asked_for():
     """A slice needs less force than a press where the solver sees the draw; the way across the blade is noted, not
     simulated."""
-    path = plan_cut(BERRY, 0.0, Descent(style="slice", depth=-0.03)).pose
+    path = plan_cut(BERRY, 0.0, BladeDescent(style="slice", depth=-0.03)).pose
     pressed, drawn = Coupling([BERRY], FOODS), Coupling([BERRY], FOODS, draws=True)
     hard, _ = follow(pressed, path)
     easy, _ = follow(drawn, path)
     assert 0 < easy < 0.9 * hard
     aside = Coupling([replace(BERRY, yaw=np.pi / 2)], FOODS)
-    poses = plan_cut(aside.items[0], 0.0, Descent(depth=-0.03)).pose
+    poses = plan_cut(aside.items[0], 0.0, BladeDescent(depth=-0.03)).pose
     poses[:, 1] += np.where(poses[:, 2] < 0.02, 2e-3, 0.0)
     follow(aside, poses)
     assert aside.aside == pytest.approx(2e-3, rel=0.2)
@@ -147,7 +147,7 @@ def test_a_rock_is_followed_at_the_end_that_is_down(flip):
     direction of the edge its angle is counted in. The edge comes down level and the berry is in two.
     """
     coupling = Coupling([BERRY], FOODS, draws=True)
-    path = plan_cut(BERRY, 0.0, Descent(style="rock", depth=0.0)).pose
+    path = plan_cut(BERRY, 0.0, BladeDescent(style="rock", depth=0.0)).pose
     if flip < 0:
         path[:, 3:] = path[:, 3:] + [np.pi, 0.0]
         path[:, 4] *= -1.0
@@ -177,7 +177,7 @@ def test_a_rock_off_the_foods_middle_is_the_same_cut():
     found = []
     for off in (0.0, 0.03):
         coupling = Coupling([BERRY], FOODS, draws=True)
-        path = plan_cut(BERRY, 0.0, Descent(style="rock", depth=0.0)).pose
+        path = plan_cut(BERRY, 0.0, BladeDescent(style="rock", depth=0.0)).pose
         edge = np.column_stack([np.cos(path[:, 3]), np.sin(path[:, 3]), np.tan(path[:, 4])])
         path[:, :3] -= off * edge
         rows = [(coupling.move(pose, 0.05)[2], np.linalg.norm(coupling.torque)) for pose in path]

@@ -23,12 +23,12 @@ from intsim.data.demonstrate import LEVELLING_GAIN, MAX_COMMAND_DEPTH, demonstra
 from intsim.data.generate import make_episode
 from intsim.data.manifest import Manifest
 from intsim.data.shards import StoredTrajectory
-from intsim.evaluate import Evaluation, evaluate
+from intsim.evaluate import PolicyEvaluation, evaluate
 from intsim.policy.oracles import make_policy
 from intsim.sim import environment as robot_environment
 from intsim.sim.closed_loop import make_environment, roll_out_closed_loop
 from intsim.sim.world import World
-from intsim.task.planner import GRIPPER_CLOSED, PHASES, Descent, plan_cut
+from intsim.task.planner import GRIPPER_CLOSED, PHASES, BladeDescent, plan_cut
 from intsim.task.suites import sample_episode
 from intsim.task.targets import target
 from mpm.errors import CutcalError
@@ -61,7 +61,9 @@ def cut(env, seed: int, depth: float = 0.0, hold: float = 0.0) -> dict[str, floa
     """One planned cut by joint targets: what came of it."""
     env.reset(seed=seed)
     episode = env.episode
-    path = plan_cut(episode.item, target(episode.spec, episode.item), Descent(depth=depth, hold=hold), start=env.pose)
+    path = plan_cut(
+        episode.item, target(episode.spec, episode.item), BladeDescent(depth=depth, hold=hold), start=env.pose
+    )
     joints, worst, peak, low = env.agent.robot.get_qpos()[0].numpy().astype(float), 0.0, 0.0, np.inf
     info = {}
     for pose in path.pose:
@@ -326,7 +328,7 @@ def test_a_policy_is_judged_in_closed_loop_with_the_food(tmp_path):
         ("deep", "overdrive", World()),
     ):
         out = tmp_path / name
-        evaluate(Evaluation(make_policy(policy), policy, food, ["seeds"], 2, world=world), out, pool=Here())
+        evaluate(PolicyEvaluation(make_policy(policy), policy, food, ["seeds"], 2, world=world), out, pool=Here())
         valid(json.loads((out / "evaluate.json").read_text()))
         rows = [json.loads(line) for line in (out / "evaluate.jsonl").read_text().splitlines()[1:]]
         found[name] = rows
@@ -336,7 +338,7 @@ def test_a_policy_is_judged_in_closed_loop_with_the_food(tmp_path):
         assert "severing" not in a and a["height_m"] < 2e-3
         assert b["height_m"] > a["height_m"] and b["severing"]["peak"] > 1
         assert c["severing"]["severed"] and c["height_m"] < 1e-3
-    again = Evaluation(make_policy("oracle"), "oracle", food, ["seeds"], 3, world=World(coupled=False))
+    again = PolicyEvaluation(make_policy("oracle"), "oracle", food, ["seeds"], 3, world=World(coupled=False))
     more = evaluate(again, tmp_path / "free", pool=Here(), resume=True)
     assert more.suites["seeds"].published.trials == 3
     with pytest.raises(OutputError, match="something else"):

@@ -24,7 +24,7 @@ from intsim.task.planner import (
     ROCK_ANGLE,
     SAW_AMPLITUDE,
     STYLES,
-    Descent,
+    BladeDescent,
     minimum_jerk,
     plan_cut,
 )
@@ -38,7 +38,7 @@ APPLE = Item("apple", Shape("ellipsoid", 0.075, 0.075, 0.07), 0.03, 0.05, math.r
 def test_every_style_reaches_the_place_within_the_arms_limits(style):
     """Phases follow one another; the edge ends at the depth across the food; speeds and accelerations are those of an
     arm."""
-    path = plan_cut(APPLE, 0.01, Descent(style=style, depth=-0.01, hold=0.4))
+    path = plan_cut(APPLE, 0.01, BladeDescent(style=style, depth=-0.01, hold=0.4))
     seen = [p for k, p in enumerate(path.phase) if k == 0 or path.phase[k - 1] != p]
     assert seen == list(PHASES)
     low = path.pose[np.argmin(path.pose[:, 2])]
@@ -58,7 +58,7 @@ def test_every_style_reaches_the_place_within_the_arms_limits(style):
 
 def test_styles_differ_along_the_edge():
     """A press comes straight down; a slice draws, a saw goes to and fro, a rock begins with one end raised."""
-    ways = {style: plan_cut(APPLE, 0.0, Descent(style=style)) for style in STYLES}
+    ways = {style: plan_cut(APPLE, 0.0, BladeDescent(style=style)) for style in STYLES}
     cut = {style: path.pose[np.isin(path.phase, ["contact", "cut"])] for style, path in ways.items()}
     edge = np.array([math.cos(cut["press"][0, 3]), math.sin(cut["press"][0, 3])])
     along = {style: (pose[:, :2] - APPLE.at(0.0)) @ edge for style, pose in cut.items()}
@@ -67,9 +67,9 @@ def test_styles_differ_along_the_edge():
     assert 1.5 * SAW_AMPLITUDE < np.ptp(along["saw"]) <= 2 * SAW_AMPLITUDE + 1e-12
     assert 0 < cut["rock"][0, 4] < ROCK_ANGLE and cut["rock"][-1, 4] == pytest.approx(0.0, abs=1e-12)
     with pytest.raises(TaskError, match="none of press"):
-        plan_cut(APPLE, 0.0, Descent(style="chop"))
+        plan_cut(APPLE, 0.0, BladeDescent(style="chop"))
     with pytest.raises(TaskError, match="positive speed"):
-        plan_cut(APPLE, 0.0, Descent(speed=0.0))
+        plan_cut(APPLE, 0.0, BladeDescent(speed=0.0))
 
 
 def test_minimum_jerk_starts_and_ends_at_rest():
