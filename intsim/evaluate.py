@@ -35,6 +35,7 @@ from intsim.task.rollout import Policy, Rollout
 from intsim.task.success import GeometricOutcome, judge_geometry
 from intsim.task.suites import FIRST_TEST_SEED, Episode, sample_episode
 from intsim.task.targets import target
+from mpm.errors import CutcalError
 from mpm.scene import Arm
 
 TABLE_STEPS = 2000  # of an episode on the plain table, at most: 100 s
@@ -148,8 +149,10 @@ def evaluate(
         What evaluate.json holds.
 
     Raises:
-        CutcalError: The folder is taken, or holds another evaluation.
+        CutcalError: The folder is taken, holds another evaluation or a damaged one, or there is a world and no pool.
     """
+    if evaluation.world is not None and pool is None:
+        raise CutcalError("evaluate: episodes in IntSim run in worker processes; give a pool")
     load_knife(evaluation.knife)
     prepare(out, resume=resume)
     settings = evaluation.settings

@@ -20,11 +20,13 @@ from intsim.evaluate import RESULT_FILE, PolicyEvaluation, evaluate, roll_out, r
 from intsim.outcomes import EvaluationResult, expected_place_rate
 from intsim.policy.oracles import POLICIES, SHALLOW_HEIGHT, make_policy
 from intsim.sim.severing import PANDA_ARM, commanded_scene, simulate_severing
+from intsim.sim.world import World
 from intsim.task.kinematic_table import KinematicTable
 from intsim.task.rollout import Rollout
 from intsim.task.success import TIP_HEIGHT, judge_geometry, wilson
 from intsim.task.suites import FIRST_TEST_SEED, FOODS, SUITES, Episode, sample_episode
 from intsim.task.targets import CutSpec, Item, TaskError, target
+from mpm.errors import CutcalError
 from mpm.scene import Arm
 from mpm.shapes import Shape
 from tests.calib.documents import valid
@@ -172,6 +174,18 @@ def test_an_evaluation_that_was_stopped_goes_on(tmp_path, monkeypatch):
     assert done == [FIRST_TEST_SEED + 3, FIRST_TEST_SEED + 4, FIRST_TEST_SEED + 5]
     with pytest.raises(OutputError, match="something else"):
         evaluate(replace(six, policy=make_policy("shallow"), name="shallow"), out, resume=True)
+
+
+def test_an_evaluation_that_cannot_go_on_is_one_line(tmp_path):
+    """A row that is damaged, and a world without processes to run it in."""
+    two = PolicyEvaluation(make_policy("oracle"), "oracle", ALL, ["seeds"], 2)
+    evaluate(two, tmp_path / "e")
+    rows = (tmp_path / "e" / "evaluate.jsonl").read_text()
+    (tmp_path / "e" / "evaluate.jsonl").write_text(rows.replace('"steps": ', '"stops": ', 1))
+    with pytest.raises(OutputError, match=r"evaluate\.jsonl: damaged \(steps is missing\)"):
+        evaluate(two, tmp_path / "e", resume=True)
+    with pytest.raises(CutcalError, match="give a pool"):
+        evaluate(replace(two, world=World()), tmp_path / "w")
 
 
 def test_episodes_repeat_with_their_seed_and_differ_between_suites():
