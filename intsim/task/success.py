@@ -30,7 +30,7 @@ class GeometricOutcome:
         angle: Between the edge and across the food, in plan, at the lowest point [rad]; NaN where the food was not met.
         offset: Place of the cut less the one asked for, over the food's length [-]; NaN where it was not met.
         pieces: Pieces of the food at the end, in plain geometry.
-        spread: Standard deviation of the lengths of the pieces over their mean; NaN for one piece.
+        length_variation: Standard deviation of the lengths of the pieces over their mean; NaN for one piece.
         criteria: Which of :data:`CRITERIA` are met; ``count`` and ``even`` for equal pieces alone.
     """
 
@@ -38,7 +38,7 @@ class GeometricOutcome:
     angle: float
     offset: float
     pieces: int
-    coefficient_of_variation: float
+    length_variation: float
     criteria: Mapping[str, bool]
 
     @property
