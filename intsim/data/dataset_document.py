@@ -13,6 +13,7 @@ from calib.io.folder import write_json
 from calib.io.typed_document import from_document, to_document
 from intsim.data.manifest import Manifest
 from intsim.sim.world import World
+from intsim.task.targets import TaskError
 
 DATASET_FILE = "dataset.json"
 DEMONSTRATION_KINDS = ("sustained", "planned", "kinematic")
@@ -33,6 +34,9 @@ class DatasetSpec:
         knife: Name of the knife.
         stiffness: Of the arm's joints [N m/rad]; None for ManiSkill's own.
         shard: Trajectories of a file.
+
+    Raises:
+        TaskError: A kind of demonstration that is none.
     """
 
     DOCUMENT: ClassVar[str] = "dataset"
@@ -42,6 +46,10 @@ class DatasetSpec:
     knife: str = "kitchen"
     stiffness: float | None = field(default_factory=lambda: None)  # no plain default: None is written as null
     shard: int = 20
+
+    def __post_init__(self) -> None:
+        if self.demos not in DEMONSTRATION_KINDS:
+            raise TaskError(f"dataset: demos {self.demos!r} is none of {', '.join(DEMONSTRATION_KINDS)}")
 
     @property
     def world(self) -> World:

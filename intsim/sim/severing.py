@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,10 +47,6 @@ class SeveringOutcome:
     peak: float = 0.0
     short: float = 0.0
     why: str = ""
-
-    def as_dict(self) -> dict[str, object]:
-        """As plain data."""
-        return asdict(self)
 
 
 def cut_scene_at(

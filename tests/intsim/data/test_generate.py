@@ -85,9 +85,11 @@ def test_a_trajectory_is_drawn_from_its_number_alone():
 
 @pytest.mark.parametrize("how", [{"trajectories": 0}, {"suites": ("none",)}, {"seed": FIRST_TEST_SEED}, {"foods": ()}])
 def test_an_impossible_manifest_is_an_error(how):
-    """Nothing to draw, an unknown task, seeds of the tests."""
+    """Nothing to draw, an unknown task, seeds of the tests; demonstrations of a kind that is none."""
     with pytest.raises(TaskError, match="dataset"):
         Manifest(**{"trajectories": 10, **how})
+    with pytest.raises(TaskError, match="demos 'lazy' is none of sustained"):
+        DatasetSpec(Manifest(), demos="lazy")
 
 
 class Inline(Workers):
