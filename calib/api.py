@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -12,12 +11,14 @@ from typing import Any
 
 import pandas as pd
 
+from calib.calibration.result import SUMMARY, read_result, read_summary
+from calib.calibration.result import CalibrationResult as CalibrationResult
 from calib.errors import OutputError
 from calib.io.folder import finite
 from calib.io.progress import Progress
 from calib.io.typed_document import to_document
 from calib.io.wording import brief
-from calib.material.food import FoodSpec, load_material_file
+from calib.material.food import FoodSpec
 from calib.material.scene import MIDDLE, Sizing
 from calib.multi_specimen.spec import StudySpec
 from calib.multi_specimen.study_file import read_study
@@ -40,6 +41,8 @@ LIMITS: dict[str, tuple[float, float, str]] = {
 """Numbers between which a value must lie, and its unit: those of the command line."""
 KEYS = ("food", "created", "status", "passed", "trace", "parameters", "versions")
 """What tells the summary of a calibration from that of a cut."""
+RESUME = "run it again with resume=True"
+"""What to do about a folder that is not whole."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,8 +153,7 @@ class Calibration:
         from calib.simulation.process_pool import Pool
 
         with script_hidden(), Pool(self.workers, self.arch) as pool:
-            run(self.request(out), Path(out), pool, resume=resume, progress=progress, say=say)
-        return Calibration.load(out)
+            return run(self.request(out), Path(out), pool, resume=resume, progress=progress, say=say)
 
     @staticmethod
     def load(out: str | Path) -> CalibrationResult:
@@ -160,22 +162,17 @@ class Calibration:
         Raises:
             OutputError: There is no finished calibration in it.
         """
-        path = Path(out) / "summary.json"
-        try:
-            summary = json.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
+        folder = Path(out)
+        path = folder / SUMMARY
+        if not path.is_file():
             raise OutputError(
-                f"{path}: cannot be read ({error.strerror}); name the folder of a finished calibration, or run it again with "
-                "resume=True"
-            ) from None
-        except ValueError as error:
-            raise OutputError(
-                f"{path}: damaged, not JSON ({brief(str(error))}); run it again with resume=True"
-            ) from None
+                f"{path}: cannot be read (no such file); name the folder of a finished calibration, or {RESUME}"
+            )
+        summary = read_summary(path, RESUME)
         missing = [key for key in KEYS if key not in summary] if isinstance(summary, dict) else list(KEYS)
         if missing:
             raise OutputError(f"{path}: not of a calibration ({', '.join(missing)} missing); name another folder")
-        return CalibrationResult(Path(out), summary)
+        return read_result(folder, RESUME)
 
     def _call(self) -> str:
         """This object as it would be written, without what is as usual."""
@@ -189,58 +186,6 @@ class Calibration:
             elif value != item.default:
                 words.append(f"{item.name}={str(value) if isinstance(value, Path) else value!r}")
         return f"Calibration({', '.join(words)})"
-
-
-@dataclass(frozen=True)
-class CalibrationResult:
-    """A finished calibration, from its folder.
-
-    Attributes:
-        folder: The output folder.
-        summary: Content of ``summary.json``: every figure of the report, SI units, errors as fractions.
-    """
-
-    folder: Path
-    summary: dict[str, Any] = field(repr=False)
-
-    @property
-    def passed(self) -> bool:
-        """Whether every line of the verdict was passed."""
-        return bool(self.summary["passed"])
-
-    @property
-    def parameters(self) -> pd.DataFrame:
-        """Fitted values by name: value, unit, 95 % interval, literature range, verdict, status, source."""
-        return pd.DataFrame.from_dict(self.summary["parameters"], orient="index")
-
-    @property
-    def curves(self) -> pd.DataFrame:
-        """Trace, simulation, its parts and the null models over the stroke [m, N].
-
-        Raises:
-            OutputError: curves.csv is missing or damaged.
-        """
-        path = self.folder / "curves.csv"
-        try:
-            return pd.read_csv(path)
-        except (OSError, ValueError) as error:
-            raise OutputError(
-                f"{path}: cannot be read ({brief(str(error))}); run the calibration with resume=True"
-            ) from None
-
-    @property
-    def material(self) -> FoodSpec:
-        """The calibrated food.
-
-        Raises:
-            MaterialError: material.yaml is missing or damaged.
-        """
-        return load_material_file(self.folder / "material.yaml")
-
-    @property
-    def report(self) -> Path:
-        """Path of the report."""
-        return self.folder / "report.pdf"
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ class RegressionError(CutcalError):
     """A recorded force curve that is missing or damaged, or that cannot be replaced."""
 
 
-class DocumentError(CutcalError):
+class DocumentError(OutputError):
     """A JSON document of a finished run that is missing, damaged or incomplete."""
 
 

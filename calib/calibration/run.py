@@ -12,16 +12,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from calib.calibration.calibrated import Calibrated
+from calib.calibration.result import SUMMARY, CalibrationResult, read_result, to_document
 from calib.calibration.summary import add_conditioning, summarise
 from calib.fit.multistart import FitResult
 from calib.fit.options import FitOptions
 from calib.io.folder import prepare, write_csv, write_json
 from calib.io.progress import Progress
-from calib.material.food import FoodSpec, dump_material
+from calib.material.food import dump_material
 from calib.problem.request import Request
 from calib.problem.setup import FINE, Setup, set_up
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore
@@ -30,12 +31,8 @@ from calib.simulation.workers import Errand, Workers
 from calib.trace.filters import filter_simulated
 from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.global_search import Listener, fit_with_uncertainty
-from calib.uncertainty.sobol import sensitivity
-from calib.validation.metrics import Metrics, compare
-from calib.validation.null_models import NullModel, null_models
-from calib.validation.numerical_checks import VARIED, Check, check, check_errands
+from calib.validation.numerical_checks import VARIED, check, check_errands
 from mpm.arrays import FloatArray
-from mpm.output.record import ForceRecord
 
 STORE, RECORD = "evaluations.h5", "record.h5"
 """Files in the output folder: all evaluations, and the whole record of the best values."""
@@ -51,7 +48,7 @@ def run(
     resume: bool = False,
     progress: Callable[[Progress], None] | None = None,
     say: Callable[[str], None] | None = None,
-) -> dict[str, Any]:
+) -> CalibrationResult:
     """Calibrate and write all outputs.
 
     Args:
@@ -63,7 +60,7 @@ def run(
         say: Called with each warning and stage, as one sentence.
 
     Returns:
-        The content of ``summary.json``.
+        The result, as ``summary.json`` has it.
 
     Raises:
         CutcalError: Anything wrong with the input; nothing that was computed is lost.
@@ -82,62 +79,6 @@ def run(
         calibrated = work.repeated(fit, analysis)
     add_conditioning(out / STORE, setup.curve)
     return _write(calibrated, out, began)
-
-
-@dataclass(frozen=True, eq=False)
-class Calibrated:
-    """What a calibration has found, before it is written.
-
-    Attributes:
-        setup: What was decided before; its fine cut has the fitted height.
-        fit: The search and its best run.
-        analysis: Its uncertainty; None where it ended too early for that.
-        record: Whole record of the best values.
-        checks: What numerical choices change; none where the search was interrupted.
-        start: Smoothed curve of the literature's values [N] (n,), NaN where that run broke down or was not made.
-    """
-
-    setup: Setup
-    fit: FitResult
-    analysis: UncertaintyAnalysis | None
-    record: ForceRecord
-    checks: list[Check]
-    start: FloatArray
-
-    @cached_property
-    def metrics(self) -> Metrics:
-        """The best curve against the trace."""
-        curve = self.setup.curve
-        return compare(curve.stroke, curve.curve, self.fit.best.curve)
-
-    @cached_property
-    def nulls(self) -> dict[str, NullModel]:
-        """Curves that explain nothing, against the trace."""
-        return null_models(self.setup.curve.stroke, self.setup.curve.curve)
-
-    def curves(self) -> dict[str, FloatArray]:
-        """Columns of curves.csv, all on the trace's stroke grid."""
-        curve, best, record = self.setup.curve, self.fit.best.curve, self.record
-        columns = {"stroke_m": curve.stroke, "real_N": curve.curve, "sim_N": best, "residual_N": best - curve.curve}
-        columns["edge_N"] = filter_simulated(curve.stroke, record.stroke, record.edge[:, 2])
-        columns["face_N"] = filter_simulated(curve.stroke, record.stroke, record.resolved_face)
-        columns["start_N"] = self.start
-        columns |= {f"{name}_N": null.curve for name, null in self.nulls.items()}
-        if self.analysis is not None:
-            columns |= {"band_low_N": self.analysis.bands[0].low, "band_high_N": self.analysis.bands[0].high}
-        return columns
-
-    def food(self) -> FoodSpec:
-        """The food with the fitted values, and the specimen's sizes that were fitted with its height."""
-        setup, values = self.setup, dict(self.fit.best.evaluation.parameters)
-        fitted = {"status": "fitted", "source": f"fitted to {setup.curve.trace.source}"}
-        height = values.pop("height", None)
-        food = setup.request.food.with_values(values, **fitted)
-        if height is None:
-            return food
-        shape = setup.fine.food.shape
-        sizes = {name: getattr(shape, name) for name in ("height", "width") if name not in setup.kept}
-        return food.with_sizes(sizes, **fitted)
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,17 +144,15 @@ class _Calibration:
         return filter_simulated(stroke, run.stroke, run.force) if run.ok else np.full_like(stroke, np.nan)
 
 
-def _write(done: Calibrated, out: Path, began: float) -> dict[str, Any]:
-    """Write curves.csv, material.yaml, summary.json and report.pdf; returns the summary."""
+def _write(done: Calibrated, out: Path, began: float) -> CalibrationResult:
+    """Write curves.csv, material.yaml, summary.json and report.pdf; returns the result, as the folder has it."""
     from reports.calibration.report import write_report
 
-    setup, request = done.setup, done.setup.request
-    summary = summarise(request, setup, done.fit, done.record, done.metrics, done.nulls, done.analysis, done.checks)
-    summary["sensitivity"] = sensitivity(setup.objective, done.fit, seed=request.seed)
-    summary["wall_s"] = time.monotonic() - began
+    document = to_document(summarise(done, out, began))
     write_csv(out / "curves.csv", done.curves())
-    provenance = {key: summary[key] for key in PROVENANCE} | {"trace": setup.curve.trace.label}
+    provenance = {key: document[key] for key in PROVENANCE} | {"trace": done.setup.curve.trace.label}
     dump_material(done.food(), out / "material.yaml", provenance)
-    write_json(out / "summary.json", summary)
-    write_report(out)
-    return summary
+    write_json(out / SUMMARY, document)
+    result = read_result(out)
+    write_report(result)
+    return result

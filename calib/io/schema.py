@@ -48,5 +48,10 @@ def schema(name: str) -> dict[str, Any]:
     return own
 
 
+def shared_part(name: str) -> dict[str, Any]:
+    """One of the parts that several schemas share."""
+    return dict(_read(COMMON)["$defs"][name])
+
+
 def _read(name: str) -> dict[str, Any]:
     return dict(json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8")))

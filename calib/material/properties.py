@@ -74,6 +74,9 @@ PROPERTIES: dict[str, Rule] = {
     "fracture_energy": Rule("J/m^2", 0.1, 1e6, "energy per crack area of bulk damage"),
 }  # fmt: skip
 
+MEANINGS = {name: rule.meaning for name, rule in PROPERTIES.items()}
+"""What each property is, in words."""
+
 DIMENSIONS: dict[str, Rule] = {
     "length": Rule("m", 1e-3, 1.0, "size along y, across the blade"),
     "width": Rule("m", 1e-3, 1.0, "size along x, along the blade"),

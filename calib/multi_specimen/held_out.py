@@ -28,7 +28,7 @@ from calib.uncertainty.predictive import Band, error_draws, pointwise_band, post
 from calib.validation.acceptance import Verdict, balances
 from calib.validation.metrics import Metrics, compare
 from calib.validation.null_models import null_models
-from calib.validation.prediction import NRMSE_LIMIT, RATING_LIMIT
+from calib.validation.prediction import PREDICTION_NRMSE_LIMIT, PREDICTION_RATING_LIMIT
 from mpm.arrays import FloatArray
 from mpm.errors import SimulationError
 
@@ -78,7 +78,11 @@ class HeldOutPrediction:
         m = self.metrics
         if any(v.passed is False for v in self.balances):
             return False
-        return m.nrmse <= NRMSE_LIMIT and m.iso18571.R >= RATING_LIMIT and self.band.inside >= INSIDE_LIMIT
+        return (
+            m.nrmse <= PREDICTION_NRMSE_LIMIT
+            and m.iso18571.R >= PREDICTION_RATING_LIMIT
+            and self.band.inside >= INSIDE_LIMIT
+        )
 
     @property
     def beats(self) -> tuple[str, ...]:

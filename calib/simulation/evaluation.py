@@ -11,7 +11,7 @@ import numpy as np
 
 from mpm.arrays import FloatArray
 
-PARTED, PUSHED = 0.8, 0.5
+FULLY_PARTED, PUSHED_AWAY = 0.8, 0.5
 """Least energy of the edge over R times the new area for a run to be a cut, and where it is none at all [-]. Fifteen foods at
 literature values have 0.96 to 1.27, a banana 0.89. One with a yield stress of 17 kPa in place of 30 has 0.48, and a process zone a
 quarter wider changes its peak by 7 %; from 0.8 on another quarter changes it by 0.3 %."""
@@ -75,12 +75,14 @@ class Evaluation:
     def completed(self) -> float:
         """Part of the stroke that was completed as a cut [-], 0 to 1.
 
-        Less than one also where the food was pressed away rather than parted: from :data:`PARTED` to :data:`PUSHED` it falls to
+        Less than one also where the food was pressed away rather than parted: from :data:`FULLY_PARTED` to :data:`PUSHED_AWAY` it falls to
         nothing.
         """
         if not self.ok:
             return self.fraction
-        return max((self.parted - PUSHED) / (PARTED - PUSHED), 0.0) if self.parted < PARTED else 1.0
+        return (
+            max((self.parted - PUSHED_AWAY) / (FULLY_PARTED - PUSHED_AWAY), 0.0) if self.parted < FULLY_PARTED else 1.0
+        )
 
     @property
     def parted(self) -> float:

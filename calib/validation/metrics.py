@@ -68,7 +68,8 @@ class IsoRating:
         EM: Magnitude rating.
         ES: Slope rating.
         R: Overall rating, 0.4 Z + 0.2 (EP + EM + ES).
-        shift: Samples by which the model lags the reference (negative: leads), of 240.
+        shift: Samples by which the model lags the reference (negative: leads), of 240; None where an older document does
+            not say.
         at_bound: Whether the shift stopped at the end of the searched range; EP then says nothing.
         without_phase: Where at_bound what Z, EM and ES of the curves as they are give, in R's proportions; else None.
     """
@@ -78,7 +79,7 @@ class IsoRating:
     EM: float
     ES: float
     R: float
-    shift: int
+    shift: int | None
     at_bound: bool
     without_phase: float | None = field(default=None, metadata=NULL)
 
@@ -87,7 +88,10 @@ class IsoRating:
         """What has to be said beside R, as a clause; empty where there is nothing."""
         if self.without_phase is None:
             return ""
-        return f"the phase search of R ran to its bound, where its phase part is 0 whatever the model; without it R is {self.without_phase:.3f}"
+        return (
+            "the phase search of R ran to its bound, where its phase part is 0 whatever the model; "
+            f"without it R is {self.without_phase:.3f}"
+        )
 
 
 @dataclass(frozen=True)

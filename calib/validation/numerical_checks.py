@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from calib.io.provenance import code_key
-from calib.io.typed_document import NULL
+from calib.io.typed_document import NULL, to_document
 from calib.material.scene import elsewhere
 from calib.problem.setup import slower
 from calib.simulation.evaluation import Evaluation
@@ -51,8 +51,12 @@ def _key(scene: Scene) -> str:
 class Check:
     """A repeated simulation against the one that is reported.
 
-    Attributes: name; reason why it broke down, or None; changes of peak and work, as fractions, and of the part of the work that
-    no law has taken, None where it broke down.
+    Attributes:
+        name: What was changed.
+        reason: Why that run broke down; None where it did not.
+        peak_change: Change of the peak, a fraction; None where the run broke down.
+        work_change: Change of the work, a fraction; None where the run broke down.
+        unbooked_change: Change of the part of the work that no law has taken; None where the run broke down.
     """
 
     name: str
@@ -63,14 +67,14 @@ class Check:
 
     @property
     def change(self) -> float | None:
-        """The larger of the two, without its sign."""
+        """The larger change of peak and work, without its sign."""
         if self.peak_change is None or self.work_change is None:
             return None
         return max(abs(self.peak_change), abs(self.work_change))
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
-        return asdict(self)
+        return to_document(self)
 
 
 def _unbooked(run: Evaluation) -> float:

@@ -27,7 +27,7 @@ from calib.material.food import FoodSpec
 from calib.material.scene import Sizing, cut_scene, specimen
 from calib.problem.food_parameters import fit_parameters
 from calib.problem.parameters import ParameterSet
-from calib.simulation.evaluation import PARTED, Evaluation
+from calib.simulation.evaluation import FULLY_PARTED, Evaluation
 from calib.simulation.evaluation_store import EvaluationStore, Header, content_key
 from calib.simulation.workers import Workers
 from calib.trace.filters import N_STROKE, filter_simulated
@@ -266,7 +266,7 @@ def _head(name: str, row: Mapping[str, Any]) -> list[str]:
         + ", ".join(row["parameters"]),
         "  (95 % ranges of materials.yaml; log-normal, mu normal; cut off at the bounds of a fit); all else as in materials.yaml",
         f"draws: {row['draws']}, broke down: {failed}{left_out}",
-        f"  pressed away, not cut: {row['pressed']} of the others (the edge takes less than {PARTED:g} of R times the new area), in the quantiles",
+        f"  pressed away, not cut: {row['pressed']} of the others (the edge takes less than {FULLY_PARTED:g} of R times the new area), in the quantiles",
         f"  not quasi-static: {row['dynamic']} of the others (kinetic energy over {DYNAMIC * 100:g} % of the work: soft, and cut late)",
         *spans,
         f"cutcal {row['cutcal']}, solver {row['solver']}, commit {row['commit'] or 'unknown'}",

@@ -6,21 +6,19 @@ What they hold is said here as data; the look is that of all reports.
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-from reports import ReportError
 from reports.base.format import breakable, publish
-from reports.base.run_folder import Data, read_json
 
 AGAIN = "run the same command again"
 
 
 @dataclass(frozen=True)
-class Table:
+class ReportTable:
     """A table of text.
 
     Attributes:
@@ -39,7 +37,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Part:
+class ReportPart:
     """A part of a report: heading, text, figure and table, of which each but the heading may be missing.
 
     Attributes:
@@ -55,7 +53,7 @@ class Part:
     text: str = ""
     picture: bytes = b""
     alt: str = ""
-    table: Table | None = None
+    table: ReportTable | None = None
     apart: bool = False
 
 
@@ -79,56 +77,66 @@ class Brief:
     passed: bool | None
     sentence: str
     facts: Sequence[tuple[str, str]]
-    parts: Sequence[Part]
+    parts: Sequence[ReportPart]
     limits: Sequence[str]
     warnings: Sequence[str] = field(default_factory=tuple)
 
 
-def write_brief(path: Path, make: Callable[[Data], Brief]) -> Path:
+class Origin(Protocol):
+    """What a finished run says of where it comes from: device, command line, versions and commit."""
+
+    @property
+    def device(self) -> str:
+        """Device of the simulations."""
+
+    @property
+    def command(self) -> Sequence[str]:
+        """Words of the command line, the first is the command."""
+
+    @property
+    def versions(self) -> Mapping[str, str]:
+        """Versions of cutcal, Python and packages."""
+
+    @property
+    def git(self) -> str | None:
+        """Commit of the checkout, None where cutcal was installed."""
+
+
+def typeset_brief(document: Path, brief: Brief, origin: Origin) -> Path:
     """Write ``report.pdf`` beside a document; the same document gives the same bytes, apart from its date.
 
     Args:
-        path: The document, JSON.
-        make: Says what the report holds.
+        document: The JSON file of the run; the report has its date.
+        brief: What the report holds.
+        origin: Where the run comes from.
 
     Returns:
         Path of the report.
 
     Raises:
-        ReportError: The document is missing, damaged or incomplete, or the report cannot be written.
+        ReportError: The report cannot be written.
     """
-    document = read_json(path)
-    try:
-        brief = make(document)
-        origin = provenance(document)
-    except (KeyError, TypeError, IndexError, AttributeError) as e:
-        what = (
-            f"{e.args[0]!r} is missing"
-            if isinstance(e, KeyError) and e.args
-            else "something is missing or of another kind"
-        )
-        raise ReportError(f"{path}: {what}; the file is incomplete or of another version of cutcal: {AGAIN}") from None
-    date = datetime.fromtimestamp(int(path.stat().st_mtime), tz=timezone.utc)
+    date = datetime.fromtimestamp(int(document.stat().st_mtime), tz=timezone.utc)
     pictures = {f"part{k}.svg": part.picture for k, part in enumerate(brief.parts) if part.picture}
     parts = [{**asdict(part), "picture": f"part{k}.svg" if part.picture else ""} for k, part in enumerate(brief.parts)]
     content = {
         **asdict(brief),
         "parts": parts,
-        "provenance": origin,
-        "cutcal": str(document["versions"].get("cutcal", "")),
+        "provenance": provenance_lines(origin),
+        "cutcal": origin.versions.get("cutcal", ""),
         "created": date.strftime("%Y-%m-%d %H:%M"),
     }
-    target = path.with_name("report.pdf")
+    target = document.with_name("report.pdf")
     publish(target, "brief.typ", content, pictures, date=date)
     return target
 
 
-def provenance(document: Mapping[str, Any]) -> Data:
-    """Commit, device, command and versions of a document."""
-    versions, command = document["versions"], document.get("command", [])
+def provenance_lines(origin: Origin) -> dict[str, Any]:
+    """Commit, device, command and versions as a report shows them."""
+    words = ["cutcal", *origin.command] if origin.command else []
     return {
-        "commit": document.get("git") or "",
-        "device": breakable(str(document.get("device") or "not recorded")),
-        "command": [breakable(shlex.quote(word)) for word in ["cutcal", *command]] if command else [],
-        "versions": ", ".join(f"{name}\u00a0{versions[name]}" for name in sorted(versions)),
+        "commit": origin.git or "",
+        "device": breakable(origin.device),
+        "command": [breakable(shlex.quote(word)) for word in words],
+        "versions": ", ".join(f"{name}\u00a0{origin.versions[name]}" for name in sorted(origin.versions)),
     }

@@ -29,7 +29,8 @@ ALMOST = 0.1
 COVERAGE = 2.0
 """An uncertainty band of about 95 % is this many standard uncertainties wide on each side."""
 
-VERDICTS = ("monotone", "oscillatory", "divergent", "noise-limited", "two grids")
+TRENDS = ("monotone", "oscillatory", "divergent", "noise-limited", "two grids")
+"""What the three finest grids can do; the word ``verdict`` of a document."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class Estimate:
     """What a sequence of grids says about one number.
 
     Attributes:
-        verdict: One of :data:`VERDICTS`, from the three finest grids.
+        verdict: One of :data:`TRENDS`, from the three finest grids.
         order: Observed order of the three finest grids [-], or None: two grids, divergent, equal values, or where the
             differences are noise and give none that is credible.
         extrapolated: Richardson's value for an infinitely fine grid, or None.
@@ -46,8 +47,8 @@ class Estimate:
         gci_coarsest: The same index of the coarsest: the way from it to the extrapolated value instead.
         fitted: Value of the least-squares fit for an infinitely fine grid, or None with fewer than four grids.
         fitted_order: Order of that fit [-], or None.
-        uncertainty: Numerical uncertainty of the finest at about 95 %, a fraction of its value [-]: of the least-squares
-            estimate where there is one, else the index, and of the runs that should agree.
+        uncertainty: Numerical uncertainty of the finest at about 95 %, a fraction of its value [-]: of the
+            least-squares estimate where there is one, else the index, and of the runs that should agree.
     """
 
     verdict: str
@@ -66,8 +67,11 @@ def estimate(h: Sequence[float], values: Sequence[float], repeat_sd: float = 0.0
 
     Args:
         h: Cell sizes [m], shape (n,), n >= 2, all different, in any order.
-        values: The number on each grid, shape (n,).
+        values: The number on each grid [its unit], shape (n,).
         repeat_sd: Its standard deviation between runs that should agree (other particles, the grid elsewhere).
+
+    Returns:
+        What the grids say of the number.
 
     Raises:
         CurveError: Fewer than two grids, equal cell sizes, or values that are not finite.
@@ -96,7 +100,10 @@ def observed_order(h: np.ndarray, values: np.ndarray) -> float | None:
 
     Args:
         h: Cell sizes from fine to coarse [m], shape (3,).
-        values: The number on each grid, shape (3,).
+        values: The number on each grid [its unit], shape (3,).
+
+    Returns:
+        The order.
     """
     r21, r32 = h[1] / h[0], h[2] / h[1]
     e21, e32 = values[1] - values[0], values[2] - values[1]
@@ -122,8 +129,8 @@ class CurveEstimate:
     Attributes:
         order: Order by which the curves approach each other, in the root mean square [-], or None.
         gci: Index at each point, over the peak of the finest curve [-], shape (m,).
-        u_num: Standard numerical uncertainty of the finest curve, of the grid and of the runs that should agree [unit of
-            the curve], shape (m,).
+        u_num: Standard numerical uncertainty of the finest curve, of the grid and of the runs that should agree
+            [unit of the curve], shape (m,).
         u_coarsest: The same of the coarsest curve, shape (m,).
     """
 
@@ -140,8 +147,11 @@ def curve_estimate(
 
     Args:
         h: Cell sizes [m], shape (n,), n >= 2.
-        curves: The curve on each grid, all at the same strokes, each of shape (m,).
-        repeat_sd: Standard deviation between curves that should agree, shape (m,).
+        curves: The curve on each grid [unit of the curve], all at the same strokes, each of shape (m,).
+        repeat_sd: Standard deviation between curves that should agree [unit of the curve], shape (m,) or scalar.
+
+    Returns:
+        What the grids say of the curve.
 
     Raises:
         CurveError: Fewer than two grids, or curves of different lengths.
@@ -204,27 +214,28 @@ def _least_squares(h: np.ndarray, phi: np.ndarray) -> tuple[float, float, float]
 
     The order is free between the credible limits; outside, the better of first and second order is taken, with the
     larger factor of safety. A free order is easily too high where the values scatter, and then the error it promises is
-    too small: a first-order fit that is nearly as good (:data:`AS_GOOD`) counts too, and the larger uncertainty is taken.
+    too small. A first-order fit that is nearly as good (:data:`AS_GOOD`) therefore counts too, and the larger
+    uncertainty is taken.
     """
 
-    def fit(p: float) -> tuple[float, float, float]:
+    def power_law(p: float) -> tuple[float, float, float]:
         columns = np.stack([np.ones_like(h), h**p], axis=1)
         solution = np.linalg.lstsq(columns, phi, rcond=None)[0]
         rest = float(((phi - columns @ solution) ** 2).sum())
         return rest, float(solution[0]), float(columns[0] @ solution)
 
     orders = np.linspace(*ORDERS, 161)
-    best = int(np.argmin([fit(p)[0] for p in orders]))
+    best = int(np.argmin([power_law(p)[0] for p in orders]))
     p, free, factor = float(orders[best]), 3, SAFETY_FACTOR
     if best in (0, len(orders) - 1):
-        p, free, factor = min((1.0, 2.0), key=lambda q: fit(q)[0]), 2, SAFETY_FACTOR_DOUBT
+        p, free, factor = min((1.0, 2.0), key=lambda q: power_law(q)[0]), 2, SAFETY_FACTOR_DOUBT
     spread, bands = [], []
     scatter = (phi.max() - phi.min()) / (len(phi) - 1)
     for order, unknowns in ((p, free), (1.0, 2)):
-        rest, limit, at_finest = fit(order)
+        rest, limit, at_finest = power_law(order)
         spread.append(math.sqrt(rest / (len(h) - unknowns)))
         bands.append(_band(abs(at_finest - limit), spread[-1], abs(phi[0] - at_finest), scatter, factor))
-    return fit(p)[1], p, max(bands) if spread[1] <= max(AS_GOOD * spread[0], ALMOST * scatter) else bands[0]
+    return power_law(p)[1], p, max(bands) if spread[1] <= max(AS_GOOD * spread[0], ALMOST * scatter) else bands[0]
 
 
 def _band(error: float, spread: float, miss: float, scatter: float, factor: float) -> float:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from scipy.stats import t as student
@@ -20,32 +19,29 @@ from mpm.shapes import volume
 from studies.convergence.gci import REPEATABILITY
 from studies.regression.reference_curves import CHECKED
 
-KNIFE = "kitchen"  # of every recorded cut
+RECORDED_KNIFE = "kitchen"  # of every recorded cut
 MOST_CELLS = 12
-"""Cells over the height of a food at most. The screening grid of a melon has 25, and its cut takes 7 to 20 s on a core; with 12 the
-longest takes three, and a changed law shows as well."""
+"""Cells over the height of a food at most. The screening grid of a melon has 25 and takes long to simulate; a changed law
+shows with fewer as well. See docs/theory.md, "Measured choices"."""
 UNEVEN = 0.97
-"""Cells over those that divide a food evenly. Where a size is a whole number of cells, as on the screening grid of a strawberry, the
-last bit of the cell decides what lies at its end, and the curve jumps by up to 1.8 % of the largest force. With uneven cells a part
-in 1e12 of the cell changes it by 7e-11 (a grape's by 6e-4)."""
-POINTS = 60  # of a curve: five to a cell, or more
-SEED = 0  # of the recorded cut
-OTHERS = (1, 2, 3, 4, 5, 6, 7)
+"""Cells over those that divide a food evenly. Where a size is a whole number of cells, the last bit of the cell decides
+what lies at its end, and the curve jumps. See docs/theory.md, "Measured choices"."""
+RECORDED_POINTS = 60  # of a curve: five to a cell, or more
+RECORDED_SEED = 0  # of the recorded cut
+OTHER_SEEDS = (1, 2, 3, 4, 5, 6, 7)
 """Seeds that are repeated beside it, for the repeatability standard deviation: seven degrees of freedom."""
 SAME = 1e-3
-"""Part of a column's largest value that the same seed may differ by between machines. The cuts are not chaotic (R changed by 1e-12
-changes a curve by 2e-11 at most), so double precision moves them by rounding alone; compilers and processors move single
-precision by up to 8e-4 (tests/mpm/test_regression.py). Also the least tolerance, where seeds hardly differ."""
+"""Part of a column's largest value that the same seed may differ by between machines: rounding, which compilers and
+processors do differently, above all in single precision (tests/mpm/test_regression.py). Also the least tolerance, where
+seeds hardly differ. See docs/theory.md, "Measured choices"."""
 KEY_LENGTH = 16  # letters of a hash that a record shows
-START, RATE = (
-    0.3,
-    2e4,
-)  # seconds of each run, and cells times cells of stroke a second, for the estimate of the time left
+START_UP = 0.3  # time of each run apart from its cells [s], for the estimate of the time left
+CELL_RATE = 2e4  # cells times cells of stroke a second, for that estimate
 
 
 @dataclass(frozen=True)
-class Case:
-    """One recorded cut: the food as it is shipped, whole height, :data:`KNIFE`, on the screening grid.
+class BaselineCut:
+    """One recorded cut: the food as it is shipped, whole height, :data:`RECORDED_KNIFE`, on the screening grid.
 
     Attributes:
         food: The food.
@@ -67,8 +63,8 @@ class Case:
         """Its name for people."""
         return f"{self.food.name}, {self.contact}"
 
-    def scene(self, seed: int = SEED) -> Scene:
-        """The cut with cells of :data:`UNEVEN` of those that a fit screens with, or that :data:`MOST_CELLS` over the height have.
+    def scene(self, seed: int = RECORDED_SEED) -> Scene:
+        """The cut, with cells of :data:`UNEVEN` of those that a fit screens with, or that :data:`MOST_CELLS` would have.
 
         Raises:
             SceneError: A food that cannot be cut.
@@ -83,7 +79,7 @@ class Case:
         """Seconds of one run, roughly."""
         scene = self.scene()
         dx, images = scene.numerics.dx, 2 ** sum(scene.mirrors)
-        return START + volume(scene.food.shape) / dx**3 / images * scene.motion.stroke / dx / RATE
+        return START_UP + volume(scene.food.shape) / dx**3 / images * scene.motion.stroke / dx / CELL_RATE
 
     @property
     def inputs(self) -> str:
@@ -94,41 +90,84 @@ class Case:
         return key_of([food.shape_kind, values, blade])[:KEY_LENGTH]
 
 
-def cases(foods: Sequence[FoodSpec], knife: Knife, contacts: Sequence[str] = CONTACTS) -> list[Case]:
-    """All cases of these foods, one contact mode after the other: their kernels are compiled once."""
-    return [Case(food, knife, contact) for contact in contacts for food in foods]
+def baseline_cuts(foods: Sequence[FoodSpec], knife: Knife, contacts: Sequence[str] = CONTACTS) -> list[BaselineCut]:
+    """All recorded cuts of these foods, one contact mode after the other: their kernels are compiled once.
+
+    Args:
+        foods: The foods.
+        knife: The knife.
+        contacts: Kinds of contact.
+
+    Returns:
+        The cuts.
+    """
+    return [BaselineCut(food, knife, contact) for contact in contacts for food in foods]
 
 
 def columns_of(record: ForceRecord, stroke: float) -> dict[str, FloatArray]:
-    """What is recorded of a cut, by the names of ``reference.COLUMNS``: forces upwards on the knife [N], work of the knife [J],
-    at :data:`POINTS` even strokes, (60,) each.
+    """What is recorded of a cut: forces upwards on the knife [N] and its work [J] over the stroke [m].
 
     Args:
         record: The cut.
         stroke: Its whole stroke [m].
+
+    Returns:
+        By the names of :data:`studies.regression.reference_curves.COLUMNS`, at :data:`RECORDED_POINTS` even strokes,
+        shape (60,) each.
     """
-    grid = np.linspace(0.0, stroke, POINTS + 1)[1:]
+    grid = np.linspace(0.0, stroke, RECORDED_POINTS + 1)[1:]
     forces = {"knife_N": record.resolved, "edge_N": record.edge[:, 2], "face_N": record.resolved_face}
     curves = {name: np.interp(grid, record.stroke, values) for name, values in forces.items()}
     work = np.interp(grid, np.append(0.0, record.stroke), np.append(0.0, record.work_done))
     return {"stroke_m": grid, **curves, "work_J": work}
 
 
-def cut(scene: Scene, arch: str, threads: int) -> dict[str, Any]:
-    """One cut in a worker: ``status``, and ``columns`` where it is ``done``."""
+@dataclass(frozen=True, eq=False)
+class CutOutcome:
+    """How the simulation of a cut ended.
+
+    Attributes:
+        status: ``done``, or why it did not reach its end.
+        columns: What is recorded of it, see :func:`columns_of`; None where it did not reach its end.
+    """
+
+    status: str
+    columns: Mapping[str, FloatArray] | None
+
+
+def run_cut(scene: Scene, arch: str, threads: int) -> CutOutcome:
+    """One cut in a worker.
+
+    Args:
+        scene: The cut.
+        arch: Device.
+        threads: CPU threads.
+
+    Returns:
+        How it ended.
+    """
     from mpm.runtime import Runtime
     from mpm.solver import Simulation
 
     record = Simulation(scene, Runtime(arch, threads)).run()
     done = record.status == "done"
-    return {"status": record.status, "columns": columns_of(record, scene.motion.stroke) if done else None}
+    return CutOutcome(record.status, columns_of(record, scene.motion.stroke) if done else None)
 
 
-def results(columns: Mapping[str, FloatArray]) -> dict[str, float]:
+@dataclass(frozen=True)
+class CutNumbers:
     """Peak [N], where it is [m] and work [J] of a recorded cut."""
+
+    peak_N: float
+    peak_stroke_m: float
+    work_J: float
+
+
+def cut_numbers(columns: Mapping[str, FloatArray]) -> CutNumbers:
+    """The numbers of a recorded cut."""
     knife, work = columns["knife_N"], columns["work_J"]
     where = float(columns["stroke_m"][np.argmax(knife)])
-    return {"peak_N": float(knife.max()), "peak_stroke_m": where, "work_J": float(work[-1])}
+    return CutNumbers(float(knife.max()), where, float(work[-1]))
 
 
 def scales(columns: Mapping[str, FloatArray]) -> dict[str, float]:
@@ -145,21 +184,34 @@ def limit_factor(runs: int) -> float:
     return max(REPEATABILITY, math.sqrt(2) * float(student.ppf(0.975, runs - 1)))
 
 
-def repeatability(runs: Sequence[Mapping[str, FloatArray]]) -> tuple[dict[str, Any], dict[str, float]]:
+@dataclass(frozen=True)
+class Repeatability:
+    """How much runs of one cut with other seeds scatter (ISO 5725-2).
+
+    Attributes:
+        s_r: Largest standard deviation over the stroke between the runs [unit of the column], by column.
+        s_r_results: Standard deviation of peak [N], its place [m] and work [J] between the runs, by name.
+        limits: Their repeatability limits [the same units], by name.
+    """
+
+    s_r: Mapping[str, float]
+    s_r_results: Mapping[str, float]
+    limits: Mapping[str, float]
+
+
+def repeatability(runs: Sequence[Mapping[str, FloatArray]]) -> tuple[Repeatability, dict[str, float]]:
     """How much runs of one cut with other seeds scatter, and the tolerances that follow.
 
-    The repeatability standard deviation s_r (ISO 5725-2) of a column is the largest over the stroke of the
-    standard deviation between the runs; tolerances are the repeatability limit (:func:`limit_factor`), and :data:`SAME` at least.
-    Of 256 curves of a ninth seed 235 are within them, in every column and at every point.
+    Tolerances are the repeatability limit (:func:`limit_factor`), and :data:`SAME` at least.
 
     Args:
         runs: Columns of at least two runs, the recorded one first.
 
     Returns:
-        ``s_r`` by column, ``s_r_results`` and ``limits`` of peak [N], its place [m] and work [J]; and the tolerances by column.
+        The scatter, and the tolerances [unit of the column] by column.
     """
     s_r = {name: float(np.std([run[name] for run in runs], axis=0, ddof=1).max()) for name in CHECKED}
-    numbers = [results(run) for run in runs]
+    numbers = [asdict(cut_numbers(run)) for run in runs]
     own = {name: float(np.std([n[name] for n in numbers], ddof=1)) for name in numbers[0]}
     first, scale = numbers[0], scales(runs[0])
     floors = {name: SAME * abs(first[name]) for name in first}
@@ -167,4 +219,4 @@ def repeatability(runs: Sequence[Mapping[str, FloatArray]]) -> tuple[dict[str, A
     factor = limit_factor(len(runs))
     limits = {name: max(factor * own[name], floors[name]) for name in own}
     tolerances = {name: max(factor * s_r[name], SAME * scale[name]) for name in CHECKED}
-    return {"s_r": s_r, "s_r_results": own, "limits": limits}, tolerances
+    return Repeatability(s_r, own, limits), tolerances

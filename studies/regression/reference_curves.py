@@ -29,7 +29,7 @@ CHECKED = COLUMNS[1:]
 """Columns with a tolerance; the stroke is given."""
 INDEX = "reference.json"
 SCHEMA = 1  # layout of that file
-DIGITS = 8  # of a recorded number: a hundredth of what keeps a record (regression.UNCHANGED)
+DIGITS = 8  # of a recorded number: a hundredth of what keeps a record (comparison.UNCHANGED)
 ABOUT = (
     "Recorded cuts of this project's own solver: a reference for changes of its code, no measurement.",
     "results: peak of the force on the knife [N], its stroke [m], work [J]; tolerances by column of the CSV file of the same name.",

@@ -1,13 +1,10 @@
-"""One line of the verification table, and the list of all cases."""
+"""A case of the verification, what is common to all, and the list of them."""
 
 from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any
-
-import numpy as np
 
 from mpm.material import Material
 from mpm.output.record import ForceRecord
@@ -15,56 +12,22 @@ from mpm.runtime import Runtime
 from mpm.scene import Numerics, Scene
 from mpm.shapes import Shape
 from mpm.solver import Simulation
-from studies.verification.free_body import FreeBody
+from studies.verification.free_body import AT_REST, FreeBody, InitialState
+from studies.verification.result import Comparison
 
 PARTS = ("constitutive_point", "motion", "contact", "bending", "pressing", "cutting", "fem_reference")
 """Modules with cases, in the order of the table."""
 
 
 @dataclass(frozen=True)
-class Row:
-    """One comparison.
+class SuiteOptions:
+    """What is common to all cases.
 
     Attributes:
-        case: What is simulated.
-        quantity: What is compared, with its unit.
-        expected: Value of the closed form or the reference; with ``least`` the least value that passes.
-        got: What the solver gives.
-        error: Difference over the expected value, or the difference itself where that is 0 [-].
-        tolerance: Largest error that passes [-].
-        source: Where the expected value comes from.
-        least: Whether more is also right: orders of convergence.
+        quick: Whether coarse versions are run.
+        seed: Seed of the particles.
+        arch: Taichi device.
     """
-
-    case: str
-    quantity: str
-    expected: float
-    got: float
-    tolerance: float
-    source: str
-    least: bool = False
-
-    @property
-    def error(self) -> float:
-        """See the class."""
-        difference = self.got - self.expected
-        return difference / abs(self.expected) if self.expected else difference
-
-    @property
-    def passed(self) -> bool:
-        """Whether the error is within the tolerance."""
-        return -self.error <= self.tolerance if self.least else abs(self.error) <= self.tolerance  # false for nan
-
-    def as_dict(self) -> dict[str, Any]:
-        """For verify.json."""
-        numbers = {"got": self.got, "error": self.error}
-        finite = {name: value if np.isfinite(value) else None for name, value in numbers.items()}
-        return {**vars(self), **finite, "passed": self.passed}
-
-
-@dataclass(frozen=True)
-class How:
-    """What is common to all cases. Attributes: quick, for coarse versions; seed of the particles; arch, Taichi device."""
 
     quick: bool = False
     seed: int = 0
@@ -75,9 +38,28 @@ class How:
         """Device of the simulations."""
         return Runtime(self.arch, threads=1)
 
-    def body(self, shape: Shape, material: Material, grid: Numerics, **options: Any) -> FreeBody:
-        """A free body of this seed, on this device; see :class:`studies.verification.free_body.FreeBody`."""
-        return FreeBody(shape, material, replace(grid, seed=self.seed), runtime=self.runtime, **options)
+    def body(
+        self,
+        shape: Shape,
+        material: Material,
+        grid: Numerics,
+        initial: InitialState = AT_REST,
+        *,
+        board: float | None = None,
+    ) -> FreeBody:
+        """A free body of this seed, on this device.
+
+        Args:
+            shape: Outline.
+            material: Its constants.
+            grid: Grid; its seed is not used.
+            initial: Where and how fast the particles begin.
+            board: Friction on the board [-]; without it there is no board.
+
+        Returns:
+            The body.
+        """
+        return FreeBody(shape, material, replace(grid, seed=self.seed), initial, board=board, runtime=self.runtime)
 
     def simulate(self, scene: Scene) -> ForceRecord:
         """A cut or press of this seed, on this device."""
@@ -85,18 +67,22 @@ class How:
 
 
 @dataclass(frozen=True)
-class Case:
-    """A function that makes rows.
+class VerificationCase:
+    """A function that makes comparisons.
 
-    Attributes: name; run; fast, whether it belongs to the quick part; cost, about the seconds that it takes: long ones start first.
+    Attributes:
+        name: Its name in the table.
+        run: The function.
+        fast: Whether it belongs to the quick part.
+        cost: About the time that it takes [s]: long ones start first.
     """
 
     name: str
-    run: Callable[[How], Iterator[Row]]
+    run: Callable[[SuiteOptions], Iterator[Comparison]]
     fast: bool = True
     cost: float = 5.0
 
 
-def cases() -> list[Case]:
+def cases() -> list[VerificationCase]:
     """All cases in the order of the table."""
     return [case for part in PARTS for case in importlib.import_module(f"studies.verification.{part}").CASES]

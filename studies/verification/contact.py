@@ -12,22 +12,24 @@ import numpy as np
 from mpm.material import Material
 from mpm.scene import Board, Food, Motion, Press, Scene
 from mpm.shapes import Shape
-from studies.verification.case import Case, How, Row
+from studies.verification.case import SuiteOptions, VerificationCase
+from studies.verification.free_body import InitialState
 from studies.verification.motion import BLOCK, SOFT, numerics
+from studies.verification.result import Comparison
 
 G = 9.81
 DAMPED = replace(SOFT, loss_factor=0.5)
 
 
-def resting(how: How) -> Iterator[Row]:
+def resting(options: SuiteOptions) -> Iterator[Comparison]:
     """What stands on the board weighs its weight; what slides is slowed by mu g."""
-    body = how.body(BLOCK, DAMPED, numerics(gravity=G), board=0.0)
+    body = options.body(BLOCK, DAMPED, numerics(gravity=G), board=0.0)
     period = 4 * BLOCK.height / DAMPED.p_wave
-    body.step(math.ceil((6 if how.quick else 12) * period / body.dt))
+    body.step(math.ceil((6 if options.quick else 12) * period / body.dt))
     before, since = body.impulse.copy(), body.time
     body.step(math.ceil(4 * period / body.dt))
     weight = DAMPED.rho * BLOCK.width * BLOCK.length * BLOCK.height * G
-    yield Row(
+    yield Comparison(
         "block at rest",
         "force on the board [N]",
         -weight,
@@ -36,30 +38,29 @@ def resting(how: How) -> Iterator[Row]:
         "m g",
     )
     mu, v0 = 0.4, 0.15
-    slide = how.body(BLOCK, DAMPED, numerics(gravity=G, room=1.0), board=mu)
+    slide = options.body(BLOCK, DAMPED, numerics(gravity=G, room=1.0), board=mu)
     slide.step(math.ceil(6 * period / slide.dt))
     slide.kick(np.array([v0, 0.0, 0.0]))
     slide.step(math.ceil(2 * period / slide.dt))
     t0, u0, x0, rubbed = slide.time, slide.v[:, 0].mean(), slide.x[:, 0].mean(), slide.friction
     slide.step(math.ceil(0.5 * v0 / (mu * G) / slide.dt))
     slowed = (slide.v[:, 0].mean() - u0) / (slide.time - t0)
-    yield Row("block slides on the board", "acceleration [m/s^2]", -mu * G, float(slowed), 0.02, "Coulomb: mu g")
+    yield Comparison("block slides on the board", "acceleration [m/s^2]", -mu * G, float(slowed), 0.02, "Coulomb: mu g")
     work, way = slide.friction - rubbed, float(slide.x[:, 0].mean() - x0)
-    yield Row(
+    yield Comparison(
         "block slides on the board", "energy of friction [J]", mu * weight * way, work, 0.03, "mu m g times the way"
     )
 
 
-def bouncing(how: How) -> Iterator[Row]:
+def bouncing(options: SuiteOptions) -> Iterator[Comparison]:
     """A ball bounces back from the board."""
     ball = Shape("sphere", 0.03, 0.03, 0.03)
-    body = how.body(
+    body = options.body(
         ball,
         Material(E=1e5, nu=0.3, rho=1000.0),
-        numerics(1.5e-3 if not how.quick else 2e-3),
+        numerics(1.5e-3 if not options.quick else 2e-3),
+        InitialState(velocity=lambda x: np.tile([0.0, 0.0, -0.3], (len(x), 1)), lift=1e-3),
         board=0.0,
-        lift=1e-3,
-        velocity=lambda x: np.tile([0.0, 0.0, -0.3], (len(x), 1)),
     )
     body.step(1)
     start = body.kinetic
@@ -68,7 +69,7 @@ def bouncing(how: How) -> Iterator[Row]:
         up = float(body.v[:, 2].mean())
         if up > 0 and body.x[:, 2].min() > 1.5e-3:
             break
-    yield Row(
+    yield Comparison(
         "ball bounces",
         "speed after over before [-]",
         0.9,
@@ -78,16 +79,16 @@ def bouncing(how: How) -> Iterator[Row]:
         least=True,
     )
     energy = (body.kinetic + body.elastic) / start
-    yield Row("ball bounces, energy", "after over before [-]", 1.0, energy, 0.10, "elastic impact")
+    yield Comparison("ball bounces, energy", "after over before [-]", 1.0, energy, 0.10, "elastic impact")
 
 
-def tilted(how: How) -> Iterator[Row]:
+def tilted(options: SuiteOptions) -> Iterator[Comparison]:
     """A block on a tilted board sticks below the angle of friction and slides with a known acceleration above it."""
     mu = 0.4
     for slope in (0.3, 0.6):
         angle = math.atan(slope)
         down = np.array([G * math.sin(angle), 0.0, 0.0])
-        body = how.body(BLOCK, DAMPED, numerics(gravity=G * math.cos(angle), room=1.0), board=mu)
+        body = options.body(BLOCK, DAMPED, numerics(gravity=G * math.cos(angle), room=1.0), board=mu)
         period = 4 * BLOCK.height / DAMPED.p_wave
         body.step(math.ceil(6 * period / body.dt))
         pull = partial(_constant, np.tile(down, (len(body.start), 1)))
@@ -99,41 +100,43 @@ def tilted(how: How) -> Iterator[Row]:
         name = f"block on a board tilted by {math.degrees(angle):.0f} degrees"
         normal = DAMPED.rho * BLOCK.width * BLOCK.length * BLOCK.height * G * math.cos(angle)
         if slope < mu:
-            yield Row(name, "acceleration over g [-]", 0.0, gained / G, 0.01, "sticks: tan of the angle below mu = 0.4")
-            yield Row(
+            yield Comparison(
+                name, "acceleration over g [-]", 0.0, gained / G, 0.01, "sticks: tan of the angle below mu = 0.4"
+            )
+            yield Comparison(
                 name, "friction over normal force [-]", slope, float(-force[0] / force[2]), 0.02, "tan of the angle"
             )
         else:
             want = G * (math.sin(angle) - mu * math.cos(angle))
-            yield Row(name, "acceleration [m/s^2]", want, gained, 0.02, "g (sin - mu cos)")
-        yield Row(name, "force on the board [N]", -normal, float(force[2]), 0.01, "m g cos")
+            yield Comparison(name, "acceleration [m/s^2]", want, gained, 0.02, "g (sin - mu cos)")
+        yield Comparison(name, "force on the board [N]", -normal, float(force[2]), 0.01, "m g cos")
 
 
 def _constant(pull: np.ndarray, time: float) -> np.ndarray:
     return pull
 
 
-def discs(how: How) -> Iterator[Row]:
+def discs(options: SuiteOptions) -> Iterator[Comparison]:
     """Two discs that meet on a shared grid feel each other before they touch, and the transfers take energy from them."""
     source = "two discs (Sulsky, Chen and Schreyer 1994)"
     losses = []
-    for cells in (20,) if how.quick else (20, 40):
+    for cells in (20,) if options.quick else (20, 40):
         dx = 40e-3 / cells
-        gap, momentum, energy = _meet(how, dx)
+        gap, momentum, energy = _meet(options, dx)
         losses.append(1 - energy)
         name = f"two discs of {cells} cells"
-        yield Row(name, "momentum gained over that of one disc [-]", 0.0, momentum, 1e-10, source)
-        yield Row(name, "energy after over before [-]", 1.0, energy, 0.10, "elastic impact")
+        yield Comparison(name, "momentum gained over that of one disc [-]", 0.0, momentum, 1e-10, source)
+        yield Comparison(name, "energy after over before [-]", 1.0, energy, 0.10, "elastic impact")
         # a quadratic kernel reaches 1.5 cells from either body (early contact, Bardenhagen et al. 2000)
-        yield Row(name, "gap at which they feel each other, in cells [-]", 0.0, gap / dx, 3.0, source)
-    if not how.quick:
+        yield Comparison(name, "gap at which they feel each other, in cells [-]", 0.0, gap / dx, 3.0, source)
+    if not options.quick:
         ratio = losses[0] / losses[1]
-        yield Row(
+        yield Comparison(
             "two discs", "loss of energy over that on half the cells [-]", 2.0, ratio, 0.1, "first order", least=True
         )
 
 
-def _meet(how: How, dx: float) -> tuple[float, float, float]:
+def _meet(options: SuiteOptions, dx: float) -> tuple[float, float, float]:
     """Gap when the first disc has lost 1 % of its speed [m], change of momentum and energy after the impact [-]."""
     radius, thick, apart, speed = 0.02, 0.01, 0.016, 0.5
     material = Material(E=1e5, nu=0.3, rho=1000.0)
@@ -142,12 +145,14 @@ def _meet(how: How, dx: float) -> tuple[float, float, float]:
         upper = x[:, 2] > thick
         return x + np.where(upper[:, None], [apart, apart, -thick], [-apart, -apart, 0.0])
 
-    body = how.body(
+    def velocity(x: np.ndarray) -> np.ndarray:
+        return np.where(x[:, :1] + x[:, 1:2] > 0, [-speed, -speed, 0.0], [speed, speed, 0.0])
+
+    body = options.body(
         Shape("upright_cylinder", 2 * radius, 2 * radius, 2 * thick),
         material,
         numerics(dx, room=1.0),
-        place=place,
-        velocity=lambda x: np.where(x[:, :1] + x[:, 1:2] > 0, [-speed, -speed, 0.0], [speed, speed, 0.0]),
+        InitialState(place, velocity),
     )
     first = body.start[:, 0] + body.start[:, 1] < 0
     p0 = body.mass * body.v.sum(axis=0)
@@ -167,14 +172,14 @@ def _meet(how: How, dx: float) -> tuple[float, float, float]:
     return gap, momentum, (body.kinetic + body.elastic) / before
 
 
-def hertz(how: How) -> Iterator[Row]:
+def hertz(options: SuiteOptions) -> Iterator[Comparison]:
     """A plate on half a lying cylinder of nu = 0, for which plane strain and free ends are the same.
 
     Not on a ball, whose far side Hertz leaves out: at a contact of a fifth of the radius finite elements give 7 % more. For a
     cylinder it is in the formula.
     """
     radius, share = 0.04, 0.1  # at 0.2 the force of finite elements is 4 % below Hertz's, as that of the particles is
-    for cells in (4,) if how.quick else (4, 8):
+    for cells in (4,) if options.quick else (4, 8):
         half = share * radius  # half the width of the contact
         dx = half / cells
         line = math.pi * SOFT.E * half**2 / (4 * radius)
@@ -186,11 +191,11 @@ def hertz(how: How) -> Iterator[Row]:
             Board(0.0),
             numerics=replace(numerics(dx), mirror=True, output=way / 200),
         )
-        record = how.simulate(scene)
+        record = options.simulate(scene)
         stroke, force = 0.5 * (record.stroke[1:] + record.stroke[:-1]), record.face[1:, 2] / (4 * dx)
         near = np.abs(stroke - way) < 0.1 * way
         got = float(np.polyval(np.polyfit(stroke[near], force[near], 1), way))
-        yield Row(
+        yield Comparison(
             f"plate on a cylinder, contact of {2 * cells} cells",
             "force on its length [N/m]",
             line,
@@ -201,9 +206,9 @@ def hertz(how: How) -> Iterator[Row]:
 
 
 CASES = [
-    Case("rest and friction", resting, cost=30),
-    Case("tilted board", tilted, cost=30),
-    Case("bounce", bouncing, cost=12),
-    Case("two discs", discs, cost=45),
-    Case("Hertz", hertz, fast=False, cost=120),
+    VerificationCase("rest and friction", resting, cost=30),
+    VerificationCase("tilted board", tilted, cost=30),
+    VerificationCase("bounce", bouncing, cost=12),
+    VerificationCase("two discs", discs, cost=45),
+    VerificationCase("Hertz", hertz, fast=False, cost=120),
 ]

@@ -15,7 +15,8 @@ from mpm.output.energy import unbooked
 from mpm.output.record import ForceRecord
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
 from mpm.shapes import Shape
-from studies.verification.case import Case, How, Row
+from studies.verification.case import SuiteOptions, VerificationCase
+from studies.verification.result import Comparison
 
 THIN = Knife("thin", 0.2e-3, math.radians(1.0), 0.05, 0.4)
 WEDGE = Knife("wedge", 2e-3, math.radians(11.0), 0.0104, 0.2)
@@ -24,7 +25,7 @@ PRISM = Shape("block", 0.03, 0.024, 0.024)
 
 
 def cut(
-    how: How,
+    options: SuiteOptions,
     *,
     knife: Knife = THIN,
     shape: Shape = PRISM,
@@ -38,7 +39,7 @@ def cut(
     scene = Scene(
         Food(shape, material), knife, motion or Motion(0.018, 0.01), Board(board), edge=EdgeLaw(zone=3e-3), numerics=num
     )
-    return how.simulate(scene)
+    return options.simulate(scene)
 
 
 def _plateau(record: ForceRecord, low: float = 8e-3, high: float = 16e-3) -> float:
@@ -51,13 +52,13 @@ def _unbooked(record: ForceRecord) -> float:
     return math.nan if part is None else part
 
 
-def resistance(how: How) -> Iterator[Row]:
+def resistance(options: SuiteOptions) -> Iterator[Comparison]:
     """A thin blade without friction needs R times the width, and nothing of the stiffness."""
-    base = cut(how)
+    base = cut(options)
     source = "F = R w (Atkins 2009)"
-    yield Row("thin blade", "force on the plateau [N]", FLESH.R * PRISM.width, _plateau(base), 0.03, source)
-    wide = cut(how, shape=replace(PRISM, width=0.048))
-    yield Row(
+    yield Comparison("thin blade", "force on the plateau [N]", FLESH.R * PRISM.width, _plateau(base), 0.03, source)
+    wide = cut(options, shape=replace(PRISM, width=0.048))
+    yield Comparison(
         "thin blade, twice the width",
         "force over that of the single width [-]",
         2.0,
@@ -65,8 +66,8 @@ def resistance(how: How) -> Iterator[Row]:
         0.02,
         source,
     )
-    stiff = cut(how, material=replace(FLESH, E=4e6, yield_stress=8e5))
-    yield Row(
+    stiff = cut(options, material=replace(FLESH, E=4e6, yield_stress=8e5))
+    yield Comparison(
         "thin blade, four times the stiffness",
         "force over that of the soft food [-]",
         1.0,
@@ -76,8 +77,8 @@ def resistance(how: How) -> Iterator[Row]:
     )
     deep = [int(np.searchsorted(base.stroke, at)) for at in (8e-3, 16e-3)]
     parted, area = float(np.diff(base.parting[deep])[0]), PRISM.width * float(np.diff(base.stroke[deep])[0])
-    yield Row("thin blade", "energy of parting over the new area [J/m^2]", FLESH.R, parted / area, 0.01, "R")
-    yield Row(
+    yield Comparison("thin blade", "energy of parting over the new area [J/m^2]", FLESH.R, parted / area, 0.01, "R")
+    yield Comparison(
         "thin blade",
         "energy that no law took, of the work [-]",
         0.0,
@@ -86,7 +87,7 @@ def resistance(how: How) -> Iterator[Row]:
         "conservation of energy: a blade this thin opens nothing ahead of its edge",
     )
     balance = float(np.abs(base.residual).max() / base.peak)
-    yield Row(
+    yield Comparison(
         "thin blade, balance",
         "impulse not accounted for over the peak [-]",
         0.0,
@@ -96,29 +97,29 @@ def resistance(how: How) -> Iterator[Row]:
     )
 
 
-def slicing(how: How) -> Iterator[Row]:
+def slicing(options: SuiteOptions) -> Iterator[Comparison]:
     """A slice/push ratio lowers the force down and brings one along the blade."""
     xi = 1.0
     held = Shape("block", 0.03, 0.072, 0.024)
-    record = cut(how, shape=held, motion=Motion(0.018, 0.01, slice_ratio=xi), board=9.0)
+    record = cut(options, shape=held, motion=Motion(0.018, 0.01, slice_ratio=xi), board=9.0)
     on = (record.stroke > 11e-3) & (record.stroke < 16e-3)  # a glued block shears until then
     down, along = float(record.edge[on, 2].mean()), abs(float(record.edge[on, 0].mean()))
     line, source = FLESH.R * held.width, "Atkins, Xu and Jeronimidis 2004"
-    yield Row("slice/push ratio 1", "force down [N]", line / (1 + xi**2), down, 0.05, source)
-    yield Row("slice/push ratio 1", "force along the blade [N]", line * xi / (1 + xi**2), along, 0.05, source)
+    yield Comparison("slice/push ratio 1", "force down [N]", line / (1 + xi**2), down, 0.05, source)
+    yield Comparison("slice/push ratio 1", "force along the blade [N]", line * xi / (1 + xi**2), along, 0.05, source)
 
 
-def invariance(how: How) -> Iterator[Row]:
+def invariance(options: SuiteOptions) -> Iterator[Comparison]:
     """The force of a wedge does not follow where the grid lies, the seed of the particles or the speed."""
     food = replace(FLESH, mu=0.3)
-    changes: tuple[tuple[str, How, dict[str, Any]], ...] = (
-        ("blade shifted by half a cell", how, {"grid_shift": (0.0, 0.5, 0.0)}),
-        ("grid shifted along the blade and upwards", how, {"grid_shift": (0.3, 0.0, 0.4)}),
-        ("other particles", replace(how, seed=how.seed + 1), {}),
+    changes: tuple[tuple[str, SuiteOptions, dict[str, Any]], ...] = (
+        ("blade shifted by half a cell", options, {"grid_shift": (0.0, 0.5, 0.0)}),
+        ("grid shifted along the blade and upwards", options, {"grid_shift": (0.3, 0.0, 0.4)}),
+        ("other particles", replace(options, seed=options.seed + 1), {}),
     )
-    base = cut(how, knife=WEDGE, material=food)
-    finer = cut(how, knife=WEDGE, material=food, dx=2e-3)
-    yield Row(
+    base = cut(options, knife=WEDGE, material=food)
+    finer = cut(options, knife=WEDGE, material=food, dx=2e-3)
+    yield Comparison(
         "wedge with friction",
         "energy lost by the discretisation, of the work [-]",
         0.0,
@@ -126,15 +127,17 @@ def invariance(how: How) -> Iterator[Row]:
         0.02,
         "first-order error of what no law took, from cells of 3 and 2 mm",
     )
-    for name, so, change in changes[:1] if how.quick else changes:
+    for name, so, change in changes[:1] if options.quick else changes:
         other = cut(so, knife=WEDGE, material=food, **change)
-        yield Row(f"wedge, {name}", "work [J]", base.work, other.work, 0.05, "the same cut")
-    if not how.quick:
-        slow = cut(how, knife=WEDGE, material=food, motion=Motion(0.018, 0.005))
-        yield Row("wedge, half the speed", "work [J]", base.work, slow.work, 0.03, "a food without rate dependence")
+        yield Comparison(f"wedge, {name}", "work [J]", base.work, other.work, 0.05, "the same cut")
+    if not options.quick:
+        slow = cut(options, knife=WEDGE, material=food, motion=Motion(0.018, 0.005))
+        yield Comparison(
+            "wedge, half the speed", "work [J]", base.work, slow.work, 0.03, "a food without rate dependence"
+        )
 
 
-def slit(how: How) -> Iterator[Row]:
+def slit(options: SuiteOptions) -> Iterator[Comparison]:
     """A wedge without friction in a slit that leads its edge: the force on the faces, and the energy that the halves release
     where they part, against finite elements.
 
@@ -176,9 +179,9 @@ def slit(how: How) -> Iterator[Row]:
             EdgeLaw(zone=2 * lead),
             Numerics(dx=dx, far=far, gravity=0.0, grid_shift=(0.0, shift, 0.0)),
         )
-        record, want = how.simulate(scene), wanted[length]
+        record, want = options.simulate(scene), wanted[length]
         where = ", blade between planes of nodes" if shift else ""
-        yield Row(
+        yield Comparison(
             f"wedge in a slit, {1e3 * length:g} mm long, dx {1e3 * dx:g} mm{where}",
             "mean force on the faces, 5 to 8.5 mm deep [N]",
             mean(want.stroke, want.force),
@@ -187,7 +190,7 @@ def slit(how: How) -> Iterator[Row]:
             f"finite elements of the same law, {want.unknowns} unknowns",
         )
         if dx < 2 * lead and not shift:
-            yield Row(
+            yield Comparison(
                 f"wedge in a slit, {1e3 * length:g} mm long, dx {1e3 * dx:g} mm",
                 "energy released where the halves part, over the area, 4 to 8.5 mm deep [J/m^2]",
                 rate(want.stroke, want.released),
@@ -198,8 +201,8 @@ def slit(how: How) -> Iterator[Row]:
 
 
 CASES = [
-    Case("cutting resistance", resistance, cost=50),
-    Case("slicing", slicing, fast=False, cost=22),
-    Case("wedge in a slit", slit, fast=False, cost=140),
-    Case("invariance of the cut", invariance, fast=False, cost=25),
+    VerificationCase("cutting resistance", resistance, cost=50),
+    VerificationCase("slicing", slicing, fast=False, cost=22),
+    VerificationCase("wedge in a slit", slit, fast=False, cost=140),
+    VerificationCase("invariance of the cut", invariance, fast=False, cost=25),
 ]

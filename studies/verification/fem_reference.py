@@ -14,7 +14,8 @@ from fem_reference.press import press
 from fem_reference.solid import Solid
 from mpm.material import Material
 from mpm.shapes import Shape
-from studies.verification.case import Case, How, Row
+from studies.verification.case import SuiteOptions, VerificationCase
+from studies.verification.result import Comparison
 
 STEEL = Material(E=210e9, nu=0.3, rho=7800.0)
 SIZE = 0.08  # amplitude of the manufactured displacement on the unit cube [m]
@@ -58,7 +59,7 @@ def manufactured(cells: int, order: int, law: Law) -> tuple[float, float]:
     )
 
 
-def orders(how: How) -> Iterator[Row]:
+def orders(options: SuiteOptions) -> Iterator[Comparison]:
     """Errors on two meshes, for both orders of the elements."""
     law = Corotated(1.0, 1.5)
     for order, (coarse, fine), cap in ((1, (4, 8), 2e-3), (2, (2, 4), 5e-4)):
@@ -69,8 +70,8 @@ def orders(how: How) -> Iterator[Row]:
             (("order of the displacement [-]", order + 1), ("order of its gradient [-]", order))
         ):
             rate = math.log(a[k] / b[k]) / math.log(fine / coarse)
-            yield Row(name, quantity, want, rate, 0.1, source, least=True)
-        yield Row(name, f"error of the displacement on {fine}^3 [m]", 0.0, b[0], cap, source)
+            yield Comparison(name, quantity, want, rate, 0.1, source, least=True)
+        yield Comparison(name, f"error of the displacement on {fine}^3 [m]", 0.0, b[0], cap, source)
 
 
 def _elliptic(thickness: float, layers: int, cells: int) -> Solid:
@@ -103,35 +104,35 @@ def _stress_at_d(solid: Solid, height: float) -> float:
     return float(solid.project(p[1, 1])[at])
 
 
-def nafems(how: How) -> Iterator[Row]:
+def nafems(options: SuiteOptions) -> Iterator[Comparison]:
     """Elliptic membrane under outward pressure, thick plate under normal pressure."""
-    cells = 5 if how.quick else 8
+    cells = 5 if options.quick else 8
     thin = _elliptic(0.05, 1, cells)
     thin.hold(np.flatnonzero(np.abs(thin.nodes[:, 2]) < 1e-9), [2])
     thin.press(surface(thin.mesh, lambda x: _outline(x) > 0.98), -10e6)
     thin.solve()
-    yield Row(
+    yield Comparison(
         "NAFEMS LE1, elliptic membrane", "stress at D [Pa]", 92.7e6, _stress_at_d(thin, 0.0), 0.02, "NAFEMS (1990)"
     )
-    thick = _elliptic(0.6, 2 if how.quick else 4, cells)
+    thick = _elliptic(0.6, 2 if options.quick else 4, cells)
     rim = np.flatnonzero(_outline(thick.nodes.T) > 1 - 1e-6)
     thick.hold(rim, [0, 1])
     thick.hold(rim[np.abs(thick.nodes[rim, 2] - 0.3) < 1e-9], [2])
     thick.press(surface(thick.mesh, lambda x: x[2] > 0.6 - 1e-6), 1e6)
     thick.solve()
-    yield Row(
+    yield Comparison(
         "NAFEMS LE10, thick plate",
         "stress at D [Pa]",
         -5.38e6,
         _stress_at_d(thick, 0.6),
-        0.05 if how.quick else 0.02,
+        0.05 if options.quick else 0.02,
         "NAFEMS (1990)",
     )
 
 
-def beams(how: How) -> Iterator[Row]:
+def beams(options: SuiteOptions) -> Iterator[Comparison]:
     """Cook's tapered panel, and a slender beam bent far."""
-    n = 6 if how.quick else 10
+    n = 6 if options.quick else 10
 
     def place(p: np.ndarray) -> np.ndarray:
         low, high = 44 * p[0] / 48, 44 + 16 * p[0] / 48
@@ -147,7 +148,7 @@ def beams(how: How) -> Iterator[Row]:
     solid.load[nodes, 1] = 0.5 * load * areas / areas.sum()
     solid.solve()
     tip = np.argmin(np.linalg.norm(solid.nodes - [48.0, 52.0, 0.0], axis=1))
-    yield Row(
+    yield Comparison(
         "Cook's membrane",
         "deflection of the end's middle over the load [-]",
         23.96,
@@ -164,7 +165,7 @@ def beams(how: How) -> Iterator[Row]:
     for k in range(1, 6):
         beam.load[nodes, 1] = k / 5 * (depth**4 / 12) / length**2 * areas / areas.sum()
         beam.solve()
-    yield Row(
+    yield Comparison(
         "slender beam, P L^2 / EI = 1",
         "deflection over length [-]",
         0.30172,
@@ -172,7 +173,7 @@ def beams(how: How) -> Iterator[Row]:
         0.005,
         "elastica (Mattiasson 1981)",
     )
-    yield Row(
+    yield Comparison(
         "slender beam, P L^2 / EI = 1",
         "shortening over length [-]",
         0.05643,
@@ -182,14 +183,14 @@ def beams(how: How) -> Iterator[Row]:
     )
 
 
-def hertz(how: How) -> Iterator[Row]:
+def hertz(options: SuiteOptions) -> Iterator[Comparison]:
     """A ball and a cylinder between two plates."""
     ball, food = Shape("sphere", 0.04, 0.04, 0.04), Material(E=1e5, nu=0.35, rho=1000.0)
     way = 0.3e-3  # contact radius over radius 0.09: Hertz holds where that is small
     curve = press(ball, food, [way / 2, way], cells=9, grade=2.0)
     modulus = food.E / (1 - food.nu**2)
     want = 4 / 3 * modulus * math.sqrt(0.02) * (way / 2) ** 1.5
-    yield Row(
+    yield Comparison(
         "ball between plates",
         f"force at {way * 1e3:g} mm [N]",
         want,
@@ -198,7 +199,7 @@ def hertz(how: How) -> Iterator[Row]:
         "Hertz, each contact half the way",
     )
     balance = abs(float(curve.force[-1] - curve.board[-1]))
-    yield Row(
+    yield Comparison(
         "ball between plates", "force of the plate less that on the board [N]", 0.0, balance, 1e-4 * want, "balance"
     )
     # of the contact, of the cylinder: nu = 0, for which plane strain and free ends are the same
@@ -208,7 +209,7 @@ def hertz(how: How) -> Iterator[Row]:
     round_ = Shape("cylinder", 0.002, 2 * radius, 2 * radius)
     soft = replace(food, nu=0.0)
     curve = press(round_, soft, [way / 4, way / 2, 3 * way / 4, way], cells=6, order=2, grade=2.0)
-    yield Row(
+    yield Comparison(
         "cylinder between plates",
         f"force on its length at {way * 1e3:.2g} mm [N/m]",
         line,
@@ -218,7 +219,7 @@ def hertz(how: How) -> Iterator[Row]:
     )
 
 
-def punch(how: How) -> Iterator[Row]:
+def punch(options: SuiteOptions) -> Iterator[Comparison]:
     """A flat punch of half width 1 on a deep block in plane strain that flows: the load at which it sinks in."""
     n, wide, depth, steps = 4, 3.0, 0.03, 6
     food, flow = Material(E=1e3, nu=0.3, rho=1.0), 1.0
@@ -237,13 +238,15 @@ def punch(how: How) -> Iterator[Row]:
         solid.solve()
     got = float(-solid.reaction(under)[2]) / 0.25
     want = (2 + math.pi) / math.sqrt(3) * flow
-    yield Row("flat punch, J2", "mean pressure over yield stress [-]", want, got, 0.05, "Prandtl 1921, plane strain")
+    yield Comparison(
+        "flat punch, J2", "mean pressure over yield stress [-]", want, got, 0.05, "Prandtl 1921, plane strain"
+    )
 
 
 CASES = [
-    Case("finite elements: orders", orders),
-    Case("finite elements: NAFEMS", nafems),
-    Case("finite elements: beams", beams),
-    Case("finite elements: Hertz", hertz, fast=False, cost=120),
-    Case("finite elements: punch", punch, fast=False, cost=140),
+    VerificationCase("finite elements: orders", orders),
+    VerificationCase("finite elements: NAFEMS", nafems),
+    VerificationCase("finite elements: beams", beams),
+    VerificationCase("finite elements: Hertz", hertz, fast=False, cost=120),
+    VerificationCase("finite elements: punch", punch, fast=False, cost=140),
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,26 @@ FAR = 1.0  # distance of what must not touch [m]
 Places = Callable[[np.ndarray], np.ndarray]
 
 
+@dataclass(frozen=True)
+class InitialState:
+    """Where and how fast the particles of a free body begin.
+
+    Attributes:
+        place: Moves the particles before the start, (n, 3) to (n, 3) [m]; they keep to the grid around the shape.
+        velocity: Velocities [m/s], shape (n, 3), of places (n, 3); at rest without it.
+        slope: Velocity gradients [1/s], shape (n, 3, 3), of places; 0 without it.
+        lift: Height above the board [m], at most 1.5 cells.
+    """
+
+    place: Places | None = None
+    velocity: Places | None = None
+    slope: Places | None = None
+    lift: float = 0.0
+
+
+AT_REST = InitialState()
+
+
 class FreeBody:
     """Particles with velocities of their own, free or above the board.
 
@@ -30,11 +51,8 @@ class FreeBody:
         shape: Outline.
         material: Its constants.
         numerics: Grid. ``room`` is all the space beside the body, above it are three cells.
-        place: Moves the particles before the start, (n, 3) to (n, 3) [m]; they keep to the grid around ``shape``.
-        velocity: Velocities [m/s], shape (n, 3), of places (n, 3); at rest without it.
-        slope: Velocity gradients [1/s], shape (n, 3, 3), of places; 0 without it.
+        initial: Where and how fast the particles begin.
         board: Friction on the board [-]; without it there is no board.
-        lift: Height above the board [m], at most 1.5 cells.
         runtime: Device.
 
     Attributes:
@@ -51,14 +69,12 @@ class FreeBody:
         shape: Shape,
         material: Material,
         numerics: Numerics,
+        initial: InitialState = AT_REST,
         *,
-        place: Places | None = None,
-        velocity: Places | None = None,
-        slope: Places | None = None,
         board: float | None = None,
-        lift: float = 0.0,
         runtime: Runtime | None = None,
     ) -> None:
+        place, velocity, slope, lift = initial.place, initial.velocity, initial.slope, initial.lift
         scene = Scene(Food(shape, material), Press(), Motion(shape.height), Board(board or 0.0), numerics=numerics)
         self._simulation = Simulation(scene, runtime or Runtime(threads=1))
         self._k: Any = self._simulation.k

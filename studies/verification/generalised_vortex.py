@@ -18,7 +18,8 @@ import numpy as np
 from mpm.material import Material
 from mpm.scene import Numerics
 from mpm.shapes import Shape
-from studies.verification.case import How
+from studies.verification.case import SuiteOptions
+from studies.verification.free_body import InitialState
 
 INNER, OUTER = 0.75, 1.25  # radii of the ring, in units of its mean radius
 TABLE = 4001  # radii at which the body force is tabulated
@@ -73,11 +74,11 @@ class Vortex:
         return out
 
 
-def errors(how: How, cells: int, *, angle: float = 0.5, swing: float = 0.5) -> tuple[float, float]:
+def errors(options: SuiteOptions, cells: int, *, angle: float = 0.5, swing: float = 0.5) -> tuple[float, float]:
     """Root-mean-square and largest error of place of the ring's particles, over its mean radius [-].
 
     Args:
-        how: Seed and device.
+        options: Seed and device.
         cells: Grid cells across the ring.
         angle: Largest rotation [rad].
         swing: Part of half a swing that is simulated, 0.5 up to the largest rotation.
@@ -99,7 +100,7 @@ def errors(how: How, cells: int, *, angle: float = 0.5, swing: float = 0.5) -> t
         columns = [(velocity(x + d * e) - velocity(x - d * e)) / (2 * d) for e in np.eye(3)]
         return np.stack(columns, axis=2)
 
-    body = how.body(Shape("block", side, side, 4 * dx), material, grid, velocity=velocity, slope=slope)
+    body = options.body(Shape("block", side, side, 4 * dx), material, grid, InitialState(None, velocity, slope))
     steps = math.ceil(swing * span / body.dt)
     body.step(steps, dt=swing * span / steps, pull=lambda t: vortex.force(body.start, t))
     r = np.hypot(body.start[:, 0], body.start[:, 1]) / radius

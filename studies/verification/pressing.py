@@ -13,18 +13,19 @@ from fem_reference.press import press
 from mpm.material import Material
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
 from mpm.shapes import Shape
-from studies.verification.case import Case, How, Row
+from studies.verification.case import SuiteOptions, VerificationCase
+from studies.verification.result import Comparison
 
-FOOD = Material(E=1e5, nu=0.35, rho=1000.0, loss_factor=0.05)
+PRESSED_MATERIAL = Material(E=1e5, nu=0.35, rho=1000.0, loss_factor=0.05)
 """The loss factor takes the ringing out; its part of the force at this speed is below 0.2 %."""
 MACH = 0.003  # speed of the plate over that of the P-wave
-CELLS = (2e-3, 1e-3)
+PRESS_CELLS = (2e-3, 1e-3)
 STICKS = 9.9  # friction with which nothing slides [-]
 WINDOW = 0.12  # part of the last stroke, on either side, over which the particles' force is smoothed
 
 
 @dataclass(frozen=True)
-class Test:
+class PressTest:
     """A press.
 
     Attributes: name; shape; strokes [m]; half_angle of the tool [rad]; bonded, whether it and the board stick; yield_stress
@@ -40,37 +41,37 @@ class Test:
     yield_stress: float = math.inf
     tolerance: float = 0.02
     reference: tuple[tuple[str, Any], ...] = ()
-    sizes: tuple[float, ...] = CELLS
+    sizes: tuple[float, ...] = PRESS_CELLS
     slow: bool = True
     cost: float = 90.0
 
 
-TESTS = (
-    Test(
+PRESS_TESTS = (
+    PressTest(
         "block, sliding", Shape("block", 0.02, 0.02, 0.02), (0.001, 0.002, 0.004), reference=(("cells", 2),), slow=False
     ),
-    Test(
+    PressTest(
         "block, bonded",
         Shape("block", 0.02, 0.02, 0.02),
         (0.001, 0.002, 0.004),
         bonded=True,
         reference=(("cells", 4), ("order", 2)),
     ),
-    Test(
+    PressTest(
         "upright cylinder, bonded",
         Shape("upright_cylinder", 0.024, 0.024, 0.02),
         (0.001, 0.002, 0.004),
         bonded=True,
         reference=(("cells", 4), ("order", 2)),
     ),
-    Test(
+    PressTest(
         "cylinder of 50 x 30 mm to 40 %, sliding",
         Shape("upright_cylinder", 0.05, 0.05, 0.03),
         (0.003, 0.006, 0.009, 0.012),
         reference=(("cells", 3),),
         sizes=(3e-3, 2e-3),
     ),
-    Test(
+    PressTest(
         "cylinder of 50 x 30 mm to 40 %, bonded",
         Shape("upright_cylinder", 0.05, 0.05, 0.03),
         (0.003, 0.006, 0.009, 0.012),
@@ -78,21 +79,21 @@ TESTS = (
         reference=(("cells", 4), ("order", 2)),
         sizes=(3e-3, 2e-3),
     ),
-    Test(
+    PressTest(
         "sphere",
         Shape("sphere", 0.03, 0.03, 0.03),
         (0.004, 0.005, 0.006),  # below, few elements touch: references differ by 2 % at 2 mm and by 5 % at 1.5 mm
         reference=(("cells", 4), ("order", 2), ("grade", 1.2)),
         cost=300.0,
     ),
-    Test(
+    PressTest(
         "lying cylinder",
         Shape("cylinder", 0.016, 0.03, 0.03),
         (0.002, 0.004, 0.006),
         reference=(("cells", 4), ("order", 2), ("grade", 1.2)),
         cost=300.0,
     ),
-    Test(
+    PressTest(
         "wedge of 140 degrees on a block",
         Shape("block", 0.03, 0.016, 0.02),
         (0.002, 0.003, 0.004),  # below, one row of elements is not enough: references differ by 3 % at 1 mm
@@ -100,7 +101,7 @@ TESTS = (
         reference=(("cells", 5), ("order", 2), ("grade", 1.3)),
         cost=300.0,
     ),
-    Test(
+    PressTest(
         "wedge of 140 degrees on a lying cylinder",
         Shape("cylinder", 0.016, 0.03, 0.03),
         (0.002, 0.004, 0.006),
@@ -108,7 +109,7 @@ TESTS = (
         reference=(("cells", 7), ("grade", 1.2)),
         cost=300.0,
     ),
-    Test(
+    PressTest(
         "block, sliding, J2",
         Shape("block", 0.02, 0.02, 0.02),
         (0.001, 0.002, 0.004),
@@ -116,7 +117,7 @@ TESTS = (
         tolerance=0.03,
         reference=(("cells", 2),),
     ),
-    Test(
+    PressTest(
         "block, bonded, J2",
         Shape("block", 0.02, 0.02, 0.02),
         (0.001, 0.002, 0.004),
@@ -128,7 +129,9 @@ TESTS = (
 )
 
 
-def particles(how: How, test: Test, dx: float, *, material: Material = FOOD, mach: float = MACH) -> np.ndarray:
+def particles(
+    options: SuiteOptions, test: PressTest, dx: float, *, material: Material = PRESSED_MATERIAL, mach: float = MACH
+) -> np.ndarray:
     """Force of the particles at the strokes of a test [N], shape (n,)."""
     friction = STICKS if test.bonded else 0.0
     end = test.strokes[-1] * (1 + WINDOW)
@@ -139,7 +142,7 @@ def particles(how: How, test: Test, dx: float, *, material: Material = FOOD, mac
         Board(friction),
         numerics=Numerics(dx=dx, gravity=0.0, output=end / 400),
     )
-    record = how.simulate(scene)
+    record = options.simulate(scene)
     if record.status != "done":
         return np.full(len(test.strokes), math.nan)
     near = WINDOW * test.strokes[-1]
@@ -153,31 +156,31 @@ def _at(stroke: np.ndarray, force: np.ndarray, s: float, near: float) -> float:
     return float(np.polyfit(stroke[on] - s, force[on], 2)[2])
 
 
-def compare(how: How, test: Test, sizes: Sequence[float]) -> Iterator[Row]:
+def compare(options: SuiteOptions, test: PressTest, sizes: Sequence[float]) -> Iterator[Comparison]:
     """Rows of one press: the largest error over the strokes, on each grid."""
-    material = replace(FOOD, yield_stress=test.yield_stress)
+    material = replace(PRESSED_MATERIAL, yield_stress=test.yield_stress)
     # a law with a memory wants small steps; a wedge's first contact is one row of nodes
     strokes = sorted({*test.strokes, *(np.arange(1, 9) / 8 * test.strokes[-1])})
-    options = dict(test.reference)
-    curve = press(test.shape, material, strokes, half_angle=test.half_angle, bonded=test.bonded, **options)
+    of_elements = dict(test.reference)
+    curve = press(test.shape, material, strokes, half_angle=test.half_angle, bonded=test.bonded, **of_elements)
     want = np.interp(test.strokes, curve.stroke, curve.force)
     misses = []
     for dx in sizes:
-        got = particles(how, test, dx)
+        got = particles(options, test, dx)
         k = int(np.argmax(np.abs(got / want - 1))) if np.isfinite(got).all() else 0
         misses.append(float(got[k] / want[k] - 1))
         name = f"{test.name}, dx {dx * 1e3:g} mm"
         source = f"finite elements of the same law, {curve.unknowns} unknowns"
-        yield Row(
+        yield Comparison(
             name, f"force at {test.strokes[k] * 1e3:g} mm [N]", float(want[k]), float(got[k]), test.tolerance, source
         )
 
 
-def _case(test: Test) -> Case:
-    def run(how: How) -> Iterator[Row]:
-        yield from compare(how, test, test.sizes[:1] if how.quick else test.sizes)
+def _case(test: PressTest) -> VerificationCase:
+    def run(options: SuiteOptions) -> Iterator[Comparison]:
+        yield from compare(options, test, test.sizes[:1] if options.quick else test.sizes)
 
-    return Case(f"press: {test.name}", run, fast=not test.slow, cost=test.cost)
+    return VerificationCase(f"press: {test.name}", run, fast=not test.slow, cost=test.cost)
 
 
-CASES = [_case(test) for test in TESTS]
+CASES = [_case(test) for test in PRESS_TESTS]

@@ -34,7 +34,8 @@ from calib.simulation.process_pool import Pool
 from calib.simulation.workers import DIED, Errand, SceneEvaluator, plain
 from calib.trace.conditioning import condition
 from calib.trace.trace import Trace
-from calib.validation.acceptance import balances, changes, judge, limits, remedied
+from calib.uncertainty.estimates import FittedParameter
+from calib.validation.acceptance import Conservation, balances, changes, judge, limits, remedied
 from calib.validation.metrics import compare
 from calib.validation.null_models import null_models
 from calib.validation.numerical_checks import Check, check, check_errands
@@ -245,6 +246,11 @@ def test_elsewhere_moves_the_grid_but_not_the_blades_plane():
     assert len({elsewhere(sliced, k).numerics.grid_shift[0] for k in (1, 2, 3)} - {0.0, 0.5}) == 3
 
 
+def fitted(verdict: str, value: float, low: float | None = None, high: float | None = None) -> FittedParameter:
+    """A fitted parameter with this verdict."""
+    return FittedParameter(value, "-", low, high, 0.1, 10.0, verdict, "assumed", "")
+
+
 def test_verdicts_fail_what_fails():
     """A curve 20 % too strong fails the peak and the curve; a parameter at a bound of ours fails its line
     (no friction is a natural limit); unrun lines decide
@@ -253,9 +259,9 @@ def test_verdicts_fail_what_fails():
     real = 10 * np.sin(np.pi * s / 0.05)
     nulls = {n: m.metrics for n, m in null_models(s, real).items()}
     parameters = {
-        "E": {"verdict": "at_bound", "value": 1e4, "low95": 1e4, "high95": 2e4},
-        "mu": {"verdict": "at_bound", "value": 0.004, "low95": 0.0, "high95": 0.6},
-        "R": {"verdict": "identified", "value": 300.0},
+        "E": fitted("at_bound", 1e4, 1e4, 2e4),
+        "mu": fitted("at_bound", 0.004, 0.0, 0.6),
+        "R": fitted("identified", 300.0),
     }
     checks = [
         Check("slower", None, 0.01, -0.06),
@@ -263,10 +269,9 @@ def test_verdicts_fail_what_fails():
         Check("broken", "inverted", None, None),
         Check("cells of two thirds", None, 0.01, 0.01, -0.03),
     ]
-    judged = partial(
-        judge, compare(s, real, 1.2 * real), nulls, momentum_residual=0.02, ke_over_ie=0.2, parted=0.7, checks=checks
-    )
-    lines = judged(parameters=parameters)
+    kept = Conservation(momentum_residual=0.02, ke_over_ie=0.2, parted=0.7)
+    judged = partial(judge, compare(s, real, 1.2 * real), nulls, conservation=kept, checks=checks)
+    lines = judged(fitted=parameters)
     failed = {v.name for v in lines if v.passed is False}
     assert failed == {
         "peak force error",
@@ -293,8 +298,8 @@ def test_verdicts_fail_what_fails():
     assert sum(v.passed is None for v in lines) == 3
     bounds = next(v for v in lines if v.name == "parameters at a bound")
     assert bounds.value == 1 and "mu at its natural limit" in bounds.note
-    most = {"mu": {"verdict": "at_bound", "value": 1.19, "low95": 0.0, "high95": 1.2}}
-    assert [v.note for v in judged(parameters=most) if v.name == bounds.name] == ["mu"]
+    most = {"mu": fitted("at_bound", 1.19, 0.0, 1.2)}
+    assert [v.note for v in judged(fitted=most) if v.name == bounds.name] == ["mu"]
     fracture = {"edge_J_m2": 97.0, "released_J_m2": 52.0}
     said = limits("measured", "speed", "constant", lines, parameters, ["the width is assumed"], fracture)
     for word in (
@@ -309,7 +314,7 @@ def test_verdicts_fail_what_fails():
     small = limits("measured", "speed", "constant", lines, parameters, [], {"edge_J_m2": 97.0, "released_J_m2": 9.0})
     assert not any("J/m²" in text for text in small)
     assert not any("Weak intervals" in text for text in small)
-    shaky = parameters | {"yield_stress": {**next(iter(parameters.values())), "verdict": "weak"}}
+    shaky = parameters | {"yield_stress": fitted("weak", 1e4, 1e4, 2e4)}
     told = limits("measured", "speed", "constant", lines, shaky, [])
     assert any("Weak intervals" in text and "for yield_stress" in text and "for R" not in text for text in told)
 

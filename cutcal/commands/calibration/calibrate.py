@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from calib.io.progress import ProgressBar
 from calib.problem.request import Request
 from calib.problem.target import ErrorModel
-from calib.validation.acceptance import Verdict, remedied
+from calib.validation.acceptance import remedied
 from cutcal.commands.calibration.describe import description
 from cutcal.options import (
     RESUME_HELP,
@@ -31,6 +31,7 @@ from cutcal.options import (
 from mpm.errors import CutcalError
 
 if TYPE_CHECKING:
+    from calib.calibration.result import CalibrationResult
     from calib.multi_specimen.result import HeldOutCut, InSampleCut, StudyResult
 
 HELP = "fit a food to a measured knife-force trace, and report"
@@ -139,6 +140,7 @@ def measured(args: argparse.Namespace, command: Sequence[str]) -> Request:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate; prints the verdict, or the summary as JSON."""
+    from calib.calibration.result import to_document
     from calib.calibration.run import run as calibrate
 
     command = ["calibrate", *(a for a in sys.argv[1:] if a != "calibrate")]
@@ -154,12 +156,12 @@ def run(args: argparse.Namespace) -> int:
     out = Path(args.out or f"cutcal-{request.food.name}-{request.stem}")
 
     with workers_of(args, note) as pool, ProgressBar() as bar:
-        summary = calibrate(request, out, pool, resume=args.resume, progress=bar, say=note)
+        result = calibrate(request, out, pool, resume=args.resume, progress=bar, say=note)
     if args.json:
-        print_json(summary)
+        print_json(to_document(result))
     else:
-        print(verdict_text(summary, out))
-    return 0 if summary["passed"] else 2
+        print(verdict_text(result))
+    return 0 if result.passed else 2
 
 
 def run_study(args: argparse.Namespace, command: Sequence[str]) -> int:
@@ -209,23 +211,24 @@ def study_text(result: StudyResult, out: Path) -> str:
     return "\n".join([head, *lines, f"  wrote {out}"])
 
 
-def verdict_text(summary: dict[str, Any], out: Path) -> str:
+def verdict_text(result: CalibrationResult) -> str:
     """What the terminal shows at the end."""
     lines = []
-    for v in summary["verdicts"]:
-        mark = {True: "pass", False: "FAIL", None: "not run"}[v["passed"]]
-        value = "" if v["value"] is None else f"{v['value']:.3g}"
-        limit = "" if v["limit"] is None else f"limit {v['limit']:.3g}"
-        lines.append(f"  {mark:8s}{v['name']:42s}{value:>10s}  {limit}")
-        remedy = remedied(Verdict(**v))
+    for v in result.verdicts:
+        mark = {True: "pass", False: "FAIL", None: "not run"}[v.passed]
+        value = "" if v.value is None else f"{v.value:.3g}"
+        limit = "" if v.limit is None else f"limit {v.limit:.3g}"
+        lines.append(f"  {mark:8s}{v.name:42s}{value:>10s}  {limit}")
+        remedy = remedied(v)
         lines += [f"  {'':8s}{remedy}"] if remedy else []
     lines.append(f"  {'fitted':8s}{'95 % interval':>42s}")
-    for name, p in summary["parameters"].items():
-        interval = "" if p["low95"] is None else f"{p['low95']:.3g} to {p['high95']:.3g}"
-        lines.append(f"  {'':8s}{name:18s}{p['value']:>10.4g} {p['unit']:6s}{interval:>24s}  {p['verdict']}")
-    state = "interrupted" if summary["status"] == "interrupted" else "passed" if summary["passed"] else "not passed"
+    for name, p in result.fitted.items():
+        interval = "" if p.low95 is None else f"{p.low95:.3g} to {p.high95:.3g}"
+        lines.append(f"  {'':8s}{name:18s}{p.value:>10.4g} {p.unit:6s}{interval:>24s}  {p.verdict}")
+    state = "interrupted" if result.status == "interrupted" else "passed" if result.passed else "not passed"
+    peak, real = result.agreement.peak_sim_N, result.agreement.peak_real_N
     head = (
-        f"{summary['food']}: {state}; peak {summary['peak_sim_N']:.2f} N against {summary['peak_real_N']:.2f} N "
-        f"({summary['trace']['label']}), {summary['simulations']} simulations in {summary['wall_s']:.0f} s"
+        f"{result.food}: {state}; peak {peak:.2f} N against {real:.2f} N ({result.trace.label}), "
+        f"{result.history.simulations} simulations in {result.wall_s:.0f} s"
     )
-    return "\n".join([head, *lines, f"  wrote {out}"])
+    return "\n".join([head, *lines, f"  wrote {result.folder}"])

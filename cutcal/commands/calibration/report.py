@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from calib.io.schema import tag
@@ -38,8 +39,13 @@ def writer(folder: Path) -> Callable[[Path], Path]:
     Raises:
         ReportError: The folder is missing, or holds no finished run.
     """
-    from reports import bench, convergence, stability, study, verification
-    from reports.calibration import report
+    from calib.calibration import result as calibration
+    from calib.material.properties import MEANINGS
+    from reports import study
+    from studies.convergence import result as convergence
+    from studies.speed import result as bench
+    from studies.stability import result as stability
+    from studies.verification import result as verification
 
     found: dict[str, Callable[[Path], Path]] = {
         "converge.json": convergence.write_report,
@@ -56,4 +62,4 @@ def writer(folder: Path) -> Callable[[Path], Path]:
     if not summary.exists():
         names = ", ".join(("summary.json", *found))
         raise ReportError(f"{folder}: holds none of {names}; give the --out of a finished run")
-    return study.write_report if study.is_study(summary) else report.write_report
+    return partial(study.write_report, meanings=MEANINGS) if study.is_study(summary) else calibration.write_report

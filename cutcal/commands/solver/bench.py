@@ -6,17 +6,22 @@ import argparse
 import shutil
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from calib.errors import CurveError
+from calib.io.typed_document import to_document
 from calib.material.food import load_food
 from cutcal.options import (
     KNIFE_HELP,
     add_run,
     number,
     print_json,
+    say,
     whole,
 )
+
+if TYPE_CHECKING:
+    from studies.speed.result import BenchmarkResult, CutErrors, PeerResult
 
 HELP = "run time against error on this machine"
 DESCRIPTION = """Measure on this machine: the rate of the kernels beside that of a textbook
@@ -59,58 +64,64 @@ def add_args(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Measure; prints a table, or bench.json."""
     from mpm.runtime import Runtime
-    from studies.speed.study import run as study
+    from studies.speed.benchmark import BenchmarkSettings, run_benchmark
 
     if args.peers is not None and shutil.which(args.peers) is None:
         raise CurveError(f"--peers {args.peers}: no such program; give the Python of an environment with the peers")
     out = Path(args.out or f"cutcal-bench-{args.food}")
-    document = study(
+    settings = BenchmarkSettings(
         load_food(args.food),
         args.knife,
-        out,
         runtime=Runtime(args.arch, args.threads),
         repeats=args.repeats,
         finest=args.reference_dx,
         seed=args.seed,
-        say=lambda text: print(text, file=sys.stderr, flush=True),
         peers=args.peers,
-        command=["bench", *(a for a in sys.argv[1:] if a != "bench")],
+        command=("bench", *(a for a in sys.argv[1:] if a != "bench")),
     )
+    result = run_benchmark(settings, out, say)
     if args.json:
-        print_json(document)
+        print_json(to_document(result))
     else:
-        print(table(document))
+        print(table(result))
         print(f"  wrote {out}")
     return 0
 
 
-def table(document: dict[str, Any]) -> str:
+def table(result: BenchmarkResult) -> str:
     """What the terminal shows at the end."""
-    t, d = document["throughput"], document["default_cut"]
-    lines = [
-        f"{document['food']} on {document['device']}, up to {document['threads']} threads",
-        f"  {t['full_physics_Mps']:.2f} million particle steps a second, {t['ratio']:.1f} times the textbook kernel; "
-        f"{t['single_Mps']:.2f} in single precision, {t['cut_Mps']:.2f} inside the cut",
-        f"  default cut {d['wall_s']:.2f} s, 1/{document['ratio_to_paper']:.0f} of the published configuration",
-        f"  {'':50s}{'time':>7s}{'peak':>8s}{'work':>8s}{'NRMSE':>8s}",
-        _line("default", {"time_ratio": 1.0, **d}),
-    ]
-    lines += [_line(row["name"], row) for row in document["ablations"]]
-    p = document["processes"]
-    lines.append(
-        f"  {p['processes']} processes do {p['speed_up']:.2f} times the cuts of one, {p['cut_Mps']:.2f} million a second; "
-        f"a further one starts in {p['start_up_s']:.2f} s"
-    )
-    lines += [
-        f"  elastic block: {row['ratio']:.1f} times {row['name']} {row['version']} ({row['Mps']:.2f} million a second)"
-        if "ratio" in row
-        else f"  elastic block in {row['name']}: not measured, {row['error']}"
-        for row in document["peers"]
-    ]
-    return "\n".join([*lines, f"  time grows with particles times steps to the power {document['exponent']:.2f}"])
+    t, cut, p = result.throughput, result.default_cut, result.processes
+    lines = [f"{result.food} on {result.device}, up to {result.threads} threads"]
+    if t is not None:
+        lines.append(
+            f"  {t.full_physics_Mps:.2f} million particle steps a second, {t.ratio:.1f} times the textbook kernel; "
+            f"{t.single_Mps:.2f} in single precision, {t.cut_Mps:.2f} inside the cut"
+        )
+    if cut is not None:
+        lines += [
+            f"  default cut {cut.wall_s:.2f} s, 1/{result.ratio_to_paper:.0f} of the published configuration",
+            f"  {'':50s}{'time':>7s}{'peak':>8s}{'work':>8s}{'NRMSE':>8s}",
+            _line("default", 1.0, cut.errors),
+        ]
+    lines += [_line(row.name, row.time_ratio, row.errors) for row in result.ablations or ()]
+    if p is not None:
+        lines.append(
+            f"  {p.processes} processes do {p.speed_up:.2f} times the cuts of one, {p.cut_Mps:.2f} million a second; "
+            f"a further one starts in {p.start_up_s:.2f} s"
+        )
+    lines += [_peer_line(peer) for peer in result.peers]
+    if result.exponent is not None:
+        lines.append(f"  time grows with particles times steps to the power {result.exponent:.2f}")
+    return "\n".join(lines)
 
 
-def _line(name: str, row: dict[str, Any]) -> str:
-    if "nrmse" not in row:
-        return f"  {name:50s}{row['time_ratio']:7.2f}   (another food)"
-    return f"  {name:50s}{row['time_ratio']:7.2f}{row['peak_error']:+8.1%}{row['work_error']:+8.1%}{row['nrmse']:8.3f}"
+def _line(name: str, time_ratio: float, errors: CutErrors | None) -> str:
+    if errors is None:
+        return f"  {name:50s}{time_ratio:7.2f}   (another food)"
+    return f"  {name:50s}{time_ratio:7.2f}{errors.peak_error:+8.1%}{errors.work_error:+8.1%}{errors.nrmse:8.3f}"
+
+
+def _peer_line(peer: PeerResult) -> str:
+    if peer.error is not None:
+        return f"  elastic block in {peer.name}: not measured, {peer.error}"
+    return f"  elastic block: {peer.ratio:.1f} times {peer.name} {peer.version} ({peer.Mps:.2f} million a second)"

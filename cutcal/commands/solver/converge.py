@@ -6,8 +6,9 @@ import argparse
 import math
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
+from calib.io.typed_document import to_document
 from calib.material.knife import load_knife
 from calib.material.scene import cut_scene, specimen
 from cutcal.options import (
@@ -27,6 +28,9 @@ from cutcal.options import (
     workers_of,
 )
 
+if TYPE_CHECKING:
+    from studies.convergence.result import ConvergenceResult, RunResult
+
 HELP = "repeat a cut on finer grids: order, numerical uncertainty"
 DESCRIPTION = """Repeat one cut on finer grids, and apart from that with other time steps,
 speeds and particles. Writes converge.json, curves.csv (with the standard
@@ -40,7 +44,7 @@ EPILOG = """examples:
 Ctrl-C keeps what was computed; the same command with --resume goes on.
 Exit codes: 0 converged (work within 2 %, peak within 3 % between the two
 finest grids), 1 error in input or run, 2 ran but did not converge."""
-WORDS = {"safety": "time step", "mach": "speed", "ppc": "particles", "offset": "offset", "repeat": "repeats"}
+AXIS_NAMES = {"safety": "time step", "mach": "speed", "ppc": "particles", "offset": "offset", "repeat": "repeats"}
 REFINED = (1.0, 2 / 3, 1 / 2, 1 / 3)  # default cells over the scene's own one, which comes first
 
 
@@ -84,7 +88,8 @@ def add_args(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the study; prints its table, or converge.json."""
-    from studies.convergence.study import run as study
+    from studies.convergence.plan import CutDescription, RefinementPlan
+    from studies.convergence.refinement import refine
 
     food, knife = food_of(args), load_knife(args.knife)
     shape, assumed = specimen(food, None, sizing_of(args))
@@ -93,58 +98,56 @@ def run(args: argparse.Namespace) -> int:
     zone, cell = default.edge.zone, default.numerics.dx
     if scene.edge.zone > zone:
         assumed.append(
-            f"the coarsest cell is larger than three quarters of the process zone of {zone * 1e3:g} mm, so all grids have one of "
-            f"{scene.edge.zone * 1e3:.3g} mm: this is not the cut of the other commands; start from {cell * 1e3:g} mm or less"
+            f"the coarsest cell is larger than three quarters of the process zone of {zone * 1e3:g} mm, so all grids "
+            f"have one of {scene.edge.zone * 1e3:.3g} mm: this is not the cut of the other commands; start from "
+            f"{cell * 1e3:g} mm or less"
         )
     axes = {"dx": args.dx or tuple(math.floor(scene.numerics.dx * part * 1e7 + 1e-3) / 1e7 for part in REFINED)}
     axes |= {name: getattr(args, name) for name in ("safety", "mach", "ppc", "offset") if getattr(args, name)}
     out = Path(args.out or f"cutcal-converge-{food.name}")
-    about = {
-        "food": food.name,
-        "knife": knife.name,
-        "shape": vars(shape),
-        "command": ["converge", *(a for a in sys.argv[1:] if a != "converge")],
-        "warnings": [*food.warnings(), *assumed],
-    }
+    command = ("converge", *(a for a in sys.argv[1:] if a != "converge"))
+    cut = CutDescription(food.name, knife.name, shape, command, (*food.warnings(), *assumed))
 
-    for text in about["warnings"]:
+    for text in cut.warnings:
         say(f"note: {text}")
     with workers_of(args, say) as pool:
-        document = study(scene, axes, out, pool, about=about, repeats=args.repeats, resume=args.resume, say=say)
+        result = refine(RefinementPlan(scene, axes, args.repeats), cut, out, pool, resume=args.resume, say=say)
     if args.json:
-        print_json(document)
+        print_json(to_document(result))
     else:
-        print(table(document))
+        print(table(result))
         print(f"  wrote {out}")
-    return 0 if document["converged"] else 2
+    return 0 if result.converged else 2
 
 
-def table(document: dict[str, Any]) -> str:
+def table(result: ConvergenceResult) -> str:
     """What the terminal shows at the end."""
     lines = [f"  {'dx [mm]':>8s}{'peak [N]':>10s}{'work [J]':>10s}{'particles':>11s}{'steps':>8s}{'time [s]':>10s}"]
-    for g in document["grids"]:
-        if g["status"] == "ok":
-            numbers = f"{g['peak_N']:10.3f}{g['work_J']:10.4f}{g['particles']:11.0f}{g['steps']:8.0f}"
-            lines.append(f"  {g['dx_m'] * 1e3:8.3g}{numbers}{g['wall_s']:10.1f}")
-        else:
-            lines.append(f"  {g['dx_m'] * 1e3:8.3g}  broke down: {g['reason']}")
-    for name in ("work", "peak"):
-        e = document[name]
-        order = "-" if e["order"] is None else f"{e['order']:.2f}"
+    lines += [_grid_line(grid) for grid in result.grids]
+    for name, estimate in (("work", result.work), ("peak", result.peak)):
+        order = "-" if estimate.order is None else f"{estimate.order:.2f}"
         lines.append(
-            f"  {name}: {e['verdict']}, order {order}, {e['change']:+.2%} between the two finest, uncertainty "
-            f"{e['uncertainty']:.2%}, GCI {e['gci']:.2%}, of the coarsest grid {e['gci_coarsest']:.2%}"
+            f"  {name}: {estimate.verdict}, order {order}, {estimate.change:+.2%} between the two finest, uncertainty "
+            f"{estimate.uncertainty:.2%}, GCI {estimate.gci:.2%}, of the coarsest grid {estimate.gci_coarsest:.2%}"
         )
     lines.append(
-        f"  curve: GCI {document['gci_curve_median']:.2%} of the peak (median), {document['gci_curve_max']:.2%} (largest)"
+        f"  curve: GCI {result.gci_curve_median:.2%} of the peak (median), {result.gci_curve_max:.2%} (largest)"
     )
-    for axis, words in WORDS.items():
-        if document[axis] is not None and "spread_work" in document[axis]:
-            spread = document[axis]
-            slope = f", log-log slope of the peak {spread['slope_peak']:+.3f}" if axis == "mach" else ""
+    for name, words in AXIS_NAMES.items():
+        axis = result.axis(name)
+        if axis is not None:
+            slope = f", log-log slope of the peak {axis.slope_peak:+.3f}" if axis.slope_peak is not None else ""
             lines.append(
-                f"  {words}: work within {spread['spread_work']:.2%}, peak within {spread['spread_peak']:.2%} of the mean"
-                + slope
+                f"  {words}: work within {axis.spread_work:.2%}, peak within {axis.spread_peak:.2%} of the mean{slope}"
             )
-    head = f"{document['food']}: {'converged' if document['converged'] else 'not converged'}"
+    head = f"{result.food}: {'converged' if result.converged else 'not converged'}"
     return "\n".join([head, *lines])
+
+
+def _grid_line(grid: RunResult) -> str:
+    """The run on one grid."""
+    cell = f"  {(grid.dx_m or math.nan) * 1e3:8.3g}"
+    if not grid.ok:
+        return f"{cell}  broke down: {grid.reason}"
+    numbers = f"{grid.peak_N:10.3f}{grid.work_J:10.4f}{grid.particles:11.0f}{grid.steps:8.0f}"
+    return f"{cell}{numbers}{grid.wall_s:10.1f}"

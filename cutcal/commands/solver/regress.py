@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from collections import Counter
-from collections.abc import Mapping, Sequence
+import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from calib.errors import RegressionError
-from calib.io.schema import tag
+from calib.io.typed_document import to_document
 from calib.material.food import load_food, load_foods
 from calib.material.knife import load_knife
 from cutcal.options import RUN, add_arch, add_json, add_workers, print_json, say, titled, workers_of
 from mpm.scene import CONTACTS
+
+if TYPE_CHECKING:
+    from studies.regression.result import CutComparison, NumberChange, RegressionResult
 
 HELP = "are cuts still those that were recorded, or what changed?"
 DESCRIPTION = """Simulate the default cut of each food, with each kind of contact, on a coarse
@@ -48,132 +50,108 @@ def add_args(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Compare or record; prints the table, or regress.json."""
     from calib.io.folder import prepare
-    from studies.regression.baseline import KNIFE, cases
+    from studies.regression.baseline import RECORDED_KNIFE, baseline_cuts
     from studies.regression.reference_curves import References
-    from studies.regression.study import check, update
+    from studies.regression.result import write_result
+    from studies.regression.suite import compare_with_references, record_changes, regression_result
 
     if args.update and args.arch != "cpu":
         raise RegressionError(
             f"--update --arch {args.arch}: references are recorded on the processor; leave --arch out"
         )
-    known, knife = load_foods(), load_knife(KNIFE)
+    known, knife = load_foods(), load_knife(RECORDED_KNIFE)
     foods = [known[name] if name in known else load_food(name) for name in dict.fromkeys(args.names)] or list(
         known.values()
     )
-    todo = cases(foods, knife, CONTACTS if args.contact is None else (args.contact,))
+    todo = baseline_cuts(foods, knife, CONTACTS if args.contact is None else (args.contact,))
     references = References()
     if args.out is not None:
         prepare(Path(args.out), resume=False)
     with workers_of(args, say) as pool:
         if args.update:
-            order = [case.name for food in known.values() for case in cases([food], knife)]
-            rows = update(todo, references, pool, say, order)
+            order = [cut.name for food in known.values() for cut in baseline_cuts([food], knife)]
+            found = record_changes(todo, references, pool, say, order)
         else:
-            rows = check(todo, references, pool, say)
-    document = document_of(rows, args)
+            found = compare_with_references(todo, references, pool, say)
+    result = regression_result(found, args.arch, update=args.update)
     if args.out is not None:
-        write(Path(args.out), rows, document)
+        write_result(result, Path(args.out))
     if args.json:
-        print_json(document)
+        print_json(to_document(result))
     else:
-        print(table(rows, recording=args.update))
+        print(table(result))
         if args.out is not None:
             print(f"wrote {args.out}")
-    return 0 if document["passed"] else 2
+    return 0 if result.passed else 2
 
 
-def document_of(rows: Sequence[Mapping[str, Any]], args: argparse.Namespace) -> dict[str, Any]:
-    """regress.json: every case, how many of each verdict, and whether all passed."""
-    from calib.io.provenance import git_commit, versions
-
-    bad = {"broke down"} if args.update else {"broke down", "outside"}
-    return {
-        "schema": tag("regress"),
-        "passed": not any(row["verdict"] in bad for row in rows),
-        "update": args.update,
-        "counts": dict(Counter(row["verdict"] for row in rows)),
-        "cases": [{key: value for key, value in row.items() if key != "columns"} for row in rows],
-        "device": args.arch,
-        "versions": versions(),
-        "git": git_commit(),
-    }
-
-
-def write(out: Path, rows: Sequence[Mapping[str, Any]], document: dict[str, Any]) -> None:
-    """The document, and the curves of the cuts that reached their end, in the layout of the references."""
-    from calib.io.folder import write_csv, write_json
-    from studies.regression.reference_curves import DIGITS
-
-    for row in rows:
-        if row["columns"] is not None:
-            write_csv(out / f"{row['food']}-{row['contact']}.csv", row["columns"], digits=DIGITS)
-    write_json(out / "regress.json", document)
-
-
-def table(rows: Sequence[Mapping[str, Any]], *, recording: bool = False) -> str:
-    """What the terminal shows at the end: a line for each case, and what to argue over where it is not the same."""
-    from studies.regression.study import VERDICTS
+def table(result: RegressionResult) -> str:
+    """What the terminal shows at the end: a line for each cut, and what to argue over where it is not the same."""
+    from studies.regression.result import VERDICT_MEANINGS
 
     head = WIDTHS.format(
         "food", "contact", "peak [N]", "change", "moved", "work", "shape", "NRMSE", "largest deviation", "verdict"
     )
-    lines = [head.rstrip(), *(line(row, recording) for row in rows)]
-    for row in rows:
-        if row["verdict"] in ("within", "outside") and (recording is False or row["recorded"]):
-            lines += ["", *argument(row)]
-    counts = Counter(row["verdict"] for row in rows)
-    said = ", ".join(f"{count} {verdict} ({VERDICTS[verdict]})" for verdict, count in counts.items())
-    lines += ["", f"{len(rows)} {'cut' if len(rows) == 1 else 'cuts'}: {said}"]
-    if recording:
-        written = sum(row["recorded"] for row in rows)
-        lines.append(f"{written} recorded, {len(rows) - written} kept as they were")
+    cuts = result.cases
+    lines = [head.rstrip(), *(line(one, result.update) for one in cuts)]
+    for one in cuts:
+        if one.verdict in ("within", "outside") and (not result.update or one.recorded):
+            lines += ["", *argument(one)]
+    said = ", ".join(f"{count} {verdict} ({VERDICT_MEANINGS[verdict]})" for verdict, count in result.counts.items())
+    lines += ["", f"{len(cuts)} {'cut' if len(cuts) == 1 else 'cuts'}: {said}"]
+    if result.update:
+        written = sum(one.recorded for one in cuts)
+        lines.append(f"{written} recorded, {len(cuts) - written} kept as they were")
     return "\n".join(lines)
 
 
-def line(row: Mapping[str, Any], recording: bool = False) -> str:
-    """One case in the table."""
-    verdict = "OUTSIDE" if row["verdict"] == "outside" else row["verdict"]
-    verdict += f": {row['reason']}" if row["reason"] else ""
+def line(one: CutComparison, recording: bool = False) -> str:
+    """One cut in the table."""
+    verdict = "OUTSIDE" if one.verdict == "outside" else one.verdict
+    verdict += f": {one.reason}" if one.reason else ""
     if recording:
-        verdict += ", recorded" if row["recorded"] else ", kept"
+        verdict += ", recorded" if one.recorded else ", kept"
     cells = ["-"] * 7
-    if "largest" in row:
-        peak, where, work = (row["results"][name] for name in ("peak_N", "peak_stroke_m", "work_J"))
-        far = row["largest"]
-        cells = [
-            f"{peak['now']:.4g}",
-            percent(peak),
-            f"{signed(where['change'] * 1e3, 1)} mm",
-            percent(work),
-            *("-" if row[name] is None else f"{row[name]:.4f}" for name in ("shape_error", "nrmse")),
-            f"{far['over_tolerance']:.2f} of {far['column']}'s tolerance",
+    if one.results is not None:
+        cells[0] = f"{one.results.peak_N.now:.4g}"
+    if one.results is not None and one.largest is not None:
+        far = one.largest
+        cells[1:] = [
+            percent(one.results.peak_N),
+            f"{signed((one.results.peak_stroke_m.change or 0.0) * 1e3, 1)} mm",
+            percent(one.results.work_J),
+            *("-" if x is None or math.isnan(x) else f"{x:.4f}" for x in (one.shape_error, one.nrmse)),
+            f"{far.over_tolerance:.2f} of {far.column}'s tolerance",
         ]
-    elif "results" in row:
-        cells[0] = f"{row['results']['peak_N']['now']:.4g}"
-    return WIDTHS.format(row["food"], row["contact"], *cells, verdict)
+    return WIDTHS.format(one.food, one.contact, *cells, verdict)
 
 
-def argument(row: Mapping[str, Any]) -> list[str]:
+def argument(one: CutComparison) -> list[str]:
     """Why a reviewer should look: each change beside what another seed changes, and what else is another than it was."""
-    peak, where, work = (row["results"][name] for name in ("peak_N", "peak_stroke_m", "work_J"))
-    far, moved, shape = row["largest"], round(where["change"] * 1e3, 1), row["shape_error"]
+    far, results, shape = one.largest, one.results, one.shape_error
+    if far is None or results is None:
+        return []
+    peak, work, moved = results.peak_N, results.work_J, round((results.peak_stroke_m.change or 0.0) * 1e3, 1)
     when = f"reached {abs(moved)} mm {'later' if moved > 0 else 'earlier'}" if moved else "at the same place"
-    form = "no force to compare the shape of" if shape is None else f"shape error {shape:.4f}"
-    unit = far["column"].rpartition("_")[2]
-    because = "; ".join(row["because"]) or "nothing that a record knows of (food, knife, scene, solver, libraries)"
+    without = shape is None or math.isnan(shape)
+    form = "no force to compare the shape of" if without else f"shape error {shape:.4f}"
+    unit = far.column.rpartition("_")[2]
+    because = "; ".join(one.because) or "nothing that a record knows of (food, knife, scene, solver, libraries)"
     return [
-        f"{row['food']}, {row['contact']}:",
-        f"  peak {peak['before']:.4g} -> {peak['now']:.4g} N ({percent(peak)}, {seeds(peak)}), {when}",
-        f"  work {work['before']:.4g} -> {work['now']:.4g} J ({percent(work)}, {seeds(work)})",
-        f"  {form}; furthest away is {far['column']}, by {far['difference']:.3g} {unit} at {far['stroke_m'] * 1e3:.1f} mm, "
-        f"{far['over_tolerance']:.1f} of its tolerance",
+        f"{one.food}, {one.contact}:",
+        f"  peak {peak.before:.4g} -> {peak.now:.4g} N ({percent(peak)}, {seeds(peak)}), {when}",
+        f"  work {work.before:.4g} -> {work.now:.4g} J ({percent(work)}, {seeds(work)})",
+        f"  {form}; furthest away is {far.column}, by {far.difference:.3g} {unit} at {far.stroke_m * 1e3:.1f} mm, "
+        f"{far.over_tolerance:.1f} of its tolerance",
         f"  changed since it was recorded: {because}",
     ]
 
 
-def percent(number: Mapping[str, float]) -> str:
+def percent(number: NumberChange) -> str:
     """A change as a part of what was before."""
-    return f"{signed(100 * number['change'] / number['before'], 1)} %" if number["before"] else "-"
+    if not number.before or number.change is None:
+        return "-"
+    return f"{signed(100 * number.change / number.before, 1)} %"
 
 
 def signed(x: float, digits: int) -> str:
@@ -181,6 +159,6 @@ def signed(x: float, digits: int) -> str:
     return f"{round(x, digits) + 0.0:+.{digits}f}"
 
 
-def seeds(number: Mapping[str, float]) -> str:
+def seeds(number: NumberChange) -> str:
     """A change beside the repeatability limit."""
-    return f"{number['over_limit']:.1f} times what another seed changes"
+    return f"{number.over_limit:.1f} times what another seed changes"

@@ -15,7 +15,7 @@ from calib.io.provenance import git_commit, versions
 from calib.io.schema import tag
 from calib.material.knife import load_knife
 from calib.material.scene import cut_scene, specimen
-from calib.simulation.evaluation import PARTED, pressed_away
+from calib.simulation.evaluation import FULLY_PARTED, pressed_away
 from cutcal.options import (
     add_food,
     add_run,
@@ -144,7 +144,7 @@ def run(args: argparse.Namespace) -> int:
     if sys.stderr.isatty():
         print(file=sys.stderr)
     write_csv(out / "force.csv", record.columns())
-    if record.parted < PARTED:
+    if record.parted < FULLY_PARTED:
         assumed.append(pressed_away(record.parted))
         note(assumed[-1])
     summary = {

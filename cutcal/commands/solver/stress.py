@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
+from calib.io.typed_document import to_document
 from cutcal.options import (
     RESUME_HELP,
     RUN,
@@ -17,6 +18,9 @@ from cutcal.options import (
     titled,
     workers_of,
 )
+
+if TYPE_CHECKING:
+    from studies.stability.result import StabilityMap
 
 HELP = "map of where the solver is stable"
 DESCRIPTION = """Run some 250 small cuts with one or two things pushed to the end of their
@@ -32,7 +36,7 @@ EPILOG = """examples:
 Ctrl-C keeps what was computed; the same command with --resume goes on.
 Exit codes: 0 every physical cell below 0.8 of the time step's limit is stable
 and all others are explained, 1 error in input or run, 2 they are not."""
-SHOWN = 12  # cells that the table names
+NAMED = 12  # cells that the table names
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
@@ -45,39 +49,39 @@ def add_args(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the map; prints its table, or stress.json."""
-    from studies.stability.cases import cells, quick_cells
-    from studies.stability.study import run as study
+    from studies.stability.families import map_cells, quick_map_cells
+    from studies.stability.stability_map import run_map
 
     out = Path(args.out or "cutcal-stress")
-    about = {"command": ["stress", *(a for a in sys.argv[1:] if a != "stress")], "seed": args.seed}
+    command = ("stress", *(a for a in sys.argv[1:] if a != "stress"))
 
     with workers_of(args, say) as pool:
-        todo = (quick_cells if args.quick else cells)(args.seed)
-        document = study(todo, out, pool, about=about, resume=args.resume, say=say)
+        cells = (quick_map_cells if args.quick else map_cells)(args.seed)
+        result = run_map(cells, out, pool, command=command, seed=args.seed, resume=args.resume, say=say)
     if args.json:
-        print_json(document)
+        print_json(to_document(result))
     else:
-        print(table(document))
+        print(table(result))
         print(f"  wrote {out}")
-    return 0 if document["passed"] else 2
+    return 0 if result.passed else 2
 
 
-def table(document: dict[str, Any]) -> str:
+def table(result: StabilityMap) -> str:
     """What the terminal shows at the end."""
-    physical, limit = document["physical"], document["limits"]["dt_over_limit"]
+    physical, limit = result.physical, result.limits.dt_over_limit
     lines = [
-        f"{len(document['cells'])} cells: {'passed' if document['passed'] else 'not passed'}",
-        f"  {physical['stable']} of {physical['cells']} physical cells below {limit:g} of the time step's limit are stable",
+        f"{len(result.cells)} cells: {'passed' if result.passed else 'not passed'}",
+        f"  {physical.stable} of {physical.cells} physical cells below {limit:g} of the time step's limit are stable",
     ]
-    for reason, count in sorted(document["counts"].items(), key=lambda item: -item[1]):
-        words = document["reasons"].get(reason, "reached the end, momentum and energy balance")
-        lines.append(f"  {count:4d} {reason}: {words}")
+    for reason, count in sorted(result.counts.items(), key=lambda item: -item[1]):
+        meaning = result.reasons.get(reason, "reached the end, momentum and energy balance")
+        lines.append(f"  {count:4d} {reason}: {meaning}")
+    reasons = {cell.name: cell.reason for cell in result.cells}
     for title, names in (
-        ("physical, but not stable", physical["not_stable"]),
-        ("unexplained", document["unexplained_cells"]),
+        ("physical, but not stable", physical.not_stable),
+        ("unexplained", result.unexplained_cells),
     ):
-        reasons = {c["name"]: c["reason"] for c in document["cells"]}
-        lines += [f"  {title}: {name} ({reasons[name]})" for name in names[:SHOWN]]
-        if len(names) > SHOWN:
-            lines.append(f"  {title}: {len(names) - SHOWN} more, see stress.json")
+        lines += [f"  {title}: {name} ({reasons[name]})" for name in names[:NAMED]]
+        if len(names) > NAMED:
+            lines.append(f"  {title}: {len(names) - NAMED} more, see stress.json")
     return "\n".join(lines)

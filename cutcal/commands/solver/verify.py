@@ -6,8 +6,9 @@ import argparse
 import math
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
+from calib.io.typed_document import to_document
 from cutcal.options import (
     RESUME_HELP,
     RUN,
@@ -18,6 +19,9 @@ from cutcal.options import (
     titled,
     workers_of,
 )
+
+if TYPE_CHECKING:
+    from studies.verification.result import Verification
 
 HELP = "compare the solver with closed forms and finite elements"
 DESCRIPTION = """Compare the solver with closed forms, and with finite elements of the same law:
@@ -44,34 +48,34 @@ def add_args(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the cases; prints their table, or verify.json."""
-    from studies.verification.case import How
-    from studies.verification.study import run as study
+    from studies.verification.case import SuiteOptions
+    from studies.verification.suite import run_suite
 
     out = Path(args.out or "cutcal-verify")
-    about = {"command": ["verify", *(a for a in sys.argv[1:] if a != "verify")]}
+    command = ("verify", *(a for a in sys.argv[1:] if a != "verify"))
 
     with workers_of(args, say) as pool:
-        how = How(args.quick, args.seed, args.arch)
-        document = study(out, how, pool, only=args.only, about=about, resume=args.resume, say=say)
+        options = SuiteOptions(args.quick, args.seed, args.arch)
+        result = run_suite(out, options, pool, only=args.only, command=command, resume=args.resume, say=say)
     if args.json:
-        print_json(document)
+        print_json(to_document(result))
     else:
-        print(f"{table(document)}\n  wrote {out}")
-    return 0 if document["passed"] else 2
+        print(f"{table(result)}\n  wrote {out}")
+    return 0 if result.passed else 2
 
 
-def table(document: dict[str, Any]) -> str:
+def table(result: Verification) -> str:
     """What the terminal shows at the end."""
     lines, group = [], None
-    for row in document["rows"]:
-        if row["group"] != group:
-            group = row["group"]
+    for row in result.rows:
+        if row.group != group:
+            group = row.group
             lines.append(f"{group}")
-        sign = ">=" if row["least"] else "  "
-        got, error = (math.nan if row[name] is None else row[name] for name in ("got", "error"))
-        numbers = f"{sign} {row['expected']:11.5g} {got:11.5g} {error:+9.2g} {row['tolerance']:8.1g}"
-        lines.append(f"  {'ok  ' if row['passed'] else 'FAIL'} {numbers}  {row['case']}: {row['quantity']}")
-    lines += [f"  FAIL {name} broke down: {why}" for name, why in document["broken"].items()]
-    failed = sum(not row["passed"] for row in document["rows"]) + len(document["broken"])
+        sign = ">=" if row.least else "  "
+        got, error = (x if math.isfinite(x) else math.nan for x in (row.got, row.error))
+        numbers = f"{sign} {row.expected:11.5g} {got:11.5g} {error:+9.2g} {row.tolerance:8.1g}"
+        lines.append(f"  {'ok  ' if row.passed else 'FAIL'} {numbers}  {row.case}: {row.quantity}")
+    lines += [f"  FAIL {name} broke down: {why}" for name, why in result.broken.items()]
+    failed = sum(not row.passed for row in result.rows) + len(result.broken)
     head = f"{'':9}{'expected':>11} {'got':>11} {'error':>9} {'allowed':>8}"
-    return "\n".join([head, *lines, f"{len(document['rows'])} rows, {failed or 'none'} failed"])
+    return "\n".join([head, *lines, f"{len(result.rows)} rows, {failed or 'none'} failed"])

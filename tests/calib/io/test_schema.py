@@ -9,12 +9,11 @@ from typing import Any, get_args
 import pytest
 from jsonschema import Draft202012Validator
 
-from calib.calibration import summary
 from calib.io.folder import write_json
 from calib.io.provenance import versions
 from calib.io.schema import COMMON, FOLDER, names, schema, tag
 from calib.material import properties
-from calib.uncertainty import intervals
+from calib.uncertainty import estimates, intervals
 from cutcal.main import COMMANDS, main
 from cutcal.options import print_json
 from mpm.output.record import ENERGIES
@@ -22,7 +21,7 @@ from mpm.runtime import ARCHES
 from mpm.scene import CONTACTS
 from mpm.shapes import SHAPE_KINDS
 from studies.convergence import gci
-from studies.stability.study import REASONS
+from studies.stability.result import REASONS
 from tests.calib.documents import at, changed, faults, places, valid, validator
 from tests.data_dir import ROOT
 from tests.reports import sample, study_sample
@@ -100,11 +99,11 @@ def test_words_are_those_of_the_code():
     parts = common()["$defs"]
     of = {name: part["enum"] for name, part in parts.items() if "enum" in part}
     assert set(of["intervalWord"]) == set(get_args(intervals.Identifiability))
-    assert set(of["verdictWord"]) == set(of["intervalWord"]) | {"only_as_product", summary.UNKNOWN}
+    assert set(of["verdictWord"]) == set(of["intervalWord"]) | {"only_as_product", estimates.UNKNOWN}
     assert (of["shapeKind"], of["device"]) == (list(SHAPE_KINDS), list(ARCHES))
     assert set(of["status"]) == {*properties.LITERATURE, *properties.OWN}
     assert list(parts["energy"]["properties"]) == list(ENERGIES)
-    assert schema("converge")["properties"]["verdict"]["enum"] == list(gci.VERDICTS)
+    assert schema("converge")["properties"]["verdict"]["enum"] == list(gci.TRENDS)
     assert schema("simulate")["properties"]["contact"]["enum"] == list(CONTACTS)
     assert set(of["runState"]) - {"done"} <= set(REASONS)
     assert set(schema("food")["$defs"]["common"]["$defs"]) == set(parts)
@@ -213,7 +212,7 @@ def test_lists_and_single_foods_and_knives(printed):
 
 def test_a_written_report_is_a_document(printed, tmp_path, monkeypatch):
     """``report --json`` names the file."""
-    monkeypatch.setattr("reports.stability.write_report", lambda folder: folder / "report.pdf")
+    monkeypatch.setattr("studies.stability.result.write_report", lambda folder: folder / "report.pdf")
     (tmp_path / "stress.json").touch()
     assert valid(printed("report", str(tmp_path)))["report"] == str(tmp_path / "report.pdf")
 

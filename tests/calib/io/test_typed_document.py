@@ -77,6 +77,28 @@ def test_numbers_that_are_not_finite_are_null_and_come_back(tmp_path):
     assert from_document(Whole, DOCUMENT | {"limit": 0.5}).limit == 0.5
 
 
+@dataclass(frozen=True)
+class Pair:
+    """A name and, beside it, a part that may be missing."""
+
+    DOCUMENT: ClassVar[str] = "verify"
+
+    title: str
+    part: Part | None = field(default=None, metadata=FLAT)
+    rest: Mapping[str, int] = field(default_factory=dict, metadata=FLAT)
+
+
+def test_keys_beside_the_others_may_all_be_missing():
+    """A part without any of its keys is None; with some of them, what misses is named."""
+    whole = {"schema": "cutcal/verify/1", "title": "t", "name": "a", "size_m": 1.0, "x": 3}
+    assert from_document(Pair, whole) == Pair("t", Part("a", 1.0), {"x": 3})
+    assert to_document(from_document(Pair, whole)) == whole
+    assert from_document(Pair, {"title": "t"}) == Pair("t")
+    assert to_document(Pair("t")) == {"schema": "cutcal/verify/1", "title": "t"}
+    with pytest.raises(DocumentError, match="^size_m is missing"):
+        from_document(Pair, {"title": "t", "name": "a"})
+
+
 def test_whole_numbers_stay_what_they_are():
     """A number that was written without a point is written so again."""
     assert json.dumps(to_document(from_document(Part, {"name": "a", "size_m": 2}))) == '{"name": "a", "size_m": 2}'

@@ -11,9 +11,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calib.errors import DocumentError
 from cutcal.main import main
-from reports import ReportError, bench, convergence, stability, verification
 from reports.base import brief
+from studies.convergence import result as convergence
+from studies.speed import result as bench
+from studies.stability import result as stability
+from studies.verification import result as verification
 from tests.reports.sample import pages, spaced
 
 VERSIONS = {"cutcal": "0.1.0", "python": "3.11.7"}
@@ -29,6 +33,9 @@ def grid(dx: float, peak: float, **more: Any) -> dict[str, Any]:
         "steps": 3000.0,
         "momentum_residual": 1e-15,
         "wall_s": 2.0,
+        "parted": 1.0,
+        "ke_over_ie": 0.001,
+        "ripple_N": 0.1,
     }
     return {"dx_m": dx, **numbers, "status": "ok", "reason": "", "fraction": 1.0, **more}
 
@@ -41,13 +48,15 @@ def converge(folder: Path, **changes: Any) -> Path:
     document = {
         "food": "shine_muscat", "knife": "kitchen", "shape": {"kind": "sphere", "length": 0.03, "width": 0.03, "height": 0.03},
         "warnings": ["E is assumed"], "grids": [grid(3e-3, 13.0), grid(2e-3, 12.5), grid(1e-3, 0.0, status="failed", reason="inverted")],
-        "converged": True, "limits": {"work": 0.02, "peak": 0.03}, "peak": estimate, "work": estimate | {"order": None},
-        "order_curve": 2.0, "gci_curve_median": 0.01, "gci_curve_max": 0.04, "mach": mach, "safety": None, "ppc": None, "offset": None,
+        "limits": {"work": 0.02, "peak": 0.03}, "peak": estimate, "work": estimate | {"order": None},
+        "order_curve": 2.0, "gci_curve_median": 0.01, "gci_curve_max": 0.04, "repeat_sd_peak_N": 0.1, "repeat_sd_work_J": 0.002, "mach": mach, "safety": None, "ppc": None, "offset": None,
         "repeat": None, **ORIGIN, **changes,
     }  # fmt: skip
     x = np.linspace(0, 0.03, 20)
     forces = {f"force_dx_{dx:g}_N": np.sin(x / 0.03 * np.pi) for dx in (3e-3, 2e-3)}
-    pd.DataFrame({"stroke_m": x, "u_num_N": 0.1 + 0 * x, **forces}).to_csv(folder / "curves.csv", index=False)
+    pd.DataFrame({"stroke_m": x, "u_num_N": 0.1 + 0 * x, "u_num_coarsest_N": 0.2 + 0 * x, **forces}).to_csv(
+        folder / "curves.csv", index=False
+    )
     return written(folder / "converge.json", document)
 
 
@@ -72,7 +81,7 @@ def verify(folder: Path, **changes: Any) -> Path:
         "passed": True,
     }
     document = {
-        "quick": False, "seed": 0, "complete": True, "passed": False, "rows": [row, order], "seconds": {"bar": 1.0, "order": 2.0},
+        "quick": False, "seed": 0, "code": "c0de", "complete": True, "passed": False, "rows": [row, order], "seconds": {"bar": 1.0, "order": 2.0},
         "broken": {"two discs": "its process was killed"}, **ORIGIN, **changes,
     }  # fmt: skip
     return written(folder / "verify.json", document)
@@ -110,17 +119,33 @@ def speed(folder: Path, **changes: Any) -> Path:
         "wall_s": 3.8,
         "particles": 3694,
         "steps": 2817,
+        "first_run_s": 20.0,
+        "nodes": 20000,
         "reference_dx_m": 1.5e-3,
+        "reference_wall_s": 40.0,
         "peak_error": 0.0231,
         "work_error": -0.002,
         "nrmse": 0.012,
     }
+    stiff = {
+        "name": "stiff",
+        "status": "done",
+        "wall_s": 3.7,
+        "first_run_s": 19.0,
+        "time_ratio": 0.98,
+        "particles": 3694,
+    }
+    stiff |= {"steps": 2817, "nodes": 20000}
+    paper = {"nodes": 120, "dx_m": 2e-3, "dt_s": 2e-5, "particles": 128792, "steps": 33000, "step_s": 0.167}
+    paper |= {"wall_s_extrapolated": 5507.0}
+    rate = {"particles": 128000, "bandwidth_GBps": 23.3, "bytes_per_particle_step": 624, "memory_bound_Mps": 37.3}
+    rate |= {"full_physics_Mps": 5.8, "single_Mps": 6.1, "textbook_Mps": 0.81, "ratio": 7.2, "cut_Mps": 4.6}
     document = {
         "food": "banana", "knife": "kitchen", "complete": True, "threads": 2, "default_cut": cut, "ratio_to_paper": 1455.9, "exponent": 1.02,
-        "ablations": [cut | {"name": "single precision", "time_ratio": 1.05, "status": "done"}, {"name": "stiff", "time_ratio": 0.98, "status": "done"}],
-        "paper_config": {"nodes": 120, "particles": 128792, "dt_s": 2e-5, "wall_s_extrapolated": 5507.0},
-        "throughput": {"full_physics_Mps": 5.8, "single_Mps": 6.1, "cut_Mps": 4.6, "textbook_Mps": 0.81, "memory_bound_Mps": 37.3},
-        "peers": [{"name": "Warp", "version": "1.19", "Mps": 2.7, "ours_Mps": 6.6, "ratio": 2.46}, {"name": "Genesis", "error": "no module"}],
+        "ablations": [cut | {"name": "single precision", "time_ratio": 1.05, "status": "done"}, stiff],
+        "paper_config": paper,
+        "throughput": rate,
+        "peers": [{"name": "Warp", "version": "1.19", "seconds": 0.05, "particles": 128000, "Mps": 2.7, "ours_Mps": 6.6, "ratio": 2.46}, {"name": "Genesis", "error": "no module"}],
         "processes": {"processes": 2, "speed_up": 1.7, "cut_Mps": 7.8, "start_up_s": 1.4},
         "batches": [{"cuts": 1, "wall_s": 1.5, "per_cut": 1.0}, {"cuts": 8, "wall_s": 6.6, "per_cut": 0.55}], **ORIGIN, **changes,
     }  # fmt: skip
@@ -185,7 +210,7 @@ def test_a_damaged_document_is_one_line_and_the_old_report_stays(kind: str, tmp_
     whole = json.loads(path.read_text())
     for change in ({k: v for k, v in whole.items() if k != "versions"}, {k: 3 for k in whole}, [], None):
         path.write_text("{" if change is None else json.dumps(change))
-        with pytest.raises(ReportError, match=path.name):
+        with pytest.raises(DocumentError, match=path.name):
             WRITERS[kind].write_report(folder)
     assert report.read_bytes() == before
     assert main(["report", str(tmp_path / "nowhere")]) == 1
@@ -200,7 +225,10 @@ def test_what_was_interrupted_or_coarse_is_said(tmp_path: Path, typeset) -> None
         (tmp_path / name).mkdir()
     bench.write_report(speed(tmp_path / "a", complete=False))
     verification.write_report(verify(tmp_path / "b", quick=True))
-    passed = [dict(row, passed=True) for row in json.loads((tmp_path / "b" / "verify.json").read_text())["rows"]]
+    passed = [
+        dict(row, got=1.0001 * row["expected"], passed=True)
+        for row in json.loads((tmp_path / "b" / "verify.json").read_text())["rows"]
+    ]
     verification.write_report(verify(tmp_path / "c", rows=passed, complete=False))
     for content, words in zip(
         typeset, ("some of it is missing", "Coarse versions", "not all cases ended"), strict=True

@@ -1,4 +1,4 @@
-"""The stability map: what an audit sees, how a cell is judged, a small map end to end, killed and resumed."""
+"""The stability map: what its check of a run sees, how a cell is judged, a small map end to end, killed and resumed."""
 
 from __future__ import annotations
 
@@ -19,10 +19,12 @@ from calib.simulation.evaluation_store import EvaluationStore, Header
 from calib.simulation.process_pool import Pool
 from cutcal.main import main
 from mpm.output.record import ForceRecord
-from studies.stability import study
-from studies.stability.audit import audit
-from studies.stability.cases import Start, cell, cells, food, forced, quick_cells
-from studies.stability.study import REASONS, conclude, evaluate, evaluation, row
+from studies.stability import stability_map
+from studies.stability.conservation import check_conservation
+from studies.stability.families import map_cells, quick_map_cells
+from studies.stability.map_cell import StartState, forced, map_cell, material_values
+from studies.stability.result import REASONS, PhysicalCells
+from studies.stability.stability_map import KILLED, cell_result, map_result, run_cells
 from tests.calib.documents import valid
 from tests.data_dir import ROOT
 
@@ -51,8 +53,8 @@ def record(**changes):
 
 
 def judged(**changes):
-    """Reason of the audit of such a record."""
-    return audit(record(**changes), precision="f64").reason
+    """Reason of the check of such a record."""
+    return check_conservation(record(**changes), precision="f64").reason
 
 
 def test_a_sound_record_passes():
@@ -79,7 +81,7 @@ def test_momentum_that_does_not_balance_is_seen():
     free = {"edge": none, "board": none, "gravity": none, "plastic": np.zeros(ROWS), "elastic": np.zeros(ROWS)}
     assert judged(**free) == ""
     assert judged(**free, residual=residual) == "momentum"
-    assert audit(record(residual=residual), precision="f32").reason == ""
+    assert check_conservation(record(residual=residual), precision="f32").reason == ""
 
 
 @pytest.mark.parametrize("name", ["kinetic", "elastic", "plastic", "viscous"])
@@ -100,7 +102,7 @@ def test_a_spike_of_contact_is_no_growth():
 def test_energy_at_the_start_is_no_growth():
     """What was stored when the run began may be there; without saying so it comes from nothing."""
     elastic = np.full(ROWS, 5.0)
-    assert audit(record(elastic=elastic), precision="f64", stored=5.0).reason == ""
+    assert check_conservation(record(elastic=elastic), precision="f64", stored=5.0).reason == ""
     assert judged(elastic=elastic) == "energy_growth"
 
 
@@ -112,11 +114,11 @@ def test_free_fall_makes_no_energy():
     momentum[:, 2] = -WEIGHT * time
     fall = {"time": time, "momentum": momentum, "edge": none, "board": none, "plastic": np.zeros(ROWS)}
     falling = record(**fall, elastic=np.zeros(ROWS), kinetic=mass / 2 * (g * time) ** 2)
-    found = audit(falling, precision="f64")
+    found = check_conservation(falling, precision="f64")
     assert found.reason == ""
     assert abs(found.energy_gain) < 1e-12
     weightless = replace(falling, gravity=none)
-    assert audit(weightless, precision="f64").energy_gain > 0.01
+    assert check_conservation(weightless, precision="f64").energy_gain > 0.01
 
 
 def test_food_at_rest_on_the_board_does_not_fall():
@@ -126,57 +128,64 @@ def test_food_at_rest_on_the_board_does_not_fall():
     """
     board = np.tile([0.0, 0.0, -WEIGHT], (ROWS, 1))
     still = record(edge=0 * board, board=board, momentum=-1e-4 * board, plastic=np.zeros(ROWS), elastic=np.zeros(ROWS))
-    right, wrong = (audit(replace(still, lagging=lag), precision="f64").energy_gain for lag in (True, False))
+    right, wrong = (
+        check_conservation(replace(still, lagging=lag), precision="f64").energy_gain for lag in (True, False)
+    )
     assert abs(right) < 0.02 * wrong
 
 
 def result(reason: str = "", **scalars: float):
     """What a worker sends back."""
-    plain = {"status": "failed" if reason else "ok", "reason": reason, "fraction": 0.5 if reason else 1.0}
-    return evaluation({**plain, "scalars": {"particle_steps": 1e9, **scalars}})
+    ends = {"status": "failed" if reason else "ok", "reason": reason, "fraction": 0.5 if reason else 1.0}
+    return replace(KILLED, **ends, scalars={"particle_steps": 1e9, **scalars})
 
 
-BASE = cell("base", {"x": 1.0})
-CRUSHED = cell("base", {"x": 2.0}, material=food(1e5, R=1e5))
-REFUSED = cell("base", {"x": 3.0}, material={"nu": 0.5})
-FAST = cell("base", {"x": 4.0}, numerics={"safety": 1.2})
+def concluded(cells, evaluations):
+    """The map of these ends."""
+    return map_result(cells, evaluations, command=("stress",), seed=0, device="cpu")
+
+
+BASE = map_cell("base", {"x": 1.0})
+CRUSHED = map_cell("base", {"x": 2.0}, material=material_values(1e5, R=1e5))
+REFUSED = map_cell("base", {"x": 3.0}, material={"nu": 0.5})
+FAST = map_cell("base", {"x": 4.0}, numerics={"safety": 1.2})
 
 
 @pytest.mark.parametrize("reason", [r for r in REASONS if r not in ("cfl", "refused")])
 def test_each_reason_explains(reason):
     """A run that stopped for a known reason is explained, and counts against the map only where it must be stable."""
-    assert row(CRUSHED, result(reason))["status"] == "stopped"
-    assert conclude([CRUSHED], [result(reason)])["passed"]
-    document = conclude([BASE, CRUSHED], [result(reason), result(reason)])
-    assert not document["passed"]
-    assert document["physical"] == {"cells": 1, "stable": 0, "not_stable": [BASE.words]}
-    assert document["unexplained"] == 0
+    assert cell_result(CRUSHED, result(reason)).status == "stopped"
+    assert concluded([CRUSHED], [result(reason)]).passed
+    found = concluded([BASE, CRUSHED], [result(reason), result(reason)])
+    assert not found.passed
+    assert found.physical == PhysicalCells(cells=1, stable=0, not_stable=(BASE.words,))
+    assert found.unexplained == 0
 
 
 def test_what_is_not_known_is_unexplained():
     """Any other reason fails the map, also of a cell that need not be stable."""
-    document = conclude([BASE, CRUSHED], [result(), result("odd")])
-    assert (document["unexplained"], document["unexplained_cells"]) == (1, [CRUSHED.words])
-    assert not document["passed"]
+    found = concluded([BASE, CRUSHED], [result(), result("odd")])
+    assert (found.unexplained, found.unexplained_cells) == (1, (CRUSHED.words,))
+    assert not found.passed
 
 
 def test_refusals_are_typed():
     """A time step is refused as ``cfl``, all else as ``refused``, with the words a user gets."""
-    rows = conclude([FAST, REFUSED], [None, None])["cells"]
-    assert [(r["status"], r["reason"]) for r in rows] == [("refused", "cfl"), ("refused", "refused")]
-    assert "stability limit" in rows[0]["message"]
-    assert "nu = 0.5" in rows[1]["message"]
+    rows = concluded([FAST, REFUSED], [None, None]).cells
+    assert [(r.status, r.reason) for r in rows] == [("refused", "cfl"), ("refused", "refused")]
+    assert "stability limit" in rows[0].message
+    assert "nu = 0.5" in rows[1].message
 
 
 def test_a_killed_worker_and_a_long_run_are_told():
     """A process that was killed has a reason of its own; a run that is too long says what it would need."""
-    assert row(CRUSHED, evaluation(None))["reason"] == "worker_died"
-    assert "1e+09 particle steps" in row(CRUSHED, result("too_long"))["message"]
+    assert cell_result(CRUSHED, KILLED).reason == "worker_died"
+    assert "1e+09 particle steps" in cell_result(CRUSHED, result("too_long")).message
 
 
 def test_the_map_covers_what_it_promises():
     """Both ends of every range are there, each cell can be told from the others, and a refused one says why."""
-    every = cells()
+    every = map_cells()
     assert len({(c.words, c.forced) for c in every}) == len(every)
     assert all(c.refusal for c in every if c.scene is None)
     seen = {name: {c.values[name] for c in every if name in c.values} for c in every for name in c.values}
@@ -202,7 +211,7 @@ def test_forced_cells_pass_the_checks_by():
     assert not forced(BASE, safety=1.2).physical
     each = (BASE, forced(BASE, nu=0.495), forced(BASE, safety=1.1), forced(BASE, safety=1.2))
     assert len({one.key for one in each}) == 4
-    assert replace(BASE, start=Start(depth=1e-3)).key != BASE.key
+    assert replace(BASE, start=StartState(depth=1e-3)).key != BASE.key
 
 
 class OneKills(Pool):
@@ -245,13 +254,13 @@ def test_known_cells_are_not_run_again(tmp_path):
         def each(self, _, jobs):
             for k, (one, *_limits) in enumerate(jobs):
                 ran.append(one.words)
-                yield k, None if one.words in dead else {"status": "ok", "reason": "", "fraction": 1.0}
+                yield k, None if one.words in dead else result()
 
     todo = [BASE, REFUSED, CRUSHED, replace(BASE, family="again")]
     for resume, expected in ((False, {BASE.words, CRUSHED.words}), (True, {CRUSHED.words}), (True, set())):
         ran.clear()
         with EvaluationStore(tmp_path / "e.h5", Header("", "x"), resume=resume) as store:
-            results = evaluate(todo, store, FakePool(), lambda _: None)
+            results = run_cells(todo, store, FakePool(), lambda _: None)
         ran_words = {w.replace("again", "base") for w in ran}
         assert ran_words == expected
         assert len(ran) == len(expected)
@@ -262,37 +271,37 @@ def test_known_cells_are_not_run_again(tmp_path):
 
 def test_a_run_ends_at_its_limits():
     """More particle steps than allowed are not begun, and a run that takes too long is ended; both say what they need."""
-    from studies.stability.case_run import attempt
+    from studies.stability.cell_run import run_cell
 
-    one = quick_cells()[1]
+    one = quick_map_cells()[1]
     for limits in ((10.0, 100.0), (1e12, -1.0)):
-        found = attempt(one, *limits, "cpu", 1)
-        assert found["reason"] == "too_long"
-        assert found["scalars"]["particle_steps"] > 1e4
-        assert found["fraction"] < 1
+        found = run_cell(one, *limits, "cpu", 1)
+        assert found.reason == "too_long"
+        assert found.scalars["particle_steps"] > 1e4
+        assert found.fraction < 1
 
 
 def test_contact_makes_no_energy_where_waves_allow_the_longest_step():
     """A very soft food of nu = 0, which gravity squeezes on the board, ends sound; the contact's spring needs a shorter step."""
-    from studies.stability.case_run import attempt
+    from studies.stability.cell_run import run_cell
 
-    one = next(c for c in cells() if c.words == "E and nu: E_Pa 1000, nu 0")
-    found = attempt(one, 1e9, 100.0, "cpu", 1)
-    assert found["reason"] == ""
-    assert found["scalars"]["energy_gain"] < 0.05
+    one = next(c for c in map_cells() if c.words == "E and nu: E_Pa 1000, nu 0")
+    found = run_cell(one, 1e9, 100.0, "cpu", 1)
+    assert found.reason == ""
+    assert found.scalars["energy_gain"] < 0.05
 
 
 @pytest.mark.slow
 def test_a_cell_does_not_feel_the_one_before():
     """Food that was drawn together below the edge gives the same work after another cut as before it."""
-    from studies.stability.case_run import attempt
+    from studies.stability.cell_run import run_cell
 
-    named = {one.words: one for one in cells()}
+    named = {one.words: one for one in map_cells()}
     overlap, other = named["start: 10 times overlap, unstrained"], named["start: blade half off the food"]
-    first, _, again = (attempt(one, 1e9, 100.0, "cpu", 1) for one in (overlap, other, overlap))
-    assert first["scalars"]["work_J"] == again["scalars"]["work_J"]
-    assert first["scalars"]["momentum_residual"] < 1e-12
-    assert again["scalars"]["momentum_residual"] < 1e-12
+    first, _, again = (run_cell(one, 1e9, 100.0, "cpu", 1) for one in (overlap, other, overlap))
+    assert first.scalars["work_J"] == again.scalars["work_J"]
+    assert first.scalars["momentum_residual"] < 1e-12
+    assert again.scalars["momentum_residual"] < 1e-12
 
 
 def known(journal: Path) -> int:
@@ -361,8 +370,8 @@ def test_negative_verdict_is_exit_code_2(quick, capsys, monkeypatch):
     arguments = ["stress", "--quick", "--out", str(out), "--resume"]
     for reason, words in (("inverted", "physical, but not stable"), ("odd", "unexplained")):
         with monkeypatch.context() as patch:
-            ends = [result(reason)] * len(quick_cells())
-            patch.setattr(study, "evaluate", lambda *_, ends=ends: ends)
+            ends = [result(reason)] * len(quick_map_cells())
+            patch.setattr(stability_map, "run_cells", lambda *_, ends=ends: ends)
             assert main(arguments) == 2
         assert words in capsys.readouterr().out
 

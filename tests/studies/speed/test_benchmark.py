@@ -11,14 +11,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import studies.speed.kernel_rates
 import studies.speed.peers
-import studies.speed.study
+import studies.speed.side_by_side
 import studies.speed.textbook
+import studies.speed.timing
+from calib.io.typed_document import from_document
 from calib.material.food import load_food
 from cutcal.commands.solver.bench import table
 from cutcal.main import main
 from mpm.runtime import Runtime
 from mpm.scene import Scene
+from studies.speed.benchmark import BenchmarkSettings, run_benchmark
+from studies.speed.result import BenchmarkResult
 from tests.calib.documents import valid
 
 
@@ -108,26 +113,24 @@ def peer(python: str, name: str, block: dict, threads: int) -> dict:
 @pytest.fixture
 def document(monkeypatch, tmp_path) -> dict:
     """What the benchmark writes."""
-    monkeypatch.setattr(studies.speed.study, "Pool", Workers)
-    monkeypatch.setattr(studies.speed.study, "measure", peer)
     clock = SimpleNamespace(perf_counter=lambda: Workers.now, monotonic=time.monotonic)
-    monkeypatch.setattr(studies.speed.study, "time", clock)
-    monkeypatch.setattr(studies.speed.study, "bandwidth", lambda threads: 2e10)
-    monkeypatch.setattr(studies.speed.study, "Simulation", Solver)
-    monkeypatch.setattr(studies.speed.study, "simulate_together", side_by_side)
-    monkeypatch.setattr(studies.speed.textbook, "Textbook", Yardstick)
+    for module, name, fake in (
+        (studies.speed.side_by_side, "Pool", Workers),
+        (studies.speed.side_by_side, "time", clock),
+        (studies.speed.side_by_side, "simulate_together", side_by_side),
+        (studies.speed.timing, "time", clock),
+        (studies.speed.timing, "Simulation", Solver),
+        (studies.speed.kernel_rates, "measure", peer),
+        (studies.speed.kernel_rates, "bandwidth", lambda threads: 2e10),
+        (studies.speed.textbook, "Textbook", Yardstick),
+    ):
+        monkeypatch.setattr(module, name, fake)
     said: list[str] = []
-    studies.speed.study.run(
-        load_food("banana"),
-        "kitchen",
-        tmp_path,
-        runtime=Runtime(threads=2),
-        repeats=2,
-        finest=1.5e-3,
-        seed=0,
-        say=said.append,
-        peers="python",
+    banana = load_food("banana")
+    settings = BenchmarkSettings(
+        banana, "kitchen", Runtime(threads=2), repeats=2, finest=1.5e-3, seed=0, peers="python"
     )
+    run_benchmark(settings, tmp_path, said.append)
     assert "published configuration" in "\n".join(said) and (tmp_path / "bench.svg").stat().st_size > 2000
     assert "mathdefault" not in (tmp_path / "bench.svg").read_text()  # powers of ten would be shown as source text
     return valid(json.loads((tmp_path / "bench.json").read_text()))
@@ -186,7 +189,7 @@ def test_missing_interpreter_is_said_before_anything_is_measured(capsys, tmp_pat
 
 def test_table_names_every_row(document):
     """The terminal shows each variant with its time and errors."""
-    text = table(document)
+    text = table(from_document(BenchmarkResult, document))
     assert all(row["name"] in text for row in document["ablations"]) and "to the power 1.00" in text
     assert "in Genesis: not measured, No module named" in text
     assert "3.9 times Warp" in text and "2 processes do 2.00 times" in text

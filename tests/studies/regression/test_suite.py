@@ -18,23 +18,25 @@ from cutcal.main import main
 from mpm.scene import CONTACTS
 from mpm.solver import Simulation
 from studies.regression.baseline import (
-    KNIFE,
-    OTHERS,
-    POINTS,
+    OTHER_SEEDS,
+    RECORDED_KNIFE,
+    RECORDED_POINTS,
+    RECORDED_SEED,
     SAME,
-    SEED,
-    cases,
+    CutOutcome,
+    baseline_cuts,
     columns_of,
-    cut,
     limit_factor,
     repeatability,
+    run_cut,
     scales,
 )
+from studies.regression.comparison import differences
 from studies.regression.reference_curves import CHECKED, COLUMNS, INDEX, References
-from studies.regression.study import check, differences, update
+from studies.regression.suite import compare_with_references, record_changes
 from tests.calib.documents import valid
 
-ALL = {case.name: case for case in cases(list(load_foods().values()), load_knife(KNIFE))}
+ALL = {case.name: case for case in baseline_cuts(list(load_foods().values()), load_knife(RECORDED_KNIFE))}
 # By default, those of a second or less, with skin and without, that flow and that do not; nodal kernels take seconds to compile.
 QUICK = (
     "banana-cohesive", "strawberry-cohesive", "kiwi-cohesive", "grape-cohesive", "shine_muscat-cohesive", "plum-cohesive",
@@ -70,7 +72,7 @@ def test_reference_is_of_this_food_and_scene(name):
     origin, case = References().read(name).origin, ALL[name]
     assert origin["inputs"] == case.inputs, f"record it again: cutcal regress {case.food.name} --update"
     assert origin["scene"] == json.loads(json.dumps(case.scene().as_dict()))
-    assert (origin["food"], origin["contact"], origin["seed"]) == (case.food.name, case.contact, SEED)
+    assert (origin["food"], origin["contact"], origin["seed"]) == (case.food.name, case.contact, RECORDED_SEED)
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -78,7 +80,7 @@ def test_tolerances_are_those_of_measured_repeatability(name):
     """2.8 s_r in each column at least, 3.34 as it is from eight seeds; where they hardly differ, a thousandth; no more."""
     reference = References().read(name)
     spread, least = reference.origin["repeatability"], scales(reference.columns)
-    assert spread["seeds"] == [SEED, *OTHERS]
+    assert spread["seeds"] == [RECORDED_SEED, *OTHER_SEEDS]
     for column in CHECKED:
         assert reference.tolerances[column] >= 2.8 * spread["s_r"][column]
         exact = max(limit_factor(8) * spread["s_r"][column], SAME * least[column])
@@ -110,7 +112,7 @@ def test_last_bit_of_a_cell_moves_no_curve():
     """A cell that is longer by a part in 1e12 gives the same curve: rounding in another machine's libraries does not decide it."""
     scene = ALL["strawberry-cohesive"].scene()
     longer = replace(scene, numerics=replace(scene.numerics, dx=scene.numerics.dx * (1 + 1e-12)))
-    one, other = (cut(s, "cpu", 1)["columns"] for s in (scene, longer))
+    one, other = (run_cut(s, "cpu", 1).columns for s in (scene, longer))
     for column, scale in scales(one).items():
         assert np.abs(one[column] - other[column]).max() < 1e-6 * scale
 
@@ -149,10 +151,10 @@ class Here(Workers):
 def test_changed_physics_is_outside(name, change):
     """A tenth more resistance of the flesh, or a fifth more stiffness where contact has no edge, is found, and named."""
     case = replace(ALL[name], food=scaled(ALL[name].food, **change))
-    (row,) = check([case], References(), Here(), lambda _: None)
-    assert row["verdict"] == "outside" and row["largest"]["over_tolerance"] > 1
-    assert row["results"]["work_J"]["over_limit"] > 1
-    (said,) = (text for text in row["because"] if "material" in text)
+    (row,) = compare_with_references([case], References(), Here(), lambda _: None)
+    assert row.verdict == "outside" and row.largest.over_tolerance > 1
+    assert row.results.work_J.over_limit > 1
+    (said,) = (text for text in row.because if "material" in text)
     old, new = (c.food.value(*change) for c in (ALL[name], case))
     assert said == f"food.material.{next(iter(change))} {old} -> {new}"
 
@@ -162,13 +164,13 @@ def test_another_seed_is_within():
     case = ALL["cherry-cohesive"]
 
     class Other(type(case)):
-        def scene(self, seed=SEED):
+        def scene(self, seed=RECORDED_SEED):
             return super().scene(8)
 
-    (row,) = check([Other(case.food, case.knife, case.contact)], References(), Here(), lambda _: None)
-    assert row["verdict"] == "within"
-    assert row["largest"]["part"] > SAME
-    assert row["because"][0] == "numerics.seed 0 -> 8"
+    (row,) = compare_with_references([Other(case.food, case.knife, case.contact)], References(), Here(), lambda _: None)
+    assert row.verdict == "within"
+    assert row.largest.part > SAME
+    assert row.because[0] == "numerics.seed 0 -> 8"
 
 
 # Scatter and tolerances ---------------------------------------------------------------------------
@@ -185,12 +187,12 @@ def curves(level, n=60, length=0.03):
 def test_scatter_of_known_curves():
     """Peaks of 9, 10 and 11 N have a standard deviation of 1 N, edge and work their parts of it; the limit of three runs is 6.08."""
     found, tolerances = repeatability([curves(10.0), curves(9.0), curves(11.0)])
-    assert found["s_r"] == pytest.approx({"knife_N": 1, "edge_N": 2 / 3, "face_N": 1 / 3, "work_J": 0.06 / np.pi})
-    assert tolerances == pytest.approx({name: 6.085 * x for name, x in found["s_r"].items()}, rel=1e-3)
-    assert found["limits"]["peak_N"] == pytest.approx(6.085, rel=1e-3)
-    assert found["limits"]["work_J"] == pytest.approx(6.085 * 0.06 / np.pi, rel=1e-3)
-    assert found["s_r_results"]["peak_stroke_m"] == 0
-    assert found["limits"]["peak_stroke_m"] == pytest.approx(0.0005)  # a point of the curve
+    assert found.s_r == pytest.approx({"knife_N": 1, "edge_N": 2 / 3, "face_N": 1 / 3, "work_J": 0.06 / np.pi})
+    assert tolerances == pytest.approx({name: 6.085 * x for name, x in found.s_r.items()}, rel=1e-3)
+    assert found.limits["peak_N"] == pytest.approx(6.085, rel=1e-3)
+    assert found.limits["work_J"] == pytest.approx(6.085 * 0.06 / np.pi, rel=1e-3)
+    assert found.s_r_results["peak_stroke_m"] == 0
+    assert found.limits["peak_stroke_m"] == pytest.approx(0.0005)  # a point of the curve
 
 
 def test_limit_of_few_runs():
@@ -217,7 +219,7 @@ WOBBLE = (0.0, 1.0, -1.0, 0.5, -0.5, 0.2, 0.8, -0.7)  # per cent of force that a
 def made_up(scene):
     """A cut whose force follows R and, by a per cent, the seed."""
     level = 0.1 * scene.food.material.R * (1 + 0.01 * WOBBLE[scene.numerics.seed])
-    return {"status": "done", "columns": curves(level, length=scene.motion.stroke)}
+    return CutOutcome("done", curves(level, length=scene.motion.stroke))
 
 
 @pytest.fixture
@@ -362,10 +364,10 @@ def test_other_code_that_moves_the_peak(play, capsys):
     """The same scene gives a curve of the same peak and work that comes later: the place is said, and it can be recorded."""
 
     def later(scene):
-        columns = dict(made_up(scene)["columns"])
+        columns = dict(made_up(scene).columns)
         for name in ("knife_N", "edge_N", "face_N"):
             columns[name] = np.roll(columns[name], 6)
-        return {"status": "done", "columns": columns}
+        return CutOutcome("done", columns)
 
     _, use = play
     use(later)
@@ -411,14 +413,14 @@ def test_cut_that_breaks_down(play, capsys):
     """It is exit code 2 and named; --update does not record it, nor one of which another seed breaks down."""
     folder, use = play
     before = content(folder)
-    use(lambda _: {"status": "inverted", "columns": None})
+    use(lambda _: CutOutcome("inverted", None))
     assert main(["regress", "grape", "--contact", "nodal"]) == 2
     assert "broke down: inverted" in capsys.readouterr().out
     assert main(["regress", "grape", "--update"]) == 2
-    use(lambda scene: made_up(scene) if scene.numerics.seed == SEED else {"status": "left_grid", "columns": None})
+    use(lambda scene: made_up(scene) if scene.numerics.seed == RECORDED_SEED else CutOutcome("left_grid", None))
     (folder / "grape-nodal.csv").unlink()
     assert main(["regress", "grape", "--contact", "nodal", "--update"]) == 2
-    assert f"broke down: left_grid with seed {OTHERS[-1]}" in capsys.readouterr().out
+    assert f"broke down: left_grid with seed {OTHER_SEEDS[-1]}" in capsys.readouterr().out
     assert content(folder) == {name: text for name, text in before.items() if name != "grape-nodal.csv"}
 
 
@@ -430,12 +432,12 @@ def test_ctrl_c_keeps_what_is_recorded(play, capsys, monkeypatch):
     folder, use = play
     before = content(folder)
     tougher(monkeypatch, *PLAY)
-    use(most=4 + 1 * len(OTHERS) + 2)
+    use(most=4 + 1 * len(OTHER_SEEDS) + 2)
     assert main(["regress", *PLAY, "--update"]) == 130
     after = content(folder)
     assert {name for name in after if after[name] != before[name]} == {"grape-cohesive.csv", INDEX}
     assert set(after) == set(before)
-    use(most=4 + 3 * len(OTHERS))
+    use(most=4 + 3 * len(OTHER_SEEDS))
     capsys.readouterr()
     assert main(["regress", *PLAY, "--update"]) == 0
     assert "3 recorded, 1 kept as they were" in capsys.readouterr().out
@@ -457,7 +459,7 @@ def test_killed_while_writing_is_old_or_new(step, level, play, monkeypatch):
     hard = replace(case, food=scaled(case.food, R=1.1))
     monkeypatch.setattr(os, "replace", replaced)
     with pytest.raises(KeyboardInterrupt):
-        update([hard], references, Here(made_up), lambda _: None, ORDER)
+        record_changes([hard], references, Here(made_up), lambda _: None, ORDER)
     monkeypatch.undo()
     assert references.read("grape-nodal").columns["knife_N"].max() == pytest.approx(level)
     references.settle()
@@ -577,8 +579,8 @@ def test_code_and_libraries_that_are_others_are_named(play, monkeypatch):
     known = References(play[0]).read("grape-cohesive")
     case = ALL["grape-cohesive"]
     assert differences(case, known) == []
-    monkeypatch.setattr("studies.regression.study.code_key", lambda: "f" * 64)
-    monkeypatch.setattr("studies.regression.study.versions", lambda: known.origin["versions"] | {"taichi": "9.9"})
+    monkeypatch.setattr("studies.regression.comparison.code_key", lambda: "f" * 64)
+    monkeypatch.setattr("studies.regression.comparison.versions", lambda: known.origin["versions"] | {"taichi": "9.9"})
     assert differences(case, known) == [
         f"the solver's code {known.origin['solver']} -> {'f' * 16}",
         f"taichi {known.origin['versions']['taichi']} -> 9.9",
@@ -591,7 +593,7 @@ def test_worker_gives_what_is_recorded(monkeypatch):
     record = Simulation(scene).run()
     for status, columns in (("done", COLUMNS), ("inverted", None)):
         monkeypatch.setattr(Simulation, "run", lambda _, now=status: replace(record, status=now))
-        result = cut(scene, "cpu", 1)
-        assert result["status"] == status
-        assert (result["columns"] and tuple(result["columns"])) == columns
-    assert len(columns_of(record, scene.motion.stroke)["work_J"]) == POINTS
+        outcome = run_cut(scene, "cpu", 1)
+        assert outcome.status == status
+        assert (outcome.columns and tuple(outcome.columns)) == columns
+    assert len(columns_of(record, scene.motion.stroke)["work_J"]) == RECORDED_POINTS

@@ -11,7 +11,8 @@ from calib.simulation.process_pool import Pool
 from cutcal.main import main
 from mpm.errors import SceneError
 from studies.verification import bending, case
-from studies.verification.case import Case, How, Row, cases
+from studies.verification.case import SuiteOptions, VerificationCase, cases
+from studies.verification.result import Comparison
 from tests.calib.documents import valid
 
 FAST = [case for case in cases() if case.fast]
@@ -19,9 +20,9 @@ FAST = [case for case in cases() if case.fast]
 SECONDS = ("tilted board", "rest and friction", "vortex", "cutting resistance", "press: block, sliding", "ball")
 
 
-def row(expected: float = 2.0, got: float = 2.0, tolerance: float = 0.01, least: bool = False) -> Row:
+def row(expected: float = 2.0, got: float = 2.0, tolerance: float = 0.01, least: bool = False) -> Comparison:
     """A row about nothing."""
-    return Row("case", "quantity", expected, got, tolerance, "nowhere", least)
+    return Comparison("case", "quantity", expected, got, tolerance, "nowhere", least)
 
 
 @pytest.mark.parametrize(
@@ -56,7 +57,7 @@ def test_there_are_enough_rows_of_every_kind():
 )
 def test_the_fast_cases_pass(case):
     """Each row of the quick version."""
-    found = list(case.run(How(quick=True)))
+    found = list(case.run(SuiteOptions(quick=True)))
     assert found
     assert not [f"{r.case}, {r.quantity}: {r.got:g} not {r.expected:g}" for r in found if not r.passed]
 
@@ -65,32 +66,34 @@ def test_the_fast_cases_pass(case):
 @pytest.mark.parametrize("case", cases(), ids=[case.name for case in cases()])
 def test_all_cases_pass(case):
     """Each row of the whole table."""
-    assert not [f"{r.case}, {r.quantity}: {r.got:g} not {r.expected:g}" for r in case.run(How()) if not r.passed]
+    assert not [
+        f"{r.case}, {r.quantity}: {r.got:g} not {r.expected:g}" for r in case.run(SuiteOptions()) if not r.passed
+    ]
 
 
-def fakes(monkeypatch: pytest.MonkeyPatch, *made: Case) -> None:
+def fakes(monkeypatch: pytest.MonkeyPatch, *made: VerificationCase) -> None:
     """Put other cases into the table, and run them in this process."""
 
     def each(self: Pool, work, jobs):
         for k, job in enumerate(jobs):
             yield k, None if job[0] == "killed" else work(*job, self.arch, self.threads)
 
-    monkeypatch.setattr("studies.verification.study.cases", lambda: list(made))
+    monkeypatch.setattr("studies.verification.suite.cases", lambda: list(made))
     monkeypatch.setattr(Pool, "each", each)
 
 
-def good(how: How):
+def good(options: SuiteOptions):
     """A case that passes."""
     yield row()
 
 
-def bad(how: How):
+def bad(options: SuiteOptions):
     """A case that fails."""
     yield row()
     yield row(got=5.0)
 
 
-def broken(how: How):
+def broken(options: SuiteOptions):
     """A case that breaks down after a row."""
     yield row()
     raise SceneError("the knife is bent")
@@ -98,7 +101,7 @@ def broken(how: How):
 
 def test_a_failed_row_is_exit_code_2(monkeypatch, tmp_path, capsys):
     """Table and document name it, and the figure is drawn."""
-    fakes(monkeypatch, Case("good", good), Case("bad", bad))
+    fakes(monkeypatch, VerificationCase("good", good), VerificationCase("bad", bad))
     assert main(["verify", "--out", str(tmp_path / "a")]) == 2
     text = capsys.readouterr().out
     assert "FAIL" in text
@@ -113,7 +116,7 @@ def test_a_failed_row_is_exit_code_2(monkeypatch, tmp_path, capsys):
 
 def test_a_case_that_breaks_down_fails_and_the_others_run(monkeypatch, tmp_path, capsys):
     """Its message is kept; --json prints the document alone."""
-    fakes(monkeypatch, Case("broken", broken), Case("good", good))
+    fakes(monkeypatch, VerificationCase("broken", broken), VerificationCase("good", good))
     assert main(["verify", "--out", str(tmp_path / "a"), "--json"]) == 2
     document = valid(json.loads(capsys.readouterr().out))
     assert document["broken"] == {"broken": "the knife is bent"}
@@ -126,16 +129,16 @@ def test_slow_cases_are_left_out_of_the_quick_run(monkeypatch, tmp_path):
     seen = []
     fakes(
         monkeypatch,
-        Case("fast", lambda how: seen.append(how) or good(how)),
-        Case("slow", lambda how: seen.append("slow") or good(how), fast=False),
+        VerificationCase("fast", lambda options: seen.append(options) or good(options)),
+        VerificationCase("slow", lambda options: seen.append("slow") or good(options), fast=False),
     )
     assert main(["verify", "--quick", "--seed", "3", "--out", str(tmp_path / "a")]) == 0
-    assert seen == [How(quick=True, seed=3)]
+    assert seen == [SuiteOptions(quick=True, seed=3)]
 
 
 def test_an_unknown_case_and_a_used_folder_are_errors(monkeypatch, tmp_path, capsys):
     """One line each, exit code 1."""
-    fakes(monkeypatch, Case("good", good))
+    fakes(monkeypatch, VerificationCase("good", good))
     assert main(["verify", "--only", "nothing", "--out", str(tmp_path / "a")]) == 1
     assert "there are good" in capsys.readouterr().err
     assert main(["verify", "--out", str(tmp_path / "a")]) == 0
@@ -146,14 +149,14 @@ def test_an_unknown_case_and_a_used_folder_are_errors(monkeypatch, tmp_path, cap
 def test_resume_runs_what_did_not_end(monkeypatch, tmp_path, capsys):
     """Cases that ended are kept, one that broke down or whose process was killed runs again; another seed is refused."""
     seen = []
-    counted = Case("good", lambda how: seen.append("good") or good(how))
+    counted = VerificationCase("good", lambda options: seen.append("good") or good(options))
     again = ["verify", "--out", str(tmp_path / "a"), "--resume"]
-    fakes(monkeypatch, counted, Case("broken", broken), Case("killed", good))
+    fakes(monkeypatch, counted, VerificationCase("broken", broken), VerificationCase("killed", good))
     assert main(again) == 2
     document = valid(json.loads((tmp_path / "a/verify.json").read_text()))
     assert set(document["broken"]) == {"broken", "killed"}
     assert "killed" in document["broken"]["killed"]
-    fakes(monkeypatch, Case("killed", good), counted, Case("broken", good))
+    fakes(monkeypatch, VerificationCase("killed", good), counted, VerificationCase("broken", good))
     monkeypatch.setattr(
         Pool, "each", lambda self, work, jobs: ((k, work(*job, "cpu", 1)) for k, job in enumerate(jobs))
     )
@@ -188,5 +191,5 @@ def test_parts_are_modules_with_cases():
 def test_the_hanging_beam_is_free_to_bend(monkeypatch):
     """In a fiftieth of the time to rest its ends have begun to fall; a mirror across the way that it bends would hold it straight."""
     monkeypatch.setattr(bending, "PERIODS", 0.04)
-    place, down = bending.particles(How(), bending.DEPTH / 8, 2)
+    place, down = bending.particles(SuiteOptions(), bending.DEPTH / 8, 2)
     assert bending.HALF - bending.DEPTH / 8 < place < bending.HALF and down > 1e-5

@@ -1,4 +1,4 @@
-"""Audit of a finished run: is every number finite, does momentum balance, was energy made from nothing."""
+"""Conservation in a finished run: is every number finite, does momentum balance, was energy made from nothing."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ GAIN_LIMIT = 0.1
 EARLY = 0.1
 """Part of all energy that is added to what was put in so far: before contact nothing has been put in."""
 LASTING = 5
-"""Outputs in a row that must show a gain: the work of gravity is summed between outputs, and is off while the food bounces
-faster than that; instability stays."""
+"""Outputs in a row that must show a gain: the work of gravity is summed between outputs, and is off while the food
+bounces faster than that; instability stays."""
 
 
 @dataclass(frozen=True)
-class Audit:
+class Conservation:
     """Attributes: reason, empty for a sound run; energy_gain [-]; momentum residual over the largest force [-]."""
 
     reason: str
@@ -28,8 +28,8 @@ class Audit:
     momentum: float
 
 
-def audit(record: ForceRecord, *, precision: str, stored: float = 0.0, least: float = 0.0) -> Audit:
-    """Judge a record.
+def check_conservation(record: ForceRecord, *, precision: str, stored: float = 0.0, least: float = 0.0) -> Conservation:
+    """Check a record.
 
     Args:
         record: Of a run that reached its end or not.
@@ -43,7 +43,7 @@ def audit(record: ForceRecord, *, precision: str, stored: float = 0.0, least: fl
     columns = (*record.columns().values(), record.momentum, record.gravity)
     if not all(np.isfinite(c).all() for c in columns):
         own = record.status if record.status != "done" else "not_finite"
-        return Audit(own, float("nan"), float("nan"))
+        return Conservation(own, float("nan"), float("nan"))
     momentum = _momentum(record)
     gain = energy_gain(record, stored=stored, least=least)
     reason = ""
@@ -53,15 +53,23 @@ def audit(record: ForceRecord, *, precision: str, stored: float = 0.0, least: fl
         reason = "momentum"
     elif not gain <= GAIN_LIMIT:
         reason = "energy_growth"
-    return Audit(reason, gain, momentum)
+    return Conservation(reason, gain, momentum)
 
 
 def energy_gain(record: ForceRecord, *, stored: float = 0.0, least: float = 0.0) -> float:
     """Largest lasting energy that nothing has put in, over what was put in so far [-]; negative where there is none.
 
-    Put in: work of the knife and of gravity, and what was stored at the start. Found: kinetic and elastic energy, and what
-    flow, damage, the loss factor, friction and the edge have taken. The transfers only take energy, so more than was put in
-    is never there.
+    Put in: work of the knife and of gravity, and what was stored at the start. Found: kinetic and elastic energy, and
+    what flow, damage, the loss factor, friction and the edge have taken. The transfers only take energy, so more than was
+    put in is never there.
+
+    Args:
+        record: Of a run that reached its end or not.
+        stored: Energy of the food at the start [J].
+        least: Energy below which everything is rounding [J].
+
+    Returns:
+        The gain [-].
     """
     weight = float(np.abs(record.gravity).max())
     put = stored + record.work_done + record.weighing

@@ -2,36 +2,34 @@
 
 from __future__ import annotations
 
-import json
-
-from reports.stability import LOOKS, write_figure
-from studies.stability.study import REASONS
+from reports.studies.stability import MARKERS, write_figure
+from studies.stability.result import REASONS, CellResult
 
 
 def drawn(folder, cells) -> bytes:
     """The figure of these cells."""
-    (folder / "stress.json").write_text(json.dumps({"cells": cells}))
-    write_figure(folder)
+    write_figure(cells, folder)
     return (folder / "stress.svg").read_bytes()
 
 
 def one(status, reason="", *, physical=False, family="dt and nu", **values):
-    """A cell as stress.json has it."""
+    """A cell of a map."""
     place = {"dt_over_limit": 0.7, "nu": 0.4} | values
-    return {"name": f"{family}: x", "family": family, "status": status, "reason": reason, "physical": physical, **place}
+    ends = {"status": status, "reason": reason, "message": ""}
+    return CellResult(name=f"{family}: x", family=family, values=place, physical=physical, forced=False, **ends)
 
 
 def test_every_reason_has_a_mark_of_its_own():
     """No reason is drawn as another one or cannot be drawn; they differ without colour."""
-    assert set(REASONS) - {"cfl"} | {"stable", "unexplained"} == set(LOOKS)
-    assert len({(look["marker"], look.get("mfc")) for look in LOOKS.values()}) == len(LOOKS)
+    assert set(REASONS) - {"cfl"} | {"stable", "unexplained"} == set(MARKERS)
+    assert len({(look["marker"], look.get("mfc")) for look in MARKERS.values()}) == len(MARKERS)
 
 
 def test_figure_shows_every_status(tmp_path):
     """All statuses in a plane and in the list, and a map of one cell, can be drawn; letters are paths."""
     cells = [one("stopped", reason, dt_over_limit=k / 10) for k, reason in enumerate(REASONS)]
     cells += [one("refused", "cfl"), one("unexplained", "odd"), one("stable"), one("stable", family="start")]
-    figure = drawn(tmp_path, [c for c in cells if c["reason"] not in ("cfl", "refused") or c["status"] == "refused"])
+    figure = drawn(tmp_path, [c for c in cells if c.reason not in ("cfl", "refused") or c.status == "refused"])
     assert figure.startswith(b"<?xml")
     assert b"<text" not in figure
     assert drawn(tmp_path, [one("stable")]).startswith(b"<?xml")

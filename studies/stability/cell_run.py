@@ -1,20 +1,20 @@
-"""One cell of the stability map, run within bounds and audited; lives in a worker process, where Taichi is."""
+"""One cell of the stability map, run within bounds and checked; lives in a worker process, where Taichi is."""
 
 from __future__ import annotations
 
 import math
 import time
-from typing import Any
 
 import numpy as np
 
+from calib.simulation.evaluation import Evaluation
 from mpm.kernels import fields as kn
 from mpm.material import Material
 from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.solver import Simulation
-from studies.stability.audit import Audit, audit
-from studies.stability.cases import Cell
+from studies.stability.conservation import Conservation, check_conservation
+from studies.stability.map_cell import MapCell
 
 ROUNDING = 1e-12  # energy over stiffness times volume that is nothing [-]
 
@@ -27,7 +27,7 @@ class TooLong(Exception):
         self.fraction = fraction
 
 
-class Trial(Simulation):
+class CellSimulation(Simulation):
     """A simulation that may start otherwise than a cut does, or take longer steps than are sound.
 
     Args:
@@ -35,7 +35,7 @@ class Trial(Simulation):
         runtime: Device.
     """
 
-    def __init__(self, cell: Cell, runtime: Runtime) -> None:
+    def __init__(self, cell: MapCell, runtime: Runtime) -> None:
         assert cell.scene is not None
         self.cell = cell
         super().__init__(cell.scene, runtime)
@@ -56,21 +56,27 @@ class Trial(Simulation):
         density = 3 * m.shear * (s - 1) ** 2 + 0.5 * m.lame * (s**3 - 1) ** 2
         return self.images * self.seeds.total * density
 
-    def go(self, longest: float) -> tuple[ForceRecord, Audit]:
-        """Run and audit.
+    def run_checked(self, longest: float) -> tuple[ForceRecord, Conservation]:
+        """Run, and check what is conserved.
+
+        Args:
+            longest: Time that the run may take [s].
+
+        Returns:
+            The record, and what the check says of it.
 
         Raises:
             TooLong: The run took more than ``longest`` seconds.
         """
         began = time.monotonic()
 
-        def watch(fraction: float, _: float) -> None:
+        def stop_when_late(fraction: float, _: float) -> None:
             if time.monotonic() - began > longest:
                 raise TooLong(fraction)
 
-        record = self.run(progress=watch)
+        record = self.run(progress=stop_when_late)
         n, volume = self.scene.numerics, self.images * self.seeds.total
-        return record, audit(
+        return record, check_conservation(
             record,
             precision=n.precision,
             stored=self.stored,
@@ -100,27 +106,28 @@ class Trial(Simulation):
             k.pose.from_numpy(pose)
 
 
-def attempt(cell: Cell, most: float, longest: float, arch: str, threads: int) -> dict[str, Any]:
-    """One run as plain data.
+def run_cell(cell: MapCell, most: float, longest: float, arch: str, threads: int) -> Evaluation:
+    """One run within bounds.
 
     Args:
         cell: What to run.
         most: Particle steps that are allowed.
-        longest: Seconds that are allowed.
+        longest: Time that is allowed [s].
         arch: Device.
         threads: CPU threads.
 
     Returns:
-        Fields of an Evaluation; reason ``too_long`` where it was not run to its end.
+        How it ended; its reason is ``too_long`` where it was not run to its end.
     """
-    trial = Trial(cell, Runtime(arch, threads))
-    scalars = {"particle_steps": trial.steps * len(trial.seeds.x), "particles": float(len(trial.seeds.x))}
+    simulation = CellSimulation(cell, Runtime(arch, threads))
+    particles = len(simulation.seeds.x)
+    scalars = {"particle_steps": simulation.steps * particles, "particles": float(particles)}
     if scalars["particle_steps"] > most:
-        return _result("too_long", 0.0, scalars, 0.0)
+        return _ended("too_long", 0.0, scalars, 0.0)
     try:
-        record, found = trial.go(longest)
+        record, found = simulation.run_checked(longest)
     except TooLong as stop:
-        return _result("too_long", stop.fraction, scalars, longest)
+        return _ended("too_long", stop.fraction, scalars, longest)
     scalars |= {
         "peak_N": record.peak,
         "work_J": record.work,
@@ -129,14 +136,18 @@ def attempt(cell: Cell, most: float, longest: float, arch: str, threads: int) ->
         "steps": float(record.steps),
         "dt_s": record.dt,
     }
-    return _result(found.reason, record.fraction, scalars, record.wall)
+    return _ended(found.reason, record.fraction, scalars, record.wall)
 
 
-def _result(reason: str, fraction: float, scalars: dict[str, float], seconds: float) -> dict[str, Any]:
-    return {
-        "status": "failed" if reason else "ok",
-        "reason": reason,
-        "fraction": fraction,
-        "scalars": {name: value for name, value in scalars.items() if math.isfinite(value)},
-        "seconds": seconds,
-    }
+def _ended(reason: str, fraction: float, scalars: dict[str, float], seconds: float) -> Evaluation:
+    return Evaluation(
+        index=0,
+        parameters={},
+        status="failed" if reason else "ok",
+        reason=reason,
+        fraction=fraction,
+        stroke=np.empty(0),
+        force=np.empty(0),
+        scalars={name: value for name, value in scalars.items() if math.isfinite(value)},
+        seconds=seconds,
+    )

@@ -1,0 +1,1 @@
+"""Reports of what was studied of the solver: convergence, verification, stability, speed."""
