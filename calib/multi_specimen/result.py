@@ -6,17 +6,21 @@ The fields have the names of the document's keys (:mod:`calib.io.typed_document`
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
 
 from calib.io.folder import write_json
-from calib.io.typed_document import read_document, to_document
+from calib.io.provenance import Invocation, Software
+from calib.io.typed_document import FLAT, read_document, to_document
+from calib.material.properties import Property
 from calib.multi_specimen.compression_modulus import CompressionModulus
 from calib.multi_specimen.fitted_cuts import FittedCut
 from calib.multi_specimen.held_out import INSIDE_LIMIT, HeldOutPrediction
-from calib.problem.nuisance import NuisanceEstimate
+from calib.problem.parameters import Parameter
 from calib.problem.setup import Setup
+from calib.uncertainty.estimates import FittedNuisance, FittedParameter
+from calib.uncertainty.intervals import Interval
 from calib.validation.acceptance import Verdict
 from calib.validation.metrics import Metrics
 from calib.validation.numerical_checks import Check
@@ -72,30 +76,6 @@ class HeldOutLimits:
     nrmse: float = PREDICTION_NRMSE_LIMIT
     rating: float = PREDICTION_RATING_LIMIT
     inside: float = INSIDE_LIMIT
-
-
-@dataclass(frozen=True)
-class FittedNuisance:
-    """What the fit says of one part of the measurement.
-
-    Attributes:
-        value: Best value [unit].
-        sd: Its standard deviation [unit].
-        prior_sd: Standard deviation that the sensor leaves open [unit].
-        unit: SI unit, - where there is none.
-        outside: Whether the trace asks for more than three standard deviations of the sensor's.
-    """
-
-    value: float
-    sd: float
-    prior_sd: float
-    unit: str
-    outside: bool
-
-    @classmethod
-    def of(cls, estimate: NuisanceEstimate) -> FittedNuisance:
-        """That of an estimate."""
-        return cls(estimate.value, estimate.sd, estimate.prior_sd, estimate.unit, estimate.outside)
 
 
 @dataclass(frozen=True)
@@ -212,30 +192,28 @@ class HeldOutCut:
 
 
 @dataclass(frozen=True)
-class StudyParameter:
+class StudyParameter(FittedParameter):
     """A fitted parameter, of all cuts or of one.
 
     Attributes:
-        value: Best value [unit].
-        unit: SI unit, - where there is none.
-        low95, high95: Ends of the 95 % interval [unit]; None where the fit ended too early.
-        prior_low, prior_high: Ends of the literature's 95 % range [unit].
-        verdict: What the fit says of it, ``unknown`` where it ended too early.
-        status: How far the value at the start can be trusted, as in ``materials.yaml``.
-        source: Where the value at the start and the range come from.
         shared: Whether it is the same for all cuts.
     """
 
-    value: float
-    unit: str
-    low95: float | None
-    high95: float | None
-    prior_low: float
-    prior_high: float
-    verdict: str
-    status: str
-    source: str
-    shared: bool
+    shared: bool = True
+
+    @classmethod
+    def of_study(cls, found: Interval | Parameter, known: Property, *, shared: bool) -> StudyParameter:
+        """A parameter of a joint fit.
+
+        Args:
+            found: Its interval; only the parameter where the fit ended too early for one.
+            known: What the literature says of it.
+            shared: Whether it is the same for all cuts.
+
+        Returns:
+            The parameter as the document has it.
+        """
+        return cls(**vars(FittedParameter.of(found, known, None)), shared=shared)
 
 
 @dataclass(frozen=True)
@@ -261,11 +239,8 @@ class StudyResult:
         warnings: What a reader of the numbers must know about the input, one sentence each.
         simulations: All simulations that are stored.
         wall_s: Run time [s].
-        seed: Seed of particles and search.
-        device: Device of the simulations.
-        command: Command line, or the call from Python.
-        versions: Versions of cutcal, Python and the packages that a result depends on.
-        git: Commit of the checkout that ran, None where cutcal was installed.
+        invocation: How it was called.
+        software: What was run.
     """
 
     DOCUMENT: ClassVar = "study"
@@ -288,11 +263,8 @@ class StudyResult:
     warnings: tuple[str, ...]
     simulations: int
     wall_s: float
-    seed: int
-    device: str
-    command: tuple[str, ...]
-    versions: Mapping[str, str]
-    git: str | None
+    invocation: Invocation = field(metadata=FLAT)
+    software: Software = field(metadata=FLAT)
 
 
 def write_result(result: StudyResult, folder: Path) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from calib.io.folder import prepare, write_csv
 from calib.io.progress import Progress
-from calib.io.provenance import git_commit, key_of, versions
+from calib.io.provenance import Invocation, Software, key_of
 from calib.material.food import FoodSpec, dump_material
 from calib.material.properties import MEANINGS
 from calib.multi_specimen.compression_modulus import CompressionModulus, compression_modulus
@@ -120,11 +120,8 @@ class Finished:
             warnings=tuple(_warnings(study, self.setups)),
             simulations=self.simulations,
             wall_s=wall_s,
-            seed=study.seed,
-            device=study.first.arch,
-            command=study.first.command,
-            versions=versions(),
-            git=git_commit(),
+            invocation=Invocation(study.seed, study.first.arch, study.first.command),
+            software=Software.here(),
         )
 
     def _parameters(self) -> dict[str, StudyParameter]:
@@ -132,21 +129,10 @@ class Finished:
         food, analysis = self.study.food, self.fit.analysis
         out = {}
         for k, p in enumerate(self.fit.result.parameters):
-            interval = None if analysis is None else analysis.uncertainty.intervals[k]
+            found = p if analysis is None else analysis.uncertainty.intervals[k]
             name = property_of(p.name)
             known = food.dims[name] if name == "height" else food.properties[name]
-            out[p.name] = StudyParameter(
-                value=p.value,
-                unit=p.unit,
-                low95=None if interval is None else interval.low95,
-                high95=None if interval is None else interval.high95,
-                prior_low=p.prior_low,
-                prior_high=p.prior_high,
-                verdict="unknown" if interval is None else interval.verdict,
-                status=known.status,
-                source=known.source,
-                shared=is_shared(p.name),
-            )
+            out[p.name] = StudyParameter.of_study(found, known, shared=is_shared(p.name))
         return out
 
     def _limits(self) -> list[str]:
@@ -200,7 +186,8 @@ def _write(done: Finished, out: Path, began: float) -> StudyResult:
         write_csv(out / f"curves-{name}.csv", done.curves(name))
     result = done.result(time.monotonic() - began)
     hashes = {name: cut.trace.sha256 for name, cut in result.traces.items()}
-    provenance = {"passed": result.passed, "git": result.git, "versions": result.versions}
+    software = result.software
+    provenance = {"passed": result.passed, "git": software.git, "versions": software.versions}
     dump_material(done.food(), out / "material.yaml", {"study": result.study, "traces": hashes, **provenance})
     write_result(result, out)
     write_report(out, MEANINGS)
