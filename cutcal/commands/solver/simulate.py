@@ -185,7 +185,9 @@ def run(args: argparse.Namespace) -> int:
     return 0 if record.status == "done" else 1
 
 
-def _draw(args: argparse.Namespace, out: Path, simulation: Any, record: ForceRecord, watch: SnapshotRecorder, title: str) -> None:
+def _draw(
+    args: argparse.Namespace, out: Path, simulation: Any, record: ForceRecord, watch: SnapshotRecorder, title: str
+) -> None:
     """Pictures, video and page, whatever was asked for; force.csv and summary.json are written before."""
     if not watch.taken:
         say("nothing to draw: the run broke down before the first look")
