@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from mpm.errors import CutcalError
-from mpm.errors import OutputError as OutputError
+from mpm.scene.errors import CutcalError
+from mpm.scene.errors import OutputError as OutputError
 
 
 class TraceError(CutcalError):

@@ -35,8 +35,8 @@ from intsim.task.rollout import Policy, Rollout
 from intsim.task.success import GeometricOutcome, judge_geometry
 from intsim.task.suites import FIRST_TEST_SEED, Episode, sample_episode
 from intsim.task.targets import target
-from mpm.errors import CutcalError
 from mpm.scene import Arm
+from mpm.scene.errors import CutcalError
 
 TABLE_STEPS = 2000  # of an episode on the plain table, at most: 100 s
 ROWS_FILE, RESULT_FILE = "evaluate.jsonl", "evaluate.json"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mpm.errors import OutputError
+from mpm.scene.errors import OutputError
 
 __all__ = ["ReportError"]
 

@@ -11,7 +11,7 @@ from calib.io.typed_document import ANY, FORMER, NULL
 from calib.material.properties import PROPERTIES
 from calib.validation.metrics import IsoRating, Metrics, SpragueGeers
 from mpm.scene import Knife
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 Sha256 = Annotated[str, Shared("sha256")]
 

@@ -29,7 +29,7 @@ from calib.problem.parameters import ParameterSet
 from calib.problem.scored_run import ScoredRun
 from calib.simulation.evaluation import Evaluator
 from mpm.arrays import FloatArray
-from mpm.errors import SimulationError
+from mpm.scene.errors import SimulationError
 
 #: Runs among which the answer is chosen by a second run of each, slower and with other particles: two batches of two.
 FINALISTS = 4

@@ -45,7 +45,7 @@ from calib.problem.objective import EXPLAINED, Objective
 from calib.problem.scored_run import ScoredRun
 from calib.simulation.evaluation import Evaluation, Evaluator
 from mpm.arrays import FloatArray
-from mpm.errors import SimulationError
+from mpm.scene.errors import SimulationError
 
 #: A promising point elsewhere must be this far from the one nearby [coordinate units].
 BASIN_DISTANCE = 0.2

@@ -31,7 +31,7 @@ from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from calib.errors import DocumentError
 from calib.io.schema import tag
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 FLAT: Mapping[str, Any] = {"flat": True}
 """Metadata of a field whose keys stand beside those of the result that has it."""

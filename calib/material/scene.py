@@ -11,7 +11,7 @@ import numpy as np
 from calib.material.food import FoodSpec
 from calib.trace.conditioning import Conditioned
 from mpm.scene import EdgeLaw, Knife, Motion, Numerics, Scene
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 ZONE_M = 4e-3
 """Process zone of the edge [m]; small foods get an eighth of their height."""
@@ -48,7 +48,7 @@ class Sizing:
     """Sizes of the specimen, each given by the user or None, and where along its length it is cut.
 
     Attributes:
-        shape: Outline, one of ``mpm.shapes.SHAPE_KINDS``.
+        shape: Outline, one of ``mpm.scene.shapes.SHAPE_KINDS``.
         height: Height [m].
         width: Width along the blade [m].
         length: Length across the blade [m].

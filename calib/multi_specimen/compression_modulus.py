@@ -12,7 +12,7 @@ from calib.compression.modulus import fit_modulus
 from calib.compression.press import homogeneous
 from calib.multi_specimen.spec import CompressionSpec
 from calib.problem.parameters import Z95, ParameterSet
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 COMPRESSION_STRAIN = 0.2
 """Strain up to which a compression test is fitted [-]: flesh yields beyond."""

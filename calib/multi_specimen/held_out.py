@@ -30,7 +30,7 @@ from calib.validation.metrics import Metrics, compare
 from calib.validation.null_models import null_models
 from calib.validation.prediction import PREDICTION_NRMSE_LIMIT, PREDICTION_RATING_LIMIT
 from mpm.arrays import FloatArray
-from mpm.errors import SimulationError
+from mpm.scene.errors import SimulationError
 
 SPECIMEN_BUDGET, SPECIMEN_DESIGN = 40.0, 5
 """Simulations at most for the few parameters of a specimen, and those of their design."""

@@ -26,7 +26,7 @@ from calib.validation.metrics import Metrics
 from calib.validation.numerical_checks import Check
 from calib.validation.prediction import PREDICTION_NRMSE_LIMIT, PREDICTION_RATING_LIMIT
 from mpm.scene import Knife
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 SUMMARY = "summary.json"
 

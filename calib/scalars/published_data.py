@@ -19,9 +19,9 @@ from calib.material.properties import DIMENSIONS, Rule
 from calib.material.scene import LENGTH_PER_HEIGHT, PRISMS
 from calib.problem.food_parameters import fit_parameters
 from calib.problem.parameters import ParameterSet
-from mpm.errors import CutcalError, SceneError
 from mpm.scene import Knife
-from mpm.shapes import SHAPE_KINDS, Shape, section_area
+from mpm.scene.errors import CutcalError, SceneError
+from mpm.scene.shapes import SHAPE_KINDS, Shape, section_area
 
 PEAK_FORCE, CUT_ENERGY = "peak_N", "energy_J_m2"
 QUANTITIES = {PEAK_FORCE: "largest force [N]", CUT_ENERGY: "work over the area of the cut [J/m^2]"}

@@ -33,7 +33,7 @@ from calib.uncertainty.analysis import UncertaintyAnalysis, analyse, equally_goo
 from calib.uncertainty.intervals import Interval
 from calib.uncertainty.profile_likelihood import RISE
 from mpm.arrays import FloatArray
-from mpm.errors import SimulationError
+from mpm.scene.errors import SimulationError
 
 CLAIMABLE = ("R", "R_skin")
 """Properties that a fit may call identified. Intervals of the others hold the truth too seldom: stiff foods that yield

@@ -18,10 +18,10 @@ from calib.problem.request import Request
 from calib.problem.setup import conditioned
 from calib.trace.filters import filter_simulated
 from calib.validation.metrics import Metrics, compare
-from mpm.errors import SimulationError
 from mpm.output.record import ForceRecord
 from mpm.scene import Scene
-from mpm.shapes import Shape
+from mpm.scene.errors import SimulationError
+from mpm.scene.shapes import Shape
 
 PREDICTION_NRMSE_LIMIT, PREDICTION_RATING_LIMIT = 0.10, 0.80
 """Largest curve error and smallest ISO-18571-style rating of a prediction that passes [-]."""

@@ -33,7 +33,7 @@ from calib.simulation.workers import Workers
 from calib.trace.filters import N_STROKE, filter_simulated
 from mpm.arrays import FloatArray
 from mpm.scene import Knife, Scene
-from mpm.shapes import volume
+from mpm.scene.shapes import volume
 
 DRAWS = 32
 QUANTILES: Mapping[str, float] = {"q025": 0.025, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q975": 0.975}

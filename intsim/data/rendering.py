@@ -15,7 +15,7 @@ from intsim.sim.scenery import FOOD_COLOURS
 from intsim.sim.world import ENV_ID
 from intsim.task.suites import Episode
 from intsim.task.targets import CutSpec
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 
 class Renderer:

@@ -43,7 +43,7 @@ from intsim.data.demonstrate import Demonstration
 from intsim.task.planner import CONTROL_RATE, GRIPPER_CLOSED, PHASES
 from intsim.task.targets import Item
 from mpm.files import replacing, write_atomic
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 SHARD_NAME = "shard-{:04d}"
 EPISODE_PART = "part-{:06d}.h5"  # an episode whose shard is not complete

@@ -27,7 +27,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 PROTOCOL = 1
 ACTION_SIZES = {"pose": 7, "joints": 8}

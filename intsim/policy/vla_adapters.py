@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from intsim.policy.remote import Model, Server
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 FRONT_CAMERA = "front"  # the picture that all three are given
 ACTION_STRIDE = 4  # RDT's actions are interpolated four times finer than its control

@@ -14,7 +14,7 @@ from intsim.task.kinematic_table import limit_command
 from intsim.task.planner import CONTROL_RATE, GRIPPER_CLOSED
 from intsim.task.rollout import Policy, Rollout
 from intsim.task.suites import sample_episode
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 STALL_STEPS, STALL_DISTANCE = 30, 1e-3
 """Steps within which an edge that has not moved so far [m] is stuck, and the episode over."""

@@ -12,10 +12,10 @@ from intsim.sim.severing import cut_scene_at
 from intsim.task.kinematic_table import axis_crossing
 from intsim.task.planner import DESCENT_SPEED
 from intsim.task.targets import Item
-from mpm.errors import SceneError, SimulationError
 from mpm.live import LiveCut
 from mpm.output.record import ForceRecord
 from mpm.scene import Scene
+from mpm.scene.errors import SceneError, SimulationError
 
 GRID_MARGIN = 2.0  # empty grid around the food, over half its size: a knife that comes back takes pieces along
 ON_BOARD_HEIGHT = 1e-4  # height at which the edge is on the board [m]

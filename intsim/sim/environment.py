@@ -31,7 +31,7 @@ from intsim.task.planner import CONTROL_RATE, HOME
 from intsim.task.success import judge_geometry
 from intsim.task.suites import FOODS, Episode, sample_episode
 from intsim.task.targets import CAMERAS
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 PHYSICS_RATE = 100  # steps of the robot's physics a second
 PIXELS, HUMAN_PIXELS = 128, 512

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeGuard
 
 from mpm.scene import Knife
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 from reports.base import figures
 from reports.base.format import breakable, count, listed, plain, publish, quantity, uncertain
 from reports.base.labels import capital, in_words, shown

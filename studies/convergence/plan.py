@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from calib.errors import CurveError
 from calib.material.scene import with_other_particles
 from mpm.scene import Scene
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 AXES = ("safety", "mach", "ppc", "offset", "repeat")
 """What can be varied beside the cell size, each apart from the others: dt over its limit, speed over the P-wave's,

@@ -26,9 +26,9 @@ from intsim.task.rollout import Rollout
 from intsim.task.success import TIP_HEIGHT, judge_geometry, wilson
 from intsim.task.suites import FIRST_TEST_SEED, FOODS, SUITES, Episode, sample_episode
 from intsim.task.targets import CutSpec, Item, TaskError, target
-from mpm.errors import CutcalError
 from mpm.scene import Arm
-from mpm.shapes import Shape
+from mpm.scene.errors import CutcalError
+from mpm.scene.shapes import Shape
 from tests.calib.documents import valid
 
 ALL = {name: load_food(name) for name in FOODS}

@@ -28,7 +28,7 @@ from cutcal.options import (
     titled,
     workers_of,
 )
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 if TYPE_CHECKING:
     from calib.calibration.result import CalibrationResult

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cutcal.options import KNIFE_HELP, RESUME_HELP, Group, add_workers, number, print_json, say, whole, workers_of
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 if TYPE_CHECKING:
     from intsim.data.dataset_document import DatasetDocument, DatasetSpec

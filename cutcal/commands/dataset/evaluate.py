@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from calib.io.typed_document import to_document
 from calib.material.food import FoodSpec, load_food, load_material_file
 from cutcal.options import KNIFE_HELP, Group, add_workers, number, print_json, say, whole, workers_of
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 if TYPE_CHECKING:
     from intsim.evaluate import PolicyEvaluation

@@ -32,7 +32,7 @@ from calib.problem.target import Target
 from calib.simulation.evaluation import Evaluation, Evaluator
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, Header
 from calib.uncertainty.intervals import linearised_likelihood, uncertainty
-from mpm.errors import SimulationError
+from mpm.scene.errors import SimulationError
 from tests.calib.fake import (
     FIVE,
     GRID,

@@ -22,7 +22,7 @@ from calib.validation.metrics import IsoRating, Metrics, Russell, SpragueGeers
 from calib.validation.numerical_checks import Check
 from calib.validation.prediction import PredictionResult
 from mpm.scene import Knife
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 from tests.calib.documents import valid
 from tests.reports import sample
 

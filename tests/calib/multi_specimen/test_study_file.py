@@ -12,7 +12,7 @@ import pytest
 from calib.multi_specimen.compression_modulus import compression_modulus, with_measured_modulus
 from calib.multi_specimen.spec import SCATTER, SPECIMEN_PROPERTIES
 from calib.multi_specimen.study_file import read_study
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 from tests.calib.fake import FIVE, goal
 
 GOOD = """

@@ -22,7 +22,7 @@ from intsim.data.pictures import load_pictures, render_dataset, require_renderer
 from intsim.data.rdt import export_rdt
 from intsim.data.rlds import export_rlds
 from intsim.data.shards import trajectories
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 from tests.calib.documents import valid
 from tests.intsim.data.test_generate import Inline
 from tests.intsim.painter import PIXELS, Here, Painter, paint_with

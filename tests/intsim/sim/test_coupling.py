@@ -13,7 +13,7 @@ from intsim.sim.severing import MIN_CELLS, cut_scene_at
 from intsim.task.planner import BladeDescent, plan_cut
 from intsim.task.targets import Item
 from mpm.live import LiveCut
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 FOODS = {"strawberry": load_food("strawberry")}
 BERRY = Item("strawberry", Shape("ellipsoid", 0.04, 0.032, 0.032), x=0.03, y=-0.02, yaw=1.2)
@@ -115,7 +115,7 @@ def test_a_cut_that_breaks_down_is_said_and_not_begun_again(monkeypatch):
     def broken(self, height, slide, span):
         calls[0] += 1
         if calls[0] == 40:
-            self._held.k.x.fill(1.0)
+            self._held.state.x.fill(1.0)
         return move(self, height, slide, span)
 
     monkeypatch.setattr(LiveCut, "move", broken)

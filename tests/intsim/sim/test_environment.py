@@ -31,7 +31,7 @@ from intsim.sim.world import World
 from intsim.task.planner import GRIPPER_CLOSED, PHASES, BladeDescent, plan_cut
 from intsim.task.suites import sample_episode
 from intsim.task.targets import target
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 from tests.calib.documents import valid
 from tests.intsim.painter import Here
 

@@ -29,7 +29,7 @@ from intsim.task.planner import (
     plan_cut,
 )
 from intsim.task.targets import Item, TaskError
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 APPLE = Item("apple", Shape("ellipsoid", 0.075, 0.075, 0.07), 0.03, 0.05, math.radians(70))
 

@@ -21,7 +21,7 @@ from intsim.task.targets import (
     coefficient_of_variation,
     target,
 )
-from mpm.shapes import Shape, volume
+from mpm.scene.shapes import Shape, volume
 
 BANANA = Item("banana", Shape("cylinder", 0.16, 0.033, 0.033), 0.02, -0.03, math.radians(80))
 ratios = st.floats(0.1, 0.9)
