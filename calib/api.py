@@ -1,8 +1,7 @@
-"""Calibrating from Python as from the command line: a request in plain values, and what a finished folder holds."""
+"""Calibrating from Python as from the command line: one trace, what a finished folder holds, and several cuts."""
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -12,16 +11,22 @@ from typing import Any
 
 import pandas as pd
 
+from calib.calibration.result import SUMMARY, read_result, read_summary
+from calib.calibration.result import CalibrationResult as CalibrationResult
 from calib.errors import OutputError
+from calib.io.folder import finite
 from calib.io.progress import Progress
+from calib.io.typed_document import to_document
 from calib.io.wording import brief
-from calib.material.food import FoodSpec, load_material_file
-from calib.material.scene import MIDDLE, Sizing
+from calib.material.food import FoodSpec
+from calib.material.scene import MID_LENGTH, Sizing
+from calib.multi_specimen.spec import StudySpec
+from calib.multi_specimen.study_file import read_study
 from calib.problem.request import Request
 from calib.trace.trace import Trace, read_trace
-from mpm.errors import CutcalError, check_number
 from mpm.runtime import ARCHES
-from mpm.shapes import SHAPE_KINDS
+from mpm.scene.errors import CutcalError, check_number
+from mpm.scene.shapes import SHAPE_KINDS
 
 LIMITS: dict[str, tuple[float, float, str]] = {
     "speed": (0.0, 10.0, "m/s"),
@@ -36,6 +41,8 @@ LIMITS: dict[str, tuple[float, float, str]] = {
 """Numbers between which a value must lie, and its unit: those of the command line."""
 KEYS = ("food", "created", "status", "passed", "trace", "parameters", "versions")
 """What tells the summary of a calibration from that of a cut."""
+RESUME = "run it again with resume=True"
+"""What to do about a folder that is not whole."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +56,7 @@ class Calibration:
         knife: Name in ``knives.yaml``, or path of a YAML file.
         speed: Knife speed [m/s], where the trace has no position.
         t_end: Time after which the record is ignored [s], or None.
-        shape: Outline of the specimen, one of ``mpm.shapes.SHAPE_KINDS``; None for the food's.
+        shape: Outline of the specimen, one of ``mpm.scene.shapes.SHAPE_KINDS``; None for the food's.
         height, width, length: Sizes of the specimen [m], None where they were not measured.
         at: Where the blade cuts, as the part of the length on one side [-].
         fit: Names of the fitted properties; None for those that cutting sees.
@@ -73,7 +80,7 @@ class Calibration:
     height: float | None = None
     width: float | None = None
     length: float | None = None
-    at: float = MIDDLE
+    at: float = MID_LENGTH
     fit: Sequence[str] | None = None
     dx: float | None = None
     budget: float = 100
@@ -146,8 +153,7 @@ class Calibration:
         from calib.simulation.process_pool import Pool
 
         with script_hidden(), Pool(self.workers, self.arch) as pool:
-            run(self.request(out), Path(out), pool, resume=resume, progress=progress, say=say)
-        return Calibration.load(out)
+            return run(self.request(out), Path(out), pool, resume=resume, progress=progress, say=say)
 
     @staticmethod
     def load(out: str | Path) -> CalibrationResult:
@@ -156,22 +162,17 @@ class Calibration:
         Raises:
             OutputError: There is no finished calibration in it.
         """
-        path = Path(out) / "summary.json"
-        try:
-            summary = json.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
+        folder = Path(out)
+        path = folder / SUMMARY
+        if not path.is_file():
             raise OutputError(
-                f"{path}: cannot be read ({error.strerror}); name the folder of a finished calibration, or run it again with "
-                "resume=True"
-            ) from None
-        except ValueError as error:
-            raise OutputError(
-                f"{path}: damaged, not JSON ({brief(str(error))}); run it again with resume=True"
-            ) from None
+                f"{path}: cannot be read (no such file); name the folder of a finished calibration, or {RESUME}"
+            )
+        summary = read_summary(path, RESUME)
         missing = [key for key in KEYS if key not in summary] if isinstance(summary, dict) else list(KEYS)
         if missing:
             raise OutputError(f"{path}: not of a calibration ({', '.join(missing)} missing); name another folder")
-        return CalibrationResult(Path(out), summary)
+        return read_result(folder, RESUME)
 
     def _call(self) -> str:
         """This object as it would be written, without what is as usual."""
@@ -187,56 +188,55 @@ class Calibration:
         return f"Calibration({', '.join(words)})"
 
 
-@dataclass(frozen=True)
-class CalibrationResult:
-    """A finished calibration, from its folder.
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Several cuts of one food, with what they share and what is held out; :meth:`run` fits and predicts them.
 
     Attributes:
-        folder: The output folder.
-        summary: Content of ``summary.json``: every figure of the report, SI units, errors as fractions.
+        spec: What the file of the study says.
     """
 
-    folder: Path
-    summary: dict[str, Any] = field(repr=False)
+    spec: StudySpec
 
-    @property
-    def passed(self) -> bool:
-        """Whether every line of the verdict was passed."""
-        return bool(self.summary["passed"])
-
-    @property
-    def parameters(self) -> pd.DataFrame:
-        """Fitted values by name: value, unit, 95 % interval, literature range, verdict, status, source."""
-        return pd.DataFrame.from_dict(self.summary["parameters"], orient="index")
-
-    @property
-    def curves(self) -> pd.DataFrame:
-        """Trace, simulation, its parts and the null models over the stroke [m, N].
+    @staticmethod
+    def read(path: str | Path) -> Study:
+        """The study of a YAML file, as ``calibrate --config`` takes it.
 
         Raises:
-            OutputError: curves.csv is missing or damaged.
+            CutcalError: Anything wrong with the file; the message names the place in it.
         """
-        path = self.folder / "curves.csv"
-        try:
-            return pd.read_csv(path)
-        except (OSError, ValueError) as error:
-            raise OutputError(
-                f"{path}: cannot be read ({brief(str(error))}); run the calibration with resume=True"
-            ) from None
+        return Study(read_study(path))
 
-    @property
-    def material(self) -> FoodSpec:
-        """The calibrated food.
+    def run(
+        self,
+        out: str | Path,
+        *,
+        workers: int = 2,
+        resume: bool = False,
+        progress: Callable[[Progress], None] | None = None,
+        say: Callable[[str], None] | None = None,
+    ) -> dict[str, Any]:
+        """Fit and predict, and write what ``calibrate --config`` writes.
+
+        Args:
+            out: Output folder, which is made and never overwritten.
+            workers: Simulations at a time.
+            resume: Go on with the study in ``out``; nothing is simulated twice.
+            progress: Called after each simulation.
+            say: Called with each warning and stage, as one sentence.
+
+        Returns:
+            The content of ``summary.json``.
 
         Raises:
-            MaterialError: material.yaml is missing or damaged.
+            CutcalError: Anything wrong with the input; nothing that was computed is lost.
         """
-        return load_material_file(self.folder / "material.yaml")
+        from calib.multi_specimen.run import run
+        from calib.simulation.process_pool import Pool
 
-    @property
-    def report(self) -> Path:
-        """Path of the report."""
-        return self.folder / "report.pdf"
+        with script_hidden(), Pool(workers, self.spec.first.arch) as pool:
+            result = run(self.spec, Path(out), pool, resume=resume, progress=progress, say=say)
+        return dict(finite(to_document(result)))
 
 
 def _record(given: str | Path | Trace | pd.DataFrame) -> Trace:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
+from mpm.scene.errors import OutputError as OutputError
 
 
 class TraceError(CutcalError):
@@ -25,11 +26,7 @@ class RegressionError(CutcalError):
     """A recorded force curve that is missing or damaged, or that cannot be replaced."""
 
 
-class OutputError(CutcalError):
-    """An output folder or file that cannot be written, or that belongs to another calibration."""
-
-
-class DocumentError(CutcalError):
+class DocumentError(OutputError):
     """A JSON document of a finished run that is missing, damaged or incomplete."""
 
 

@@ -20,10 +20,11 @@ from typing import Any
 from calib._version import __version__
 from calib.material.food import load_foods
 from calib.material.knife import load_knives
-from mpm.errors import CutcalError
-from mpm.material import Material
+from cutcal.installation import overwritten
 from mpm.scene import EdgeLaw, Food, Knife, Motion, Numerics, Scene
-from mpm.shapes import Shape
+from mpm.scene.errors import CutcalError
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 
 FLESH = Material(E=1e6, nu=0.35, rho=1000, yield_stress=2e5, R=300.0, R_initiation=300.0)
 BLADE = Knife("thin", 0.2e-3, math.radians(1.0), 0.05, 0.4)
@@ -39,7 +40,7 @@ WANTED = FLESH.R * CUT.food.shape.width
 CLOSE = 0.05
 """Error of that force that passes; on the few coarse cells it is 1 %."""
 PATIENCE = 180.0
-"""Seconds after which a device that has not answered is given up: compiling for the first time takes a twentieth of that."""
+"""Seconds after which a device that has not answered is given up; compiling for the first time takes a twentieth."""
 DEVICES = {"cuda": "CUDA", "vulkan": "Vulkan"}
 EXTRAS = {
     "cluster": "--scheduler",
@@ -50,8 +51,10 @@ EXTRAS = {
 }
 """What the optional packages are for."""
 SMALL = 1.5e9
-"""Free memory under which a calibration may not fit [byte]: a worker takes 0.2 GB (resident, of the small cut), and there are two of
-them, the main process with its report, and other programs."""
+"""Free memory under which a calibration may not fit [byte].
+
+A worker takes 0.2 GB (resident, of the small cut); there are two of them, the main process with its report, and other
+programs."""
 
 
 @dataclass(frozen=True)
@@ -81,6 +84,7 @@ def examine(folder: Path) -> Iterator[Finding]:
     """
     yield Finding("cutcal", "ok", f"{__version__}, Python {platform.python_version()}, {platform.platform()}")
     yield packages()
+    yield own_packages()
     yield _tried("foods and knives", _data, "install cutcal again")
     cpu, cache = device("cpu", "solver")
     yield cpu
@@ -115,6 +119,12 @@ def packages() -> Finding:
         return Finding("packages", "fail", f"missing: pip install {' '.join(missing)}")
     absent = f"; absent: {', '.join(without)}" if without else ""
     return Finding("packages", "ok", f"all {needed} are installed{absent}")
+
+
+def own_packages() -> Finding:
+    """Whether no other distribution has overwritten one of cutcal's packages."""
+    found = overwritten()
+    return Finding("own packages", "fail" if found else "ok", found.sentence() if found else "none is overwritten")
 
 
 def _installed(name: str) -> bool:
@@ -161,8 +171,8 @@ def robot() -> Finding:
             name, "absent", "ManiSkill is not installed; everything else works (pip install 'cutcal[robot]')"
         )
     remedy = (
-        "states and forces work, pictures do not: SAPIEN needs Vulkan with descriptorBindingPartiallyBound. Mesa 25 has it "
-        "(mesa-vulkan-drivers of Debian 13, or of Debian 12's backports), Debian 12's own 22.3 has not"
+        "states and forces work, pictures do not: SAPIEN needs Vulkan with descriptorBindingPartiallyBound. Mesa 25 "
+        "has it (mesa-vulkan-drivers of Debian 13, or of Debian 12's backports), Debian 12's own 22.3 has not"
     )
     code = "import sapien; sapien.render.RenderMaterial(); print('ManiSkill is installed and SAPIEN renders')"
     return _optional(name, code, remedy)
@@ -201,8 +211,8 @@ def device(arch: str, name: str) -> tuple[Finding, Path | None]:
     cache = Path(found["cache"]) if found["cache"] else None
     error = found["force_N"] / WANTED - 1
     words = (
-        f"a small cut needs {found['force_N']:.3g} N where R times the width is {WANTED:.3g} N; {whole:.0f} s with start and "
-        f"compilation, {found['seconds']:.1f} s without"
+        f"a small cut needs {found['force_N']:.3g} N where R times the width is {WANTED:.3g} N; {whole:.0f} s with "
+        f"start and compilation, {found['seconds']:.1f} s without"
     )
     if not (abs(error) <= CLOSE and found["balance"] < 1e-3):
         return Finding(name, "fail", f"{words}: this device computes wrongly; do not use it"), cache
@@ -223,7 +233,8 @@ def kernels(cache: Path | None) -> Finding:
         return Finding(
             name,
             "absent",
-            f"{cache} cannot be written, so every process compiles anew; set TI_OFFLINE_CACHE_FILE_PATH to a folder that can",
+            f"{cache} cannot be written, so every process compiles anew; set TI_OFFLINE_CACHE_FILE_PATH to a folder "
+            "that can",
         )
     size = sum(f.stat().st_size for f in cache.rglob("*") if f.is_file())
     return Finding(name, "ok", f"{cache}, {size / 1e6:.0f} MB")

@@ -1,6 +1,7 @@
 """``cutcal``: dispatch to the sub-commands, and turn expected errors into one line and exit code 1.
 
-Every worker process imports this module again, as the program it was started by: nothing is imported before it is needed.
+Every worker process imports this module again, as the program it was started by: nothing is imported before it is
+needed.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from calib._version import __version__
 if TYPE_CHECKING:
     from cutcal.parsing import Parser
 
-# The fit's matrices are small and the simulations have the cores: more threads for linear algebra only get in their way.
+# The fit's matrices are small and the simulations have the cores: more threads for linear algebra get in their way.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 DESCRIPTION = "Calibrate cutting simulations of food against measured knife forces."
@@ -86,7 +87,7 @@ def calibrate() -> int:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; returns its exit code."""
     from cutcal.parsing import Misused, parse
-    from mpm.errors import CutcalError
+    from mpm.scene.errors import CutcalError
 
     words = sys.argv[1:] if argv is None else argv
     for stream in (sys.stdout, sys.stderr):

@@ -1,4 +1,4 @@
-"""Options that several sub-commands share, the checks of their values, and how all of them speak beside their results."""
+"""Options that several sub-commands share, checks of their values, and lines beside the results."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from typing import Any, TypeAlias
 
 from calib.io.folder import finite
 from calib.material.food import FoodSpec, check_override, load_food, load_material_file
-from calib.material.scene import MIDDLE, Sizing
+from calib.material.scene import MID_LENGTH, Sizing
 from calib.simulation.dask_cluster import Cluster
 from calib.simulation.process_pool import Pool
 from calib.simulation.workers import Workers
-from mpm.errors import CutcalError
 from mpm.runtime import ARCHES
-from mpm.shapes import SHAPE_KINDS
+from mpm.scene.errors import CutcalError
+from mpm.scene.shapes import SHAPE_KINDS
 
 Group: TypeAlias = argparse._ActionsContainer
 """A parser, or a group of its options."""
@@ -38,7 +38,19 @@ def note(text: str) -> None:
 
 
 def number(low: float, high: float, unit: str) -> Callable[[str], float]:
-    """Type of an option that takes a number between two limits (both excluded)."""
+    """Type of an option that takes a number between two limits (both excluded).
+
+    Args:
+        low: Lower limit, in the option's unit.
+        high: Upper limit, in the option's unit.
+        unit: The unit, for the error.
+
+    Returns:
+        What argparse calls with the text of the option.
+
+    Raises:
+        ArgumentTypeError: From what is returned, for a text that is no such number.
+    """
 
     def convert(text: str) -> float:
         try:
@@ -68,7 +80,19 @@ def whole(least: int) -> Callable[[str], int]:
 
 
 def numbers(low: float, high: float, unit: str) -> Callable[[str], tuple[float, ...]]:
-    """Type of an option that takes several numbers with commas between them, each within limits and none twice."""
+    """Type of an option that takes several numbers with commas between them, none twice.
+
+    Args:
+        low: Lower limit of each, in the option's unit.
+        high: Upper limit of each, in the option's unit.
+        unit: The unit, for the error.
+
+    Returns:
+        What argparse calls with the text of the option.
+
+    Raises:
+        ArgumentTypeError: From what is returned, for a text that is no such list.
+    """
     one = number(low, high, unit)
 
     def convert(text: str) -> tuple[float, ...]:
@@ -81,7 +105,13 @@ def numbers(low: float, high: float, unit: str) -> Callable[[str], tuple[float, 
 
 
 def add_food(p: Group, *, cell: bool = True, required: bool = True) -> None:
-    """Options that say what is cut with what."""
+    """Options that say what is cut with what.
+
+    Args:
+        p: Where they are added.
+        cell: Whether the cell size is an option.
+        required: Whether ``--food`` must be given.
+    """
     p = p.add_argument_group("food and knife")
     p.add_argument("--food", required=required, metavar="NAME", help="food of materials.yaml (cutcal foods lists them)")
     p.add_argument("--material", metavar="YAML", help="take the food from this file: a material.yaml")
@@ -97,7 +127,7 @@ def add_food(p: Group, *, cell: bool = True, required: bool = True) -> None:
     p.add_argument(
         "--at",
         type=number(0, 1, ""),
-        default=MIDDLE,
+        default=MID_LENGTH,
         metavar="PART",
         help="place of the blade, part of the length (default 0.5)",
     )

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from calib.io.yaml_checks import suggest
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 COLUMN = 24  # where the explanations of options begin
 
@@ -38,7 +38,7 @@ class Misused(CutcalError):
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors are those of everything else: one line, and exit code 1, for 2 is of what ran and did not pass."""
+    """A parser whose errors are those of everything else: one line and exit code 1; 2 is what ran and did not pass."""
 
     def __init__(self, **how: Any) -> None:
         super().__init__(**{"formatter_class": Formatter, "add_help": False, **how})
@@ -72,7 +72,7 @@ def commands(top: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]
 
 
 def parse(top: Parser, argv: Sequence[str] | None = None) -> argparse.Namespace:
-    """Read a command line; an option that the command has not is named before anything that it is missing for want of it.
+    """Read a command line; an option that the command has not is named before what is missing for want of it.
 
     Args:
         top: The whole command line.

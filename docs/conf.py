@@ -9,12 +9,12 @@ from sphinx.application import Sphinx
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
 
-import calib  # noqa: E402
+import cutcal  # noqa: E402
 
 project = "cutcal"
 author = "the cutcal developers"
 project_copyright = author
-version = release = calib.__version__
+version = release = cutcal.__version__
 
 extensions = ["commands", "mathml", "myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 exclude_patterns = ["_build"]

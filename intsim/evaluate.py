@@ -6,39 +6,98 @@ import json
 import math
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from calib.errors import OutputError
-from calib.io.folder import prepare, write_json
+from calib.errors import DocumentError, OutputError
+from calib.io.folder import finite, prepare, write_json
 from calib.io.progress import Countdown
 from calib.io.provenance import git_commit, key_of, versions
-from calib.io.schema import tag
+from calib.io.typed_document import from_document, to_document
 from calib.material.food import FoodSpec
 from calib.material.knife import load_knife
 from calib.simulation.workers import Workers
-from intsim.policy.oracles import Policy
-from intsim.sim.closed_loop import World
-from intsim.sim.severing import ARM, Severed, sever
-from intsim.task.kinematic_table import Rollout, Table
-from intsim.task.success import PLACE, Judged, judge, wilson
-from intsim.task.suites import SUITES, TEST, Episode, draw
+from intsim.outcomes import (
+    ArmSettings,
+    EpisodeOutcome,
+    EvaluationResult,
+    EvaluationSettings,
+    SuiteResult,
+    WorldSettings,
+)
+from intsim.sim.closed_loop import closed_loop_episode
+from intsim.sim.severing import PANDA_ARM, SeveringOutcome, simulate_severing
+from intsim.sim.world import World
+from intsim.task.kinematic_table import KinematicTable
+from intsim.task.rollout import Policy, Rollout
+from intsim.task.success import GeometricOutcome, judge_geometry
+from intsim.task.suites import FIRST_TEST_SEED, Episode, sample_episode
 from intsim.task.targets import target
 from mpm.scene import Arm
+from mpm.scene.errors import CutcalError
 
-STEPS = 2000  # of an episode, at most: 100 s
-ROWS = "evaluate.jsonl"
-
-Say = Callable[[str], None]
+TABLE_STEPS = 2000  # of an episode on the plain table, at most: 100 s
+ROWS_FILE, RESULT_FILE = "evaluate.jsonl", "evaluate.json"
 
 
-def roll_out(policy: Policy, episode: Episode) -> tuple[Rollout, Table]:
-    """One episode on the plain table."""
-    table = Table([episode.item, *episode.others])
+@dataclass(frozen=True, eq=False)
+class PolicyEvaluation:
+    """What is evaluated.
+
+    Attributes:
+        policy: Who moves the knife.
+        name: What it is called.
+        foods: Foods that are asked for, by name.
+        suites: Names in :data:`intsim.task.suites.SUITES`.
+        episodes: Episodes of each suite.
+        seed: Of the first episode of each suite, above :data:`intsim.task.suites.FIRST_TEST_SEED`.
+        sigma: Standard deviation of the noisy oracle [m]: its closed form is given beside what was found.
+        severing: Whether single cuts on the table are simulated in the solver too.
+        knife: Name of the knife.
+        arm: What holds it in the solver, on the table.
+        world: Where the episodes take place: in IntSim, in closed loop with the food; None for the plain table.
+    """
+
+    policy: Policy
+    name: str
+    foods: Mapping[str, FoodSpec]
+    suites: Sequence[str]
+    episodes: int
+    seed: int = 0
+    sigma: float | None = None
+    severing: bool = False
+    knife: str = "kitchen"
+    arm: Arm = PANDA_ARM
+    world: World | None = None
+
+    @property
+    def settings(self) -> EvaluationSettings:
+        """What the results say of it."""
+        return EvaluationSettings(
+            policy=self.name,
+            foods={name: key_of(vars(food.to_scene_food().material)) for name, food in self.foods.items()},
+            knife=self.knife,
+            seed=self.seed,
+            sigma_m=self.sigma,
+            severing=self.severing,
+            arm=ArmSettings.of(self.arm),
+            world=WorldSettings.of(self.world),
+        )
+
+    @property
+    def tests(self) -> list[tuple[str, int]]:
+        """Suite and seed of every episode."""
+        first = FIRST_TEST_SEED + self.seed
+        return [(suite, first + k) for suite in self.suites for k in range(self.episodes)]
+
+
+def roll_out(policy: Policy, episode: Episode) -> tuple[Rollout, KinematicTable]:
+    """One episode on the plain table: what has happened, and the table at its end."""
+    table = KinematicTable([episode.item, *episode.others])
     policy.reset(zlib.crc32(f"{episode.suite} {episode.seed}".encode()))
-    for _ in range(STEPS):
+    for _ in range(TABLE_STEPS):
         action = policy.act(table.observe(), episode.instruction)
         if action is None:
             break
@@ -46,173 +105,119 @@ def roll_out(policy: Policy, episode: Episode) -> tuple[Rollout, Table]:
     return table.rollout, table
 
 
-def run_episode(
-    policy: Policy, episode: Episode, foods: Mapping[str, FoodSpec], *, severing: bool, knife: str, arm: Arm
-) -> dict[str, Any]:
-    """One row of the evaluation: what was asked for, what was found."""
-    rollout, table = roll_out(policy, episode)
-    judged = judge(episode.spec, episode.item, rollout, table.items[0])
-    row = _row(episode, rollout, judged)
-    if severing and not episode.spec.pieces:
-        row["severing"] = _sever(episode, rollout, judged, foods, knife, arm).as_dict()
-    return row
+def run_episode(evaluation: PolicyEvaluation, episode: Episode) -> EpisodeOutcome:
+    """One episode on the plain table, its cut simulated where the evaluation asks for it."""
+    rollout, table = roll_out(evaluation.policy, episode)
+    judged = judge_geometry(episode.spec, episode.item, rollout, table.items[0])
+    simulated = evaluation.severing and not episode.spec.pieces
+    severing = _simulate(evaluation, episode, rollout, judged) if simulated else None
+    return EpisodeOutcome.of(episode, rollout.clipped, judged, severing)
 
 
-def _row(episode: Episode, rollout: Rollout, judged: Judged) -> dict[str, Any]:
-    """What was asked for, and what geometry says of it."""
-    return {
-        "suite": episode.suite,
-        "seed": episode.seed,
-        "food": episode.item.name,
-        "instruction": episode.instruction,
-        "ratio": float(episode.spec.ratio),
-        "side": episode.spec.side,
-        "pieces": episode.spec.pieces,
-        "length_m": episode.item.shape.length,
-        "steps": len(rollout.pose),
-        "clipped": sum(bool(c) for c in rollout.clipped),
-        "height_m": judged.height,
-        "angle_rad": _finite(judged.angle),
-        "offset": _finite(judged.offset),
-        "criteria": dict(judged.criteria),
-        "published": judged.published,
-        "strict": judged.strict,
-    }
-
-
-def _finite(x: float) -> float | None:
-    return x if math.isfinite(x) else None
-
-
-def _sever(
-    episode: Episode, rollout: Rollout, judged: Judged, foods: Mapping[str, FoodSpec], knife: str, arm: Arm
-) -> Severed:
+def _simulate(
+    evaluation: PolicyEvaluation, episode: Episode, rollout: Rollout, judged: GeometricOutcome
+) -> SeveringOutcome:
     """The cut in the solver, where the edge came down over the food."""
     if not judged.criteria["region"] or not math.isfinite(judged.offset):
-        return Severed(False, why="the edge does not come down on the food")
-    along = target(episode.spec, episode.item) + judged.offset * episode.item.shape.length
-    found, _ = sever(episode.item, along, np.array(rollout.command), foods[episode.item.name], knife=knife, arm=arm)
-    return found
-
-
-def expected(length: float, sigma: float) -> float:
-    """Chance that a cut whose place has a normal error [m] is within the published tolerance [-]: erf(0.1 L / (sigma sqrt 2))."""
-    return math.erf(PLACE * length / (sigma * math.sqrt(2.0)))
+        return SeveringOutcome(False, why="the edge does not come down on the food")
+    item = episode.item
+    along = target(episode.spec, item) + judged.offset * item.shape.length
+    food, command = evaluation.foods[item.name], np.array(rollout.command)
+    return simulate_severing(item, along, command, food, knife=evaluation.knife, arm=evaluation.arm)[0]
 
 
 def evaluate(
-    policy: Policy,
-    name: str,
-    foods: Mapping[str, FoodSpec],
-    suites: Sequence[str],
-    episodes: int,
+    evaluation: PolicyEvaluation,
     out: Path,
     *,
-    seed: int = 0,
-    sigma: float | None = None,
-    severing: bool = False,
-    knife: str = "kitchen",
-    arm: Arm = ARM,
-    world: World | None = None,
     pool: Workers | None = None,
     resume: bool = False,
-    say: Say = lambda _: None,
+    say: Callable[[str], None] = lambda _: None,
     command: Sequence[str] = (),
-) -> dict[str, Any]:
+) -> EvaluationResult:
     """Evaluate a policy, and write evaluate.jsonl (a row for each episode) and evaluate.json.
 
     Args:
-        policy: The policy.
-        name: What it is called.
-        foods: Foods that are asked for, by name.
-        suites: Names in :data:`intsim.task.suites.SUITES`.
-        episodes: Of each suite.
+        evaluation: What is evaluated.
         out: Folder of the results.
-        seed: Of the first episode of each suite, above :data:`intsim.task.suites.TEST`.
-        sigma: Standard deviation of the noisy oracle [m]: its closed form is given beside what was found.
-        severing: Simulate single cuts in the solver too; on the table.
-        knife: Name of the knife.
-        arm: What holds it in the solver; on the table.
-        world: Where the episodes take place: in IntSim, in closed loop with the food; without it on the table.
-        pool: Where IntSim runs.
+        pool: Where IntSim runs; not needed on the plain table.
         resume: Go on with what is in ``out``.
         say: Called with a line now and then.
         command: Command line, for provenance.
 
     Returns:
-        The content of evaluate.json.
+        What evaluate.json holds.
 
     Raises:
-        CutcalError: The folder is taken, or holds another evaluation.
+        CutcalError: The folder is taken, holds another evaluation or a damaged one, or there is a world and no pool.
     """
-    load_knife(knife)
+    if evaluation.world is not None and pool is None:
+        raise CutcalError("evaluate: episodes in IntSim run in worker processes; give a pool")
+    load_knife(evaluation.knife)
     prepare(out, resume=resume)
-    about = {
-        "policy": name,
-        "foods": {n: key_of(vars(f.to_scene_food().material)) for n, f in foods.items()},
-        "knife": knife,
-        "seed": seed,
-        "sigma_m": sigma,
-        "severing": severing,
-        "arm": vars(arm),
-        "world": None if world is None else {"coupled": world.coupled, "stiffness": world.stiffness},
-    }
-    rows = _rows(out / ROWS, about)
-    done = {(r["suite"], r["seed"]) for r in rows}
-    todo = [(s, TEST + seed + k) for s in suites for k in range(episodes) if (s, TEST + seed + k) not in done]
-    with (out / ROWS).open("a", encoding="utf-8") as file:
+    settings = evaluation.settings
+    rows = _read_rows(out / ROWS_FILE, settings)
+    done = {(row.suite, row.seed) for row in rows}
+    todo = [test for test in evaluation.tests if test not in done]
+    often = evaluation.severing or evaluation.world is not None
+    with (out / ROWS_FILE).open("a", encoding="utf-8") as file:
         if not rows and file.tell() == 0:
-            file.write(json.dumps(about) + "\n")
-
-        def made() -> Iterator[dict[str, Any]]:
-            if world is not None and pool is not None:
-                yield from _in_world(policy, todo, foods, world, pool)
-                return
-            for suite, at in todo:
-                episode = draw(suite, at, dict(foods))
-                yield run_episode(policy, episode, foods, severing=severing, knife=knife, arm=arm)
-
+            file.write(_line(settings))
         rest = Countdown(max(len(todo), 1))
-        for k, row in enumerate(made(), 1):
+        for k, row in enumerate(_outcomes(evaluation, todo, pool), 1):
             rows.append(row)
-            file.write(json.dumps(row) + "\n")
+            file.write(_line(row))
             file.flush()
             left = rest.left(1)
-            if severing or world is not None or k % 100 == 0:
-                say(f"{k} of {len(todo)} episodes: {row['suite']}, {row['food']}, {_words(row)}; {left}")
-    wanted = {(s, TEST + seed + k) for s in suites for k in range(episodes)}
-    document = {
-        "schema": tag("evaluate"),
-        **about,
-        "suites": {s: _count([r for r in rows if r["suite"] == s and (s, r["seed"]) in wanted], sigma) for s in suites},
-        "command": list(command),
-        "versions": versions(),
-        "git": git_commit(),
-    }
-    write_json(out / "evaluate.json", document)
-    return document
+            if often or k % 100 == 0:
+                say(f"{k} of {len(todo)} episodes: {row.suite}, {row.food}, {row.words()}; {left}")
+    result = EvaluationResult(settings, _by_suite(evaluation, rows), tuple(command), versions(), git_commit())
+    write_json(out / RESULT_FILE, to_document(result))
+    return result
+
+
+def _by_suite(evaluation: PolicyEvaluation, rows: Sequence[EpisodeOutcome]) -> dict[str, SuiteResult]:
+    """Successes by suite of the episodes that were asked for."""
+    wanted = set(evaluation.tests)
+    kept = [row for row in rows if (row.suite, row.seed) in wanted]
+    return {s: SuiteResult.of([row for row in kept if row.suite == s], evaluation.sigma) for s in evaluation.suites}
+
+
+def _outcomes(
+    evaluation: PolicyEvaluation, todo: Sequence[tuple[str, int]], pool: Workers | None
+) -> Iterator[EpisodeOutcome]:
+    """Episodes one after the other, on the table or in IntSim."""
+    if evaluation.world is not None and pool is not None:
+        yield from _in_world(evaluation, evaluation.world, todo, pool)
+        return
+    for suite, seed in todo:
+        yield run_episode(evaluation, sample_episode(suite, seed, dict(evaluation.foods)))
 
 
 def _in_world(
-    policy: Policy, todo: Sequence[tuple[str, int]], foods: Mapping[str, FoodSpec], world: World, pool: Workers
-) -> Iterator[dict[str, Any]]:
-    """Rows of episodes in IntSim, in order of completion."""
-    from intsim.sim.closed_loop import episode_of
-
-    for k, result in pool.each(episode_of, [(policy, suite, seed, dict(foods), world) for suite, seed in todo]):
+    evaluation: PolicyEvaluation, world: World, todo: Sequence[tuple[str, int]], pool: Workers
+) -> Iterator[EpisodeOutcome]:
+    """Episodes in IntSim, in order of completion."""
+    foods = dict(evaluation.foods)
+    jobs = [(evaluation.policy, suite, seed, foods, world) for suite, seed in todo]
+    for k, result in pool.each(closed_loop_episode, jobs):
         suite, seed = todo[k]
         if result is None:
             raise OutputError(
                 f"{suite} {seed}: its process was killed twice, perhaps for lack of memory; free some and add --resume"
             )
         rollout, after, found = result
-        episode = draw(suite, seed, dict(foods))
-        judged = judge(episode.spec, episode.item, rollout, after)
-        row = _row(episode, rollout, judged)
-        yield row | {"severing": found.as_dict()} if world.coupled else row
+        episode = sample_episode(suite, seed, foods)
+        judged = judge_geometry(episode.spec, episode.item, rollout, after)
+        yield EpisodeOutcome.of(episode, rollout.clipped, judged, found if world.coupled else None)
 
 
-def _rows(path: Path, about: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _line(part: EvaluationSettings | EpisodeOutcome) -> str:
+    """A line of evaluate.jsonl."""
+    return json.dumps(finite(to_document(part))) + "\n"
+
+
+def _read_rows(path: Path, settings: EvaluationSettings) -> list[EpisodeOutcome]:
     """Rows of an evaluation that was stopped; a line that was cut off is dropped."""
     if not path.exists():
         return []
@@ -220,50 +225,13 @@ def _rows(path: Path, about: Mapping[str, Any]) -> list[dict[str, Any]]:
     path.write_text("".join(whole), encoding="utf-8")
     if not whole:
         return []
-    if json.loads(whole[0]) != json.loads(json.dumps(about)):
+    try:
+        before = from_document(EvaluationSettings, json.loads(whole[0]))
+        rows = [from_document(EpisodeOutcome, json.loads(line)) for line in whole[1:]]
+    except (ValueError, DocumentError) as e:
+        raise OutputError(f"{path}: damaged ({e}); choose another folder") from None
+    if before != settings:
         raise OutputError(
             f"--out {path.parent}: holds an evaluation of something else ({path.name}); choose another folder"
         )
-    return [json.loads(line) for line in whole[1:]]
-
-
-def _words(row: Mapping[str, Any]) -> str:
-    found = row.get("severing")
-    if found is None:
-        return "published criteria met" if row["published"] else "not met"
-    return str(found["why"])
-
-
-def _count(rows: Sequence[Mapping[str, Any]], sigma: float | None) -> dict[str, Any]:
-    """Rates of success of a suite."""
-    out: dict[str, Any] = {
-        "what": SUITES[rows[0]["suite"]].what if rows else "",
-        "published": rate([r["published"] for r in rows]),
-        "strict": rate([r["strict"] for r in rows]),
-        "criteria": {},
-        "clipped_steps": sum(r["clipped"] for r in rows),
-    }
-    for name in ("tip", "region", "angle", "place", "strict_tip", "count", "even"):
-        found = [r["criteria"][name] for r in rows if name in r["criteria"]]
-        if found:
-            out["criteria"][name] = rate(found)
-    cut = [r["severing"]["severed"] for r in rows if "severing" in r]
-    if cut:
-        out["severing"] = rate([c for c in cut if c is not None])
-        out["not_simulated"] = sum(c is None for c in cut)
-        both = [
-            r["published"] and r["severing"]["severed"]
-            for r in rows
-            if "severing" in r and r["severing"]["severed"] is not None
-        ]
-        out["published_and_severed"] = rate(both)
-    if sigma is not None and rows and not any(r["pieces"] for r in rows):
-        out["expected_place"] = sum(expected(r["length_m"], sigma) for r in rows) / len(rows)
-    return out
-
-
-def rate(found: Sequence[bool]) -> dict[str, float | int]:
-    """Successes, trials, rate and its 95 % interval."""
-    n, k = len(found), sum(bool(f) for f in found)
-    low, high = wilson(k, n)
-    return {"successes": k, "trials": n, "rate": k / n if n else 0.0, "low95": low, "high95": high}
+    return rows

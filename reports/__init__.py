@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from mpm.errors import CutcalError
+from mpm.scene.errors import OutputError
 
 __all__ = ["ReportError"]
 
 
-class ReportError(CutcalError):
+class ReportError(OutputError):
     """A run folder from which no report can be made, or a report that cannot be written."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from reports.base.figures import BAND, MEASURED, SIMULATED, svg
+from reports.base.figures import HATCHED, MEASURED, SIMULATED, svg
 
 if TYPE_CHECKING:
     from calib.compression.result import CompressionResult, StressCurves
@@ -32,8 +32,8 @@ def write_figure(result: CompressionResult, curves: StressCurves, out: Path) -> 
     def draw(figure: Figure) -> None:
         top, below = figure.subplots(2, 1, sharex=True, height_ratios=[2.4, 1.0])
         if several:
-            top.fill_between(x, low, high, label=f"range of {len(repeats)} repeats", **BAND)
-            below.fill_between(x, low - mean, high - mean, **BAND)
+            top.fill_between(x, low, high, label=f"range of {len(repeats)} repeats", **HATCHED)
+            below.fill_between(x, low - mean, high - mean, **HATCHED)
         top.plot(x, mean, label="measured, mean" if several else "measured", **MEASURED)
         top.plot(x, fitted, label=f"fitted, E = {modulus:.4g} kPa over 0-{x[-1]:g} % strain", **SIMULATED)
         top.set_ylabel("force / first area [kPa]")

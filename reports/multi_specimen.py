@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from mpm.output.section import Section
+from mpm.scene import Knife
 from reports import ReportError
 from reports.base.figures import BLACK, BLUE, MEASURED, SIMULATED, next_to, predictive, stroke_axis, svg
 from reports.base.format import breakable, count, duration, interval, listed, publish, quantity
-from reports.base.labels import capital, meaning, words
+from reports.base.labels import capital, in_words
 from reports.base.run_folder import Data, check_kind, read_columns, read_date, read_json, read_section
 from reports.calibration import cut_figure, measurement
 
@@ -56,19 +59,22 @@ class FinishedStudy:
         created: When it was made.
         curves: Columns of ``curves-NAME.csv`` by trace: stroke [m] and forces [N].
         sections: The food across the blade's middle, by trace; those that were fitted have one, but for older runs.
+        meanings: What each property of the material is, in words.
     """
 
     summary: Data
     created: datetime
     curves: dict[str, dict[str, np.ndarray]]
     sections: dict[str, Section]
+    meanings: Mapping[str, str] = field(default_factory=dict)
 
 
-def write_report(folder: Path) -> Path:
+def write_report(folder: Path, meanings: Mapping[str, str] | None = None) -> Path:
     """Write ``report.pdf`` of a finished study into its folder.
 
     Args:
         folder: Folder with ``summary.json`` and ``curves-NAME.csv`` of each trace.
+        meanings: What each property of the material is, in words.
 
     Returns:
         Path of the report.
@@ -76,7 +82,7 @@ def write_report(folder: Path) -> Path:
     Raises:
         ReportError: A file is missing, damaged or incomplete, or the report cannot be written.
     """
-    done = read_study(Path(folder))
+    done = read_study(Path(folder), meanings)
     pictures = {f"trace{k}.svg": picture(done, name) for k, name in enumerate(done.curves)}
     target = Path(folder) / "report.pdf"
     publish(target, "study.typ", content(done), pictures, date=done.created)
@@ -93,7 +99,7 @@ def is_study(summary: Path) -> bool:
     return isinstance(found, dict) and "study" in found
 
 
-def read_study(folder: Path) -> FinishedStudy:
+def read_study(folder: Path, meanings: Mapping[str, str] | None = None) -> FinishedStudy:
     """Read a study's folder.
 
     Raises:
@@ -112,7 +118,7 @@ def read_study(folder: Path) -> FinishedStudy:
     curves = {n: read_columns(folder / f"curves-{n}.csv", complete, complete) for n in names}
     drawn = [n for n, t in summary["traces"].items() if "shape" in t and "sim_N" in curves[n]]
     looks = {n: look for n in drawn if (look := read_section(folder / f"record-{n}.h5")) is not None}
-    return FinishedStudy(summary, created, curves, looks)
+    return FinishedStudy(summary, created, curves, looks, meanings or {})
 
 
 def _changed(path: Path) -> datetime:
@@ -134,7 +140,7 @@ def picture(done: FinishedStudy, name: str) -> bytes:
 
     look = None
     if fitted and name in done.sections:
-        of_cut = (fitted["knife"], fitted["shape"]["height"], curves["stroke_m"], curves["sim_N"])
+        of_cut = (Knife(**fitted["knife"]), fitted["shape"]["height"], curves["stroke_m"], curves["sim_N"])
         look = cut_figure.glance(done.sections[name], *of_cut)
 
     def draw(figure: Figure) -> None:
@@ -184,10 +190,10 @@ def content(done: FinishedStudy) -> Data:
         "names": [breakable(name) for name in done.curves],
         "shown": list(done.curves).index(first(done)),
         "captions": [_caption(s, name) for name in done.curves],
-        "left_open": [[breakable(name), *measurement.left_open(n, row)] for name, t in s["traces"].items()
+        "left_open": [[breakable(name), *measurement.left_open(n, SimpleNamespace(**row))] for name, t in s["traces"].items()
                       for n, row in (t.get("nuisances") or {}).items()],
-        "parameters": [_parameter(name, p) for name, p in s["parameters"].items()],
-        "checks": [[breakable(name), words(c["name"]), *_change(c)] for name, t in s["traces"].items()
+        "parameters": [_parameter(name, p, done.meanings) for name, p in s["parameters"].items()],
+        "checks": [[breakable(name), in_words(c["name"]), *_change(c)] for name, t in s["traces"].items()
                    for c in t.get("numerical_checks") or []],
         "traces": [[breakable(name), *_origin(_source(s, name))] for name in done.curves],
         "runs": _runs(s),
@@ -259,7 +265,7 @@ def _ranking(s: Data, name: str) -> list[list[str]]:
     rows = {us: {"R": own["metrics"]["iso18571"]["R"], "nrmse": own["metrics"]["nrmse"]}, **own["null_models"]}
     order = sorted(rows, key=lambda n: -(rows[n]["R"] if rows[n]["R"] is not None else -1.0))
     return [
-        [words(n), quantity(rows[n]["R"], "-"), quantity(rows[n]["nrmse"], "fraction"), "own" if n == us else ""]
+        [in_words(n), quantity(rows[n]["R"], "-"), quantity(rows[n]["nrmse"], "fraction"), "own" if n == us else ""]
         for n in order
     ]
 
@@ -280,19 +286,19 @@ def _property_of(name: str) -> str:
     return name.split("@")[0]
 
 
-def _parameter(name: str, p: Data) -> list[str]:
+def _parameter(name: str, p: Data, meanings: Mapping[str, str]) -> list[str]:
     unit = p["unit"]
     shared = "all cuts" if p.get("shared", True) else "one cut"
     return [
-        breakable(name), meaning(_property_of(name)), quantity(p["value"], unit),
-        interval(p["low95"], p["high95"], unit), interval(p["prior_low"], p["prior_high"], unit), words(p["verdict"]),
+        breakable(name), meanings.get(_property_of(name), ""), quantity(p["value"], unit),
+        interval(p["low95"], p["high95"], unit), interval(p["prior_low"], p["prior_high"], unit), in_words(p["verdict"]),
         shared,
     ]  # fmt: skip
 
 
 def _change(c: Data) -> list[str]:
     if c.get("reason"):
-        return [f"broke down: {words(c['reason'])}", ""]
+        return [f"broke down: {in_words(c['reason'])}", ""]
     return [quantity(c.get(key), "fraction", digits=2, signed=True) for key in ("peak_change", "work_change")]
 
 

@@ -1,37 +1,43 @@
-"""One calibration from files to files: condition, fit, judge, write. The command line is a thin layer over it."""
+"""One calibration from files to files. The command line is a thin layer over it.
+
+:func:`run` conditions the trace and decides the problem (:mod:`calib.problem.setup`), fits and quantifies the
+uncertainty of the fit (:mod:`calib.uncertainty.global_search`), repeats the best values for their whole record and the
+numerical checks, judges, and writes.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from calib.calibration.calibrated import Calibrated
+from calib.calibration.result import SUMMARY, CalibrationResult, read_result, to_document
 from calib.calibration.summary import add_conditioning, summarise
 from calib.fit.multistart import FitResult
 from calib.fit.options import FitOptions
 from calib.io.folder import prepare, write_csv, write_json
 from calib.io.progress import Progress
-from calib.io.provenance import code_key, key_of
-from calib.material.food import FoodSpec, dump_material
-from calib.material.scene import place
-from calib.problem.request import Request, Setup
-from calib.problem.setup import set_up
-from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, Header
+from calib.material.food import dump_material
+from calib.problem.request import Request
+from calib.problem.setup import FINE, Setup, set_up
+from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore
 from calib.simulation.record_file import read_record, record_errands
 from calib.simulation.workers import Errand, Workers
-from calib.trace.conditioning import Conditioned
 from calib.trace.filters import filter_simulated
-from calib.uncertainty.analysis import Doubt
-from calib.uncertainty.global_search import infer
-from calib.uncertainty.sobol import sensitivity
-from calib.validation.metrics import compare
-from calib.validation.null_models import NullModel, null_models
-from calib.validation.numerical_checks import VARIED, Check, check, check_errands, otherwise
-from mpm.output.record import ForceRecord
+from calib.uncertainty.analysis import UncertaintyAnalysis
+from calib.uncertainty.global_search import Listener, fit_with_uncertainty
+from calib.validation.numerical_checks import VARIED, check, check_errands
+from mpm.arrays import FloatArray
+
+STORE, RECORD = "evaluations.h5", "record.h5"
+"""Files in the output folder: all evaluations, and the whole record of the best values."""
+PROVENANCE = ("created", "trace_sha256", "passed", "peak_error", "nrmse", "shape_error", "git", "versions")
+"""What material.yaml says of the calibration that it is from, as ``summary.json`` calls it."""
 
 
 def run(
@@ -42,7 +48,7 @@ def run(
     resume: bool = False,
     progress: Callable[[Progress], None] | None = None,
     say: Callable[[str], None] | None = None,
-) -> dict[str, Any]:
+) -> CalibrationResult:
     """Calibrate and write all outputs.
 
     Args:
@@ -54,7 +60,7 @@ def run(
         say: Called with each warning and stage, as one sentence.
 
     Returns:
-        The content of ``summary.json``.
+        The result, as ``summary.json`` has it.
 
     Raises:
         CutcalError: Anything wrong with the input; nothing that was computed is lost.
@@ -62,130 +68,91 @@ def run(
     say = say or (lambda text: None)
     began = time.monotonic()
     setup = set_up(request)
-    for text in [*request.food.warnings(), *setup.curve.warnings, *setup.assumed]:
+    for text in [*setup.warnings, *setup.assumed]:
         say(text)
     options = FitOptions(budget=request.budget, batch=pool.batch, seed=request.seed)
     options.check(len(setup.objective.parameters))
     prepare(out, resume=resume)
-    header = Header(setup.curve.trace.sha256, key_of(setup.fine.as_dict()))
-    with EvaluationStore(out / "evaluations.h5", header, resume=resume) as store:
-        fine, coarse, again = (
-            CachedEvaluator(
-                pool.evaluator(scene, setup.kept),
-                store,
-                scene=scene.as_dict() | {"kept": setup.kept},
-                code=code_key(),
-                fidelity=name,
-            )
-            for name, scene in (("fine", setup.fine), ("coarse", setup.coarse), ("again", otherwise(setup.fine)))
+    with EvaluationStore(out / STORE, setup.header, resume=resume) as store:
+        work = _Calibration(setup, pool, store, out, say)
+        fit, analysis = work.fitted(options, progress)
+        calibrated = work.repeated(fit, analysis)
+    add_conditioning(out / STORE, setup.curve)
+    return _write(calibrated, out, began)
+
+
+@dataclass(frozen=True, eq=False)
+class _Calibration:
+    """A calibration while its simulations run.
+
+    Attributes: what was decided; where the simulations run and where they are kept; the output folder; and who is told
+    of each stage.
+    """
+
+    setup: Setup
+    pool: Workers
+    store: EvaluationStore
+    out: Path
+    say: Callable[[str], None]
+
+    def fitted(
+        self, options: FitOptions, progress: Callable[[Progress], None] | None
+    ) -> tuple[FitResult, UncertaintyAnalysis | None]:
+        """The fit, and its uncertainty."""
+        setup = self.setup
+        evaluators = setup.evaluators(self.pool, self.store)
+        listener = Listener(progress, self.say, self._begin_longest_check)
+        return fit_with_uncertainty(
+            setup.objective, evaluators, options, sample=setup.request.sample, listener=listener
         )
 
-        def begin(found: FitResult) -> None:
-            """The longest of the last simulations, beside those of the intervals."""
-            scene, values = place(setup.fine, found.best.evaluation.parameters, setup.kept)
-            for errand in sorted(check_errands(scene.with_material(**values), store), key=lambda e: e.haste)[:1]:
-                pool.begin(errand)
+    def _begin_longest_check(self, fit: FitResult) -> None:
+        """Begin the longest of the last simulations, beside those of the intervals."""
+        scene = self.setup.scene(fit.best.evaluation.parameters)
+        for errand in sorted(check_errands(scene, self.store), key=lambda e: e.haste)[:1]:
+            self.pool.begin(errand)
 
-        result, doubt = infer(
-            setup.objective,
-            fine,
-            coarse=coarse,
-            again=again,
-            options=options,
-            sample=request.sample,
-            progress=progress,
-            say=say,
-            found=begin,
-        )
-        scene, values = place(setup.fine, result.best.evaluation.parameters, setup.kept)
-        first, setup = setup, replace(setup, fine=scene)
-        scene = scene.with_material(**values)
-        errands, ended = record_errands(scene, out / "record.h5"), result.status != "interrupted"
+    def repeated(self, fit: FitResult, analysis: UncertaintyAnalysis | None) -> Calibrated:
+        """The best values simulated once more, whole and otherwise, and those of the literature."""
+        setup, best, path = self.setup, fit.best.evaluation, self.out / RECORD
+        scene, ended = setup.scene(best.parameters), fit.status != "interrupted"
+        errands = record_errands(scene, path)
         if ended:
-            errands += [*check_errands(scene, store), *_start_errands(first, fine)]
+            errands += [*check_errands(scene, self.store), *self._start_errands()]
         if errands:
-            say(f"simulating the best values once more: {'whole, and ' + VARIED if ended else 'whole'}")
-            pool.errands(errands)
-        record = read_record(scene, out / "record.h5")
-        checks = check(scene, result.best.evaluation, store, setup.curve.stroke_length_m) if ended else []
-        start = _start_curve(first, fine) if ended else np.full_like(setup.curve.stroke, np.nan)
-    add_conditioning(out / "evaluations.h5", setup.curve)
-    return _write(request, setup, result, doubt, record, checks, start, out, time.monotonic() - began)
+            self.say(f"simulating the best values once more: {'whole, and ' + VARIED if ended else 'whole'}")
+            self.pool.errands(errands)
+        record = read_record(scene, path)
+        checks = check(scene, best, self.store, setup.curve.stroke_length_m) if ended else []
+        start = self._start_curve() if ended else np.full_like(setup.curve.stroke, np.nan)
+        return Calibrated(setup.sized(best.parameters), fit, analysis, record, checks, start)
+
+    @cached_property
+    def _fine(self) -> CachedEvaluator:
+        return self.setup.evaluator(self.setup.fine, self.pool, self.store, FINE)
+
+    def _start_errands(self) -> list[Errand]:
+        """The simulation of the literature's values, where the search has not made it."""
+        values = self.setup.start_values
+        keep = self._fine.keeper(values)
+        return [] if keep is None else [Errand(self.setup.scene(values), keep)]
+
+    def _start_curve(self) -> FloatArray:
+        """Smoothed curve of the literature's values [N] (n,); NaN where that run broke down."""
+        stroke = self.setup.curve.stroke
+        run = next(iter(self._fine.evaluate([self.setup.start_values])))
+        return filter_simulated(stroke, run.stroke, run.force) if run.ok else np.full_like(stroke, np.nan)
 
 
-def _literature(setup: Setup) -> dict[str, float]:
-    """The values that the fit began with, by name [SI]."""
-    return {p.name: p.value for p in setup.objective.parameters}
-
-
-def _start_errands(setup: Setup, fine: CachedEvaluator) -> list[Errand]:
-    """The simulation of the literature values, where the search has not made it."""
-    keep = fine.keeper(_literature(setup))
-    scene, values = place(setup.fine, _literature(setup), setup.kept)
-    return [] if keep is None else [Errand(scene.with_material(**values), keep)]
-
-
-def _start_curve(setup: Setup, fine: CachedEvaluator) -> np.ndarray:
-    """Smoothed curve of the literature values [N], shape (240,); NaN where that run broke down."""
-    evaluation = next(iter(fine.evaluate([_literature(setup)])))
-    if not evaluation.ok:
-        return np.full_like(setup.curve.stroke, np.nan)
-    return filter_simulated(setup.curve.stroke, evaluation.stroke, evaluation.force)
-
-
-def _write(
-    request: Request,
-    setup: Setup,
-    result: FitResult,
-    doubt: Doubt | None,
-    record: ForceRecord,
-    checks: Sequence[Check],
-    start: np.ndarray,
-    out: Path,
-    wall: float,
-) -> dict[str, Any]:
-    """Write curves.csv, material.yaml, summary.json and report.pdf; returns the summary."""
+def _write(done: Calibrated, out: Path, began: float) -> CalibrationResult:
+    """Write curves.csv, material.yaml, summary.json and report.pdf; returns the result, as the folder has it."""
     from reports.calibration.report import write_report
 
-    curve, best = setup.curve, result.best
-    metrics = compare(curve.stroke, curve.curve, best.curve)
-    nulls = null_models(curve.stroke, curve.curve)
-    summary = summarise(request, setup, result, record, metrics, nulls, doubt, checks)
-    summary |= {"sensitivity": sensitivity(setup.objective, result, seed=request.seed), "wall_s": wall}
-    write_csv(out / "curves.csv", _curves(curve, best.curve, record, start, nulls, doubt))
-    fitted = _fitted_food(request, setup, best.evaluation.parameters)
-    keep = ("created", "trace_sha256", "passed", "peak_error", "nrmse", "shape_error", "git", "versions")
-    dump_material(fitted, out / "material.yaml", {k: summary[k] for k in keep} | {"trace": curve.trace.label})
-    write_json(out / "summary.json", summary)
-    write_report(out)
-    return summary
-
-
-def _fitted_food(request: Request, setup: Setup, parameters: Mapping[str, float]) -> FoodSpec:
-    """The food with the fitted values, and the specimen's height (and width, unless measured) where it was fitted."""
-    _, values = place(setup.fine, parameters)
-    how = {"status": "fitted", "source": f"fitted to {setup.curve.trace.source}"}
-    food = request.food.with_values(values, **how)
-    if len(values) == len(parameters):
-        return food
-    shape = setup.fine.food.shape
-    names = [name for name in ("height", "width") if name not in setup.kept]
-    return food.with_sizes({name: getattr(shape, name) for name in names}, **how)
-
-
-def _curves(
-    curve: Conditioned,
-    best: np.ndarray,
-    record: ForceRecord,
-    start: np.ndarray,
-    nulls: Mapping[str, NullModel],
-    doubt: Doubt | None,
-) -> dict[str, np.ndarray]:
-    """Columns of curves.csv, all on the trace's stroke grid."""
-    parts = {
-        "edge_N": filter_simulated(curve.stroke, record.stroke, record.edge[:, 2]),
-        "face_N": filter_simulated(curve.stroke, record.stroke, record.resolved_face),
-    }
-    columns = {"stroke_m": curve.stroke, "real_N": curve.curve, "sim_N": best, "residual_N": best - curve.curve}
-    band = {} if doubt is None else {"band_low_N": doubt.bands[0].low, "band_high_N": doubt.bands[0].high}
-    return columns | parts | {"start_N": start} | {f"{name}_N": n.curve for name, n in nulls.items()} | band
+    document = to_document(summarise(done, out, began))
+    write_csv(out / "curves.csv", done.curves())
+    provenance = {key: document[key] for key in PROVENANCE} | {"trace": done.setup.curve.trace.label}
+    dump_material(done.food(), out / "material.yaml", provenance)
+    write_json(out / SUMMARY, document)
+    result = read_result(out)
+    write_report(result)
+    return result

@@ -1,252 +1,226 @@
-"""The content of ``summary.json``: every figure that a report quotes, in SI units, errors as fractions."""
+"""The result of a calibration from what was computed: every figure that a report quotes, in SI units."""
 
 from __future__ import annotations
 
 import math
 import shutil
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Mapping
+from dataclasses import replace
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Any
 
 import h5py
 
+from calib.calibration.calibrated import Calibrated
+from calib.calibration.result import CalibrationResult
+from calib.calibration.result_parts import (
+    Agreement,
+    AirSource,
+    BrokenRun,
+    Conditioning,
+    FixedParameter,
+    NullRating,
+    Posterior,
+    ProfileCurve,
+    SearchHistory,
+    SimulatedCut,
+    SobolIndices,
+    TraceSource,
+)
 from calib.errors import OutputError
 from calib.fit.multistart import FitResult
-from calib.io.provenance import git_commit, versions
-from calib.io.schema import tag
-from calib.problem.parameters import STRESS_LIKE, plain
-from calib.problem.request import Request, Setup
+from calib.io.provenance import Invocation, Software
+from calib.problem.parameters import STRESS_LIKE, property_of
+from calib.problem.request import Request
+from calib.problem.setup import Setup
 from calib.trace.conditioning import Conditioned
-from calib.uncertainty.analysis import Doubt
+from calib.uncertainty.analysis import UncertaintyAnalysis
+from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.uncertainty.intervals import Uncertainty
-from calib.validation.acceptance import judge, limits
-from calib.validation.metrics import Metrics
-from calib.validation.null_models import NullModel
-from calib.validation.numerical_checks import Check
+from calib.validation.acceptance import Conservation, judge, limits
 from mpm.files import replacing
 from mpm.output.record import ForceRecord
+from mpm.scene import Knife
 
-WITH_WIDTH = 0.5  # an interval that a measured width would halve belongs to the product with it
-UNKNOWN = "unknown"  # verdict of a parameter when a fit ended before its curvature was known
+WITH_WIDTH = 0.5
+"""An interval that a measured width would make shorter than this part of it belongs to the product with the width."""
 
 
-def summarise(
-    request: Request,
-    setup: Setup,
-    result: FitResult,
-    record: ForceRecord,
-    metrics: Metrics,
-    nulls: Mapping[str, NullModel],
-    doubt: Doubt | None,
-    checks: Sequence[Check],
-) -> dict[str, Any]:
-    """All figures of a calibration but its run time.
+def summarise(done: Calibrated, folder: Path, began: float) -> CalibrationResult:
+    """The result of a calibration: judged, and with all that a document says.
 
     Args:
-        request: What was asked.
-        setup: Trace, scenes and objective.
-        result: The fit.
-        record: Full record of the best values.
-        metrics: Best curve against the trace.
-        nulls: Null models against the trace.
-        doubt: What the fit does not know; None when it ended too early for that.
-        checks: What numerical choices change.
+        done: What was computed.
+        folder: The output folder.
+        began: When the calibration began, by ``time.monotonic`` [s].
+
+    Returns:
+        The result.
     """
-    parameters = _parameters(request, result, None if doubt is None else doubt.uncertainty)
-    for name, ends in ({} if doubt is None else doubt.sampled).items():
-        parameters[name]["sampled95"] = list(ends)
-    open_ends = {} if doubt is None else {e.name: e.as_dict() for e in doubt.nuisances}
+    setup, fit, analysis, record = done.setup, done.fit, done.analysis, done.record
+    request, curve = setup.request, setup.curve
+    fitted = _fitted(request, fit, analysis)
+    nuisances = {} if analysis is None else {e.name: FittedNuisance.of(e) for e in analysis.nuisances}
     verdicts = judge(
-        metrics,
-        {n: m.metrics for n, m in nulls.items()},
-        momentum_residual=record.momentum_residual,
-        ke_over_ie=record.ke_over_ie,
-        parted=record.parted,
-        parameters=parameters,
-        checks=checks,
-        nuisances=open_ends,
+        done.metrics,
+        {name: model.metrics for name, model in done.nulls.items()},
+        conservation=Conservation(record.momentum_residual, record.ke_over_ie, record.parted),
+        fitted=fitted,
+        checks=done.checks,
+        nuisances=nuisances,
     )
-    trace = setup.curve.trace
-    stopped = result.status == "interrupted"
-    said = limits(
-        trace.label,
-        setup.curve.stroke_source,
-        setup.curve.baseline_kind,
-        verdicts,
-        parameters,
-        setup.assumed,
-        record.fracture,
+    stopped = fit.status == "interrupted"
+    label, source, kind = curve.trace.label, curve.stroke_source, curve.baseline_kind
+    said = limits(label, source, kind, verdicts, fitted, setup.assumed, record.fracture)
+    nulls = {name: NullRating.of(model.metrics) for name, model in done.nulls.items()}
+    return CalibrationResult(
+        folder=folder,
+        food=request.food.name,
+        created=datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        status="interrupted" if stopped else "done",
+        search=fit.status,
+        passed=not stopped and all(v.passed is not False for v in verdicts),
+        verdicts=tuple(verdicts),
+        trace=_trace(curve),
+        air=None if request.air is None else AirSource(request.air_source, setup.air_sha256),
+        conditioning=_conditioning(curve),
+        agreement=Agreement(done.metrics, nulls, curve.peak_sd_N),
+        fitted=fitted,
+        nuisances=nuisances,
+        posterior=_posterior(setup, fit, analysis),
+        fixed_parameters=_fixed(request, fitted),
+        history=_history(fit),
+        cut=_cut(setup, record),
+        software=Software.here(),
+        invocation=Invocation(request.seed, request.arch, tuple(request.command)),
+        numerical_checks=tuple(done.checks),
+        warnings=tuple(setup.warnings),
+        limits=(*(() if analysis is None else analysis.remarks), *said),
+        sensitivity=_sensitivity(done),
+        wall_s=time.monotonic() - began,
     )
+
+
+def _sensitivity(done: Calibrated) -> dict[str, dict[str, SobolIndices]]:
     return {
-        "schema": tag("calibrate"),
-        "food": request.food.name,
-        "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
-        "status": "interrupted" if stopped else "done",
-        "search": result.status,
-        "passed": not stopped and all(v.passed is not False for v in verdicts),
-        "verdicts": [v.as_dict() for v in verdicts],
-        **_trace(request, setup),
-        **_agreement(metrics, nulls),
-        "peak_real_sd_N": setup.curve.peak_sd_N,
-        "parameters": parameters,
-        "nuisances": open_ends,
-        **_doubt(setup, doubt),
-        "correlations": _correlations(result, None if doubt is None else doubt.uncertainty),
-        "fixed_parameters": _fixed(request, parameters),
-        **_runs(result),
-        **_numerics(request, setup, record),
-        "numerical_checks": [c.as_dict() for c in checks],
-        "warnings": [*request.food.warnings(), *setup.curve.warnings],
-        "limits": [*(() if doubt is None else doubt.said), *said],
+        quantity: {name: SobolIndices(**row) for name, row in rows.items()}
+        for quantity, rows in done.sensitivity.items()
     }
 
 
-def _trace(request: Request, setup: Setup) -> dict[str, Any]:
-    curve = setup.curve
+def _trace(curve: Conditioned) -> TraceSource:
     trace = curve.trace
-    return {
-        "trace": {
-            "source": trace.source,
-            "label": trace.label,
-            "sha256": trace.sha256,
-            "samples": len(trace.time),
-            "duration_s": float(trace.time[-1] - trace.time[0]),
-            "columns": dict(trace.columns),
-        },
-        "trace_sha256": trace.sha256,
-        "air": None if request.air is None else {"source": request.air_source, "sha256": setup.air_sha256},
-        "baseline_N": curve.baseline_N,
-        "baseline_sd_N": curve.baseline_sd_N,
-        "baseline_kind": curve.baseline_kind,
-        "onset_s": curve.onset_s,
-        "onset_sd_s": curve.onset_sd_s,
-        "end_s": curve.end_s,
-        "stroke_m": curve.stroke_length_m,
-        "stroke_source": curve.stroke_source,
-        "noise_sd_N": curve.noise_sd_N,
-        "filter_sd_m": curve.filter_sd_m,
-    }
+    duration = float(trace.time[-1] - trace.time[0])
+    return TraceSource(trace.source, trace.label, trace.sha256, len(trace.time), duration, dict(trace.columns))
 
 
-def _agreement(metrics: Metrics, nulls: Mapping[str, NullModel]) -> dict[str, Any]:
-    all_of = metrics.as_dict()
-    headline = ("peak_real_N", "peak_sim_N", "peak_error", "shape_error", "nrmse", "work_error")
-    null = {}
-    for name, model in nulls.items():
-        theirs = model.metrics.as_dict()
-        null[name] = {k: theirs[k] for k in ("nrmse", "shape_error", "peak_error", "work_error")}
-        null[name]["R"] = theirs["iso18571"]["R"]
-    return {
-        **{k: all_of[k] for k in headline},
-        "metrics": all_of,
-        "sprague_geers": all_of["sprague_geers"],
-        "iso18571": all_of["iso18571"],
-        "null_models": null,
-    }
+def _conditioning(curve: Conditioned) -> Conditioning:
+    return Conditioning(
+        baseline_N=curve.baseline_N,
+        baseline_sd_N=curve.baseline_sd_N,
+        baseline_kind=curve.baseline_kind,
+        onset_s=curve.onset_s,
+        onset_sd_s=curve.onset_sd_s,
+        end_s=curve.end_s,
+        stroke_m=curve.stroke_length_m,
+        stroke_source=curve.stroke_source,
+        noise_sd_N=curve.noise_sd_N,
+        filter_sd_m=curve.filter_sd_m,
+    )
 
 
-def _parameters(request: Request, result: FitResult, doubt: Uncertainty | None) -> dict[str, dict[str, Any]]:
-    out: dict[str, dict[str, Any]] = {}
-    for k, p in enumerate(result.parameters):
-        if doubt is not None:
-            entry: dict[str, Any] = dict(doubt.intervals[k].as_dict())
-        else:
-            entry = {"value": p.value, "unit": p.unit, "low95": None, "high95": None}
-            entry |= {"prior_low": p.prior_low, "prior_high": p.prior_high, "verdict": UNKNOWN}
+def _fitted(request: Request, fit: FitResult, analysis: UncertaintyAnalysis | None) -> dict[str, FittedParameter]:
+    """The fitted parameters; those that are only known as a product are called so."""
+    found = None if analysis is None else analysis.uncertainty
+    sampled = {} if analysis is None else analysis.sampled
+    products = set() if found is None else _products(found)
+    out = {}
+    for k, p in enumerate(fit.parameters):
         known = (request.food.dims if p.name == "height" else request.food.properties)[p.name]
-        out[p.name] = entry | {"status": known.status, "source": known.source}
-    if doubt is not None:
-        names = result.parameters.names
-        for tie in doubt.only_as_product:
-            for name in names:
-                if name in tie.combination.split() and out[name]["verdict"] in ("identified", "weak"):
-                    out[name]["verdict"] = "only_as_product"
-        for name, part in doubt.known_width().items():
-            if part < WITH_WIDTH and plain(name) in STRESS_LIKE and out[name]["verdict"] in ("identified", "weak"):
-                out[name]["verdict"] = "only_as_product"
+        one = FittedParameter.of(p if found is None else found.intervals[k], known, sampled.get(p.name))
+        product = p.name in products and one.verdict in ("identified", "weak")
+        out[p.name] = replace(one, verdict="only_as_product") if product else one
     return out
 
 
-def _doubt(setup: Setup, doubt: Doubt | None) -> dict[str, Any]:
+def _products(found: Uncertainty) -> set[str]:
+    """Names of the parameters that are known only times another one, or times a width that nobody measured."""
+    tied = {name for tie in found.only_as_product for name in tie.combination.split()}
+    width = {n for n, part in found.known_width().items() if part < WITH_WIDTH and property_of(n) in STRESS_LIKE}
+    return tied | width
+
+
+def _posterior(setup: Setup, fit: FitResult, analysis: UncertaintyAnalysis | None) -> Posterior:
     """Profiles, the size and correlation of the errors, and how much of the trace lies in the predictive band."""
-    if doubt is None:
-        return {"profiles": {}, "reduced_chi2": None, "correlation_length_m": None, "predictive_inside": None}
-    found = doubt.uncertainty
-    chosen = setup.objective.parameters
-    return {
-        "profiles": {
-            p.name: {
-                "value": [chosen[p.name].from_internal(z) for z in p.z],
-                "rise": [float(x) for x in p.rise],
-                "trace_alone": [float(x) for x in p.data],
-            }
-            for p in doubt.profiles
-        },
-        "reduced_chi2": found.reduced_chi2,
-        "correlation_length_m": found.data.lengths[0] * setup.curve.stroke_length_m,
-        "predictive_inside": doubt.bands[0].inside,
+    if analysis is None:
+        return Posterior(correlations={})
+    found, chosen, names = analysis.uncertainty, setup.objective.parameters, fit.parameters.names
+    profiles = {
+        p.name: ProfileCurve(
+            tuple(chosen[p.name].from_internal(z) for z in p.z),
+            tuple(float(x) for x in p.rise),
+            tuple(float(x) for x in p.data),
+        )
+        for p in analysis.profiles
     }
+    pairs = [(i, j) for i in range(len(names)) for j in range(i)]
+    return Posterior(
+        profiles=profiles,
+        reduced_chi2=found.reduced_chi2,
+        correlation_length_m=found.data.lengths[0] * setup.curve.stroke_length_m,
+        predictive_inside=analysis.bands[0].inside,
+        correlations={f"{names[i]},{names[j]}": float(found.correlation[i, j]) for i, j in pairs},
+    )
 
 
-def _correlations(result: FitResult, doubt: Uncertainty | None) -> dict[str, float]:
-    if doubt is None:
-        return {}
-    n = result.parameters.names
-    return {f"{n[i]},{n[j]}": float(doubt.correlation[i, j]) for i in range(len(n)) for j in range(i)}
-
-
-def _fixed(request: Request, fitted: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+def _fixed(request: Request, fitted: Mapping[str, FittedParameter]) -> dict[str, FixedParameter]:
     return {
-        name: {"value": p.value, "unit": p.unit, "status": p.status, "source": p.source}
+        name: FixedParameter(p.value, p.unit, p.status, p.source)
         for name, p in request.food.properties.items()
         if name not in fitted
     }
 
 
-def _runs(result: FitResult) -> dict[str, Any]:
+def _history(fit: FitResult) -> SearchHistory:
     history, best = [], math.inf
-    for number, trial in enumerate(result.history, 1):
+    for number, trial in enumerate(fit.history, 1):
         if trial.ok and not trial.coarse and trial.misfit < best:
             best = trial.misfit
         if math.isfinite(best):
-            history.append([number, best])
-    failed = [t.evaluation for t in (*result.history, *result.replicates) if not t.ok]
-    return {
-        "simulations": result.simulations + result.coarse_simulations,
-        "fine_simulations": result.simulations,
-        "coarse_simulations": result.coarse_simulations,
-        "failed_simulations": len(failed),
-        "failures": [{"reason": e.reason, "fraction": e.fraction, "parameters": e.parameters} for e in failed],
-        "misfit_history": history,
-        "repeatability": result.repeatability,
-    }
+            history.append((number, best))
+    failed = [t.evaluation for t in (*fit.history, *fit.replicates) if not t.ok]
+    return SearchHistory(
+        simulations=fit.simulations + fit.coarse_simulations,
+        fine_simulations=fit.simulations,
+        coarse_simulations=fit.coarse_simulations,
+        failed_simulations=len(failed),
+        failures=tuple(BrokenRun(e.reason, e.fraction, e.parameters) for e in failed),
+        misfit_history=tuple(history),
+        repeatability=None if math.isnan(fit.repeatability) else fit.repeatability,
+    )
 
 
-def _numerics(request: Request, setup: Setup, record: ForceRecord) -> dict[str, Any]:
+def _cut(setup: Setup, record: ForceRecord) -> SimulatedCut:
     scene = setup.fine
-    return {
-        "dx_m": scene.numerics.dx,
-        "particles": record.particles,
-        "mirror_images": record.images,
-        "mach": scene.motion.mach,
-        "speed_real_m_s": request.speed,
-        "momentum_residual": record.momentum_residual,
-        "ke_over_ie": record.ke_over_ie,
-        "ripple_N": record.ripple,
-        "energy_J": record.budget,
-        "fracture": record.fracture,
-        "parted": None if math.isnan(record.parted) else record.parted,
-        "counters": dict(record.counters),
-        "shape": vars(scene.food.shape),
-        "knife": vars(scene.knife),
-        "scene": scene.as_dict(),
-        "versions": versions(),
-        "git": git_commit(),
-        "seed": request.seed,
-        "device": request.arch,
-        "command": list(request.command),
-    }
+    assert isinstance(scene.knife, Knife)  # a press has no trace of a cut
+    return SimulatedCut(
+        dx_m=scene.numerics.dx,
+        particles=record.particles,
+        mirror_images=record.images,
+        mach=scene.motion.mach,
+        speed_real_m_s=setup.request.speed,
+        momentum_residual=record.momentum_residual,
+        ke_over_ie=record.ke_over_ie,
+        ripple_N=record.ripple,
+        energy_J=record.budget,
+        fracture=record.fracture,
+        parted=None if math.isnan(record.parted) else record.parted,
+        counters=dict(record.counters),
+        shape=scene.food.shape,
+        knife=scene.knife,
+        scene=scene.as_dict(),
+    )
 
 
 def add_conditioning(path: Path, curve: Conditioned) -> None:

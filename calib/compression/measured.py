@@ -10,10 +10,11 @@ import numpy as np
 
 from calib.errors import CurveError, TraceError
 from calib.trace.columns import candidates, choose, numbers
-from calib.trace.table import Table, read_table
+from calib.trace.reader import read_table
+from calib.trace.table import Table
 from calib.trace.trace import MIN_SAMPLES
 from mpm.arrays import FloatArray
-from mpm.shapes import Shape, volume
+from mpm.scene.shapes import Shape, volume
 
 STRAIN_STEP = 0.001
 """Step of the common strain grid, about [-]."""

@@ -39,7 +39,7 @@ from calib.io.folder import prepare
 from calib.io.provenance import git_commit, versions
 from calib.validation.acceptance import Verdict
 from mpm.scene import Scene
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 CURVE_ERROR_LIMIT = 0.05
 MODULUS_ERROR_LIMIT = 0.10

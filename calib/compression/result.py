@@ -16,7 +16,7 @@ from calib.io.folder import write_csv, write_json
 from calib.io.typed_document import FLAT, to_document
 from calib.validation.acceptance import Verdict
 from mpm.arrays import FloatArray
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 RESULT_FILE, CURVES_FILE = "compress.json", "curves.csv"
 

@@ -1,9 +1,10 @@
-"""A fit: the search for the material (:mod:`calib.fit.search`), and the choice of the answer among its runs.
+"""A multi-start search (:mod:`calib.fit.search`), and the choice of the answer among its runs.
 
-The best run ever made is returned, not the last one; where simulations can be repeated slower and with other particles, the
-best of the most promising ones run twice, because the luckiest of fifty noisy runs is not the best (selection by replication:
-Bechhofer 1954, Ann. Math. Statist. 25:16), and a force that hangs on the simulated speed is not the food's. A search that has stalled
-above what the right material would leave is begun afresh: multi-start, with the budget as its stopping rule.
+The best run ever made is returned, not the last one. Where simulations can be repeated slower and with other
+particles, it is the best of the most promising ones run twice: the best of fifty noisy runs owes part of that to its
+noise (selection by replication: Bechhofer 1954, Ann. Math. Statist. 25:16), and a force that hangs on the simulated
+speed is not the food's. A search that has stalled above what the right material would leave is started once more from
+another design, with the budget as its stopping rule.
 """
 
 from __future__ import annotations
@@ -16,22 +17,26 @@ import numpy as np
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
+from calib.fit.acquisition import LOCAL_WEIGHT
+from calib.fit.budget import progress_of_all
 from calib.fit.options import FitOptions
-from calib.fit.search import CAUTION_NEAR, ELSEWHERE, Search
+from calib.fit.search import BASIN_DISTANCE, Search
 from calib.fit.surrogate import Surrogate
-from calib.io.progress import Progress, onward
+from calib.io.progress import Progress
 from calib.problem.joint_objective import JointObjective
-from calib.problem.objective import Objective, Trial
+from calib.problem.objective import Objective
 from calib.problem.parameters import ParameterSet
+from calib.problem.scored_run import ScoredRun
 from calib.simulation.evaluation import Evaluator
 from mpm.arrays import FloatArray
-from mpm.errors import SimulationError
+from mpm.scene.errors import SimulationError
 
-#: Runs among which the answer is chosen by a second run of each, slower and with other particles: two batches of two.  They
-#: may be expected to be worse than the best by what the noise of two runs makes.
-FINALISTS, NOISES = 4, 2.0
-#: Added to the seed of a search that is begun afresh.
-AFRESH = 1_000_003
+#: Runs among which the answer is chosen by a second run of each, slower and with other particles: two batches of two.
+FINALISTS = 4
+#: They may be expected to be worse than the best by the chi-square that the noise of so many runs makes.
+FINALIST_MARGIN = 2.0
+#: Added to the seed of a search that is started once more.
+RESTART_SEED = 1_000_003
 
 
 @dataclass(frozen=True)
@@ -39,45 +44,44 @@ class FitResult:
     """Outcome of a fit.
 
     Attributes:
-        status: ``converged`` (no gain in sight), ``stalled`` (gains promised, none realised), ``budget``
-            (spent) or ``interrupted``.
+        status: ``converged`` (no gain in sight), ``stalled`` (gains promised, none realised), ``budget`` (spent) or
+            ``interrupted``.
         best: Best finished run on the fine evaluator.
         parameters: The fitted parameters with the best values [SI].
-        jacobian: Derivative of the residual vector at the best point by internal coordinates (n + 2 + p, p);
-            None when the search was interrupted before there were enough runs.
-        repeatability: Noise of a simulated curve as seen by the fit, part of the peak [-]; NaN without
-            Jacobian.
+        jacobian: Derivative of the residual vector at the best point by internal coordinates (rows, p); None when the
+            search was interrupted before there were enough runs.
+        repeatability: Noise of a simulated curve as seen by the fit, part of the peak [-]; NaN without Jacobian.
         history: All runs in the order of the search.
         replicates: Second runs of the finalists.
-        surrogate: The process through them, about the best run; None where the Jacobian is.
+        surrogate: The surrogate through them, about the best run; None where the Jacobian is.
     """
 
     status: str
-    best: Trial
+    best: ScoredRun
     parameters: ParameterSet
     jacobian: FloatArray | None
     repeatability: float
-    history: tuple[Trial, ...]
-    replicates: tuple[Trial, ...] = ()
+    history: tuple[ScoredRun, ...]
+    replicates: tuple[ScoredRun, ...] = ()
     surrogate: Surrogate | None = None
 
     @property
     def simulations(self) -> int:
         """Number of runs on the fine evaluator, second ones included."""
-        return sum(not t.coarse for t in self.history) + len(self.replicates)
+        return sum(not run.coarse for run in self.history) + len(self.replicates)
 
     @property
     def coarse_simulations(self) -> int:
         """Number of runs on the coarse evaluator."""
-        return sum(t.coarse for t in self.history)
+        return sum(run.coarse for run in self.history)
 
     @property
     def failed(self) -> int:
         """Number of runs that did not finish their stroke."""
-        return sum(not t.ok for t in (*self.history, *self.replicates))
+        return sum(not run.ok for run in (*self.history, *self.replicates))
 
 
-def calibrate(
+def multistart_search(
     objective: Objective | JointObjective,
     evaluator: Evaluator,
     *,
@@ -92,14 +96,13 @@ def calibrate(
         objective: Target, parameters and error model.
         evaluator: Runs simulations at the resolution that counts.
         coarse: Runs cheaper simulations for the design.
-        replicate: Runs the simulations of ``evaluator`` with what should not matter changed (speed, particles); with it the
-            answer is not the luckiest run but the best of the most promising ones run twice.
+        replicate: Runs the simulations of ``evaluator`` with what should not matter changed (speed, particles); with it
+            the answer is the best of the most promising runs made twice.
         options: Budget and the like.
         progress: Called after each simulation.
 
     Returns:
-        The best run, its Jacobian and the history; after Ctrl-C what there is so far, with status
-        ``interrupted``.
+        The best run, its Jacobian and the history; after Ctrl-C what there is so far, with status ``interrupted``.
 
     Raises:
         MaterialError: A budget too small for the number of parameters.
@@ -109,16 +112,16 @@ def calibrate(
     options = FitOptions() if options is None else options
     options.check(len(objective.parameters))
     search = Search(objective, evaluator, coarse, options, progress)
-    best: Trial | None = None
-    replicates: list[Trial] = []
+    best: ScoredRun | None = None
+    replicates: list[ScoredRun] = []
     # the workers have the cores, and sums in another order would ask for other points
     with threadpool_limits(1, "blas"):
         try:
             status = search.run()
             if status == "stalled":
-                status = _afresh(search, evaluator, coarse)
+                status = _restarted(search)
             if replicate is not None:
-                best, replicates = _choose(search, replicate)
+                best, replicates = _best_of_finalists(search, replicate)
         except KeyboardInterrupt:
             if not search.finished:
                 raise
@@ -126,81 +129,88 @@ def calibrate(
         return _result(search, status, best or search.best, replicates)
 
 
-def _afresh(search: Search, evaluator: Evaluator, coarse: Evaluator | None) -> str:
-    """Search once more from another design, with nothing of what a stalled search has learnt, for what is left of its budget; the runs
-    of both are then the search's.
+def _restarted(search: Search) -> str:
+    """Spend the rest of the budget of a stalled search on one from another design, with nothing of what it has learnt.
 
-    That is where the right material would more likely than not have left a smaller chi-square, the budget holds a search, and the first
-    has not already looked elsewhere for long in vain. Of 21 made-up cuts two had stalled at two to four times the chi-square that
-    other seeds found.
+    That is where the right material would more likely than not have left a smaller chi-square, the budget holds a
+    search, and the first has not already looked elsewhere for long in vain. The runs of both are then the search's.
 
     Returns:
         How the better of the two ended.
     """
     goal, options = search.objective, search.options
-    least = options.least(len(goal.parameters))
     rest = options.budget - search.spent
-    if rest < least or search.idle or search.best.misfit <= chi2.median(goal.effective_rows):
+    if rest < options.least(len(goal.parameters)) or search.idle:
         return "stalled"
-    first, told = search.best, onward(search.progress, search.trials, search.best, options)
-    other = Search(goal, evaluator, coarse, replace(options, budget=rest, seed=options.seed + AFRESH), told)
+    if search.best.misfit <= chi2.median(goal.effective_rows):
+        return "stalled"
+    first, told = search.best, progress_of_all(search.progress, search.runs, search.best, options)
+    own = replace(options, budget=rest, seed=options.seed + RESTART_SEED)
+    other = Search(goal, search.fine, search.coarse, own, told)
     try:
         status = other.run()
     except SimulationError:
         status = "stalled"  # no run of the other design ended its stroke
     finally:
-        search.trials += other.trials
+        search.runs += other.runs
     return status if search.best is not first else "stalled"
 
 
-def _choose(search: Search, replicate: Evaluator) -> tuple[Trial, list[Trial]]:
-    """Run the most promising runs once more, slower and with other particles; the one of least mean chi-square, and those runs.
+def _best_of_finalists(search: Search, replicate: Evaluator) -> tuple[ScoredRun, list[ScoredRun]]:
+    """Repeat the most promising runs, slower and with other particles; the one of least mean chi-square, and those.
 
-    A run whose repetition breaks down is not the answer; where all break down, the next ones are repeated, promising or not.
+    A run whose repetition breaks down is not the answer; where all break down, the next ones are repeated, promising or
+    not.
     """
-    process = search.process()
-    order = sorted(search.finished, key=lambda t: process.expected(t.z, CAUTION_NEAR))
-    limit = process.expected(order[0].z, CAUTION_NEAR) + NOISES * max(process.luck, 1.0)
-    tried: list[Trial] = []
-    replicates: list[Trial] = []
+    surrogate = search.surrogate()
+    order = sorted(search.finished, key=lambda run: surrogate.expected(run.z, LOCAL_WEIGHT))
+    limit = surrogate.expected(order[0].z, LOCAL_WEIGHT) + FINALIST_MARGIN * max(surrogate.noise_misfit, 1.0)
+    tried: list[ScoredRun] = []
+    replicates: list[ScoredRun] = []
     for bound in (limit, math.inf):
-        finalists: list[Trial] = []
-        for trial in [search.best, *order]:
-            apart = all(np.abs((trial.z - t.z) / search.unit).max() > ELSEWHERE for t in (*tried, *finalists))
-            if apart and len(finalists) < FINALISTS and process.expected(trial.z, CAUTION_NEAR) <= bound:
-                finalists.append(trial)
+        finalists: list[ScoredRun] = []
+        for run in [search.best, *order]:
+            known = (*tried, *finalists)
+            apart = all(np.abs((run.z - other.z) / search.unit).max() > BASIN_DISTANCE for other in known)
+            if apart and len(finalists) < FINALISTS and surrogate.expected(run.z, LOCAL_WEIGHT) <= bound:
+                finalists.append(run)
         if not finalists:
             continue
         for first in range(0, len(finalists), search.options.batch):
             batch = finalists[first : first + search.options.batch]
-            left = [t for t in batch if _may_win(t, process, tried, replicates)]
-            runs = sorted(replicate.evaluate([t.evaluation.parameters for t in left]), key=lambda e: e.index)
+            left = [run for run in batch if _may_win(run, surrogate, tried, replicates)]
+            asked = [run.evaluation.parameters for run in left]
+            found = sorted(replicate.evaluate(asked), key=lambda e: e.index)
             tried += left
-            replicates += (search.objective.trial(e, stage="replicate") for e in runs)
+            replicates += (search.objective.score(e, stage="replicate") for e in found)
         sound = [(t.misfit + r.misfit, k) for k, (t, r) in enumerate(zip(tried, replicates, strict=True)) if r.ok]
         if sound:
             return tried[min(sound)[1]], replicates
     return search.best, replicates
 
 
-def _may_win(trial: Trial, process: Surrogate, tried: list[Trial], replicates: list[Trial]) -> bool:
-    """Whether a second run of a finalist may make it the answer: not if it would have to gain more over what is expected of it than
-    those run twice so far have gained, on average, and the noise (a race: Maron & Moore 1994, NIPS 6:59)."""
+def _may_win(run: ScoredRun, surrogate: Surrogate, tried: list[ScoredRun], replicates: list[ScoredRun]) -> bool:
+    """Whether a second run of a finalist may make it the answer (a race: Maron & Moore 1994, NIPS 6:59).
+
+    Not if it would have to gain more over what is expected of it than those run twice so far have gained, on average,
+    and the noise.
+    """
     sound = [(t, again) for t, again in zip(tried, replicates, strict=True) if again.ok]
     if not sound:
         return True
-    gain = float(np.mean([process.expected(t.z, CAUTION_NEAR) - again.misfit for t, again in sound]))
-    least = process.expected(trial.z, CAUTION_NEAR) - gain - NOISES * max(process.luck, 1.0)
-    return trial.misfit + least < min(t.misfit + again.misfit for t, again in sound)
+    gain = float(np.mean([surrogate.expected(t.z, LOCAL_WEIGHT) - again.misfit for t, again in sound]))
+    noise = FINALIST_MARGIN * max(surrogate.noise_misfit, 1.0)
+    least = surrogate.expected(run.z, LOCAL_WEIGHT) - gain - noise
+    return run.misfit + least < min(t.misfit + again.misfit for t, again in sound)
 
 
-def _result(search: Search, status: str, best: Trial, replicates: list[Trial]) -> FitResult:
+def _result(search: Search, status: str, best: ScoredRun, replicates: list[ScoredRun]) -> FitResult:
     """What was found, with a Jacobian if there are runs enough for one."""
-    jacobian, repeatability, process = None, math.nan, None
-    if sum(t.ok for t in search.trials) > len(search.parameters):
-        process = search.process(best)
-        jacobian, repeatability = process.jacobian(best.z), process.noise
+    jacobian, repeatability, surrogate = None, math.nan, None
+    if sum(run.ok for run in search.runs) > len(search.parameters):
+        surrogate = search.surrogate(best)
+        jacobian, repeatability = surrogate.jacobian(best.z), surrogate.noise
     parameters = search.parameters.with_values(best.evaluation.parameters)
     return FitResult(
-        status, best, parameters, jacobian, repeatability, tuple(search.trials), tuple(replicates), process
+        status, best, parameters, jacobian, repeatability, tuple(search.runs), tuple(replicates), surrogate
     )

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from calib.errors import MaterialError
-
-if TYPE_CHECKING:
-    from calib.problem.objective import Trial
+from calib.problem.scored_run import ScoredRun
 
 
 @dataclass(frozen=True)
@@ -20,12 +17,10 @@ class FitOptions:
         budget: Largest number of simulations, coarse ones counted by their cost.
         batch: Simulations that run at the same time (worker processes).
         design: Space-filling runs at the start, besides the given values and the prior centre.
-        coarse_cost: Cost of a coarse simulation in fine ones [-]; half the resolution costs about a quarter
-            or less.
-        tolerance: Gain in chi-square that is worth a round [-], times the reduced chi-square where that
-            exceeds 1. 0.5 is an eighth of what bounds a 95 % interval (3.84), and moves its ends by 6 % of its half
-            width. 36 synthetic cuts took 70 runs (84 at most) where 0.2 asked for 76 (114), and their intervals held
-            the truth as often.
+        coarse_cost: Cost of a coarse simulation in fine ones [-]; half the resolution costs about a quarter or less.
+        tolerance: Gain in chi-square that is worth a round [-], times the reduced chi-square where that exceeds 1. 0.5
+            is an eighth of what bounds a 95 % interval (3.84), and moves its ends by 6 % of its half width
+            (docs/theory.md, "Measured choices").
         seed: Seed of the design and of the probes.
 
     Raises:
@@ -43,9 +38,9 @@ class FitOptions:
         if min(self.budget, self.batch, self.design, self.coarse_cost, self.tolerance) <= 0 or self.seed < 0:
             raise ValueError(f"{self} has a number that is not positive; give positive ones.")
 
-    def cost(self, trials: Iterable[Trial]) -> float:
-        """What some runs have taken of the budget."""
-        return sum(self.coarse_cost if t.coarse else 1.0 for t in trials)
+    def cost(self, runs: Iterable[ScoredRun]) -> float:
+        """What some runs have taken of the budget [fine simulations]."""
+        return sum(self.coarse_cost if run.coarse else 1.0 for run in runs)
 
     def least(self, parameters: int) -> int:
         """Smallest budget of a search for so many parameters."""

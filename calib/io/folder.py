@@ -13,7 +13,7 @@ import pandas as pd
 from calib.errors import OutputError
 from mpm.files import write_atomic
 
-MARKS = (
+RUN_FILES = (
     "summary.json",
     "material.yaml",
     "curves.csv",
@@ -34,6 +34,7 @@ MARKS = (
     "evaluations.h5.journal",
     "record.h5",
 )
+"""Files by which a folder is known to hold a run."""
 
 
 def prepare(out: Path, *, resume: bool) -> None:
@@ -44,7 +45,7 @@ def prepare(out: Path, *, resume: bool) -> None:
     """
     if out.exists() and not out.is_dir():
         raise OutputError(f"--out {out}: is a file, not a folder; choose another name")
-    found = [m for m in MARKS if (out / m).exists()]
+    found = [m for m in RUN_FILES if (out / m).exists()]
     if found and not resume:
         raise OutputError(
             f"--out {out}: holds another run ({', '.join(found)}) and is never overwritten; choose another folder, "
@@ -60,12 +61,30 @@ def prepare(out: Path, *, resume: bool) -> None:
 
 
 def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Write a JSON document atomically; NaN and infinity become null."""
+    """Write a JSON document whole or not at all; NaN and infinity become null.
+
+    Args:
+        path: The file; an existing one is replaced.
+        content: The document.
+
+    Raises:
+        OutputError: The file cannot be written.
+    """
     _replace(path, json.dumps(finite(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 
 def write_csv(path: Path, columns: Mapping[str, Any], *, head: Sequence[str] = (), digits: int = 9) -> None:
-    """Write columns of equal length atomically, with this many significant digits, below comments if there are any."""
+    """Write columns of equal length as a CSV file, whole or not at all.
+
+    Args:
+        path: The file; an existing one is replaced.
+        columns: Columns of n values each, by name.
+        head: Comments above the header, one line each.
+        digits: Significant digits of a number.
+
+    Raises:
+        OutputError: The file cannot be written.
+    """
     body = pd.DataFrame(columns).to_csv(index=False, float_format=f"%.{digits}g")
     _replace(path, "".join(f"# {line}\n" for line in head) + body)
 

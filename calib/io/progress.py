@@ -5,20 +5,13 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from types import TracebackType
-from typing import TYPE_CHECKING, TextIO
-
-if TYPE_CHECKING:
-    from calib.fit.options import FitOptions
-    from calib.problem.objective import Trial
+from typing import TextIO
 
 #: Width of the bar in characters.
 BAR = 20
-
-#: Time of a coarse run over that of a default one [-]: 0.08 to 0.10 in six real cuts. The budget counts it as more (``FitOptions.coarse_cost``).
-COARSE_TIME = 0.09
 
 #: Without a terminal (log file, pipe) a line is printed at most this often [s].
 PLAIN_INTERVAL_S = 30.0
@@ -55,35 +48,6 @@ class Progress:
         parts.append(f"at most {clock(self.eta_s)} left")
         parts.append(self.stage)
         return ", ".join(parts)
-
-
-def at_most(trials: Sequence[Trial], rest: float, options: FitOptions) -> float:
-    """Time that the rest of a budget takes at most [s]: were it all spent on default runs. Before there is one, by what coarse ones take."""
-    default = [t.evaluation.seconds for t in trials if not t.coarse]
-    each = default or [t.evaluation.seconds / COARSE_TIME for t in trials]
-    return rest * math.fsum(each) / len(each) / options.batch
-
-
-def onward(
-    report: Callable[[Progress], None] | None, trials: Sequence[Trial], best: Trial, options: FitOptions
-) -> Callable[[Progress], None] | None:
-    """The progress of one more search, told as that of all of them.
-
-    Args:
-        report: Who is told.
-        trials, best: The runs so far, and the best of them.
-        options: What all may spend.
-    """
-    if report is None:
-        return None
-    done, spent, failed = len(trials), options.cost(trials), sum(not t.ok for t in trials)
-
-    def told(p: Progress) -> None:
-        rest = (options.budget - spent - p.spent) / max(p.budget - p.spent, options.coarse_cost)
-        total = replace(p, done=done + p.done, spent=spent + p.spent, failed=failed + p.failed)
-        report(replace(total, budget=options.budget, misfit=min(p.misfit, best.misfit), eta_s=max(rest, 0.0) * p.eta_s))
-
-    return told
 
 
 def clock(seconds: float) -> str:

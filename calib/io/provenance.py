@@ -6,11 +6,15 @@ import hashlib
 import json
 import platform
 import subprocess
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from calib._version import __version__
+from calib.io.type_schema import ALWAYS, Shared
+from calib.io.typed_document import ANY
 from calib.io.yaml_checks import PACKAGE
 
 DATA = "data"  # folder of a package that an installed one has and a checkout has not
@@ -62,3 +66,37 @@ def code_key(*packages: str) -> str:
 def key_of(content: Any) -> str:
     """SHA-256 over plain data in canonical form."""
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class Software:
+    """What was run.
+
+    Attributes:
+        versions: Versions of cutcal, of Python and of the packages that a result depends on.
+        git: Commit of the checkout that ran, with +changes where it was edited; null where cutcal was installed without
+            one.
+    """
+
+    versions: Annotated[Mapping[str, str], Shared("versions")]
+    git: Annotated[str | None, Shared("commit")]
+
+    @classmethod
+    def here(cls) -> Software:
+        """The software that runs now."""
+        return cls(versions(), git_commit())
+
+
+@dataclass(frozen=True)
+class Invocation:
+    """How it was called.
+
+    Attributes:
+        seed: Seed of the particles, and of the search or the draws where there are any.
+        device: Device of the simulations.
+        command: Command line, or the call from Python, that made the document.
+    """
+
+    seed: Annotated[int, Shared("seed")] = field(metadata=ANY)
+    device: Annotated[str | None, Shared("device"), ALWAYS]
+    command: Annotated[tuple[str, ...], Shared("command")]

@@ -1,8 +1,8 @@
 """The JSON documents of the command line: which there are, and the schema of each.
 
-A document that is an object says in ``schema`` which one it is, as ``cutcal/NAME/VERSION``; the lists of names cannot. The version
-rises when a key is taken away or comes to mean something else, not when one is added. The schemas are closed: an object whose keys
-are listed has no others.
+A document that is an object says in ``schema`` which one it is, as ``cutcal/NAME/VERSION``; the lists of names cannot.
+The version rises when a key is taken away or comes to mean something else, not when one is added. The schemas are
+closed: an object whose keys are listed has no others.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from calib.io.yaml_checks import suggest
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 FOLDER = Path(__file__).with_name("schemas")
 COMMON = "common"  # parts that several schemas share
@@ -46,6 +46,11 @@ def schema(name: str) -> dict[str, Any]:
     if f":{COMMON}:" in json.dumps(own):
         own["$defs"] = own.get("$defs", {}) | {COMMON: _read(COMMON)}
     return own
+
+
+def shared_part(name: str) -> dict[str, Any]:
+    """One of the parts that several schemas share."""
+    return dict(_read(COMMON)["$defs"][name])
 
 
 def _read(name: str) -> dict[str, Any]:

@@ -2,7 +2,8 @@
 
 The fields of a result have the names of the document's keys, units included. Two rules say what a missing number is:
 
-* A field whose default is None stands for a key that may be missing: while it is None the key is left out.
+* A field whose default is None stands for a key that may be missing: while it is None the key is left out. With the
+  metadata :data:`NULL` it is missing in older documents alone: today it is written as null.
 * NaN and infinity are written as null, because JSON has no word for them. A null is read back as None where the type
   allows None and the key may not be missing, else as NaN.
 
@@ -11,8 +12,10 @@ A class may say more about its document in two class variables:
 * ``DOCUMENT`` is the name of the document. It becomes the first key, ``schema``.
 * ``KEYS`` lists the keys in their order, where these are not just the fields: properties may be among them.
 
-A field with the metadata :data:`FLAT` is a mapping or another dataclass. Its keys stand beside those of the result;
-where it may be None, they may all be missing.
+A field with the metadata :data:`FLAT` is a mapping or another dataclass. Its keys stand beside those of the result; where
+it may be None, they may all be missing. :func:`renamed` gives a field another name in the document; a field with the metadata
+:data:`ANY` may be of any kind in older documents. The JSON Schema of a document is made from the same type
+(:mod:`calib.io.type_schema`).
 """
 
 from __future__ import annotations
@@ -28,13 +31,34 @@ from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from calib.errors import DocumentError
 from calib.io.schema import tag
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 FLAT: Mapping[str, Any] = {"flat": True}
 """Metadata of a field whose keys stand beside those of the result that has it."""
+NULL: Mapping[str, Any] = {"null": True}
+"""Metadata of a field whose default is None and which is written all the same, as null."""
+ANY: Mapping[str, Any] = {"any": True}
+"""Metadata of a field that may be of any kind in older documents."""
 REMEDY = "run the same command again"
 
 Result = TypeVar("Result")
+FORMER: Mapping[str, Any] = {"former": True}
+"""Metadata of a field whose default is None and that only documents of other versions have: it is read and not written."""
+
+
+def renamed(name: str) -> Mapping[str, Any]:
+    """Metadata of a field with another name in the document."""
+    return {"key": name}
+
+
+def document_key(field: Field[Any]) -> str:
+    """Name of a field in the document."""
+    return str(field.metadata.get("key", field.name))
+
+
+def left_out(field: Field[Any]) -> bool:
+    """Whether the key of a field is left out while it is None."""
+    return field.default is None and not field.metadata.get("null")
 
 
 def to_document(result: Any) -> dict[str, Any]:
@@ -51,12 +75,12 @@ def to_document(result: Any) -> dict[str, Any]:
     known = {f.name: f for f in fields(result)}
     for key in getattr(kind, "KEYS", tuple(known)):
         value = getattr(result, key)
-        if value is None and key in known and known[key].default is None:
+        if key in known and (known[key].metadata.get("former") or (value is None and left_out(known[key]))):
             continue
         if key in known and known[key].metadata.get("flat"):
             out |= _plain(value)
         else:
-            out[key] = _plain(value)
+            out[document_key(known[key]) if key in known else key] = _plain(value)
     return out
 
 
@@ -117,10 +141,10 @@ def from_document(kind: type[Result], content: Any, place: str = "") -> Result:
     for one in fields(own):
         if one.metadata.get("flat"):
             values[one.name] = _flat(hints[one.name], content, place, _keys(own))
-        elif one.name in content:
-            values[one.name] = _typed(hints[one.name], content[one.name], _at(place, one.name), one)
+        elif document_key(one) in content:
+            values[one.name] = _field(one, hints[one.name], content[document_key(one)], _at(place, document_key(one)))
         elif one.default is MISSING and one.default_factory is MISSING:
-            raise DocumentError(f"{_at(place, one.name)} is missing")
+            raise DocumentError(f"{_at(place, document_key(one))} is missing")
     try:
         return kind(**values)
     except CutcalError as e:  # a class that checks its values
@@ -141,7 +165,7 @@ def _hints(kind: Any) -> dict[str, Any]:
 @cache
 def _keys(kind: Any) -> frozenset[str]:
     """Keys of a document that are not of a flat mapping in it."""
-    own = {"schema", *getattr(kind, "KEYS", ()), *(f.name for f in fields(kind))}
+    own = {"schema", *getattr(kind, "KEYS", ()), *map(document_key, fields(kind))}
     for one in fields(kind):
         if one.metadata.get("flat"):
             hint: Any = _hints(kind)[one.name]
@@ -155,17 +179,26 @@ def _flat(hint: Any, content: dict[str, Any], place: str, known: frozenset[str])
     kinds = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
     kind = next((one for one in kinds if isinstance(one, type) and is_dataclass(one)), None)
     if kind is not None:
-        absent = NoneType in kinds and not any(f.name in content for f in fields(kind))
+        absent = NoneType in kinds and not any(document_key(f) in content for f in fields(kind))
         return None if absent else from_document(kind, content, place)
     each = get_args(hint)[1]
     return {name: _typed(each, value, _at(place, name)) for name, value in content.items() if name not in known}
 
 
-def _typed(hint: Any, value: Any, place: str, of: Field[Any] | None = None) -> Any:
+def _field(of: Field[Any], hint: Any, value: Any, place: str) -> Any:
+    """The value of a field."""
+    if of.metadata.get("any"):
+        return value
+    if value is None and left_out(of) and not of.metadata.get("former") and float in get_args(hint):
+        return math.nan
+    return _typed(hint, value, place)
+
+
+def _typed(hint: Any, value: Any, place: str) -> Any:
     """A value of the type that a hint says."""
     origin, inner = get_origin(hint), get_args(hint)
     if origin in (Union, UnionType):
-        return _optional(inner, value, place, of)
+        return _optional(inner, value, place)
     if hint is Any:
         return value
     if isinstance(hint, type) and is_dataclass(hint):
@@ -175,17 +208,24 @@ def _typed(hint: Any, value: Any, place: str, of: Field[Any] | None = None) -> A
             raise DocumentError(f"{place} is not a mapping of names to values")
         return {name: _typed(inner[1], part, _at(place, name)) for name, part in value.items()}
     if origin is not None and issubclass(origin, Sequence):
-        if not isinstance(value, list):
-            raise DocumentError(f"{place} is not a list")
-        return tuple(_typed(inner[0], part, _at(place, k)) for k, part in enumerate(value))
+        return _list(inner, value, place)
     return _scalar(hint, value, place)
 
 
-def _optional(kinds: tuple[Any, ...], value: Any, place: str, of: Field[Any] | None) -> Any:
+def _list(kinds: tuple[Any, ...], value: Any, place: str) -> tuple[Any, ...]:
+    """A list whose items are all of one type, or as many as there are types."""
+    if not isinstance(value, list):
+        raise DocumentError(f"{place} is not a list")
+    each = [kinds[0]] * len(value) if len(kinds) == 1 or kinds[-1] is ... else list(kinds)
+    if len(each) != len(value):
+        raise DocumentError(f"{place} is not a list of {len(each)}")
+    return tuple(_typed(one, part, _at(place, k)) for k, (one, part) in enumerate(zip(each, value, strict=True)))
+
+
+def _optional(kinds: tuple[Any, ...], value: Any, place: str) -> Any:
     """A value that may be one of several types; the first that fits."""
     if value is None and NoneType in kinds:
-        left_out = of is not None and of.default is None
-        return math.nan if left_out and float in kinds else None
+        return None
     wrong: list[DocumentError] = []
     for one in kinds:
         try:

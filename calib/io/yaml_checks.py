@@ -18,12 +18,11 @@ import yaml
 
 from calib.errors import MaterialError
 from calib.io.wording import brief, quoted
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 PACKAGE = Path(__file__).resolve().parents[1]
 """Folder of the package ``calib``; an installed one has the data in it, a checkout beside it."""
 
-#: Units a value may have been meant in, and what one of them is in the SI unit.
 MULTIPLES: dict[str, dict[str, float]] = {
     "Pa": {"kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/m^2": 1.0, "N/mm^2": 1e6},
     "m": {"mm": 1e-3, "cm": 1e-2, "um": 1e-6},
@@ -33,17 +32,15 @@ MULTIPLES: dict[str, dict[str, float]] = {
     "-": {"": 1.0, "1": 1.0, "%": 1e-2},
     "deg": {"rad": 180.0 / math.pi, "degree": 1.0, "degrees": 1.0},
 }
+"""Units that a value may have been meant in, by SI unit, and what one of them is in the SI unit."""
 
 _FLOAT_TAG = "tag:yaml.org,2002:float"
 _FLOAT = re.compile(r"^[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+$")
 _FLOAT_START = list("-+.0123456789")
-
-
-# What PyYAML lets through from Python where a date, a number or a tagged value is none, such as 2024-13-01 or "!!int x".
+# What PyYAML lets through from Python where a date, a number or a tagged value is none: 2024-13-01 or "!!int x".
 _UNCONSTRUCTED = (ValueError, KeyError, IndexError, AttributeError, TypeError, OverflowError)
-
-#: Letters of a key from which on it is the name of nothing.
 LONGEST_KEY = 60
+"""Letters of a key from which on it is the name of nothing."""
 
 
 class _Loader(yaml.SafeLoader):
@@ -97,6 +94,9 @@ def suggest(word: str, known: Iterable[str], synonyms: Mapping[str, str] | None 
         word: What was written.
         known: What may be written.
         synonyms: Lower-case everyday names of known words, for instance ``density`` of ``rho``.
+
+    Returns:
+        The end of the message, from its comma or semicolon on.
     """
     names = list(known)
     plain = {n.casefold(): n for n in names} | {k: v for k, v in (synonyms or {}).items() if v in names}
@@ -190,6 +190,13 @@ def check_keys(
 ) -> None:
     """Check that a mapping has the required keys and no unknown one.
 
+    Args:
+        place: Where the mapping is, for errors.
+        given: The mapping.
+        required: Keys that it must have.
+        optional: Keys that it may have.
+        synonyms: As in :func:`suggest`.
+
     Raises:
         CutcalError: An unknown key (with the nearest known one) or the missing keys.
     """
@@ -203,7 +210,7 @@ def check_keys(
         raise place.error(f"misses {', '.join(missing)}; add it")
 
 
-def number(place: Place, value: Any) -> float:
+def finite_number(place: Place, value: Any) -> float:
     """The value as a finite number.
 
     Raises:
@@ -235,6 +242,14 @@ def text(place: Place, value: Any) -> str:
 def choice(place: Place, value: Any, options: Iterable[str]) -> str:
     """The value as one of the options.
 
+    Args:
+        place: Where the value is, for errors.
+        value: What YAML has there.
+        options: What may be there.
+
+    Returns:
+        The value, as text.
+
     Raises:
         CutcalError: It is none of them.
     """
@@ -247,6 +262,12 @@ def choice(place: Place, value: Any, options: Iterable[str]) -> str:
 
 def check_unit(place: Place, unit: Any, expected: str, value: float) -> None:
     """Check that a value is in the expected unit, which is never converted behind the reader's back.
+
+    Args:
+        place: Where the value is, for errors.
+        unit: What YAML has as its unit.
+        expected: The SI unit that it must be.
+        value: The value, in the unit that was written.
 
     Raises:
         CutcalError: Another unit; where it is a known multiple, with the converted value to write.

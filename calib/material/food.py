@@ -19,9 +19,9 @@ from calib.io.wording import listed
 from calib.io.yaml_checks import Dumper, Place, check_keys, choice, data_path, mapping, read_yaml, suggest, text
 from calib.material.properties import (
     DIMENSIONS,
-    OPTIONAL,
+    OPTIONAL_KEYS,
     PROPERTIES,
-    REQUIRED,
+    REQUIRED_KEYS,
     SYNONYMS,
     Property,
     Source,
@@ -29,7 +29,7 @@ from calib.material.properties import (
     rule_of,
 )
 from mpm.files import write_atomic
-from mpm.shapes import SHAPE_KINDS
+from mpm.scene.shapes import SHAPE_KINDS
 
 if TYPE_CHECKING:
     from mpm.scene import Food
@@ -45,8 +45,8 @@ __all__ = [
     "load_material_file",
 ]
 
-#: Range of a property that has no literature and is given by the user: the value over and times this.
 GIVEN_SPREAD = 10.0
+"""Range of a property that has no literature and is given by the user: the value over and times this."""
 
 _DAMAGE = ("tensile_strength", "fracture_energy")
 _NULLABLE = ("R_skin", *_DAMAGE)
@@ -58,7 +58,7 @@ class FoodSpec:
 
     Attributes:
         name: Lower case with underscores.
-        shape_kind: One of ``mpm.shapes.SHAPE_KINDS``.
+        shape_kind: One of ``mpm.scene.shapes.SHAPE_KINDS``.
         dims: ``length``, ``width``, ``height`` [m].
         properties: By name; a property the food has no value for (null in the file) is absent.
         calibration: Provenance of a calibrated food, or None.
@@ -122,7 +122,15 @@ class FoodSpec:
         return self.properties[name].low, self.properties[name].high
 
     def with_sizes(self, sizes: Mapping[str, float], *, status: str, source: str) -> FoodSpec:
-        """The same food with other dimensions [m], by name; ranges stay.
+        """The same food with other dimensions; ranges stay.
+
+        Args:
+            sizes: Dimensions [m] by name.
+            status: ``given`` or ``fitted``.
+            source: Where they come from.
+
+        Returns:
+            The food.
 
         Raises:
             MaterialError: An impossible size.
@@ -142,6 +150,9 @@ class FoodSpec:
             status: ``given`` or ``fitted``.
             source: Where the values come from.
 
+        Returns:
+            The food; a property that it had no value for has a range of ``GIVEN_SPREAD`` to either side.
+
         Raises:
             MaterialError: An unknown property, or a value out of its limits.
         """
@@ -156,7 +167,7 @@ class FoodSpec:
         return replace(self, properties=new)
 
     def warnings(self) -> list[str]:
-        """What a user of this food must know: what is not modelled, sources that disagree or are flagged, odd values."""
+        """What a user of this food must know: what is not modelled, sources that disagree or are flagged, odd ones."""
         both = {"shape": self.dims, "properties": self.properties}
         said = [] if self.not_modelled is None else [f"{self.name}: not modelled: {self.not_modelled}"]
         said += [
@@ -187,12 +198,15 @@ class FoodSpec:
             length: Another length across the blade [m].
             shape: Another outline.
 
+        Returns:
+            The food; bulk damage is left out where it has only one of the two properties of it.
+
         Raises:
             SceneError: A shape or size that the solver cannot take.
         """
-        from mpm.material import Material
         from mpm.scene import Food
-        from mpm.shapes import Shape
+        from mpm.scene.material import Material
+        from mpm.scene.shapes import Shape
 
         sizes = {"length": length, "width": width, "height": height}
         size = {n: self.dims[n].value if given is None else given for n, given in sizes.items()}
@@ -304,12 +318,15 @@ def read_property(parent: Place, name: str, raw: Any) -> Property:
         name: Its name.
         raw: What YAML has there.
 
+    Returns:
+        The property, checked.
+
     Raises:
         CutcalError: Of the class of ``parent``: unknown name or key, wrong unit or status, a number out of its limits.
     """
     place = parent.at(name)
     given = mapping(place, raw)
-    check_keys(place, given, REQUIRED, OPTIONAL)
+    check_keys(place, given, REQUIRED_KEYS, OPTIONAL_KEYS)
     listed = given.get("sources", [])
     if not isinstance(listed, list):
         raise place.at("sources").error("must be a list of {value, source}")

@@ -14,26 +14,26 @@ from calib.io.yaml_checks import (
     check_unit,
     choice,
     data_path,
+    finite_number,
     mapping,
-    number,
     read_yaml,
     suggest,
     text,
 )
-from mpm.errors import SceneError
 from mpm.scene import Knife
+from mpm.scene.errors import SceneError
 
 #: Unit of each field in the file.
-UNITS = {"spine": "m", "angle": "deg", "height": "m", "length": "m"}
+KNIFE_UNITS = {"spine": "m", "angle": "deg", "height": "m", "length": "m"}
 
 #: Smallest and largest value of each field in its unit: from a scalpel to a cleaver.
-LIMITS = {"spine": (1e-4, 0.02), "angle": (0.1, 60.0), "height": (2e-3, 0.2), "length": (5e-3, 0.6)}
+KNIFE_LIMITS = {"spine": (1e-4, 0.02), "angle": (0.1, 60.0), "height": (2e-3, 0.2), "length": (5e-3, 0.6)}
 
-STATUSES = ("measured", "proxy", "assumed", "given")
+KNIFE_STATUSES = ("measured", "proxy", "assumed", "given")
 
 #: Part of the spine by which the faces may miss it at the top of the blade: the flat of the edge is not
 #: modelled (0.08 mm of 2 mm, 4 %) and angles are given to three digits.
-TOLERANCE = 0.06
+WEDGE_TOLERANCE = 0.06
 
 _SYNONYMS = {
     "thickness": "spine", "width": "spine", "bevel": "angle", "included_angle": "angle", "wedge": "angle",
@@ -42,8 +42,15 @@ _SYNONYMS = {
 
 
 @dataclass(frozen=True)
-class Field:
-    """One number of a knife as its file has it. Attributes: value; unit; status; source."""
+class KnifeNumber:
+    """One number of a knife as its file has it.
+
+    Attributes:
+        value: The number [unit].
+        unit: SI unit, degrees for the angle.
+        status: One of ``KNIFE_STATUSES``.
+        source: Where it comes from.
+    """
 
     value: float
     unit: str
@@ -51,11 +58,14 @@ class Field:
     source: str
 
 
-def knife_fields(path: Path | str | None = None) -> dict[str, dict[str, Field]]:
-    """Every number of all knives of a file with its source, by knife and field.
+def knife_fields(path: Path | str | None = None) -> dict[str, dict[str, KnifeNumber]]:
+    """Every number of all knives of a file with its source.
 
     Args:
         path: As :func:`load_knives`.
+
+    Returns:
+        The numbers by knife and by ``spine``, ``angle``, ``height`` and ``length``.
 
     Raises:
         SceneError: As :func:`load_knives`.
@@ -64,12 +74,12 @@ def knife_fields(path: Path | str | None = None) -> dict[str, dict[str, Field]]:
     out = {}
     for name, raw in content.items():
         _read_knife(top.at(name), raw)
-        out[name] = {n: _field(float(raw[n]["value"]), n, raw[n]) for n in UNITS}
+        out[name] = {n: _field(float(raw[n]["value"]), n, raw[n]) for n in KNIFE_UNITS}
     return out
 
 
-def _field(value: float, name: str, raw: dict[str, Any]) -> Field:
-    return Field(value, UNITS[name], raw.get("status", "given"), raw.get("source", "no source"))
+def _field(value: float, name: str, raw: dict[str, Any]) -> KnifeNumber:
+    return KnifeNumber(value, KNIFE_UNITS[name], raw.get("status", "given"), raw.get("source", "no source"))
 
 
 def load_knives(path: Path | str | None = None) -> dict[str, Knife]:
@@ -116,11 +126,11 @@ def wedge_height(knife: Knife) -> float:
 
 def _read_knife(place: Place, raw: Any) -> Knife:
     given = mapping(place, raw)
-    check_keys(place, given, UNITS, synonyms=_SYNONYMS)
-    value = {field: _read_field(place.at(field), field, given[field]) for field in UNITS}
+    check_keys(place, given, KNIFE_UNITS, synonyms=_SYNONYMS)
+    value = {field: _read_field(place.at(field), field, given[field]) for field in KNIFE_UNITS}
     knife = Knife(place.path[-1], value["spine"], math.radians(value["angle"]), value["height"], value["length"])
     top = 2.0 * knife.height * math.tan(0.5 * knife.angle)
-    if top < (1.0 - TOLERANCE) * knife.spine:
+    if top < (1.0 - WEDGE_TOLERANCE) * knife.spine:
         angle = math.degrees(2.0 * math.atan(0.5 * knife.spine / knife.height))
         raise place.error(
             f"with an angle of {value['angle']:g} deg the faces are only {top * 1e3:.3g} mm apart at the top "
@@ -133,14 +143,14 @@ def _read_knife(place: Place, raw: Any) -> Knife:
 def _read_field(place: Place, field: str, raw: Any) -> float:
     given = mapping(place, raw)
     check_keys(place, given, ("value", "unit"), ("source", "status"))
-    value = number(place.at("value"), given["value"])
-    check_unit(place, given["unit"], UNITS[field], value)
-    low, high = LIMITS[field]
+    value = finite_number(place.at("value"), given["value"])
+    check_unit(place, given["unit"], KNIFE_UNITS[field], value)
+    low, high = KNIFE_LIMITS[field]
     if not low <= value <= high:
-        unit = UNITS[field]
+        unit = KNIFE_UNITS[field]
         raise place.error(f"{value:g} {unit} is no knife; it must lie between {low:g} and {high:g} {unit}")
     if "source" in given:
         text(place.at("source"), given["source"])
     if "status" in given:
-        choice(place.at("status"), given["status"], STATUSES)
+        choice(place.at("status"), given["status"], KNIFE_STATUSES)
     return value

@@ -7,23 +7,23 @@ from dataclasses import dataclass
 from typing import Any
 
 from calib.errors import MaterialError
-from calib.io.yaml_checks import Place, check_unit, choice, number, suggest, text
-from mpm.material import MAX_POISSON
+from calib.io.yaml_checks import Place, check_unit, choice, finite_number, suggest, text
+from mpm.scene.material import MAX_POISSON
 
 #: Where a literature value comes from: measured on this food; Table 2 of the CulinaryCut paper; another food,
 #: another test or a second-hand quotation; nobody's measurement.
-LITERATURE = ("measured", "paper_table2", "proxy", "assumed")
+LITERATURE_STATUSES = ("measured", "paper_table2", "proxy", "assumed")
 
 #: Where another value comes from: fitted to a trace, or given by the user.
-OWN = ("fitted", "given")
+OTHER_STATUSES = ("fitted", "given")
 
 #: Published values further apart than this are worth a warning (the test method alone can move E by 13 times:
 #: limequat, Vatani et al. 2024, Microsc. Res. Tech.).
 DISAGREEMENT = 3.0
 
 #: Keys of a property in a file.
-REQUIRED = ("value", "low", "high", "unit", "source", "status")
-OPTIONAL = ("sources", "flag")
+REQUIRED_KEYS = ("value", "low", "high", "unit", "source", "status")
+OPTIONAL_KEYS = ("sources", "flag")
 #: What people call the properties, in lower case.
 SYNONYMS = {
     "young": "E", "youngs": "E", "youngs_modulus": "E", "modulus": "E", "stiffness": "E",
@@ -31,7 +31,8 @@ SYNONYMS = {
     "yield": "yield_stress", "sigma_y": "yield_stress", "yield_strength": "yield_stress",
     "friction": "mu", "friction_coefficient": "mu",
     "toughness": "R", "fracture_toughness": "R", "cutting_resistance": "R", "resistance": "R",
-    "initiation": "R_initiation", "depth": "initiation_depth", "damping": "loss_factor", "skin": "skin_thickness", "skin_resistance": "R_skin",
+    "initiation": "R_initiation", "depth": "initiation_depth", "damping": "loss_factor",
+    "skin": "skin_thickness", "skin_resistance": "R_skin",
     "gf": "fracture_energy", "strength": "tensile_strength", "diameter": "width",
 }  # fmt: skip
 
@@ -74,6 +75,9 @@ PROPERTIES: dict[str, Rule] = {
     "fracture_energy": Rule("J/m^2", 0.1, 1e6, "energy per crack area of bulk damage"),
 }  # fmt: skip
 
+MEANINGS = {name: rule.meaning for name, rule in PROPERTIES.items()}
+"""What each property is, in words."""
+
 DIMENSIONS: dict[str, Rule] = {
     "length": Rule("m", 1e-3, 1.0, "size along y, across the blade"),
     "width": Rule("m", 1e-3, 1.0, "size along x, along the blade"),
@@ -105,7 +109,7 @@ class Property:
         high: Upper end of the literature's 95 % range [unit].
         unit: SI unit.
         source: Where ``value`` comes from; for an assumed value the reason.
-        status: One of ``LITERATURE`` or ``OWN``.
+        status: One of ``LITERATURE_STATUSES`` or ``OTHER_STATUSES``.
         sources: Published values, the used one may be among them.
         flag: Reason why a published value must not be trusted, or None.
 
@@ -129,14 +133,14 @@ class Property:
         here = Place("", (self.name,))
         rule = rule_of(self.name, PROPERTIES | DIMENSIONS)
         for key in ("value", "low", "high"):
-            object.__setattr__(self, key, number(here.at(key), getattr(self, key)))
+            object.__setattr__(self, key, finite_number(here.at(key), getattr(self, key)))
         check_unit(here, self.unit, rule.unit, self.value)
         for key in ("value", "low", "high"):
             _check_limits(here.at(key), getattr(self, key), rule)
         text(here.at("source"), self.source)
-        choice(here.at("status"), self.status, (*LITERATURE, *OWN))
+        choice(here.at("status"), self.status, (*LITERATURE_STATUSES, *OTHER_STATUSES))
         for i, entry in enumerate(self.sources):
-            number(here.at("sources").at(str(i)).at("value"), entry.value)
+            finite_number(here.at("sources").at(str(i)).at("value"), entry.value)
             text(here.at("sources").at(str(i)).at("source"), entry.source)
         if self.flag is not None:
             text(here.at("flag"), self.flag)
@@ -145,7 +149,7 @@ class Property:
     def _check_range(self, here: Place) -> None:
         if self.low > self.high:
             raise here.error(f"has the range {self.low:g} to {self.high:g} {self.unit}; write low <= high")
-        if self.status in LITERATURE and not self.low <= self.value <= self.high:
+        if self.status in LITERATURE_STATUSES and not self.low <= self.value <= self.high:
             raise here.error(
                 f"has the value {self.value:g} outside its range {self.low:g} to {self.high:g} {self.unit}; "
                 "correct the value or widen the range"
@@ -154,7 +158,7 @@ class Property:
     def warnings(self) -> list[str]:
         """What a reader of this value must know, one sentence each; empty where there is nothing."""
         said = []
-        values = [s.value for s in self.sources] + ([self.value] if self.status in LITERATURE else [])
+        values = [s.value for s in self.sources] + ([self.value] if self.status in LITERATURE_STATUSES else [])
         if min(values, default=0.0) > 0.0 and max(values) > DISAGREEMENT * min(values):
             said.append(
                 f"published values go from {min(values):.3g} to {max(values):.3g} {self.unit}, "
@@ -171,7 +175,7 @@ class Property:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data in the layout of ``materials.yaml``."""
-        out: dict[str, Any] = {key: getattr(self, key) for key in REQUIRED}
+        out: dict[str, Any] = {key: getattr(self, key) for key in REQUIRED_KEYS}
         if self.sources:
             out["sources"] = [{"value": s.value, "source": s.source} for s in self.sources]
         if self.flag:
@@ -198,7 +202,7 @@ def check_override(name: str, value: float | str) -> float:
             raise place.error(
                 f"{value!r} is not a number; give the {rule.meaning} as a plain number in {rule.unit}"
             ) from None
-    x = number(place, value)
+    x = finite_number(place, value)
     _check_limits(place, x, rule)
     return x
 

@@ -11,40 +11,55 @@ import numpy as np
 from calib.material.food import FoodSpec
 from calib.trace.conditioning import Conditioned
 from mpm.scene import EdgeLaw, Knife, Motion, Numerics, Scene
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
-ZONE_M = 4e-3  # process zone of the edge; small foods get an eighth of their height
+ZONE_M = 4e-3
+"""Process zone of the edge [m]; small foods get an eighth of their height."""
 ZONE_PARTS = 8
-CELL_PER_ZONE = 0.75  # default cell, so that the zone spans 1.3 cells; the coarse grid has one cell to the zone
-CLEARANCE_ZONES = 1.0  # least food left below the edge where a trace ends under load
-HEIGHT_SPAN = 1.25  # a specimen of unknown height may be at least this many times higher than the lowest it can be
-UNDER_LOAD = 0.5  # the trace ends under load when its last force exceeds this part of its median after the peak
-# Multiples of these, less whole cells, are the places of the grid in repeated runs: they fill the cell evenly (powers of the root
-# of g^3 = g + 1: Roberts 2018).
-PLACES = np.array([0.7548776662, 0.5698402910])
+"""Parts of the height or width of a small food that one process zone takes."""
+CELL_PER_ZONE = 0.75
+"""Default cell over the process zone [-], which then spans 1.3 cells; the coarse grid has one cell to the zone."""
+MACH = 0.01
+"""Speed of the blade over that of the P-wave [-]; the coarse cut has twice of it."""
+CLEARANCE_ZONES = 1.0
+"""Least food left below the edge where a trace ends under load, in process zones."""
+HEIGHT_SPAN = 1.25
+"""A specimen of unknown height may be at least this many times higher than the lowest it can be."""
+UNDER_LOAD = 0.5
+"""A trace ends under load when its last force exceeds this part of its median after the peak."""
+QUASI_RANDOM = np.array([0.7548776662, 0.5698402910])
+"""Multiples of these, less whole cells, are the offsets of the grid in repeated runs: they fill the cell evenly (powers
+of the root of g^3 = g + 1: Roberts 2018)."""
 LENGTH_PER_HEIGHT = 4.0
-"""Largest simulated length across the blade of a food with parallel sides. The blade bends its halves apart like the arms of a double
-cantilever beam (Gurney and Hunt 1967), so the force on its faces grows with the length: a cucumber of one height needs 0.56 of the
-work of one of five, two heights need 0.77, three 0.93, four 0.99; for a banana, which flows, two are enough."""
+"""Largest simulated length across the blade of a food with parallel sides, over its height. The blade bends its halves
+apart like the arms of a double cantilever beam (Gurney and Hunt 1967), so the force on its faces grows with the length
+(docs/theory.md, "Measured choices")."""
 PRISMS = ("block", "cylinder", "half_cylinder", "capsule")
-MIDDLE = 0.5  # place of the blade where nothing else is said, in parts of the length
-FAR = 0.25
-"""Distance from the cut from which on there are fewer particles, over the height: peak and work of banana, cucumber and pear
-change by 0.3 % at most, their curves by 0.4 % of the peak, and long foods take half the time."""
+"""Shapes with parallel sides."""
+MID_LENGTH = 0.5
+"""Where the blade cuts when nothing else is said, in parts of the length."""
+FAR_PER_HEIGHT = 0.25
+"""Distance from the cut from which on there are fewer particles, over the height (docs/theory.md, "Measured
+choices")."""
 
 
 @dataclass(frozen=True)
 class Sizing:
     """Sizes of the specimen, each given by the user or None, and where along its length it is cut.
 
-    Attributes: shape; height, width, length [m]; at, part of the length on the left of the blade (y < 0) [-].
+    Attributes:
+        shape: Outline, one of ``mpm.scene.shapes.SHAPE_KINDS``.
+        height: Height [m].
+        width: Width along the blade [m].
+        length: Length across the blade [m].
+        at: Part of the length on the left of the blade (y < 0) [-].
     """
 
     shape: str | None = None
     height: float | None = None
     width: float | None = None
     length: float | None = None
-    at: float = MIDDLE
+    at: float = MID_LENGTH
 
     @property
     def kept(self) -> tuple[str, ...]:
@@ -56,9 +71,17 @@ def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple
     """Shape of the specimen, and what had to be assumed about it.
 
     Real traces rarely come with the specimen's size. Where the trace has a position and ends released, the height is
-    the stroke; where it ends under load it lies in :func:`height_range`. Width and length that are not given keep the food's
-    proportions. The force is proportional to the width, so only the product of resistance and width is seen by one
-    trace.
+    the stroke; where it ends under load it lies in :func:`height_range`. Width and length that are not given keep the
+    food's proportions. The force is proportional to the width, so only the product of resistance and width is seen by
+    one trace.
+
+    Args:
+        food: The food with its usual sizes.
+        trace: The measured cut, None where there is none: then a height that is not given is the usual one.
+        sizing: What is known of the specimen.
+
+    Returns:
+        The shape, and what had to be assumed, one sentence each.
 
     Raises:
         SceneError: A shape or size that cannot be simulated.
@@ -77,16 +100,16 @@ def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple
         else:
             low, height, high = free
             said.append(
-                f"the specimen's height is not known: the trace ends under load, so the edge stopped above the board, and "
-                f"{low * 1e3:.0f} to {high * 1e3:.0f} mm are possible; give --height if you measured it"
+                "the specimen's height is not known: the trace ends under load, so the edge stopped above the board, "
+                f"and {low * 1e3:.0f} to {high * 1e3:.0f} mm are possible; give --height if you measured it"
             )
     height = default.height if height is None else height
     width = sizing.width
     if width is None:
         width = default.width * height / default.height
         said.append(
-            "the specimen's width is not known: it keeps the proportions of the food; resistances are only identified as "
-            "their product with it; give --width if you measured it"
+            "the specimen's width is not known: it keeps the proportions of the food; resistances are only identified "
+            "as their product with it; give --width if you measured it"
         )
     whole, most = sizing.length, math.inf
     if whole is None:
@@ -97,17 +120,25 @@ def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple
     length = left + right
     if sizing.length is None:
         said.append(
-            f"the specimen's length across the blade is not known: {length * 1e3:.0f} mm keep the proportions of the food; the blade "
-            "bends longer halves apart with more force; give --length if you measured it"
+            f"the specimen's length across the blade is not known: {length * 1e3:.0f} mm keep the proportions of the "
+            "food; the blade bends longer halves apart with more force; give --length if you measured it"
         )
     return Shape(default.kind, length, width, height, (left - right) / 2), said
 
 
 def height_range(food: FoodSpec, trace: Conditioned, sizing: Sizing) -> tuple[float, float, float] | None:
-    """Lowest, likely and largest height of a specimen whose trace ends under load [m]; None where it is known.
+    """Range of the height of a specimen whose trace ends under load.
 
-    The edge then stopped above the board: the food is higher than the stroke by a process zone at least, and where the
-    literature's range allows, within it.
+    The edge then stopped above the board: the food is higher than the stroke by a process zone at least. Its likely
+    height is the usual one where that is possible.
+
+    Args:
+        food: The food with its usual height and the literature's range of it.
+        trace: The measured cut.
+        sizing: What is known of the specimen.
+
+    Returns:
+        Lowest, likely and largest height [m]; None where the height is given, or follows from the trace.
     """
     late = trace.curve[int(trace.curve.argmax()) :]
     loaded = trace.curve[-1] > UNDER_LOAD * float(sorted(late)[len(late) // 2])
@@ -119,7 +150,9 @@ def height_range(food: FoodSpec, trace: Conditioned, sizing: Sizing) -> tuple[fl
     return low, known.value if low < known.value < high else (low * high) ** 0.5, high
 
 
-def place(scene: Scene, values: Mapping[str, float], kept: Collection[str] = ()) -> tuple[Scene, dict[str, float]]:
+def at_fitted_height(
+    scene: Scene, values: Mapping[str, float], kept: Collection[str] = ()
+) -> tuple[Scene, dict[str, float]]:
     """The scene at a fitted height, and the values that are left: those of the material.
 
     The cell grows with the height, so that every height has the same particles and nodes: on a fixed cell each height
@@ -129,6 +162,9 @@ def place(scene: Scene, values: Mapping[str, float], kept: Collection[str] = ())
         scene: The scene with any height.
         values: Fitted values by name, ``height`` [m] among them or not.
         kept: Which of ``width`` and ``length`` do not grow with the height, because they were measured.
+
+    Returns:
+        The scene, and the values without ``height``.
     """
     rest = dict(values)
     height = rest.pop("height", None)
@@ -154,13 +190,16 @@ def place(scene: Scene, values: Mapping[str, float], kept: Collection[str] = ())
 def windowed(scene: Scene, heights: tuple[float, float, float] | None = None) -> Scene:
     """The scene with half a cell more of stroke, where the food is that high.
 
-    The simulated force is a mean over a cell of the way, which up to the end of what is compared then has its whole window. Where
-    it has not, the mean is carried on along a line, and what the grid adds with it: the last sample of an apple's cut, its peak, changed
-    by -0.3 to -6.3 % in six runs at another speed, with other particles, grids and cells, and by -2.3 to +1.9 % with its window.
+    The simulated force is a mean over a cell of the way. With half a cell more, that mean has its whole window up to
+    the end of what is compared. Without, it is carried on along a line there, and with it what the grid adds to the
+    force (docs/theory.md, "Measured choices").
 
     Args:
         scene: The scene of what is compared.
-        heights: As :func:`height_range` gives them; its cell will grow with its height.
+        heights: As :func:`height_range` gives them [m]; the cell grows with the height that is fitted.
+
+    Returns:
+        The scene.
     """
     own = scene.food.shape.height
     low, _, high = heights or (own, own, own)
@@ -168,15 +207,22 @@ def windowed(scene: Scene, heights: tuple[float, float, float] | None = None) ->
     return replace(scene, motion=replace(scene.motion, stroke=stroke))
 
 
-def elsewhere(scene: Scene, k: int) -> Scene:
-    """The scene with other particles and the grid shifted along the blade and upwards, for k = 1, 2, ...
+def with_other_particles(scene: Scene, k: int) -> Scene:
+    """The scene with other particles and the grid shifted along the blade and upwards.
 
-    Across the blade the grid stays: the blade lies on a plane of nodes in every run that is compared, and what leaving it
-    changes is no scatter (see ``numerics.grid_shift`` and ``cutcal converge --offset``). A scene whose grid is mirrored along the
-    blade is shifted by half a cell there and stays so: for a banana a quarter and three quarters give the same work to 0.05 %, at
-    twice the cost.
+    Across the blade the grid stays: the blade lies on a plane of nodes in every run that is compared, and what leaving
+    it changes is no scatter (see ``numerics.grid_shift`` and ``cutcal converge --offset``). A scene whose grid is
+    mirrored along the blade is shifted by half a cell there, and so stays mirrored, at half the cost (docs/theory.md,
+    "Measured choices").
+
+    Args:
+        scene: The scene.
+        k: Which of the others: 1, 2, ...
+
+    Returns:
+        The scene, with another seed and another grid shift.
     """
-    x, z = (float(part) for part in np.round(k * PLACES % 1.0, 4))
+    x, z = (float(part) for part in np.round(k * QUASI_RANDOM % 1.0, 4))
     along, across, _ = scene.numerics.grid_shift
     moved = ((along + 0.5) % 1.0 if scene.mirrors[0] else x, across, z)
     return replace(scene, numerics=replace(scene.numerics, seed=scene.numerics.seed + k, grid_shift=moved))
@@ -189,26 +235,26 @@ def cut_scene(
     *,
     stroke: float | None = None,
     dx: float | None = None,
-    mach: float = 0.01,
     coarse: bool = False,
-    contact: str = "cohesive",
-    grid_shift: tuple[float, float, float] = (0.0, 0.0, 0.0),
     seed: int = 0,
 ) -> Scene:
     """The scene of one cut.
+
+    What else a motion or a discretisation has is as :class:`mpm.scene.Motion` and :class:`mpm.scene.Numerics` have it
+    by default; ``dataclasses.replace`` changes it.
 
     Args:
         food: Material and its values.
         shape: Specimen.
         knife: Blade.
         stroke: Way of the edge [m]; the whole height by default.
-        dx: Cell [m]; by default three quarters of the process zone, which grows with larger ones: a screening version has the
-            same edge.
-        mach: Blade speed over the P-wave speed.
+        dx: Cell [m]; by default three quarters of the process zone, which grows with larger ones: a screening version
+            has the same edge.
         coarse: Screening version of the scene: one cell to the process zone, twice the speed.
-        contact: ``cohesive`` or ``nodal``.
-        grid_shift: Grid against scene [cells].
         seed: Seed of the particles.
+
+    Returns:
+        The scene.
 
     Raises:
         SceneError: The scene cannot be simulated as asked.
@@ -216,6 +262,7 @@ def cut_scene(
     zone = min(ZONE_M, min(shape.height, shape.width) / ZONE_PARTS)
     cell = dx if dx is not None else CELL_PER_ZONE * zone
     zone = max(zone, cell / CELL_PER_ZONE)
+    mach = MACH
     if coarse:
         cell, mach = cell / CELL_PER_ZONE, 2 * mach
     filled = food.to_scene_food()
@@ -224,5 +271,5 @@ def cut_scene(
         knife=knife,
         motion=Motion(min(stroke or shape.height, shape.height), mach),
         edge=EdgeLaw(zone=zone),
-        numerics=Numerics(dx=cell, far=FAR * shape.height, contact=contact, grid_shift=grid_shift, seed=seed),
+        numerics=Numerics(dx=cell, far=FAR_PER_HEIGHT * shape.height, seed=seed),
     )

@@ -1,8 +1,8 @@
-"""Several traces fitted at once: shared flesh, and what each specimen has of its own.
+"""Traces fitted together: shared flesh, and what each specimen has of its own.
 
-A parameter named ``R_skin@cut2`` belongs to the trace ``cut2`` alone; one without ``@`` is shared by all.  Data rows of
-the traces stand one after the other, then the priors of all parameters, each once.  A joint evaluation is one simulation
-for each trace.
+A parameter named ``R_skin@cut2`` belongs to the trace ``cut2`` alone; one without ``@`` is shared by all. Data rows of
+the traces stand one after the other, then the priors of all parameters, each once. A joint evaluation is one
+simulation for each trace.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from calib.problem.objective import Case, Objective, Trial
-from calib.problem.parameters import Parameter, ParameterSet, own, plain
+from calib.problem.objective import Objective, ObjectiveTerm
+from calib.problem.parameters import Parameter, ParameterSet, parameter_of, property_of
+from calib.problem.scored_run import ScoredRun
 from calib.simulation.evaluation import Evaluation, Evaluator
 from mpm.arrays import FloatArray
 
@@ -26,9 +27,12 @@ def residual(
 
     Args:
         objective: The objective.
-        curves: Smoothed force of each trace's simulation [N] (n,).
+        curves: Smoothed force of each trace's simulation [N], shape (n,) each.
         fractions: Part of its stroke that each completed [-].
-        z: Internal coordinates (p,).
+        z: Internal coordinates [-] (p,).
+
+    Returns:
+        The rows [-] (rows,).
     """
     return residuals(objective, [m[None] for m in curves], np.array(fractions)[:, None], z[None])[0]
 
@@ -36,15 +40,18 @@ def residual(
 def residuals(
     objective: JointObjective | Objective, curves: Sequence[FloatArray], fractions: FloatArray, z: FloatArray
 ) -> FloatArray:
-    """The same of q materials at once (q, rows).
+    """All rows of an objective for q materials at once.
 
     Args:
         objective: The objective.
-        curves: Smoothed force of each trace's simulations [N], each (q, n).
+        curves: Smoothed force of each trace's simulations [N], shape (q, n) each.
         fractions: Part of its stroke that each completed [-], by trace (t, q).
-        z: Internal coordinates (q, p).
+        z: Internal coordinates [-] (q, p).
+
+    Returns:
+        The rows [-] (q, rows).
     """
-    data = [c.objective.data_residuals(m, f) for c, m, f in zip(objective.cases, curves, fractions, strict=True)]
+    data = [t.objective.data_residuals(m, f) for t, m, f in zip(objective.terms, curves, fractions, strict=True)]
     return np.concatenate([*data, objective.parameters.prior_residual(z)], axis=1)
 
 
@@ -54,11 +61,11 @@ class JointObjective:
 
     Attributes:
         parameters: All parameters with their priors.
-        cases: One per trace.
+        terms: One per trace.
     """
 
     parameters: ParameterSet
-    cases: tuple[Case, ...]
+    terms: tuple[ObjectiveTerm, ...]
 
     @classmethod
     def of(cls, objectives: Mapping[str, Objective], shared: Sequence[str]) -> JointObjective:
@@ -67,35 +74,47 @@ class JointObjective:
         Args:
             objectives: Each over the properties that its simulation takes.
             shared: Which of them are the same for all traces; priors and start values are the first one's.
+
+        Returns:
+            The joint objective.
         """
-        names: dict[str, int] = {}
+        places: dict[str, int] = {}
         items: list[Parameter] = []
-        cases = []
+        terms = []
         for trace, objective in objectives.items():
             index = []
             for p in objective.parameters:
-                name = p.name if p.name in shared else own(p.name, trace)
-                if name not in names:
-                    names[name] = len(items)
+                name = p.name if p.name in shared else parameter_of(p.name, trace)
+                if name not in places:
+                    places[name] = len(items)
                     items.append(replace(p, name=name))
-                index.append(names[name])
-            cases.append(Case(trace, objective, np.array(index)))
-        return cls(ParameterSet(tuple(items)), tuple(cases))
+                index.append(places[name])
+            terms.append(ObjectiveTerm(trace, objective, np.array(index)))
+        return cls(ParameterSet(tuple(items)), tuple(terms))
 
     @property
     def effective_rows(self) -> float:
         """Effective number of independent data, all traces together [-]."""
-        return sum(c.objective.effective_rows for c in self.cases)
+        return sum(t.objective.effective_rows for t in self.terms)
 
-    def trial(self, evaluation: Evaluation, *, coarse: bool = False, stage: str = "design") -> Trial:
-        """Curves and residual vector of a joint evaluation."""
+    def score(self, evaluation: Evaluation, *, coarse: bool = False, stage: str = "design") -> ScoredRun:
+        """Curves and residual vector of a joint evaluation.
+
+        Args:
+            evaluation: The simulations, one part per trace.
+            coarse: Whether they were run at the coarse resolution.
+            stage: Why they were run.
+
+        Returns:
+            The run with its residual, which is always finite.
+        """
         z = self.parameters.to_vector(evaluation.parameters)
         parts = tuple(
-            c.objective.trial(e, coarse=coarse, stage=stage) for c, e in zip(self.cases, evaluation.parts, strict=True)
+            t.objective.score(e, coarse=coarse, stage=stage) for t, e in zip(self.terms, evaluation.parts, strict=True)
         )
         fractions = [e.completed for e in evaluation.parts]
-        rows = residual(self, [t.curve for t in parts], fractions, z)
-        return Trial(z, evaluation, np.concatenate([t.curve for t in parts]), rows, coarse, stage, parts)
+        rows = residual(self, [part.curve for part in parts], fractions, z)
+        return ScoredRun(z, evaluation, np.concatenate([part.curve for part in parts]), rows, coarse, stage, parts)
 
 
 class JointEvaluator:
@@ -113,9 +132,9 @@ class JointEvaluator:
         """Run each candidate on each trace, trace by trace, so that a batch keeps all workers busy."""
         names = self.objective.parameters.names
         parts: list[list[Evaluation]] = [[] for _ in batch]
-        for case, evaluator in zip(self.objective.cases, self.evaluators, strict=True):
-            own_names = [plain(names[k]) for k in case.index]
-            asked = [{n: values[names[k]] for n, k in zip(own_names, case.index, strict=True)} for values in batch]
+        for term, evaluator in zip(self.objective.terms, self.evaluators, strict=True):
+            taken = [(property_of(names[k]), names[k]) for k in term.index]
+            asked = [{taken_as: values[name] for taken_as, name in taken} for values in batch]
             for evaluation in sorted(evaluator.evaluate(asked), key=lambda e: e.index):
                 parts[evaluation.index].append(evaluation)
         for index, (values, runs) in enumerate(zip(batch, parts, strict=True)):

@@ -1,20 +1,25 @@
 """What a measurement leaves open of its own curve: tare, drift, lag and gain, each with a standard deviation.
 
-To first order each of them moves the measured curve along one known shape g, and its size is normal about zero with
-a standard deviation of its own, so that it joins the covariance of the residuals (Kennedy & O'Hagan 2001, J. R. Statist.
+To first order each of them moves the measured curve along one known shape g. Its size is normal about zero with a
+standard deviation of its own, so that it joins the covariance of the residuals (Kennedy & O'Hagan 2001, J. R. Statist.
 Soc. B 63:425, section 4; for the offset and the gain of a sensor this is the marginal likelihood of a linear Gaussian
 model, Rasmussen & Williams 2006, section 2.7):
 
     V = diag(sigma^2) + sum_k sd_k^2 g_k g_k^T
 
-    tare   1                     drift   s / L (0 at contact, 1 at the end of the stroke)
-    lag    -dF/ds                gain    F, as for a width that is not known
+    ======  =========================================================
+    tare    1
+    drift   s / L: 0 at contact, 1 at the end of the stroke
+    lag     -dF/ds
+    gain    F
+    width   F: that of the specimen, where nobody measured it
+    ======  =========================================================
 
-Tare, drift and lag are integrated out of the curve while the search runs: an onset found 0.3 mm late costs the right material a
-chi-square of hundreds where the model is right to 1 %, and the search would go elsewhere for it.  The headline figures stay those
-of the bare simulation against the bare trace, and so does the peak in the search: a drift widens its tolerance and cannot explain
-it away.  Gain and width only scale a curve, as the stress-like parameters do: the search leaves them at their likely values, and
-they widen the intervals.
+Tare, drift and lag are integrated out of the curve while the search runs: an onset found 0.3 mm late costs the right
+material a chi-square of hundreds where the model is right to 1 %, and the search would go elsewhere for it. The
+headline figures stay those of the bare simulation against the bare trace, and so does the peak in the search: a drift
+widens its tolerance and cannot explain it away. Gain and width only scale a curve, as the stress-like parameters do:
+the search leaves them at their likely values, and they widen the intervals.
 """
 
 from __future__ import annotations
@@ -28,18 +33,17 @@ from calib.errors import TraceError
 from calib.trace.conditioning import Conditioned
 from mpm.arrays import FloatArray
 
-#: Relative standard deviation of the gain of a calibrated force sensor, where nothing is said of it.  Assumed: no source was found
-#: that holds for all; give --gain-sd from the sensor's own calibration.
+#: Relative standard deviation of the gain of a calibrated force sensor, where nothing is said of it [-]. Assumed: no
+#: source was found that holds for all; give --gain-sd from the sensor's own calibration.
 GAIN_SD = 0.02
-#: The same for a wrench that a robot estimates from its joint torques: masses hung on such an arm in three poses read 1, 17
-#: and 25 % too little, presses on a scale 6 and 8 % too much (panda-force, static calibration), which is 0.15 about their mean.
+#: The same for a wrench that a robot estimates from its joint torques [-] (docs/theory.md, "Measured choices").
 TORQUE_GAIN_SD = 0.15
+#: Beginnings of names of columns that hold such an estimate.
 TORQUE_COLUMNS = ("base_f", "knife_f", "o_f_ext", "k_f_ext")
-"""Beginnings of names of columns that hold such an estimate."""
-#: A drift is extrapolated over the cut, but beyond this part of the peak it is a broken measurement, which is warned of
+#: A drift is extrapolated over the cut. Beyond this part of the peak [-] it is a broken measurement, which is warned of
 #: and not fitted away.
 LARGEST_DRIFT = 0.05
-#: An estimate this many standard deviations of its prior away contradicts it.
+#: A size that is this many standard deviations of its prior away contradicts it.
 OUTSIDE = 3.0
 
 
@@ -73,6 +77,9 @@ def sensor_of(curve: Conditioned, gain_sd: float | None, lag_sd: float | None) -
         gain_sd: Given relative standard deviation of the gain [-], or None.
         lag_sd: Given standard deviation of the delay [s], or None.
 
+    Returns:
+        The sensor, and what was assumed of it in one sentence, or None.
+
     Raises:
         TraceError: Impossible values.
     """
@@ -83,7 +90,8 @@ def sensor_of(curve: Conditioned, gain_sd: float | None, lag_sd: float | None) -
     if name.startswith(TORQUE_COLUMNS):
         said = (
             f"{curve.trace.columns['force']} is estimated from joint torques: its gain is taken as known to "
-            f"{TORQUE_GAIN_SD:.0%} (hung masses read 1 to 25 % too little on such an arm); give --gain-sd if you measured it"
+            f"{TORQUE_GAIN_SD:.0%} (hung masses read 1 to 25 % too little on such an arm); give --gain-sd if you "
+            "measured it"
         )
         return Sensor(TORQUE_GAIN_SD, lag), said
     return Sensor(GAIN_SD, lag), None
@@ -112,9 +120,14 @@ class Nuisance:
 
 @dataclass(frozen=True)
 class NuisanceEstimate:
-    """What a fitted curve says of a nuisance.
+    """What a fitted curve says of a nuisance: its posterior beside its prior.
 
-    Attributes: name; unit; prior_sd; value and sd of its posterior [unit].
+    Attributes:
+        name: Which it is.
+        unit: Unit of its size.
+        prior_sd: Prior standard deviation [unit].
+        value: Posterior mean [unit].
+        sd: Posterior standard deviation [unit].
     """
 
     name: str
@@ -148,7 +161,11 @@ def nuisances(
         curve: The conditioned trace.
         sensor: Its sensor.
         width_sd: Relative standard deviation of the specimen's width [-], 0 where it was measured.
-        scaled: Whether gain and width are one factor that the objective has (``scale_sd``), as where specimens share their flesh.
+        scaled: Whether gain and width are one factor that the objective has (``scale_sd``), as where specimens share
+            their flesh.
+
+    Returns:
+        The nuisances whose standard deviation is not zero.
     """
     length = curve.stroke_length_m
     speed = length / (curve.end_s - curve.onset_s)
@@ -189,13 +206,19 @@ class Whitening:
         return out
 
 
-def estimate(given: Sequence[Nuisance], columns: FloatArray, rows: FloatArray) -> tuple[NuisanceEstimate, ...]:
+def estimate_nuisances(
+    given: Sequence[Nuisance], columns: FloatArray, rows: FloatArray
+) -> tuple[NuisanceEstimate, ...]:
     """Posterior of each nuisance given the residuals of a simulated curve.
 
     Args:
         given: The nuisances.
-        columns: Residual (simulated less measured) by one prior standard deviation of each (n, k), of unit variance.
-        rows: The residuals (n,), likewise.
+        columns: Residual (simulated less measured) by one prior standard deviation of each (n, k), in standard
+            deviations [-].
+        rows: The residuals (n,), in standard deviations [-].
+
+    Returns:
+        An estimate for each nuisance, in their order.
     """
     if not given:
         return ()

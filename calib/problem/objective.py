@@ -1,199 +1,76 @@
 """The misfit of a simulated cut against the conditioned real curve, as a vector of residuals.
 
-Rows of the vector (n grid points, p parameters; all without dimension, one standard deviation each):
+Rows of the vector for n grid points and p parameters, each without dimension, in standard deviations:
 
-    0 .. n-1   w (m_i - r_i) / sigma     m: simulated, r: real force, both smoothed alike, on the trace's
-    stroke grid n          (max m - max r) / s_peak  the headline figure, which n correlated points would
-    otherwise outvote n+1        P (1 - fraction)          zero for a run that cut the food to the end of the stroke
-    n+2 ..     (z_j - mean_j) / sd_j     literature priors in internal coordinates
+    =========  =======================  =====================================================================
+    row        residual                 what it compares
+    =========  =======================  =====================================================================
+    0 .. n-1   w (k m_i - r_i) / s_i    the curve: m simulated, r real force, both smoothed alike, on the
+                                        stroke grid of the trace; whitened
+    n          (max k m - max r) / s_p  the peak: the headline figure, which n correlated points would
+                                        otherwise outvote
+    n+1        ln k / sd_k              the factor k on the force, in a fit of several specimens only
+    next       P (1 - fraction)         the failure: zero for a run that cut the food to the end of the stroke
+    last p     (z_j - mean_j) / sd_j    the literature's priors, in internal coordinates
+    =========  =======================  =====================================================================
 
-Where a study has several specimens, m is k times the simulated force; k is the factor of width and sensor, the best one for
-each curve, with a lognormal prior whose row ln k / sd_k stands before that of the failure.
+    s_i^2 = noise_sd^2 + (discrepancy * max r)^2 + u_num_i^2
+    s_p^2 = peak_sd^2 + (peak * max r)^2 + (what the drift may do to the peak)^2
+    w     = sqrt(n_eff / n),   n_eff = stroke length / correlation length, at most n
 
-    sigma^2  = noise_sd^2 + (discrepancy * max r)^2 + u_num^2
-    s_peak^2 = peak_sd^2 + (peak * max r)^2 + what the drift may do to it
-    w        = sqrt(n_eff / n),   n_eff = stroke length / correlation length
+The factor k stands for the width of a specimen and the gain of its sensor. It is the best one for each curve, with a
+lognormal prior of standard deviation sd_k. Without it, k = 1 and its row is missing. P is the root of the chi-square of
+a curve without any force.
 
-What the tare, the drift and the lag of the measurement leave open correlates the first n rows; they are whitened with
-that covariance (:mod:`calib.problem.nuisance`).
+The tare, the drift and the lag of the measurement correlate the first n rows. The rows are whitened with that
+covariance (:mod:`calib.problem.nuisance`).
 
-A run that broke down gives a vector of the same length: where it computed nothing, its last mean difference
-to the real curve is held.  The vector is finite, continuous in ``fraction``, and passes into that of a
-finished run.
+A run that broke down gives a vector of the same length: where it computed nothing, its last mean difference to the real
+curve is held. The vector is finite, continuous in ``fraction``, and passes into that of a finished run.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from calib.errors import TraceError
-from calib.problem.nuisance import Nuisance, NuisanceEstimate, Whitening, estimate
+from calib.problem.nuisance import Nuisance, NuisanceEstimate, Whitening, estimate_nuisances
 from calib.problem.parameters import ParameterSet
+from calib.problem.scored_run import ScoredRun
+from calib.problem.target import ErrorModel, Target
 from calib.simulation.evaluation import Evaluation
 from mpm.arrays import FloatArray
 
-#: Smooths a raw record like the real one was: (grid [m] (n,), stroke [m] (k,), force [N] (k,)) -> force [N]
-#: (n,).
-Smoother = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+#: A curve counts as explained when the right material would leave a larger chi-square than its own in one of a hundred
+#: cuts. Where it is not, the model or the search is wrong, and nothing is called identified
+#: (docs/theory.md, "Measured choices").
+EXPLAINED = 0.99
 
-#: Model discrepancy as a part of the peak.  Seven-parameter curves fitted to single cuts of apple, cucumber
-#: and potato leave 2-7 % of the peak; a simulator with five constants is not credited with more than the
-#: better half.
-DISCREPANCY = 0.03
-
-#: Correlation length of that discrepancy as a part of the stroke: structural misfit (a skin peak, a slope, a
-#: plateau) extends over about a twentieth of a cut, so at most 20 of the grid points count as independent.
-CORRELATION = 0.05
-
-#: Tolerance of the peak, as a part of it, so that an error of 5 % (the limit of a passed calibration) costs
-#: 2.5 sd.
-PEAK = 0.02
-
-#: Samples further than this many real peaks from the real curve count as that far: a spike of a run that
-#: blows up must not overflow the sum of squares.
+#: Simulated forces, and differences between curves in the surrogate, beyond this many peaks count as that many [-]: a
+#: spike of a run that blows up must not overflow the sum of squares.
 LARGEST_DIFFERENCE = 10.0
 
 #: Steps of Newton's method for the factor; from the least squares without prior, four reach rounding.
 NEWTON = 6
 
-#: A run that broke down is continued at the mean difference over this last part of the stroke: over less, the
-#: spike with which it broke down would be held.
+#: A run that broke down is continued at the mean difference over this last part of the stroke [-]: over less, the spike
+#: with which it broke down would be held.
 TAIL = 0.05
 
 
-@dataclass(frozen=True)
-class ErrorModel:
-    """How far a right model may be from the trace; see the constants of this module for the reasons.
-
-    Attributes:
-        discrepancy: Model discrepancy along the curve, part of the real peak [-].
-        correlation: Correlation length of the residuals, part of the stroke [-], at most 1.
-        peak: Tolerance of the peak force, part of the real peak [-].
-    """
-
-    discrepancy: float = DISCREPANCY
-    correlation: float = CORRELATION
-    peak: float = PEAK
-
-    def __post_init__(self) -> None:
-        if not (self.discrepancy > 0.0 and self.peak > 0.0 and 0.0 < self.correlation <= 1.0):
-            raise TraceError(
-                f"error model {self} needs discrepancy > 0, peak > 0 and 0 < correlation <= 1; "
-                "give parts of the peak and of the stroke, for instance 0.03."
-            )
-
-
-@dataclass(frozen=True)
-class Target:
-    """The conditioned real curve that a simulation is compared with.
-
-    Attributes:
-        stroke: Uniform stroke grid from 0 [m] (n,).
-        curve: Smoothed real force [N] (n,).
-        noise_sd: Standard deviation of the noise of ``curve`` [N].
-        peak_sd: Standard deviation of its peak [N].
-        smooth: Puts a raw simulated record on given strokes, smoothed like ``curve``.
-        u_num: Numerical standard uncertainty of the simulated curve [N], one for all or (n,).
-
-    Raises:
-        TraceError: A curve that is not finite, not matching its grid, or without a positive peak.
-    """
-
-    stroke: FloatArray
-    curve: FloatArray
-    noise_sd: float
-    peak_sd: float
-    smooth: Smoother
-    u_num: float | FloatArray = 0.0
-
-    def __post_init__(self) -> None:
-        if self.stroke.ndim != 1 or self.stroke.shape != self.curve.shape or self.stroke.size < 2:
-            raise TraceError(
-                f"target has {self.stroke.shape} strokes and {self.curve.shape} forces; give two "
-                "vectors of equal length, at least 2."
-            )
-        if not (np.isfinite(self.curve).all() and np.all(np.diff(self.stroke) > 0.0)):
-            raise TraceError("target has forces that are not finite or strokes that do not rise; condition it first.")
-        if not self.peak > 0.0:
-            raise TraceError(f"target has the peak {self.peak:g} N; it must be positive, check the sign of the force.")
-        if not (0.0 <= self.noise_sd < math.inf and 0.0 <= self.peak_sd < math.inf):
-            raise TraceError(
-                f"target has noise_sd {self.noise_sd:g} N and peak_sd {self.peak_sd:g} N; "
-                "give finite values that are not negative."
-            )
-
-    @property
-    def peak(self) -> float:
-        """Largest force of the real curve [N]."""
-        return float(self.curve.max())
-
-    @property
-    def length(self) -> float:
-        """Length of the stroke [m]."""
-        return float(self.stroke[-1] - self.stroke[0])
-
-
 @dataclass(frozen=True, eq=False)
-class Trial:
-    """An evaluation as the objective sees it.
-
-    Attributes:
-        z: Internal coordinates (p,).
-        evaluation: The simulation.
-        curve: Its smoothed force on the target's grid [N] (n,).
-        residual: Its residual vector (n + 2 + p,).
-        coarse: Whether it was run at the coarse resolution.
-        stage: Why it was run: design, scaled, difference, round or screened.
-        parts: The trial as each trace of a joint objective sees it; empty for a single one.
-    """
-
-    z: FloatArray
-    evaluation: Evaluation
-    curve: FloatArray
-    residual: FloatArray
-    coarse: bool = False
-    stage: str = "design"
-    parts: tuple[Trial, ...] = ()
-
-    def as_fine(self) -> Trial:
-        """The same trial, as if its resolution were the one that counts."""
-        return replace(self, coarse=False, parts=tuple(t.as_fine() for t in self.parts))
-
-    @property
-    def each(self) -> tuple[Trial, ...]:
-        """The trial of each trace."""
-        return self.parts or (self,)
-
-    @property
-    def misfit(self) -> float:
-        """Chi-square with priors [-]."""
-        return float(self.residual @ self.residual)
-
-    @property
-    def ok(self) -> bool:
-        """Whether the run reached the end of its stroke."""
-        return self.evaluation.ok
-
-    @property
-    def cut(self) -> bool:
-        """Whether it cut the food all the way, that of each trace."""
-        return all(t.evaluation.completed == 1.0 for t in self.each)
-
-
-@dataclass(frozen=True, eq=False)
-class Case:
-    """One trace of an objective.
+class ObjectiveTerm:
+    """The part of an objective that one trace has; the data rows of several stand one after the other.
 
     Attributes:
         name: Name of the trace; empty where there is only one.
         objective: Its own objective, over those parameters that its simulation takes.
-        index: Places of those among the parameters of the whole (q,).
+        index: Places of those among the parameters of the whole objective (q,).
     """
 
     name: str
@@ -210,7 +87,7 @@ class Objective:
         parameters: The fitted parameters with their priors.
         errors: The error model.
         nuisances: What the measurement leaves open.
-        scale_sd: Standard deviation of the logarithm of the factor of width and sensor [-]; 0: there is none.
+        scale_sd: Standard deviation of the logarithm of the factor of width and sensor [-]; 0: there is no factor.
     """
 
     target: Target
@@ -248,19 +125,25 @@ class Objective:
 
     @property
     def data_rows(self) -> int:
-        """Length of :meth:`data_residual`: grid points, peak, factor where there is one, failure."""
+        """Number of rows of :meth:`data_residual`: grid points, peak, factor where there is one, failure."""
         return self.target.stroke.size + 2 + (self.scale_sd > 0.0)
 
     @cached_property
     def failure_weight(self) -> float:
-        """Penalty P of a run that computed nothing: the misfit of predicting no force at all [-]."""
+        """Penalty P of a run that computed nothing: the root of the chi-square of predicting no force at all [-]."""
         return float(np.linalg.norm(self._whiten(self._bare(np.zeros_like(self.target.curve)))))
 
     def curve(self, evaluation: Evaluation) -> tuple[FloatArray, float]:
-        """Smoothed force on the target's grid [N] (n,) and the part of the stroke [-] that was completed.
+        """Smoothed force of a simulation on the target's grid, and the part of the stroke that it completed.
 
-        Samples from the first one that is not finite on, and those that do not advance the stroke, are left
-        out. Beyond the last sample the record is continued at its last mean difference to the real curve.
+        Samples from the first one that is not finite on, and those that do not advance the stroke, are left out. Beyond
+        the last sample the record is continued at its last mean difference to the real curve.
+
+        Args:
+            evaluation: The simulation.
+
+        Returns:
+            Force [N] (n,), always finite, and part of the stroke [-].
         """
         target = self.target
         stroke, force, fraction = _usable(evaluation, target)
@@ -277,68 +160,116 @@ class Objective:
         return target.smooth(target.stroke, stroke, force), fraction
 
     def data_residual(self, curve: FloatArray, fraction: float = 1.0) -> FloatArray:
-        """Rows of curve, peak, factor and failure (n + 2 or n + 3,) of a curve [N] (n,) that completed ``fraction``."""
+        """The rows of the data: curve, peak, factor where there is one, failure.
+
+        Args:
+            curve: Simulated force on the target's grid [N] (n,).
+            fraction: Part of the stroke that was completed [-].
+
+        Returns:
+            The rows [-] (data_rows,).
+        """
         return self.data_residuals(curve[None], np.array([fraction]))[0]
 
     def data_residuals(self, curves: FloatArray, fractions: FloatArray) -> FloatArray:
-        """The same of several curves [N] (q, n) that completed their ``fractions`` (q,): (q, n + 2 or n + 3)."""
+        """The rows of the data of several curves.
+
+        Args:
+            curves: Simulated forces on the target's grid [N] (q, n).
+            fractions: Part of the stroke that each completed [-] (q,).
+
+        Returns:
+            The rows [-] (q, data_rows).
+        """
         penalty = self.failure_weight * (1.0 - fractions)
         return np.column_stack([self._compare(curves), penalty])
 
     def residual(self, curve: FloatArray, fraction: float, z: FloatArray) -> FloatArray:
-        """All rows (n + 2 + p,) of a curve [N] (n,) from a run at ``z`` (p,) that completed ``fraction``."""
+        """All rows of the residual: those of the data, then those of the priors.
+
+        Args:
+            curve: Simulated force on the target's grid [N] (n,).
+            fraction: Part of the stroke that was completed [-].
+            z: Internal coordinates of the run [-] (p,).
+
+        Returns:
+            The rows [-] (data_rows + p,).
+        """
         return np.concatenate([self.data_residual(curve, fraction), self.parameters.prior_residual(z)])
 
     @cached_property
-    def cases(self) -> tuple[Case, ...]:
-        """The one trace, as a joint objective has several."""
-        return (Case("", self, np.arange(len(self.parameters))),)
+    def terms(self) -> tuple[ObjectiveTerm, ...]:
+        """The one trace, in the form in which a joint objective has several."""
+        return (ObjectiveTerm("", self, np.arange(len(self.parameters))),)
 
-    def trial(self, evaluation: Evaluation, *, coarse: bool = False, stage: str = "design") -> Trial:
-        """Curve and residual vector of an evaluation; always finite."""
+    def score(self, evaluation: Evaluation, *, coarse: bool = False, stage: str = "design") -> ScoredRun:
+        """Curve and residual vector of a simulation.
+
+        Args:
+            evaluation: The simulation.
+            coarse: Whether it was run at the coarse resolution.
+            stage: Why it was run.
+
+        Returns:
+            The run with its residual, which is always finite.
+        """
         z = self.parameters.to_vector(evaluation.parameters)
         curve, fraction = self.curve(evaluation)
-        return Trial(z, evaluation, curve, self.residual(curve, fraction, z), coarse, stage)
+        return ScoredRun(z, evaluation, curve, self.residual(curve, fraction, z), coarse, stage)
 
     def nuisance_estimates(self, curve: FloatArray) -> tuple[NuisanceEstimate, ...]:
         """What a simulated curve [N] (n,) says of the nuisances, those that the search may not use included."""
-        own = self.factor(curve) * curve
-        return estimate(self.nuisances, self._columns(self.nuisances), self._bare(own))
+        scaled = self.factor(curve) * curve
+        return estimate_nuisances(self.nuisances, self._columns(self.nuisances), self._bare(scaled))
 
     def factor(self, curve: FloatArray) -> float:
-        """The factor that a specimen's width and sensor ask for on its simulated force (n,), least squares with its prior [-].
+        """The factor k of width and sensor on a simulated force: least squares with its lognormal prior.
 
-        1 where there is none.
+        Newton's method on f(ln k) = k^2 size - 2 k cross + (ln k / sd_k)^2, where size is the square of the simulated
+        rows and cross their product with the measured ones. The curvature of f is positive near its least value.
+
+        Args:
+            curve: Simulated force on the target's grid [N] (n,).
+
+        Returns:
+            The factor [-]; 1 where there is none.
         """
         if not self.scale_sd > 0.0:
             return 1.0
-        own = self._whiten(np.append(self._weights * curve, float(curve.max()) / self.sigma_peak))
-        size, cross = float(own @ own), float(own @ self._measured)
+        simulated = self._whiten(np.append(self._weights * curve, float(curve.max()) / self.sigma_peak))
+        size, cross = float(simulated @ simulated), float(simulated @ self._measured)
         if not (size > 0.0 and cross > 0.0):
             return 1.0
         log, pull = math.log(cross / size), self.scale_sd**-2
-        for _ in range(NEWTON):  # (k^2 size - 2 k cross + (ln k / sd)^2)' = 0 by ln k; curvature positive near its root
+        for _ in range(NEWTON):
             k = math.exp(log)
             slope, curvature = k * (k * size - cross) + pull * log, k * (2.0 * k * size - cross) + pull
             log -= min(max(slope / max(curvature, pull), -1.0), 1.0)
         return math.exp(log)
 
     def factors(self, curves: FloatArray) -> FloatArray:
-        """The same of several curves (q, n): (q,)."""
+        """The factors [-] (q,) of several simulated curves [N] (q, n)."""
         return np.array([self.factor(curve) for curve in curves]) if self.scale_sd > 0.0 else np.ones(len(curves))
 
     def unsearched(self) -> FloatArray:
-        """Residual by one standard deviation of each nuisance that the search may not use (data_rows, k)."""
+        """Residual [-] by one standard deviation of each nuisance that the search may not use (data_rows, k)."""
         columns = self._columns([n for n in self.nuisances if not n.searched])
         return np.vstack([self._whiten(columns), np.zeros((self.data_rows - len(columns), columns.shape[1]))])
 
     def curve_residual(self, curve: FloatArray) -> FloatArray:
-        """Rows of the curve alone (n,), in standard deviations of a point, less what the nuisances explain of them."""
-        own = self.factor(curve) * curve
+        """Residual of the curve alone, less what the nuisances explain of it.
+
+        Args:
+            curve: Simulated force on the target's grid [N] (n,).
+
+        Returns:
+            The residual in standard deviations of a point [-] (n,).
+        """
+        scaled = self.factor(curve) * curve
         explained = sum(
             (e.value * n.shape for e, n in zip(self.nuisance_estimates(curve), self.nuisances, strict=True)), 0.0
         )
-        out: FloatArray = (own - self.target.curve + explained) / self.sigmas
+        out: FloatArray = (scaled - self.target.curve + explained) / self.sigmas
         return out
 
     def _compare(self, curves: FloatArray) -> FloatArray:

@@ -24,31 +24,43 @@ Scale = Literal["log", "linear"]
 #: Half width of a normal distribution's central 95 % in standard deviations.
 Z95 = 1.959963984540054
 
-#: Width of a finite difference in a log coordinate: 10 %.  An explicit solver repeats its curve to 0.5-1 %,
-#: so a parameter the force is proportional to then moves it by ten times the noise; the truncation error of a
-#: forward difference of a power law with exponent below 1 stays under 1 % of the force.
+#: Width of a finite difference in a log coordinate: 10 %. An explicit solver repeats its curve to 0.5-1 %, so that a
+#: parameter to which the force is proportional then moves it by ten times the noise; the truncation error of a forward
+#: difference of a power law with an exponent below 1 stays under 1 % of the force.
 LOG_STEP = math.log(1.1)
 
 #: Width of a finite difference in a linear coordinate, as a part of the prior's 95 % range (same argument).
 LINEAR_STEP = 0.1
 
-#: Material properties with the dimension of a stress or of a force per length.  Multiplying all of them by k
-#: multiplies every quasi-static force by k and leaves the geometry of the cut alone.
+#: Material properties with the dimension of a stress or of a force per length. Multiplying all of them by k multiplies
+#: every quasi-static force by k and leaves the geometry of the cut alone.
 STRESS_LIKE = ("E", "yield_stress", "R", "R_initiation", "R_skin", "tensile_strength", "fracture_energy")
 
-
-OF = "@"
-"""Between the name of a property and that of the trace which has a value of its own: ``R_skin@cut2``."""
-
-
-def own(name: str, trace: str) -> str:
-    """Name of the parameter that a property is for one trace alone."""
-    return f"{name}{OF}{trace}"
+#: Between the name of a property and that of the trace which has a value of its own: ``R_skin@cut2``.
+OF_TRACE = "@"
 
 
-def plain(name: str) -> str:
-    """Name of the property that a parameter is."""
-    return name.split(OF)[0]
+def parameter_of(name: str, trace: str) -> str:
+    """Name of the parameter that a property is for one trace alone.
+
+    >>> parameter_of("R_skin", "cut2")
+    'R_skin@cut2'
+    """
+    return f"{name}{OF_TRACE}{trace}"
+
+
+def property_of(name: str) -> str:
+    """Name of the property that a parameter is.
+
+    >>> property_of("R_skin@cut2"), property_of("E")
+    ('R_skin', 'E')
+    """
+    return name.split(OF_TRACE)[0]
+
+
+def is_shared(name: str) -> bool:
+    """Whether a parameter of this name is the same for all traces."""
+    return OF_TRACE not in name
 
 
 @dataclass(frozen=True)
@@ -66,8 +78,7 @@ class Parameter:
         scale: ``log`` or ``linear``: the coordinate in which the prior is normal and the fit works.
 
     Raises:
-        MaterialError: A number that is not finite, an empty interval, a value or prior centre outside the
-        hard
+        MaterialError: A number that is not finite, an empty interval, a value or prior centre outside the hard
             bounds, or a log parameter that is not positive.
     """
 
@@ -260,7 +271,7 @@ class ParameterSet:
 
     def stress_like(self, names: Sequence[str] = STRESS_LIKE) -> FloatArray:
         """Direction (p,) of a joint scaling of the stress-like parameters: 1 for each on a log scale."""
-        return np.array([1.0 if p.log and plain(p.name) in names else 0.0 for p in self.items])
+        return np.array([1.0 if p.log and property_of(p.name) in names else 0.0 for p in self.items])
 
     def with_values(self, values: Mapping[str, float]) -> ParameterSet:
         """The same parameters with other present values [unit]; names not mentioned keep theirs."""

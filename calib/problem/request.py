@@ -1,4 +1,4 @@
-"""What a calibration is asked to do, and what is decided before its first simulation."""
+"""What a calibration is asked to do."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ from typing import Any
 
 from calib.material.food import FoodSpec
 from calib.material.scene import Sizing
-from calib.problem.objective import ErrorModel, Objective
-from calib.trace.conditioning import Conditioned
-from calib.trace.table import split_address
+from calib.problem.target import ErrorModel
+from calib.trace.reader import split_address
 from calib.trace.trace import Trace, read_trace
-from mpm.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -95,16 +93,3 @@ def _source(given: Path | Trace) -> str:
         file, address = split_address(given)
         return f"{file.name}:{address}" if address else file.name
     return given.source if given.sha256 else f"{given.source} (arrays)"
-
-
-@dataclass(frozen=True)
-class Setup:
-    """Everything that is decided before the first simulation."""
-
-    curve: Conditioned
-    fine: Scene
-    coarse: Scene
-    objective: Objective
-    assumed: list[str]
-    kept: tuple[str, ...] = ()
-    air_sha256: str | None = None

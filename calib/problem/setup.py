@@ -2,71 +2,133 @@
 
 from __future__ import annotations
 
-import json
 import math
-from dataclasses import replace
-from pathlib import Path
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
-import numpy as np
-import pandas as pd
-
-from calib.errors import CurveError, MaterialError, OutputError
-from calib.material.food import FoodSpec
+from calib.io.provenance import code_key, key_of
 from calib.material.knife import load_knife
-from calib.material.properties import rule_of
-from calib.material.scene import cut_scene, height_range, specimen, windowed
-from calib.problem.nuisance import nuisances, sensor_of
-from calib.problem.objective import Objective, Target
-from calib.problem.parameters import Z95, Parameter, ParameterSet
-from calib.problem.request import Request, Setup
+from calib.material.scene import at_fitted_height, cut_scene, height_range, specimen, windowed, with_other_particles
+from calib.problem.food_parameters import Heights, fit_parameters, size_relative_sd
+from calib.problem.nuisance import Sensor, nuisances, sensor_of
+from calib.problem.numerical_uncertainty import numerical_uncertainty
+from calib.problem.objective import Objective
+from calib.problem.request import Request
+from calib.problem.target import Target
+from calib.simulation.evaluation import Evaluators
+from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, Header
+from calib.simulation.workers import Workers
 from calib.trace.conditioning import Conditioned, condition
 from calib.trace.filters import filter_simulated
 from mpm.scene import Scene
 
-# Hard bounds reach this factor beyond the literature's range, so that a trace may contradict the literature.
-BOUND_FACTOR = 5.0
-SCOUTS_HASTE = 2.0
-"""Speed of a search's coarse simulations over that of a screening run [-]. The process takes their common offset from the default ones away, and
-what is left of the difference, over the 16 best runs of five calibrations, is 1.2, 0.6, 0.4, 1.2 and 3.6 % of the peak at 1 and 1.3, 0.5, 0.5, 1.8
-and 5.5 % at 2 (apple, two cucumbers, two potatoes; the noise of the coarse runs in the process is 2 %), in half the time."""
-LINEAR = {"nu": (0.0, 0.49), "mu": (0.0, 1.2)}  # fitted on a linear scale, with their hard bounds
+COARSE_SPEED = 2.0
+"""Speed of a search's coarse simulations over that of a screening scene [-] (docs/theory.md, "Surrogate and search").
+The surrogate takes their common offset from the fine ones away."""
+FINE, COARSE, AGAIN = "fine", "coarse", "again"
+"""What the fidelities of a search are called in its store; that of repeated runs is the last."""
+REPEAT = 2
+"""Which of the shifted grids, with its own particles, a repeated run has; the numerical checks take another one."""
 
 
-def fit_parameters(
-    food: FoodSpec, names: tuple[str, ...], heights: tuple[float, float, float] | None = None
-) -> ParameterSet:
-    """The fitted properties with start value, hard bounds and literature prior.
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """What is decided for a trace before its first simulation.
 
-    Args:
-        food: The food.
-        names: Properties, and ``height`` for the specimen's.
-        heights: Lowest, likely and largest height of the specimen [m]; None where it is known.
+    Attributes:
+        request: What was asked.
+        curve: The conditioned trace.
+        fine: The cut at the resolution that counts, with the food's values.
+        coarse: The same on coarser cells and faster.
+        objective: Target, parameters and error model.
+        assumed: What was assumed of specimen and sensor, one sentence each.
+        air_sha256: SHA-256 of the air run, None without one.
+    """
+
+    request: Request
+    curve: Conditioned
+    fine: Scene
+    coarse: Scene
+    objective: Objective
+    assumed: tuple[str, ...]
+    air_sha256: str | None = None
+
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """Which of width and length were measured, and so do not follow a fitted height."""
+        return self.request.sizing.kept
+
+    @property
+    def start_values(self) -> dict[str, float]:
+        """The values that a fit begins with, by name [SI]: those of the literature."""
+        return {p.name: p.value for p in self.objective.parameters}
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is doubtful of the food's values and of the trace, one sentence each."""
+        return [*self.request.food.warnings(), *self.curve.warnings]
+
+    @property
+    def header(self) -> Header:
+        """What the store of its simulations belongs to."""
+        return Header(self.curve.trace.sha256, key_of(self.fine.as_dict()))
+
+    def sized(self, values: Mapping[str, float]) -> Setup:
+        """The set-up with the specimen of its fine cut as high as ``values`` say, where its height is among them."""
+        scene, _ = at_fitted_height(self.fine, values, self.kept)
+        return replace(self, fine=scene)
+
+    def scene(self, values: Mapping[str, float]) -> Scene:
+        """The fine cut at some values [SI] by name: the material's, and the specimen's height where that is fitted."""
+        scene, material = at_fitted_height(self.fine, values, self.kept)
+        return scene.with_material(**material)
+
+    def evaluators(self, pool: Workers, store: EvaluationStore, label: str = "") -> Evaluators:
+        """What runs the simulations of a search for this trace.
+
+        Args:
+            pool: Where they run.
+            store: Where they are kept.
+            label: What their fidelity begins with in the store; of several traces, the name of this one and a blank.
+
+        Returns:
+            An evaluator for each fidelity.
+        """
+        return Evaluators(
+            self.evaluator(self.fine, pool, store, label + FINE),
+            self.evaluator(self.coarse, pool, store, label + COARSE),
+            self.evaluator(repeated(self.fine), pool, store, label + AGAIN),
+        )
+
+    def evaluator(self, scene: Scene, pool: Workers, store: EvaluationStore, fidelity: str) -> CachedEvaluator:
+        """What runs candidates of one scene of this trace, and each of them once.
+
+        Args:
+            scene: The scene, with any values of what is fitted.
+            pool: Where the simulations run.
+            store: Where they are kept.
+            fidelity: What they are called in the store.
+
+        Returns:
+            The evaluator.
+        """
+        inner = pool.evaluator(scene, self.kept)
+        content = scene.as_dict() | {"kept": self.kept}
+        return CachedEvaluator(inner, store, scene=content, code=code_key(), fidelity=fidelity)
+
+
+def set_up(request: Request) -> Setup:
+    """Condition the trace, and make the scenes and the objective of a calibration.
 
     Raises:
-        MaterialError: An unknown or repeated name, a property without a literature range, or a height that is known.
+        CutcalError: Anything wrong with the input.
     """
-    chosen = []
-    for name in names:
-        if name == "height":
-            if heights is None:
-                raise MaterialError(
-                    "--fit height: the height is known (given, or the trace ends released); leave one of both out"
-                )
-            low, likely, high = heights
-            chosen.append(Parameter(name, likely, low, high, "m", low, high))
-            continue
-        rule, (low, high) = rule_of(name), food.prior(name)
-        value = food.value(name)
-        assert value is not None  # prior() has a range only where there is a value
-        if name in LINEAR:
-            bottom, top = LINEAR[name]
-            chosen.append(Parameter(name, value, bottom, top, rule.unit, low, high, scale="linear"))
-            continue
-        if low <= 0:
-            raise MaterialError(f"{food.name}: {name} cannot be fitted from a range that starts at {low:g} {rule.unit}")
-        bottom, top = max(rule.low, low / BOUND_FACTOR), min(rule.high, high * BOUND_FACTOR)
-        chosen.append(Parameter(name, value, bottom, top, rule.unit, low, high))
-    return ParameterSet(tuple(chosen))
+    curve, air_sha256 = conditioned(request)
+    heights = height_range(request.food, curve, request.sizing)
+    fine, coarse, assumed = _scenes(request, curve, heights)
+    sensor, said = sensor_of(curve, request.gain_sd, request.lag_sd)
+    objective = _objective(request, curve, fine, sensor, heights)
+    return Setup(request, curve, fine, coarse, objective, (*assumed, *([said] if said else [])), air_sha256)
 
 
 def conditioned(request: Request) -> tuple[Conditioned, str | None]:
@@ -83,73 +145,43 @@ def conditioned(request: Request) -> tuple[Conditioned, str | None]:
     return curve, None if air is None else air.sha256
 
 
-def set_up(request: Request) -> Setup:
-    """Condition the trace, and make the scenes and the objective of a calibration.
-
-    Raises:
-        CutcalError: Anything wrong with the input.
-    """
+def _scenes(request: Request, curve: Conditioned, heights: Heights | None) -> tuple[Scene, Scene, list[str]]:
+    """The fine and the coarse cut of a request, and what was assumed of the specimen."""
     food = request.food
-    curve, air_sha256 = conditioned(request)
     shape, assumed = specimen(food, curve, request.sizing)
     knife = load_knife(request.knife)
-    heights = height_range(food, curve, request.sizing)
+    stroke, dx, seed = curve.stroke_length_m, request.dx, request.seed
     fine, screening = (
-        windowed(
-            cut_scene(
-                food, shape, knife, stroke=curve.stroke_length_m, dx=request.dx, seed=request.seed, coarse=coarse
-            ),
-            heights,
-        )
+        windowed(cut_scene(food, shape, knife, stroke=stroke, dx=dx, seed=seed, coarse=coarse), heights)
         for coarse in (False, True)
     )
-    coarse = replace(screening, motion=replace(screening.motion, mach=SCOUTS_HASTE * screening.motion.mach))
-    sensor, said = sensor_of(curve, request.gain_sd, request.lag_sd)
-    if said is not None:
-        assumed.append(said)
-    width_sd = 0.0 if request.sizing.width is not None else spread(food, "width")
-    u_num = 0.0 if request.u_num is None else numerical(request.u_num, food.name, fine, curve)
+    faster = replace(screening.motion, mach=COARSE_SPEED * screening.motion.mach)
+    return fine, replace(screening, motion=faster), assumed
+
+
+def _objective(
+    request: Request, curve: Conditioned, scene: Scene, sensor: Sensor, heights: Heights | None
+) -> Objective:
+    """Target, parameters, error model and nuisances of a request."""
+    food = request.food
+    width_sd = 0.0 if request.sizing.width is not None else size_relative_sd(food, "width")
+    u_num = 0.0 if request.u_num is None else numerical_uncertainty(request.u_num, food.name, scene, curve)
     target = Target(curve.stroke, curve.curve, curve.curve_noise_sd_N, curve.peak_sd_N, filter_simulated, u_num)
-    given = nuisances(curve, sensor, width_sd=width_sd, scaled=request.scaled)
-    scale_sd = math.hypot(width_sd, sensor.gain_sd) if request.scaled else 0.0
     names = request.fit or (food.default_fit if heights is None else (*food.default_fit, "height"))
-    objective = Objective(target, fit_parameters(food, names, heights), request.errors, given, scale_sd)
-    return Setup(curve, fine, coarse, objective, assumed, request.sizing.kept, air_sha256)
+    return Objective(
+        target,
+        fit_parameters(food, names, heights),
+        request.errors,
+        nuisances(curve, sensor, width_sd=width_sd, scaled=request.scaled),
+        scale_sd=math.hypot(width_sd, sensor.gain_sd) if request.scaled else 0.0,
+    )
 
 
-def numerical(folder: Path, food: str, scene: Scene, curve: Conditioned) -> np.ndarray:
-    """Numerical standard uncertainty of a simulated curve on the stroke of a trace [N] (240,), from ``cutcal converge``.
-
-    It is that of the study's coarsest grid as a part of its peak, at equal parts of the stroke.
-
-    Raises:
-        OutputError: There is no such study in the folder.
-        CurveError: It is of another food, knife or cell.
-    """
-    try:
-        document = json.loads((folder / "converge.json").read_text(encoding="utf-8"))
-        table = pd.read_csv(folder / "curves.csv", comment="#")
-        coarsest = max(row["dx_m"] for row in document["grids"])
-        stroke, u_num = table["stroke_m"].to_numpy(), table["u_num_coarsest_N"].to_numpy()
-        peak = float(table[f"force_dx_{coarsest:g}_N"].max())
-    except (OSError, ValueError, KeyError) as e:
-        raise OutputError(f"--u-num {folder}: no finished study of cutcal converge there ({e})") from None
-    for what, own, theirs in (
-        ("food", food, document["food"]),
-        ("knife", scene.knife.name, document["knife"]),
-        ("cell", f"{scene.numerics.dx * 1e3:.3g} mm", f"{coarsest * 1e3:.3g} mm"),
-    ):
-        if own != theirs:
-            raise CurveError(
-                f"--u-num {folder}: its {what} is {theirs}, that of this calibration {own}; repeat cutcal converge with the same, "
-                "its coarsest --dx the cell of the calibration"
-            )
-    parts = curve.stroke / curve.stroke[-1]
-    out: np.ndarray = np.interp(parts, stroke / stroke[-1], u_num) / peak * float(curve.curve.max())
-    return out
+def slower(scene: Scene) -> Scene:
+    """The scene at half the simulated speed."""
+    return replace(scene, motion=replace(scene.motion, mach=scene.motion.mach / 2))
 
 
-def spread(food: FoodSpec, size: str) -> float:
-    """Relative standard deviation of a size of the food, whose 95 % range is that of the literature [-]."""
-    known = food.dims[size]
-    return math.log(known.high / known.low) / (2.0 * Z95)
+def repeated(scene: Scene) -> Scene:
+    """The scene at half the speed, with other particles and the grid with_other_particles: what an answer should not depend on."""
+    return with_other_particles(slower(scene), REPEAT)

@@ -12,16 +12,16 @@ from pathlib import Path
 from typing import Any
 
 from calib.errors import PublishedError
-from calib.io.yaml_checks import Place, check_keys, choice, mapping, number, read_yaml, text
+from calib.io.yaml_checks import Place, check_keys, choice, finite_number, mapping, read_yaml, text
 from calib.material.food import FoodSpec, load_food, read_property
 from calib.material.knife import load_knife
 from calib.material.properties import DIMENSIONS, Rule
 from calib.material.scene import LENGTH_PER_HEIGHT, PRISMS
+from calib.problem.food_parameters import fit_parameters
 from calib.problem.parameters import ParameterSet
-from calib.problem.setup import fit_parameters
-from mpm.errors import CutcalError, SceneError
 from mpm.scene import Knife
-from mpm.shapes import SHAPE_KINDS, Shape, section_area
+from mpm.scene.errors import CutcalError, SceneError
+from mpm.scene.shapes import SHAPE_KINDS, Shape, section_area
 
 PEAK_FORCE, CUT_ENERGY = "peak_N", "energy_J_m2"
 QUANTITIES = {PEAK_FORCE: "largest force [N]", CUT_ENERGY: "work over the area of the cut [J/m^2]"}
@@ -245,7 +245,7 @@ def _scalars(place: Place, raw: Any) -> tuple[PublishedNumber, ...]:
         here = place.at(quantity)
         one = mapping(here, entry)
         check_keys(here, one, ("value", "relative_sd"), ("source",), _SYNONYMS)
-        value = number(here.at("value"), one["value"])
+        value = finite_number(here.at("value"), one["value"])
         if value <= 0:
             raise here.at("value").error(f"is {value:g}; {QUANTITIES[quantity]} of a cut is positive")
         if "source" in one:
@@ -258,7 +258,7 @@ def _scalars(place: Place, raw: Any) -> tuple[PublishedNumber, ...]:
 
 def _size(place: Place, raw: Any, rule: Rule) -> float:
     """A size of a specimen [m]."""
-    value = number(place, raw)
+    value = finite_number(place, raw)
     if not rule.low <= value <= rule.high:
         raise place.error(f"is {value:g} m, but must lie between {rule.low:g} and {rule.high:g} m; write metres")
     return value
@@ -266,7 +266,7 @@ def _size(place: Place, raw: Any, rule: Rule) -> float:
 
 def _within(place: Place, raw: Any, high: float) -> float:
     """A positive fraction."""
-    value = number(place, raw)
+    value = finite_number(place, raw)
     if not 0.0 < value <= high:
         raise place.error(f"is {value:g}, but must lie above 0 and at most at {high:g} (0.05 is 5 %)")
     return value

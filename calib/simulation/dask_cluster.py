@@ -1,8 +1,8 @@
-"""Workers of a Dask cluster: the runs of a study on other machines, with the store where the study is.
+"""Workers of a Dask cluster: the runs of a command on other machines, with the store where the command is.
 
-A job goes to one named worker and to no other, so that it is known which job a dead worker had, and only that one is made
-again. Left to the scheduler, jobs would queue at workers, a death would count against all of them, and a job that kills its
-worker would go on to the next three.
+A job goes to one named worker and to no other, so that it is known which job a dead worker had, and only that one is
+made again. Left to the scheduler, jobs would queue at workers, a death would count against all of them, and a job that
+kills its worker would go on to the next three.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 from calib.errors import ClusterError
 from calib.io.provenance import code_key
 from calib.simulation.workers import Result, Workers
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -33,17 +33,19 @@ if TYPE_CHECKING:
 CONNECT_S = 5.0  # time in which a scheduler must answer
 LOOK_S = 1.0  # time between two looks at which workers there are, while no run ends
 FETCH_S = 30.0  # time in which the result of a run that has ended must arrive
-DESERTED_S = 120.0  # time without any worker after which a study gives up; a nanny needs seconds to start another
-GREETINGS = 5  # attempts to be greeted by a scheduler that is telling its clients news; 3 of 60 failed where two clients never stopped
+DESERTED_S = 120.0  # time without any worker after which a command gives up; a nanny needs seconds to start another
+GREETINGS = 5  # attempts to be greeted by a scheduler that tells its clients news (docs/theory.md, "Measured choices")
 KILLS = 2  # workers that a job may kill
-EXECUTED = ("mpm", "calib", "fem_reference", "robot")  # packages whose code runs in workers
+EXECUTED = ("mpm", "fem_reference", "calib", "studies", "intsim")  # packages whose code runs in workers
 LOST = object()  # in place of the result of a job that did not come to its end
 
 
 @functools.cache
 def identity() -> dict[str, str]:
-    """What must be the same in client and workers. It is found out once in a process, of the code that is imported then:
-    a worker that has run since before an update of its files runs the old code.
+    """What must be the same in client and workers.
+
+    It is found out once in a process, of the code that is imported then: a worker that has run since before an update
+    of its files runs the old code.
     """
     return {
         "code of cutcal": code_key(*EXECUTED)[:12],
@@ -68,7 +70,8 @@ class Cluster(Workers):
         say: Called with a sentence about the workers.
 
     Raises:
-        ClusterError: Dask is not installed, the scheduler does not answer, or there are no workers, or such as cannot be used.
+        ClusterError: Dask is not installed, the scheduler does not answer, or there are no workers, or such as cannot
+            be used.
     """
 
     def __init__(
@@ -99,8 +102,8 @@ class Cluster(Workers):
             raise
         super().__init__(workers or len(ready), arch, threads)
         say(
-            f"{len(ready)} workers at {address}, {self.workers} simulations at a time; --workers {self.workers} asks for "
-            "the same ones again when there are other workers"
+            f"{len(ready)} workers at {address}, {self.workers} simulations at a time; --workers {self.workers} asks "
+            "for the same ones again when there are other workers"
         )
 
     def close(self) -> None:
@@ -109,10 +112,10 @@ class Cluster(Workers):
             self._client.close(timeout=CONNECT_S)
 
     def each(self, work: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Result | None]]:
-        """Call ``work(*job, arch, threads)`` for each job; yields (place among the jobs, result) in order of completion.
+        """Call ``work(*job, arch, threads)`` for each job; yields (place of the job, result) in order of completion.
 
-        A job whose worker dies is made again by another one. As a worker has one job at a time, a job whose second worker
-        dies has killed both: its result is None.
+        A job whose worker dies is made again by another one. As a worker has one job at a time, a job whose second
+        worker dies has killed both: its result is None.
 
         Raises:
             ClusterError: Scheduler or all workers are gone.
@@ -162,8 +165,8 @@ class Cluster(Workers):
             answers = self._client.run(identity, workers=new, on_error="return") if new else {}
         except OSError:
             raise ClusterError(
-                f"--scheduler {self._address}: the connection was lost; what was computed is stored: start the scheduler "
-                "and add --resume"
+                f"--scheduler {self._address}: the connection was lost; what was computed is stored: start the "
+                "scheduler and add --resume"
             ) from None
         joined = [worker for worker in new if not isinstance(answers.get(worker), (OSError, NoneType))]  # and not left
         faults = {worker: _fault(answers[worker], present[worker]) for worker in joined}
@@ -197,14 +200,17 @@ def _connect(address: str) -> Client:
     except (OSError, ValueError, TypeError, asyncio.TimeoutError) as e:  # TypeError: TLS that is not configured
         why = str(e) or "something else listens there"
     raise ClusterError(
-        f"--scheduler {address}: no Dask scheduler answers there ({why}); start one with 'dask scheduler', which prints its "
-        "address"
+        f"--scheduler {address}: no Dask scheduler answers there ({why}); start one with 'dask scheduler', which "
+        "prints its address"
     )
 
 
 def _client(connect: Callable[[], Client]) -> Client:
-    """A client. Whatever the scheduler tells all its clients within milliseconds of its greeting, such as what another study
-    has cancelled, arrives together with that; ``Client`` asserts that a greeting comes alone. Who connects again is greeted anew.
+    """A client, after :data:`GREETINGS` attempts at most.
+
+    Whatever the scheduler tells all its clients within milliseconds of its greeting, such as what another run has
+    cancelled, arrives together with that; ``Client`` asserts that a greeting comes alone. Who connects again is greeted
+    anew.
     """
     for _ in range(GREETINGS):
         with suppress(AssertionError):

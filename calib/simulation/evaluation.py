@@ -11,10 +11,9 @@ import numpy as np
 
 from mpm.arrays import FloatArray
 
-PARTED, PUSHED = 0.8, 0.5
-"""Least energy of the edge over R times the new area for a run to be a cut, and where it is none at all [-]. Fifteen foods at
-literature values have 0.96 to 1.27, a banana 0.89. One with a yield stress of 17 kPa in place of 30 has 0.48, and a process zone a
-quarter wider changes its peak by 7 %; from 0.8 on another quarter changes it by 0.3 %."""
+FULLY_PARTED, NOT_PARTED = 0.8, 0.5
+"""Energy of the edge over R times the new area from which on a run is a cut, and up to which it is none at all [-]
+(docs/theory.md, "Measured choices")."""
 
 
 def pressed_away(parted: float) -> str:
@@ -22,10 +21,14 @@ def pressed_away(parted: float) -> str:
 
     Args:
         parted: That part [-].
+
+    Returns:
+        One sentence.
     """
     return (
-        f"the food was pressed away rather than cut: the edge took {parted:.0%} of R times the new area, so the force is "
-        "that of flow and hangs on the width of the process zone; a food that is cut has a larger yield stress or a smaller R"
+        f"the food was pressed away rather than cut: the edge took {parted:.0%} of R times the new area, so the force "
+        "is that of flow and hangs on the width of the process zone; a food that is cut has a larger yield stress or a "
+        "smaller R"
     )
 
 
@@ -75,12 +78,14 @@ class Evaluation:
     def completed(self) -> float:
         """Part of the stroke that was completed as a cut [-], 0 to 1.
 
-        Less than one also where the food was pressed away rather than parted: from :data:`PARTED` to :data:`PUSHED` it falls to
-        nothing.
+        Less than one also where the food was pressed away rather than parted: from :data:`FULLY_PARTED` to
+        :data:`NOT_PARTED` it falls to nothing.
         """
         if not self.ok:
             return self.fraction
-        return max((self.parted - PUSHED) / (PARTED - PUSHED), 0.0) if self.parted < PARTED else 1.0
+        if self.parted < FULLY_PARTED:
+            return max((self.parted - NOT_PARTED) / (FULLY_PARTED - NOT_PARTED), 0.0)
+        return 1.0
 
     @property
     def parted(self) -> float:
@@ -93,7 +98,7 @@ class Evaluation:
         return self.status == "ok"
 
     def until(self, stroke: float) -> tuple[float, float]:
-        """Largest force [N] and work [J] up to a stroke [m], by which a simulation may be longer than the trace it is compared with."""
+        """Largest force [N] and work [J] up to a stroke [m]: a simulation may be longer than its trace."""
         steps = np.diff(self.stroke, prepend=0.0)
         last, work = (np.interp(stroke, self.stroke, values) for values in (self.force, np.cumsum(self.force * steps)))
         return max(float(self.force[self.stroke <= stroke].max(initial=0.0)), float(last)), float(work)
@@ -104,3 +109,18 @@ class Evaluator(Protocol):
 
     def evaluate(self, batch: Sequence[Mapping[str, float]]) -> Iterator[Evaluation]:
         """Run each set of ``batch``; yield in order of completion, ``index`` = place in the batch."""
+
+
+@dataclass(frozen=True)
+class Evaluators:
+    """What runs the simulations of a fit.
+
+    Attributes:
+        fine: Simulations at the resolution that counts.
+        coarse: Cheaper ones, on coarse cells.
+        repeat: Those of ``fine`` with what should not matter changed: speed, particles and the place of the grid.
+    """
+
+    fine: Evaluator
+    coarse: Evaluator
+    repeat: Evaluator

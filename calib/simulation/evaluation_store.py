@@ -15,7 +15,7 @@ runs):
         table = pandas.DataFrame({name: column[()] for name, column in f["parameters"].items()})
         table["status"] = f["status"].asstr()[()]
 
-HDF5 does not survive a process that is killed while it writes.  Runs therefore go first into a journal beside
+HDF5 does not survive a process that is killed while it writes. Runs therefore go first into a journal beside
 it, ``evaluations.h5.journal``: one line of checksum and JSON per run, forced to disk before :meth:`append`
 returns; a kill can tear the last line only.  Closing and reopening the store write the HDF5 file as a whole
 under another name and rename it, which is atomic, before the journal is removed.  One process at a time may
@@ -42,27 +42,26 @@ from calib.errors import OutputError
 from calib.simulation.evaluation import Evaluation, Evaluator
 from mpm.files import replacing
 
-#: Version of both layouts; a file with another one is refused.
-SCHEMA = 1
-
-#: Significant digits of a parameter in a key: what survives any arithmetic on its logarithm.
+LAYOUT_VERSION = 1
+"""Version of both layouts; a file with another one is refused."""
 KEY_DIGITS = 12
-
-#: Outcomes that would come out the same again; of other runs (timeout, stopped by the user) nothing was
-#: learnt.
+"""Significant digits of a parameter in a key: what survives any arithmetic on its logarithm."""
 REPEATABLE_STATUS = ("ok", "failed")
-#: Reasons of a failure that say nothing of the material, so that the run is made again: a worker process was
-#: killed.
+"""Outcomes that would come out the same again; of other runs (timeout, stopped by the user) nothing was learnt."""
 TRANSIENT_REASONS = ("worker_died",)
+"""Reasons of a failure that say nothing of the material, so that the run is made again: a worker process was killed."""
 
 
 def content_key(scene: Mapping[str, Any], parameters: Mapping[str, float], code: str) -> str:
-    """SHA-256 (hexadecimal) of the canonical JSON of scene, parameters (12 digits) and code version.
+    """Key of a run: the same for the same scene, parameters (12 digits) and code version.
 
     Args:
         scene: Everything else that determines the simulation, as plain JSON types.
         parameters: Values [SI] by name.
         code: Version of the simulating code.
+
+    Returns:
+        SHA-256 of the canonical JSON of the three, hexadecimal.
 
     Raises:
         ValueError: A number that is not finite.
@@ -86,11 +85,11 @@ class Header:
 
     trace_sha256: str
     scene_key: str
-    schema: int = SCHEMA
+    schema: int = LAYOUT_VERSION
 
 
 @dataclass(frozen=True)
-class Record:
+class StoredEvaluation:
     """One stored run.
 
     Attributes:
@@ -121,7 +120,7 @@ class EvaluationStore:
         self.path = Path(path)
         self.journal = self.path.with_name(self.path.name + ".journal")
         self.header = header
-        self._records: dict[str, Record] = {}
+        self._entries: dict[str, StoredEvaluation] = {}
         self._stream: BinaryIO | None = None
         self.torn = 0
         """Damaged lines found in the journal: runs that were being written when the process was killed."""
@@ -137,10 +136,10 @@ class EvaluationStore:
             self._compact()
 
     def __len__(self) -> int:
-        return len(self._records)
+        return len(self._entries)
 
-    def __iter__(self) -> Iterator[Record]:
-        return iter(self._records.values())
+    def __iter__(self) -> Iterator[StoredEvaluation]:
+        return iter(self._entries.values())
 
     def __enter__(self) -> EvaluationStore:
         return self
@@ -151,11 +150,11 @@ class EvaluationStore:
         self.close()
 
     def get(self, key: str) -> Evaluation | None:
-        """The run with this content key; None where there is none, or where it may come out otherwise the next time."""
-        record = self._records.get(key)
-        if record is None:
+        """The run with this content key; None where there is none, or where it may come out otherwise next time."""
+        entry = self._entries.get(key)
+        if entry is None:
             return None
-        run = record.evaluation
+        run = entry.evaluation
         return run if run.status in REPEATABLE_STATUS and run.reason not in TRANSIENT_REASONS else None
 
     def last(self, key: str) -> Evaluation:
@@ -164,26 +163,31 @@ class EvaluationStore:
         Raises:
             KeyError: There is none.
         """
-        return self._records[key].evaluation
+        return self._entries[key].evaluation
 
     def append(self, key: str, evaluation: Evaluation, fidelity: str) -> None:
-        """Store a run; it is on disk when this returns.  A run with a known key takes the place of that one.
+        """Store a run; it is on disk when this returns. A run with a known key takes the place of that one.
+
+        Args:
+            key: Its content key.
+            evaluation: The run; its ``index`` becomes its place in the store.
+            fidelity: Label of the resolution it was run at.
 
         Raises:
             OutputError: The journal cannot be written.
         """
-        known = self._records.get(key)
+        known = self._entries.get(key)
         place = len(self) if known is None else known.evaluation.index
-        record = Record(key, fidelity, replace(evaluation, index=place))
+        entry = StoredEvaluation(key, fidelity, replace(evaluation, index=place))
         try:
             if self._stream is None:
                 self._stream = self._begin()
-            _write_line(self._stream, _to_json(record))
+            _write_line(self._stream, _to_json(entry))
         except OSError as error:
             raise OutputError(
                 f"{self.journal} cannot be written: {error}; free space or choose another --out."
             ) from error
-        self._records[key] = record
+        self._entries[key] = entry
 
     def close(self) -> None:
         """Write the HDF5 file and remove the journal.
@@ -228,16 +232,16 @@ class EvaluationStore:
             if "schema" in document:
                 self._check(document, self.journal)
             else:
-                record = _from_json(document)
-                self._records[record.key] = record
+                entry = _from_json(document)
+                self._entries[entry.key] = entry
 
     def _read_file(self) -> None:
         """Take over the runs of the HDF5 file."""
         try:
             with h5py.File(self.path, "r") as file:
                 self._check({name: _plain(value) for name, value in file.attrs.items()}, self.path)
-                for record in _read_records(file):
-                    self._records[record.key] = record
+                for entry in _read_entries(file):
+                    self._entries[entry.key] = entry
         except (OSError, KeyError) as error:
             raise OutputError(f"{self.path} is no store of evaluations: {error}; move it away.") from error
 
@@ -246,7 +250,7 @@ class EvaluationStore:
         try:
             with replacing(self.path, sync=True) as draft, h5py.File(draft, "w") as file:
                 file.attrs.update(asdict(self.header))
-                _write_records(file, list(self))
+                _write_entries(file, list(self))
             if self._stream is not None:
                 self._stream.close()
                 self._stream = None
@@ -314,9 +318,9 @@ def _write_line(stream: BinaryIO, document: Mapping[str, Any]) -> None:
     os.fsync(stream.fileno())
 
 
-def _to_json(record: Record) -> dict[str, Any]:
-    """A record as plain JSON; curves as base64 of little-endian 64-bit floats."""
-    document = {"key": record.key, "fidelity": record.fidelity, **vars(record.evaluation)}
+def _to_json(entry: StoredEvaluation) -> dict[str, Any]:
+    """An entry as plain JSON; curves as base64 of little-endian 64-bit floats."""
+    document = {"key": entry.key, "fidelity": entry.fidelity, **vars(entry.evaluation)}
     for name in ("parameters", "scalars"):
         document[name] = {n: float(x) for n, x in document[name].items()}
     for name in ("stroke", "force"):
@@ -324,12 +328,12 @@ def _to_json(record: Record) -> dict[str, Any]:
     return document
 
 
-def _from_json(document: dict[str, Any]) -> Record:
+def _from_json(document: dict[str, Any]) -> StoredEvaluation:
     """Inverse of :func:`_to_json`."""
     key, fidelity = document.pop("key"), document.pop("fidelity")
     for name in ("stroke", "force"):
         document[name] = np.frombuffer(base64.b64decode(document[name]), "<f8").astype(np.float64)
-    return Record(key, fidelity, Evaluation(**document))
+    return StoredEvaluation(key, fidelity, Evaluation(**document))
 
 
 def _plain(value: Any) -> Any:
@@ -337,12 +341,12 @@ def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _write_records(file: h5py.File, records: Sequence[Record]) -> None:
+def _write_entries(file: h5py.File, entries: Sequence[StoredEvaluation]) -> None:
     """Write all runs in the layout of the module."""
-    runs = [r.evaluation for r in records]
+    runs = [r.evaluation for r in entries]
     text = h5py.string_dtype()
-    file.create_dataset("key", data=[r.key for r in records], dtype=text)
-    file.create_dataset("fidelity", data=[r.fidelity for r in records], dtype=text)
+    file.create_dataset("key", data=[r.key for r in entries], dtype=text)
+    file.create_dataset("fidelity", data=[r.fidelity for r in entries], dtype=text)
     file.create_dataset("status", data=[e.status for e in runs], dtype=text)
     file.create_dataset("reason", data=[e.reason for e in runs], dtype=text)
     file.create_dataset("fraction", data=[e.fraction for e in runs], dtype="f8")
@@ -360,8 +364,8 @@ def _write_records(file: h5py.File, records: Sequence[Record]) -> None:
         file.create_dataset(f"curves/{name}", data=np.concatenate([*curves, np.empty(0)]), dtype="f8")
 
 
-def _read_records(file: h5py.File) -> Iterator[Record]:
-    """Inverse of :func:`_write_records`."""
+def _read_entries(file: h5py.File) -> Iterator[StoredEvaluation]:
+    """Inverse of :func:`_write_entries`."""
     text = {name: file[name].asstr()[()] for name in ("key", "fidelity", "status", "reason")}
     number = {name: file[name][()] for name in ("fraction", "seconds")}
     named = {group: {n: c[()] for n, c in file[group].items()} for group in ("parameters", "scalars")}
@@ -383,4 +387,4 @@ def _read_records(file: h5py.File) -> Iterator[Record]:
             scalars=own["scalars"],
             seconds=float(number["seconds"][k]),
         )
-        yield Record(key, text["fidelity"][k], evaluation)
+        yield StoredEvaluation(key, text["fidelity"][k], evaluation)

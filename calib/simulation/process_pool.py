@@ -17,7 +17,7 @@ from mpm.runtime import stop
 
 
 def _begin() -> None:
-    """Start of a worker: Ctrl-C is handled by the main process, which then ends the workers; they end with it anyway."""
+    """Start of a worker: Ctrl-C is left to the main process, which then ends the workers; they end with it anyway."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _end)
     parent = parent_process()
@@ -26,9 +26,9 @@ def _begin() -> None:
 
 
 def _end(*_: Any) -> None:
-    """End of a worker when it is told to: after the launch it is in, and with what it has compiled kept for the next process.
+    """End of a worker when it is told to: after the launch it is in.
 
-    On Windows nobody is told: there the next process compiles anew.
+    What it has compiled is kept for the next process. On Windows nobody is told: there the next process compiles anew.
     """
     stop()
     os._exit(0)
@@ -44,7 +44,8 @@ class Pool(Workers):
     """Workers on this machine.
 
     Args:
-        workers: Simulations at a time: in as many processes, on a GPU side by side in one. They start when there is work for them.
+        workers: Simulations at a time: in as many processes, on a GPU side by side in one. They start when there is
+            work for them.
         arch: Taichi device of each.
         threads: CPU threads of each.
     """
@@ -82,7 +83,7 @@ class Pool(Workers):
         self._executor = self._start()
 
     def each(self, work: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Result | None]]:
-        """Call ``work(*job, arch, threads)`` for each job; yields (place among the jobs, result) in order of completion.
+        """Call ``work(*job, arch, threads)`` for each job; yields (place of the job, result) in order of completion.
 
         A process that is killed takes its neighbours with it. All of them are made again one at a time, so that None is
         the result only of the job whose process was killed when it ran alone.
@@ -113,7 +114,7 @@ class Pool(Workers):
             self._begun[self._submit(*errand.job, self.arch, self.threads)] = errand
 
     def errands(self, errands: Sequence[Errand]) -> None:
-        """Make them all but those that were begun, which are waited for; what was begun and is not among them is dropped."""
+        """Make them all, but wait for those that were begun; what was begun and is not among them is dropped."""
         begun = {f: e for f, e in self._begun.items() if any(e.same(other) for other in errands)}
         for future in self._begun.keys() - begun.keys():
             future.cancel()

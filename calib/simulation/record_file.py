@@ -1,7 +1,7 @@
 """The whole record of one cut in a file, so that it is simulated once.
 
-An HDF5 file: what a :class:`mpm.output.record.ForceRecord` has over the stroke as datasets of its names and units, all else as
-attributes, ``counters`` and ``pieces`` as JSON, and ``key``, the SHA-256 of scene and code.
+An HDF5 file: what a :class:`mpm.output.record.ForceRecord` has over the stroke as datasets of its names and units, all
+else as attributes, ``counters`` and ``pieces`` as JSON, and ``key``, the SHA-256 of scene and code.
 """
 
 from __future__ import annotations
@@ -24,15 +24,14 @@ from mpm.output.section import Section
 from mpm.output.topology import Topology
 from mpm.scene import Scene
 
-SECTION = "section"
-JSON = ("counters", "pieces")  # parts of a record that are neither arrays nor numbers
+SECTION_GROUP = "section"
+JSON_FIELDS = ("counters", "pieces")  # parts of a record that are neither arrays nor numbers
 
 
 def record_errands(scene: Scene, path: Path) -> list[Errand]:
-    """The simulation that brings the whole record of a scene into a file, in which a record of something else is replaced; none where
-    the file holds it.
+    """The simulation that brings the whole record of a scene into a file; none where the file holds it.
 
-    The errand raises OutputError where the file cannot be written.
+    A record of something else in the file is replaced. The errand raises OutputError where the file cannot be written.
     """
     if _read(path, _key(scene)) is not None:
         return []
@@ -63,11 +62,11 @@ def _write(path: Path, key: str, record: ForceRecord) -> None:
             for name, value in asdict(record).items():
                 if isinstance(value, np.ndarray):
                     file[name] = value
-                elif name == SECTION:
+                elif name == SECTION_GROUP:
                     for part, content in (value or {}).items():
-                        file[f"{SECTION}/{part}"] = content
+                        file[f"{SECTION_GROUP}/{part}"] = content
                 else:
-                    file.attrs[name] = json.dumps(value) if name in JSON else value
+                    file.attrs[name] = json.dumps(value) if name in JSON_FIELDS else value
     except OSError as e:
         raise OutputError(f"{path}: cannot be written ({e}); check the disk") from None
 
@@ -78,12 +77,12 @@ def _read(path: Path, key: str) -> ForceRecord | None:
         with h5py.File(path) as file:
             if file.attrs["key"] != key:
                 return None
-            section = {name: part[()] for name, part in file.get(SECTION, {}).items()}
-            found = {name: values[()] for name, values in file.items() if name != SECTION}
+            section = {name: part[()] for name, part in file.get(SECTION_GROUP, {}).items()}
+            found = {name: values[()] for name, values in file.items() if name != SECTION_GROUP}
             found |= {name: v.item() if isinstance(v, np.generic) else v for name, v in file.attrs.items()}
-            found[SECTION] = Section(**section) if section else None
+            found[SECTION_GROUP] = Section(**section) if section else None
             values = {f.name: found[f.name] for f in fields(ForceRecord)}
-            values |= {name: json.loads(values[name]) for name in JSON}
+            values |= {name: json.loads(values[name]) for name in JSON_FIELDS}
     except (OSError, KeyError, ValueError):
         return None
     if values["pieces"] is not None:

@@ -1,4 +1,4 @@
-"""What worker processes are asked to do, wherever they are: run candidates of a scene, one simulation at a time each."""
+"""What worker processes are asked to do, wherever they are: run candidates of a scene, one at a time each."""
 
 from __future__ import annotations
 
@@ -10,47 +10,51 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from calib.material.scene import place
+from calib.material.scene import at_fitted_height
 from calib.simulation.evaluation import Evaluation
-from mpm.errors import SimulationError
-from mpm.material import Material
 from mpm.output.record import ForceRecord
 from mpm.scene import Scene
+from mpm.scene.errors import SimulationError
+from mpm.scene.material import Material
 
 Result = TypeVar("Result")
 Kind = TypeVar("Kind", bound="Workers")
 
-SECTIONS = 24  # looks at the food in a whole record, of which a report shows three
-LEAST = 2
-"""Simulations of a round of a search, whatever the workers: a lone worker finds what two find, bit for bit. With rounds of one the search
-ends sooner and worse, and what it calls identified is often wrong: 22 of 32 intervals on 24 made-up bananas held the truth."""
-DIGITS = (9, 6)
-"""Decimals to which an evaluation keeps stroke [m] and force [N]. Two builds of the solver agree to some fifteen digits, and a search that is
-told them all may still end elsewhere: one of two points that differ by a step of its lattice is run, and then all others differ."""
-DIED = "worker_died"  # reason of a run whose process was killed, for instance for lack of memory
+RECORD_SECTIONS = 24
+"""Sections of the food in a whole record, of which a report shows three."""
+LEAST_BATCH = 2
+"""Simulations of a round of a search, whatever the workers: a lone worker finds what two find, bit for bit. With rounds
+of one the search ends sooner and worse, and what it calls identified is often wrong (docs/theory.md, "Measured
+choices")."""
+STROKE_DECIMALS, FORCE_DECIMALS = 9, 6
+"""Decimals to which an evaluation keeps stroke [m] and force [N]. Two builds of the solver agree to some fifteen
+digits. A search that is told them all may still end elsewhere: one of two points that differ by a step of its lattice
+is run, and then all others differ."""
+DIED = "worker_died"
+"""Reason of a run whose process was killed, for instance for lack of memory."""
 
 
-def _run(scene: Scene, values: dict[str, Any], arch: str, threads: int) -> dict[str, Any]:
-    """One simulation in a worker; everything that is sent back is plain data."""
+def _run(scene: Scene, values: dict[str, Any], arch: str, threads: int) -> Evaluation:
+    """One simulation in a worker."""
     from mpm.runtime import Runtime
     from mpm.solver import Simulation
 
     simulation = Simulation(scene, Runtime(arch, threads))
     material: Material = replace(scene.food.material, **values)
-    return plain(simulation.run(material))
+    return evaluation_of(simulation.run(material))
 
 
-def _run_together(jobs: Sequence[tuple[Scene, dict[str, Any]]], arch: str, threads: int) -> list[dict[str, Any]]:
+def _run_together(jobs: Sequence[tuple[Scene, dict[str, Any]]], arch: str, threads: int) -> list[Evaluation]:
     """Several simulations side by side in a worker."""
     from mpm.batch import simulate_together
     from mpm.runtime import Runtime
 
     scenes = [scene.with_material(**values) for scene, values in jobs]
-    return [plain(record) for record in simulate_together(scenes, runtime=Runtime(arch, threads))]
+    return [evaluation_of(record) for record in simulate_together(scenes, runtime=Runtime(arch, threads))]
 
 
-def plain(record: ForceRecord) -> dict[str, Any]:
-    """What an evaluation keeps of a record."""
+def evaluation_of(record: ForceRecord) -> Evaluation:
+    """What an evaluation keeps of a record, without its values: ``index`` is 0 and ``parameters`` are empty."""
     scalars = {
         "peak_N": record.peak,
         "work_J": record.work,
@@ -63,15 +67,18 @@ def plain(record: ForceRecord) -> dict[str, Any]:
     }
     if not math.isnan(record.parted):
         scalars["parted"] = record.parted
-    return {
-        "status": "ok" if record.status == "done" else "failed",
-        "reason": "" if record.status == "done" else record.status,
-        "fraction": record.fraction,
-        "stroke": np.round(record.stroke, DIGITS[0]),
-        "force": np.round(record.resolved, DIGITS[1]),
-        "scalars": scalars,
-        "seconds": record.wall,
-    }
+    done = record.status == "done"
+    return Evaluation(
+        index=0,
+        parameters={},
+        status="ok" if done else "failed",
+        reason="" if done else record.status,
+        fraction=record.fraction,
+        stroke=np.round(record.stroke, STROKE_DECIMALS),
+        force=np.round(record.resolved, FORCE_DECIMALS),
+        scalars=scalars,
+        seconds=record.wall,
+    )
 
 
 def _whole(scene: Scene, arch: str, threads: int) -> ForceRecord:
@@ -79,7 +86,7 @@ def _whole(scene: Scene, arch: str, threads: int) -> ForceRecord:
     from mpm.runtime import Runtime
     from mpm.solver import Simulation
 
-    return Simulation(scene, Runtime(arch, threads)).run(sections=SECTIONS)
+    return Simulation(scene, Runtime(arch, threads)).run(sections=RECORD_SECTIONS)
 
 
 def _errand(work: Callable[..., Result], *args: Any) -> Result:
@@ -138,14 +145,17 @@ class Workers(ABC):
 
     @property
     def together(self) -> int:
-        """Simulations that a process makes side by side, each launch a step of them all: more than one only on a GPU, which the launch of
-        one cut does not fill. On CPUs as many processes do it as well and do not wait for each other."""
+        """Simulations that a process makes side by side, each launch a step of them all.
+
+        There is more than one only on a GPU, which the launch of one cut does not fill. On CPUs as many processes do it
+        as well and do not wait for each other.
+        """
         return 1
 
     @property
     def batch(self) -> int:
-        """Simulations that a search asks for at once: those of all workers, and no fewer than :data:`LEAST`."""
-        return max(self.workers, LEAST)
+        """Simulations that a search asks for at once: those of all workers, and no fewer than :data:`LEAST_BATCH`."""
+        return max(self.workers, LEAST_BATCH)
 
     def __enter__(self: Kind) -> Kind:
         return self
@@ -159,20 +169,20 @@ class Workers(ABC):
 
     @abstractmethod
     def each(self, work: Callable[..., Result], jobs: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Result | None]]:
-        """Call ``work(*job, arch, threads)`` for each job; yields (place among the jobs, result) in order of completion.
+        """Call ``work(*job, arch, threads)`` for each job; yields (place of the job, result) in order of completion.
 
         A job whose process was killed is made once more. None is the result only of a job whose process was killed a
         second time, when nothing else ran in it.
         """
 
     def renew(self) -> None:  # noqa: B027 - a cluster keeps its workers
-        """Begin with fresh processes, where they are this one's: a process keeps the memory of every size of scene that it has had."""
+        """Begin with fresh processes, where they are this one's: each keeps the memory of all sizes of scene it had."""
 
     def run(self, jobs: Sequence[tuple[Scene, Mapping[str, float]]]) -> Iterator[Evaluation]:
-        """Run each scene with its material values; yields in order of completion, ``index`` is the place among the jobs.
+        """Run each scene with its material values; yields in order of completion, ``index`` is the place of the job.
 
-        A run that killed its process twice is a failed one, for the reason :data:`DIED`; where several were made side by side, each of
-        them is tried by itself first.
+        A run that killed its process twice is a failed one, for the reason :data:`DIED`; where several were made side
+        by side, each of them is tried by itself first.
         """
         asked = [(scene, dict(values)) for scene, values in jobs]
         alone = list(range(len(asked)))
@@ -190,11 +200,15 @@ class Workers(ABC):
             yield _evaluation(k, asked[k][1], found)
 
     def begin(self, errand: Errand) -> None:  # noqa: B027 - where it is not begun it is made when its time has come
-        """Make an errand beside what else is asked for, where there are processes to spare: it is kept when it is made and something
-        is waited for."""
+        """Make an errand beside what else is asked for, where there are processes to spare.
+
+        It is kept when it is made and something is waited for.
+        """
 
     def errands(self, errands: Sequence[Errand]) -> None:
-        """Make them all, the longest first, or the workers of the others would wait for it; each is kept as soon as it is made.
+        """Make them all, the longest first, or the workers of the others would wait for it.
+
+        Each is kept as soon as it is made.
 
         Raises:
             SimulationError: The process of a whole record was killed twice.
@@ -208,11 +222,11 @@ class Workers(ABC):
         return SceneEvaluator(self, scene, kept)
 
 
-def _evaluation(index: int, values: dict[str, float], result: dict[str, Any] | None) -> Evaluation:
+def _evaluation(index: int, values: dict[str, float], result: Evaluation | None) -> Evaluation:
     """What a worker has sent back, or that it was killed twice."""
     if result is None:
         return Evaluation(index, values, "failed", DIED, 0.0, np.empty(0), np.empty(0))
-    return Evaluation(index=index, parameters=values, **result)
+    return replace(result, index=index, parameters=values)
 
 
 def _alive(record: ForceRecord | None) -> ForceRecord:
@@ -240,5 +254,5 @@ class SceneEvaluator:
 
     def evaluate(self, batch: Sequence[Mapping[str, float]]) -> Iterator[Evaluation]:
         """Run each candidate; yields in order of completion, ``index`` is the place in the batch."""
-        for evaluation in self.workers.run([place(self.scene, values, self.kept) for values in batch]):
+        for evaluation in self.workers.run([at_fitted_height(self.scene, values, self.kept) for values in batch]):
             yield replace(evaluation, parameters=dict(batch[evaluation.index]))

@@ -13,13 +13,8 @@ import numpy as np
 from calib.errors import TraceError
 from calib.io.wording import brief, listed, quoted
 from calib.trace.table import Table, as_float
+from calib.trace.units import UNITS_OF_ROLE
 
-_SECONDS = {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3, "millisecond": 1e-3, "milliseconds": 1e-3,
-            "us": 1e-6, "usec": 1e-6, "ns": 1e-9, "nsec": 1e-9, "nanosecond": 1e-9, "nanoseconds": 1e-9}  # fmt: skip
-_NEWTONS = {"N": 1.0, "n": 1.0, "newton": 1.0, "newtons": 1.0, "kN": 1e3, "KN": 1e3, "kn": 1e3, "mN": 1e-3, "mn": 1e-3}
-_METRES = {"m": 1.0, "metre": 1.0, "metres": 1.0, "meter": 1.0, "meters": 1.0, "cm": 1e-2, "mm": 1e-3, "millimetre": 1e-3,
-           "millimetres": 1e-3, "millimeter": 1e-3, "millimeters": 1e-3, "um": 1e-6}  # fmt: skip
-_UNITS = {"time": _SECONDS, "force": _NEWTONS, "position": _METRES, "compression": _METRES}
 _LIMITS = {"time": (1e11, "s"), "force": (1e6, "N"), "position": (1e3, "m"), "compression": (1e3, "m")}
 """Largest number of each role: beyond it there is no clock since 1970, no knife and no kitchen."""
 _STEMS = {
@@ -56,13 +51,8 @@ _EXPECTED = {
     "position": ("ee_z_m", "position_m", "position_mm", "stroke_m", "displacement_mm"),
     "compression": ("compression_mm", "displacement_mm", "stroke_m"),
 }
-LONGEST = 200
+LONGEST_NAME = 200
 """Letters from which on the name of a column means nothing."""
-
-
-def is_unit(text: str) -> bool:
-    """Whether this is a unit of time, force or length, in brackets or not."""
-    return any(text.strip(" []()") in units for units in _UNITS.values())
 
 
 @dataclass(frozen=True)
@@ -96,7 +86,10 @@ def choose(table: Table, role: str, wanted: str | None) -> Column:
     Args:
         table: The table.
         role: ``time``, ``force``, ``position`` or ``compression``.
-        wanted: Name of a column, or None.
+        wanted: Name of a column, or None to choose one by its name and unit.
+
+    Returns:
+        The column, with the factor that its unit and its name stand for.
 
     Raises:
         TraceError: There is no such column, no single one whose name fits, or a unit that is none of the role.
@@ -124,7 +117,14 @@ def choose(table: Table, role: str, wanted: str | None) -> Column:
 
 
 def numbers(table: Table, column: Column) -> np.ndarray:
-    """The numbers of a column in SI, shape (rows,).
+    """The numbers of a column.
+
+    Args:
+        table: The table.
+        column: One of its columns.
+
+    Returns:
+        The numbers in SI with our sign, shape (n,) for n rows [s], [N] or [m] by the column's role.
 
     Raises:
         TraceError: A cell holds no finite number, or one that is too large; the message names the first one.
@@ -191,18 +191,18 @@ def _stem(name: str) -> str:
 
 def _meaning(table: Table, name: str) -> tuple[str, str]:
     """Stem and unit of a column: from the unit stated beside its name, the conventions of ROS, or its name alone."""
-    if len(name) > LONGEST:
+    if len(name) > LONGEST_NAME:
         return "", ""
     stem, unit = next(((s, u) for pattern, s, u in _ROS if pattern.fullmatch(name)), _split_unit(name))
     stated = table.units.get(name, unit)
-    ends_in_unit = any(unit in units for units in _UNITS.values())
+    ends_in_unit = any(unit in units for units in UNITS_OF_ROLE.values())
     return (stem, unit) if stated == unit else (stem if ends_in_unit else _stem(name), stated)
 
 
 def _fits(table: Table, name: str, role: str) -> bool:
     """Whether a column can have a role; a ROS stamp that nobody has set, and so stands, is no clock."""
     stem, unit = _meaning(table, name)
-    if unit not in _UNITS[role]:
+    if unit not in UNITS_OF_ROLE[role]:
         return False
     if role == "time" and stem == "stamp":
         cells = table.columns[name]
@@ -217,17 +217,17 @@ def _column(table: Table, role: str, name: str) -> Column:
         TraceError: The unit stated beside the name is none of the role, or not that of the name.
     """
     stem, unit = _meaning(table, name)
-    named = _split_unit(name[:LONGEST])[1]
-    if name in table.units and unit not in _UNITS[role]:
+    named = _split_unit(name[:LONGEST_NAME])[1]
+    if name in table.units and unit not in UNITS_OF_ROLE[role]:
         raise TraceError(
             f"{table.source}, column {brief(name)}: its unit is {quoted(unit)}, which is none of a {role}; use one of "
-            f"{', '.join(list(_UNITS[role])[:6])}"
+            f"{', '.join(list(UNITS_OF_ROLE[role])[:6])}"
         )
-    if name in table.units and _UNITS[role].get(named, _UNITS[role][unit]) != _UNITS[role][unit]:
+    if name in table.units and UNITS_OF_ROLE[role].get(named, UNITS_OF_ROLE[role][unit]) != UNITS_OF_ROLE[role][unit]:
         raise TraceError(
             f"{table.source}, column {brief(name)}: its unit is stated as {quoted(unit)}; correct one of them"
         )
-    factor = _UNITS[role].get(unit, 1.0)
+    factor = UNITS_OF_ROLE[role].get(unit, 1.0)
     if role == "force":
         factor *= _KNOWN_FORCE.get(stem, 1.0)
     if role == "position" and _DEPTH.fullmatch(stem):
@@ -237,7 +237,7 @@ def _column(table: Table, role: str, name: str) -> Column:
 
 def _did_you_mean(wanted: Sequence[str], table: Table) -> str:
     """A hint with the nearest existing names, or with all of them."""
-    lower = {name.lower(): name for name in table.columns if len(name) <= LONGEST}
+    lower = {name.lower(): name for name in table.columns if len(name) <= LONGEST_NAME}
     near = [lower[n] for w in wanted for n in difflib.get_close_matches(w.lower(), lower, n=1, cutoff=0.7)]
     if not near:
         labels = [f"{name} [{table.units[name]}]" if name in table.units else name for name in table.columns]

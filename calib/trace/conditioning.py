@@ -7,21 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.errors import TraceError
-from calib.trace.contact_onset import FLOOR_FRACTION, SUSTAIN, Contact, find_contact, first_sustained
+from calib.trace.contact_onset import FLOOR_FRACTION, SUSTAIN, ContactOnset, find_contact_onset
 from calib.trace.filters import FILTER_SD_M, N_STROKE, leading_grid, resample, smooth
+from calib.trace.stroke import DWELL_M, end_of_descent, ending_at_board, stroke_axis
+from calib.trace.table import RECONSTRUCTED
 from calib.trace.trace import MIN_SAMPLES, Trace
 
 AIR_SLACK_SAMPLES = 3
 """Sampling intervals by which an air run may be shorter than the cut; its last value is held over them."""
 AIR_PATH_M = 2e-3
 """Largest difference in height between cut and air run before contact [m] that goes without a warning."""
-DWELL_M = 0.1e-3
-"""Height above the lowest position so far [m] at which the knife still counts as there: a robot arm's
-repeatability. The stroke is over where it comes that near to the lowest of all; higher, it is retracting."""
-RELEASE_SD = 4.0
-"""The force is released when it stays within this many noise standard deviations of the baseline ..."""
-RELEASE_FRACTION = 0.05
-"""... or below this fraction of the peak, whichever is higher: a baseline drifts during a cut."""
 DRIFT_FRACTION = 0.02
 """Drift over the cut, as a fraction of the peak, that is warned about."""
 DRIFT_REACH = 10.0
@@ -29,19 +24,12 @@ DRIFT_REACH = 10.0
 the cut."""
 DRIFT_SIGNIFICANCE = 3.0
 """Standard uncertainties by which a drift must differ from zero to be warned about."""
-STROKE_RANGE_M = (1e-3, 0.5)
-"""Strokes outside are taken for a unit mix-up [m]: less than a grape's skin, more than any kitchen
-knife's way."""
 PEAK_RANGE_N = (0.05, 5e3)
 """Peak forces outside are taken for a unit mix-up [N]."""
 NOTHING_N = 1e-6
 """Variation of a force below which there is nothing in it but rounding [N]."""
 PEAK_HALF_WIDTH = 2
 """Points on each side of the maximum through which the parabola of the peak is fitted."""
-BEYOND = 0.1
-"""Part of the specimen's height by which a stroke may exceed it: 10 N bend an arm of 3 kN/m by 3 mm, a tenth of a fruit of 3 cm."""
-MAX_DESCENT_FRACTION = 0.5
-"""Part of the position's range that must lie before its lowest point for a record to be a downward stroke."""
 
 
 @dataclass(frozen=True)
@@ -117,8 +105,8 @@ def condition(
         speed: Knife speed [m/s], needed where the trace has no position.
         height: Height of the food [m]; without position and speed, onset to release is taken for this height.
         t_end: End of the record on the trace's clock [s]; what comes later (board contact, say) is dropped.
-        board: Stroke at which the edge is at the board, which is the specimen's height where that was measured [m]; the curve ends
-            there.
+        board: Stroke at which the edge is at the board, which is the specimen's height where that was measured [m]; the
+            curve ends there.
 
     Returns:
         The conditioned cut.
@@ -128,78 +116,43 @@ def condition(
     """
     _check_options(trace, speed, height)
     trace = trace if t_end is None else trace.until(t_end)
-    warnings = list(trace.notes)
-    if trace.label == "reconstructed":
-        warnings.append(f"{trace.source} is a reconstruction, not a measurement: nothing fitted to it is validated")
-    if trace.start:
-        warnings.append(
-            f"the clock of {trace.source} starts at {trace.start:.10g} s; all times, also --t-end, are counted from "
-            "there"
-        )
-    force = trace.force
-    if air is not None:
-        force = force - _air_force(trace, air)
-    last = _lowest(trace)
-    if last + 1 < MIN_SAMPLES:
-        raise TraceError(
-            f"{trace.source}, column {trace.columns.get('position')}: the position is at its lowest after {last + 1} samples, "
-            f"at least {MIN_SAMPLES} are needed on the way down; it must be a height, or a depth named like stroke_m; name "
-            "another with --position-col, or none and give --speed"
-        )
-    if 0.0 < np.ptp(force[: last + 1]) < NOTHING_N:
-        raise TraceError(
-            f"{trace.source}, column {trace.columns.get('force')}: no contact found: the force varies by "
-            f"{np.ptp(force[: last + 1]):.3g} N in all; check the column and its unit (force_N, force_mN, force_kN)"
-        )
-    contact = find_contact(trace.time[: last + 1], force[: last + 1], source=trace.source)
-    if air is None:
-        warnings += _drift_warnings(trace, force, contact, trace.time[last])
-    else:
-        warnings += _air_warnings(trace, air, contact.onset)
-    if contact.baseline.noise_sd < FLOOR_FRACTION * contact.peak:
-        warnings.append(
-            f"the force before contact hardly varies ({contact.baseline.noise_sd:.2g} N): digitised, "
-            "smoothed or clipped data; the noise and every uncertainty that follows from it are too small"
-        )
-    tared = force - contact.baseline.level
-    stroke, end, source = _stroke_axis(trace, tared, contact, last, speed, height, warnings)
-    if board is not None and end > board * (1 + 1e-9):
-        if end > (1 + BEYOND) * board:
-            raise TraceError(
-                f"{trace.source}: the stroke after contact is {1e3 * end:.1f} mm (from {source}), but the specimen is {1e3 * board:.1f} "
-                "mm high; check the height, or the position or speed, or say with --t-end where the cut ends"
-            )
-        warnings.append(
-            f"the stroke of {1e3 * end:.1f} mm goes beyond the specimen's height of {1e3 * board:.1f} mm; what is below the board's "
-            "top is left out"
-        )
-        end = board
-    grid, curve = _on_grid(trace, stroke, tared, contact.onset, end)
-    noise = _filtered_noise(contact, len(tared[(stroke >= 0.0) & (stroke <= grid[-1])]), grid[-1])
+    force = trace.force if air is None else trace.force - _air_force(trace, air)
+    last = end_of_descent(trace)
+    _check_record(trace, force, last)
+    contact = find_contact_onset(trace.time[: last + 1], force[: last + 1], source=trace.source)
+    baseline = contact.baseline
+    tared = force - baseline.level
+    axis = stroke_axis(trace, tared, contact, last=last, speed=speed, height=height)
+    if board is not None:
+        axis = ending_at_board(axis, board, trace.source)
+    grid, curve = _on_grid(trace, axis.stroke, tared, contact.onset, axis.end)
+    length = float(grid[-1])
+    samples = int(np.count_nonzero((axis.stroke >= 0.0) & (axis.stroke <= length)))
+    noise = _filtered_noise(contact, samples, length)
     peak = _peak(curve)
     _check_peak(trace, peak)
     return Conditioned(
         trace=trace,
-        baseline_N=contact.baseline.level,
-        baseline_sd_N=contact.baseline.level_sd,
+        baseline_N=baseline.level,
+        baseline_sd_N=baseline.level_sd,
         baseline_kind="constant" if air is None else "air",
         onset_s=contact.onset,
         onset_sd_s=contact.onset_sd,
-        end_s=float(trace.time[int(np.argmax(stroke >= grid[-1] * (1 - 1e-9)))]),
+        end_s=float(trace.time[int(np.argmax(axis.stroke >= length * (1 - 1e-9)))]),
         time=trace.time,
         force=tared,
         stroke=grid,
         curve=curve,
-        stroke_source=source,
-        stroke_length_m=float(grid[-1]),
-        noise_sd_N=contact.baseline.noise_sd,
+        stroke_source=axis.source,
+        stroke_length_m=length,
+        noise_sd_N=baseline.noise_sd,
         curve_noise_sd_N=noise,
         filter_sd_m=FILTER_SD_M,
         peak_N=peak,
-        peak_sd_N=float(np.hypot(noise, contact.baseline.level_sd)),
-        drift_N_per_s=contact.baseline.slope,
-        drift_sd_N_per_s=contact.baseline.slope_sd,
-        warnings=tuple(warnings),
+        peak_sd_N=float(np.hypot(noise, baseline.level_sd)),
+        drift_N_per_s=baseline.slope,
+        drift_sd_N_per_s=baseline.slope_sd,
+        warnings=(*_record_warnings(trace), *_baseline_warnings(trace, air, force, contact, last), *axis.warnings),
     )
 
 
@@ -213,6 +166,50 @@ def _check_options(trace: Trace, speed: float | None, height: float | None) -> N
             f"{trace.source}: no position column, so the stroke is unknown; give the knife speed with "
             "--speed (m/s), or name a position column with --position-col"
         )
+
+
+def _check_record(trace: Trace, force: np.ndarray, last: int) -> None:
+    """Refuse a record that does not go down for long enough, or in whose force there is nothing."""
+    if last + 1 < MIN_SAMPLES:
+        raise TraceError(
+            f"{trace.source}, column {trace.columns.get('position')}: the position is at its lowest after {last + 1} "
+            f"samples, at least {MIN_SAMPLES} are needed on the way down; it must be a height, or a depth named like "
+            "stroke_m; name another with --position-col, or none and give --speed"
+        )
+    if 0.0 < np.ptp(force[: last + 1]) < NOTHING_N:
+        raise TraceError(
+            f"{trace.source}, column {trace.columns.get('force')}: no contact found: the force varies by "
+            f"{np.ptp(force[: last + 1]):.3g} N in all; check the column and its unit (force_N, force_mN, force_kN)"
+        )
+
+
+def _record_warnings(trace: Trace) -> list[str]:
+    """What was done to read the record, and what it is."""
+    found = list(trace.notes)
+    if trace.label == RECONSTRUCTED:
+        found.append(f"{trace.source} is a reconstruction, not a measurement: nothing fitted to it is validated")
+    if trace.start:
+        found.append(
+            f"the clock of {trace.source} starts at {trace.start:.10g} s; all times, also --t-end, are counted from "
+            "there"
+        )
+    return found
+
+
+def _baseline_warnings(
+    trace: Trace, air: Trace | None, force: np.ndarray, contact: ContactOnset, last: int
+) -> list[str]:
+    """What speaks against the baseline: its drift or another air run, and a noise that is none."""
+    if air is None:
+        found = _drift_warnings(trace, force, contact, trace.time[last])
+    else:
+        found = _air_warnings(trace, air, contact.onset)
+    if contact.baseline.noise_sd < FLOOR_FRACTION * contact.peak:
+        found.append(
+            f"the force before contact hardly varies ({contact.baseline.noise_sd:.2g} N): digitised, "
+            "smoothed or clipped data; the noise and every uncertainty that follows from it are too small"
+        )
+    return found
 
 
 def _air_force(trace: Trace, air: Trace) -> np.ndarray:
@@ -250,7 +247,7 @@ def _air_warnings(trace: Trace, air: Trace, onset: float) -> list[str]:
     return found
 
 
-def _drift_warnings(trace: Trace, force: np.ndarray, contact: Contact, end: float) -> list[str]:
+def _drift_warnings(trace: Trace, force: np.ndarray, contact: ContactOnset, end: float) -> list[str]:
     """A constant baseline that the force before contact contradicts."""
     base = contact.baseline
     found = []
@@ -271,74 +268,6 @@ def _drift_warnings(trace: Trace, force: np.ndarray, contact: Contact, end: floa
             "with --air"
         )
     return found
-
-
-def _lowest(trace: Trace) -> int:
-    """Index of the end of the descent, DWELL_M above the lowest position, or the last sample."""
-    if trace.position is None:
-        return len(trace.time) - 1
-    lowest = int(np.argmin(trace.position))
-    descent = float(np.max(trace.position[: lowest + 1]) - trace.position[lowest])
-    if descent < MAX_DESCENT_FRACTION * np.ptp(trace.position):
-        return len(trace.time) - 1
-    top = int(np.argmax(trace.position[: lowest + 1]))
-    return top + int(np.argmax(trace.position[top : lowest + 1] <= trace.position[lowest] + DWELL_M))
-
-
-def _stroke_axis(
-    trace: Trace,
-    tared: np.ndarray,
-    contact: Contact,
-    last: int,
-    speed: float | None,
-    height: float | None,
-    warnings: list[str],
-) -> tuple[np.ndarray, float, str]:
-    """Stroke of every sample, negative before contact [m], its value at the end, and its source."""
-    if trace.position is not None:
-        if speed is not None:
-            warnings.append("the speed is not used: the stroke comes from the position column")
-        stroke = float(np.interp(contact.onset, trace.time, trace.position)) - trace.position
-        end = float(stroke[last])
-        if not end > 0.0:
-            raise TraceError(
-                f"{trace.source}, column {trace.columns.get('position')}: the position does not descend "
-                f"after contact at {contact.onset:.4g} s (it changes by {-end:.3g} m); it must be a height, "
-                "or a depth (--depth-col); name another with --position-col, or none and give --speed"
-            )
-        source = "position"
-    else:
-        release, released = _release(trace.time, tared, contact)
-        elapsed = trace.time - contact.onset
-        if speed is not None:
-            rate, source = speed, "speed"
-        else:
-            assert height is not None
-            rate, source = height / (release - contact.onset), "height"
-            until = "release" if released else "the end of the record (the force is not released in it)"
-            warnings.append(
-                f"no position and no speed: contact to {until} was taken for the food's height of "
-                f"{1e3 * height:.3g} mm at constant speed ({1e3 * rate:.3g} mm/s); a fitted stiffness or R "
-                "inherits that guess"
-            )
-        stroke, end = rate * elapsed, rate * (release - contact.onset)
-    low, high = STROKE_RANGE_M
-    if not low <= end <= high:
-        raise TraceError(
-            f"{trace.source}: the stroke after contact is {end:.3g} m (from {source}), outside {low:g} to "
-            f"{high:g} m; check millimetres against metres in the position, speed or height"
-        )
-    return stroke, end, source
-
-
-def _release(time: np.ndarray, tared: np.ndarray, contact: Contact) -> tuple[float, bool]:
-    """Time at which the force is back at the baseline for good, and whether the record has it."""
-    limit = max(RELEASE_SD * contact.baseline.noise_sd, RELEASE_FRACTION * contact.peak)
-    after_last = first_sustained((tared > limit)[::-1])
-    last = len(tared) - 1 - (after_last or 0)
-    if last >= len(tared) - SUSTAIN:
-        return float(time[-1]), False
-    return float(time[last + 1]), True
 
 
 def _on_grid(
@@ -371,7 +300,7 @@ def _peak(curve: np.ndarray) -> float:
     return float(curve[i])
 
 
-def _filtered_noise(contact: Contact, samples: int, length: float) -> float:
+def _filtered_noise(contact: ContactOnset, samples: int, length: float) -> float:
     """Standard deviation of the noise that is left in a point of the filtered curve [N].
 
     The Gaussian averages 2 sqrt(pi) of its standard deviations' worth of samples.

@@ -30,9 +30,9 @@ HINGE_FLAT_RATIO = 3.0
 """Length of the hinge's flat part over that of its rise: long enough to fix the level, too short to feel
 drift."""
 HINGE_POWERS = (1.0, 1.5, 2.0)
-"""Powers of the rise after contact: a straight edge on a flat food, a round food or blunt edge (Hertz), and what widens as it
-sinks in, a cone (Sneddon 1965, Int. J. Eng. Sci. 3:47) or an edge across a round food. Twenty simulated cuts rise with powers of
-1.6 to 1.9 over their first millimetre; without the 2 their onsets were found 0.4 mm late."""
+"""Powers of the rise after contact: a straight edge on a flat food, a round food or blunt edge (Hertz), and what widens
+as it sinks in, a cone (Sneddon 1965, Int. J. Eng. Sci. 3:47) or an edge across a round food. What simulated cuts do,
+and what the 2 is for: docs/theory.md, "Measured choices"."""
 HINGE_GRID = 200
 """Trial positions of the kink in each of the two passes of its search."""
 MAD_TO_SD = 1.4826
@@ -71,7 +71,7 @@ class Baseline:
 
 
 @dataclass(frozen=True)
-class Contact:
+class ContactOnset:
     """Baseline and contact onset of a record.
 
     Attributes:
@@ -97,7 +97,7 @@ class _Coarse:
     noise: float
 
 
-def find_contact(time: np.ndarray, force: np.ndarray, *, source: str) -> Contact:
+def find_contact_onset(time: np.ndarray, force: np.ndarray, *, source: str) -> ContactOnset:
     """Find baseline and contact onset by a change-point fit.
 
     The first sustained excursion is located against the noise of the second half of the record before it (the
@@ -113,7 +113,7 @@ def find_contact(time: np.ndarray, force: np.ndarray, *, source: str) -> Contact
         source: Name of the record for messages.
 
     Returns:
-        The contact.
+        Time of contact and the baseline before it.
 
     Raises:
         TraceError: No contact, the wrong sign, or too little baseline before contact.
@@ -137,11 +137,24 @@ def find_contact(time: np.ndarray, force: np.ndarray, *, source: str) -> Contact
             "needed for the baseline; keep the approach of the knife in the record"
         )
     baseline = estimate_baseline(time, force, before - max(before // 2, MIN_BASELINE), before)
-    return Contact(baseline, onset, onset_sd, coarse.height)
+    return ContactOnset(baseline, onset, onset_sd, coarse.height)
 
 
 def estimate_baseline(time: np.ndarray, force: np.ndarray, start: int, stop: int) -> Baseline:
-    """Robust level, noise and drift of ``force[start:stop]``; see Baseline for the meaning of each."""
+    """Robust level, noise and drift of ``force[start:stop]``.
+
+    The correlation of neighbouring samples is that of the window without its drift, corrected for its bias in a short
+    window (Marriott and Pope 1954).
+
+    Args:
+        time: Time [s], shape (n,).
+        force: Force [N], shape (n,).
+        start: Index of the first sample of the window.
+        stop: Index after its last one.
+
+    Returns:
+        Level, noise and drift, and the uncertainty of each.
+    """
     t, f = time[start:stop], force[start:stop]
     level, noise = _median_and_sd(f)
     centred = t - t.mean()

@@ -9,21 +9,21 @@ from collections.abc import Sequence
 
 from calib.errors import TraceError
 from calib.io.wording import brief, quoted
-from calib.trace.columns import is_unit
-from calib.trace.table import LABELS, Table, as_float, check_names, decoded
+from calib.trace.table import MEASURED, Table, as_float, check_names, decoded
+from calib.trace.units import is_unit
 
 SEPARATORS = ",;\t"
 MOST_ABOVE = 60
 """Lines above a header that are taken for words about the record; a table that changes its width later is damaged."""
-COMMA = re.compile(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*")
+DECIMAL_COMMA = re.compile(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*")
 """A number whose decimals follow a comma."""
-UNIT = re.compile(
+UNIT_CELL = re.compile(
     r"\s*[\[(]?\s*[A-Za-z%\u00b5\u03bc\u00b0][\w/^%.*\u00b7-]{0,7}\s*[\])]?\s*|\s*[\[(]?\s*-?\s*[\])]?\s*"
 )
 """A cell of a row of units: a short word, in brackets or not, or nothing."""
 
-Lines = list[tuple[int, str]]
-Rows = list[tuple[int, list[str]]]
+NumberedLines = list[tuple[int, str]]
+NumberedRows = list[tuple[int, list[str]]]
 
 
 def table_of_csv(source: str, raw: bytes) -> Table:
@@ -32,6 +32,9 @@ def table_of_csv(source: str, raw: bytes) -> Table:
     Args:
         source: What errors call the file.
         raw: Its content.
+
+    Returns:
+        The table, all cells as text.
 
     Raises:
         TraceError: It is no CSV file with a header.
@@ -75,12 +78,12 @@ def _were(count: int) -> str:
     return "were" if count > 1 else "was"
 
 
-def _above(body: Lines) -> tuple[int, str]:
+def _above(body: NumberedLines) -> tuple[int, str]:
     """How many lines stand above the header, and what separates cells.
 
-    The table is the block of lines of one width at the end, from its last line of words on, or from the one before where that has
-    the units. What is above are words about the record, unless one of those lines holds numbers alone: then it is a damaged table,
-    and the header is the first line.
+    The table is the block of lines of one width at the end. It begins with its last line of words, or with the one
+    before where the last has the units. What is above are words about the record. Where one of the lines above holds
+    numbers alone, it is a damaged table instead, and the header is the first line.
     """
     lines = [line for _, line in body]
     own = max(SEPARATORS, key=lines[0].count)
@@ -119,17 +122,17 @@ def _numeric(line: str, separator: str) -> bool:
 
 
 def _number(cell: str, separator: str) -> bool:
-    return as_float(cell) is not None or (separator != "," and COMMA.fullmatch(cell) is not None)
+    return as_float(cell) is not None or (separator != "," and DECIMAL_COMMA.fullmatch(cell) is not None)
 
 
-def _cells(source: str, body: Lines, separator: str) -> Rows:
+def _cells(source: str, body: NumberedLines, separator: str) -> NumberedRows:
     """Line number and cells of each row; a quoted cell may hold several lines.
 
     Raises:
         TraceError: A quote that is not closed, or a cell that is too long.
     """
     reader = csv.reader([line for _, line in body], delimiter=separator, strict=True)
-    rows: Rows = []
+    rows: NumberedRows = []
     begin = 0
     try:
         for row in reader:
@@ -140,12 +143,12 @@ def _cells(source: str, body: Lines, separator: str) -> Rows:
     return rows
 
 
-def _units(names: list[str], rows: Rows) -> tuple[dict[str, str], Rows]:
+def _units(names: list[str], rows: NumberedRows) -> tuple[dict[str, str], NumberedRows]:
     """Units from the row below the header, where it holds nothing else and numbers follow; and the other rows."""
-    if len(rows) < 2 or not any(as_float(cell) is not None or COMMA.fullmatch(cell) for cell in rows[1][1]):
+    if len(rows) < 2 or not any(as_float(cell) is not None or DECIMAL_COMMA.fullmatch(cell) for cell in rows[1][1]):
         return {}, rows
     cells = rows[0][1]
-    if not all(UNIT.fullmatch(cell) for cell in cells) or any(as_float(cell) is not None for cell in cells):
+    if not all(UNIT_CELL.fullmatch(cell) for cell in cells) or any(as_float(cell) is not None for cell in cells):
         return {}, rows
     stated = {name: cell.strip(" []()-") for name, cell in zip(names, cells, strict=True)}
     return ({name: unit for name, unit in stated.items() if unit}, rows[1:]) if any(stated.values()) else ({}, rows)
@@ -153,8 +156,8 @@ def _units(names: list[str], rows: Rows) -> tuple[dict[str, str], Rows]:
 
 def _has_commas(cells: Sequence[str]) -> bool:
     """Whether the numbers of a column have decimals after a comma: some have, and all others are whole."""
-    some = any(COMMA.fullmatch(cell) for cell in cells)
-    return some and all(COMMA.fullmatch(cell) or re.fullmatch(r"\s*[-+]?\d+\s*|\s*", cell) for cell in cells)
+    some = any(DECIMAL_COMMA.fullmatch(cell) for cell in cells)
+    return some and all(DECIMAL_COMMA.fullmatch(cell) or re.fullmatch(r"\s*[-+]?\d+\s*|\s*", cell) for cell in cells)
 
 
 def _check_header(source: str, names: list[str]) -> None:
@@ -172,4 +175,4 @@ def _label(comments: list[str]) -> str:
         found = re.match(r"\s*#\s*label\s*:\s*(\S+)", comment)
         if found:
             return found.group(1).lower()
-    return LABELS[0]
+    return MEASURED

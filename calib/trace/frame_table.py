@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 
 from calib.errors import TraceError
-from calib.trace.table import Table, check_names
-from calib.trace.vector_fields import Values
+from calib.trace.table import Cells, Table, check_names
 
 
 def table_of_frame(frame: pd.DataFrame, *, source: str, label: str) -> Table:
@@ -22,6 +21,9 @@ def table_of_frame(frame: pd.DataFrame, *, source: str, label: str) -> Table:
         frame: A row for each sample; an index with a name is a column too, and dates count in seconds.
         source: What errors call it.
         label: ``measured`` or ``reconstructed``.
+
+    Returns:
+        The table.
 
     Raises:
         TraceError: It is empty, or has a column name twice.
@@ -54,7 +56,7 @@ def _name(name: Any) -> str:
     return ".".join(str(part) for part in name if str(part)) if isinstance(name, tuple) else str(name)
 
 
-def _cells(column: pd.Series) -> tuple[Values, str]:
+def _cells(column: pd.Series) -> tuple[Cells, str]:
     """Cells of a column, and ``s`` where they are dates or durations, which count from the first."""
     if pd.api.types.is_datetime64_any_dtype(column.dtype):
         column = column - column.iloc[0]

@@ -11,8 +11,8 @@ import numpy as np
 
 from calib.errors import TraceError
 from calib.io.wording import brief, listed
-from calib.trace.table import LABELS, Table
-from calib.trace.vector_fields import LONGEST_VECTOR, Values, table_of_fields
+from calib.trace.table import MEASURED, Cells, Table
+from calib.trace.vector_fields import LONGEST_VECTOR, table_of_fields
 
 UNIT_ATTRIBUTES = ("unit", "units")
 MOST_VALUES = 10**8
@@ -24,14 +24,17 @@ _UNREADABLE = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryErr
 def table_of_hdf5(path: Path, raw: bytes, address: str) -> Table:
     """The table in an HDF5 file.
 
-    The data sets of one group are its columns, or the fields of one structured data set are. Without an address that is
-    the root, or the only group that has any. Units come from an attribute ``unit`` or ``units`` of a data set, else from
+    Its columns are the data sets of one group, or the fields of one structured data set. Without an address that is the
+    root, or the only group that has any. Units come from an attribute ``unit`` or ``units`` of a data set, else from
     its name.
 
     Args:
         path: The file.
         raw: Its bytes.
         address: Group or data set, empty to look for one.
+
+    Returns:
+        The table; its SHA-256 is that of the file and of the address, if one was given.
 
     Raises:
         TraceError: The file is damaged, has no such group, or several that could be meant.
@@ -41,7 +44,7 @@ def table_of_hdf5(path: Path, raw: bytes, address: str) -> Table:
         with h5py.File(path, "r") as file:
             node = _node(source, path.name, file, address)
             fields, units = _fields(node)
-            label = _text(node.attrs.get("label", file.attrs.get("label"))) or LABELS[0]
+            label = _text(node.attrs.get("label", file.attrs.get("label"))) or MEASURED
     except _UNREADABLE as error:
         raise TraceError(f"{source}: damaged, or not an HDF5 file ({brief(str(error))})") from None
     digest = hashlib.sha256(raw)
@@ -111,8 +114,8 @@ def _is_column(node: Any) -> bool:
     return node.ndim == 1 or (node.ndim == 2 and 0 < node.shape[1] <= LONGEST_VECTOR)
 
 
-def _fields(node: h5py.Group | h5py.Dataset) -> tuple[dict[str, Values], dict[str, str]]:
-    """Values and stated units of each column by name."""
+def _fields(node: h5py.Group | h5py.Dataset) -> tuple[dict[str, Cells], dict[str, str]]:
+    """Cells and stated units of each column by name."""
     if isinstance(node, h5py.Group):
         sets = {name: item for name in node if _is_column(item := node.get(name))}
         units = {name: unit for name, item in sets.items() if (unit := _unit(item))}
@@ -130,7 +133,7 @@ def _fields(node: h5py.Group | h5py.Dataset) -> tuple[dict[str, Values], dict[st
     return {name: _values(content[name]) for name in content.dtype.names}, units
 
 
-def _values(values: np.ndarray) -> Values:
+def _values(values: np.ndarray) -> Cells:
     """The numbers of a column, or its texts."""
     if values.dtype.kind in "iuf":
         return values

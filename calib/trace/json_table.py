@@ -9,21 +9,24 @@ from typing import Any
 
 from calib.errors import TraceError
 from calib.io.wording import brief, quoted
-from calib.trace.table import LABELS, Table, check_names, decoded
+from calib.trace.table import MEASURED, Table, check_names, decoded
 from calib.trace.vector_fields import LONGEST_VECTOR, row_count, table_of_fields, width_of
 
 
 def table_of_json(source: str, raw: bytes) -> Table:
     """The table in a JSON file.
 
-    A list of values is a column, a list of records is a column for each of their fields, a list of vectors is one for each
-    part (see :func:`calib.trace.vector_fields.parts`). Groups join the names with a point, except one that all columns are in. Lists that
-    are not as long as the others are left out, and single values are none of the record. One record a line (JSON Lines) is
-    a list of records.
+    A list of values is a column, a list of records one for each of their fields, and a list of vectors one for each
+    part (see :func:`calib.trace.vector_fields.parts`). The name of a group stands before the names in it, with a point
+    between, but for a group that all columns are in. Lists that are not as long as the others are left out, and single
+    values are not part of the record. One record a line (JSON Lines) is a list of records.
 
     Args:
         source: Name of the file.
         raw: Its bytes.
+
+    Returns:
+        The table.
 
     Raises:
         TraceError: It is not JSON, or holds no lists.
@@ -35,8 +38,8 @@ def table_of_json(source: str, raw: bytes) -> Table:
         raise TraceError(f"{source}: lists or groups are nested too deeply for a record of a cut") from None
     if not found:
         raise TraceError(
-            f"{source}: no lists of values with names; write lists of one length by name, or a list of records, with units "
-            "in the names such as time_s and force_N"
+            f"{source}: no lists of values with names; write lists of one length by name, or a list of records, with "
+            "units in the names such as time_s and force_N"
         )
     check_names(source, [name for name, _ in found])
     return table_of_fields(
@@ -112,4 +115,4 @@ def _common_group_removed(fields: dict[str, list[Any]]) -> dict[str, list[Any]]:
 def _label(content: Any) -> str:
     """The label that a document states, ``measured`` without one."""
     label = content.get("label") if isinstance(content, dict) else None
-    return label.lower() if isinstance(label, str) else LABELS[0]
+    return label.lower() if isinstance(label, str) else MEASURED

@@ -12,7 +12,8 @@ import numpy as np
 from calib.errors import TraceError
 from calib.io.wording import brief, quoted
 from calib.trace.columns import Column, candidates, choose, numbers
-from calib.trace.table import LABELS, Table, read_table
+from calib.trace.reader import read_table
+from calib.trace.table import MEASURED, TRACE_LABELS, Table
 
 if TYPE_CHECKING:
     import pandas
@@ -27,7 +28,7 @@ CLOCK_START_S = 1000.0
 then counts from its first sample."""
 CLOCK_JITTER = 0.5
 """Largest deviation of a step from the mean step for a column that looks like a clock [-]."""
-FRAME = "DataFrame"
+DATA_FRAME = "DataFrame"
 """What a trace from a DataFrame is called that says nothing else."""
 DISABLED = "none"
 """Value of ``position_col`` that leaves a position column unused."""
@@ -58,7 +59,7 @@ class Trace:
     source: str = "trace"
     sha256: str = ""
     columns: dict[str, str] = field(default_factory=dict)
-    label: str = LABELS[0]
+    label: str = MEASURED
     start: float = 0.0
     notes: tuple[str, ...] = ()
 
@@ -66,8 +67,8 @@ class Trace:
         for name in ("time", "force", "position"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, self._numbers(name))
-        if self.label not in LABELS:
-            raise TraceError(f"{self.source}: label {quoted(self.label)} is not one of {', '.join(LABELS)}")
+        if self.label not in TRACE_LABELS:
+            raise TraceError(f"{self.source}: label {quoted(self.label)} is not one of {', '.join(TRACE_LABELS)}")
         if len(self.time) < MIN_SAMPLES:
             raise TraceError(
                 f"{self.source}: {len(self.time)} samples, at least {MIN_SAMPLES} are needed; record the "
@@ -90,8 +91,8 @@ class Trace:
         keep = self.time <= end
         if np.count_nonzero(keep) < MIN_SAMPLES or not end <= self.time[-1]:
             raise TraceError(
-                f"{self.source}: t_end is {end:g} s, the record runs from {self.time[0]:g} to {self.time[-1]:g} s; choose a time "
-                f"inside it with at least {MIN_SAMPLES} samples before (option --t-end)"
+                f"{self.source}: t_end is {end:g} s, the record runs from {self.time[0]:g} to {self.time[-1]:g} s; "
+                f"choose a time inside it with at least {MIN_SAMPLES} samples before (option --t-end)"
             )
         position = None if self.position is None else self.position[keep]
         return replace(self, time=self.time[keep], force=self.force[keep], position=position)
@@ -123,9 +124,13 @@ class Trace:
 
         Args:
             frame: A row for each sample; an index with a name is a column too.
-            source: Name in errors and reports, which say that it was a DataFrame; ``frame.attrs["source"]`` if not given.
+            source: Name in errors and reports, which say that it was a DataFrame; ``frame.attrs["source"]`` if not
+                given.
             label: ``measured`` or ``reconstructed``; ``frame.attrs["label"]`` or ``measured`` if not given.
             columns: ``time_col``, ``force_col``, ``position_col``, ``depth_col`` and ``sign``.
+
+        Returns:
+            The trace in SI units.
 
         Raises:
             TraceError: As :func:`read_trace`.
@@ -137,9 +142,9 @@ class Trace:
         if not isinstance(frame, pandas.DataFrame):
             raise TraceError(f"a {type(frame).__name__} is no record: give the path of a file, or a pandas DataFrame")
         source = source or str(frame.attrs.get("source") or "")
-        if FRAME not in source:
-            source = f"{source} ({FRAME})" if source else FRAME
-        label = label or str(frame.attrs.get("label") or LABELS[0])
+        if DATA_FRAME not in source:
+            source = f"{source} ({DATA_FRAME})" if source else DATA_FRAME
+        label = label or str(frame.attrs.get("label") or MEASURED)
         return _trace(table_of_frame(frame, source=source, label=label), **columns)
 
     def frame(self) -> pandas.DataFrame:
@@ -181,9 +186,10 @@ def read_trace(
 
     Columns are found by their names, which carry the unit: ``time_s``, ``time_ms``, ``t_s``; ``force_N``, ``fz_N``,
     ``force_kN``; heights ``ee_z_m``, ``position_mm``; depths ``stroke_m``, ``displacement_mm`` (positive downwards,
-    turned into heights). ``base_Fz_N`` of a robot log is preferred to a derived ``cut_force_z_N`` and has its sign turned
-    round. In CSV files, lines that start with ``#`` are comments; ``# label: reconstructed`` sets the label. Lines above the
-    header, a row of units below it, and decimals after a comma (where something else separates cells) are understood.
+    turned into heights). ``base_Fz_N`` of a robot log is preferred to a derived ``cut_force_z_N`` and has its sign
+    turned round. In CSV files, lines that start with ``#`` are comments; ``# label: reconstructed`` sets the label.
+    Lines above the header, a row of units below it, and decimals after a comma (where something else separates cells)
+    are understood.
 
     JSON files hold lists by name, or a list of records; HDF5 files data sets of one group (``file.h5:/group``) or a
     structured one, with units in names or attributes. In both, vectors become columns ``_x``, ``_y``, ``_z``, and
@@ -283,13 +289,14 @@ def _check_clock(table: Table, time: Column, force: Column, t: np.ndarray, f: np
         if mean > 0.0 and np.all(np.abs(force_steps - mean) <= CLOCK_JITTER * mean):
             raise TraceError(
                 f"{table.source}: columns {brief(time.name)} and {brief(force.name)} look swapped ({brief(force.name)} "
-                f"rises in equal steps like a clock, {brief(time.name)} does not); exchange their names or use --time-col "
-                "and --force-col"
+                f"rises in equal steps like a clock, {brief(time.name)} does not); exchange their names or use "
+                "--time-col and --force-col"
             )
         i = int(np.argmax(steps <= 0.0))
         raise TraceError(
-            f"{table.source}, {table.row} {brief(table.rows[i + 1])}, column {brief(time.name)}: time does not increase "
-            f"({t[i]:.10g} s, then {t[i + 1]:.10g} s); remove repeated rows, or cut the file where the clock restarts"
+            f"{table.source}, {table.row} {brief(table.rows[i + 1])}, column {brief(time.name)}: time does not "
+            f"increase ({t[i]:.10g} s, then {t[i + 1]:.10g} s); remove repeated rows, or cut the file where the "
+            "clock restarts"
         )
     median = float(np.median(steps))
     where = f"{table.source}, column {brief(time.name)}: samples are {median:g} s apart"

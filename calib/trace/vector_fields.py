@@ -4,52 +4,55 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from calib.trace.table import LABELS, Table, check_names
+from calib.trace.table import MEASURED, Cells, Table, check_names
 
-Values = Sequence[Any] | np.ndarray
-
-AXES = ("Fx_N", "Fy_N", "Fz_N", "Tx_Nm", "Ty_Nm", "Tz_Nm")
-PARTS: Mapping[str, Mapping[int, str]] = {
-    "O_F_ext_hat_K": dict(enumerate(f"base_{axis}" for axis in AXES)),
-    "K_F_ext_hat_K": dict(enumerate(f"knife_{axis}" for axis in AXES)),
+FORCE_AXES = ("Fx_N", "Fy_N", "Fz_N", "Tx_Nm", "Ty_Nm", "Tz_Nm")
+FIELD_PARTS: Mapping[str, Mapping[int, str]] = {
+    "O_F_ext_hat_K": dict(enumerate(f"base_{axis}" for axis in FORCE_AXES)),
+    "K_F_ext_hat_K": dict(enumerate(f"knife_{axis}" for axis in FORCE_AXES)),
     "O_T_EE": {12: "ee_x_m", 13: "ee_y_m", 14: "ee_z_m"},  # a pose, column after column
     "tau_ext_hat_filtered": {j - 1: f"tau_ext_j{j}_Nm" for j in range(1, 8)},
 }
-"""Fields of libfranka's RobotState: which parts are columns, and their names."""
-LENGTHS = {"O_F_ext_hat_K": 6, "K_F_ext_hat_K": 6, "O_T_EE": 16, "tau_ext_hat_filtered": 7}
-SI = {"time": "s"}
-"""Units of its numbers whose names have none."""
+"""Fields of libfranka's RobotState: which of their numbers are columns, by index, and the names of those columns."""
+FIELD_LENGTHS = {"O_F_ext_hat_K": 6, "K_F_ext_hat_K": 6, "O_T_EE": 16, "tau_ext_hat_filtered": 7}
+"""Numbers that a sample of such a field has."""
+FIELD_UNITS = {"time": "s"}
+"""Units of fields of RobotState whose names have none."""
 LONGEST_VECTOR = 16
 """Numbers of a sample from which on it is no vector: a pose has as many."""
 
 
 def table_of_fields(
     source: str,
-    fields: Mapping[str, Values],
+    fields: Mapping[str, Cells],
     sha256: str,
     *,
-    label: str = LABELS[0],
+    label: str = MEASURED,
     stated: Mapping[str, str] | None = None,
 ) -> Table:
-    """The table of named lists of values or vectors; those that do not fit are left out.
+    """The table of named lists of values or vectors.
+
+    Lists that are not as long as most others, and those of long vectors, are left out and named in ``left_out``.
 
     Args:
         source: What errors call it.
-        fields: Values by name.
+        fields: Cells by name; vectors of k numbers as lists or as an array of shape (n, k).
         sha256: SHA-256 of where they come from.
         label: ``measured`` or ``reconstructed``.
-        stated: Units of fields that are stated beside their names.
+        stated: Units of fields that are stated beside their names, by name.
+
+    Returns:
+        The table, with a column for each part of a vector (see :func:`parts`).
 
     Raises:
         TraceError: Two columns have one name.
     """
     rows = row_count(fields)
-    columns: list[tuple[str, Values]] = []
+    columns: list[tuple[str, Cells]] = []
     left_out: dict[str, str] = {}
     said = dict(stated or {})
     for name, values in fields.items():
@@ -63,7 +66,7 @@ def table_of_fields(
         else:
             split = parts(name, width)
             columns += [(part, _part(values, i)) for i, part in split.items()]
-            if name in said and name not in LENGTHS:
+            if name in said and name not in FIELD_LENGTHS:
                 said |= {part: said[name] for i, part in split.items() if i < 3 or width != 6}
     check_names(source, [name for name, _ in columns])
     return Table(
@@ -78,13 +81,13 @@ def table_of_fields(
     )
 
 
-def row_count(fields: Mapping[str, Values]) -> int:
+def row_count(fields: Mapping[str, Cells]) -> int:
     """Length of the longest lists that are not alone in it: lists of another are settings, or were cut off."""
     lengths = Counter(len(values) for values in fields.values())
     return max([n for n, count in lengths.items() if count > 1] or lengths)
 
 
-def width_of(values: Values) -> int | None:
+def width_of(values: Cells) -> int | None:
     """Numbers of each sample of a field, 0 for one alone, None where they differ; a missing sample has any."""
     if isinstance(values, np.ndarray):
         return {1: 0, 2: values.shape[-1]}.get(values.ndim)
@@ -92,24 +95,27 @@ def width_of(values: Values) -> int | None:
     return widths.pop() if len(widths) == 1 else None if widths else 0
 
 
-def _part(values: Values, i: int) -> Values:
+def _part(values: Cells, i: int) -> Cells:
     """One number of each sample of a field of vectors."""
     return values[:, i] if isinstance(values, np.ndarray) else [sample and sample[i] for sample in values]
 
 
 def parts(name: str, length: int) -> dict[int, str]:
-    """Columns that a field with several numbers a sample becomes: index in the vector and name.
+    """The columns that a field with several numbers a sample becomes.
 
-    Three numbers are x, y, z; six are those and the three about the axes, which do not have the unit of the first; others
-    are counted from 1. A unit at the end of the name stays there.
+    Three numbers are x, y, z. Six are those and the three about the axes, which do not have the unit of the first
+    three. Others are counted from 1. A unit at the end of the name stays there.
 
     Args:
         name: Name of the field, in a group or not.
         length: Numbers of each sample.
+
+    Returns:
+        Names of the columns, by index in the vector.
     """
     field = _field(name)
-    if LENGTHS.get(field) == length:
-        return dict(PARTS[field])
+    if FIELD_LENGTHS.get(field) == length:
+        return dict(FIELD_PARTS[field])
     found = re.fullmatch(r"(.+)(_(?:[kmM]?N|[cmu]?m|Nm|rad))", name)
     stem, unit = found.groups() if found else (name, "")
     if length == 1:
@@ -122,15 +128,18 @@ def parts(name: str, length: int) -> dict[int, str]:
 
 
 def units(fields: Iterable[str], columns: Iterable[str]) -> dict[str, str]:
-    """Units of the columns of a libfranka log whose names have none; no log of libfranka, no units.
+    """Units of the columns of a libfranka log whose names have none; none for any other log.
 
     Args:
         fields: Names of the fields of the file.
         columns: Names of the columns of the table.
+
+    Returns:
+        Units by name of the column.
     """
-    if not any(_field(name) in LENGTHS for name in fields):
+    if not any(_field(name) in FIELD_LENGTHS for name in fields):
         return {}
-    return {name: SI[_field(name)] for name in columns if _field(name) in SI}
+    return {name: FIELD_UNITS[_field(name)] for name in columns if _field(name) in FIELD_UNITS}
 
 
 def _field(name: str) -> str:

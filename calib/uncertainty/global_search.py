@@ -1,10 +1,11 @@
-"""A second search for what one search calls identified: from another design, knowing nothing of the first, and sent away from it.
+"""A second search for what one search calls identified: from another design, knowing nothing of the first, and sent
+away from it.
 
-A profile is walked from the best run, and sees no other food that explains the curve as well. On 85 made-up bananas whose cut was searched once, 18 of 25
-intervals of E, yield stress and initiation depth that were called identified held the truth; others belonged to such a food, with a fourth of the stiffness or
-a thirteenth of the yield stress. So a claim has to stand against a search for a food that would refute it, and where the budget does not hold one it is none
-(multi-start as a check: Raue et al. 2013, PLoS ONE 8:e74335; sent away from what is known, as deflation does: Farrell et al. 2015, SIAM J. Sci. Comput.
-37:A2026). A second search that was not sent away ended in the first one's valley where another one explained the curve as well.
+A profile is computed from the best run, and sees no other food that explains the curve as well. On made-up bananas one
+search alone claimed intervals that belonged to such a food (docs/theory.md, "Measured choices"). So a claim has to
+stand against a search for a food that would refute it, and where the budget does not hold one there is no claim. This
+is multi-start as a check (Raue et al. 2013, PLoS ONE 8:e74335), and the search is sent away from what is known as
+deflation does (Farrell et al. 2015, SIAM J. Sci. Comput. 37:A2026).
 """
 
 from __future__ import annotations
@@ -17,210 +18,255 @@ import numpy as np
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
-from calib.fit.multistart import FitResult, calibrate
+from calib.fit.budget import progress_of_all
+from calib.fit.multistart import FitResult, multistart_search
 from calib.fit.options import FitOptions
 from calib.fit.search import Search
 from calib.fit.surrogate import Surrogate
-from calib.io.progress import Progress, onward
+from calib.io.progress import Progress
 from calib.problem.joint_objective import JointObjective
-from calib.problem.objective import Objective, Trial
-from calib.problem.parameters import ParameterSet, plain
-from calib.simulation.evaluation import Evaluator
-from calib.uncertainty.analysis import Doubt, as_good, at_first_sight, doubt_of
-from calib.uncertainty.intervals import EXPLAINED, Interval
+from calib.problem.objective import EXPLAINED, Objective
+from calib.problem.parameters import ParameterSet, property_of
+from calib.problem.scored_run import ScoredRun
+from calib.simulation.evaluation import Evaluator, Evaluators
+from calib.uncertainty.analysis import UncertaintyAnalysis, analyse, equally_good, search_uncertainty
+from calib.uncertainty.intervals import Interval
 from calib.uncertainty.profile_likelihood import RISE
 from mpm.arrays import FloatArray
-from mpm.errors import SimulationError
+from mpm.scene.errors import SimulationError
 
-PROVEN = ("R", "R_skin")
-"""Properties that a fit may claim: of 100 made-up bananas 28 of 28 and 15 of 15 such intervals held the truth. Of E, yield stress and initiation
-depth, which a cut bounds as well, 18 of 25 did on the 85 before, called identified by one search: stiff foods that yield late and soft ones that flow and rub
-are cut with the same force, and two searches did not find the one beside the other."""
-OTHERWISE = 2_000_003
+CLAIMABLE = ("R", "R_skin")
+"""Properties that a fit may call identified. Intervals of the others hold the truth too seldom: stiff foods that yield
+late and soft ones that flow and rub are cut with the same force (docs/theory.md, "Measured choices")."""
+SECOND_SEED = 2_000_003
 """Added to the seed of the second search."""
 STRETCH = 3.0
-"""Claimed intervals are barred this much longer about their middle: there chi-square has risen by 8.6, so that no food of the same
-valley draws the search away from another one that is as good."""
-BARRED = 10.0
-"""Residual in the middle of what is barred [standard deviations]."""
+"""Claimed intervals are deflated this much longer about their middle: there chi-square has risen by 8.6, so that no
+food of the same valley draws the search away from another one that is as good."""
+DEFLATION = 10.0
+"""Residual in the middle of what is deflated [standard deviations]."""
 
 
 @dataclass(frozen=True)
-class Barred(ParameterSet):
+class DeflatedParameterSet(ParameterSet):
     """Parameters whose prior has a row more: how deep a point lies within all claimed intervals at once.
 
     Attributes:
-        claims: Place of each claimed parameter, middle and half width of what is barred of it, in internal coordinates.
+        claims: Place of each claimed parameter among the items, and the middle and the half width of what is deflated
+            of it, in internal coordinates.
     """
 
     claims: tuple[tuple[int, float, float], ...] = ()
 
     def prior_residual(self, z: FloatArray) -> FloatArray:
-        """Distance from the prior centre in prior standard deviations, and the depth: (p + 1,) of a point (p,), (q, p + 1) of many."""
+        """Distance from the prior centre in prior standard deviations, and the depth: (p + 1,) of a point (p,),
+        (q, p + 1) of many."""
         depth = [1.0 - np.abs(z[..., place] - middle) / half for place, middle, half in self.claims]
-        row = BARRED * np.maximum(np.min(depth, axis=0), 0.0)
+        row = DEFLATION * np.maximum(np.min(depth, axis=0), 0.0)
         return np.concatenate([super().prior_residual(z), row[..., None]], axis=-1)
 
 
-def infer(
+@dataclass(frozen=True)
+class Listener:
+    """What is told of a fit while it runs.
+
+    Attributes:
+        progress: Called after each simulation of a search.
+        say: Called with each stage, as one sentence.
+        found: Called with the fit once it is found, before its uncertainty is: the fit will hardly change.
+    """
+
+    progress: Callable[[Progress], None] | None = None
+    say: Callable[[str], None] = lambda text: None
+    found: Callable[[FitResult], None] = lambda result: None
+
+
+def fit_with_uncertainty(
     objective: Objective | JointObjective,
-    fine: Evaluator,
-    *,
-    coarse: Evaluator,
-    again: Evaluator,
+    evaluators: Evaluators,
     options: FitOptions,
+    *,
     sample: bool = False,
-    progress: Callable[[Progress], None] | None = None,
-    say: Callable[[str], None] = lambda text: None,
-    found: Callable[[FitResult], None] = lambda result: None,
-) -> tuple[FitResult, Doubt | None]:
-    """Fit, find what the fit does not know, and search once more for what it calls identified.
+    listener: Listener | None = None,
+) -> tuple[FitResult, UncertaintyAnalysis | None]:
+    """Fit, analyse the uncertainty of the fit, and search once more for what it calls identified.
 
     Args:
         objective: Target, parameters and error model.
-        fine: Runs simulations at the resolution that counts.
-        coarse: Runs cheaper ones.
-        again: Runs those of ``fine`` with what should not matter changed.
+        evaluators: What runs the simulations.
         options: Budget and the like, of all that is searched.
         sample: Whether the posterior is sampled as well.
-        progress: Called after each simulation of a search.
-        say: Called with each stage, as one sentence.
-        found: Told the fit when it is found and what it does not know is not: it will hardly change.
+        listener: What is told of it; None for nothing.
 
     Returns:
-        The fit, and what it does not know: None where it ended too early for that.
+        The fit, and its uncertainty: None where it ended too early for that.
 
     Raises:
-        As :func:`calib.fit.multistart.calibrate` and :func:`calib.uncertainty.analysis.doubt_of`.
+        MaterialError: A budget too small for the number of parameters.
+        SimulationError: No simulation of the design reached the end of its stroke.
+        CurveError: A sample is asked for and emcee is not installed.
+        KeyboardInterrupt: Interrupted before any simulation reached the end of its stroke.
     """
-    first = calibrate(objective, fine, coarse=coarse, replicate=again, options=options, progress=progress)
+    told = listener or Listener()
+    fine, coarse, repeat = evaluators.fine, evaluators.coarse, evaluators.repeat
+    first = multistart_search(objective, fine, coarse=coarse, replicate=repeat, options=options, progress=told.progress)
     if first.status == "interrupted":
-        return first, doubt_of(objective, first, seed=options.seed, sample=sample)
-    alone = at_first_sight(objective, first)
-    claimed = [] if alone is None else [i for i in alone.intervals if i.verdict == "identified" and _proven(i)]
+        return first, analyse(objective, first, seed=options.seed, sample=sample)
+    alone = search_uncertainty(objective, first)
+    claimed = [] if alone is None else [i for i in alone.intervals if i.verdict == "identified" and _claimable(i)]
     if claimed:
-        first = _repeated(objective, first, again)
+        first = _repeated(objective, first, repeat)
     result, second = first, None
-    held = options.budget - options.cost(first.history) >= options.least(len(objective.parameters))
-    if claimed and held and _steady(objective, first):
-        say(f"a second search, from another design, for a food with another {_names(claimed, ' or ')}")
-        result = second = _searched(objective, first, claimed, fine, coarse, options, progress)
-    found(result)
-    doubt = doubt_of(objective, result, scout=coarse, judge=fine, seed=options.seed, sample=sample, say=say)
-    if doubt is None:
+    affordable = options.budget - options.cost(first.history) >= options.least(len(objective.parameters))
+    if claimed and affordable and _robust(objective, first):
+        told.say(f"a second search, from another design, for a food with another {_names(claimed, ' or ')}")
+        result = second = _second_search(objective, first, claimed, evaluators, options, told.progress)
+    told.found(result)
+    analysis = analyse(objective, result, coarse=coarse, fine=fine, seed=options.seed, sample=sample, say=told.say)
+    if analysis is None:
         return result, None
-    doubt = _unclaimed(
-        doubt,
+    analysis = _reviewed(objective, analysis, _Searches(first, second, claimed), repeat, options.budget)
+    for sentence in analysis.remarks:
+        told.say(sentence[:-1])
+    return analysis.result, analysis
+
+
+@dataclass(frozen=True, eq=False)
+class _Searches:
+    """The fit of the first search, that of both where there was a second one, and what the first alone has claimed."""
+
+    first: FitResult
+    second: FitResult | None
+    claimed: Sequence[Interval]
+
+
+def _reviewed(
+    objective: Objective | JointObjective,
+    analysis: UncertaintyAnalysis,
+    searches: _Searches,
+    repeat: Evaluator,
+    budget: float,
+) -> UncertaintyAnalysis:
+    """The uncertainty with no claim that a second search, a repeated run or experience with made-up cuts refutes."""
+    analysis = _without_claims(
+        analysis,
         "bounded, but of made-up cuts one of four such intervals does not hold the truth",
-        lambda i: not _proven(i),
+        lambda i: not _claimable(i),
     )
-    if any(i.verdict == "identified" for i in doubt.uncertainty.intervals):
-        doubt = replace(doubt, result=_repeated(objective, doubt.result, again))
-    if second is not None:
-        doubt = _weighed(doubt, first, second, claimed)
-    if not _steady(objective, doubt.result):
-        doubt = _unclaimed(
-            doubt, "bounded, but the same values at half the speed and with other particles do not explain the curve"
+    if any(i.verdict == "identified" for i in analysis.uncertainty.intervals):
+        analysis = replace(analysis, result=_repeated(objective, analysis.result, repeat))
+    if searches.second is not None:
+        analysis = _compared(analysis, searches.first, searches.second, searches.claimed)
+    if not _robust(objective, analysis.result):
+        return _without_claims(
+            analysis, "bounded, but the same values at half the speed and with other particles do not explain the curve"
         )
-    elif second is None:
-        more = f"; a budget of {2 * options.budget:g} may hold one" if claimed else ""
-        doubt = _unclaimed(doubt, f"bounded by one search and not by a second one that might refute it{more}")
-    for sentence in doubt.said:
-        say(sentence[:-1])
-    return doubt.result, doubt
+    if searches.second is None:
+        more = f"; a budget of {2 * budget:g} may hold one" if searches.claimed else ""
+        return _without_claims(analysis, f"bounded by one search and not by a second one that might refute it{more}")
+    return analysis
 
 
-def _repeated(objective: Objective | JointObjective, fit: FitResult, again: Evaluator) -> FitResult:
+def _repeated(objective: Objective | JointObjective, fit: FitResult, repeat: Evaluator) -> FitResult:
     """The fit with a second run of its answer, if there is none yet."""
     if _second_run(fit) is not None:
         return fit
-    run = next(iter(again.evaluate([fit.best.evaluation.parameters])))
-    return replace(fit, replicates=(*fit.replicates, objective.trial(run, stage="replicate")))
+    run = next(iter(repeat.evaluate([fit.best.evaluation.parameters])))
+    return replace(fit, replicates=(*fit.replicates, objective.score(run, stage="replicate")))
 
 
-def _second_run(fit: FitResult) -> Trial | None:
+def _second_run(fit: FitResult) -> ScoredRun | None:
     """That of the answer, slower and with other particles."""
     return next((t for t in fit.replicates if np.array_equal(t.z, fit.best.z)), None)
 
 
-def _steady(objective: Objective | JointObjective, fit: FitResult) -> bool:
-    """Whether the answer explains the curve whatever should not matter: the right material would leave as large a chi-square in its second run, if
-    there is one."""
+def _robust(objective: Objective | JointObjective, fit: FitResult) -> bool:
+    """Whether the answer explains the curve whatever should not matter: the right material would leave as large a
+    chi-square in its second run, if there is one."""
     run = _second_run(fit)
     return run is None or run.misfit <= float(chi2.ppf(EXPLAINED, objective.effective_rows))
 
 
-def _searched(
+def _second_search(
     objective: Objective | JointObjective,
     first: FitResult,
     claimed: Sequence[Interval],
-    fine: Evaluator,
-    coarse: Evaluator,
+    evaluators: Evaluators,
     options: FitOptions,
     progress: Callable[[Progress], None] | None,
 ) -> FitResult:
     """The fit with the runs of a second search, for a food with one of the claimed parameters elsewhere."""
-    told = onward(progress, first.history, first.best, options)
-    own = replace(options, budget=options.budget - options.cost(first.history), seed=options.seed + OTHERWISE)
-    barred = replace(objective, parameters=_barred(objective.parameters, claimed))
-    search = Search(barred, fine, coarse, own, told, first.best.misfit + RISE)
+    told = progress_of_all(progress, first.history, first.best, options)
+    own = replace(options, budget=options.budget - options.cost(first.history), seed=options.seed + SECOND_SEED)
+    deflated = replace(objective, parameters=_deflated(objective.parameters, claimed))
+    search = Search(deflated, evaluators.fine, evaluators.coarse, own, told, first.best.misfit + RISE)
     with threadpool_limits(1, "blas"):
         with suppress(SimulationError):  # no run of this design ends its stroke
             search.run()
-        more = [objective.trial(t.evaluation, coarse=t.coarse, stage=t.stage) for t in search.trials]
+        more = [objective.score(t.evaluation, coarse=t.coarse, stage=t.stage) for t in search.runs]
         runs = (*first.history, *more)
         assert first.surrogate is not None  # or nothing would be claimed
         found = min((t for t in more if t.cut and not t.coarse), key=lambda t: t.misfit, default=first.best)
-        best = found if found.misfit < first.best.misfit - first.surrogate.luck else first.best
+        best = found if found.misfit < first.best.misfit - first.surrogate.noise_misfit else first.best
         surrogate = Surrogate(objective, runs, best, first.surrogate.hyper)
         parameters = first.parameters.with_values(best.evaluation.parameters)
         jacobian = surrogate.jacobian(best.z)
     return replace(first, history=runs, best=best, parameters=parameters, surrogate=surrogate, jacobian=jacobian)
 
 
-def _barred(parameters: ParameterSet, claimed: Sequence[Interval]) -> Barred:
-    """The parameters with what is claimed of them barred."""
-    bars = []
+def _deflated(parameters: ParameterSet, claimed: Sequence[Interval]) -> DeflatedParameterSet:
+    """The parameters with what is claimed of them deflated."""
+    claims = []
     for i in claimed:
         low, high = i.parameter.to_internal(i.low95), i.parameter.to_internal(i.high95)
-        bars.append((parameters.names.index(i.parameter.name), 0.5 * (low + high), 0.5 * STRETCH * (high - low)))
-    return Barred(parameters.items, tuple(bars))
+        claims.append((parameters.names.index(i.parameter.name), 0.5 * (low + high), 0.5 * STRETCH * (high - low)))
+    return DeflatedParameterSet(parameters.items, tuple(claims))
 
 
-def _weighed(doubt: Doubt, first: FitResult, second: FitResult, claimed: Sequence[Interval]) -> Doubt:
-    """What is not known after a second search for another food than is ``claimed`` after the first."""
+def _compared(
+    analysis: UncertaintyAnalysis, first: FitResult, second: FitResult, claimed: Sequence[Interval]
+) -> UncertaintyAnalysis:
+    """The uncertainty after a second search for another food than is ``claimed`` after the first."""
     if second.best is not first.best:
         values = first.best.evaluation.parameters
         gain = first.best.misfit - second.best.misfit
-        said = f"A second search found a food that explains the curve better, by {gain:.3g} in chi-square: the values are its own."
-        doubt = replace(doubt, said=(*doubt.said, said))
-        return _unclaimed(doubt, "the food of the first search had another", lambda i: not _holds(i, values))
+        remark = (
+            f"A second search found a food that explains the curve better, by {gain:.3g} in chi-square: the values are "
+            "its own."
+        )
+        analysis = replace(analysis, remarks=(*analysis.remarks, remark))
+        return _without_claims(analysis, "the food of the first search had another", lambda i: not _holds(i, values))
     after = second.history[len(first.history) :]
-    others = [t.evaluation.parameters for t in as_good(doubt.result, doubt.uncertainty) if any(t is o for o in after)]
-    kept = {i.parameter.name for i in doubt.uncertainty.intervals if i.verdict == "identified"}
+    good = equally_good(analysis.result, analysis.uncertainty)
+    others = [t.evaluation.parameters for t in good if any(t is o for o in after)]
+    kept = {i.parameter.name for i in analysis.uncertainty.intervals if i.verdict == "identified"}
     lost = [i for i in claimed if i.parameter.name not in kept and not all(_holds(i, values) for values in others)]
     if not lost:
-        return doubt
-    said = f"{_names(lost)}: a second search found another food that explains the curve as well; the interval reaches to it."
-    return replace(doubt, said=(*doubt.said, said))
+        return analysis
+    why = "a second search found another food that explains the curve as well; the interval reaches to it."
+    remark = f"{_names(lost)}: {why}"
+    return replace(analysis, remarks=(*analysis.remarks, remark))
 
 
 def _holds(interval: Interval, values: Mapping[str, float]) -> bool:
     return interval.low95 <= values[interval.parameter.name] <= interval.high95
 
 
-def _unclaimed(doubt: Doubt, why: str, lost: Callable[[Interval], bool] = lambda i: True) -> Doubt:
+def _without_claims(
+    analysis: UncertaintyAnalysis, why: str, lost: Callable[[Interval], bool] = lambda i: True
+) -> UncertaintyAnalysis:
     """The same with those that are ``lost`` weak where they were identified, and with a sentence on why."""
-    gone = [i for i in doubt.uncertainty.intervals if i.verdict == "identified" and lost(i)]
+    gone = [i for i in analysis.uncertainty.intervals if i.verdict == "identified" and lost(i)]
     if not gone:
-        return doubt
-    changed = tuple(replace(i, verdict="weak") if i in gone else i for i in doubt.uncertainty.intervals)
-    said = f"{_names(gone)}: {why}, so called weak."
-    return replace(doubt, uncertainty=replace(doubt.uncertainty, intervals=changed), said=(*doubt.said, said))
+        return analysis
+    changed = tuple(replace(i, verdict="weak") if i in gone else i for i in analysis.uncertainty.intervals)
+    remark = f"{_names(gone)}: {why}, so called weak."
+    uncertainty = replace(analysis.uncertainty, intervals=changed)
+    return replace(analysis, uncertainty=uncertainty, remarks=(*analysis.remarks, remark))
 
 
-def _proven(interval: Interval) -> bool:
-    return plain(interval.parameter.name) in PROVEN
+def _claimable(interval: Interval) -> bool:
+    return property_of(interval.parameter.name) in CLAIMABLE
 
 
 def _names(intervals: Sequence[Interval], between: str = ", ") -> str:

@@ -1,15 +1,14 @@
-"""What a fit does not know of its parameters.
+"""Intervals of the fitted parameters from the curvature of chi-square at the optimum: the normal approximation.
 
-:func:`uncertainty` gives 95 % intervals from the curvature of chi-square at the optimum, in internal
-coordinates (so those of log parameters are asymmetric in SI), with J_d the rows of the data and J_p those of
-the priors:
+:func:`uncertainty` gives 95 % intervals in internal coordinates (so those of log parameters are asymmetric in SI), with
+J_d the rows of the data and J_p those of the priors:
 
     covariance = (J_d^T J_d / s + J_p^T J_p)^-1,   s = max(1, reduced chi-square of the data)
 
-Where the model misses the curve by more than the stated errors, s widens what the data say, with Student's factor because it is
-estimated; it does not touch the literature, so no parameter ends up known less than before.  The rows of the data are weighted by
-the correlation length that the residuals show, and what the measurement leaves open without the search being free to use it
-(gain, width) is integrated out.
+Where the model misses the curve by more than the stated errors, s widens what the data say, with Student's factor
+because it is estimated. It does not touch the literature, so no parameter ends up known less than before. The rows of
+the data are weighted by the correlation length that the residuals show. What the measurement leaves open without the
+search being free to use it (gain, width) is integrated out.
 """
 
 from __future__ import annotations
@@ -26,30 +25,28 @@ from scipy.stats import t as student
 
 from calib.problem.joint_objective import JointObjective
 from calib.problem.nuisance import Whitening
-from calib.problem.objective import Objective, Trial
+from calib.problem.objective import EXPLAINED, Objective
 from calib.problem.parameters import Z95, Parameter, ParameterSet
+from calib.problem.scored_run import ScoredRun
 from mpm.arrays import FloatArray
 
-Verdict = Literal["identified", "weak", "one_sided", "not_seen", "at_bound"]
+Identifiability = Literal["identified", "weak", "one_sided", "not_seen", "at_bound"]
+"""What the trace says of a parameter; docs/theory.md, "Intervals and verdicts", has the conditions of each."""
 
-#: A parameter is identified when its posterior is narrower than this part of its prior, and not seen when it
-#: is wider than the other: below one half the cut says more than the literature, above 0.9 next to nothing.
 IDENTIFIED, NOT_SEEN = 0.5, 0.9
-#: An estimate this close to a hard bound, in posterior standard deviations, lies on it.
+"""A parameter is identified when its posterior is narrower than the first part of its prior, and not seen when it is
+wider than the second: below one half the cut says more than the literature, above 0.9 next to nothing."""
 ON_BOUND = 0.1
-#: Two parameters that correlate more are only known together.
+"""An estimate this close to a hard bound, in posterior standard deviations, lies on it."""
 TIED = 0.95
-#: A curve counts as explained when the right material would leave a larger chi-square than its in one of a hundred cuts. In one
-#: that is not, the model or the search is wrong, and nothing is called identified: of 33 made-up cuts whose model was right, five
-#: searches ended so, at up to twenty times the chi-square of the truth.
-EXPLAINED = 0.99
-#: Part of the posterior within an interval.
-COVERED = 0.95
-#: Residuals that keep their sign over more than this part of the stroke are a wrong model, not noise.
+"""Two parameters whose correlation is larger, of either sign, are only known together."""
+CREDIBLE_LEVEL = 0.95
+"""Part of the posterior within an interval [-]."""
 LARGEST_CORRELATION = 0.5
-#: Standard deviations of the logarithm of the correlation length: of what is assumed before the residuals are seen (a factor
-#: of 2.7 either way), and of what one curve shows (0.16 of made-up noise of one kind, more of a real misfit).
+"""Residuals that keep their sign over more than this part of the stroke are a wrong model, not noise."""
 ASSUMED_SPREAD, SEEN_SPREAD = 0.5, 0.4
+"""Standard deviations of the logarithm of the correlation length: of what is assumed before the residuals are seen (a
+factor of 2.7 either way), and of what one curve shows (docs/theory.md, "Measured choices")."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +59,8 @@ class Interval:
         high95: Upper end [unit], not above the hard bound.
         clipped: Whether a hard bound cut the interval off.
         width: Posterior over prior standard deviation in the internal coordinate [-].
-        verdict: ``at_bound``: the best value lies on a hard bound; else by width ``identified`` (below 0.5),
-            ``weak``, or ``not_seen`` (above 0.9: the interval is the literature's). Profiles refine it.
+        verdict: Its identifiability. ``at_bound``: the best value lies on a hard bound; else by width ``identified``
+            (below 0.5), ``weak``, or ``not_seen`` (above 0.9: the interval is the literature's). Profiles refine it.
     """
 
     parameter: Parameter
@@ -71,7 +68,7 @@ class Interval:
     high95: float
     clipped: bool
     width: float
-    verdict: Verdict
+    verdict: Identifiability
 
     def as_dict(self) -> dict[str, float | str]:
         """Entry of ``summary.json``: value, unit, low95, high95, prior_low, prior_high, verdict."""
@@ -101,19 +98,21 @@ class Tie:
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
-    """What the data of a fit say, independent rows of unit variance if the stated errors are right.
+class LinearisedLikelihood:
+    """Residuals of a fit and their slopes at the best values: independent rows of unit variance if the stated errors
+    are right.
 
     Attributes:
         jacobian: Derivative of the residuals by internal coordinates (k, p).
         residual: Residuals at the best values (k,).
-        unsearched: Residuals by one prior standard deviation of what the measurement leaves open and the search may not use
-            (k, m).
+        unsearched: Residuals by one prior standard deviation of what the measurement leaves open and the search may not
+            use (k, m).
         rows: Effective number of independent ones among them [-].
         weights: What the rows of the objective were multiplied by for the correlation that their residuals show (k,).
         lengths: Correlation length of each trace's residuals, part of its stroke [-].
-        met: Whether the right material would leave as large a chi-square with the correlation that was assumed, too. A wrong curve is off
-            for long stretches, which looks like few independent rows, and so like a chi-square that is nothing odd.
+        met: Whether the right material would leave as large a chi-square with the correlation that was assumed, too. A
+            wrong curve is off for long stretches, which looks like few independent rows, and so like a chi-square that
+            is nothing odd.
     """
 
     jacobian: FloatArray
@@ -136,12 +135,12 @@ class Uncertainty:
         only_as_product: Pairs with a correlation beyond 0.95 either way.
         reduced_chi2: Chi-square of the data per degree of freedom [-].
         freedom: Degrees of freedom [-].
-        widened: Factor on the variance of the data's errors [-]: ``reduced_chi2`` but at least 1, times Student's where it
-            is more.
-        data: What the data say at the best values.
+        widened: Factor on the variance of the data's errors [-]: ``reduced_chi2`` but at least 1, times Student's where
+            it is more.
+        data: The likelihood at the best values.
         alone: The covariance if gain and width were known (p, p).
-        unsearched: Posterior mean and standard deviation of each nuisance that the search may not use, in prior standard
-            deviations.
+        unsearched: Posterior mean and standard deviation of each nuisance that the search may not use, in prior
+            standard deviations.
     """
 
     intervals: tuple[Interval, ...]
@@ -151,7 +150,7 @@ class Uncertainty:
     reduced_chi2: float
     freedom: float
     widened: float
-    data: Evidence
+    data: LinearisedLikelihood
     alone: FloatArray
     unsearched: tuple[tuple[float, float], ...] = ()
 
@@ -161,7 +160,8 @@ class Uncertainty:
         return self.data.met and self.reduced_chi2 * self.freedom <= chi2.ppf(EXPLAINED, self.freedom)
 
     def rows(self, residuals: FloatArray) -> FloatArray:
-        """Residual vectors (q, k + p) of runs as the intervals see them: the errors of the data widened, weighted and marginal."""
+        """Residual vectors (q, k + p) of runs as the intervals see them: errors of the data widened, weighted,
+        marginal."""
         size = math.sqrt(self.widened)
         k = len(self.data.weights)
         data = Whitening(self.data.unsearched / size)((self.data.weights / size * residuals[:, :k]).T).T
@@ -176,15 +176,18 @@ class Uncertainty:
 def correlation_length(residual: FloatArray, determined: float, assumed: float) -> float:
     """Correlation length of the residuals along a curve, part of its length [-].
 
-    The integral of their autocorrelation up to the first pair of lags with a negative sum (Geyer 1992, Statist. Sci. 7:473).
-    A fit takes part of the correlation away: with p parameters that the curve determines, lengths l of 0.02 to 0.2 of the
-    stroke are seen as l / (1 + p l) to 10 % (400 curves each), which is undone.  One curve tells it to a factor of 1.5, so that the
-    assumed length still counts, as a lognormal prior.
+    It is the integral of their autocorrelation up to the first pair of lags with a negative sum (Geyer 1992, Statist.
+    Sci. 7:473). A fit takes part of the correlation away: with p parameters that the curve determines, a length l is
+    seen as l / (1 + p l), which is undone (docs/theory.md, "Measured choices"). One curve tells the length to a factor
+    of 1.5, so that the assumed one still counts, as a lognormal prior.
 
     Args:
-        residual: Residuals on a uniform grid (n,).
+        residual: Residuals on a uniform grid, in standard deviations [-], (n,).
         determined: Number of parameters that the curve determines [-].
         assumed: Correlation length before the residuals were seen, part of the length [-].
+
+    Returns:
+        The correlation length, part of the length [-]; ``assumed`` where all residuals are zero.
     """
     n = len(residual)
     power = float(residual @ residual)
@@ -200,18 +203,23 @@ def correlation_length(residual: FloatArray, determined: float, assumed: float) 
     return float(assumed ** (1.0 - trust) * alone**trust)
 
 
-def evidence(objective: Objective | JointObjective, best: Trial, jacobian: FloatArray) -> Evidence:
+def linearised_likelihood(
+    objective: Objective | JointObjective, best: ScoredRun, jacobian: FloatArray
+) -> LinearisedLikelihood:
     """The data rows of a fit, weighted by the correlation length that their residuals show.
 
     Args:
         objective: The objective.
         best: The best run.
-        jacobian: Derivative of its residual vector (k + p, p), prior rows last.
+        jacobian: Derivative of its residual vector by internal coordinates [-], (k + p, p), prior rows last.
+
+    Returns:
+        The rows of the data at the best run, and their slopes.
     """
     first, rows, lengths = 0, 0.0, []
     weights, open_ended = [], []
     prior = objective.parameters.prior_jacobian()
-    for trial, case in zip(best.each, objective.cases, strict=True):
+    for trial, case in zip(best.each, objective.terms, strict=True):
         goal = case.objective
         part = slice(first, first + goal.data_rows)
         first = part.stop
@@ -229,15 +237,18 @@ def evidence(objective: Objective | JointObjective, best: Trial, jacobian: Float
     slopes = scale[:, None] * jacobian[: len(scale)]
     met = bool(best.misfit <= chi2.ppf(EXPLAINED, objective.effective_rows))
     left = scale * best.residual[: len(scale)]
-    return Evidence(slopes, left, block_diag(*open_ended), rows, scale, tuple(lengths), met)
+    return LinearisedLikelihood(slopes, left, block_diag(*open_ended), rows, scale, tuple(lengths), met)
 
 
-def uncertainty(parameters: ParameterSet, data: Evidence) -> Uncertainty:
+def uncertainty(parameters: ParameterSet, data: LinearisedLikelihood) -> Uncertainty:
     """95 % intervals, correlations and a verdict per parameter from the curvature at the optimum.
 
     Args:
         parameters: The parameters with their best values.
-        data: What the data say there.
+        data: The likelihood there.
+
+    Returns:
+        The posterior in the normal approximation.
     """
     prior = parameters.prior_jacobian()
     own = prior.T @ prior
@@ -246,7 +257,7 @@ def uncertainty(parameters: ParameterSet, data: Evidence) -> Uncertainty:
     freedom = max(data.rows - float(np.trace(first @ information)), 1.0)
     reduced = float(data.residual @ data.residual) / freedom
     size = max(1.0, reduced)
-    tails = float(student.ppf(0.5 + 0.5 * COVERED, freedom)) / Z95 if reduced > 1.0 else 1.0
+    tails = float(student.ppf(0.5 + 0.5 * CREDIBLE_LEVEL, freedom)) / Z95 if reduced > 1.0 else 1.0
     widened = size * tails**2
     marginal = _marginal(data.jacobian, data.unsearched, widened)
     covariance: FloatArray = np.asarray(np.linalg.inv(marginal + own), dtype=np.float64)
@@ -259,11 +270,13 @@ def uncertainty(parameters: ParameterSet, data: Evidence) -> Uncertainty:
     return Uncertainty(intervals, covariance, correlation, ties, reduced, freedom, widened, data, alone, beside)
 
 
-def _beside(data: Evidence, own: FloatArray, pull: FloatArray, size: float) -> tuple[tuple[float, float], ...]:
+def _beside(
+    data: LinearisedLikelihood, own: FloatArray, pull: FloatArray, size: float
+) -> tuple[tuple[float, float], ...]:
     """Mean and standard deviation of each unsearched nuisance, in prior ones, with the parameters free beside it.
 
     Args:
-        data: What the data say at the best values.
+        data: The likelihood at the best values.
         own: Information of the parameters' priors (p, p).
         pull: Gradient of half their chi-square (p,).
         size: Factor on the variance of the errors.
@@ -278,7 +291,7 @@ def _beside(data: Evidence, own: FloatArray, pull: FloatArray, size: float) -> t
 
 
 def _marginal(jacobian: FloatArray, unsearched: FloatArray, size: float) -> FloatArray:
-    """Information (p, p) of rows with errors ``size`` times the stated variance, whatever the unsearched nuisances are."""
+    """Information (p, p) of rows with ``size`` times the stated variance, the unsearched nuisances integrated out."""
     cross = unsearched.T @ jacobian / size
     inner = unsearched.T @ unsearched / size + np.eye(unsearched.shape[1])
     out: FloatArray = jacobian.T @ jacobian / size - cross.T @ np.linalg.solve(inner, cross)
@@ -290,7 +303,7 @@ def _interval(parameter: Parameter, z: float, sd: float) -> Interval:
     low, high = parameter.to_internal(parameter.low), parameter.to_internal(parameter.high)
     ends = z - Z95 * sd, z + Z95 * sd
     width = sd / parameter.prior_sd
-    verdict: Verdict = "identified" if width < IDENTIFIED else "not_seen" if width > NOT_SEEN else "weak"
+    verdict: Identifiability = "identified" if width < IDENTIFIED else "not_seen" if width > NOT_SEEN else "weak"
     if min(z - low, high - z) < ON_BOUND * sd:
         verdict = "at_bound"
     return Interval(

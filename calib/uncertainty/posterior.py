@@ -1,4 +1,4 @@
-"""The posterior that a fit's surrogate expects: chi-square of data and priors, with errors widened, weighted and marginal."""
+"""The posterior by a fit's surrogate: chi-square of data and priors, with errors widened, weighted and marginal."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from calib.errors import CurveError
 from calib.fit.surrogate import Surrogate
 from calib.problem.parameters import ParameterSet
-from calib.uncertainty.intervals import COVERED, Uncertainty
+from calib.uncertainty.intervals import CREDIBLE_LEVEL, Uncertainty
 from mpm.arrays import FloatArray
 
 WALKERS = 4
@@ -39,22 +39,26 @@ class Posterior:
         return self.found.rows(self.surrogate.residuals(z))
 
     def log(self, z: FloatArray) -> float:
-        """Logarithm of the posterior density at internal coordinates (p,), up to a constant; minus infinity out of bounds."""
+        """Logarithm of the posterior density at internal coordinates (p,), up to a constant; minus infinity beyond the
+        bounds."""
         if np.any(z < self.parameters.lower) or np.any(z > self.parameters.upper):
             return -math.inf
         rows = self.rows(z)
         return -0.5 * float(rows @ rows)
 
 
-def sampled(posterior: Posterior, best: FloatArray, seed: int = 0) -> dict[str, tuple[float, float]]:
-    """95 % intervals [unit] from a sample of the posterior, by name: an opinion on the profiles that shares only the surrogate.
+def credible_intervals(posterior: Posterior, best: FloatArray, seed: int = 0) -> dict[str, tuple[float, float]]:
+    """95 % credible intervals from a sample of the posterior, which share only the surrogate with the profiles.
 
     The affine-invariant ensemble of Goodman & Weare (2010, Comm. App. Math. Comp. Sci. 5:65), by emcee.
 
     Args:
         posterior: What to sample.
-        best: Internal coordinates of the best values (p,).
+        best: Internal coordinates of the best values, logarithms of SI values on a log scale [-], (p,).
         seed: Seed of the walkers.
+
+    Returns:
+        Both ends [unit of the parameter] by name.
 
     Raises:
         CurveError: emcee is not installed.
@@ -73,7 +77,7 @@ def sampled(posterior: Posterior, best: FloatArray, seed: int = 0) -> dict[str, 
     sampler.random_state = np.random.RandomState(seed).get_state()
     sampler.run_mcmc(start, MOVES, skip_initial_state_check=True)
     chain = sampler.get_chain(discard=BURNED, flat=True)
-    tail = 50.0 * (1.0 - COVERED)
+    tail = 50.0 * (1.0 - CREDIBLE_LEVEL)
     low, high = np.percentile(chain, [tail, 100.0 - tail], axis=0)
     return {
         q.name: (q.from_internal(float(a)), q.from_internal(float(b)))

@@ -1,9 +1,9 @@
-"""The band in which another measurement of the same cut would lie, if parameters, errors and model are what the fit says.
+"""The band in which another measurement of the same cut would lie if the fit is right.
 
-Materials are drawn from the normal approximation of the posterior, with the specimen's width and the sensor's gain as they were
-in this cut, and weighted by the chi-square that the surrogate expects of them (sampling, importance resampling: Rubin 1988,
-Bayesian Statistics 3); to each curve come the doubt of the surrogate, an error of the size and correlation length that the
-residuals showed, and tare, drift and lag from their priors.
+Draws come from the normal approximation of the posterior, with the specimen's width and the sensor's gain as they were
+in this cut, and are weighted by the chi-square that the surrogate expects of them (sampling, importance resampling:
+Rubin 1988, Bayesian Statistics 3). To each curve come the standard deviation of the surrogate, an error of the size and
+correlation length that the residuals showed, and tare, drift and lag from their priors.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ import numpy as np
 
 from calib.fit.surrogate import Surrogate
 from calib.problem.objective import Objective
-from calib.uncertainty.intervals import COVERED, Uncertainty
+from calib.uncertainty.intervals import CREDIBLE_LEVEL, Uncertainty
 from mpm.arrays import FloatArray
 
-DRAWS = 400
-"""Materials drawn: the ends of a 95 % band are then known to a tenth of their distance."""
+POSTERIOR_DRAWS = 400
+"""Draws from the posterior: the ends of a 95 % band are then known to a tenth of their distance."""
 JITTER = 1e-6
 """Added to the variance of correlated errors, so that their covariance has a root."""
 
@@ -38,49 +38,55 @@ class Band:
     inside: float
 
 
-def bands(surrogate: Surrogate, z: FloatArray, found: Uncertainty, seed: int = 0) -> tuple[Band, ...]:
+def predictive_bands(surrogate: Surrogate, z: FloatArray, found: Uncertainty, seed: int = 0) -> tuple[Band, ...]:
     """Posterior predictive band of each trace.
 
     Args:
         surrogate: The process of the fit.
-        z: Internal coordinates of the best values (p,).
+        z: Internal coordinates of the best values, logarithms of SI values on a log scale [-], (p,).
         found: Their uncertainty.
         seed: Seed of the draws.
+
+    Returns:
+        A band for each trace, in their order.
     """
     random = np.random.default_rng(seed)
-    drawn = materials(surrogate, z, found, random)
+    drawn = posterior_draws(surrogate, z, found, random)
     out = []
-    for process, case, length in zip(surrogate.each, surrogate.objective.cases, found.data.lengths, strict=True):
+    for process, case, length in zip(surrogate.each, surrogate.objective.terms, found.data.lengths, strict=True):
         goal = case.objective
-        added = errors(goal, length, math.sqrt(found.widened), len(drawn), random)
+        added = error_draws(goal, length, math.sqrt(found.widened), len(drawn), random)
         curves = []
         for point, error in zip(drawn, added, strict=True):
             curve, sd, _ = process.predict(point[case.index])
             drawn_curve = curve + sd * float(random.standard_normal())
             curves.append(goal.factor(drawn_curve) * drawn_curve + error)
-        out.append(band_of(np.array(curves), goal.target.curve))
+        out.append(pointwise_band(np.array(curves), goal.target.curve))
     return tuple(out)
 
 
-def band_of(curves: FloatArray, measured: FloatArray) -> Band:
+def pointwise_band(curves: FloatArray, measured: FloatArray) -> Band:
     """The band of some curves (k, n) about a measured one (n,)."""
-    tail = 50.0 * (1.0 - COVERED)
+    tail = 50.0 * (1.0 - CREDIBLE_LEVEL)
     low, high = np.percentile(curves, [tail, 100.0 - tail], axis=0)
     return Band(low, high, float(np.mean((measured >= low) & (measured <= high))))
 
 
-def materials(surrogate: Surrogate, z: FloatArray, found: Uncertainty, random: np.random.Generator) -> FloatArray:
-    """Internal coordinates of materials from the posterior (DRAWS, p), in random order.
+def posterior_draws(surrogate: Surrogate, z: FloatArray, found: Uncertainty, random: np.random.Generator) -> FloatArray:
+    """Draws from the posterior, in random order.
 
     Args:
         surrogate: The process of the fit.
-        z: Internal coordinates of the best values (p,).
+        z: Internal coordinates of the best values, logarithms of SI values on a log scale [-], (p,).
         found: Their uncertainty.
         random: Source of randomness.
+
+    Returns:
+        Internal coordinates (POSTERIOR_DRAWS, p).
     """
     parameters = surrogate.objective.parameters
     root = np.linalg.cholesky(found.alone)
-    normal = random.standard_normal((DRAWS, len(z)))
+    normal = random.standard_normal((POSTERIOR_DRAWS, len(z)))
     points = parameters.clip(z + normal @ root.T)
     weights = found.data.weights / math.sqrt(found.widened)
     size = len(weights)
@@ -92,12 +98,12 @@ def materials(surrogate: Surrogate, z: FloatArray, found: Uncertainty, random: n
     rise = np.array([cost(p) for p in points]) - cost(z)
     log_weight = -0.5 * (rise - np.sum(normal**2, axis=1))
     weight = np.exp(log_weight - log_weight.max())
-    chosen: FloatArray = points[random.choice(DRAWS, DRAWS, p=weight / weight.sum())]
+    chosen: FloatArray = points[random.choice(POSTERIOR_DRAWS, POSTERIOR_DRAWS, p=weight / weight.sum())]
     return chosen
 
 
-def errors(goal: Objective, length: float, widened: float, count: int, random: np.random.Generator) -> FloatArray:
-    """Errors of the model and the measurement [N] (count, n).
+def error_draws(goal: Objective, length: float, widened: float, count: int, random: np.random.Generator) -> FloatArray:
+    """Draws of the errors of the model and the measurement along a curve.
 
     Args:
         goal: The objective of a trace.
@@ -105,6 +111,9 @@ def errors(goal: Objective, length: float, widened: float, count: int, random: n
         widened: Their standard deviation over the stated one [-].
         count: How many.
         random: Source of randomness.
+
+    Returns:
+        Errors [N] (count, n).
     """
     n = goal.target.stroke.size
     parts = np.linspace(0.0, 1.0, n)

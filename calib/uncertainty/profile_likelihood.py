@@ -1,14 +1,14 @@
-"""Profile likelihoods on the surrogate: intervals that follow the curvature of chi-square, and what the trace alone bounds.
+"""Profile likelihoods on the surrogate: intervals that follow chi-square, and what the trace alone bounds.
 
 Along each parameter the others are fitted anew, each step from the last one's optimum:
 
     P_i(v) = min over the others of  chi2_data(z) / s + chi2_prior(z),   z_i = v
 
-The 95 % interval is where P_i has risen by 3.84 (Venzon & Moolgavkar 1988, Appl. Statist. 37:87), more where the size of the
-errors is estimated.  The same profile without the parameter's own prior says what the *trace* bounds: both sides, one, or none
-(Raue et al. 2009, Bioinformatics 25:1923: identifiable, practically non-identifiable).  What the noise of the runs feigns of the
-rise is taken off: near the best values its curvature, as in the normal approximation's Jacobian, and further away no more than one
-noisy run would feign.
+The 95 % interval is where P_i has risen by 3.84 (Venzon & Moolgavkar 1988, Appl. Statist. 37:87), more where the size
+of the errors is estimated. The same profile without the parameter's own prior says what the *trace* bounds: both sides,
+one, or none (Raue et al. 2009, Bioinformatics 25:1923: identifiable, practically non-identifiable). What the noise of
+the runs feigns of the rise is taken off: near the best values its curvature, as in the normal approximation's Jacobian,
+and further away no more than one noisy run would feign.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from calib.fit.surrogate import STEP, Surrogate, slopes
+from calib.fit.surrogate import JACOBIAN_STEP, Surrogate, slopes
 from calib.problem.parameters import Z95, Parameter, ParameterSet
-from calib.uncertainty.intervals import IDENTIFIED, NOT_SEEN, Interval, Uncertainty, Verdict
+from calib.uncertainty.intervals import IDENTIFIED, NOT_SEEN, Identifiability, Interval, Uncertainty
 from calib.uncertainty.posterior import Posterior
 from mpm.arrays import FloatArray
 
@@ -33,8 +33,8 @@ STEPS = 4
 LONGEST = 6
 """Half widths of the normal approximation after which a profile that has not risen is flat."""
 KNOWN = 0.10
-"""Largest relative standard deviation of an identified parameter [-]: its median error is then below 7 %. On 100 made-up bananas it is 4 % of R and
-6 % of the skin's; with 15 %, on the first 27 of them, that of R was 12 %."""
+"""Largest relative standard deviation of an identified parameter [-]: its median error is then below 7 %
+(docs/theory.md, "Measured choices")."""
 EVALUATIONS = 12
 """Evaluations of the surrogate with which the others follow a step."""
 
@@ -59,12 +59,12 @@ class Profile:
     points: FloatArray
     index: int
 
-    def frontier(self, alone: bool = False) -> list[FloatArray]:
+    def end_points(self, alone: bool = False) -> list[FloatArray]:
         """Points (p,) where the trace alone is claimed to end the parameter, on both sides.
 
         Args:
-            alone: Whether the other parameters stay at their best values, and a walk that met no end counts with where it stopped;
-                else they are at their optimum, as the surrogate sees it, and an open side stays open.
+            alone: Whether the other parameters stay at their best values, and a profile that met no end counts with
+                where it stopped; else they are at their optimum, as the surrogate sees it, and an open side stays open.
         """
         best = int(np.argmin(np.abs(self.z - self.best)))
         found: list[FloatArray] = []
@@ -77,7 +77,8 @@ class Profile:
         return found
 
     def end(self, side: int, rise: FloatArray) -> float | None:
-        """Internal coordinate where ``rise`` reaches :data:`RISE` below (-1) or above (+1) the best value, None if never."""
+        """Internal coordinate where ``rise`` (k,) reaches :data:`RISE` below (``side`` -1) or above (+1) the best
+        value, None if never."""
         best = int(np.argmin(np.abs(self.z - self.best)))
         order = range(best, -1, -1) if side < 0 else range(best, len(self.z))
         last = None
@@ -99,19 +100,22 @@ def _root(rise: float) -> float:
     return math.sqrt(max(rise, 0.0))
 
 
-def profiles(surrogate: Surrogate, parameters: ParameterSet, found: Uncertainty) -> tuple[Profile, ...]:
+def profile_likelihoods(surrogate: Surrogate, parameters: ParameterSet, found: Uncertainty) -> tuple[Profile, ...]:
     """Profile of each parameter about the best values.
 
     Args:
         surrogate: The process of the fit.
         parameters: The parameters with their best values.
         found: Their normal approximation: size of the errors, step of the profile.
+
+    Returns:
+        A profile for each parameter, in their order.
     """
-    return tuple(_Walker(surrogate, parameters, found, i).profile() for i in range(len(parameters)))
+    return tuple(_Profiler(surrogate, parameters, found, i).profile() for i in range(len(parameters)))
 
 
-class _Walker:
-    """Walks along one parameter with the others following."""
+class _Profiler:
+    """Computes the profile of one parameter, step by step, with the others fitted anew at each step."""
 
     def __init__(self, surrogate: Surrogate, parameters: ParameterSet, found: Uncertainty, i: int) -> None:
         self.surrogate, self.parameters, self.found, self.i = surrogate, parameters, found, i
@@ -192,31 +196,37 @@ class _Walker:
     def one_run(self) -> float:
         """Chi-square of the difference that the noise of one simulated curve makes [-]."""
         parts = zip(self.surrogate.each, self.found.data.lengths, strict=True)
-        return math.fsum(process.luck / (length * self.found.widened) for process, length in parts)
+        return math.fsum(process.noise_misfit / (length * self.found.widened) for process, length in parts)
 
     @property
     def steps(self) -> FloatArray:
         """Small steps along each parameter (p, p), diagonal."""
-        return np.diag(STEP * self.surrogate.unit)
+        return np.diag(JACOBIAN_STEP * self.surrogate.unit)
 
 
-def with_profiles(found: Uncertainty, walked: Sequence[Profile], beside: Sequence[FloatArray] = ()) -> Uncertainty:
+def with_profile_intervals(
+    found: Uncertainty, profiles: Sequence[Profile], beside: Sequence[FloatArray] = ()
+) -> Uncertainty:
     """The same uncertainty with the intervals and verdicts of the profiles.
+
+    A side is bounded by the trace where the trace alone ends it within the literature's range. A parameter is
+    ``identified`` where both sides are, its interval is narrower than half the prior's, it is known to 10 % (one
+    standard deviation), and the curve is explained; ``weak`` where one of these is not so; ``one_sided`` where the
+    trace bounds one side and leaves the other to the prior or to what is possible; ``not_seen`` where it bounds
+    neither.
 
     Args:
         found: The normal approximation.
-        walked: The profiles.
-        beside: Points (p,) of runs whose chi-square is within :data:`RISE` of the best: an interval reaches to each of them, whatever the
-            profile, which is walked from the best one alone, has seen.
+        profiles: The profiles.
+        beside: Internal coordinates [-], each (p,), of runs whose chi-square is within :data:`RISE` of the best. An
+            interval reaches to each of them, whatever the profile, which starts from the best one alone, has seen.
 
-    A side is bounded by the trace where the trace alone ends it within the literature's range. A parameter is ``identified``
-    where both sides are, its interval is narrower than half the prior's, it is known to 10 % (one standard deviation), and the
-    curve is explained; ``weak`` where one of these is not so; ``one_sided`` where the trace bounds one side and leaves the other to
-    the prior or to what is possible; ``not_seen`` where it bounds neither.
+    Returns:
+        The uncertainty.
     """
     intervals = (
         _interval(i, p, found.explained, [float(z[p.index]) for z in beside])
-        for i, p in zip(found.intervals, walked, strict=True)
+        for i, p in zip(found.intervals, profiles, strict=True)
     )
     return replace(found, intervals=tuple(intervals))
 
@@ -224,8 +234,8 @@ def with_profiles(found: Uncertainty, walked: Sequence[Profile], beside: Sequenc
 def _interval(interval: Interval, profile: Profile, explained: bool, beside: Sequence[float]) -> Interval:
     """The interval of a profile: what is not worse than the best run's value by more than the limit.
 
-    The surrogate may put the optimum beside that value, and the unknown width and gain, which the search leaves alone, too. An
-    interval about the optimum would end at the value that is reported, or before it.
+    The surrogate may put the optimum beside that value, and so may the unknown width and gain, which the search leaves
+    alone. An interval about the optimum would end at the value that is reported, or before it.
     """
     parameter = interval.parameter
     low, high = parameter.to_internal(parameter.low), parameter.to_internal(parameter.high)
@@ -236,7 +246,7 @@ def _interval(interval: Interval, profile: Profile, explained: bool, beside: Seq
     top = max(high if ends[1] is None else ends[1], at, *beside)
     bounded = [_bounds(profile.end(side, profile.data), side, parameter) for side in (-1, 1)]
     width = (top - bottom) / (2.0 * Z95 * parameter.prior_sd)
-    verdict: Verdict = "not_seen"
+    verdict: Identifiability = "not_seen"
     if all(bounded) and width <= NOT_SEEN:
         sd = width * parameter.prior_sd / (1.0 if parameter.log else max(abs(parameter.value), 1e-12))
         verdict = "identified" if width < IDENTIFIED and sd <= KNOWN and explained else "weak"

@@ -1,9 +1,9 @@
 """What moves the curve: Sobol indices of its peak, work and initial slope over the box of the literature's ranges.
 
-The first-order index is the part of a quantity's variance that goes when a parameter is known, the total index the part that
-stays when all others are (Sobol 2001, Math. Comput. Simul. 55:271; Saltelli et al. 2010, Comput. Phys. Commun. 181:259); both by
-SALib (Herman & Usher 2017, J. Open Source Softw. 2:97). They are evaluated on the surrogate of a fit: no simulation is added,
-and far from the runs of the fit they are its extrapolation.
+The first-order index is the part of a quantity's variance that goes when a parameter is known, the total index the part
+that stays when all others are (Sobol 2001, Math. Comput. Simul. 55:271; Saltelli et al. 2010, Comput. Phys. Commun.
+181:259); both by SALib (Herman & Usher 2017, J. Open Source Softw. 2:97). They are evaluated on the surrogate of a fit:
+no simulation is added, and far from the runs of the fit they are its extrapolation.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ from mpm.arrays import FloatArray
 Indices = dict[str, dict[str, dict[str, float]]]
 
 BASE = 128
-"""Base samples; a power of 2, as the sequence wants. With p parameters the curve is evaluated (p + 2) times as often."""
-START = 0.2
+"""Base samples; a power of 2, as the sequence wants. With p parameters the curve is evaluated (p + 2) times as
+often."""
+INITIAL_PART = 0.2
 """Part of the stroke whose mean slope is the initial one [-]."""
 
 
@@ -33,8 +34,8 @@ def sensitivity(objective: Objective, result: FitResult, *, seed: int = 0) -> In
         seed: Seed of the samples and of the confidence intervals.
 
     Returns:
-        For ``peak``, ``work`` and ``initial_slope`` and each parameter: ``first``, ``total`` and the half widths of their 95 %
-        intervals, ``first_conf`` and ``total_conf`` [-].
+        For ``peak``, ``work`` and ``initial_slope`` and each parameter: ``first``, ``total`` and the half widths of
+        their 95 % intervals, ``first_conf`` and ``total_conf`` [-].
     """
     if result.surrogate is None:
         return {}
@@ -50,13 +51,16 @@ def sensitivity(objective: Objective, result: FitResult, *, seed: int = 0) -> In
 
 
 def quantities(stroke: FloatArray, curves: FloatArray) -> dict[str, FloatArray]:
-    """Peak [N], work [J] and mean slope of the first fifth of the stroke [N/m] of curves, each (k,).
+    """Peak [N], work [J] and mean slope of the first fifth of the stroke [N/m] of curves.
 
     Args:
         stroke: Stroke [m] (n,), rising.
         curves: Forces [N] (k, n).
+
+    Returns:
+        The three by name, each (k,).
     """
-    first = stroke <= stroke[0] + START * (stroke[-1] - stroke[0])
+    first = stroke <= stroke[0] + INITIAL_PART * (stroke[-1] - stroke[0])
     arm = stroke[first] - stroke[first].mean()
     return {
         "peak": curves.max(axis=1),
@@ -77,8 +81,8 @@ def indices(
 
     Args:
         names: The parameters.
-        box: Their lowest and highest values (2, p), between which each is uniform.
-        model: Quantities (k,) by name at points (k, p).
+        box: Their lowest and highest internal coordinates [-], (2, p), between which each is uniform.
+        model: Gives quantities by name, each (k,) [SI], at points (k, p) in internal coordinates.
         base: Number of base samples, a power of 2.
         seed: Seed of the samples and of the confidence intervals.
 

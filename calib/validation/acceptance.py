@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+from calib.io.typed_document import ANY, FORMER, to_document
 from calib.problem.nuisance import OUTSIDE
-from calib.problem.parameters import plain
-from calib.simulation.evaluation import PARTED
+from calib.problem.parameters import property_of
+from calib.simulation.evaluation import FULLY_PARTED
+from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.validation.metrics import Metrics
 from calib.validation.numerical_checks import FINER, FINER_GRID, Check
 
@@ -17,33 +19,66 @@ from calib.validation.numerical_checks import FINER, FINER_GRID, Check
 # Curve and shape: twice the target of a validated model (5 %), because absolute forces of the sensors that such traces
 # come from are themselves uncertain by 10 % and more.
 PEAK_LIMIT = 0.05
-NRMSE_LIMIT = 0.08
+FIT_NRMSE_LIMIT = 0.08
 SHAPE_LIMIT = 0.08
-MOMENTUM_LIMIT = 0.01
+MOMENTUM_BALANCE_LIMIT = 0.01
 CHANGE_LIMIT = 0.05  # of peak and work by numerical choices: as much as the peak may miss the trace
 LOSS_LIMIT = 0.05  # energy lost by the discretisation, of all work: the force is too large by about that
-PRESSED, PRESSED_LIMIT = "food pressed away, not parted", round(1.0 - PARTED, 6)
+PRESSED, PRESSED_LIMIT = "food pressed away, not parted", round(1.0 - FULLY_PARTED, 6)
 KINETIC_LIMIT = 0.10  # explicit quasi-static practice: kinetic energy below 5 to 10 % of internal energy
+RELEASE_REMARKED = 0.1  # energy released ahead of the edge over that spent at it, from which on it is said [-]
 # Ends of what is physically possible: a fit that ends there found a one-sided answer (the cut shows no friction, say),
 # whereas one that ends on a bound of ours asks for a value that it was not allowed.
 NATURAL_LIMITS = {"mu": 0.0}
 SIZE = "height"  # the specimen's, bounded by what is possible: a bound that is reached is a result
+NUISANCE_LINES = {"lag": "delay of the trace within its uncertainty", "gain": "sensor's gain within its uncertainty"}
+"""Nuisances that the validation hangs on, and their lines: a trace that asks for more of one than its sensor leaves open
+fails."""
+HELD_WEAK = {"R": 0.92, "R_skin": 0.90, "E": 0.88, "yield_stress": 0.80, "initiation_depth": 0.84}
+"""Part of the weak 95 % intervals that held the truth on 100 made-up bananas, where it is less and there are
+more than ten (docs/pitfalls.md, how far to trust an interval)."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """One line of the table. ``passed`` None: not run."""
+    """One line of the verdict table.
+
+    Attributes:
+        name: What is judged.
+        value: Its value [unit]; None where it was not run or broke down.
+        limit: Largest value that passes [unit].
+        unit: Unit of value and limit: ``fraction``, ``sd`` (standard deviations), or empty for a number of things.
+        passed: Whether it passes; None: not run, decides nothing.
+        note: Detail in words, may be empty.
+        relation: ``<=`` or ``>=`` between value and limit, where the document of another version says so.
+    """
 
     name: str
-    value: float | None
-    limit: float | None
-    unit: str
+    value: float | None = field(metadata=ANY)
+    limit: float | None = field(metadata=ANY)
+    unit: str | None
     passed: bool | None
-    note: str = ""
+    note: str | None = ""
+    relation: str | None = field(default=None, metadata=FORMER)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
-        return asdict(self)
+        return to_document(self)
+
+
+@dataclass(frozen=True)
+class Conservation:
+    """What a simulated cut should keep.
+
+    Attributes:
+        momentum_residual: Momentum balance that does not close, part of the peak [-].
+        ke_over_ie: Kinetic over internal energy [-].
+        parted: Energy of the edge over R times the new area [-]; NaN where there is nothing to judge.
+    """
+
+    momentum_residual: float
+    ke_over_ie: float
+    parted: float = math.nan
 
 
 def _below(name: str, value: float, limit: float, unit: str = "fraction", note: str = "") -> Verdict:
@@ -63,47 +98,16 @@ def _change(check: Check) -> Verdict:
     return Verdict(check.name, change, CHANGE_LIMIT, "fraction", change <= CHANGE_LIMIT, note)
 
 
-JUDGED = {"lag": "delay of the trace within its uncertainty", "gain": "sensor's gain within its uncertainty"}
-"""Nuisances that the validation hangs on, in words: a trace that asks for more of them than its sensor leaves open fails."""
-
-
-def _nuisance(name: str, n: Mapping[str, Any]) -> Verdict:
-    size = abs(n["value"]) / n["prior_sd"]
-    unit = "" if n["unit"] == "-" else f" {n['unit']}"
-    note = f"{name} {n['value']:+.2g} ± {n['sd']:.1g}{unit}, expected 0 ± {n['prior_sd']:.1g}{unit}"
-    return Verdict(JUDGED[name], size, OUTSIDE, "sd", not n["outside"], note)
-
-
-SPENT = {
-    "parting": "parting the food",
-    "friction": "friction",
-    "plastic": "flow",
-    "damage": "damage",
-    "viscous": "loss factor",
-    "elastic": "elastic",
-    "kinetic": "kinetic",
-}
-"""Where the work of a cut goes, in words."""
-WORTH_SAYING = 0.1  # energy released ahead of the edge, over that spent at it
-LEAST = 0.005  # part of the work that is named
-
-
-def spent(energy: Mapping[str, float]) -> str:
-    """Where the work of a cut has gone, in words, largest first; what is less than half a per cent is left out."""
-    total = sum(energy.values())
-    parts = {words: energy[name] / total for name, words in SPENT.items()} if total > 0 else {}
-    large = sorted((part, words) for words, part in parts.items() if part >= LEAST)
-    return ", ".join(f"{words} {part:.0%}" for part, words in reversed(large))
-
-
-def unbooked(energy: Mapping[str, float]) -> float | None:
-    """Part of the work of a cut that no law has taken [-]; None where no work was done."""
-    total = sum(energy.values())
-    return energy["unbooked"] / total if total > 0 and "unbooked" in energy else None
+def _nuisance(name: str, n: FittedNuisance) -> Verdict:
+    size = abs(n.value) / n.prior_sd
+    unit = "" if n.unit == "-" else f" {n.unit}"
+    note = f"{name} {n.value:+.2g} ± {n.sd:.1g}{unit}, expected 0 ± {n.prior_sd:.1g}{unit}"
+    return Verdict(NUISANCE_LINES[name], size, OUTSIDE, "sd", not n.outside, note)
 
 
 def _loss(finer: Check) -> Verdict:
-    """What of the energy that no law has taken follows the grid, as a first-order error; the rest is released by the crack."""
+    """The part of the energy taken by no law that follows the grid, as a first-order error; the crack releases the
+    rest."""
     name, change = "energy lost by the discretisation", finer.unbooked_change
     if change is None:
         return Verdict(name, None, LOSS_LIMIT, "fraction", False, f"{finer.name} broke down")
@@ -118,12 +122,15 @@ def balances(momentum_residual: float, ke_over_ie: float, parted: float) -> list
         momentum_residual: Momentum balance that does not close, part of the peak [-].
         ke_over_ie: Kinetic over internal energy [-].
         parted: Energy of the edge over R times the new area [-]; NaN where there is nothing to judge, and no line.
+
+    Returns:
+        The lines.
     """
     note = f"the edge took {parted:.0%} of R times the new area"
     cut = [] if math.isnan(parted) else [_below(PRESSED, max(0.0, 1.0 - parted), PRESSED_LIMIT, note=note)]
     return [
         *cut,
-        _below("momentum balance residual", momentum_residual, MOMENTUM_LIMIT, note="part of the peak force"),
+        _below("momentum balance residual", momentum_residual, MOMENTUM_BALANCE_LIMIT, note="part of the peak force"),
         _below("kinetic over internal energy", ke_over_ie, KINETIC_LIMIT),
     ]
 
@@ -132,102 +139,127 @@ def agreement(metrics: Metrics) -> list[Verdict]:
     """Lines of the agreement with the trace: peak, curve, shape."""
     return [
         _below("peak force error", metrics.peak_error, PEAK_LIMIT),
-        _below("curve error (NRMSE)", metrics.nrmse, NRMSE_LIMIT),
+        _below("curve error (NRMSE)", metrics.nrmse, FIT_NRMSE_LIMIT),
         _below("normalised-shape error", metrics.shape_error, SHAPE_LIMIT),
     ]
 
 
-def _at_natural_limit(name: str, parameter: Mapping[str, Any]) -> bool:
-    """Whether a parameter at a bound is at the end of what is possible: its interval reaches there, and its value is nearer to that end."""
+def _at_natural_limit(name: str, p: FittedParameter) -> bool:
+    """Whether a parameter at a bound is at the end of what is possible: its interval reaches there, and its value is
+    nearer to that end than to the other."""
     limit = NATURAL_LIMITS.get(name, -math.inf)
-    value, low, high = (parameter[q] for q in ("value", "low95", "high95"))
-    return bool(low <= limit and value - limit < high - value)
+    if p.low95 is None or p.high95 is None:
+        return False
+    return bool(p.low95 <= limit and p.value - limit < p.high95 - p.value)
 
 
 def judge(
     metrics: Metrics,
     nulls: Mapping[str, Metrics],
     *,
-    momentum_residual: float,
-    ke_over_ie: float,
-    parted: float = math.nan,
-    parameters: Mapping[str, Mapping[str, Any]],
+    conservation: Conservation,
+    fitted: Mapping[str, FittedParameter],
     checks: Sequence[Check] = (),
-    nuisances: Mapping[str, Mapping[str, Any]] | None = None,
+    nuisances: Mapping[str, FittedNuisance] | None = None,
 ) -> list[Verdict]:
     """The verdict table of a calibration.
 
     Args:
         metrics: Simulation against trace.
-        nulls: Null models against trace.
-        momentum_residual: Momentum balance that does not close, part of the peak [-].
-        ke_over_ie: Kinetic over internal energy [-].
-        parted: Energy of the edge over R times the new area [-].
-        parameters: Fitted parameters with their verdicts.
+        nulls: Null models against trace, by name.
+        conservation: What the simulation kept.
+        fitted: Fitted parameters by name.
         checks: What numerical choices change; none were made where the fit was interrupted.
-        nuisances: What the fit says of the measurement: value, sd, prior_sd, unit and outside, by name.
+        nuisances: What the fit says of the measurement, by name.
 
     Returns:
         All lines; those with ``passed`` None were not run and decide nothing.
     """
-    lines = agreement(metrics)
-    simple = {n: m for n, m in nulls.items() if n in ("ramp", "half_sine")}
-    best = min(simple, key=lambda n: simple[n].shape_error)
-    lines.append(
-        Verdict(
-            "shape better than ramp and half sine",
-            metrics.shape_error,
-            simple[best].shape_error,
-            "fraction",
-            metrics.shape_error < simple[best].shape_error,
-            f"best null model: {best.replace('_', ' ')}",
-        )
-    )
-    lines += [*balances(momentum_residual, ke_over_ie, parted), *changes(checks)]
-    lines += [_nuisance(name, n) for name, n in (nuisances or {}).items() if name in JUDGED]
-    on = [n for n, p in parameters.items() if p["verdict"] == "at_bound"]
-    stuck = [n for n in on if n != SIZE and not _at_natural_limit(n, parameters[n])]
-    note = ", ".join(stuck + [f"{n} at its natural limit" for n in on if n not in stuck])
-    lines.append(Verdict("parameters at a bound", len(stuck), 0, "", not stuck, note))
+    lines = [*agreement(metrics), _against_nulls(metrics, nulls)]
+    kept = conservation
+    lines += [*balances(kept.momentum_residual, kept.ke_over_ie, kept.parted), *changes(checks)]
+    lines += [_nuisance(name, n) for name, n in (nuisances or {}).items() if name in NUISANCE_LINES]
+    lines.append(_bounds(fitted))
     for name in ("held-out specimens", "grid convergence of the calibrated force", "repeated cuts"):
         lines.append(Verdict(name, None, None, "", None, "not run"))
     return lines
 
 
-HELD_WEAK = {"R": 0.92, "R_skin": 0.90, "E": 0.88, "yield_stress": 0.80, "initiation_depth": 0.84}
-"""Part of the weak 95 % intervals that held the truth on 100 made-up bananas, where it is less and there are
-more than ten (docs/pitfalls.md, how far to trust an interval)."""
+def _against_nulls(metrics: Metrics, nulls: Mapping[str, Metrics]) -> Verdict:
+    """The line of the shape against the better one of two null models."""
+    simple = {n: m for n, m in nulls.items() if n in ("ramp", "half_sine")}
+    best = min(simple, key=lambda n: simple[n].shape_error)
+    limit = simple[best].shape_error
+    return Verdict(
+        "shape better than ramp and half sine",
+        metrics.shape_error,
+        limit,
+        "fraction",
+        metrics.shape_error < limit,
+        f"best null model: {best.replace('_', ' ')}",
+    )
+
+
+def _bounds(fitted: Mapping[str, FittedParameter]) -> Verdict:
+    """The line of parameters that ran into a bound of ours."""
+    on = [n for n, p in fitted.items() if p.verdict == "at_bound"]
+    stuck = [n for n in on if n != SIZE and not _at_natural_limit(n, fitted[n])]
+    note = ", ".join(stuck + [f"{n} at its natural limit" for n in on if n not in stuck])
+    return Verdict("parameters at a bound", len(stuck), 0, "", not stuck, note)
 
 
 def limits(
     label: str,
     stroke_source: str,
     baseline_kind: str,
-    verdicts: list[Verdict],
-    parameters: Mapping[str, Mapping[str, Any]],
-    assumptions: list[str],
+    verdicts: Sequence[Verdict],
+    fitted: Mapping[str, FittedParameter],
+    assumptions: Sequence[str],
     fracture: Mapping[str, float] | None = None,
 ) -> list[str]:
-    """What the calibration does not show, one sentence each."""
+    """What the calibration does not show.
+
+    Args:
+        label: Whether the trace was ``measured`` or ``reconstructed``.
+        stroke_source: What its stroke rests on: ``position``, ``speed`` or ``height``.
+        baseline_kind: What was subtracted: ``constant`` or ``air``.
+        verdicts: The verdict table.
+        fitted: Fitted parameters by name.
+        assumptions: What was assumed of the specimen and the sensor, each a sentence without capital and full stop.
+        fracture: Energy of new surface at the edge and released ahead of it [J/m^2]; None where nothing was cut.
+
+    Returns:
+        One sentence for each.
+    """
     said = []
     if label != "measured":
         said.append(f"The trace is {label}, not a measurement: agreement with it says nothing about a real food.")
     said.append("All figures are in-sample: the same trace was fitted and compared. Nothing here is validated.")
     said += [f"{v.name}: failed; see the first page." for v in verdicts if v.passed is False]
-    unseen = [n for n, p in parameters.items() if p["verdict"] in ("not_seen", "weak", "one_sided")]
+    said += _limits_of_parameters(fitted)
+    said += _limits_of_measurement(stroke_source, baseline_kind)
+    said += [a[0].upper() + a[1:] + "." for a in assumptions]
+    said += _limits_of_simulation(fracture)
+    said += [f"{remedy[0].upper()}{remedy[1:]}." for remedy in map(remedied, verdicts) if remedy]
+    return said
+
+
+def _limits_of_parameters(fitted: Mapping[str, FittedParameter]) -> list[str]:
+    said = []
+    unseen = [n for n, p in fitted.items() if p.verdict in ("not_seen", "weak", "one_sided")]
     if unseen:
         said.append(
             f"The trace hardly sees {', '.join(unseen)}: these values are the literature's as much as the trace's."
         )
-    held = [
-        f"{HELD_WEAK[plain(n)]:.0%} for {n}"
-        for n, p in parameters.items()
-        if p["verdict"] == "weak" and plain(n) in HELD_WEAK
-    ]
-    if held:
-        said.append(
-            f"Weak intervals hold the truth less often than in 95 %: of 100 made-up banana cuts in {', '.join(held)}."
-        )
+    weak = [n for n, p in fitted.items() if p.verdict == "weak" and property_of(n) in HELD_WEAK]
+    if weak:
+        held = ", ".join(f"{HELD_WEAK[property_of(n)]:.0%} for {n}" for n in weak)
+        said.append(f"Weak intervals hold the truth less often than in 95 %: of 100 made-up banana cuts in {held}.")
+    return said
+
+
+def _limits_of_measurement(stroke_source: str, baseline_kind: str) -> list[str]:
+    said = []
     if stroke_source != "position":
         how = (
             "one constant speed" if stroke_source == "speed" else "one constant speed and a stroke of the food's height"
@@ -235,28 +267,29 @@ def limits(
         said.append(f"The trace has no position: its stroke axis rests on {how}.")
     if baseline_kind == "constant":
         said.append("A constant baseline was subtracted: drift of the sensor along the stroke is in the force.")
-    said += [a[0].upper() + a[1:] + "." for a in assumptions]
-    if fracture is not None and fracture["released_J_m2"] > WORTH_SAYING * fracture["edge_J_m2"]:
+    return said
+
+
+def _limits_of_simulation(fracture: Mapping[str, float] | None) -> list[str]:
+    said = []
+    if fracture is not None and fracture["released_J_m2"] > RELEASE_REMARKED * fracture["edge_J_m2"]:
         edge, released = fracture["edge_J_m2"], fracture["released_J_m2"]
         said.append(
-            f"R is the resistance at the edge, not all that new surface costs: {edge:.3g} J/m² went there and {released:.3g} J/m² were "
-            "released where the blade bends the halves apart ahead of it. Compare their sum with published works of fracture."
+            f"R is the resistance at the edge, not all that new surface costs: {edge:.3g} J/m² went there and "
+            f"{released:.3g} J/m² were released where the blade bends the halves apart ahead of it. Compare their sum with "
+            "published works of fracture."
         )
-    said.append("One cut of one specimen says nothing about the scatter between specimens.")
-    said.append(
+    return [
+        *said,
+        "One cut of one specimen says nothing about the scatter between specimens.",
         "The laws are independent of rate; relaxation, adhesion and moisture were not simulated, and the lower skin of a "
-        "whole fruit is not cut."
-    )
-    said.append(
-        "The blade lay on a plane of the grid's nodes. Between two planes the same values give other work, by 1 % in a stiff food "
-        "with little friction and by 10 to 20 % where a soft one flows or rubs hard (cutcal converge --material --offset 0.5 measures it)."
-    )
-    said.append(
-        "One finer grid was tried, which gives a difference but neither an order nor an uncertainty (cutcal converge --material "
-        "measures both; calibrate --u-num takes them into the likelihood)."
-    )
-    said += [f"{remedy[0].upper()}{remedy[1:]}." for remedy in map(remedied, verdicts) if remedy]
-    return said
+        "whole fruit is not cut.",
+        "The blade lay on a plane of the grid's nodes. Between two planes the same values give other work, by 1 % in a "
+        "stiff food with little friction and by 10 to 20 % where a soft one flows or rubs hard (cutcal converge "
+        "--material --offset 0.5 measures it).",
+        "One finer grid was tried, which gives a difference but neither an order nor an uncertainty (cutcal converge "
+        "--material measures both; calibrate --u-num takes them into the likelihood).",
+    ]
 
 
 def remedied(line: Verdict) -> str:
@@ -264,6 +297,6 @@ def remedied(line: Verdict) -> str:
     if line.name != FINER_GRID or line.passed is not False:
         return ""
     return (
-        "values and intervals answer for these cells alone: cutcal converge --material measures what they leave out, and the same "
-        "calibration with --u-num takes it into the likelihood"
+        "values and intervals answer for these cells alone: cutcal converge --material measures what they leave out, and "
+        "the same calibration with --u-num takes it into the likelihood"
     )

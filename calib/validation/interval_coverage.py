@@ -27,15 +27,16 @@ from calib.io.schema import tag
 from calib.material.food import FoodSpec
 from calib.material.knife import load_knife
 from calib.material.scene import Sizing, cut_scene, specimen
-from calib.problem.objective import ErrorModel
+from calib.problem.food_parameters import fit_parameters
 from calib.problem.request import Request
-from calib.problem.setup import fit_parameters, set_up
+from calib.problem.setup import repeated, set_up
+from calib.problem.target import ErrorModel
+from calib.simulation.evaluation import Evaluators
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, Header
 from calib.simulation.workers import Workers
-from calib.uncertainty.global_search import infer
-from calib.validation.numerical_checks import otherwise
-from mpm.errors import CutcalError
+from calib.uncertainty.global_search import fit_with_uncertainty
 from mpm.scene import Scene
+from mpm.scene.errors import CutcalError
 
 RIGHT = ErrorModel(discrepancy=0.01, peak=0.02)
 """Error model of a fit with the very model that made the trace: with other particles a simulated cut of a banana repeats its curve to
@@ -179,23 +180,23 @@ def _one(
             CachedEvaluator(
                 pool.evaluator(scene, setup.kept), store, scene=scene.as_dict(), code=code_key(), fidelity=name
             )
-            for name, scene in (("fine", setup.fine), ("coarse", setup.coarse), ("again", otherwise(setup.fine)))
+            for name, scene in (("fine", setup.fine), ("coarse", setup.coarse), ("again", repeated(setup.fine)))
         ]
         options = FitOptions(budget=request.budget, batch=pool.batch, seed=k)
         fine, coarse, again = evaluators
-        result, doubt = infer(setup.objective, fine, coarse=coarse, again=again, options=options)
+        result, analysis = fit_with_uncertainty(setup.objective, Evaluators(fine, coarse, again), options)
     except CutcalError as e:
         return row | {"error": str(e)}
     if result.status == "interrupted":
         raise KeyboardInterrupt
-    if doubt is None:
+    if analysis is None:
         return row | {"error": "the search ended before there were intervals"}
     return row | {
-        "parameters": {i.parameter.name: i.as_dict() for i in doubt.uncertainty.intervals},
-        "inside": doubt.bands[0].inside,
+        "parameters": {i.parameter.name: i.as_dict() for i in analysis.uncertainty.intervals},
+        "inside": analysis.bands[0].inside,
         "misfit": result.best.misfit,
-        "reduced_chi2": doubt.uncertainty.reduced_chi2,
-        "lengths": list(doubt.uncertainty.data.lengths),
+        "reduced_chi2": analysis.uncertainty.reduced_chi2,
+        "lengths": list(analysis.uncertainty.data.lengths),
         "simulations": result.simulations,
         "coarse_simulations": result.coarse_simulations,
         "search": result.status,

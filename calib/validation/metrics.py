@@ -6,12 +6,13 @@ simulated one the model m; integrals are trapezium sums over the stroke. Errors 
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
 from calib.errors import CurveError
+from calib.io.typed_document import NULL
 
 ISO_SAMPLES = 240
 """Samples to which curves are brought for the ISO rating; its slope part changes by 0.07 from 80 to 600."""
@@ -67,7 +68,8 @@ class IsoRating:
         EM: Magnitude rating.
         ES: Slope rating.
         R: Overall rating, 0.4 Z + 0.2 (EP + EM + ES).
-        shift: Samples by which the model lags the reference (negative: leads), of 240.
+        shift: Samples by which the model lags the reference (negative: leads), of 240; None where an older document does
+            not say.
         at_bound: Whether the shift stopped at the end of the searched range; EP then says nothing.
         without_phase: Where at_bound what Z, EM and ES of the curves as they are give, in R's proportions; else None.
     """
@@ -77,16 +79,19 @@ class IsoRating:
     EM: float
     ES: float
     R: float
-    shift: int
+    shift: int | None
     at_bound: bool
-    without_phase: float | None = None
+    without_phase: float | None = field(default=None, metadata=NULL)
 
     @property
     def caveat(self) -> str:
         """What has to be said beside R, as a clause; empty where there is nothing."""
         if self.without_phase is None:
             return ""
-        return f"the phase search of R ran to its bound, where its phase part is 0 whatever the model; without it R is {self.without_phase:.3f}"
+        return (
+            "the phase search of R ran to its bound, where its phase part is 0 whatever the model; "
+            f"without it R is {self.without_phase:.3f}"
+        )
 
 
 @dataclass(frozen=True)

@@ -1,22 +1,19 @@
-"""What numerical choices do to a calibrated force: the best values once more, slower and elsewhere on the grid."""
+"""What numerical choices do to a calibrated force: the best values once more, slower and with_other_particles on the grid."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from calib.io.provenance import code_key
-from calib.material.scene import elsewhere
+from calib.io.typed_document import NULL, to_document
+from calib.material.scene import with_other_particles
+from calib.problem.setup import slower
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_store import EvaluationStore, content_key
 from calib.simulation.workers import Errand
 from mpm.scene import Scene
-
-
-def _slower(scene: Scene) -> Scene:
-    return replace(scene, motion=replace(scene.motion, mach=scene.motion.mach / 2))
-
 
 FINER = 2 / 3
 """Cell of the finer grid over that of the calibration: five times the cost of the cut."""
@@ -26,19 +23,14 @@ def _finer(scene: Scene) -> Scene:
     return replace(scene, numerics=replace(scene.numerics, dx=FINER * scene.numerics.dx))
 
 
-def otherwise(scene: Scene) -> Scene:
-    """The scene at half the speed, with other particles and the grid elsewhere: what an answer should not depend on."""
-    return elsewhere(_slower(scene), 2)
-
-
 FINER_GRID = "cells of two thirds"
 VARIANTS: Mapping[str, Callable[[Scene], Scene]] = {
-    "half the simulated speed": _slower,
-    "grid and particles elsewhere": lambda scene: elsewhere(scene, 1),
+    "half the simulated speed": slower,
+    "grid and particles with_other_particles": lambda scene: with_other_particles(scene, 1),
     FINER_GRID: _finer,
 }
 """What should not matter, by name. The order of convergence, and an uncertainty, are the business of a convergence study."""
-VARIED = "at half the speed, with the grid and the particles elsewhere, and on cells of two thirds"
+VARIED = "at half the speed, with the grid and the particles with_other_particles, and on cells of two thirds"
 
 
 def check_errands(scene: Scene, store: EvaluationStore) -> list[Errand]:
@@ -59,26 +51,30 @@ def _key(scene: Scene) -> str:
 class Check:
     """A repeated simulation against the one that is reported.
 
-    Attributes: name; reason why it broke down, or None; changes of peak and work, as fractions, and of the part of the work that
-    no law has taken, None where it broke down.
+    Attributes:
+        name: What was changed.
+        reason: Why that run broke down; None where it did not.
+        peak_change: Change of the peak, a fraction; None where the run broke down.
+        work_change: Change of the work, a fraction; None where the run broke down.
+        unbooked_change: Change of the part of the work that no law has taken; None where the run broke down.
     """
 
     name: str
     reason: str | None
     peak_change: float | None
     work_change: float | None
-    unbooked_change: float | None = None
+    unbooked_change: float | None = field(default=None, metadata=NULL)
 
     @property
     def change(self) -> float | None:
-        """The larger of the two, without its sign."""
+        """The larger change of peak and work, without its sign."""
         if self.peak_change is None or self.work_change is None:
             return None
         return max(abs(self.peak_change), abs(self.work_change))
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
-        return asdict(self)
+        return to_document(self)
 
 
 def _unbooked(run: Evaluation) -> float:

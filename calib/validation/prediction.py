@@ -3,30 +3,130 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
+from calib.io import typed_document
 from calib.io.folder import prepare, write_csv, write_json
-from calib.io.provenance import git_commit, versions
-from calib.io.schema import tag
+from calib.io.provenance import Invocation, Software
+from calib.io.type_schema import NotNegative, Positive, Shared, keywords, one_of
+from calib.io.typed_document import FLAT
 from calib.material.knife import load_knife
 from calib.material.scene import cut_scene, specimen, windowed
 from calib.problem.request import Request
 from calib.problem.setup import conditioned
 from calib.trace.filters import filter_simulated
 from calib.validation.metrics import Metrics, compare
-from mpm.errors import SimulationError
+from mpm.output.record import ForceRecord
+from mpm.scene import Scene
+from mpm.scene.errors import SimulationError
+from mpm.scene.shapes import Shape
 
-NRMSE_LIMIT, RATING_LIMIT = 0.10, 0.80
+PREDICTION_NRMSE_LIMIT, PREDICTION_RATING_LIMIT = 0.10, 0.80
 """Largest curve error and smallest ISO-18571-style rating of a prediction that passes [-]."""
 
 
-def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], None]) -> dict[str, Any]:
+@dataclass(frozen=True)
+class PredictionLimits:
+    """Limits of passing.
+
+    Attributes:
+        nrmse: Largest curve error.
+        rating: Least rating R.
+    """
+
+    nrmse: Positive = PREDICTION_NRMSE_LIMIT
+    rating: Positive = PREDICTION_RATING_LIMIT
+
+    def hold(self, metrics: Metrics) -> bool:
+        """Whether a prediction passes."""
+        return metrics.nrmse <= self.nrmse and metrics.iso18571.R >= self.rating
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PredictionResult:
+    """A cut predicted with values of another.
+
+    ``summary.json`` of ``cutcal predict``, and what ``cutcal predict --json`` prints.
+
+    Attributes:
+        food: Food of materials.yaml, or of the file given.
+        trace: Whether the record was measured or reconstructed from published figures.
+        trace_sha256: SHA-256 of a file's content.
+        held_out: That no value but the width was fitted to this trace.
+        passed: Whether curve error and rating are within the limits.
+        width_scale: Factor on the force that was fitted to this trace, with --scale-width; null without.
+        width_m: Width of the specimen, with that factor [m].
+        metrics: Prediction against trace, with the factor.
+        unscaled: Prediction against trace, without the factor.
+        limits: Limits of passing.
+        status: How the simulation ended; another end is an error.
+        momentum_residual: Part of the momentum balance that does not close, over the peak force.
+        dx_m: Cell of the grid [m].
+        shape: Specimen as it was simulated.
+        knife: Knife of knives.yaml, or of the file given.
+        invocation: How it was called.
+        software: What was run.
+        warnings: What a reader of the numbers must know about the input, one sentence each.
+    """
+
+    DOCUMENT: ClassVar[str] = "predict"
+
+    food: str
+    trace: Annotated[str, one_of("measured", "reconstructed")]
+    trace_sha256: Annotated[str, Shared("sha256")]
+    held_out: Annotated[bool, keywords(const=True)] = True
+    passed: bool
+    width_scale: float | None
+    width_m: Positive
+    metrics: Annotated[Metrics, Shared("metrics")]
+    unscaled: Annotated[Metrics, Shared("metrics")]
+    limits: PredictionLimits = PredictionLimits()
+    status: Annotated[str, one_of("done")]
+    momentum_residual: NotNegative
+    dx_m: Positive
+    shape: Annotated[Shape, Shared("shape")]
+    knife: str
+    invocation: Invocation = field(metadata=FLAT)
+    software: Software = field(metadata=FLAT)
+    warnings: Annotated[tuple[str, ...], Shared("warnings")]
+
+
+def to_document(result: PredictionResult) -> dict[str, Any]:
+    """The content of ``summary.json``."""
+    return typed_document.to_document(result)
+
+
+def read_prediction(folder: Path) -> PredictionResult:
+    """The finished prediction in a folder.
+
+    Args:
+        folder: The output folder of ``cutcal predict``.
+
+    Returns:
+        The prediction.
+
+    Raises:
+        DocumentError: The summary is missing, damaged or incomplete.
+    """
+    return typed_document.read_document(folder / "summary.json", PredictionResult)
+
+
+def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], None]) -> PredictionResult:
     """Simulate the cut of a trace with the food's values as they are, compare, and write summary.json and curves.csv.
 
     The resistances of a cut are known only times the width that is cut. With ``scale_width`` the one number that is
     taken from this trace is that width: the scale that brings the curves closest.
+
+    Args:
+        request: What was cut and measured, and the calibrated food.
+        out: Output folder.
+        scale_width: Whether the width of the specimen is fitted.
+        say: Called with each warning, as one sentence.
+
+    Returns:
+        The prediction.
 
     Raises:
         CutcalError: Anything wrong with the input, or a run that breaks down.
@@ -37,24 +137,14 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
     scene = windowed(
         cut_scene(request.food, shape, knife, stroke=curve.stroke_length_m, dx=request.dx, seed=request.seed)
     )
-    for text in [*request.food.warnings(), *curve.warnings, *assumed]:
+    warnings = (*request.food.warnings(), *curve.warnings, *assumed)
+    for text in warnings:
         say(text)
     prepare(out, resume=False)
-
-    from mpm.runtime import Runtime
-    from mpm.solver import Simulation
-
-    record = Simulation(scene, Runtime(request.arch)).run()
-    if record.status != "done":
-        raise SimulationError(
-            f"the predicted cut broke down at {record.fraction:.0%} of its stroke ({record.status}); nothing was compared; "
-            "try another --dx",
-            reason=record.status,
-            fraction=record.fraction,
-        )
+    record = _simulated(scene, request.arch)
     whole = filter_simulated(curve.stroke, record.stroke, record.resolved)
-    bare = compare(curve.stroke, curve.curve, whole)
-    factor = bare.best_scale if scale_width else 1.0
+    unscaled = compare(curve.stroke, curve.curve, whole)
+    factor = unscaled.best_scale if scale_width else 1.0
     metrics = compare(curve.stroke, curve.curve, factor * whole)
     write_csv(
         out / "curves.csv",
@@ -66,33 +156,43 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
             "face_N": factor * filter_simulated(curve.stroke, record.stroke, record.resolved_face),
         },
     )
-    summary = {
-        "schema": tag("predict"),
-        "food": request.food.name,
-        "trace": curve.trace.label,
-        "trace_sha256": curve.trace.sha256,
-        "held_out": True,
-        "passed": _passes(metrics),
-        "width_scale": factor if scale_width else None,
-        "width_m": factor * shape.width,
-        "metrics": metrics.as_dict(),
-        "unscaled": bare.as_dict(),
-        "limits": {"nrmse": NRMSE_LIMIT, "rating": RATING_LIMIT},
-        "status": record.status,
-        "momentum_residual": record.momentum_residual,
-        "dx_m": scene.numerics.dx,
-        "shape": vars(replace(shape, width=factor * shape.width)),
-        "knife": knife.name,
-        "seed": request.seed,
-        "device": request.arch,
-        "command": list(request.command),
-        "versions": versions(),
-        "git": git_commit(),
-        "warnings": [*request.food.warnings(), *curve.warnings, *assumed],
-    }
-    write_json(out / "summary.json", summary)
-    return summary
+    result = PredictionResult(
+        food=request.food.name,
+        trace=curve.trace.label,
+        trace_sha256=curve.trace.sha256,
+        passed=PredictionLimits().hold(metrics),
+        width_scale=factor if scale_width else None,
+        width_m=factor * shape.width,
+        metrics=metrics,
+        unscaled=unscaled,
+        status=record.status,
+        momentum_residual=record.momentum_residual,
+        dx_m=scene.numerics.dx,
+        shape=replace(shape, width=factor * shape.width),
+        knife=knife.name,
+        invocation=Invocation(request.seed, request.arch, tuple(request.command)),
+        software=Software.here(),
+        warnings=warnings,
+    )
+    write_json(out / "summary.json", to_document(result))
+    return result
 
 
-def _passes(metrics: Metrics) -> bool:
-    return metrics.nrmse <= NRMSE_LIMIT and metrics.iso18571.R >= RATING_LIMIT
+def _simulated(scene: Scene, arch: str) -> ForceRecord:
+    """The record of a cut that ends its stroke.
+
+    Raises:
+        SimulationError: It did not.
+    """
+    from mpm.runtime import Runtime
+    from mpm.solver import Simulation
+
+    record = Simulation(scene, Runtime(arch)).run()
+    if record.status != "done":
+        raise SimulationError(
+            f"the predicted cut broke down at {record.fraction:.0%} of its stroke ({record.status}); nothing was "
+            "compared; try another --dx",
+            reason=record.status,
+            fraction=record.fraction,
+        )
+    return record

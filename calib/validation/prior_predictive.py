@@ -25,15 +25,15 @@ from calib.io.provenance import code_key, git_commit, key_of
 from calib.io.schema import tag
 from calib.material.food import FoodSpec
 from calib.material.scene import Sizing, cut_scene, specimen
+from calib.problem.food_parameters import fit_parameters
 from calib.problem.parameters import ParameterSet
-from calib.problem.setup import fit_parameters
-from calib.simulation.evaluation import PARTED, Evaluation
+from calib.simulation.evaluation import FULLY_PARTED, Evaluation
 from calib.simulation.evaluation_store import EvaluationStore, Header, content_key
 from calib.simulation.workers import Workers
 from calib.trace.filters import N_STROKE, filter_simulated
 from mpm.arrays import FloatArray
 from mpm.scene import Knife, Scene
-from mpm.shapes import volume
+from mpm.scene.shapes import volume
 
 DRAWS = 32
 QUANTILES: Mapping[str, float] = {"q025": 0.025, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q975": 0.975}
@@ -266,7 +266,7 @@ def _head(name: str, row: Mapping[str, Any]) -> list[str]:
         + ", ".join(row["parameters"]),
         "  (95 % ranges of materials.yaml; log-normal, mu normal; cut off at the bounds of a fit); all else as in materials.yaml",
         f"draws: {row['draws']}, broke down: {failed}{left_out}",
-        f"  pressed away, not cut: {row['pressed']} of the others (the edge takes less than {PARTED:g} of R times the new area), in the quantiles",
+        f"  pressed away, not cut: {row['pressed']} of the others (the edge takes less than {FULLY_PARTED:g} of R times the new area), in the quantiles",
         f"  not quasi-static: {row['dynamic']} of the others (kinetic energy over {DYNAMIC * 100:g} % of the work: soft, and cut late)",
         *spans,
         f"cutcal {row['cutcal']}, solver {row['solver']}, commit {row['commit'] or 'unknown'}",

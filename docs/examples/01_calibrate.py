@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from calib import Calibration, Trace
+from cutcal import Calibration, Trace
 
 FORCE_DATA = Path(__file__).parents[2] / "force_data"
 

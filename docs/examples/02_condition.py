@@ -7,8 +7,8 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from calib import Trace
 from calib.trace.conditioning import condition
+from cutcal import Trace
 
 recorded = Trace.read(Path(__file__).parents[2] / "force_data" / "banana_reconstructed.csv")
 frame = recorded.frame()  # any DataFrame with time_s and force_N will do

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from calib import Food
+from cutcal import Food
 
 FOLDER = Path(__file__).parents[2] / "force_data" / "prior_predictive"
 document = json.loads((FOLDER / "prior.json").read_text(encoding="utf-8"))

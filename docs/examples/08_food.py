@@ -1,7 +1,7 @@
 """A food of one's own from one that is there: other values, written and read back."""
 
-from calib import Food
 from calib.material.food import dump_material
+from cutcal import Food
 
 potato = Food.load("potato")
 print("fitted by default:", ", ".join(potato.default_fit))

@@ -8,23 +8,38 @@ from typing import Any
 import numpy as np
 
 from calib.material.knife import load_knife
-from intsim.task.planner import HOME, PHASES, RATE, SPEED, minimum_jerk, plan
+from intsim.task.planner import (
+    CONTROL_RATE,
+    DESCENT_SPEED,
+    GRIPPER_CLOSED,
+    HOME,
+    PHASES,
+    BladeDescent,
+    minimum_jerk,
+    plan_cut,
+)
 from intsim.task.targets import TaskError, target
 
-REACHED = 2e-4  # height of the edge at which it is on the board [m]
-DEEPEST = 0.08  # way below the board that is commanded at most [m]: 140 N behind the Panda's own gains
-LEVELLED = 0.2  # part of the edge's tilt by which a step of pressing on turns the command back where one end of it is on the board [-]: in a quarter of a
-# second, after the arm, which lags by a tenth
-LONGEST = 40  # steps in which it is turned at most: as many as the way down to the deepest command takes
-LOW = 5e-4  # height of the lower end of the blade at which it is there [m], half of what the middle hangs above it (1.1 mm, banana)
-HOLD = 0.3  # time that the edge is held on the board [s]
-RETRACT = 1.5  # time of the way back up [s]
-OPEN = -1.0  # of the gripper's action: closed on the handle
-OFF = 1e-3  # error of the inverse kinematics that is too large [m]
+BOARD_REACHED = 2e-4  # height of the edge at which it is on the board [m]
+MAX_COMMAND_DEPTH = 0.08  # way below the board that is commanded at most [m]: 140 N behind the Panda's own gains
+LEVELLING_GAIN = 0.2
+"""Part of the edge's tilt by which a step of pressing on turns the command back, one end being on the board [-].
+
+It levels the edge in a quarter of a second, after the arm, which lags by a tenth.
+"""
+MAX_LEVELLING_STEPS = 40  # steps in which it is turned at most: as many as the way down to the deepest command takes
+BLADE_END_REACHED = 5e-4
+"""Height of the lower end of the blade at which it is on the board [m].
+
+It is half of what the middle hangs above the board then (docs/robot.md, "What it shows").
+"""
+HOLD_TIME = 0.3  # time that the edge is held on the board [s]
+RETRACT_TIME = 1.5  # time of the way back up [s]
+MAX_IK_ERROR = 1e-3  # error of the inverse kinematics that is too large [m]
 
 
 @dataclass(eq=False)
-class Track:
+class Demonstration:
     """What was done and seen, step by step.
 
     Attributes:
@@ -34,7 +49,8 @@ class Track:
         action: Joint targets and gripper (n, 8).
         phase: Phase of each step (n,).
         force: Force of the food on the knife in each step of the robot's physics [N] (n, 5, 3).
-        touching, uncut, pieces: Whether food presses on the knife, part of the section that holds, pieces of the food (n,).
+        touching: Whether food presses on the knife (n,).
+        uncut, pieces: Part of the section that holds, and pieces of the food (n,).
         published, severed: Success by the published criteria, and in pieces (n,).
         meshes: Steps after which the food under the knife was kept, which food, its vertices, triangles and flesh.
         status: ``done``, or what went wrong.
@@ -56,82 +72,93 @@ class Track:
     status: str = "done"
 
 
-def demonstrate(env: Any, *, style: str = "press", sustained: bool = True, meshes: bool = True) -> Track:
+def demonstrate(env: Any, *, style: str = "press", sustained: bool = True, meshes: bool = True) -> Demonstration:
     """Cut what the environment's episode asks for.
 
     Args:
         env: A :class:`intsim.sim.environment.CutFoodEnv` that was reset, in joint positions.
-        style: Of the motion.
-        sustained: Whether the edge is commanded deeper until the food is in pieces or the board reached, and held there; the load turns the hand, and
-            where one end of the blade then rests on the board and the other hangs, it is turned back. Without it the motion is the planned one, whatever
-            the food does.
+        style: Of the motion, in :data:`intsim.task.planner.STYLES`.
+        sustained: Whether the edge is commanded deeper until the food is in pieces or the board reached, and held
+            there. The load turns the hand; where one end of the blade then rests on the board and the other hangs, the
+            command turns it back. Without it the motion is the planned one, whatever the food does.
         meshes: Whether the food's surface is kept.
+
+    Returns:
+        What was done and seen, step by step; its status says whether the solver and the arm followed.
     """
-    track, episode, half = Track(), env.episode, load_knife(env.knife).length / 2
-    _see(env, track)
+    demo, episode = Demonstration(), env.episode
+    _see(env, demo)
     for _ in range(episode.spec.cuts):
         item = (env.coupling if env.coupled else env.table).items[0]
         try:
             along = target(episode.spec, item)
         except TaskError:
             break
-        path = plan(item, along, style=style, start=env.pose)
-        for pose, phase in zip(path.pose, path.phase, strict=True):
+        planned = plan_cut(item, along, BladeDescent(style), start=env.pose)
+        for pose, phase in zip(planned.pose, planned.phase, strict=True):
             if phase != "retract":
-                _step(env, track, pose, str(phase), meshes)
-        pose = track.command[-1].copy()
+                _step(env, demo, pose, str(phase), meshes)
+        pose = demo.command[-1].copy()
         if sustained:
-            whole, turned = len(item.pieces), 0
-            while (
-                len(env.coupling.items[0].pieces) == whole
-                and env.pose[2] > REACHED
-                and pose[2] > -DEEPEST
-                and turned < LONGEST
-            ):
-                if env.pose[2] - half * abs(np.sin(env.pose[4])) < LOW:
-                    pose[4] -= LEVELLED * env.pose[4]
-                    turned += 1
-                else:
-                    pose[2] -= SPEED / RATE
-                _step(env, track, pose, "cut", meshes)
-            for _ in range(round(HOLD * RATE)):
-                _step(env, track, pose, "hold", meshes)
+            _press_on(env, demo, pose, len(item.pieces), meshes)
         up = np.array([*pose[:2], HOME[2], pose[3], 0.0])
-        for part in minimum_jerk(round(RETRACT * RATE)):
-            _step(env, track, pose + part * (up - pose), "retract", meshes)
-    return track
+        for part in minimum_jerk(round(RETRACT_TIME * CONTROL_RATE)):
+            _step(env, demo, pose + part * (up - pose), "retract", meshes)
+    return demo
 
 
-def _see(env: Any, track: Track) -> None:
+def _press_on(env: Any, demo: Demonstration, pose: np.ndarray, pieces: int, meshes: bool) -> None:
+    """Command the edge deeper until the food has more pieces or the board is reached, and hold it there.
+
+    Where one end of the blade is on the board, it is levelled in place of pressed. The commanded pose (5,) is changed.
+    """
+    half, turned = load_knife(env.knife).length / 2, 0
+    while (
+        len(env.coupling.items[0].pieces) == pieces
+        and env.pose[2] > BOARD_REACHED
+        and pose[2] > -MAX_COMMAND_DEPTH
+        and turned < MAX_LEVELLING_STEPS
+    ):
+        if env.pose[2] - half * abs(np.sin(env.pose[4])) < BLADE_END_REACHED:
+            pose[4] -= LEVELLING_GAIN * env.pose[4]
+            turned += 1
+        else:
+            pose[2] -= DESCENT_SPEED / CONTROL_RATE
+        _step(env, demo, pose, "cut", meshes)
+    for _ in range(round(HOLD_TIME * CONTROL_RATE)):
+        _step(env, demo, pose, "hold", meshes)
+
+
+def _see(env: Any, demo: Demonstration) -> None:
     robot = env.agent.robot
-    track.qpos.append(robot.get_qpos()[0].numpy().astype(np.float32))
-    track.qvel.append(robot.get_qvel()[0].numpy().astype(np.float32))
-    track.edge.append(env.pose)
+    demo.qpos.append(robot.get_qpos()[0].numpy().astype(np.float32))
+    demo.qvel.append(robot.get_qvel()[0].numpy().astype(np.float32))
+    demo.edge.append(env.pose)
 
 
-def _step(env: Any, track: Track, pose: np.ndarray, phase: str, meshes: bool) -> None:
+def _step(env: Any, demo: Demonstration, pose: np.ndarray, phase: str, meshes: bool) -> None:
     """One control step towards a pose."""
-    near = np.array([*track.action[-1][:7], 0.0, 0.0]) if track.action else track.qpos[-1].astype(float)
+    near = np.array([*demo.action[-1][:7], 0.0, 0.0]) if demo.action else demo.qpos[-1].astype(float)
     joints, off = env.kinematics.joints(pose, near)
-    if off > OFF:
-        track.status = f"the arm does not reach {np.round(pose[:3], 3).tolist()}"
-    action = np.array([*joints[:7], OPEN], np.float32)
+    if off > MAX_IK_ERROR:
+        demo.status = f"the arm does not reach {np.round(pose[:3], 3).tolist()}"
+    action = np.array([*joints[:7], GRIPPER_CLOSED], np.float32)
     _, _, _, _, info = env.step(action)
     assert phase in PHASES
-    track.command.append(np.array(pose, float))
-    track.action.append(action)
-    track.phase.append(phase)
-    track.force.append(env.forces)
-    track.touching.append(bool(info["touching"]))
-    track.uncut.append(float(info["uncut"]))
-    track.pieces.append(len(env.coupling.items[0].pieces))
-    track.published.append(bool(info["published"]))
-    track.severed.append(bool(info["severed"]))
-    _see(env, track)
+    demo.command.append(np.array(pose, float))
+    demo.action.append(action)
+    demo.phase.append(phase)
+    demo.force.append(env.forces)
+    demo.touching.append(bool(info["touching"]))
+    demo.uncut.append(float(info["uncut"]))
+    demo.pieces.append(len(env.coupling.items[0].pieces))
+    demo.published.append(bool(info["published"]))
+    demo.severed.append(bool(info["severed"]))
+    _see(env, demo)
     broken = next((d.why for d in env.coupling.done if d.severed is None), "")
     if broken:
-        track.status = broken
+        demo.status = broken
     mesh = env.coupling.mesh() if meshes else None
     if mesh is not None:
         which, points, triangles, flesh = mesh
-        track.meshes.append((len(track.action), which, points, triangles, flesh))
+        demo.meshes.append((len(demo.action), which, points, triangles, flesh))

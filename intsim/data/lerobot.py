@@ -1,7 +1,7 @@
 """Export as a LeRobotDataset v3.0; needs the extra ``[data]``, for pictures ``[robot]`` and Vulkan too.
 
-LeRobot takes every ``observation*`` for an input of the policy and every ``action*`` for its output. The force is therefore ``contact.*``,
-and joints are ``extra.*``: in the data, and in no policy that was not told to look at them.
+LeRobot takes every ``observation*`` for an input of the policy and every ``action*`` for its output. The force is
+therefore ``contact.*``, and joints are ``extra.*``: in the data, and in no policy that was not told to look at them.
 """
 
 from __future__ import annotations
@@ -15,24 +15,23 @@ import numpy as np
 
 from calib.errors import OutputError
 from calib.simulation.workers import Workers
-from intsim.data.demonstrate import OPEN
-from intsim.data.pictures import VIEWS
-from intsim.data.shards import Stored
-from intsim.data.views import View, check, views
-from intsim.task.planner import RATE
+from intsim.data.cameras import CAMERA_NAMES
+from intsim.data.export_episodes import ExportEpisode, check_target, export_episodes
+from intsim.data.shards import StoredTrajectory
+from intsim.task.planner import CONTROL_RATE, GRIPPER_CLOSED
 
-VERSION = "v3.0"
+CODEBASE_VERSION = "v3.0"
 FILE_FRAMES = 50_000  # frames of a file of data or video
-SAMPLED = 32  # pictures of an episode from which its statistics are found
+SAMPLED_PICTURES = 32  # pictures of an episode from which its statistics are found
 QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
-POSE = ("x", "y", "z", "roll", "pitch", "yaw")
-JOINTS = tuple(f"panda_joint{k}" for k in range(1, 8))
+POSE_NAMES = ("x", "y", "z", "roll", "pitch", "yaw")
+JOINT_NAMES = tuple(f"panda_joint{k}" for k in range(1, 8))
 #: Name: type, names of the components.
 FEATURES: dict[str, tuple[str, tuple[str, ...] | None]] = {
-    "observation.state": ("float32", (*POSE, "pad", "gripper")),
-    "action": ("float32", (*(f"d{name}" for name in POSE), "gripper")),
-    "extra.qpos": ("float32", (*JOINTS, "finger1", "finger2")),
-    "extra.joint_target": ("float32", (*JOINTS, "gripper")),
+    "observation.state": ("float32", (*POSE_NAMES, "pad", "gripper")),
+    "action": ("float32", (*(f"d{name}" for name in POSE_NAMES), "gripper")),
+    "extra.qpos": ("float32", (*JOINT_NAMES, "finger1", "finger2")),
+    "extra.joint_target": ("float32", (*JOINT_NAMES, "gripper")),
     "contact.force": ("float32", ("x", "y", "z")),
     "contact.impulse": ("float32", ("x", "y", "z")),
     "contact.phase": ("int64", None),
@@ -48,13 +47,20 @@ FEATURES: dict[str, tuple[str, tuple[str, ...] | None]] = {
     "task_index": ("int64", None),
 }
 
+TASK_COLUMN = "__index_level_0__"  # of meta/tasks.parquet: the sentences
+SIDE_KEYS = (
+    "index", "suite", "style", "demos", "food", "episode_seed", "severed", "published", "instructions",
+)  # fmt: skip
+"""Keys of a trajectory's entry that meta/culinary.parquet has."""
 
-def columns(stored: Stored) -> dict[str, np.ndarray]:
+
+def episode_columns(stored: StoredTrajectory) -> dict[str, np.ndarray]:
     """Features of one trajectory, a row for each step, without what depends on its place in the dataset."""
     g = stored.group
     n = len(g["actions"])
     edge = g["obs/extra/edge"][()][:n]
-    state = np.column_stack([edge[:, :3], np.zeros(n), edge[:, 4], edge[:, 3], np.zeros(n), np.full(n, OPEN)])
+    zero, gripper = np.zeros(n), np.full(n, GRIPPER_CLOSED)
+    state = np.column_stack([edge[:, :3], zero, edge[:, 4], edge[:, 3], zero, gripper])
     return {
         "observation.state": state.astype(np.float32),
         "action": g["control/delta"][()],
@@ -68,7 +74,7 @@ def columns(stored: Stored) -> dict[str, np.ndarray]:
         "cut.n_pieces": g["mpm/pieces"][()].astype(np.int64),
         "next.done": np.arange(n) == n - 1,
         "next.success": g["success"][()],
-        "timestamp": (np.arange(n) / RATE).astype(np.float32),
+        "timestamp": (np.arange(n) / CONTROL_RATE).astype(np.float32),
         "frame_index": np.arange(n),
     }
 
@@ -83,12 +89,12 @@ def statistics(values: np.ndarray) -> dict[str, list[Any]]:
 
 def picture_statistics(frames: np.ndarray) -> dict[str, list[Any]]:
     """The same of pictures (n, h, w, 3) by colour, in parts of 255; shape (3, 1, 1)."""
-    some = frames[np.linspace(0, len(frames) - 1, min(SAMPLED, len(frames))).round().astype(int)]
+    some = frames[np.linspace(0, len(frames) - 1, min(SAMPLED_PICTURES, len(frames))).round().astype(int)]
     found = statistics(some.reshape(-1, 3) / 255)
     return {n: v if n == "count" else [[[x]] for x in v] for n, v in (found | {"count": [len(some)]}).items()}
 
 
-def together(parts: Sequence[dict[str, list[Any]]]) -> dict[str, list[Any]]:
+def merge_statistics(parts: Sequence[dict[str, list[Any]]]) -> dict[str, list[Any]]:
     """Statistics of several episodes as one; quantiles are the weighted means of theirs, as LeRobot's are."""
     counts = np.array([p["count"][0] for p in parts], float)
     weight = counts / counts.sum()
@@ -110,24 +116,24 @@ def together(parts: Sequence[dict[str, list[Any]]]) -> dict[str, list[Any]]:
     return {name: v.tolist() for name, v in out.items()} | {"count": [int(counts.sum())]}
 
 
-def export(
+def export_lerobot(
     folder: Path,
     out: Path,
     *,
-    scenes: Sequence[int] = (),
+    backgrounds: Sequence[int] = (),
     pixels: int = 128,
     pool: Workers | None = None,
     say: Callable[[str], None] = lambda text: None,
 ) -> dict[str, Any]:
     """Write a LeRobotDataset v3.0.
 
-    Each trajectory is an episode for each background, with one of its sentences in turn; all of its sentences, its task, material and
-    seed are in ``meta/culinary.parquet``.
+    Each trajectory is an episode for each background, with one of its sentences in turn; all of its sentences, its
+    task, material and seed are in ``meta/culinary.parquet``.
 
     Args:
         folder: A dataset of :func:`intsim.data.generate.generate`.
         out: Folder that is made.
-        scenes: Backgrounds that are rendered; without any there are no pictures.
+        backgrounds: Numbers of those that are rendered; without any there are no pictures.
         pixels: Width and height of the pictures.
         pool: Where pictures are rendered that the dataset does not have yet.
         say: Called with a line after each episode.
@@ -143,10 +149,10 @@ def export(
         import pyarrow  # noqa: F401
     except ImportError as e:
         raise OutputError(f"dataset export: {e.name} is not installed; pip install 'cutcal[data]'") from None
-    check(out, scenes)
-    writer = _Writer(out, pixels if scenes else 0)
-    for view in views(folder, scenes, pixels, pool, say):
-        writer.add(view)
+    check_target(out, backgrounds)
+    writer = _Writer(out, pixels if backgrounds else 0)
+    for episode in export_episodes(folder, backgrounds, pixels, pool, say):
+        writer.add(episode)
     return writer.close()
 
 
@@ -168,14 +174,13 @@ class _Writer:
         self.frames, self.file, self.in_file = 0, 0, 0
         self.videos: dict[str, _Video] = {}
 
-    def add(self, one: View) -> None:
-        """An episode."""
-        stored, sentence, pictures, scene = one.stored, one.sentence, one.pictures, one.scene
-        found = columns(stored)
+    def add(self, episode: ExportEpisode) -> None:
+        """Add an episode."""
+        found = episode_columns(episode.stored)
         n = len(found["timestamp"])
         if self.in_file and self.in_file + n > FILE_FRAMES:
             self._roll()
-        number, task = len(self.episodes), self.tasks.setdefault(sentence, len(self.tasks))
+        number, task = len(self.episodes), self.tasks.setdefault(episode.sentence, len(self.tasks))
         found |= {
             "episode_index": np.full(n, number),
             "index": self.frames + np.arange(n),
@@ -185,7 +190,7 @@ class _Writer:
         own = {name: statistics(values) for name, values in found.items()}
         row: dict[str, Any] = {
             "episode_index": number,
-            "tasks": [sentence],
+            "tasks": [episode.sentence],
             "length": n,
             "data/chunk_index": 0,
             "data/file_index": self.file,
@@ -194,65 +199,55 @@ class _Writer:
             "meta/episodes/chunk_index": 0,
             "meta/episodes/file_index": 0,
         }
-        for view, frames in pictures.items():
-            key = f"observation.images.{view}"
-            if key not in self.videos:
-                self.videos[key] = _Video(self.out / f"videos/{key}/chunk-000/file-{self.file:03d}.mp4", self.pixels)
-            row |= {
-                f"videos/{key}/chunk_index": 0,
-                f"videos/{key}/file_index": self.file,
-                f"videos/{key}/from_timestamp": self.in_file / RATE,
-                f"videos/{key}/to_timestamp": (self.in_file + n) / RATE,
-            }
-            self.videos[key].add(frames)
+        for camera, frames in episode.pictures.items():
+            key = f"observation.images.{camera}"
+            row |= self._add_frames(key, frames)
             own[key] = picture_statistics(frames)
         for name, values in own.items():
             self.parts.setdefault(name, []).append(values)
             row |= {f"stats/{name}/{kind}": v for kind, v in values.items()}
         self.episodes.append(row)
-        a = stored.about
-        self.side.append(
-            {
-                "episode_index": number,
-                "scene": -1 if scene is None else scene,
-                "material": stored.group["mpm"].attrs["material"],
-            }
-            | {
-                k: a[k]
-                for k in (
-                    "index",
-                    "suite",
-                    "style",
-                    "demos",
-                    "food",
-                    "episode_seed",
-                    "severed",
-                    "published",
-                    "instructions",
-                )
-            }
-            | {
-                "ratio": a["task"]["ratio"],
-                "side": a["task"]["side"],
-                "pieces": a["task"]["pieces"],
-                "peak_N": a["peak_N"],
-            }
-        )
+        self.side.append(_side_row(episode, number))
         self.frames, self.in_file = self.frames + n, self.in_file + n
+
+    def _add_frames(self, key: str, frames: np.ndarray) -> dict[str, Any]:
+        """Append pictures (n, h, w, 3) to the video of a feature; returns where they are in it."""
+        if key not in self.videos:
+            self.videos[key] = _Video(self.out / f"videos/{key}/chunk-000/file-{self.file:03d}.mp4", self.pixels)
+        self.videos[key].add(frames)
+        return {
+            f"videos/{key}/chunk_index": 0,
+            f"videos/{key}/file_index": self.file,
+            f"videos/{key}/from_timestamp": self.in_file / CONTROL_RATE,
+            f"videos/{key}/to_timestamp": (self.in_file + len(frames)) / CONTROL_RATE,
+        }
 
     def close(self) -> dict[str, Any]:
         """Write what is left, and all of ``meta``; returns info.json."""
         import pyarrow as pa
 
         self._roll()
+        meta, info = self.out / "meta", self._info()
+        _parquet(meta / "episodes/chunk-000/file-000.parquet", pa.Table.from_pylist(self.episodes))
+        tasks = pa.table({"task_index": list(self.tasks.values()), TASK_COLUMN: list(self.tasks)})
+        _parquet(meta / "tasks.parquet", tasks.replace_schema_metadata({b"pandas": json.dumps(_task_index()).encode()}))
+        _parquet(meta / "culinary.parquet", pa.Table.from_pylist(self.side))
+        stats = {name: merge_statistics(parts) for name, parts in self.parts.items()}
+        (meta / "stats.json").write_text(json.dumps(stats, indent=1) + "\n", encoding="utf-8")
+        (meta / "info.json").write_text(json.dumps(info, indent=1) + "\n", encoding="utf-8")
+        return info
+
+    def _info(self) -> dict[str, Any]:
+        """Content of info.json."""
         features: dict[str, Any] = {
             name: {"dtype": kind, "shape": [len(names) if names else 1], "names": list(names) if names else None}
             for name, (kind, names) in FEATURES.items()
         }
         if self.pixels:
-            features |= {f"observation.images.{view}": self._video_feature() for view in VIEWS}
-        info = {
-            "codebase_version": VERSION,
+            features |= {f"observation.images.{camera}": self._video_feature() for camera in CAMERA_NAMES}
+        videos = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
+        return {
+            "codebase_version": CODEBASE_VERSION,
             "robot_type": "panda",
             "total_episodes": len(self.episodes),
             "total_frames": self.frames,
@@ -260,35 +255,12 @@ class _Writer:
             "chunks_size": 1000,
             "data_files_size_in_mb": 100,
             "video_files_size_in_mb": 200,
-            "fps": round(RATE),
+            "fps": round(CONTROL_RATE),
             "splits": {"train": f"0:{len(self.episodes)}"},
             "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
-            "video_path": "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
-            if self.pixels
-            else None,
+            "video_path": videos if self.pixels else None,
             "features": features,
         }
-        meta = self.out / "meta"
-        _parquet(meta / "episodes/chunk-000/file-000.parquet", pa.Table.from_pylist(self.episodes))
-        tasks = pa.table({"task_index": list(self.tasks.values()), "__index_level_0__": list(self.tasks)})
-        index: dict[str, Any] = {
-            "index_columns": ["__index_level_0__"],
-            "column_indexes": [],
-            "pandas_version": "2.2.0",
-        }
-        index["columns"] = [
-            {"name": n, "field_name": f, "pandas_type": t, "numpy_type": d, "metadata": None}
-            for n, f, t, d in (
-                ("task_index", "task_index", "int64", "int64"),
-                (None, "__index_level_0__", "unicode", "object"),
-            )
-        ]
-        _parquet(meta / "tasks.parquet", tasks.replace_schema_metadata({b"pandas": json.dumps(index).encode()}))
-        _parquet(meta / "culinary.parquet", pa.Table.from_pylist(self.side))
-        stats = {name: together(parts) for name, parts in self.parts.items()}
-        (meta / "stats.json").write_text(json.dumps(stats, indent=1) + "\n", encoding="utf-8")
-        (meta / "info.json").write_text(json.dumps(info, indent=1) + "\n", encoding="utf-8")
-        return info
 
     def _video_feature(self) -> dict[str, Any]:
         about = {
@@ -297,7 +269,7 @@ class _Writer:
             "video.codec": "h264",
             "video.pix_fmt": "yuv420p",
             "video.is_depth_map": False,
-            "video.fps": round(RATE),
+            "video.fps": round(CONTROL_RATE),
             "video.channels": 3,
             "has_audio": False,
         }
@@ -323,6 +295,33 @@ class _Writer:
         self.file, self.in_file = self.file + 1, 0
 
 
+def _side_row(episode: ExportEpisode, number: int) -> dict[str, Any]:
+    """A row of meta/culinary.parquet: what LeRobot has no place for."""
+    entry, task = episode.stored.entry, episode.stored.entry["task"]
+    return {
+        "episode_index": number,
+        "scene": -1 if episode.background is None else episode.background,
+        "material": episode.stored.group["mpm"].attrs["material"],
+        **{name: entry[name] for name in SIDE_KEYS},
+        **{name: task[name] for name in ("ratio", "side", "pieces")},
+        "peak_N": entry["peak_N"],
+    }
+
+
+def _task_index() -> dict[str, Any]:
+    """What pandas wants to know of meta/tasks.parquet: the sentences are its index."""
+    columns = (("task_index", "task_index", "int64", "int64"), (None, TASK_COLUMN, "unicode", "object"))
+    return {
+        "index_columns": [TASK_COLUMN],
+        "column_indexes": [],
+        "pandas_version": "2.2.0",
+        "columns": [
+            {"name": name, "field_name": field, "pandas_type": kind, "numpy_type": dtype, "metadata": None}
+            for name, field, kind, dtype in columns
+        ],
+    }
+
+
 class _Video:
     """Pictures one after the other in an mp4 file, every second one a key frame, at times that are exact.
 
@@ -336,7 +335,7 @@ class _Video:
 
         path.parent.mkdir(parents=True, exist_ok=True)
         self._file = av.open(str(path), "w")
-        self._stream = self._file.add_stream("libx264", rate=round(RATE), options={"crf": "18", "g": "2"})
+        self._stream = self._file.add_stream("libx264", rate=round(CONTROL_RATE), options={"crf": "18", "g": "2"})
         self._stream.width = self._stream.height = pixels
         self._stream.pix_fmt = "yuv420p"
         self._count = 0

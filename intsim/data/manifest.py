@@ -4,29 +4,45 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 
 from calib.material.food import FoodSpec, load_food
-from intsim.task.language import VARIANTS
+from intsim.sim.background import BACKGROUNDS
+from intsim.task.language import SENTENCES_PER_TASK
 from intsim.task.planner import STYLES
-from intsim.task.suites import FOODS, SUITES, TEST, Episode, draw
+from intsim.task.suites import FIRST_TEST_SEED, FOODS, SUITES, Episode, sample_episode
 from intsim.task.targets import TaskError
 
-JITTER = {"E": 0.2, "R": 0.1, "yield_stress": 0.1, "mu": 0.2}
-"""Standard deviation of the logarithm of properties that differ from item to item [-]: assumed, a third of what gripped fruit scatters in
-stiffness and less for strength."""
-TASKS = ("seeds", "continuous", "split", "flips", "objects")
-"""Suites that training may see, in turn; the sentences of ``language`` and every seed from a million on are for tests."""
-BACKGROUNDS = 15
-"""Procedural backgrounds: colours of table, board and walls, light and its direction; 0 is plain."""
-PRESSED = 0.5  # part of the episodes that press; the other styles share the rest
+PUBLISHED_TRAJECTORIES = 21_000
+"""Trajectories of the published data set."""
+PROPERTY_SCATTER = {"E": 0.2, "R": 0.1, "yield_stress": 0.1, "mu": 0.2}
+"""Standard deviation of the logarithm of properties that differ from item to item [-].
+
+Assumed: a third of what gripped fruit scatters in stiffness, and less for strength.
+"""
+TRAINING_SUITES = ("seeds", "continuous", "split", "flips", "objects")
+"""Suites that training may see, in turn.
+
+The sentences of ``language`` and every seed from a million on are for tests.
+"""
+PRESS_SHARE = 0.5  # part of the episodes that press; the other styles share the rest
 
 
 @dataclass(frozen=True)
-class Draw:
-    """One trajectory. Attributes: index; suite; seed; style of the motion; episode; food, with its own values."""
+class TrajectorySpec:
+    """One trajectory of a manifest.
+
+    Attributes:
+        index: Its number.
+        suite: Kind of task.
+        seed: Of the episode.
+        style: Of the motion, in :data:`intsim.task.planner.STYLES`.
+        episode: What is on the table and what is asked for.
+        food: The food, with its own values.
+        values: Those of its properties that were drawn, by name.
+    """
 
     index: int
     suite: str
@@ -48,7 +64,9 @@ class Sample:
 
 @dataclass(frozen=True)
 class Manifest:
-    """The product of trajectories, backgrounds and sentences, counted and never stored: 21,000 x 15 x 5 are 1,575,000 samples.
+    """The product of trajectories, backgrounds and sentences, counted and never stored.
+
+    That of the published data set is 21,000 x 15 x 5, 1,575,000 samples.
 
     Attributes:
         trajectories, backgrounds, instructions: How many of each.
@@ -61,15 +79,21 @@ class Manifest:
         TaskError: Nothing to draw from, or seeds that belong to the tests.
     """
 
-    trajectories: int = 21_000
+    KEYS: ClassVar[tuple[str, ...]] = (
+        "trajectories", "backgrounds", "instructions", "seed", "foods", "suites", "styles",
+    )  # fmt: skip
+
+    trajectories: int = PUBLISHED_TRAJECTORIES
     backgrounds: int = BACKGROUNDS
-    instructions: int = VARIANTS
+    instructions: int = SENTENCES_PER_TASK
     foods: Sequence[str] = FOODS
-    suites: Sequence[str] = TASKS
+    suites: Sequence[str] = TRAINING_SUITES
     seed: int = 0
     styles: Sequence[str] = STYLES
 
     def __post_init__(self) -> None:
+        for name in ("foods", "suites", "styles"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
         lists = (self.foods, self.suites, self.styles)
         if min(self.trajectories, self.backgrounds, self.instructions, *map(len, lists)) < 1:
             raise TaskError(
@@ -79,10 +103,9 @@ class Manifest:
             for name in given:
                 if name not in known:
                     raise TaskError(f"dataset: {what} {name!r} is none of {', '.join(known)}")
-        if self.seed < 0 or self.seed + self.trajectories > TEST:
-            raise TaskError(
-                f"dataset: seeds {self.seed} to {self.seed + self.trajectories}; those from {TEST} on are for tests"
-            )
+        end = self.seed + self.trajectories
+        if self.seed < 0 or end > FIRST_TEST_SEED:
+            raise TaskError(f"dataset: seeds {self.seed} to {end}; those from {FIRST_TEST_SEED} on are for tests")
 
     def __len__(self) -> int:
         return self.trajectories * self.backgrounds * self.instructions
@@ -96,7 +119,7 @@ class Manifest:
     def __iter__(self) -> Iterator[Sample]:
         return (self[k] for k in range(len(self)))
 
-    def draw(self, index: int) -> Draw:
+    def trajectory(self, index: int) -> TrajectorySpec:
         """A trajectory: food and task in turn, all else from its seed."""
         seed = self.seed + index
         name = self.foods[index % len(self.foods)]
@@ -104,17 +127,13 @@ class Manifest:
         food = load_food(name)
         rng = np.random.default_rng([seed, *b"dataset"])
         values = {}
-        for prop, sd in JITTER.items():
+        for prop, sd in PROPERTY_SCATTER.items():
             if prop in food.properties:
                 found = food.properties[prop]
                 values[prop] = float(np.clip(found.value * np.exp(sd * rng.standard_normal()), found.low, found.high))
         others = [style for style in self.styles if style != STYLES[0]]
-        pressed = STYLES[0] in self.styles and rng.random() < PRESSED
+        pressed = STYLES[0] in self.styles and rng.random() < PRESS_SHARE
         style = STYLES[0] if pressed or not others else others[int(rng.integers(len(others)))]
-        episode = draw(suite, seed, {name: food})
-        return Draw(index, suite, seed, style, episode, food.with_values(values, source="drawn for a dataset"), values)
-
-    def as_dict(self) -> dict[str, Any]:
-        """As plain data."""
-        own = {name: getattr(self, name) for name in ("trajectories", "backgrounds", "instructions", "seed")}
-        return own | {name: list(getattr(self, name)) for name in ("foods", "suites", "styles")}
+        episode = sample_episode(suite, seed, {name: food})
+        own = food.with_values(values, source="drawn for a dataset")
+        return TrajectorySpec(index, suite, seed, style, episode, own, values)

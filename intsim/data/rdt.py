@@ -3,9 +3,10 @@
     TASK/motionplanning/TASK.h5           traj_K/actions (T, 8), traj_K/obs/agent/qpos (T + 1, 9)
     TASK/motionplanning/K//100/K%100/S.png    what the front camera sees before step S, from 1
 
-That loader knows one sentence for a task, which stands in its own source: a task here is one instruction's meaning, such as
-``orange-0_25-left``, and ``tasks.json`` has the sentence and the number of episodes of each. It scales by the range of each joint and action, which the
-gripper, closed on the knife throughout, has none of: ``statistics.json`` has the ranges, its own that of the mechanism. The force is not in it.
+That loader knows one sentence for a task, which stands in its own source. A task here is one instruction's meaning,
+such as ``orange-0_25-left``, and ``tasks.json`` has the sentence and the number of episodes of each. The loader scales
+by the range of each joint and action, and the gripper, closed on the knife throughout, has none. ``statistics.json``
+therefore has the ranges that were found, and for the gripper that of the mechanism. The force is not in it.
 """
 
 from __future__ import annotations
@@ -21,22 +22,22 @@ import numpy as np
 
 from calib.errors import OutputError
 from calib.simulation.workers import Workers
+from intsim.data.export_episodes import ExportEpisode, check_pictured_target, export_episodes
 from intsim.data.shards import trajectories
-from intsim.data.views import View, check_pictured, views
 
-CAMERA = "front"
-JOINTS = 8  # of the state that RDT is given: the second finger does what the first does
-GRIPPER = {"state_min": 0.0, "state_max": 0.04, "action_min": -1.0, "action_max": 1.0}
+CAMERA_NAME = "front"
+STATE_SIZE = 8  # of the state that RDT is given: the second finger does what the first does
+GRIPPER_RANGE = {"state_min": 0.0, "state_max": 0.04, "action_min": -1.0, "action_max": 1.0}
 """Ranges of the Panda's finger [m] and of its action."""
-FOLDER = 100  # episodes of a folder of pictures
-TASKS, STATISTICS = "tasks.json", "statistics.json"
+FOLDER_EPISODES = 100  # episodes of a folder of pictures
+TASKS_FILE, STATISTICS_FILE = "tasks.json", "statistics.json"
 
 
-def export(
+def export_rdt(
     folder: Path,
     out: Path,
     *,
-    scenes: Sequence[int],
+    backgrounds: Sequence[int],
     pixels: int = 128,
     pool: Workers | None = None,
     say: Callable[[str], None] = lambda text: None,
@@ -46,51 +47,53 @@ def export(
     Args:
         folder: A dataset of :func:`intsim.data.generate.generate`.
         out: Folder that is made.
-        scenes: Backgrounds that are rendered, at least one; each makes an episode of its own.
+        backgrounds: Numbers of those that are rendered, at least one; each makes an episode of its own.
         pixels: Width and height of the pictures.
         pool: Where pictures are rendered that the dataset does not have yet.
         say: Called with a line after each episode.
 
     Returns:
-        The content of tasks.json: by task its ``instruction``, another sentence for it in ``instructions``, and ``episodes``.
+        The content of tasks.json: by task its ``instruction``, all sentences for it in ``instructions``, and how many
+        ``episodes``.
 
     Raises:
-        CutcalError: A package or the renderer is missing, no background is named, the folder is taken or holds no dataset.
+        CutcalError: A package or the renderer is missing, no background is named, the folder is taken or holds no
+            dataset.
     """
-    check_pictured(out, scenes, "RDT's input", "PIL")
+    check_pictured_target(out, backgrounds, "RDT's input", "PIL")
     from PIL import Image
 
     tasks: dict[str, dict[str, Any]] = {}
-    for view in views(folder, scenes, pixels, pool, say):
-        name = task_of(view.stored.about["food"], view.stored.about["task"])
+    for episode in export_episodes(folder, backgrounds, pixels, pool, say):
+        name = task_name(episode.stored.entry["food"], episode.stored.entry["task"])
         home = out / name / "motionplanning"
-        known = tasks.setdefault(name, {"instruction": view.sentence, "instructions": [], "episodes": 0})
-        known["instructions"] = sorted({*known["instructions"], *view.stored.about["instructions"]})
+        known = tasks.setdefault(name, {"instruction": episode.sentence, "instructions": [], "episodes": 0})
+        known["instructions"] = sorted({*known["instructions"], *episode.stored.entry["instructions"]})
         k = known["episodes"]
-        shown = home / str(k // FOLDER) / str(k % FOLDER)
+        shown = home / str(k // FOLDER_EPISODES) / str(k % FOLDER_EPISODES)
         try:
             shown.mkdir(parents=True)
-            _trajectory(home / f"{name}.h5", k, view)
-            for step, picture in enumerate(view.pictures[CAMERA], 1):
+            _trajectory(home / f"{name}.h5", k, episode)
+            for step, picture in enumerate(episode.pictures[CAMERA_NAME], 1):
                 stream = io.BytesIO()
                 Image.fromarray(picture).save(stream, "PNG")
                 (shown / f"{step}.png").write_bytes(stream.getvalue())
         except OSError as e:
             raise OutputError(f"{home}: cannot be written ({e}); free some space and export again elsewhere") from None
         known["episodes"] = k + 1
-    (out / STATISTICS).write_text(json.dumps(_statistics(folder), indent=1) + "\n", encoding="utf-8")
-    (out / TASKS).write_text(json.dumps(tasks, indent=1) + "\n", encoding="utf-8")
+    (out / STATISTICS_FILE).write_text(json.dumps(_statistics(folder), indent=1) + "\n", encoding="utf-8")
+    (out / TASKS_FILE).write_text(json.dumps(tasks, indent=1) + "\n", encoding="utf-8")
     return tasks
 
 
-def _trajectory(path: Path, k: int, view: View) -> None:
+def _trajectory(path: Path, k: int, episode: ExportEpisode) -> None:
     """Add a trajectory to the file of its task."""
-    stored = view.stored.group
+    stored = episode.stored.group
     with h5py.File(path, "a") as file:
         group = file.create_group(f"traj_{k}")
         for name in ("actions", "obs/agent/qpos"):
             group.create_dataset(name, data=stored[name][()], compression="gzip", shuffle=True)
-        group.attrs["scene"], group.attrs["sentence"] = view.scene, view.sentence
+        group.attrs["scene"], group.attrs["sentence"] = episode.background, episode.sentence
 
 
 def _statistics(folder: Path) -> dict[str, list[float]]:
@@ -98,15 +101,15 @@ def _statistics(folder: Path) -> dict[str, list[float]]:
     ends: dict[str, list[float]] = {}
     for stored in trajectories(folder):
         for kind, name in (("state", "obs/agent/qpos"), ("action", "actions")):
-            values = stored.group[name][()][:, :JOINTS]
+            values = stored.group[name][()][:, :STATE_SIZE]
             for end, pick in (("min", np.min), ("max", np.max)):
                 before = ends.get(f"{kind}_{end}")
                 now = pick(values, axis=0)
                 ends[f"{kind}_{end}"] = (now if before is None else pick([before, now], axis=0)).astype(float).tolist()
-    return {name: [*values[:-1], GRIPPER[name]] for name, values in ends.items()}
+    return {name: [*values[:-1], GRIPPER_RANGE[name]] for name, values in ends.items()}
 
 
-def task_of(food: str, task: Mapping[str, Any]) -> str:
+def task_name(food: str, task: Mapping[str, Any]) -> str:
     """Name of a task: one for all sentences that ask for the same cut of the same food."""
     if task["pieces"]:
         return f"{food}-in_{task['pieces']}"

@@ -1,7 +1,7 @@
-"""Export as RLDS, the TFDS layout that OpenVLA and Octo read; needs the extras ``[data]`` and ``[robot]``, and Vulkan, but no TensorFlow.
+"""Export as RLDS, the TFDS layout that OpenVLA and Octo read; needs the extras ``[data]`` and ``[robot]``, and Vulkan.
 
-A record is a ``tf.train.Example`` for each episode, its steps end to end, written here by hand: a message of one map from names to lists, and
-TFRecord's frame of length and checksum. The force is not in it.
+It needs no TensorFlow. A record is a ``tf.train.Example`` for each episode, its steps end to end, written here by hand:
+a message of one map from names to lists, and TFRecord's frame of length and checksum. The force is not in it.
 """
 
 from __future__ import annotations
@@ -16,36 +16,36 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from calib.simulation.workers import Workers
-from intsim.data.lerobot import columns
-from intsim.data.pictures import VIEWS
-from intsim.data.views import View, check_pictured, views
+from intsim.data.cameras import CAMERA_NAMES
+from intsim.data.export_episodes import ExportEpisode, check_pictured_target, export_episodes
+from intsim.data.lerobot import episode_columns
 
-NAME, VERSION = "cutcal", "1.0.0"
-VALIDATION = 20  # every so many-th trajectory is kept for validation
-QUALITY = 95  # of the JPEG pictures
-MASK = 0xA282EAD8  # of TFRecord's checksums
-CLASS = "tensorflow_datasets.core.features."
+DATASET_NAME, DATASET_VERSION = "cutcal", "1.0.0"
+VALIDATION_STRIDE = 20  # every so many-th trajectory is kept for validation
+JPEG_QUALITY = 95  # of the JPEG pictures
+CRC_MASK = 0xA282EAD8  # of TFRecord's checksums
+FEATURE_CLASS = "tensorflow_datasets.core.features."
 
 
-def export(
+def export_rlds(
     folder: Path,
     out: Path,
     *,
-    scenes: Sequence[int],
+    backgrounds: Sequence[int],
     pixels: int = 128,
     pool: Workers | None = None,
     say: Callable[[str], None] = lambda text: None,
 ) -> dict[str, Any]:
     """Write ``cutcal/1.0.0`` with the splits train and val.
 
-    Each step has the observation (pictures ``image``, ``side_image``, ``wrist_image`` and ``state``: x y z roll pitch yaw pad gripper), the action
-    (change of pose [m, rad] and gripper), reward, discount, the flags of its place, and the sentence. ``val`` are whole trajectories, before every
-    background.
+    Each step has the observation, the action (change of pose [m, rad] and gripper), reward, discount, the flags of its
+    place, and the sentence. The observation is the pictures ``image``, ``side_image`` and ``wrist_image``, and
+    ``state``: x y z roll pitch yaw pad gripper. ``val`` are whole trajectories, before every background.
 
     Args:
         folder: A dataset of :func:`intsim.data.generate.generate`.
         out: Folder that is made.
-        scenes: Backgrounds that are rendered, at least one.
+        backgrounds: Numbers of those that are rendered, at least one.
         pixels: Width and height of the pictures.
         pool: Where pictures are rendered that the dataset does not have yet.
         say: Called with a line after each episode.
@@ -54,27 +54,37 @@ def export(
         The content of dataset_info.json.
 
     Raises:
-        CutcalError: A package or the renderer is missing, no background is named, the folder is taken or holds no dataset.
+        CutcalError: A package or the renderer is missing, no background is named, the folder is taken or holds no
+            dataset.
     """
-    check_pictured(out, scenes, "RLDS", "google_crc32c", "PIL")
-    shown = views(folder, scenes, pixels, pool, say)
-    home = out / NAME / VERSION
+    check_pictured_target(out, backgrounds, "RLDS", "google_crc32c", "PIL")
+    shown = export_episodes(folder, backgrounds, pixels, pool, say)
+    home = out / DATASET_NAME / DATASET_VERSION
     home.mkdir(parents=True)
     counts, sizes = {"train": 0, "val": 0}, {"train": 0, "val": 0}
     files = {split: (home / _file(split)).open("wb") for split in counts}
     try:
-        for view in shown:
-            split = "val" if view.stored.about["index"] % VALIDATION == VALIDATION - 1 else "train"
-            sizes[split] += write_record(files[split], example(episode(view)))
+        for episode in shown:
+            last = episode.stored.entry["index"] % VALIDATION_STRIDE == VALIDATION_STRIDE - 1
+            split = "val" if last else "train"
+            sizes[split] += write_record(files[split], encode_example(episode_lists(episode)))
             counts[split] += 1
     finally:
         for file in files.values():
             file.close()
     for split in [s for s, n in counts.items() if n == 0]:
         (home / _file(split)).unlink()
-    info = {
-        "name": NAME,
-        "version": VERSION,
+    info = _info(counts, sizes)
+    (home / "dataset_info.json").write_text(json.dumps(info, indent=2) + "\n", encoding="utf-8")
+    (home / "features.json").write_text(json.dumps(features(pixels), indent=2) + "\n", encoding="utf-8")
+    return info
+
+
+def _info(counts: Mapping[str, int], sizes: Mapping[str, int]) -> dict[str, Any]:
+    """Content of dataset_info.json, from the number of episodes and bytes of each split."""
+    return {
+        "name": DATASET_NAME,
+        "version": DATASET_VERSION,
         "description": "Cuts of food by a simulated Panda, told in words.",
         "fileFormat": "tfrecord",
         "splits": [
@@ -88,25 +98,22 @@ def export(
             if n
         ],
     }
-    (home / "dataset_info.json").write_text(json.dumps(info, indent=2) + "\n", encoding="utf-8")
-    (home / "features.json").write_text(json.dumps(features(pixels), indent=2) + "\n", encoding="utf-8")
-    return info
 
 
 def _file(split: str) -> str:
-    return f"{NAME}-{split}.tfrecord-00000-of-00001"
+    return f"{DATASET_NAME}-{split}.tfrecord-00000-of-00001"
 
 
-def episode(view: View) -> dict[str, list[bytes] | np.ndarray]:
+def episode_lists(episode: ExportEpisode) -> dict[str, list[bytes] | np.ndarray]:
     """The lists of one episode by name."""
-    found = columns(view.stored)
+    found = episode_columns(episode.stored)
     n = len(found["timestamp"])
-    step = np.arange(n)
+    step, index = np.arange(n), episode.stored.entry["index"]
     out: dict[str, list[bytes] | np.ndarray] = {
-        f"steps/observation/{name}": [_jpeg(picture) for picture in view.pictures[camera]]
-        for camera, name in zip(VIEWS, ("image", "side_image", "wrist_image"), strict=True)
+        f"steps/observation/{name}": [_jpeg(picture) for picture in episode.pictures[camera]]
+        for camera, name in zip(CAMERA_NAMES, ("image", "side_image", "wrist_image"), strict=True)
     }
-    done = (step == n - 1) & bool(view.stored.about["success"])
+    done = (step == n - 1) & bool(episode.stored.entry["success"])
     return out | {
         "steps/observation/state": found["observation.state"],
         "steps/action": found["action"],
@@ -115,8 +122,8 @@ def episode(view: View) -> dict[str, list[bytes] | np.ndarray]:
         "steps/is_first": step == 0,
         "steps/is_last": step == n - 1,
         "steps/is_terminal": done,
-        "steps/language_instruction": [view.sentence.encode()] * n,
-        "episode_metadata/file_path": [f"trajectory {view.stored.about['index']}, background {view.scene}".encode()],
+        "steps/language_instruction": [episode.sentence.encode()] * n,
+        "episode_metadata/file_path": [f"trajectory {index}, background {episode.background}".encode()],
     }
 
 
@@ -124,11 +131,11 @@ def _jpeg(picture: np.ndarray) -> bytes:
     from PIL import Image
 
     stream = io.BytesIO()
-    Image.fromarray(picture).save(stream, format="JPEG", quality=QUALITY)
+    Image.fromarray(picture).save(stream, format="JPEG", quality=JPEG_QUALITY)
     return stream.getvalue()
 
 
-def example(lists: Mapping[str, list[bytes] | np.ndarray]) -> bytes:
+def encode_example(lists: Mapping[str, list[bytes] | np.ndarray]) -> bytes:
     """A ``tf.train.Example`` as protocol buffer: bytes, floats, or integers and flags by name."""
     entries = b""
     for name, values in lists.items():
@@ -167,16 +174,16 @@ def _checksum(content: bytes) -> bytes:
     import google_crc32c
 
     crc = google_crc32c.value(content)
-    return struct.pack("<I", ((crc >> 15 | crc << 17) + MASK) & 0xFFFFFFFF)
+    return struct.pack("<I", ((crc >> 15 | crc << 17) + CRC_MASK) & 0xFFFFFFFF)
 
 
 def features(pixels: int) -> dict[str, Any]:
     """Content of features.json: what TFDS builds its reader from."""
     picture = {
-        "pythonClassName": CLASS + "image_feature.Image",
+        "pythonClassName": FEATURE_CLASS + "image_feature.Image",
         "image": {"shape": _shape(pixels, pixels, 3), "dtype": "uint8", "encodingFormat": "jpeg"},
     }
-    text = {"pythonClassName": CLASS + "text_feature.Text", "text": {}}
+    text = {"pythonClassName": FEATURE_CLASS + "text_feature.Text", "text": {}}
     observation = {"image": picture, "side_image": picture, "wrist_image": picture, "state": _tensor("float32", 8)}
     flags = {name: _tensor("bool") for name in ("is_first", "is_last", "is_terminal")}
     steps = {
@@ -188,7 +195,7 @@ def features(pixels: int) -> dict[str, Any]:
         "language_instruction": text,
     }
     sequence = {"feature": _dictionary(steps), "length": "-1"}
-    dataset = {"pythonClassName": CLASS + "dataset_feature.Dataset", "sequence": sequence}
+    dataset = {"pythonClassName": FEATURE_CLASS + "dataset_feature.Dataset", "sequence": sequence}
     return _dictionary({"steps": dataset, "episode_metadata": _dictionary({"file_path": text})})
 
 
@@ -198,8 +205,11 @@ def _shape(*sizes: int) -> dict[str, Any]:
 
 def _tensor(kind: str, *sizes: int) -> dict[str, Any]:
     name = "tensor_feature.Tensor" if sizes else "scalar.Scalar"
-    return {"pythonClassName": CLASS + name, "tensor": {"shape": _shape(*sizes), "dtype": kind, "encoding": "none"}}
+    return {
+        "pythonClassName": FEATURE_CLASS + name,
+        "tensor": {"shape": _shape(*sizes), "dtype": kind, "encoding": "none"},
+    }
 
 
 def _dictionary(parts: Mapping[str, Any]) -> dict[str, Any]:
-    return {"pythonClassName": CLASS + "features_dict.FeaturesDict", "featuresDict": {"features": dict(parts)}}
+    return {"pythonClassName": FEATURE_CLASS + "features_dict.FeaturesDict", "featuresDict": {"features": dict(parts)}}

@@ -9,12 +9,17 @@
     control/command (T, 5)             commanded pose of the edge
     control/delta (T, 7)               commanded pose less the present one: x, y, z [m], roll, pitch, yaw [rad], gripper
     control/phase (T,)                 approach 0, contact 1, cut 2, hold 3, retract 4
-    mpm/force (T, 5, 3)                force of the food on the knife, world axes [N], in each step of the robot's physics (100 Hz)
-    mpm/force_control, mpm/impulse (T, 3)   their mean [N], and the impulse so far [N s]
-    mpm/touching, severed, published (T,)   mpm/uncut (T,) part of the section that holds, mpm/pieces (T,)
-    mpm/surface/C/step (F,), vertices (F, m, 3), triangles (t, 3), flesh (m,)   food under the knife in cut C, half precision [m], less
-                                       the attribute origin (3,); flesh tells the face of the cut; attribute food: which one
-    attributes of mpm: food, material (JSON), material_sha256, solver_sha256, knife, arm, contact_step (-1 without contact)
+    mpm/force (T, 5, 3)                force of the food on the knife, world axes [N], in each step of the robot's
+                                       physics (100 Hz)
+    mpm/force_control, impulse (T, 3)  their mean [N], and the impulse so far [N s]
+    mpm/touching, severed, published (T,)
+    mpm/uncut, pieces (T,)             part of the section that holds, pieces of the food
+    mpm/surface/C                      food under the knife in cut C; attribute food: which one
+        step (F,)                      steps after which it was kept
+        vertices (F, m, 3)             half precision [m], less the attribute origin (3,)
+        triangles (t, 3), flesh (m,)   flesh tells the face of the cut
+    attributes of mpm: food, material (JSON), material_sha256, solver_sha256, knife, arm,
+        contact_step (-1 without contact)
 
 ``shard-0000.json`` beside it lists environment and episodes as ManiSkill's does: seeds, sentences, task, success.
 The force is in no group that a loader of observations or actions reads.
@@ -34,77 +39,80 @@ import numpy as np
 
 from calib.errors import OutputError
 from calib.io.folder import finite
-from intsim.data.demonstrate import OPEN, Track
-from intsim.task.planner import PHASES, RATE
+from intsim.data.demonstrate import Demonstration
+from intsim.task.planner import CONTROL_RATE, GRIPPER_CLOSED, PHASES
 from intsim.task.targets import Item
 from mpm.files import replacing, write_atomic
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
-SHARD = "shard-{:04d}"
-PART = "part-{:06d}.h5"  # an episode whose shard is not complete
-ABOUT = "about"  # attribute of such a file: the entry in the JSON file
-META = "dataset.json"
+SHARD_NAME = "shard-{:04d}"
+EPISODE_PART = "part-{:06d}.h5"  # an episode whose shard is not complete
+ENTRY_ATTRIBUTE = "about"  # attribute of such a file: the entry in the JSON file
 
 
-def pack(track: Track, about: Mapping[str, Any], mpm: Mapping[str, Any]) -> bytes:
+def pack_episode(demo: Demonstration, entry: Mapping[str, Any], mpm: Mapping[str, Any]) -> bytes:
     """An episode as the bytes of an HDF5 file with the content of its group.
 
     Args:
-        track: What was done.
-        about: Its entry in the JSON file.
+        demo: What was done.
+        entry: Its entry in the JSON file.
         mpm: Attributes of its group ``mpm``.
+
+    Returns:
+        The bytes.
     """
     stream = io.BytesIO()
     with h5py.File(stream, "w") as file:
-        file.attrs[ABOUT] = json.dumps(finite(dict(about)))
-        n = len(track.action)
-        force = np.array(track.force, np.float32).reshape(n, -1, 3)
+        file.attrs[ENTRY_ATTRIBUTE] = json.dumps(finite(dict(entry)))
+        n = len(demo.action)
+        force = np.array(demo.force, np.float32).reshape(n, -1, 3)
         mean = force.mean(axis=1)
-        command, edge = np.array(track.command), np.array(track.edge)
+        command, edge = np.array(demo.command), np.array(demo.edge)
         change = command - edge[:-1]
-        delta = np.column_stack([change[:, :3], np.zeros(n), change[:, 4], change[:, 3], np.full(n, OPEN)])
+        gripper = np.full(n, GRIPPER_CLOSED)
+        delta = np.column_stack([change[:, :3], np.zeros(n), change[:, 4], change[:, 3], gripper])
         last = np.arange(n) == n - 1
         columns = {
-            "actions": np.array(track.action, np.float32),
-            "obs/agent/qpos": np.array(track.qpos, np.float32),
-            "obs/agent/qvel": np.array(track.qvel, np.float32),
+            "actions": np.array(demo.action, np.float32),
+            "obs/agent/qpos": np.array(demo.qpos, np.float32),
+            "obs/agent/qvel": np.array(demo.qvel, np.float32),
             "obs/extra/edge": edge.astype(np.float32),
-            "success": np.array(track.published) & np.array(track.severed),
+            "success": np.array(demo.published) & np.array(demo.severed),
             "terminated": np.zeros(n, bool),
             "truncated": last,
             "control/command": command.astype(np.float32),
             "control/delta": delta.astype(np.float32),
-            "control/phase": np.array([PHASES.index(p) for p in track.phase], np.int8),
+            "control/phase": np.array([PHASES.index(p) for p in demo.phase], np.int8),
             "mpm/force": force,
             "mpm/force_control": mean,
-            "mpm/impulse": np.cumsum(mean, axis=0) / np.float32(RATE),
-            "mpm/touching": np.array(track.touching),
-            "mpm/uncut": np.array(track.uncut, np.float32),
-            "mpm/pieces": np.array(track.pieces, np.int16),
-            "mpm/severed": np.array(track.severed),
-            "mpm/published": np.array(track.published),
+            "mpm/impulse": np.cumsum(mean, axis=0) / np.float32(CONTROL_RATE),
+            "mpm/touching": np.array(demo.touching),
+            "mpm/uncut": np.array(demo.uncut, np.float32),
+            "mpm/pieces": np.array(demo.pieces, np.int16),
+            "mpm/severed": np.array(demo.severed),
+            "mpm/published": np.array(demo.published),
         }
         for name, values in columns.items():
             file.create_dataset(name, data=values, compression="gzip", shuffle=True)
-        _surface(file, track)
-        touched = np.flatnonzero(track.touching)
+        _surface(file, demo)
+        touched = np.flatnonzero(demo.touching)
         attributes = {**mpm, "contact_step": int(touched[0]) if len(touched) else -1}
         for name, value in attributes.items():
             file["mpm"].attrs[name] = value
     return stream.getvalue()
 
 
-def _surface(file: h5py.File, track: Track) -> None:
+def _surface(file: h5py.File, demo: Demonstration) -> None:
     """The food's surface in each step of a cut; each cut has triangles of its own."""
     cuts: list[list[int]] = []
-    for k, (step, which, points, _, _) in enumerate(track.meshes):
-        before = track.meshes[k - 1] if k else None
+    for k, (step, which, points, _, _) in enumerate(demo.meshes):
+        before = demo.meshes[k - 1] if k else None
         if before is None or before[0] != step - 1 or before[1] != which or len(before[2]) != len(points):
             cuts.append([])
         cuts[-1].append(k)
     for n, frames in enumerate(cuts):
         group = file.create_group(f"mpm/surface/{n}")
-        shown = [track.meshes[k] for k in frames]
+        shown = [demo.meshes[k] for k in frames]
         group.attrs["food"] = shown[0][1]
         group["step"] = np.array([s[0] for s in shown], np.int32)
         origin = shown[0][2].mean(axis=0)
@@ -117,7 +125,7 @@ def _surface(file: h5py.File, track: Track) -> None:
         group.create_dataset("flesh", data=shown[0][4])
 
 
-def keep(path: Path, content: bytes) -> None:
+def write_part(path: Path, content: bytes) -> None:
     """Write a file whole or not at all.
 
     Raises:
@@ -129,8 +137,8 @@ def keep(path: Path, content: bytes) -> None:
         raise OutputError(f"{path}: cannot be written ({e.strerror}); what was made before is there") from None
 
 
-def put_together(
-    path: Path, parts: Sequence[Path], beside: Callable[[list[dict[str, Any]]], None] = lambda about: None
+def merge_parts(
+    path: Path, parts: Sequence[Path], beside: Callable[[list[dict[str, Any]]], None] = lambda entries: None
 ) -> None:
     """Make one file of several, each of them the group ``traj_k`` of it; a kill leaves them or the file.
 
@@ -151,9 +159,9 @@ def put_together(
                         group = file.create_group(f"traj_{k}")
                         for child in own:
                             own.copy(child, group)
-                        for key in set(own.attrs) - {ABOUT}:
+                        for key in set(own.attrs) - {ENTRY_ATTRIBUTE}:
                             group.attrs[key] = own.attrs[key]
-                        listed.append(json.loads(own.attrs.get(ABOUT, "{}")))
+                        listed.append(json.loads(own.attrs.get(ENTRY_ATTRIBUTE, "{}")))
             beside(listed)
         for part in parts:
             part.unlink()
@@ -164,31 +172,43 @@ def put_together(
 def write_shard(out: Path, number: int, indices: Sequence[int], env_info: Mapping[str, Any]) -> None:
     """Put episodes together, in order, and remove their parts.
 
+    Args:
+        out: Folder of the dataset.
+        number: Of the shard.
+        indices: Numbers of its trajectories.
+        env_info: What the JSON file says of the environment.
+
     Raises:
         OutputError: The disk is full, or the like.
     """
-    path = out / f"{SHARD.format(number)}.h5"
+    path = out / f"{SHARD_NAME.format(number)}.h5"
     head = {"env_info": dict(env_info), "source_type": "motionplanning", "source_desc": "cutcal"}
 
     def beside(listed: list[dict[str, Any]]) -> None:
         text = json.dumps(
-            {**head, "episodes": [{"episode_id": k, **about} for k, about in enumerate(listed)]}, indent=1
+            {**head, "episodes": [{"episode_id": k, **entry} for k, entry in enumerate(listed)]}, indent=1
         )
         path.with_suffix(".json").write_text(text + "\n", encoding="utf-8")
 
-    put_together(path, [out / PART.format(index) for index in indices], beside)
+    merge_parts(path, [out / EPISODE_PART.format(index) for index in indices], beside)
 
 
 @dataclass(frozen=True, eq=False)
-class Stored:
-    """One trajectory of a dataset. Attributes: group, open while it is looked at; about, its entry in the JSON file; number of its shard."""
+class StoredTrajectory:
+    """One trajectory of a dataset.
+
+    Attributes:
+        group: Its group in the HDF5 file, open while it is looked at.
+        entry: What the JSON file says of it.
+        shard: Number of its shard.
+    """
 
     group: h5py.Group
-    about: dict[str, Any]
+    entry: dict[str, Any]
     shard: int = 0
 
 
-def shards_of(folder: Path) -> list[Path]:
+def shard_paths(folder: Path) -> list[Path]:
     """The shards in a folder, in order.
 
     Raises:
@@ -202,12 +222,12 @@ def shards_of(folder: Path) -> list[Path]:
     return shards
 
 
-def number_of(shard: Path) -> int:
+def shard_number(shard: Path) -> int:
     """The number in the name of a shard: those before it may still be missing."""
     return int(shard.stem.removeprefix("shard-"))
 
 
-def episodes_of(shard: Path) -> list[dict[str, Any]]:
+def shard_entries(shard: Path) -> list[dict[str, Any]]:
     """What the JSON file of a shard says of each trajectory.
 
     Raises:
@@ -220,23 +240,23 @@ def episodes_of(shard: Path) -> list[dict[str, Any]]:
     return listed
 
 
-def trajectories(folder: Path) -> Iterator[Stored]:
+def trajectories(folder: Path) -> Iterator[StoredTrajectory]:
     """All trajectories of the shards in a folder, in order.
 
     Raises:
         OutputError: There is no complete shard, or one is damaged.
     """
-    for path in shards_of(folder):
-        listed = episodes_of(path)
+    for path in shard_paths(folder):
+        listed = shard_entries(path)
         try:
             with h5py.File(path) as file:
-                for about in listed:
-                    yield Stored(file[f"traj_{about['episode_id']}"], about, number_of(path))
+                for entry in listed:
+                    yield StoredTrajectory(file[f"traj_{entry['episode_id']}"], entry, shard_number(path))
         except (OSError, KeyError, ValueError) as e:
             raise OutputError(f"{path}: damaged ({e}); make the dataset again") from None
 
 
-def item_of(listed: dict[str, Any]) -> Item:
+def stored_item(listed: dict[str, Any]) -> Item:
     """A food as a dataset lists it."""
     shape = {name: value for name, value in listed.items() if name not in ("name", "x", "y", "yaw")}
     return Item(listed["name"], Shape(**shape), listed["x"], listed["y"], listed["yaw"])

@@ -1,30 +1,23 @@
-"""Who moves the knife: one ``act(obs, instruction)``; oracles that test the evaluation, and a policy that knows nothing."""
+"""Built-in policies: oracles that test the evaluation, and a policy that knows nothing."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from intsim.task.language import parse
-from intsim.task.planner import HOME, plan
+from intsim.task.language import parse_instruction
+from intsim.task.planner import GRIPPER_CLOSED, HOME, PRESS, BladeDescent, plan_cut
+from intsim.task.rollout import Policy
 from intsim.task.targets import CutSpec, Item, TaskError, boxed_target, target
 
-OPEN = 0.0  # of the gripper: closed on the handle
-SHORT = 7e-3
-"""Height at which the shallow oracle stops [m]: what 12.5 N, the paper's banana, leave of a cut under ManiSkill's arm (0.57 mm/N)."""
+SHALLOW_HEIGHT = 7e-3
+"""Height at which the shallow oracle stops [m].
 
-
-class Policy(Protocol):
-    """What an evaluation needs of a policy."""
-
-    def reset(self, seed: int) -> None:
-        """A new episode begins."""
-
-    def act(self, obs: dict[str, Any], instruction: str) -> np.ndarray | None:
-        """The next change of pose x, y, z [m], roll, pitch, yaw [rad] and gripper, shape (7,); None when it has done what it was told."""
+It is what 12.5 N, the paper's banana, leave of a cut under ManiSkill's arm, which gives way by 0.57 mm per N.
+"""
 
 
 class Oracle:
@@ -34,10 +27,8 @@ class Oracle:
         sigma: Standard deviation of the place along the food [m].
         wrong_side: Measure from the other end.
         wrong_item: Cut another food where there is one.
-        depth: Height of the edge at the end of each cut [m].
-        hold: Time that it is held there [s].
-        style: Of :func:`intsim.task.planner.plan`.
         boxed: Know the food's bounding box alone, as the published planner does.
+        descent: How it brings the blade down.
     """
 
     def __init__(
@@ -46,13 +37,11 @@ class Oracle:
         sigma: float = 0.0,
         wrong_side: bool = False,
         wrong_item: bool = False,
-        depth: float = 0.0,
-        hold: float = 0.0,
-        style: str = "press",
         boxed: bool = False,
+        descent: BladeDescent = PRESS,
     ) -> None:
         self.sigma, self.wrong_side, self.wrong_item, self.boxed = sigma, wrong_side, wrong_item, boxed
-        self.depth, self.hold, self.style = depth, hold, style
+        self.descent = descent
         self.reset(0)
 
     def reset(self, seed: int) -> None:
@@ -66,15 +55,12 @@ class Oracle:
         """The next step of the plan; a new one after each cut of several."""
         if not self._todo:
             self._plan(obs, instruction)
-        if not self._todo:
-            return None
-        change = self._todo.pop(0) - obs["pose"]
-        return np.array([*change[:3], 0.0, change[4], change[3], OPEN])
+        return step_towards(self._todo.pop(0), obs["pose"]) if self._todo else None
 
     def _plan(self, obs: dict[str, Any], instruction: str) -> None:
         items: tuple[Item, ...] = obs["items"]
         if self._spec is None:
-            self._spec = parse(instruction, [i.name for i in items])
+            self._spec = parse_instruction(instruction, [i.name for i in items])
         if self._cuts == self._spec.cuts:
             return
         self._cuts += 1
@@ -89,13 +75,11 @@ class Oracle:
         if self.wrong_side and not self._spec.pieces:
             along = -along
         along += self.sigma * float(self._rng.standard_normal())
-        path = plan(
-            item, along, style=self.style, start=obs["pose"], yaw=yaw, place=place, depth=self.depth, hold=self.hold
-        )
-        self._todo = list(path.pose)
+        planned = plan_cut(item, along, self.descent, start=obs["pose"], yaw=yaw, place=place)
+        self._todo = list(planned.pose)
 
 
-class Wanderer:
+class RandomPolicy:
     """Moves at random around its home: what success without any knowledge looks like."""
 
     def __init__(self) -> None:
@@ -111,10 +95,13 @@ class Wanderer:
     def act(self, obs: dict[str, Any], instruction: str) -> np.ndarray | None:
         """The next step, whatever it was told."""
         del instruction
-        if not self._todo:
-            return None
-        change = self._todo.pop(0) - obs["pose"]
-        return np.array([*change[:3], 0.0, change[4], change[3], OPEN])
+        return step_towards(self._todo.pop(0), obs["pose"]) if self._todo else None
+
+
+def step_towards(goal: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    """The action (7,) that brings the edge from one pose (5,) to another [m, rad], the gripper closed."""
+    change = goal - pose
+    return np.array([*change[:3], 0.0, change[4], change[3], GRIPPER_CLOSED])
 
 
 POLICIES: dict[str, tuple[Callable[[float], Policy], str]] = {
@@ -122,19 +109,26 @@ POLICIES: dict[str, tuple[Callable[[float], Policy], str]] = {
     "noisy": (lambda sigma: Oracle(sigma=sigma), "misses the place along the food by a normal error (--sigma)"),
     "wrong-side": (lambda sigma: Oracle(wrong_side=True), "takes left for right"),
     "wrong-item": (lambda sigma: Oracle(wrong_item=True), "cuts another food where there is one"),
-    "shallow": (lambda sigma: Oracle(depth=SHORT), "stops 7 mm above the board"),
+    "shallow": (lambda sigma: Oracle(descent=BladeDescent(depth=SHALLOW_HEIGHT)), "stops 7 mm above the board"),
     "overdrive": (
-        lambda sigma: Oracle(depth=-0.03, hold=0.5),
+        lambda sigma: Oracle(descent=BladeDescent(depth=-0.03, hold=0.5)),
         "commands the edge 30 mm into the board and holds it for half a second",
     ),
     "boxed": (lambda sigma: Oracle(boxed=True), "knows the bounding box alone, as the published planner does"),
-    "random": (lambda sigma: Wanderer(), "comes down somewhere"),
+    "random": (lambda sigma: RandomPolicy(), "comes down somewhere"),
 }
 """Policies by name, each from a standard deviation [m], and what they do."""
 
 
-def make(name: str, sigma: float = 0.01) -> Policy:
+def make_policy(name: str, sigma: float = 0.01) -> Policy:
     """A policy by its name.
+
+    Args:
+        name: One of :data:`POLICIES`.
+        sigma: Standard deviation of the noisy oracle's place along the food [m].
+
+    Returns:
+        A policy that no episode has begun with.
 
     Raises:
         TaskError: There is none of this name.

@@ -7,9 +7,10 @@ HTTP, a JSON document each way:
     POST /act     {"instruction": ..., "pose": [x, y, z, yaw, pitch], "joints": [9 numbers] or null,
                    "images": {camera: PNG in base64}} -> {"actions": [[...], ...], "done": false}
 
-``pose`` actions have 7 numbers: change of x, y, z [m], roll, pitch, yaw [rad] from where the edge is, and the gripper; ``joints`` have 8: joint targets
-[rad] and the gripper. All actions of an answer are carried out, one in each step of control, before the next question. Foods are not sent:
-what a policy may know of them is in the pictures.
+``pose`` actions have 7 numbers: change of x, y, z [m], roll, pitch, yaw [rad] from where the edge is, and the gripper.
+``joints`` actions have 8: joint targets [rad] and the gripper. The gripper stays closed, whatever is sent: the knife is
+fixed to the hand. All actions of an answer are carried out, one in each control step, before the next question. Foods
+are not sent: what a policy may know of them is in the pictures.
 """
 
 from __future__ import annotations
@@ -26,19 +27,19 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 PROTOCOL = 1
-NUMBERS = {"pose": 7, "joints": 8}
+ACTION_SIZES = {"pose": 7, "joints": 8}
 """Kinds of action, and how many numbers each has."""
-PATIENCE_S = 600.0  # until an answer; the first one may load a network
-LARGEST = 100_000_000  # bytes of a question
+ANSWER_TIMEOUT_S = 600.0  # until an answer; the first one may load a network
+MAX_REQUEST_BYTES = 100_000_000  # bytes of a question
 
 
 class Model(Protocol):
     """What a server asks: a policy as its authors' code has it.
 
-    Attributes: name; action, a kind of :data:`NUMBERS`; cameras, the pictures it wants.
+    Attributes: name; action, a kind of :data:`ACTION_SIZES`; cameras, the pictures it wants.
     """
 
     name: str
@@ -51,7 +52,17 @@ class Model(Protocol):
     def act(
         self, instruction: str, pose: np.ndarray, joints: np.ndarray | None, images: dict[str, np.ndarray]
     ) -> np.ndarray:
-        """The next actions (n, 7 or 8); pictures are (h, w, 3), 8 bits."""
+        """The next actions.
+
+        Args:
+            instruction: What is asked for, in words.
+            pose: Pose of the edge x, y, z [m], yaw and tilt [rad], shape (5,).
+            joints: Arm and fingers [rad, m], shape (9,); None on the plain table.
+            images: Pictures by camera, from 0 to 255 [-], shape (h, w, 3) each.
+
+        Returns:
+            Actions one after the other [m, rad], shape (n, 7) or (n, 8); none when it is done.
+        """
 
 
 class Remote:
@@ -65,11 +76,11 @@ class Remote:
         CutcalError: Nothing answers there, or something else.
     """
 
-    def __init__(self, address: str, patience: float = PATIENCE_S) -> None:
+    def __init__(self, address: str, patience: float = ANSWER_TIMEOUT_S) -> None:
         self.address, self.patience = address.rstrip("/"), patience
         about = self._ask("about", None)
         kind = about.get("action")
-        if about.get("protocol") != PROTOCOL or kind not in NUMBERS:
+        if about.get("protocol") != PROTOCOL or kind not in ACTION_SIZES:
             raise CutcalError(f"--server {address}: is no policy server of protocol {PROTOCOL} ({str(about)[:80]})")
         self.name, self.action, self.cameras = str(about.get("name")), str(kind), list(about.get("cameras", []))
         self._todo: list[np.ndarray] = []
@@ -96,7 +107,7 @@ class Remote:
                     "instruction": instruction,
                     "pose": np.asarray(obs["pose"], float).tolist(),
                     "joints": None if joints is None else np.asarray(joints, float).tolist(),
-                    "images": {name: packed(self._image(obs, name)) for name in self.cameras},
+                    "images": {name: encode_png(self._image(obs, name)) for name in self.cameras},
                 },
             )
             self._done = bool(answer.get("done"))
@@ -108,8 +119,8 @@ class Remote:
             image: np.ndarray = obs["images"][name]
         except KeyError:
             raise CutcalError(
-                f"--server {self.address}: {self.name} wants pictures of the camera {name!r}; evaluate it with --world intsim and "
-                "--pixels N, which needs Vulkan"
+                f"--server {self.address}: {self.name} wants pictures of the camera {name!r}; evaluate it with "
+                "--world intsim and --pixels N, which needs Vulkan"
             ) from None
         return image
 
@@ -119,10 +130,10 @@ class Remote:
             actions = np.array(given, float)
         except (TypeError, ValueError):
             actions = np.empty(0)
-        if actions.ndim != 2 or actions.shape[1] != NUMBERS[self.action] or not np.isfinite(actions).all():
+        if actions.ndim != 2 or actions.shape[1] != ACTION_SIZES[self.action] or not np.isfinite(actions).all():
             raise CutcalError(
-                f"--server {self.address}: {self.name} answers with actions {str(given)[:80]}; {self.action} actions are rows of "
-                f"{NUMBERS[self.action]} finite numbers"
+                f"--server {self.address}: {self.name} answers with actions {str(given)[:80]}; "
+                f"{self.action} actions are rows of {ACTION_SIZES[self.action]} finite numbers"
             )
         return list(actions)
 
@@ -144,7 +155,7 @@ class Remote:
         return found
 
 
-def packed(image: np.ndarray) -> str:
+def encode_png(image: np.ndarray) -> str:
     """A picture (h, w, 3) as PNG in base64."""
     from PIL import Image
 
@@ -153,8 +164,8 @@ def packed(image: np.ndarray) -> str:
     return base64.b64encode(stream.getvalue()).decode()
 
 
-def unpacked(text: str) -> np.ndarray:
-    """A picture (h, w, 3) from :func:`packed`."""
+def decode_png(text: str) -> np.ndarray:
+    """A picture (h, w, 3) from :func:`encode_png`."""
     from PIL import Image
 
     return np.array(Image.open(io.BytesIO(base64.b64decode(text))).convert("RGB"))
@@ -196,7 +207,7 @@ class _Handler(BaseHTTPRequestHandler):
         """Reset, or act."""
         try:
             size = int(self.headers.get("Content-Length", 0))
-            if not 0 < size <= LARGEST:
+            if not 0 < size <= MAX_REQUEST_BYTES:
                 raise ValueError(f"a question of {size} bytes")
             asked = json.loads(self.rfile.read(size))
             answer = self._answer(asked)
@@ -215,7 +226,7 @@ class _Handler(BaseHTTPRequestHandler):
             if pose.shape != (5,) or not all(math.isfinite(v) for v in pose):
                 raise ValueError(f"pose {asked['pose']}; five finite numbers")
             joints = None if asked.get("joints") is None else np.array(asked["joints"], float)
-            images = {name: unpacked(text) for name, text in asked["images"].items()}
+            images = {name: decode_png(text) for name, text in asked["images"].items()}
             actions = np.atleast_2d(model.act(str(asked["instruction"]), pose, joints, images))
             return {"actions": actions.tolist() if actions.size else [], "done": actions.size == 0}
         return None

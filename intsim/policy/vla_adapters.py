@@ -1,10 +1,11 @@
-"""Published vision-language-action models as servers of :mod:`intsim.policy.remote`: RDT, Octo and OpenVLA, each loaded by its authors' own code.
+"""Published vision-language-action models as servers of :mod:`intsim.policy.remote`: RDT, Octo and OpenVLA.
 
     python -m intsim.policy.vla_adapters openvla --weights runs/openvla-cutcal --key cutcal --port 8000
     cutcal evaluate --policy remote --server http://127.0.0.1:8000 --world intsim --pixels 256
 
-Each runs in an environment of its own, with the packages that its authors ask for and a GPU; the evaluation runs in another. They have to be fine-tuned on an
-export of ``cutcal dataset`` first: none has seen a knife. No weights are loaded in the tests, where stand-ins take the place of the packages.
+Each is loaded by its authors' own code and runs in an environment of its own, with the packages that they ask for and a
+GPU; the evaluation runs in another. They have to be fine-tuned on an export of ``cutcal dataset`` first: none has seen
+a knife. No weights are loaded in the tests, where stand-ins take the place of the packages.
 """
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ from typing import Any
 import numpy as np
 
 from intsim.policy.remote import Model, Server
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
-FRONT = "front"  # the picture that all three are given
-STRIDE = 4  # RDT's actions are interpolated four times finer than its control
+FRONT_CAMERA = "front"  # the picture that all three are given
+ACTION_STRIDE = 4  # RDT's actions are interpolated four times finer than its control
 HISTORY = 2  # pictures that RDT and Octo remember
-PRIMARY, WRIST = 256, 128  # sizes of Octo's pictures
+PRIMARY_PIXELS, WRIST_PIXELS = 256, 128  # sizes of Octo's pictures
 
 
 class OpenVLA:
@@ -38,7 +39,7 @@ class OpenVLA:
     """
 
     name, action = "openvla", "pose"
-    cameras: Sequence[str] = (FRONT,)
+    cameras: Sequence[str] = (FRONT_CAMERA,)
 
     def __init__(self, weights: str, key: str, device: str = "cuda:0") -> None:
         import torch
@@ -56,11 +57,21 @@ class OpenVLA:
     def act(
         self, instruction: str, pose: np.ndarray, joints: np.ndarray | None, images: dict[str, np.ndarray]
     ) -> np.ndarray:
-        """One action, (1, 7)."""
+        """Ask for one action.
+
+        Args:
+            instruction: What is asked for, in words.
+            pose: Pose of the edge x, y, z [m], yaw and tilt [rad], shape (5,); not used.
+            joints: Arm and fingers [rad, m], shape (9,); not used.
+            images: Pictures by camera, from 0 to 255 [-], shape (h, w, 3) each.
+
+        Returns:
+            Change of pose [m, rad] and gripper, shape (1, 7).
+        """
         from PIL import Image
 
         asked = f"In: What action should the robot take to {instruction.lower()}?\nOut:"
-        given = self.processor(asked, Image.fromarray(images[FRONT])).to(self.device, dtype=self.kind)
+        given = self.processor(asked, Image.fromarray(images[FRONT_CAMERA])).to(self.device, dtype=self.kind)
         found = self.network.predict_action(**given, unnorm_key=self.key, do_sample=False)
         return np.asarray(found, float).reshape(1, 7)
 
@@ -74,7 +85,7 @@ class Octo:
     """
 
     name, action = "octo", "pose"
-    cameras: Sequence[str] = (FRONT, "wrist")
+    cameras: Sequence[str] = (FRONT_CAMERA, "wrist")
 
     def __init__(self, weights: str, key: str = "") -> None:
         from octo.model.octo_model import OctoModel
@@ -95,10 +106,23 @@ class Octo:
     def act(
         self, instruction: str, pose: np.ndarray, joints: np.ndarray | None, images: dict[str, np.ndarray]
     ) -> np.ndarray:
-        """Some actions, (n, 7)."""
+        """Ask for some actions.
+
+        Args:
+            instruction: What is asked for, in words.
+            pose: Pose of the edge x, y, z [m], yaw and tilt [rad], shape (5,); not used.
+            joints: Arm and fingers [rad, m], shape (9,); not used.
+            images: Pictures by camera, from 0 to 255 [-], shape (h, w, 3) each.
+
+        Returns:
+            Changes of pose [m, rad] and gripper, shape (n, 7).
+        """
         import jax
 
-        now = {"image_primary": _sized(images[FRONT], PRIMARY), "image_wrist": _sized(images["wrist"], WRIST)}
+        now = {
+            "image_primary": _sized(images[FRONT_CAMERA], PRIMARY_PIXELS),
+            "image_wrist": _sized(images["wrist"], WRIST_PIXELS),
+        }
         self.seen.append(now)
         missing = HISTORY - len(self.seen)
         window = [self.seen[0]] * missing + list(self.seen)
@@ -110,7 +134,9 @@ class Octo:
 
 
 class RDT:
-    """RDT (Liu et al. 2024, arXiv:2410.07864) by the model of its ManiSkill evaluation: two pictures, joints, a row of joint targets.
+    """RDT (Liu et al. 2024, arXiv:2410.07864): two pictures and joints, a row of joint targets.
+
+    It is asked by the model of its authors' ManiSkill evaluation.
 
     Args:
         weights: Checkpoint, .pt or .safetensors.
@@ -120,7 +146,7 @@ class RDT:
     """
 
     name, action = "rdt", "joints"
-    cameras: Sequence[str] = (FRONT,)
+    cameras: Sequence[str] = (FRONT_CAMERA,)
 
     def __init__(
         self,
@@ -158,17 +184,30 @@ class RDT:
     def act(
         self, instruction: str, pose: np.ndarray, joints: np.ndarray | None, images: dict[str, np.ndarray]
     ) -> np.ndarray:
-        """A row of joint targets and gripper, (n, 8)."""
+        """Ask for a row of joint targets.
+
+        Args:
+            instruction: What is asked for, in words.
+            pose: Pose of the edge x, y, z [m], yaw and tilt [rad], shape (5,); not used.
+            joints: Arm and fingers [rad, m], shape (9,).
+            images: Pictures by camera, from 0 to 255 [-], shape (h, w, 3) each.
+
+        Returns:
+            Joint targets [rad] and gripper, shape (n, 8).
+
+        Raises:
+            ValueError: Joints are missing.
+        """
         import torch
         from PIL import Image
 
         if joints is None:
             raise ValueError("joints are missing: RDT is evaluated with --world intsim")
-        self.seen.append(Image.fromarray(images[FRONT]))
+        self.seen.append(Image.fromarray(images[FRONT_CAMERA]))
         shown = [one for picture in self.seen for one in (picture, None, None)]  # its wrist cameras are not there
         own = torch.tensor(joints[None, :-1], dtype=torch.float32)
         found = self.network.step(own, shown, self.words).squeeze(0).cpu().numpy()
-        return np.asarray(found, float)[::STRIDE]
+        return np.asarray(found, float)[::ACTION_STRIDE]
 
 
 def _sized(image: np.ndarray, size: int) -> np.ndarray:
@@ -178,7 +217,7 @@ def _sized(image: np.ndarray, size: int) -> np.ndarray:
     return np.array(Image.fromarray(image).resize((size, size), Image.Resampling.LANCZOS))
 
 
-def make(args: argparse.Namespace) -> Model:
+def load_model(args: argparse.Namespace) -> Model:
     """The model that the command line asks for.
 
     Raises:
@@ -213,7 +252,7 @@ def main(words: Sequence[str] | None = None) -> int:
     p.add_argument("--port", type=int, default=8000, help="(default 8000)")
     args = p.parse_args(words)
     try:
-        server = Server(make(args), args.host, args.port)
+        server = Server(load_model(args), args.host, args.port)
     except (CutcalError, OSError) as e:
         sys.stderr.write(f"error: {e}\n")
         return 1

@@ -1,4 +1,4 @@
-"""The food under a robot's knife: the edge's pose goes in at the rate of the robot's physics, the food's force comes back."""
+"""The food under a robot's knife: the edge's pose goes in, the food's force comes back, step by step."""
 
 from __future__ import annotations
 
@@ -8,28 +8,34 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib.material.food import FoodSpec
-from intsim.sim.severing import cut_place
-from intsim.task.kinematic_table import crossing
-from intsim.task.planner import SPEED
+from intsim.sim.severing import cut_scene_at
+from intsim.task.kinematic_table import axis_crossing
+from intsim.task.planner import DESCENT_SPEED
 from intsim.task.targets import Item
-from mpm.errors import SceneError, SimulationError
 from mpm.live import LiveCut
 from mpm.output.record import ForceRecord
 from mpm.scene import Scene
+from mpm.scene.errors import SceneError, SimulationError
 
-ROOM = 2.0  # empty grid around the food, over half its size: a knife that comes back takes pieces along
-REST = 1e-4  # height at which the edge is on the board [m]
-STANDS = 1e-3  # speed of the edge below which it stands [m/s], a fortieth of that of a press: one end of the blade on the board, say, and the middle above it
-NEAR = 0.01  # height of the edge above the food at which its cut is made ready [m]
-TOUCH = 1e-3  # force from which on the knife touches the food, over the weight of the food [-]
-CELLS = 14
-"""Cells over a food at most. It concerns peach, pear, orange and melon, whose largest force is then off by +1.4, +1.1, +0.5 and -2.0 % of that of default
-cells (those of a screening run: +2.5, +1.5, +3.2 and +2.0 %), their work by +1.1, +0.5, +0.9 and -1.3 %."""
-DRAWN = 1.0  # way along the edge over the way down that a scene is made ready for [-]
+GRID_MARGIN = 2.0  # empty grid around the food, over half its size: a knife that comes back takes pieces along
+ON_BOARD_HEIGHT = 1e-4  # height at which the edge is on the board [m]
+STALL_SPEED = 1e-3
+"""Speed of the edge below which it stands [m/s], a fortieth of that of a press.
+
+It stands above the board where one end of the blade, say, is on the board and the middle hangs.
+"""
+READY_CLEARANCE = 0.01  # height of the edge above the food at which its cut is made ready [m]
+TOUCH_FORCE = 1e-3  # force from which on the knife touches the food, over the weight of the food [-]
+MAX_CELLS = 14
+"""Cells over height and width of a food at most: large foods have larger cells, which save much time.
+
+What that does to the force: docs/robot.md, "The dataset".
+"""
+READY_SLICE_RATIO = 1.0  # way along the edge over the way down that a scene is made ready for [-]
 
 
 @dataclass(frozen=True, eq=False)
-class Done:
+class FinishedCut:
     """A cut that has ended.
 
     Attributes:
@@ -52,19 +58,26 @@ class Done:
 class Coupling:
     """Foods on a table and one knife; each cut in its turn is followed by the cutting solver.
 
-    The solver's blade stays in the plane in which it came down, across the food's axis: the way of the knife down is passed on, and where
-    it ``draws`` its way along the edge and its tilt are too; its way across the blade is not, nor the tilt elsewhere, and both are
-    recorded as ``aside`` and ``pitch``. The force has no component across the blade either: of two even halves it has none. A second cut is one of the whole outline at its
-    place. A cut ends when nothing holds any more and the edge rests on the board or turns back, or stands and the food is in pieces: those that
-    lie free are no longer followed. A knife that goes on being pressed or drawn would take them off the grid. It also ends when the knife is above the food again, or the simulation breaks down. It begins only from above: a food
-    that is met from its side is not cut.
+    The solver's blade stays in the plane in which it came down, across the food's axis. The way of the knife down is
+    passed on, and where it ``draws`` its way along the edge and its tilt are too. Its way across the blade is not, nor
+    the tilt elsewhere: both are recorded as ``aside`` and ``pitch``. The force has no component across the blade
+    either: of two even halves it has none. A second cut is one of the whole outline at its place.
+
+    A cut begins only from above: a food that is met from its side is not cut. It ends
+
+    * when nothing holds any more and the edge rests on the board or turns back,
+    * when nothing holds any more, the edge stands, and the food is in pieces: those that lie free are no longer
+      followed, because a knife that goes on being pressed or drawn would take them off the grid,
+    * when the knife is above the food again,
+    * or when the simulation breaks down.
 
     Args:
         items: The foods.
         foods: Their properties, by name.
         knife: Name of the knife.
-        coarse: Cells of a screening run, of a large food larger ones (:data:`CELLS`).
-        draws: Whether the knife is drawn along its edge or rocks; without it the food has a mirror plane more and costs half.
+        coarse: Cells of a screening run, of a large food larger ones (:data:`MAX_CELLS`).
+        draws: Whether the knife is drawn along its edge or rocks; without it the food has a mirror plane more and costs
+            half.
         speed: Usual speed of the descent [m/s].
 
     Attributes:
@@ -72,7 +85,8 @@ class Coupling:
         live: The cut that goes on, or None.
         done: Cuts that have ended.
         force: Force of the food on the knife, world axes [N], shape (3,).
-        torque: Of the food on the knife about :meth:`point`, world axes [N m], shape (3,): what tilts the edge; 0 unless it ``draws``.
+        torque: Of the food on the knife about :meth:`point`, world axes [N m], shape (3,): what tilts the edge; 0
+            unless it ``draws``.
         impulse: Impulse of the food on the knife so far [N s], shape (3,).
         touching: Whether the food presses on the knife.
         aside, pitch: Largest way across the blade [m] and tilt [rad] of the knife since a cut began.
@@ -86,12 +100,12 @@ class Coupling:
         knife: str = "kitchen",
         coarse: bool = True,
         draws: bool = False,
-        speed: float = SPEED,
+        speed: float = DESCENT_SPEED,
     ) -> None:
         self.items, self.foods = list(items), foods
         self.knife, self.coarse, self.draws, self.speed = knife, coarse, draws, speed
         self.live: LiveCut | None = None
-        self.done: list[Done] = []
+        self.done: list[FinishedCut] = []
         self.force, self.torque, self.impulse, self.touching = np.zeros(3), np.zeros(3), np.zeros(3), False
         self.aside = self.pitch = 0.0
         self._which, self._along, self._begin = 0, 0.0, np.zeros(5)
@@ -121,8 +135,11 @@ class Coupling:
         return self.force
 
     def point(self, pose: np.ndarray) -> np.ndarray:
-        """Where the food's force acts on the knife, beside :attr:`torque`: on the edge, above the food's axis; where it ``draws`` the point
-        of the edge that was above it when the cut began [m], shape (3,)."""
+        """Where the food's force acts on the knife, beside :attr:`torque` [m], shape (3,).
+
+        It is on the edge, above the food's axis; where the knife ``draws`` the point of the edge that was above the
+        axis when the cut began.
+        """
         if not self.draws:
             return np.array([*self.items[self._which].at(self._along), pose[2]])
         edge, tilt = self._lying(pose)
@@ -130,8 +147,12 @@ class Coupling:
         return np.array([*(pose[:2] + off * np.cos(tilt) * edge), pose[2] + off * np.sin(tilt)])
 
     def mesh(self) -> tuple[int, np.ndarray, np.ndarray, np.ndarray] | None:
-        """The food under the knife: its place in ``items``, vertices in the world [m] (m, 3), triangles (t, 3), and which vertices lie on
-        the face of the cut (m,); None while no cut goes on."""
+        """The food under the knife; None while no cut goes on.
+
+        Returns:
+            Its place in ``items``, vertices in the world [m] (m, 3), triangles (t, 3), and which vertices lie on the
+            face of the cut (m,).
+        """
         if self.live is None or not self.live.begun:
             return None
         points, triangles, flesh = self.live.surface()
@@ -153,9 +174,9 @@ class Coupling:
             return
         record = live.record()
         if live.status != "done" or record.pieces is None:
-            found = Done(item, self._along, None, 1.0, record, f"the simulation stopped: {live.status}")
+            found = FinishedCut(item, self._along, None, 1.0, record, f"the simulation stopped: {live.status}")
         else:
-            found = Done(item, self._along, record.pieces.complete, live.uncut, record, record.pieces.words())
+            found = FinishedCut(item, self._along, record.pieces.complete, live.uncut, record, record.pieces.words())
         self.done.append(found)
         if found.severed:
             self.items[self._which] = item.cut_at(self._along)
@@ -167,9 +188,9 @@ class Coupling:
             k: pose[2] - item.shape.height - item.shape.width / 2 * abs(np.tan(pose[4]))
             for k, item in enumerate(self.items)
         }
-        self._ready |= {k for k in over if over[k] > NEAR}
-        down = [k for k in sorted(self._ready) if over[k] <= NEAR]
-        met = [(k, along) for k in down if (along := crossing(self.items[k], pose)) is not None]
+        self._ready |= {k for k in over if over[k] > READY_CLEARANCE}
+        down = [k for k in sorted(self._ready) if over[k] <= READY_CLEARANCE]
+        met = [(k, along) for k in down if (along := axis_crossing(self.items[k], pose)) is not None]
         self._ready -= {k for k in down if over[k] < 0}
         if met:
             self._which, self._along = met[0]
@@ -179,17 +200,21 @@ class Coupling:
             try:
                 self.live = LiveCut(self._scene(item, self._along))
             except SceneError as e:
-                self.done.append(Done(item, self._along, None, 1.0, None, str(e)))
+                self.done.append(FinishedCut(item, self._along, None, 1.0, None, str(e)))
 
     def _scene(self, item: Item, along: float) -> Scene:
         """The cut of a food there."""
-        cells = CELLS if self.coarse else None
-        scene = cut_place(item, along, self.foods[item.name], knife=self.knife, coarse=self.coarse, cells=cells)
-        motion = replace(scene.motion, speed=self.speed, slice_ratio=DRAWN if self.draws else 0.0)
-        return replace(scene, motion=motion, numerics=replace(scene.numerics, room=ROOM))
+        cells = MAX_CELLS if self.coarse else None
+        scene = cut_scene_at(item, along, self.foods[item.name], knife=self.knife, coarse=self.coarse, cells=cells)
+        motion = replace(scene.motion, speed=self.speed, slice_ratio=READY_SLICE_RATIO if self.draws else 0.0)
+        return replace(scene, motion=motion, numerics=replace(scene.numerics, room=GRID_MARGIN))
 
     def _lying(self, pose: np.ndarray) -> tuple[np.ndarray, float]:
-        """Direction of the edge as the cut began, along x of the cut's scene, shape (2,), and how much its end there is risen [rad]."""
+        """How the edge lies in the cut's scene.
+
+        Returns:
+            Its direction as the cut began, along x of the scene, shape (2,), and how much its end there is risen [rad].
+        """
         edge = np.array([np.cos(self._begin[3]), np.sin(self._begin[3])])
         edge *= np.sign(edge @ self.items[self._which].across)
         same = edge @ [np.cos(pose[3]), np.sin(pose[3])] > 0  # an edge has two directions
@@ -221,16 +246,21 @@ class Coupling:
         self.force = np.array([*(along * edge), up])
         self.torque = self.live.moment * np.array([edge[1], -edge[0], 0.0])
         weight = self.live.weight
-        self.touching = bool(np.linalg.norm(self.force) > TOUCH * weight)
-        above = pose[2] > item.shape.height + NEAR and (self.live.begun or pose[2] > self._begin[2] + NEAR)
+        self.touching = bool(np.linalg.norm(self.force) > TOUCH_FORCE * weight)
+        above = pose[2] > item.shape.height + READY_CLEARANCE and (
+            self.live.begun or pose[2] > self._begin[2] + READY_CLEARANCE
+        )
         if above or (
             self.live.begun and self.live.uncut == 0 and self._through(before - self.live.height, pose[2], span)
         ):
             self.end()
 
     def _through(self, down: float, height: float, span: float) -> bool:
-        """Whether an edge that has passed the whole section is done: in a span of time it went ``down`` as far as the board let it, to ``height`` [m]."""
+        """Whether an edge that has passed the whole section is done.
+
+        In a span of time [s] it went ``down`` as far as the board let it, to ``height`` [m].
+        """
         assert self.live is not None
-        if height < REST or down < 0:
+        if height < ON_BOARD_HEIGHT or down < 0:
             return True
-        return down < STANDS * span and self.live.pieces().complete
+        return down < STALL_SPEED * span and self.live.pieces().complete

@@ -1,7 +1,8 @@
-"""IntSim: a ManiSkill environment in which a Panda cuts food that the cutting solver simulates; needs the extra ``[robot]``.
+"""IntSim: a ManiSkill environment in which a Panda cuts food of the cutting solver; needs the extra ``[robot]``.
 
-The robot's physics (100 Hz) and the solver take turns: the solver follows the edge to where the robot has brought it, and the mean force of that
-interval acts on the knife in the next. Without a renderer it runs all the same, and gives states.
+The robot's physics (100 Hz) and the solver take turns: the solver follows the edge to where the robot has brought it,
+and the mean force of that interval acts on the knife in the next. Without a renderer it runs all the same, and gives
+states.
 """
 
 from __future__ import annotations
@@ -20,28 +21,31 @@ from mani_skill.utils.registration import register_env
 from mani_skill.utils.structs.types import SimConfig
 
 from calib.material.food import FoodSpec, load_food
+from intsim.sim.background import Background
 from intsim.sim.coupling import Coupling
-from intsim.sim.panda import BASE, BLADE, EDGE, Kinematics, PandaKnife, pose_of
+from intsim.sim.panda import BASE_POSITION, BLADE_LINK, EDGE_LINK, Kinematics, PandaKnife, edge_pose
 from intsim.sim.scenery import Scenery
-from intsim.task.kinematic_table import Table
-from intsim.task.planner import HOME, RATE
-from intsim.task.success import judge
-from intsim.task.suites import FOODS, Episode, draw
+from intsim.sim.world import ENV_ID, EPISODE_STEPS
+from intsim.task.kinematic_table import KinematicTable
+from intsim.task.planner import CONTROL_RATE, HOME
+from intsim.task.success import judge_geometry
+from intsim.task.suites import FOODS, Episode, sample_episode
 from intsim.task.targets import CAMERAS
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
-PHYSICS = 100  # steps of the robot's physics a second
-STEPS = 400  # of an episode, at most
+PHYSICS_RATE = 100  # steps of the robot's physics a second
 PIXELS, HUMAN_PIXELS = 128, 512
 
 
-@register_env("CutFood-v1", max_episode_steps=STEPS)
+@register_env(ENV_ID, max_episode_steps=EPISODE_STEPS)
 class CutFoodEnv(BaseEnv):
     """Cut the food that the instruction names, where it says.
 
-    ``reset(seed=...)`` draws the task from a suite; ``reset(options={"episode": episode})`` sets one, with
-    ``draws`` beside it for that episode alone. ``instruction`` is the sentence of the
-    episode. The force of the food is in ``info`` and not among the observations: a real arm of this kind does not feel it.
+    ``reset(seed=...)`` draws the task from a suite; ``reset(options={"episode": episode})`` sets one, with ``draws``
+    beside it for that episode alone. ``instruction`` is the sentence of the episode. The force of the food is in
+    ``info`` and not among the observations: a real arm of this kind does not feel it.
+
+    Its arguments are keywords of ``gymnasium.make``, which is why they are no object.
 
     Args:
         suite: Name in :data:`intsim.task.suites.SUITES`.
@@ -51,9 +55,10 @@ class CutFoodEnv(BaseEnv):
         coarse: Cells of a screening run.
         draws: Whether the knife is drawn along its edge and tilted in the solver as well.
         stiffness, damping: Of the arm's joints [N m/rad, N m s/rad]; ManiSkill's own without it.
-        criterion: What ``info["success"]`` is: ``published`` for the four published criteria, ``severed`` for pieces in the solver too.
+        criterion: What ``info["success"]`` is: ``published`` for the four published criteria, ``severed`` for pieces in
+            the solver too.
         pixels: Width and height of the cameras' pictures.
-        scenery: Which background, see :mod:`intsim.sim.scenery`.
+        scenery: Which background, see :mod:`intsim.sim.background`.
 
     Attributes:
         solver_s: Time that the solver has taken so far [s].
@@ -84,7 +89,7 @@ class CutFoodEnv(BaseEnv):
         self.suite, self.knife, self.coupled, self.coarse, self.draws = suite, knife, coupled, coarse, draws
         self.foods = dict(foods) if foods is not None else {name: load_food(name) for name in FOODS}
         self.criterion, self.pixels = criterion, pixels
-        self.scenery = Scenery(scenery)
+        self.scenery = Scenery(Background.of(scenery))
         self.solver_s = 0.0
         self._gains = {k: v for k, v in (("arm_stiffness", stiffness), ("arm_damping", damping)) if v is not None}
         self.episode: Episode | None = None
@@ -93,7 +98,7 @@ class CutFoodEnv(BaseEnv):
 
     @property
     def _default_sim_config(self) -> SimConfig:
-        return SimConfig(sim_freq=PHYSICS, control_freq=round(RATE))
+        return SimConfig(sim_freq=PHYSICS_RATE, control_freq=round(CONTROL_RATE))
 
     @property
     def _default_sensor_configs(self) -> list[CameraConfig]:
@@ -123,12 +128,12 @@ class CutFoodEnv(BaseEnv):
         try:  # ManiSkill makes the agent itself, from its class
             for name, value in own.items():
                 setattr(PandaKnife, name, value)
-            super()._load_agent(options, sapien.Pose(p=list(BASE)))
+            super()._load_agent(options, sapien.Pose(p=list(BASE_POSITION)))
         finally:
             for name, value in before.items():
                 setattr(PandaKnife, name, value)
         links = self.agent.robot.links_map
-        self._edge, self._blade = links[EDGE]._objs[0], links[BLADE]._objs[0]
+        self._edge, self._blade = links[EDGE_LINK]._objs[0], links[BLADE_LINK]._objs[0]
         self.kinematics = Kinematics(self.agent.robot)
 
     def _load_scene(self, options: dict[str, Any]) -> None:
@@ -140,17 +145,17 @@ class CutFoodEnv(BaseEnv):
     def _initialize_episode(self, env_idx: torch.Tensor, options: dict[str, Any]) -> None:
         del env_idx
         seed = int(self._episode_seed[0])
-        episode = options.get("episode") or draw(self.suite, seed, self.foods)
+        episode = options.get("episode") or sample_episode(self.suite, seed, self.foods)
         self.episode = episode
         items = [episode.item, *episode.others]
-        self.table = Table(items)
+        self.table = KinematicTable(items)
         self.coupling = Coupling(
             items, self.foods, knife=self.knife, coarse=self.coarse, draws=options.get("draws", self.draws)
         )
         rest = self.agent.keyframes["rest"].qpos.astype(float)
         joints, _ = self.kinematics.joints(np.array([*HOME, 0.0, 0.0]), rest)
         self.agent.reset(joints)
-        self.agent.robot.set_pose(sapien.Pose(p=list(BASE)))
+        self.agent.robot.set_pose(sapien.Pose(p=list(BASE_POSITION)))
         self._force, self._point = np.zeros(3), np.zeros(3)
         self._forces: list[np.ndarray] = []
         self.scenery.serve(self.scene, items)
@@ -165,7 +170,7 @@ class CutFoodEnv(BaseEnv):
     def pose(self) -> np.ndarray:
         """The edge's middle x, y, z [m], its direction and its angle to the board [rad], shape (5,)."""
         there = self._edge.entity_pose
-        return pose_of(np.array(there.p, float), there.to_transformation_matrix()[:3, 0].astype(float))
+        return edge_pose(np.array(there.p, float), there.to_transformation_matrix()[:3, 0].astype(float))
 
     def _before_control_step(self) -> None:
         self._forces = []
@@ -180,7 +185,7 @@ class CutFoodEnv(BaseEnv):
         pose = self.pose
         if self.coupled:
             began = time.perf_counter()
-            self._force = self.coupling.move(pose, 1 / PHYSICS)
+            self._force = self.coupling.move(pose, 1 / PHYSICS_RATE)
             self.solver_s += time.perf_counter() - began
             self._point = self.coupling.point(pose)
         self._forces.append(self._force)
@@ -197,7 +202,7 @@ class CutFoodEnv(BaseEnv):
         no = torch.zeros(1, dtype=torch.bool)
         info: dict[str, Any] = {"success": no, "published": no, "severed": no}
         if self.table.rollout.pose:
-            judged = judge(self.episode.spec, self.episode.item, self.table.rollout, self.table.items[0])
+            judged = judge_geometry(self.episode.spec, self.episode.item, self.table.rollout, self.table.items[0])
             severed = len(self.coupling.items[0].pieces) > max(self.episode.spec.cuts, 1)
             info["severed"] = torch.tensor([severed])
             published = (

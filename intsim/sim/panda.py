@@ -17,33 +17,36 @@ from mani_skill.agents.robots import Panda
 
 from calib.material.knife import load_knife
 
-SOURCE = Path(PACKAGE_ASSET_DIR) / "robots" / "panda" / "panda_v2.urdf"
-BASE = (-0.615, 0.0, 0.0)  # where ManiSkill's table scenes put the arm [m]
-GRIP = 0.12  # from the hand to the back of the blade [m]: beyond the fingertips
-STEEL = 7850.0  # kg/m^3
-EDGE = "knife_edge"
-BLADE = "knife"
+URDF_SOURCE = Path(PACKAGE_ASSET_DIR) / "robots" / "panda" / "panda_v2.urdf"
+BASE_POSITION = (-0.615, 0.0, 0.0)  # where ManiSkill's table scenes put the arm [m]
+BLADE_OFFSET = 0.12  # from the hand to the back of the blade [m]: beyond the fingertips
+STEEL_DENSITY = 7850.0  # kg/m^3
+EDGE_LINK = "knife_edge"
+BLADE_LINK = "knife"
 
 
 @functools.cache
 def urdf(knife: str, *, visible: bool) -> str:
-    """Path of the robot's description with a blade fixed to its hand, along the hand's x axis, the edge away from the hand.
+    """Path of the robot's description with a blade fixed to its hand.
+
+    The blade lies along the hand's x axis, the edge away from the hand.
 
     Args:
         knife: Name of the knife.
-        visible: Without it all that only a renderer needs is left out: where there is no renderer, its materials cannot be made.
+        visible: Without it all that only a renderer needs is left out: where there is no renderer, its materials cannot
+            be made.
     """
     blade = load_knife(knife)
-    tree = ElementTree.parse(SOURCE)
+    tree = ElementTree.parse(URDF_SOURCE)
     root = tree.getroot()
     for mesh in root.iter("mesh"):
-        mesh.set("filename", str(SOURCE.parent / mesh.get("filename", "")))
+        mesh.set("filename", str(URDF_SOURCE.parent / mesh.get("filename", "")))
     size = (blade.length, blade.spine, blade.height)
-    link = ElementTree.SubElement(root, "link", name=BLADE)
+    link = ElementTree.SubElement(root, "link", name=BLADE_LINK)
     for kind in ("visual", "collision"):
         box = ElementTree.SubElement(ElementTree.SubElement(link, kind), "geometry")
         ElementTree.SubElement(box, "box", size=_numbers(*size))
-    mass = STEEL * float(np.prod(size))
+    mass = STEEL_DENSITY * float(np.prod(size))
     inertial = ElementTree.SubElement(link, "inertial")
     ElementTree.SubElement(inertial, "mass", value=_numbers(mass))
     squares = mass / 12 * np.square(size)
@@ -51,8 +54,8 @@ def urdf(knife: str, *, visible: bool) -> str:
     ElementTree.SubElement(
         inertial, "inertia", {k: _numbers(v) for k, v in (moments | {"ixy": 0.0, "ixz": 0.0, "iyz": 0.0}).items()}
     )
-    ElementTree.SubElement(root, "link", name=EDGE)
-    for child, z in ((BLADE, GRIP + blade.height / 2), (EDGE, GRIP + blade.height)):
+    ElementTree.SubElement(root, "link", name=EDGE_LINK)
+    for child, z in ((BLADE_LINK, BLADE_OFFSET + blade.height / 2), (EDGE_LINK, BLADE_OFFSET + blade.height)):
         joint = ElementTree.SubElement(root, "joint", name=f"{child}_joint", type="fixed")
         ElementTree.SubElement(joint, "origin", rpy="0 0 0", xyz=_numbers(0.0, 0.0, z))
         ElementTree.SubElement(joint, "parent", link="panda_hand")
@@ -82,7 +85,7 @@ class PandaKnife(Panda):
     """A Panda whose end effector is the middle of a knife's edge."""
 
     uid = "panda_knife"
-    ee_link_name = EDGE
+    ee_link_name = EDGE_LINK
     knife, visible = "kitchen", True
     keyframes = {
         "rest": Keyframe(
@@ -97,15 +100,15 @@ class PandaKnife(Panda):
         return urdf(self.knife, visible=self.visible)
 
 
-def rotation(yaw: float, pitch: float = 0.0) -> np.ndarray:
-    """Orientation (3, 3) of a hand that points down, with the edge in this direction, its end risen by the pitch [rad]."""
+def hand_rotation(yaw: float, pitch: float = 0.0) -> np.ndarray:
+    """Orientation (3, 3) of a hand that points down, the edge in a direction and its end risen by a pitch [rad]."""
     c, s, cp, sp = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch)
     x = np.array([c * cp, s * cp, sp])
     y = np.array([s, -c, 0.0])
     return np.stack([x, y, np.cross(x, y)], axis=1)
 
 
-def pose_of(p: np.ndarray, axis: np.ndarray) -> np.ndarray:
+def edge_pose(p: np.ndarray, axis: np.ndarray) -> np.ndarray:
     """The edge's pose x, y, z, yaw, pitch (5,) from its middle and its direction; an edge has no beginning."""
     yaw = float(np.arctan2(axis[1], axis[0]))
     turned = yaw > np.pi / 2 or yaw <= -np.pi / 2
@@ -124,7 +127,7 @@ class Kinematics:
     def __init__(self, robot: Any) -> None:
         own = robot._objs[0]
         self._model = own.create_pinocchio_model()
-        self._link = next(k for k, link in enumerate(own.links) if link.name.endswith(EDGE))
+        self._link = next(k for k, link in enumerate(own.links) if link.name.endswith(EDGE_LINK))
         self._mask = np.array([1] * 7 + [0] * 2)
         self._root = own.pose
 
@@ -132,7 +135,7 @@ class Kinematics:
         """Pose of the edge (5,) in the world that joints (9,) give."""
         self._model.compute_forward_kinematics(joints)
         there = self._root * self._model.get_link_pose(self._link)
-        return pose_of(np.array(there.p, float), there.to_transformation_matrix()[:3, 0].astype(float))
+        return edge_pose(np.array(there.p, float), there.to_transformation_matrix()[:3, 0].astype(float))
 
     def joints(self, pose: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, float]:
         """Joint angles that bring the edge to a pose.
@@ -145,7 +148,7 @@ class Kinematics:
             Joints (9,), and how far the edge is from there [m].
         """
         matrix = np.eye(4)
-        matrix[:3, :3], matrix[:3, 3] = rotation(pose[3], pose[4]), pose[:3]
+        matrix[:3, :3], matrix[:3, 3] = hand_rotation(pose[3], pose[4]), pose[:3]
         goal = self._root.inv() * sapien.Pose(matrix)
         found, _, _ = self._model.compute_inverse_kinematics(
             self._link, goal, initial_qpos=near, active_qmask=self._mask, eps=1e-5, max_iterations=200

@@ -1,8 +1,7 @@
-"""What there is to see beside the robot: board, table, light, and the food as the solver has moved it; needs the extra ``[robot]``."""
+"""What there is to see beside the robot: board, table, light, and the deformed food; needs the extra ``[robot]``."""
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -10,16 +9,16 @@ from typing import Any
 import numpy as np
 import sapien
 
-from intsim.data.manifest import BACKGROUNDS
+from intsim.sim.background import Background
 from intsim.sim.coupling import Coupling
-from intsim.task.targets import Item, TaskError
+from intsim.task.targets import Item
 from mpm.output.surface import half_of
 
-TABLE, BOARD, THICK = (0.8, 1.2), (0.4, 0.5), 0.02  # sizes along x, y and the board's thickness [m]
-AWAY = 3.0  # of the walls from the board [m]
-RING = 3e-3  # distance of the rings of a food's outline beside the cut [m]
+TABLE_SIZE, BOARD_SIZE, THICKNESS = (0.8, 1.2), (0.4, 0.5), 0.02  # sizes along x, y and the board's thickness [m]
+WALL_DISTANCE = 3.0  # of the walls from the board [m]
+OUTLINE_STEP = 3e-3  # distance of the rings of a food's outline beside the cut [m]
 #: Skin and flesh by food, red, green, blue: for the eye only.
-COLOURS = {
+FOOD_COLOURS = {
     "banana": ((0.88, 0.75, 0.2), (0.96, 0.92, 0.72)),
     "cucumber": ((0.15, 0.4, 0.15), (0.8, 0.9, 0.65)),
     "apple": ((0.75, 0.12, 0.12), (0.96, 0.93, 0.8)),
@@ -37,47 +36,33 @@ COLOURS = {
     "cherry": ((0.55, 0.03, 0.1), (0.75, 0.2, 0.25)),
     "potato": ((0.7, 0.55, 0.35), (0.95, 0.9, 0.7)),
 }
-PLAIN = ((0.8, 0.6, 0.4), (0.95, 0.9, 0.8))
+OTHER_COLOURS = ((0.8, 0.6, 0.4), (0.95, 0.9, 0.8))
 
 
 class Scenery:
-    """One background.
+    """What is around the robot before one background.
 
     Args:
-        number: Which, from 0 to 14.
-
-    Raises:
-        TaskError: There is none of this number.
+        background: Colours and light.
     """
 
-    def __init__(self, number: int = 0) -> None:
-        if not 0 <= number < BACKGROUNDS:
-            raise TaskError(f"scenery {number}: give a number from 0 to {BACKGROUNDS - 1}")
-        rng = np.random.default_rng([number, zlib.crc32(b"scenery")])
-        self.number = number
-        plain = number == 0
-        self.table = np.array([0.75, 0.72, 0.68]) if plain else rng.uniform(0.15, 0.95, 3)
-        self.board = np.array([0.72, 0.53, 0.34]) if plain else rng.uniform(0.2, 0.95, 3)
-        self.wall = np.array([0.82, 0.84, 0.86]) if plain else rng.uniform(0.2, 0.95, 3)
-        self.ambient = 0.35 if plain else float(rng.uniform(0.2, 0.5))
-        turn = np.pi / 4 if plain else rng.uniform(0, 2 * np.pi)
-        self.direction = np.array([np.cos(turn), np.sin(turn), -1.0 if plain else -rng.uniform(0.6, 2.0)])
-        self.strength = 1.0 if plain else float(rng.uniform(0.6, 1.6))
+    def __init__(self, background: Background) -> None:
+        self.background = background
         self._foods: list[sapien.Entity] = []
         self._shown: list[Any] = []
 
     def build(self, scene: Any) -> None:
         """Board, its top at z = 0, and table."""
         for name, size, top, colour in (
-            ("board", (*BOARD, THICK), 0.0, self.board),
-            ("table", (*TABLE, THICK), -THICK, self.table),
+            ("board", (*BOARD_SIZE, THICKNESS), 0.0, self.background.board),
+            ("table", (*TABLE_SIZE, THICKNESS), -THICKNESS, self.background.table),
         ):
             builder = scene.create_actor_builder()
             half = [s / 2 for s in size]
             builder.add_box_collision(half_size=half)
             if scene.can_render():
-                builder.add_box_visual(half_size=half, material=material(colour))
-            builder.initial_pose = sapien.Pose(p=[0.0, 0.0, top - THICK / 2])
+                builder.add_box_visual(half_size=half, material=dull_material(colour))
+            builder.initial_pose = sapien.Pose(p=[0.0, 0.0, top - THICKNESS / 2])
             builder.build_kinematic(name=name)
         if scene.can_render():
             for axis in (0, 1):
@@ -87,16 +72,17 @@ class Scenery:
     def _wall(self, scene: Any, axis: int, side: float) -> None:
         """A wall of the room, for the eye only."""
         builder = scene.create_actor_builder()
-        half, place = [AWAY, AWAY, AWAY], [0.0, 0.0, 0.0]
-        half[axis], place[axis] = THICK, side * AWAY
-        builder.add_box_visual(half_size=half, material=material(self.wall))
+        half, place = [WALL_DISTANCE, WALL_DISTANCE, WALL_DISTANCE], [0.0, 0.0, 0.0]
+        half[axis], place[axis] = THICKNESS, side * WALL_DISTANCE
+        builder.add_box_visual(half_size=half, material=dull_material(self.background.wall))
         builder.initial_pose = sapien.Pose(p=place)
         builder.build_kinematic(name=f"wall {axis} {side:+.0f}")
 
     def light(self, scene: Any) -> None:
         """Light of this background."""
-        scene.set_ambient_light([self.ambient] * 3)
-        scene.add_directional_light(self.direction.tolist(), [self.strength] * 3)
+        own = self.background
+        scene.set_ambient_light([own.ambient] * 3)
+        scene.add_directional_light(own.direction.tolist(), [own.strength] * 3)
         scene.add_directional_light([0.0, 0.0, -1.0], [0.6] * 3)
 
     def serve(self, scene: Any, items: Sequence[Item]) -> None:
@@ -127,21 +113,29 @@ class Scenery:
         self.show(which, points, triangles, flesh, coupling.items[which].name)
 
     def show(self, which: int, points: np.ndarray, triangles: np.ndarray, flesh: np.ndarray, name: str) -> None:
-        """Show a food as this mesh: vertices in the world [m] (m, 3), triangles (t, 3), which vertices are flesh (m,)."""
+        """Show a food as a mesh.
+
+        Args:
+            which: Its place among the foods of the episode.
+            points: Vertices in the world [m], shape (m, 3).
+            triangles: Vertices of each triangle, indices [-], shape (t, 3).
+            flesh: Which vertices lie on the face of the cut, truth values [-], shape (m,).
+            name: Food whose colours it has.
+        """
         entity = self._foods[which]
         entity.remove_component(self._shown[which])
         self._shown[which] = _body(points, triangles, flesh, name)
         entity.add_component(self._shown[which])
 
 
-def material(colour: np.ndarray) -> sapien.render.RenderMaterial:
+def dull_material(colour: np.ndarray) -> sapien.render.RenderMaterial:
     """A dull material of a colour."""
     return sapien.render.RenderMaterial(base_color=[*map(float, colour), 1.0], roughness=0.9, specular=0.1)
 
 
 def _whole(item: Item) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Vertices in the world, triangles, and which are flesh, of a food that nothing has touched."""
-    half = half_of(replace(item.shape, cut=0.0), RING)
+    half = half_of(replace(item.shape, cut=0.0), OUTLINE_STEP)
     points = np.concatenate([half.points * [1.0, -1.0, 1.0], half.points])
     triangles = np.concatenate([half.triangles[:, ::-1], half.triangles + len(half.points)])
     return item.placed(points, 0.0), triangles, np.zeros(len(points), bool)
@@ -149,7 +143,7 @@ def _whole(item: Item) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _body(points: np.ndarray, triangles: np.ndarray, flesh: np.ndarray, name: str) -> sapien.render.RenderBodyComponent:
     """What SAPIEN shows of a mesh: a palette of two colours, skin and flesh."""
-    skin, inner = COLOURS.get(name, PLAIN)
+    skin, inner = FOOD_COLOURS.get(name, OTHER_COLOURS)
     palette = np.zeros((2, 4, 4), np.uint8)
     palette[:, :2] = [*(round(255 * c) for c in skin), 255]
     palette[:, 2:] = [*(round(255 * c) for c in inner), 255]

@@ -8,39 +8,43 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from intsim.task.kinematic_table import Rollout, crossing, uncut
-from intsim.task.targets import CutSpec, Item, TaskError, spread, target
+from intsim.task.kinematic_table import axis_crossing
+from intsim.task.rollout import Rollout
+from intsim.task.targets import CutSpec, Item, TaskError, coefficient_of_variation, target
 
-TIP, STRICT_TIP = 0.05, 0.005  # height of the edge above the table that counts as reaching it, published and strict [m]
-ANGLE = math.radians(10.0)  # most that the edge may deviate from across the food
-PLACE = 0.1  # most error of the place, over the size of the food
-EVEN = 0.1  # most spread of the lengths of equal pieces, over their mean
+TIP_HEIGHT, STRICT_TIP_HEIGHT = 0.05, 0.005
+"""Height of the edge above the table that counts as reaching it, published and strict [m]."""
+ANGLE_TOLERANCE = math.radians(10.0)  # most that the edge may deviate from across the food
+PLACE_TOLERANCE = 0.1  # most error of the place, over the size of the food
+CRITERIA = ("tip", "region", "angle", "place", "strict_tip", "count", "even")
+"""All criteria; the first four are published, the last two are of equal pieces alone."""
+LENGTH_VARIATION_LIMIT = 0.1  # most spread of the lengths of equal pieces, over their mean
 
 
 @dataclass(frozen=True)
-class Judged:
-    """What was found.
+class GeometricOutcome:
+    """What geometry says of an episode.
 
     Attributes:
         height: Lowest height of the edge above the table [m].
         angle: Between the edge and across the food, in plan, at the lowest point [rad]; NaN where the food was not met.
         offset: Place of the cut less the one asked for, over the food's length [-]; NaN where it was not met.
         pieces: Pieces of the food at the end, in plain geometry.
-        spread: Standard deviation of the lengths of the pieces over their mean; NaN for one piece.
-        criteria: ``tip``, ``region``, ``angle``, ``place`` as published; ``strict_tip``; for equal pieces ``count`` and ``even``.
+        length_variation: Standard deviation of the lengths of the pieces over their mean; NaN for one piece.
+        criteria: Which of :data:`CRITERIA` are met; ``count`` and ``even`` for equal pieces alone.
     """
 
     height: float
     angle: float
     offset: float
     pieces: int
-    spread: float
+    length_variation: float
     criteria: Mapping[str, bool]
 
     @property
     def published(self) -> bool:
         """The four published criteria together."""
-        return all(self.criteria[name] for name in ("tip", "region", "angle", "place"))
+        return all(self.criteria[name] for name in CRITERIA[:4])
 
     @property
     def strict(self) -> bool:
@@ -48,18 +52,22 @@ class Judged:
         return self.published and all(self.criteria.values())
 
 
-def judge(spec: CutSpec, item: Item, rollout: Rollout, after: Item) -> Judged:
-    """Judge an episode.
+def judge_geometry(spec: CutSpec, item: Item, rollout: Rollout, after: Item) -> GeometricOutcome:
+    """Judge an episode by geometry.
 
-    The published criteria are read so that each fails by itself: the tip's error is its height above the table, the region is the
-    food, the place is along its axis. A tip within 50 mm of the table says nothing of a grape 25 mm high: ``strict_tip`` asks for 5 mm.
-    For equal pieces every cut counts against the piece that was there: the worst angle and place.
+    The published criteria are read so that each fails by itself: the tip's error is its height above the table, the
+    region is the food, the place is along its axis. A tip within 50 mm of the table says nothing of a grape 25 mm high:
+    ``strict_tip`` asks for 5 mm. For equal pieces every cut counts against the piece that was there: the worst angle
+    and place.
 
     Args:
         spec: What was asked for.
         item: The food at the beginning.
         rollout: What happened.
         after: The food at the end.
+
+    Returns:
+        What was found, and which criteria are met.
     """
     poses = np.array(rollout.pose)
     low = int(np.argmin(poses[:, 2]))
@@ -70,24 +78,24 @@ def judge(spec: CutSpec, item: Item, rollout: Rollout, after: Item) -> Judged:
         errors = [_offset(spec, was, along) for was, along in made]
         angles = [_angle(item, rollout, k) for k in range(len(made))]
     else:
-        place = crossing(uncut(item), poses[low])
+        place = axis_crossing(item.whole, poses[low])
         tries = [(item, place)] if place is not None else []
         errors = [_offset(spec, was, along) for was, along in tries]
         angles = [_from_across(item, poses[low])] if tries else []
     offset = max(errors, key=abs) if errors else math.nan
     angle = max(angles) if angles else math.nan
     lengths = [p.length for p in after.pieces]
-    even = spread(lengths) if len(lengths) > 1 else math.nan
+    even = coefficient_of_variation(lengths) if len(lengths) > 1 else math.nan
     criteria = {
-        "tip": height < TIP,
+        "tip": height < TIP_HEIGHT,
         "region": bool(tries),
-        "angle": angle <= ANGLE,
-        "place": abs(offset) <= PLACE,
-        "strict_tip": height < STRICT_TIP,
+        "angle": angle <= ANGLE_TOLERANCE,
+        "place": abs(offset) <= PLACE_TOLERANCE,
+        "strict_tip": height < STRICT_TIP_HEIGHT,
     }
     if spec.pieces:
-        criteria |= {"count": len(lengths) == spec.pieces, "even": even <= EVEN}
-    return Judged(height, angle, offset, len(lengths), even, criteria)
+        criteria |= {"count": len(lengths) == spec.pieces, "even": even <= LENGTH_VARIATION_LIMIT}
+    return GeometricOutcome(height, angle, offset, len(lengths), even, criteria)
 
 
 def _offset(spec: CutSpec, was: Item, along: float) -> float:
@@ -109,13 +117,22 @@ def _from_across(item: Item, pose: np.ndarray) -> float:
 
 def _angle(item: Item, rollout: Rollout, k: int) -> float:
     """Of the k-th cut: the pose in which the edge was lowest while it was down for it."""
-    down = np.array([pose[2] for pose in rollout.pose]) < STRICT_TIP
+    down = np.array([pose[2] for pose in rollout.pose]) < STRICT_TIP_HEIGHT
     starts = np.flatnonzero(down & ~np.concatenate([[False], down[:-1]]))
     return _from_across(item, rollout.pose[starts[min(k, len(starts) - 1)]])
 
 
 def wilson(successes: int, trials: int, z: float = 1.959964) -> tuple[float, float]:
-    """95 % interval of a rate of success (Wilson 1927, J. Am. Stat. Assoc. 22:209)."""
+    """95 % interval of a rate of success (Wilson 1927, J. Am. Stat. Assoc. 22:209).
+
+    Args:
+        successes: Successes.
+        trials: Trials.
+        z: Quantile of the normal distribution at 97.5 % [-].
+
+    Returns:
+        Lower and upper end [-]; 0 and 1 without trials.
+    """
     if trials == 0:
         return 0.0, 1.0
     p, n = successes / trials, trials

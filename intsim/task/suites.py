@@ -11,27 +11,35 @@ import numpy as np
 
 from calib.material.food import FoodSpec, load_foods
 from intsim.task.language import instructions
-from intsim.task.targets import ALONG_VIEW, CutSpec, Item, TaskError
-from mpm.shapes import Shape
+from intsim.task.targets import MIN_VIEW_ANGLE, CutSpec, Item, TaskError
+from mpm.scene.shapes import Shape
 
 FOODS = (
     "banana", "cucumber", "apple", "peach", "melon", "orange", "strawberry", "pear", "kiwi", "tomato", "lemon", "grape",
     "shine_muscat", "plum", "cherry",
 )  # fmt: skip
 """The fifteen foods of the published data set."""
-TEST = 1_000_000
+FIRST_TEST_SEED = 1_000_000
 """First seed of the tests; those of training are below."""
-FRACTIONS = tuple(Fraction(*r) for r in ((1, 2), (1, 3), (1, 4), (1, 6), (2, 3), (3, 4)))
-SCALE = 0.1  # most that a food's size deviates from its usual one, part of it
-REACH_X, REACH_Y = (-0.08, 0.08), (-0.12, 0.12)  # where a food may lie [m]
-ROOM = 0.03  # between foods [m]
-MOST_PIECES = 4
-TRIES = 200
+CUT_RATIOS = tuple(Fraction(*r) for r in ((1, 2), (1, 3), (1, 4), (1, 6), (2, 3), (3, 4)))
+SIZE_VARIATION = 0.1  # most that a food's size deviates from its usual one, part of it
+FOOD_X, FOOD_Y = (-0.08, 0.08), (-0.12, 0.12)  # where a food may lie [m]
+FOOD_SPACING = 0.03  # between foods [m]
+MAX_PIECES = 4
+PLACEMENT_TRIES = 200
 
 
 @dataclass(frozen=True)
 class Episode:
-    """One test. Attributes: suite; seed; spec; item, the food that is meant; others; instruction."""
+    """One task on one table.
+
+    Attributes:
+        suite, seed: Which it is.
+        spec: What is asked for.
+        item: The food that is meant.
+        others: Other foods on the table.
+        instruction: What is asked for, in words.
+    """
 
     suite: str
     seed: int
@@ -41,18 +49,27 @@ class Episode:
     instruction: str
 
 
-def place(food: FoodSpec, rng: np.random.Generator) -> Item:
+def random_item(food: FoodSpec, rng: np.random.Generator) -> Item:
     """A food of a random size, place and direction; its ends can be told apart in the front camera's picture."""
-    scale = 1 + rng.uniform(-SCALE, SCALE)
+    scale = 1 + rng.uniform(-SIZE_VARIATION, SIZE_VARIATION)
     usual = food.to_scene_food().shape
     shape = Shape(usual.kind, scale * usual.length, scale * usual.width, scale * usual.height)
-    turn = math.pi / 2 - 1.2 * ALONG_VIEW
+    turn = math.pi / 2 - 1.2 * MIN_VIEW_ANGLE
     yaw = math.pi / 2 + rng.uniform(-turn, turn)
-    return Item(food.name, shape, float(rng.uniform(*REACH_X)), float(rng.uniform(*REACH_Y)), float(yaw))
+    return Item(food.name, shape, float(rng.uniform(*FOOD_X)), float(rng.uniform(*FOOD_Y)), float(yaw))
 
 
-def crowd(item: Item, foods: dict[str, FoodSpec], count: int, rng: np.random.Generator) -> tuple[Item, ...]:
-    """Other foods beside it, no two of a kind and none touching another.
+def distractors(item: Item, foods: dict[str, FoodSpec], count: int, rng: np.random.Generator) -> tuple[Item, ...]:
+    """Other foods beside one, no two of a kind and none touching another.
+
+    Args:
+        item: The food that is there.
+        foods: Foods that they are taken from, by name.
+        count: How many.
+        rng: Generator of the choice and the places.
+
+    Returns:
+        The other foods.
 
     Raises:
         TaskError: There is no room for them.
@@ -60,12 +77,12 @@ def crowd(item: Item, foods: dict[str, FoodSpec], count: int, rng: np.random.Gen
     names = [n for n in foods if n != item.name]
     rng.shuffle(names)
     out: list[Item] = []
-    for _ in range(TRIES):
+    for _ in range(PLACEMENT_TRIES):
         if len(out) == count:
             break
-        new = place(foods[names[len(out)]], rng)
+        new = random_item(foods[names[len(out)]], rng)
         new = replace(new, x=float(rng.uniform(-0.2, 0.2)), y=float(rng.uniform(-0.35, 0.35)))
-        if all(math.hypot(new.x - o.x, new.y - o.y) > _reach(new) + _reach(o) + ROOM for o in (item, *out)):
+        if all(math.hypot(new.x - o.x, new.y - o.y) > _reach(new) + _reach(o) + FOOD_SPACING for o in (item, *out)):
             out.append(new)
     if len(out) < count:
         raise TaskError(f"suite: no room for {count} foods beside the {item.name}")
@@ -77,7 +94,7 @@ def _reach(item: Item) -> float:
 
 
 def _fraction(rng: np.random.Generator, name: str) -> CutSpec:
-    ratio = FRACTIONS[rng.integers(len(FRACTIONS))]
+    ratio = CUT_RATIOS[rng.integers(len(CUT_RATIOS))]
     side = ("left", "right")[rng.integers(2)]
     return CutSpec(name, ratio, "centre" if ratio == Fraction(1, 2) and rng.random() < 0.5 else side)
 
@@ -87,7 +104,7 @@ def _continuous(rng: np.random.Generator, name: str) -> CutSpec:
 
 
 def _split(rng: np.random.Generator, name: str) -> CutSpec:
-    return CutSpec(name, pieces=int(rng.integers(2, MOST_PIECES + 1)))
+    return CutSpec(name, pieces=int(rng.integers(2, MAX_PIECES + 1)))
 
 
 def _flip(rng: np.random.Generator, name: str) -> CutSpec:
@@ -96,34 +113,43 @@ def _flip(rng: np.random.Generator, name: str) -> CutSpec:
 
 
 @dataclass(frozen=True)
-class Suite:
-    """A kind of test. Attributes: what, in words; task, drawn from a generator for a food; crowd, most other foods; unseen, words that
-    were kept for testing."""
+class TaskSuite:
+    """A kind of task.
+
+    Attributes:
+        what: What it tests, in words.
+        task: Draws what is asked for from a generator, for a food.
+        distractors: Other foods on the table at most.
+        unseen: Whether the sentences are of those that are kept for testing.
+    """
 
     what: str
     task: Callable[[np.random.Generator, str], CutSpec] = _fraction
-    crowd: int = 0
+    distractors: int = 0
     unseen: bool = False
 
 
 SUITES = {
-    "seeds": Suite("places and sizes that training has not seen"),
-    "objects": Suite("other foods on the table", crowd=3),
-    "language": Suite("sentences that training has not seen", unseen=True),
-    "continuous": Suite("any part from 0.1 to 0.9", task=_continuous),
-    "split": Suite("two to four equal pieces", task=_split),
-    "flips": Suite("a quarter and three quarters from either end", task=_flip),
+    "seeds": TaskSuite("places and sizes that training has not seen"),
+    "objects": TaskSuite("other foods on the table", distractors=3),
+    "language": TaskSuite("sentences that training has not seen", unseen=True),
+    "continuous": TaskSuite("any part from 0.1 to 0.9", task=_continuous),
+    "split": TaskSuite("two to four equal pieces", task=_split),
+    "flips": TaskSuite("a quarter and three quarters from either end", task=_flip),
 }
 """Suites by name. Leave one food out by naming it: a suite of a policy that was trained without it."""
 
 
-def draw(suite: str, seed: int, foods: dict[str, FoodSpec]) -> Episode:
-    """The episode of a suite with this seed; the same seed is the same episode.
+def sample_episode(suite: str, seed: int, foods: dict[str, FoodSpec]) -> Episode:
+    """The episode of a suite with a seed; the same seed is the same episode.
 
     Args:
         suite: Name in ``SUITES``.
         seed: From ``TEST`` on for a test.
         foods: Foods that may be asked for, by name.
+
+    Returns:
+        What is on the table, what is asked for, and in which words.
 
     Raises:
         TaskError: No such suite.
@@ -134,12 +160,15 @@ def draw(suite: str, seed: int, foods: dict[str, FoodSpec]) -> Episode:
     rng = np.random.default_rng([seed, *suite.encode()])
     names = list(foods)
     name = names[rng.integers(len(names))]
-    item, spec = place(foods[name], rng), kind.task(rng, name)
+    item, spec = random_item(foods[name], rng), kind.task(rng, name)
     others: tuple[Item, ...] = ()
-    if kind.crowd:
+    if kind.distractors:
         item = replace(item, x=float(np.clip(item.x, -0.05, 0.05)), y=float(np.clip(item.y, -0.05, 0.05)))
-        others = crowd(
-            item, load_foods() if len(foods) <= kind.crowd else foods, int(rng.integers(1, kind.crowd + 1)), rng
+        others = distractors(
+            item,
+            load_foods() if len(foods) <= kind.distractors else foods,
+            int(rng.integers(1, kind.distractors + 1)),
+            rng,
         )
     words = instructions(spec, int(rng.integers(2**31)), unseen=kind.unseen)
     return Episode(suite, seed, spec, item, others, words[0])

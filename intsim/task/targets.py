@@ -9,15 +9,17 @@ from fractions import Fraction
 
 import numpy as np
 
-from mpm.errors import CutcalError
-from mpm.shapes import Shape, half_width, section_area
+from mpm.scene.errors import CutcalError
+from mpm.scene.shapes import Shape, half_width, section_area
 
 SIDES = ("left", "right", "centre")
-ALONG_VIEW = math.radians(15.0)
-"""Least angle between a food's axis and the direction in which the camera looks, seen from above: nearer to it the two ends lie behind
-each other, and left and right say nothing."""
-SAMPLES = 64  # sections from which the volume of a piece is found
-APART = 4e-3  # way that the two sides of a cut slide apart [m]
+MIN_VIEW_ANGLE = math.radians(15.0)
+"""Least angle between a food's axis and the direction in which the camera looks, seen from above [rad].
+
+Nearer to it the two ends lie behind each other, and left and right say nothing.
+"""
+VOLUME_SECTIONS = 64  # sections from which the volume of a piece is found
+CUT_OPENING = 4e-3  # way that the two sides of a cut slide apart [m]
 
 
 class TaskError(CutcalError):
@@ -51,7 +53,12 @@ CAMERAS = {
 
 @dataclass(frozen=True)
 class Piece:
-    """A part of a food along its axis. Attributes: low, high, from where to where in the uncut food; shift, how far it has slid along the axis [m]."""
+    """A part of a food along its axis.
+
+    Attributes:
+        low, high: From where to where in the uncut food [m].
+        shift: How far it has slid along the axis [m].
+    """
 
     low: float
     high: float
@@ -87,6 +94,11 @@ class Item:
             object.__setattr__(self, "pieces", (Piece(-self.shape.length / 2, self.shape.length / 2),))
 
     @property
+    def whole(self) -> Item:
+        """The food before any cut."""
+        return replace(self, pieces=())
+
+    @property
     def axis(self) -> np.ndarray:
         """Direction of its axis, shape (2,)."""
         return np.array([math.cos(self.yaw), math.sin(self.yaw)])
@@ -112,7 +124,15 @@ class Item:
         return np.array([self.x, self.y]) + along * self.axis
 
     def placed(self, points: np.ndarray, along: float) -> np.ndarray:
-        """Points (n, 3) of a cut's scene, whose blade is at ``along``, on the table [m]: x along the blade, y along the food's axis."""
+        """Points of a cut's scene on the table.
+
+        Args:
+            points: In the scene: x along the blade, y along the food's axis, z up [m], shape (n, 3).
+            along: Where along the food's axis the blade is [m].
+
+        Returns:
+            The same points in the world [m], shape (n, 3).
+        """
         plane = self.at(along) + points[:, :1] * self.across + points[:, 1:2] * self.axis
         return np.column_stack([plane, points[:, 2]])
 
@@ -132,7 +152,9 @@ class Item:
         place = along - old.shift
         halves = (Piece(old.low, place, old.shift), Piece(place, old.high, old.shift))
         parts = (*self.pieces[:k], *halves, *self.pieces[k + 1 :])
-        moved = tuple(replace(p, shift=p.shift + (APART / 2 if i > k else -APART / 2)) for i, p in enumerate(parts))
+        moved = tuple(
+            replace(p, shift=p.shift + (CUT_OPENING / 2 if i > k else -CUT_OPENING / 2)) for i, p in enumerate(parts)
+        )
         return replace(self, pieces=moved)
 
     def half_width(self, along: float) -> float:
@@ -144,7 +166,7 @@ class Item:
         """Volumes of its pieces [m^3], from sections."""
         out = []
         for p in self.pieces:
-            places = p.low + (np.arange(SAMPLES) + 0.5) / SAMPLES * p.length
+            places = p.low + (np.arange(VOLUME_SECTIONS) + 0.5) / VOLUME_SECTIONS * p.length
             areas = [section_area(replace(self.shape, cut=float(y))) for y in places]
             out.append(float(np.mean(areas)) * p.length)
         return out
@@ -193,9 +215,10 @@ def from_left(spec: CutSpec, item: Item) -> float:
         TaskError: The axis lies along the direction of view, so that neither end is the left one.
     """
     across = float(item.axis @ CAMERAS[spec.camera].right)
-    if spec.side != "centre" and abs(across) < math.sin(ALONG_VIEW):
+    if spec.side != "centre" and abs(across) < math.sin(MIN_VIEW_ANGLE):
         raise TaskError(
-            f"task: the {item.name} points to the camera {spec.camera!r} ({math.degrees(math.asin(abs(across))):.0f} degrees across its view), "
+            f"task: the {item.name} points to the camera {spec.camera!r} "
+            f"({math.degrees(math.asin(abs(across))):.0f} degrees across its view), "
             "which sees no left and right end; name another camera"
         )
     return 1.0 if across >= 0 else -1.0
@@ -204,8 +227,9 @@ def from_left(spec: CutSpec, item: Item) -> float:
 def target(spec: CutSpec, item: Item) -> float:
     """Where along the axis the next cut has to go, from the middle of the food [m].
 
-    One cut is measured on the whole food. To make equal pieces, the largest that is left is cut so that what comes off is one of
-    as many equal parts as are still to be made of it: from what it has become, not from what was planned for the whole.
+    One cut is measured on the whole food. To make equal pieces, the largest that is left is cut so that what comes off
+    is one of as many equal parts as are still to be made of it: from what it has become, not from what was planned for
+    the whole.
 
     Raises:
         TaskError: As :func:`from_left`, or there is nothing more to cut.
@@ -224,8 +248,8 @@ def target(spec: CutSpec, item: Item) -> float:
 def boxed_target(spec: CutSpec, item: Item) -> tuple[np.ndarray, float]:
     """Where a planner cuts that knows no more than the food's bounding box, as the published one does.
 
-    It measures the ratio along the side of the box that the camera sees across its view, and cuts across that side. The box of a food
-    that is turned is longer or shorter than the food, and its cut is as oblique as the food lies.
+    It measures the ratio along the side of the box that the camera sees across its view, and cuts across that side. The
+    box of a food that is turned is longer or shorter than the food, and its cut is as oblique as the food lies.
 
     Returns:
         Point of the table (2,) [m], and the direction of the edge [rad].
@@ -240,7 +264,7 @@ def boxed_target(spec: CutSpec, item: Item) -> tuple[np.ndarray, float]:
     return whole.at(target(replace(spec, pieces=0), whole)), 0.0 if along_y else math.pi / 2
 
 
-def spread(values: Sequence[float]) -> float:
+def coefficient_of_variation(values: Sequence[float]) -> float:
     """Standard deviation over the mean [-]: 0 for equal pieces."""
     a = np.asarray(values, float)
     return float(a.std() / a.mean())

@@ -26,7 +26,7 @@ WIDTH = 170.0
 #: Widths of forces and picture of the cut where they stand side by side, as a ratio.
 BESIDE = (2.0, 1.0)
 #: A record is drawn with its extremes in this many columns: more than a printer resolves on the page.
-COLUMNS = 900
+ENVELOPE_PARTS = 900
 #: Ratio of the ends of a log axis up to which 1, 2 and 5 of each decade have room for their numbers.
 FEW_DECADES = 1e3
 
@@ -66,9 +66,9 @@ MEASURED: dict[str, Any] = {"color": BLACK, "lw": 1.8}
 SIMULATED: dict[str, Any] = {"color": RED, "lw": 1.8, "dashes": (4.5, 1.4)}
 EDGE: dict[str, Any] = {"color": BLUE, "lw": 1.1, "dashes": (1.2, 1.2)}
 FACE: dict[str, Any] = {"color": GREEN, "lw": 1.1, "dashes": (7.0, 1.6, 1.2, 1.6)}
-BAND: dict[str, Any] = {"facecolor": LIGHT, "edgecolor": GREY, "hatch": "////", "lw": 0.0}
+HATCHED: dict[str, Any] = {"facecolor": LIGHT, "edgecolor": GREY, "hatch": "////", "lw": 0.0}
 PREDICTIVE: dict[str, Any] = {"facecolor": "#ebebeb", "edgecolor": "#a8a8a8", "lw": 0.5}
-NULLS: dict[str, dict[str, Any]] = {
+NULL_STYLES: dict[str, dict[str, Any]] = {
     "ramp_N": {"label": "ramp", "color": BLUE, "lw": 0.8, "dashes": (1.5, 1.5)},
     "half_sine_N": {"label": "half sine", "color": GREEN, "lw": 0.8, "dashes": (8.0, 2.0)},
     "three_term_N": {"label": "three-term", "color": ORANGE, "lw": 0.8, "dashes": (8.0, 2.0, 1.5, 2.0)},
@@ -79,7 +79,7 @@ Curves = Mapping[str, np.ndarray]
 
 
 @dataclass(frozen=True)
-class Record:
+class ConditioningRecord:
     """What the conditioning of a trace is drawn from.
 
     Attributes:
@@ -160,7 +160,7 @@ def predictive(axes: Axes, x: np.ndarray, curves: Curves, low: str, high: str, l
         axes.fill_between(x, curves[low], curves[high], label=label, zorder=0.5, **PREDICTIVE)
 
 
-def conditioning(record: Record, curves: Curves) -> bytes:
+def conditioning(record: ConditioningRecord, curves: Curves) -> bytes:
     """Raw record with baseline, contact and end; the tared record about contact; the filtered curve."""
 
     def draw(figure: Figure) -> None:
@@ -190,7 +190,7 @@ def fit(curves: Curves, noise_sd: float, trace: str) -> bytes:
         if np.max(sim) > 0.0:
             shape.plot(x, sim / np.max(sim), label="simulated, over its own peak", **SIMULATED)
         shape.set_ylabel("force / own peak")
-        residual.axhspan(-noise_sd, noise_sd, label="± 1 sd of one raw sample before contact", **BAND)
+        residual.axhspan(-noise_sd, noise_sd, label="± 1 sd of one raw sample before contact", **HATCHED)
         residual.axhline(0.0, color=BLACK, lw=0.5)
         residual.plot(x, sim - real, color=BLUE, lw=1.3, label=f"simulated − {trace}")
         residual.set_ylabel("residual [N]")
@@ -203,7 +203,7 @@ def fit(curves: Curves, noise_sd: float, trace: str) -> bytes:
     return svg(draw, 76.0)
 
 
-def nulls(curves: Curves, trace: str) -> bytes:
+def null_models(curves: Curves, trace: str) -> bytes:
     """Real and simulated force with the null models and the simulation before the fit."""
 
     def draw(figure: Figure) -> None:
@@ -214,7 +214,7 @@ def nulls(curves: Curves, trace: str) -> bytes:
         axes.plot(x, curves["sim_N"], label="simulated, fitted", **SIMULATED)
         top = 1.5 * max(np.max(curves["real_N"]), np.max(curves["sim_N"]))
         bottom, highest = min(0.0, np.min(curves["real_N"]), np.min(curves["sim_N"])), 0.0
-        for column, look in NULLS.items():
+        for column, look in NULL_STYLES.items():
             y = curves[column]
             if np.all(np.isnan(y)):
                 continue
@@ -254,11 +254,11 @@ def misfit(history: Sequence[tuple[float, float]]) -> bytes:
     return svg(draw, 42.0)
 
 
-def envelope(x: np.ndarray, y: np.ndarray, columns: int = COLUMNS) -> tuple[np.ndarray, np.ndarray]:
+def envelope(x: np.ndarray, y: np.ndarray, columns: int = ENVELOPE_PARTS) -> tuple[np.ndarray, np.ndarray]:
     """A long record with only the lowest and highest sample of each of ``columns`` equal parts, in order.
 
     Args:
-        x, y: Record, shape (n,).
+        x, y: ConditioningRecord, shape (n,).
         columns: Number of parts.
 
     Returns:
@@ -297,7 +297,7 @@ def log_ticks(axis: Axis, low: float, high: float, few: float = FEW_DECADES) -> 
     axis.set_minor_formatter(NullFormatter())
 
 
-def _raw(axes: Axes, r: Record) -> None:
+def _raw(axes: Axes, r: ConditioningRecord) -> None:
     """Raw record over time with what was subtracted and where the cut begins and ends."""
     x, y = envelope(r.time, r.raw)
     axes.plot(x, y, color=BLACK, lw=0.7, label="raw force")
@@ -305,7 +305,7 @@ def _raw(axes: Axes, r: Record) -> None:
     name = "baseline" if r.baseline_kind == "constant" else "air run, shifted"
     axes.plot(bx, by, color=RED, lw=1.2, dashes=(5.0, 2.0), label=name)
     if r.window is not None:
-        axes.axvspan(*r.window, label="baseline window", **BAND)
+        axes.axvspan(*r.window, label="baseline window", **HATCHED)
     _moment(axes, r.onset, r.onset_sd, "contact", BLUE, (1.2, 1.2))
     _moment(axes, r.end, r.end_sd, "end of the downward stroke", GREEN, (7.0, 1.6, 1.2, 1.6))
     axes.set_xlim(float(r.time[0]), float(r.time[-1]))
@@ -322,14 +322,14 @@ def _moment(axes: Axes, at: float, sd: float | None, name: str, color: str, dash
         axes.axvspan(at - sd, at + sd, facecolor=color, alpha=0.25, lw=0.0)
 
 
-def _contact(axes: Axes, r: Record) -> None:
+def _contact(axes: Axes, r: ConditioningRecord) -> None:
     """Tared record around contact."""
     half = max(0.12 * (r.end - r.onset), 4.0 * (r.onset_sd or 0.0))
     inside = (r.time >= r.onset - half) & (r.time <= r.onset + half)
     axes.axhline(0.0, color=BLACK, lw=0.5)
     if np.any(inside):
         few = np.count_nonzero(inside) <= 120
-        axes.plot(*envelope(r.time[inside], r.tared[inside], COLUMNS // 2), color=BLACK, lw=0.8,
+        axes.plot(*envelope(r.time[inside], r.tared[inside], ENVELOPE_PARTS // 2), color=BLACK, lw=0.8,
                   marker="o" if few else None, ms=1.8)  # fmt: skip
     _moment(axes, r.onset, r.onset_sd, "contact", BLUE, (1.2, 1.2))
     axes.set_xlim(r.onset - half, r.onset + half)
@@ -339,7 +339,7 @@ def _contact(axes: Axes, r: Record) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(5))
 
 
-def _filtered(axes: Axes, r: Record, curves: Curves) -> None:
+def _filtered(axes: Axes, r: ConditioningRecord, curves: Curves) -> None:
     """Filtered curve over stroke with the uncertainty of its peak."""
     x, y = 1e3 * curves["stroke_m"], curves["real_N"]
     axes.axhline(0.0, color=BLACK, lw=0.5)

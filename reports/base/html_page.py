@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from calib.errors import OutputError
 from mpm.files import write_atomic
+from mpm.scene.errors import OutputError
 from reports.base.scene_render import COLOURS, EYE, FRAME, INK, STEEL, WOOD, Film, blade_at
 
 PER_METRE = 1e5  # whole numbers of the file in a metre: hundredths of a millimetre

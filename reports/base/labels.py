@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from calib.material.properties import PROPERTIES
 from reports.base.format import breakable, count, listed, quantity
 
 #: Names of the files in words; what is not here loses its underscores.
@@ -20,10 +19,21 @@ WORDS = {
     "unknown": "not determined",
     "paper_table2": "paper, Table 2",
 }
+#: Properties of the material whose names are single words, which no capital changes.
+SYMBOLS = ("rho", "E", "nu", "R", "mu")
 
 
 def shown(x: Any, unit: str, digits: int | None) -> str:
-    """A value or limit of any type as text."""
+    """A value or limit of any type as text.
+
+    Args:
+        x: A number, a flag, a text, a list of these, or None.
+        unit: SI unit of a number, ``-`` where there is none.
+        digits: Significant digits of a number; None for the shortest text.
+
+    Returns:
+        The text; a dash for None.
+    """
     if isinstance(x, bool):
         return "yes" if x else "no"
     if isinstance(x, int) and unit == "-":
@@ -33,18 +43,13 @@ def shown(x: Any, unit: str, digits: int | None) -> str:
     return breakable(listed([str(i) for i in x]) if isinstance(x, list) else str(x))
 
 
-def meaning(name: str) -> str:
-    """What a property of the material is; nothing where the name is not one."""
-    return PROPERTIES[name].meaning if name in PROPERTIES else ""
-
-
 def capital(text: str) -> str:
     """A sentence with a capital, unless it begins with a name: of a property, a file or a column."""
     first = text.split(" ", 1)[0]
-    return text[:1].upper() + text[1:] if first.isalpha() and first not in PROPERTIES else text
+    return text[:1].upper() + text[1:] if first.isalpha() and first not in SYMBOLS else text
 
 
-def words(name: str) -> str:
+def in_words(name: str) -> str:
     """A key of the files in words."""
     return WORDS.get(name, name.replace("_", " "))
 

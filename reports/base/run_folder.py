@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -16,63 +16,19 @@ import numpy as np
 from mpm.output.section import Section
 from reports import ReportError
 
+if TYPE_CHECKING:
+    from calib.calibration.result import CalibrationResult
+
 Data = dict[str, Any]
 
-COLUMNS = ("stroke_m", "real_N", "sim_N", "residual_N", "edge_N", "face_N", "start_N", "ramp_N",
-           "half_sine_N", "three_term_N")  # fmt: skip
+CURVE_COLUMNS = ("stroke_m", "real_N", "sim_N", "residual_N", "edge_N", "face_N", "start_N", "ramp_N",
+                 "half_sine_N", "three_term_N")  # fmt: skip
 #: These must be finite; a part of the simulation or a null model may be missing (NaN).
-COMPLETE = COLUMNS[:4]
+COMPLETE = CURVE_COLUMNS[:4]
 #: These may be left out, by an interrupted run and by older versions.
-BAND = ("band_low_N", "band_high_N")
-STATUS = ("done", "interrupted")
-LABELS = ("measured", "reconstructed")
+BAND_COLUMNS = ("band_low_N", "band_high_N")
 RECORD = ("time_s", "raw_N", "tared_N")
 REMEDY = "run the same calibrate command again with --resume"
-
-#: What summary.json must hold: names -> kind. A kind is a tuple of types, {names: kind} ("*": any name) or
-#: [kind]. The second group of numbers may be null: not known, or not defined for this curve.
-_NULL = type(None)
-_NUM, _OPT, _TEXT, _MAYBE, _ANY = (int, float), (int, float, _NULL), (str,), (str, _NULL), (object,)
-SCHEMA: Data = {
-    "food created status trace_sha256 baseline_kind stroke_source": _TEXT,
-    "passed": (bool,),
-    "baseline_N onset_s end_s stroke_m noise_sd_N filter_sd_m peak_real_N peak_sim_N dx_m": _NUM,
-    "baseline_sd_N onset_sd_s peak_real_sd_N peak_error shape_error nrmse work_error": _OPT,
-    "wall_s particles mach momentum_residual ke_over_ie ripple_N": _OPT,
-    "simulations failed_simulations": (int,),
-    "metrics": (dict,),
-    "air": (dict, _NULL),
-    "seed mirror_images": _ANY,
-    "git device": _MAYBE,
-    "command warnings limits": [_TEXT],
-    "misfit_history": [[_OPT]],
-    "versions": {"*": _ANY},
-    "correlations": {"*": _OPT},
-    "verdicts": [{"name": _TEXT, "value limit": _ANY, "unit note": _MAYBE, "passed": (bool, _NULL)}],
-    "trace": {"source label sha256": _TEXT, "samples": (int,), "duration_s": _NUM, "columns": (dict,)},
-    "sprague_geers": {"M P C": _OPT},
-    "iso18571": {"Z EP EM ES R shift": _OPT, "at_bound": _ANY},
-    "null_models": {"*": {"nrmse shape_error peak_error work_error R": _OPT}},
-    "parameters": {"*": {"value": _NUM, "low95 high95 prior_low prior_high": _OPT,
-                         "unit verdict status": _TEXT, "source": _MAYBE}},
-    "fixed_parameters": {"*": {"value": _OPT, "unit status": _TEXT, "source": _MAYBE}},
-    "failures": [{"reason": _TEXT, "fraction": _OPT, "parameters": (dict,)}],
-    "shape": {"kind": _TEXT, "length width height": _NUM},
-    "knife": {"name": _TEXT, "spine angle height length": _NUM},
-}  # fmt: skip
-
-#: What it may hold besides, or leave out.
-EXTRA: Data = {
-    "baseline_window_s": [_NUM],
-    "end_sd_s": _OPT,
-    "counters": {"*": (int,)},
-    "energy_J": {"*": _NUM},
-    "coarse_simulations": (int,),
-    "nuisances": {"*": {"value sd prior_sd": _NUM, "unit": _TEXT, "outside": (bool,)}},
-    "profiles": {"*": {"value rise trace_alone": [_NUM]}},
-    "sensitivity": {"*": {"*": {"first total total_conf": _OPT}}},
-    "reduced_chi2 correlation_length_m predictive_inside": _OPT,
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,9 +49,10 @@ class Finished:
     """What a report is made from.
 
     Attributes:
-        summary: ``summary.json``, checked against SCHEMA; numbers that are not finite are None.
+        result: What the calibration ended with.
         created: When the run was made.
-        curves: Columns of ``curves.csv`` by name: stroke [m] and forces [N], shape (n,); BAND only where the file has it.
+        curves: Columns of ``curves.csv`` by name: stroke [m] and forces [N], shape (n,); those of the band only where the
+            file has them.
         time: Time of the whole record [s], shape (k,).
         raw: Force as recorded [N], shape (k,).
         tared: Force less its baseline [N], shape (k,).
@@ -103,7 +60,7 @@ class Finished:
         section: The food across the blade's middle; None where the record has none.
     """
 
-    summary: Data
+    result: CalibrationResult
     created: datetime
     curves: dict[str, np.ndarray]
     time: np.ndarray
@@ -113,41 +70,24 @@ class Finished:
     section: Section | None = None
 
 
-def read_finished(run: Path) -> Finished:
-    """Read a calibration's folder.
+def read_finished(result: CalibrationResult) -> Finished:
+    """Read what else there is in the folder of a calibration.
 
     Args:
-        run: Folder with ``summary.json``, ``curves.csv`` and ``evaluations.h5``.
+        result: The calibration, whose folder has ``curves.csv`` and ``evaluations.h5``.
+
+    Returns:
+        All that a report is made from.
 
     Raises:
         ReportError: A file is missing, damaged or incomplete.
     """
-    if not run.is_dir():
-        raise ReportError(f"{run}: no such folder; give the output folder of a calibration")
-    summary, created = _read_summary(run / "summary.json")
-    curves = _read_curves(run / "curves.csv")
-    store = run / "evaluations.h5"
-    section = read_section(run / "record.h5")
-    return Finished(summary, created, curves, *_read_record(store), _read_runs(store), section)
-
-
-def _read_summary(path: Path) -> tuple[Data, datetime]:
-    data = read_json(path)
-    check_kind(path, "", data, SCHEMA)
-    for names, kind in EXTRA.items():
-        for name in names.split():
-            if data.get(name) is not None:
-                check_kind(path, name, data[name], kind)
-    for name, p in (data.get("profiles") or {}).items():
-        if len({len(p[key]) for key in ("value", "rise", "trace_alone")}) != 1:
-            raise ReportError(f"{path}: profiles.{name} has lists of unequal length; {REMEDY}")
-    if len(data.get("baseline_window_s") or (0.0, 0.0)) != 2:
-        raise ReportError(f"{path}: baseline_window_s is not a pair of times; {REMEDY}")
-    if data["trace"]["label"] not in LABELS:
-        raise ReportError(f"{path}: trace.label is not {' or '.join(LABELS)}; {REMEDY}")
-    if data["status"] not in STATUS:
-        raise ReportError(f"{path}: status is {data['status']!r}, not {' or '.join(STATUS)}; {REMEDY}")
-    return data, read_date(path, data)
+    folder = result.folder
+    created = read_date(folder / "summary.json", {"created": result.created})
+    curves = _read_curves(folder / "curves.csv")
+    store = folder / "evaluations.h5"
+    section = read_section(folder / "record.h5")
+    return Finished(result, created, curves, *_read_record(store), _read_runs(store), section)
 
 
 def read_json(path: Path) -> Any:
@@ -206,8 +146,8 @@ def check_kind(path: Path, place: str, value: Any, kind: Any) -> None:
 
 
 def _read_curves(path: Path) -> dict[str, np.ndarray]:
-    columns = read_columns(path, COLUMNS, COMPLETE)
-    return {name: x for name, x in columns.items() if name in COLUMNS or set(BAND) <= set(columns)}
+    columns = read_columns(path, CURVE_COLUMNS, COMPLETE)
+    return {name: x for name, x in columns.items() if name in CURVE_COLUMNS or set(BAND_COLUMNS) <= set(columns)}
 
 
 def read_columns(path: Path, needed: Sequence[str], complete: Sequence[str]) -> dict[str, np.ndarray]:

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from calib.errors import OutputError
 from mpm.files import replacing
 from mpm.output.snapshot import Snapshot
 from mpm.output.surface import Surface
 from mpm.scene import Knife, Scene
+from mpm.scene.errors import OutputError
 
 COLOURS = "YlOrRd"  # falls evenly in lightness, so it can be read in grey and by the colour-blind
 SIZE, VIDEO_SIZE = (1200, 900), (960, 720)  # of a picture and of a video [pixels]

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,6 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from mpm.output.section import Section
+from mpm.scene import Knife
 from reports.base.figures import BLACK, LIGHT, WIDTH, svg
 
 EARLY = 0.2
@@ -40,6 +40,9 @@ def moments(section: Section, stroke: np.ndarray, force: np.ndarray) -> list[tup
         section: The looks.
         stroke: Strokes of the force curve [m], shape (n,).
         force: Simulated force [N], shape (n,).
+
+    Returns:
+        Index of each look, in the order of time, and its name.
     """
     peak = float(stroke[int(np.argmax(force))])
     wanted = ((EARLY * float(section.stroke[-1]), ""), (peak, "largest force"), (math.inf, "at the end"))
@@ -50,14 +53,18 @@ def moments(section: Section, stroke: np.ndarray, force: np.ndarray) -> list[tup
     return sorted(found.items())
 
 
-def cut(section: Section, knife: Mapping[str, Any], height: float, stroke: np.ndarray, force: np.ndarray) -> bytes:
+def cut(section: Section, knife: Knife, height: float, stroke: np.ndarray, force: np.ndarray) -> bytes:
     """Pictures of the food under the blade, coloured by its von Mises stress.
 
     Args:
         section: The food across the blade's middle.
-        knife: ``spine`` [m], ``angle`` [rad] and ``height`` [m] of the blade.
+        knife: The blade.
         height: Height of the food [m].
-        stroke, force: The simulated curve [m], [N].
+        stroke: Strokes of the simulated curve [m], shape (n,).
+        force: Its forces [N], shape (n,).
+
+    Returns:
+        An SVG document.
     """
     shown = moments(section, stroke, force)
     half = float(np.abs(section.y[[k for k, _ in shown]]).max()) + MARGIN * height
@@ -84,14 +91,18 @@ def cut(section: Section, knife: Mapping[str, Any], height: float, stroke: np.nd
     return svg(draw, len(shown) * (tall + 9.0) + BESIDE)
 
 
-def glance(section: Section, knife: Mapping[str, Any], height: float, stroke: np.ndarray, force: np.ndarray) -> Glance:
+def glance(section: Section, knife: Knife, height: float, stroke: np.ndarray, force: np.ndarray) -> Glance:
     """What draws the food about the blade at the largest force into given axes.
 
     Args:
         section: The food across the blade's middle.
-        knife: ``spine`` [m], ``angle`` [rad] and ``height`` [m] of the blade.
+        knife: The blade.
         height: Height of the food [m].
-        stroke, force: The simulated curve [m], [N].
+        stroke: Strokes of the simulated curve [m], shape (n,).
+        force: Its forces [N], shape (n,).
+
+    Returns:
+        What draws it.
     """
     k = int(np.argmin(np.abs(section.stroke - float(stroke[int(np.argmax(force))]))))
     half = min(float(np.abs(section.y[k]).max()) + MARGIN * height, ABOUT * height)
@@ -126,11 +137,11 @@ def _food(axes: Axes, section: Section, k: int, colour: ScalarMappable) -> None:
         )
 
 
-def _tools(axes: Axes, knife: Mapping[str, Any], edge: float, top: float, half: float) -> None:
+def _tools(axes: Axes, knife: Knife, edge: float, top: float, half: float) -> None:
     """Blade above its edge, and the board."""
-    spine = float(knife["spine"]) / 2
-    full = min(spine / math.tan(float(knife["angle"]) / 2), float(knife["height"]))
-    up = min(edge + float(knife["height"]), 2 * top)
+    spine = knife.spine / 2
+    full = min(spine / math.tan(knife.angle / 2), knife.height)
+    up = min(edge + knife.height, 2 * top)
     outline = [(0.0, edge), (spine, edge + full), (spine, up), (-spine, up), (-spine, edge + full)]
     axes.add_patch(
         Polygon([(1e3 * y, 1e3 * z) for y, z in outline], facecolor="white", edgecolor=BLACK, lw=0.7, zorder=3)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,7 +13,10 @@ from matplotlib.ticker import MaxNLocator
 
 from reports.base.figures import BLACK, GREY, LIGHT, RED, log_ticks, svg
 from reports.base.format import interval, listed, plain, quantity, rung
-from reports.base.run_folder import Data, Runs
+from reports.base.run_folder import Runs
+
+if TYPE_CHECKING:
+    from calib.uncertainty.estimates import FittedParameter
 
 #: Fewer failed or finished runs than these have no region.
 FEWEST = 3
@@ -43,12 +47,15 @@ class Split:
     log: bool
 
 
-def splits(runs: Runs, parameters: Data) -> list[Split]:
+def splits(runs: Runs, fitted: Mapping[str, FittedParameter]) -> list[Split]:
     """All parameters that failed and finished runs have, the one that separates them best first; none for too few runs.
 
     Args:
         runs: The simulations.
-        parameters: ``parameters`` of the summary: which are fitted, in what unit.
+        fitted: The fitted parameters by name.
+
+    Returns:
+        The parameters with their values in both kinds of runs.
     """
     if min(np.count_nonzero(runs.failed), np.count_nonzero(~runs.failed)) < FEWEST:
         return []
@@ -56,9 +63,9 @@ def splits(runs: Runs, parameters: Data) -> list[Split]:
     for name, values in runs.parameters.items():
         known = np.isfinite(values)
         failed, finished = known & runs.failed, known & ~runs.failed
-        if name not in parameters or min(np.count_nonzero(failed), np.count_nonzero(finished)) < FEWEST:
+        if name not in fitted or min(np.count_nonzero(failed), np.count_nonzero(finished)) < FEWEST:
             continue
-        unit = parameters[name]["unit"]
+        unit = fitted[name].unit
         log = unit != "-" and bool(np.all(values[known] > 0.0))
         z = np.log(values) if log else values
         low, high = np.percentile(z[known], [25.0, 75.0])

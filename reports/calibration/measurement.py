@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING, Any
 
 from reports.base.format import count, plain, quantity, uncertain
-from reports.base.labels import capital, words
-from reports.base.run_folder import Data
+from reports.base.labels import capital, in_words
+
+if TYPE_CHECKING:
+    from calib.calibration.result_parts import Posterior
+    from calib.uncertainty.estimates import FittedNuisance
 
 #: What a measurement leaves open of its own curve.
 LEFT_OPEN = {
@@ -19,20 +23,37 @@ LEFT_OPEN = {
 }
 
 
-def left_open(name: str, n: Data) -> list[str]:
-    """What was known of one thing that the measurement leaves open, what the fit says of it, and whether they agree."""
-    unit = "fraction" if n["unit"] == "-" else n["unit"]
-    before = f"0 ± {quantity(n['prior_sd'], unit, digits=2)}"
-    said = "yes" if not n["outside"] else "no"
-    return [capital(words(name)), LEFT_OPEN.get(name, ""), before, uncertain(n["value"], n["sd"], unit), said]
+def left_open(name: str, n: FittedNuisance | Any) -> list[str]:
+    """What was known of one thing that the measurement leaves open, what the fit says of it, and whether they agree.
+
+    Args:
+        name: Its name.
+        n: Its value, standard deviations and unit.
+
+    Returns:
+        Cells of a line: name, what it is, before, after, and ``yes`` or ``no``.
+    """
+    unit = "fraction" if n.unit == "-" else n.unit
+    before = f"0 ± {quantity(n.prior_sd, unit, digits=2)}"
+    said = "yes" if not n.outside else "no"
+    return [capital(in_words(name)), LEFT_OPEN.get(name, ""), before, uncertain(n.value, n.sd, unit), said]
 
 
-def errors(s: Data, points: int) -> list[str]:
-    """How the errors of the fit hang together, and how large they are."""
+def errors(posterior: Posterior, stroke: float, points: int) -> list[str]:
+    """How the errors of the fit hang together, and how large they are, in sentences.
+
+    Args:
+        posterior: What is known of the parameters together.
+        stroke: Length of the stroke [m].
+        points: Number of points of the curve.
+
+    Returns:
+        The sentences; none where the fit ended too early.
+    """
     said = []
-    length, reduced = s.get("correlation_length_m"), s.get("reduced_chi2")
+    length, reduced = posterior.correlation_length_m, posterior.reduced_chi2
     if length is not None and length > 0.0:
-        independent = max(round(s["stroke_m"] / length), 1)
+        independent = max(round(stroke / length), 1)
         said.append(
             f"The residuals hang together over {quantity(length, 'm', digits=2)} of stroke, so that the {count(points)} "
             f"points of the curve count as about {count(independent)} independent readings."

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter, NullLocator
 
-from reports.base.figures import BAND, BLACK, BLUE, GREY, LIGHT, ORANGE, log_ticks, svg
+from reports.base.figures import BLACK, BLUE, GREY, HATCHED, LIGHT, ORANGE, log_ticks, svg
+
+if TYPE_CHECKING:
+    from calib.calibration.result_parts import SobolIndices
 
 #: Axis of the parameter figure: at most this factor either side of the middle of the literature's range.
 LARGEST_FACTOR = 1e3
@@ -28,7 +31,7 @@ TRACE_ALONE: dict[str, Any] = {"color": BLUE, "lw": 1.2, "dashes": (3.5, 1.5)}
 
 
 @dataclass(frozen=True)
-class Row:
+class ParameterRange:
     """One fitted parameter of the parameter figure; numbers over the middle of the literature's range [-].
 
     Attributes:
@@ -71,7 +74,7 @@ class Panel:
     log: bool
 
 
-def ranges(rows: Sequence[Row]) -> bytes:
+def ranges(rows: Sequence[ParameterRange]) -> bytes:
     """Fitted values with their intervals against the literature's ranges, one row each, on a log axis."""
 
     def draw(figure: Figure) -> None:
@@ -102,7 +105,7 @@ def ranges(rows: Sequence[Row]) -> bytes:
     return svg(draw, 20.0 + 7.6 * max(len(rows), 2))
 
 
-def profiles(panels: Sequence[Panel]) -> bytes:
+def profile_panels(panels: Sequence[Panel]) -> bytes:
     """Rise of chi-square along each parameter, in small panels."""
     rows = -(-len(panels) // ACROSS)
 
@@ -135,7 +138,7 @@ def _profile(axes: Axes, panel: Panel) -> None:
         axes.xaxis.set_major_locator(MaxNLocator(4))
     if panel.prior is not None and panel.prior[0] < high and panel.prior[1] > low:
         axes.axvspan(max(panel.prior[0], low), min(panel.prior[1], high), 0.0, 0.06,
-                     label="range of the literature", **BAND)  # fmt: skip
+                     label="range of the literature", **HATCHED)  # fmt: skip
     axes.axhline(RISE, color=GREY, lw=0.9, dashes=(1.0, 1.5), label=f"{RISE}: ends of a 95 % interval")
     axes.plot(panel.x, panel.alone, label="trace alone", **TRACE_ALONE)
     axes.plot(panel.x, panel.rise, label="with the literature", **WITH_PRIOR)
@@ -147,11 +150,11 @@ def _profile(axes: Axes, panel: Panel) -> None:
     axes.set_title(panel.title)
 
 
-def influence(found: Mapping[str, Mapping[str, Mapping[str, float | None]]], labels: Mapping[str, str]) -> bytes:
+def influence(found: Mapping[str, Mapping[str, SobolIndices]], labels: Mapping[str, str]) -> bytes:
     """Sobol indices: a panel for each quantity, a row for each parameter.
 
     Args:
-        found: ``first``, ``total`` and ``total_conf`` by parameter by quantity.
+        found: The indices by quantity and parameter.
         labels: What the quantities are called.
     """
     names = list(next(iter(found.values())))
@@ -161,10 +164,9 @@ def influence(found: Mapping[str, Mapping[str, Mapping[str, float | None]]], lab
         y = np.arange(len(names))
         for axes, (quantity, rows) in zip(grid, found.items(), strict=True):
             first, total, half = (
-                np.array([_number(rows.get(name, {}).get(key)) for name in names])
-                for key in ("first", "total", "total_conf")
+                np.array([_number(rows.get(name), key) for name in names]) for key in ("first", "total", "total_conf")
             )
-            axes.barh(y, total, height=0.66, label="with its interactions (whisker: 95 %)", **(BAND | {"lw": 0.6}))
+            axes.barh(y, total, height=0.66, label="with its interactions (whisker: 95 %)", **(HATCHED | {"lw": 0.6}))
             axes.barh(
                 y, np.maximum(first, 0.0), height=0.3, facecolor=ORANGE, edgecolor=BLACK, lw=0.6, label="on its own"
             )
@@ -180,11 +182,12 @@ def influence(found: Mapping[str, Mapping[str, Mapping[str, float | None]]], lab
     return svg(draw, 24.0 + 5.0 * len(names))
 
 
-def _number(x: float | None) -> float:
+def _number(row: SobolIndices | None, key: str) -> float:
+    x: float | None = getattr(row, key, None)
     return np.nan if x is None else x
 
 
-def _interval(axes: Axes, i: int, row: Row) -> None:
+def _interval(axes: Axes, i: int, row: ParameterRange) -> None:
     """The 95 % interval in row ``i``; an arrow where it leaves the axis or has no end."""
     if row.low is None and row.high is None:
         return
@@ -198,7 +201,7 @@ def _interval(axes: Axes, i: int, row: Row) -> None:
                   zorder=3, clip_on=False)  # fmt: skip
 
 
-def _factors(rows: Sequence[Row]) -> tuple[float, float]:
+def _factors(rows: Sequence[ParameterRange]) -> tuple[float, float]:
     """Limits of the axis that hold all positive numbers: a factor 3 to LARGEST_FACTOR either side."""
     numbers = [x for r in rows for x in (r.value, r.low, r.high, r.prior_low, r.prior_high)]
     positive = [x for x in numbers if x is not None and x > 0.0]

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from reports.base.brief import Brief, ReportPart, ReportTable, typeset_brief
 from reports.base.figures import BLACK, BLUE, GREEN, GREY, LIGHT, ORANGE, RED, SKY, stroke_axis, svg
 from reports.base.format import count, duration, listed, quantity
-from reports.base.labels import capital, words
+from reports.base.labels import capital, in_words
 
 if TYPE_CHECKING:
     from studies.convergence.gci import Estimate
@@ -101,7 +101,7 @@ def _brief(result: ConvergenceResult, curves: ForceCurves) -> Brief:
         sentence=f"{said}: between the two finest grids {_changes(result)}. Trend over the grids: {verdicts}.",
         facts=[
             ("Knife", result.knife),
-            ("Food", f"{words(shape.kind)}, {size} (across the blade, along it, height)"),
+            ("Food", f"{in_words(shape.kind)}, {size} (across the blade, along it, height)"),
             ("Passed where", f"between the two finest grids {limits}"),
         ],
         parts=[
@@ -130,7 +130,7 @@ def _grids(grids: tuple[RunResult, ...]) -> ReportTable:
     for g in grids:
         cell = quantity(g.dx_m, "m")
         if not g.ok:
-            rows.append([cell, f"broke down: {words(g.reason)}", "", "", "", "", ""])
+            rows.append([cell, f"broke down: {in_words(g.reason)}", "", "", "", "", ""])
             continue
         rows.append([
             cell, quantity(g.peak_N, "N", digits=4), quantity(g.work_J, "J", digits=4), count(g.particles),

@@ -15,7 +15,7 @@ from reports import ReportError
 from reports.base.brief import AGAIN, Brief, ReportPart, ReportTable, typeset_brief
 from reports.base.figures import BLACK, BLUE, GREEN, GREY, ORANGE, RED, svg
 from reports.base.format import breakable, duration, quantity
-from reports.base.labels import capital, words
+from reports.base.labels import capital, in_words
 
 if TYPE_CHECKING:
     from studies.stability.result import CellResult, StabilityMap
@@ -118,12 +118,12 @@ def _brief(result: StabilityMap) -> Brief:
 def _ends(result: StabilityMap) -> ReportTable:
     reasons = {"stable": "reached the end; momentum and energy balance", **result.reasons}
     order = sorted(result.counts.items(), key=lambda item: -item[1])
-    rows = [[words(reason), reasons.get(reason, ""), str(count)] for reason, count in order]
+    rows = [[in_words(reason), reasons.get(reason, ""), str(count)] for reason, count in order]
     return ReportTable(("End", "Meaning", "Cells"), ("36mm", "1fr", "16mm"), rows, left=2)
 
 
 def _failed(cells: Sequence[CellResult]) -> ReportTable:
-    rows = [[breakable(c.name), words(c.reason or c.status), capital(c.message)] for c in cells]
+    rows = [[breakable(c.name), in_words(c.reason or c.status), capital(c.message)] for c in cells]
     return ReportTable(("Cell", "End", "Why"), ("60mm", "30mm", "1fr"), rows, left=3)
 
 
@@ -136,7 +136,7 @@ def _balances(cells: Sequence[CellResult]) -> ReportTable:
             momenta = [abs(c.momentum_residual) for c in own if c.momentum_residual is not None]
             gains = [abs(c.energy_gain) for c in own if c.energy_gain is not None]
             worst = [quantity(max(found, default=None), "fraction", digits=2) for found in (momenta, gains)]
-            rows.append([words(family), str(len(own)), *worst])
+            rows.append([in_words(family), str(len(own)), *worst])
     head = ("Family", "Stable runs", "Momentum, largest", "Energy gain, largest")
     return ReportTable(head, ("1fr", "auto", "auto", "auto"), rows)
 

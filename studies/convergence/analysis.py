@@ -9,7 +9,7 @@ import numpy as np
 
 from calib.errors import CurveError
 from calib.io.provenance import git_commit, versions
-from calib.simulation.evaluation import PARTED, Evaluation, pressed_away
+from calib.simulation.evaluation import FULLY_PARTED, Evaluation, pressed_away
 from calib.trace.filters import N_STROKE, filter_simulated
 from mpm.arrays import FloatArray
 from studies.convergence.gci import curve_estimate, estimate
@@ -53,7 +53,7 @@ def analyse(
     stroke = np.linspace(0.0, min(r.stroke[-1] for r in (*(r for _, r in sound), *same)), N_STROKE)
     forces = [filter_simulated(stroke, r.stroke, r.force) for _, r in sound]
     curve = curve_estimate(h, forces, _deviation([filter_simulated(stroke, r.stroke, r.force) for r in same]))
-    least = min((r.parted for r in evaluations if r.parted < PARTED), default=None)
+    least = min((r.parted for r in evaluations if r.parted < FULLY_PARTED), default=None)
     result = ConvergenceResult(
         food=cut.food,
         knife=cut.knife,

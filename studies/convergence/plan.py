@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from calib.errors import CurveError
-from calib.material.scene import elsewhere
+from calib.material.scene import with_other_particles
 from mpm.scene import Scene
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 AXES = ("safety", "mach", "ppc", "offset", "repeat")
 """What can be varied beside the cell size, each apart from the others: dt over its limit, speed over the P-wave's,
@@ -22,7 +22,7 @@ class RefinementPlan:
     Attributes:
         scene: The cut; its cell size is not used.
         axes: Values to try, by axis of :data:`AXES`; cell sizes [m] under ``dx``.
-        repeats: Runs with other particles and the grid elsewhere, to tell noise from trend.
+        repeats: Runs with other particles and the grid with_other_particles, to tell noise from trend.
     """
 
     scene: Scene
@@ -106,5 +106,5 @@ def planned_runs(plan: RefinementPlan) -> list[PlannedRun]:
         out.append(PlannedRun("offset", value, replace(base, numerics=shifted)))
     own = out[min(1, len(cells) - 2)].scene
     for k in range(1, plan.repeats + 1):
-        out.append(PlannedRun("repeat", k, elsewhere(own, k)))
+        out.append(PlannedRun("repeat", k, with_other_particles(own, k)))
     return out

@@ -13,7 +13,7 @@ from calib.errors import DocumentError
 from calib.io.folder import write_csv, write_json
 from calib.io.typed_document import REMEDY, read_document, to_document
 from mpm.arrays import FloatArray
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 from studies.convergence.gci import Estimate
 
 RESULT_FILE, CURVES_FILE = "converge.json", "curves.csv"

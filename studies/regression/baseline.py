@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from scipy.stats import t as student
@@ -15,7 +15,7 @@ from calib.material.scene import CELL_PER_ZONE, Sizing, cut_scene, specimen
 from mpm.arrays import FloatArray
 from mpm.output.record import ForceRecord
 from mpm.scene import CONTACTS, Knife, Scene
-from mpm.shapes import volume
+from mpm.scene.shapes import volume
 from studies.convergence.gci import REPEATABILITY
 from studies.regression.reference_curves import CHECKED
 
@@ -72,7 +72,8 @@ class BaselineCut:
         shape, _ = specimen(self.food, None, Sizing())
         screening = cut_scene(self.food, shape, self.knife, coarse=True).numerics.dx
         dx = CELL_PER_ZONE * UNEVEN * max(screening, shape.height / MOST_CELLS)
-        return cut_scene(self.food, shape, self.knife, dx=dx, coarse=True, contact=self.contact, seed=seed)
+        scene = cut_scene(self.food, shape, self.knife, dx=dx, coarse=True, seed=seed)
+        return replace(scene, numerics=replace(scene.numerics, contact=self.contact))
 
     @property
     def cost(self) -> float:

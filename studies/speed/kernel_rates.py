@@ -13,9 +13,9 @@ import numpy as np
 
 from calib.io.progress import clock
 from mpm.arrays import FloatArray
-from mpm.material import Material
 from mpm.scene import EdgeLaw, Food, Knife, Motion, Numerics, Scene
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from studies.speed.peers import PEERS, measure
 from studies.speed.result import PeerResult, PublishedConfiguration, Throughput
 from studies.speed.timing import RateMeter, Session
@@ -141,10 +141,10 @@ def peers(session: Session, python: str) -> tuple[PeerResult, ...]:
     ours = session.kept.get(scene, session.runtime)
     shape, dx, law = scene.food.shape, BENCHMARK_BLOCK.numerics.dx, scene.food.material
     size = np.array([shape.width, shape.length, shape.height])
-    room = np.array(ours.nodes) * dx - size
+    room = np.array(ours.setup.grid.nodes) * dx - size
     block = {
         "dx": dx,
-        "nodes": [int(n) for n in ours.nodes],
+        "nodes": [int(n) for n in ours.setup.grid.nodes],
         "low": [float(room[0]) / 2, float(room[1]) / 2, PEER_FLOOR * dx],
         "counts": [round(s / dx * BENCHMARK_BLOCK.numerics.ppc) for s in size],
         "dt": ours.run().dt,

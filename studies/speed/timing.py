@@ -95,4 +95,4 @@ class RateMeter:
 
 def node_count(simulation: Simulation) -> int:
     """Nodes of the grid of a simulation."""
-    return math.prod(simulation.nodes)
+    return math.prod(simulation.setup.grid.nodes)

@@ -8,11 +8,11 @@ import time
 import numpy as np
 
 from calib.simulation.evaluation import Evaluation
-from mpm.kernels import fields as kn
-from mpm.material import Material
 from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
+from mpm.scene.material import Material
 from mpm.solver import Simulation
+from mpm.state.tables import COMMAND, EDGE_S, EDGE_Z
 from studies.stability.conservation import Conservation, check_conservation
 from studies.stability.map_cell import MapCell
 
@@ -39,13 +39,14 @@ class CellSimulation(Simulation):
         assert cell.scene is not None
         self.cell = cell
         super().__init__(cell.scene, runtime)
+        self.setup.step_scale = cell.step
 
     @property
     def steps(self) -> float:
         """Time steps that the run takes [-]."""
         m, material = self.scene.motion, self.scene.food.material
-        dt = self.time_step(material)
-        way = m.stroke + self.gap + m.retract
+        dt = self.setup.time_step(material)
+        way = m.stroke + self.setup.gap + m.retract
         return way / (m.mach * material.p_wave * dt) + m.dwell / self.scene.time_scale / dt
 
     @property
@@ -54,7 +55,7 @@ class CellSimulation(Simulation):
         start, m = self.cell.start, self.scene.food.material
         s = start.squeeze if start.strained else 1.0
         density = 3 * m.shear * (s - 1) ** 2 + 0.5 * m.lame * (s**3 - 1) ** 2
-        return self.images * self.seeds.total * density
+        return self.setup.grid.images * self.setup.seeds.total * density
 
     def run_checked(self, longest: float) -> tuple[ForceRecord, Conservation]:
         """Run, and check what is conserved.
@@ -75,7 +76,7 @@ class CellSimulation(Simulation):
                 raise TooLong(fraction)
 
         record = self.run(progress=stop_when_late)
-        n, volume = self.scene.numerics, self.images * self.seeds.total
+        n, volume = self.scene.numerics, self.setup.grid.images * self.setup.seeds.total
         return record, check_conservation(
             record,
             precision=n.precision,
@@ -83,27 +84,23 @@ class CellSimulation(Simulation):
             least=ROUNDING * self.scene.food.material.E * volume,
         )
 
-    def time_step(self, material: Material) -> float:
-        """The sound step times the factor of the cell [s]."""
-        return self.cell.step * super().time_step(material)
-
-    def _load(self, material: Material) -> None:
+    def load(self, material: Material) -> None:
         """Fields of a cut, changed as the start says."""
-        super()._load(material)
-        s, k = self.cell.start, self.k
+        super().load(material)
+        s, state = self.cell.start, self.state
         if s.lift or s.squeeze != 1:
-            x = k.x.to_numpy()
-            k.x.from_numpy(x * s.squeeze + np.array([0.0, 0.0, s.lift], x.dtype))
+            x = state.x.to_numpy()
+            state.x.from_numpy(x * s.squeeze + np.array([0.0, 0.0, s.lift], x.dtype))
         if s.strained:
-            f = k.F.to_numpy()
+            f = state.F.to_numpy()
             f[0, :, [0, 4, 8]] = s.squeeze
-            k.F.from_numpy(f)
+            state.F.from_numpy(f)
         if s.depth or s.aside:
-            pose = k.pose.to_numpy()
+            pose = state.pose.to_numpy()
             if s.depth:
-                pose[0, [kn.Z, kn.COMMAND]] = self.scene.food.shape.height - s.depth
-            pose[0, kn.S] = s.aside
-            k.pose.from_numpy(pose)
+                pose[0, [EDGE_Z, COMMAND]] = self.scene.food.shape.height - s.depth
+            pose[0, EDGE_S] = s.aside
+            state.pose.from_numpy(pose)
 
 
 def run_cell(cell: MapCell, most: float, longest: float, arch: str, threads: int) -> Evaluation:
@@ -120,7 +117,7 @@ def run_cell(cell: MapCell, most: float, longest: float, arch: str, threads: int
         How it ended; its reason is ``too_long`` where it was not run to its end.
     """
     simulation = CellSimulation(cell, Runtime(arch, threads))
-    particles = len(simulation.seeds.x)
+    particles = len(simulation.setup.seeds.x)
     scalars = {"particle_steps": simulation.steps * particles, "particles": float(particles)}
     if scalars["particle_steps"] > most:
         return _ended("too_long", 0.0, scalars, 0.0)

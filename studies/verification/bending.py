@@ -12,8 +12,8 @@ from fem_reference.laws import Corotated
 from fem_reference.meshes import box
 from fem_reference.solid import Solid
 from mpm.arrays import FloatArray
-from mpm.material import Material
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from studies.verification.case import SuiteOptions, VerificationCase
 from studies.verification.motion import numerics
 from studies.verification.result import Comparison

@@ -6,11 +6,11 @@ import importlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
-from mpm.material import Material
 from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import Numerics, Scene
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from mpm.solver import Simulation
 from studies.verification.free_body import AT_REST, FreeBody, InitialState
 from studies.verification.result import Comparison

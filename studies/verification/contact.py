@@ -10,9 +10,9 @@ from functools import partial
 import numpy as np
 
 from mpm.arrays import FloatArray
-from mpm.material import Material
 from mpm.scene import Board, Food, Motion, Press, Scene
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from studies.verification.case import SuiteOptions, VerificationCase
 from studies.verification.free_body import InitialState
 from studies.verification.motion import BLOCK, SOFT, numerics

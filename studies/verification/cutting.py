@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from calib.validation.acceptance import unbooked
 from fem_reference.slit import cleave
 from mpm.arrays import FloatArray
-from mpm.material import Material
+from mpm.output.energy import unbooked
 from mpm.output.record import ForceRecord
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from studies.verification.case import SuiteOptions, VerificationCase
 from studies.verification.result import Comparison
 

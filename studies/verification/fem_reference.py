@@ -13,8 +13,8 @@ from fem_reference.meshes import bent, box, surface
 from fem_reference.press import press
 from fem_reference.solid import Solid
 from mpm.arrays import FloatArray
-from mpm.material import Material
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from studies.verification.case import SuiteOptions, VerificationCase
 from studies.verification.result import Comparison
 

@@ -16,9 +16,9 @@ import math
 import numpy as np
 
 from mpm.arrays import FloatArray
-from mpm.material import Material
 from mpm.scene import Numerics
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from studies.verification.case import SuiteOptions
 from studies.verification.free_body import InitialState
 

@@ -10,9 +10,9 @@ from scipy.optimize import brentq
 from scipy.special import spherical_jn
 
 from mpm.arrays import FloatArray
-from mpm.material import Material
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from studies.verification import generalised_vortex
 from studies.verification.case import SuiteOptions, VerificationCase
 from studies.verification.free_body import InitialState

@@ -11,9 +11,9 @@ import numpy as np
 
 from fem_reference.press import press
 from mpm.arrays import FloatArray
-from mpm.material import Material
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from studies.verification.case import SuiteOptions, VerificationCase
 from studies.verification.result import Comparison
 

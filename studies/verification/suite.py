@@ -13,7 +13,7 @@ from calib.io.progress import Countdown
 from calib.io.provenance import code_key, git_commit, versions
 from calib.io.typed_document import read_document, to_document
 from calib.simulation.workers import Workers
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 from studies.verification.case import SuiteOptions, VerificationCase, cases
 from studies.verification.result import RESULT_FILE, Comparison, Verification, write_report
 

@@ -1,4 +1,5 @@
-"""Studies without their physics: a formula in place of the solver, in real worker processes, which write down what they do."""
+"""Studies without their physics: a formula in place of the solver, in real worker processes, which write down what they
+do."""
 
 from __future__ import annotations
 
@@ -13,6 +14,7 @@ import numpy as np
 from calib.io.provenance import key_of
 from calib.simulation import workers
 from calib.simulation.dask_cluster import Cluster
+from calib.simulation.evaluation import Evaluation
 from calib.simulation.process_pool import Pool
 from mpm.output.record import ForceRecord
 from mpm.scene import Scene
@@ -46,9 +48,9 @@ def cut(scene: Scene) -> ForceRecord:
     )
 
 
-def run(scene: Scene, values: dict[str, Any], arch: str, threads: int) -> dict[str, Any]:
+def run(scene: Scene, values: dict[str, Any], arch: str, threads: int) -> Evaluation:
     """In place of the candidate of a search."""
-    return workers.plain(_noted("run", scene.with_material(**values)))
+    return workers.evaluation_of(_noted("run", scene.with_material(**values)))
 
 
 def whole(scene: Scene, arch: str, threads: int) -> ForceRecord:

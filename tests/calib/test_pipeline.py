@@ -25,24 +25,35 @@ from calib.io.folder import prepare, write_json
 from calib.io.provenance import code_key, key_of, versions
 from calib.material.food import load_food, load_foods
 from calib.material.knife import load_knife
-from calib.material.scene import Sizing, cut_scene, elsewhere, height_range, place, specimen, windowed
-from calib.problem.setup import fit_parameters, set_up
+from calib.material.scene import (
+    Sizing,
+    at_fitted_height,
+    cut_scene,
+    height_range,
+    specimen,
+    windowed,
+    with_other_particles,
+)
+from calib.problem.food_parameters import fit_parameters
+from calib.problem.setup import set_up
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_store import EvaluationStore, Header
 from calib.simulation.process_pool import Pool
-from calib.simulation.workers import DIED, Errand, SceneEvaluator, plain
+from calib.simulation.workers import DIED, Errand, SceneEvaluator, evaluation_of
 from calib.trace.conditioning import condition
 from calib.trace.trace import Trace
-from calib.validation.acceptance import balances, changes, judge, limits, remedied, spent, unbooked
+from calib.uncertainty.estimates import FittedParameter
+from calib.validation.acceptance import Conservation, balances, changes, judge, limits, remedied
 from calib.validation.metrics import compare
 from calib.validation.null_models import null_models
 from calib.validation.numerical_checks import Check, check, check_errands
 from mpm.discretisation.particles import seed
-from mpm.errors import SceneError, SimulationError
+from mpm.output.energy import spent, unbooked
 from mpm.output.record import ENERGIES, ForceRecord
 from mpm.runtime import Runtime, start
 from mpm.scene import Scene
-from mpm.shapes import SHAPE_KINDS
+from mpm.scene.errors import SceneError, SimulationError
+from mpm.scene.shapes import SHAPE_KINDS
 from tests.calib.cheap import LOG, SECONDS, CheapPool, noted
 from tests.calib.cheap import cut as cheap_cut
 from tests.data_dir import ROOT
@@ -99,7 +110,8 @@ def test_a_food_is_simulated_as_long_as_it_matters():
 
 
 def test_a_food_is_cut_where_it_is_asked_for():
-    """At a part of its length; of parallel sides no more than two heights on either side, and a fitted height moves the blade along."""
+    """At a part of its length; of parallel sides no more than two heights on either side, and a fitted height moves the
+    blade along."""
     cucumber, strawberry = load_food("cucumber"), load_food("strawberry")
     whole = cucumber.dims["length"].value
     shape, _ = specimen(cucumber, None, Sizing(at=0.25))
@@ -111,7 +123,7 @@ def test_a_food_is_cut_where_it_is_asked_for():
     measured, _ = specimen(cucumber, None, Sizing(length=0.4, at=0.75))
     assert (measured.length, measured.cut) == pytest.approx((0.4, 0.1))
     scene = cut_scene(strawberry, berry, load_knife("kitchen"))
-    higher, _ = place(scene, {"height": 1.1 * berry.height})
+    higher, _ = at_fitted_height(scene, {"height": 1.1 * berry.height})
     assert higher.food.shape.cut == pytest.approx(1.1 * berry.cut)
 
 
@@ -120,7 +132,7 @@ def test_fitted_height_takes_the_other_sizes_along():
     food = load_food("cucumber")
     shape, _ = specimen(food, None, Sizing())
     scene = cut_scene(food, shape, load_knife("kitchen"), stroke=0.02)
-    higher, values = place(scene, {"E": 1e6, "height": 1.2 * shape.height}, kept=("width",))
+    higher, values = at_fitted_height(scene, {"E": 1e6, "height": 1.2 * shape.height}, kept=("width",))
     grown = higher.food.shape
     assert values == {"E": 1e6}
     assert (grown.height, grown.length) == pytest.approx((1.2 * shape.height, 1.2 * shape.length))
@@ -128,21 +140,21 @@ def test_fitted_height_takes_the_other_sizes_along():
     assert scene.numerics.far is not None
     assert higher.numerics == replace(scene.numerics, dx=1.2 * scene.numerics.dx, far=1.2 * scene.numerics.far)
     assert (higher.motion, higher.edge) == (scene.motion, scene.edge)
-    free, _ = place(scene, {"height": 1.2 * shape.height})
+    free, _ = at_fitted_height(scene, {"height": 1.2 * shape.height})
     assert len(seed(free).x) == len(seed(scene).x)
-    assert place(scene, {"E": 1e6}) == (scene, {"E": 1e6})
+    assert at_fitted_height(scene, {"E": 1e6}) == (scene, {"E": 1e6})
 
 
 def test_the_mean_over_a_cell_has_its_whole_window_up_to_the_end_of_the_trace(tmp_path):
-    """Half a cell more is simulated than a trace that ends under load shows, at every height that is possible; one that cut through has the
-    food's whole height."""
+    """Half a cell more is simulated than a trace that ends under load shows, at every height that is possible; one that
+    cut through has the food's whole height."""
     path, raw = tmp_path / "loaded.csv", recorded(loaded=True)
     pd.DataFrame({"time_s": raw.time, "force_N": raw.force, "position_m": raw.position}).to_csv(path, index=False)
     setup = set_up(Calibration("cucumber", path).request())
     length, heights = setup.curve.stroke_length_m, setup.objective.parameters["height"]
     for scene in (setup.fine, setup.coarse):
         for height in (heights.low, heights.value, heights.high):
-            placed, _ = place(scene, {"height": height})
+            placed, _ = at_fitted_height(scene, {"height": height})
             assert length + 0.5 * placed.numerics.dx <= placed.motion.stroke * (1 + 1e-9)
             assert placed.motion.stroke <= height * (1 + 1e-9)
     measured = set_up(Calibration("cucumber", path, height=length + 1e-4).request())
@@ -152,7 +164,8 @@ def test_the_mean_over_a_cell_has_its_whole_window_up_to_the_end_of_the_trace(tm
 
 
 def test_a_repeated_run_is_compared_over_the_stroke_of_the_trace(tmp_path):
-    """What happens beyond the trace's end changes neither peak nor work; a run that broke down or felt nothing is said to."""
+    """What happens beyond the trace's end changes neither peak nor work; a run that broke down or felt nothing is said
+    to."""
     stroke = np.linspace(0.001, 0.02, 20)
     scalars = {"work_J": 1.0, "unbooked_J": 0.1}
     own = Evaluation(0, {}, "ok", "", 1.0, stroke, np.where(stroke < 0.0155, 10.0, 90.0), scalars)
@@ -205,7 +218,8 @@ def test_every_food_makes_a_scene_that_can_run(name):
 
 
 def test_scouts_differ_from_the_answer_in_cell_and_speed_alone():
-    """What a search learns from coarse runs is about the same specimen, edge and material; they are at four times the speed."""
+    """What a search learns from coarse runs is about the same specimen, edge and material; they are at four times the
+    speed."""
     setup = set_up(Calibration("banana", ROOT / "force_data" / "banana_reconstructed.csv").request())
     fine, coarse = setup.fine, setup.coarse
     assert coarse.motion == replace(fine.motion, mach=4 * fine.motion.mach)
@@ -231,16 +245,21 @@ def test_elsewhere_moves_the_grid_but_not_the_blades_plane():
     """
     food = load_food("banana")
     scene = cut_scene(food, specimen(food, None, Sizing())[0], load_knife("kitchen"))
-    moved = [elsewhere(scene, k) for k in (1, 2, 3)]
+    moved = [with_other_particles(scene, k) for k in (1, 2, 3)]
     for one in moved:
         x, y, z = one.numerics.grid_shift
         assert 0 < x < 1 and y == 0 and 0 < z < 1
         assert one.mirrors == (True, True) and one.mirrored_between
         assert replace(one, numerics=scene.numerics) == scene
     assert len({one.numerics.grid_shift for one in moved}) == len({one.numerics.seed for one in moved}) == 3
-    assert elsewhere(moved[0], 1).numerics.grid_shift[0] == 0.0
+    assert with_other_particles(moved[0], 1).numerics.grid_shift[0] == 0.0
     sliced = replace(scene, motion=replace(scene.motion, slice_ratio=1.0))
-    assert len({elsewhere(sliced, k).numerics.grid_shift[0] for k in (1, 2, 3)} - {0.0, 0.5}) == 3
+    assert len({with_other_particles(sliced, k).numerics.grid_shift[0] for k in (1, 2, 3)} - {0.0, 0.5}) == 3
+
+
+def fitted(verdict: str, value: float, low: float | None = None, high: float | None = None) -> FittedParameter:
+    """A fitted parameter with this verdict."""
+    return FittedParameter(value, "-", low, high, 0.1, 10.0, verdict, "assumed", "")
 
 
 def test_verdicts_fail_what_fails():
@@ -251,9 +270,9 @@ def test_verdicts_fail_what_fails():
     real = 10 * np.sin(np.pi * s / 0.05)
     nulls = {n: m.metrics for n, m in null_models(s, real).items()}
     parameters = {
-        "E": {"verdict": "at_bound", "value": 1e4, "low95": 1e4, "high95": 2e4},
-        "mu": {"verdict": "at_bound", "value": 0.004, "low95": 0.0, "high95": 0.6},
-        "R": {"verdict": "identified", "value": 300.0},
+        "E": fitted("at_bound", 1e4, 1e4, 2e4),
+        "mu": fitted("at_bound", 0.004, 0.0, 0.6),
+        "R": fitted("identified", 300.0),
     }
     checks = [
         Check("slower", None, 0.01, -0.06),
@@ -261,10 +280,9 @@ def test_verdicts_fail_what_fails():
         Check("broken", "inverted", None, None),
         Check("cells of two thirds", None, 0.01, 0.01, -0.03),
     ]
-    judged = partial(
-        judge, compare(s, real, 1.2 * real), nulls, momentum_residual=0.02, ke_over_ie=0.2, parted=0.7, checks=checks
-    )
-    lines = judged(parameters=parameters)
+    kept = Conservation(momentum_residual=0.02, ke_over_ie=0.2, parted=0.7)
+    judged = partial(judge, compare(s, real, 1.2 * real), nulls, conservation=kept, checks=checks)
+    lines = judged(fitted=parameters)
     failed = {v.name for v in lines if v.passed is False}
     assert failed == {
         "peak force error",
@@ -291,8 +309,8 @@ def test_verdicts_fail_what_fails():
     assert sum(v.passed is None for v in lines) == 3
     bounds = next(v for v in lines if v.name == "parameters at a bound")
     assert bounds.value == 1 and "mu at its natural limit" in bounds.note
-    most = {"mu": {"verdict": "at_bound", "value": 1.19, "low95": 0.0, "high95": 1.2}}
-    assert [v.note for v in judged(parameters=most) if v.name == bounds.name] == ["mu"]
+    most = {"mu": fitted("at_bound", 1.19, 0.0, 1.2)}
+    assert [v.note for v in judged(fitted=most) if v.name == bounds.name] == ["mu"]
     fracture = {"edge_J_m2": 97.0, "released_J_m2": 52.0}
     said = limits("measured", "speed", "constant", lines, parameters, ["the width is assumed"], fracture)
     for word in (
@@ -307,7 +325,7 @@ def test_verdicts_fail_what_fails():
     small = limits("measured", "speed", "constant", lines, parameters, [], {"edge_J_m2": 97.0, "released_J_m2": 9.0})
     assert not any("J/m²" in text for text in small)
     assert not any("Weak intervals" in text for text in small)
-    shaky = parameters | {"yield_stress": {**next(iter(parameters.values())), "verdict": "weak"}}
+    shaky = parameters | {"yield_stress": fitted("weak", 1e4, 1e4, 2e4)}
     told = limits("measured", "speed", "constant", lines, shaky, [])
     assert any("Weak intervals" in text and "for yield_stress" in text and "for R" not in text for text in told)
 
@@ -338,7 +356,8 @@ def test_keys_follow_the_content():
 
 
 def test_code_is_the_same_in_a_checkout_and_installed(tmp_path, monkeypatch):
-    """The key of the code follows every module of the packages that are named, and not the data an installed one holds."""
+    """The key of the code follows every module of the packages that are named, and not the data an installed one
+    holds."""
     (tmp_path / "calib" / "part").mkdir(parents=True)
     (tmp_path / "calib" / "__init__.py").write_text("")
     monkeypatch.setattr("calib.io.provenance.PACKAGE", tmp_path / "calib")
@@ -382,8 +401,7 @@ class FlakyPool(Pool):
             future.set_exception(BrokenProcessPool("killed"))
             return future
         curve = np.linspace(0, 1, 5)
-        done = {"status": "ok", "reason": "", "fraction": 1.0, "stroke": curve, "scalars": {}, "seconds": 0.1}
-        results = [done | {"force": job[1].get("E", 0.0) * curve} for job in jobs]
+        results = [Evaluation(0, {}, "ok", "", 1.0, curve, job[1].get("E", 0.0) * curve, {}, 0.1) for job in jobs]
         future.set_result(results if together else results[0])
         return future
 
@@ -398,21 +416,21 @@ def test_killed_worker_is_tried_once_more():
 
 
 def test_last_bits_of_a_force_are_not_kept() -> None:
-    """Another build of the solver, whose forces and strokes differ by rounding, gives a search the very same curve; a millionth of the peak
-    is still felt.
+    """Another build of the solver, whose forces and strokes differ by rounding, gives a search the very same curve; a
+    millionth of the peak is still felt.
     """
     record = cheap_cut(PRISM)
     other = replace(record, edge=record.edge * (1 + 2e-15), stroke=record.stroke * (1 - 2e-16))
     assert (other.resolved != record.resolved).any() and (other.stroke != record.stroke).any()
     for key in ("stroke", "force"):
-        np.testing.assert_array_equal(plain(other)[key], plain(record)[key])
-    felt = plain(replace(record, edge=record.edge * (1 + 1e-6)))["force"]
-    assert np.abs(felt - plain(record)["force"]).max() == pytest.approx(1e-6 * record.edge.max(), rel=0.2)
+        np.testing.assert_array_equal(getattr(evaluation_of(other), key), getattr(evaluation_of(record), key))
+    felt = evaluation_of(replace(record, edge=record.edge * (1 + 1e-6))).force
+    assert np.abs(felt - evaluation_of(record).force).max() == pytest.approx(1e-6 * record.edge.max(), rel=0.2)
 
 
 def test_a_gpu_gets_all_that_is_asked_for_at_a_time() -> None:
-    """Five candidates, four at a time: two launches in one process, each result with its own values. Where the first kills its process
-    twice, its four are tried by themselves, and nothing is lost.
+    """Five candidates, four at a time: two launches in one process, each result with its own values. Where the first
+    kills its process twice, its four are tried by themselves, and nothing is lost.
     """
     batch = [{"E": float(k)} for k in range(5)]
     for deaths, sizes in ((0, [4, 1]), (2, [4, 4, 1, 1, 1, 1, 1])):
@@ -494,8 +512,8 @@ def test_what_a_worker_has_compiled_is_kept(tmp_path, monkeypatch):
 
 
 def test_killed_last_run_is_made_once_more():
-    """The full record of the best values survives one death; after two the message says what is kept and what to do. A check
-    that is killed twice is kept as one that broke down."""
+    """The full record of the best values survives one death; after two the message says what is kept and what to do. A
+    check that is killed twice is kept as one that broke down."""
     kept: list[Any] = []
     LastRun(1).errands([Errand(PRISM, kept.append, whole=True)])
     assert kept == ["the record"]
@@ -507,8 +525,8 @@ def test_killed_last_run_is_made_once_more():
 
 
 def test_an_errand_that_was_begun_is_made_once(tmp_path, monkeypatch):
-    """Beside other runs, kept when it is there, not asked for again; dropped where it is not wanted; made again where its process
-    was killed."""
+    """Beside other runs, kept when it is there, not asked for again; dropped where it is not wanted; made again where
+    its process was killed."""
     log = tmp_path / "log"
     monkeypatch.setenv(LOG, str(log))
     monkeypatch.setenv(SECONDS, "0.3")
@@ -598,10 +616,12 @@ def _alive(process: int) -> bool:
 
 
 def test_imports_stay_light():
-    """Importing calib and mpm loads neither Taichi nor any plotting nor Dask; nothing is printed, and Taichi will call nobody."""
+    """Importing calib and mpm loads neither Taichi nor any plotting nor Dask; nothing is printed, and Taichi will call
+    nobody."""
     code = (
         "import os, sys, cutcal.main\n"
-        "again = {'numpy', 'pandas', 'mpm', 'cutcal.commands.calibration.calibrate'} & set(sys.modules)\n"  # in every worker, as its program
+        # in every worker, as its program
+        "again = {'numpy', 'pandas', 'mpm', 'cutcal.commands.calibration.calibrate'} & set(sys.modules)\n"
         "assert not again, again\n"
         "import calib, mpm, calib.calibration.run\n"
         "assert os.environ['TI_SKIP_VERSION_CHECK'] == 'ON'\n"

@@ -1,4 +1,5 @@
-"""Killed and resumed until it is done: nothing is lost, nothing is made twice, and the optimum is that of an undisturbed study."""
+"""Killed and resumed until it is done: nothing is lost, nothing is made twice, and the optimum is that of an
+undisturbed study."""
 
 from __future__ import annotations
 
@@ -122,11 +123,13 @@ class Study:
 
 
 @pytest.mark.slow
-# Only a signal that cannot be caught proves this; where there is none (Windows) test_store covers the states that a kill leaves.
+# Only a signal that cannot be caught proves this; where there is none (Windows) test_store covers the states that a
+# kill leaves.
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="processes cannot be killed without notice here")
 def test_ten_kills_change_nothing(tmp_path):
-    """kill -9 at ten random moments: the same summary to the last digit; what was stored is never begun again, and all that
-    is begun twice was in flight at a kill. The same command once more begins no run at all, and changes no number."""
+    """kill -9 at ten random moments: the same summary to the last digit; what was stored is never begun again, and all
+    that is begun twice was in flight at a kill. The same command once more begins no run at all, and changes no
+    number."""
     calm, hunted = (Study(tmp_path, name) for name in ("calm", "hunted"))
     calm.finish()
     runs = Counter(calm.begun())

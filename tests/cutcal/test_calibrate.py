@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calib.calibration.result import from_document
 from calib.material.food import load_material_file
 from calib.simulation.process_pool import Pool
 from calib.validation.metrics import compare
@@ -82,7 +83,7 @@ def test_a_grid_that_counts_is_said_with_a_remedy(finished):
     line = next(v for v in summary["verdicts"] if v["name"] == "cells of two thirds")
     for passed in (True, False):
         line["passed"] = passed
-        text = verdict_text(summary, finished[0]).splitlines()
+        text = verdict_text(from_document(summary, finished[0])).splitlines()
         place = next(k for k, words in enumerate(text) if line["name"] in words)
         assert ("--u-num" in text[place + 1]) == (not passed) and "".join(text).count("--u-num") == (not passed)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import re
@@ -15,12 +16,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import calib
-from calib import Calibration, Food, Trace
 from calib.material.food import FoodSpec, load_food
 from calib.problem.request import Request
 from calib.problem.setup import conditioned
-from mpm.errors import CutcalError
+from cutcal import Calibration, Food, Trace
+from mpm.scene.errors import CutcalError
 from tests.data_dir import ROOT
 
 BANANA = ROOT / "force_data" / "banana_reconstructed.csv"
@@ -169,18 +169,20 @@ def test_foods_by_name_and_by_file(tmp_path: Path) -> None:
     assert Food.load(path).name == Food.load(str(path)).name == "mine"
 
 
-def test_names_are_loaded_when_they_are_used() -> None:
-    """``import calib`` loads no pandas, no Taichi and no plotting; Trace needs no pandas either; other names are errors."""
+@pytest.mark.parametrize("name", ["cutcal", "calib"])
+def test_names_are_loaded_when_they_are_used(name: str) -> None:
+    """``import cutcal`` loads no pandas, no Taichi and no plotting; Trace needs no pandas either; other names are errors."""
     code = (
-        "import sys, calib\n"
+        f"import sys, {name}\n"
         "heavy = {'taichi', 'matplotlib', 'pandas', 'numpy', 'yaml', 'scipy', 'h5py'} & set(sys.modules)\n"
         "assert not heavy, heavy\n"
-        "from calib import Trace\n"
+        f"from {name} import Trace\n"
         "heavy = {'taichi', 'matplotlib', 'pandas', 'h5py'} & set(sys.modules)\n"
         "assert not heavy, heavy\n"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert set(calib.__all__) <= set(dir(calib))
+    package = importlib.import_module(name)
+    assert set(package.__all__) <= set(dir(package))
     with pytest.raises(AttributeError, match="no attribute 'Knife'"):
-        calib.Knife  # noqa: B018
+        package.Knife  # noqa: B018

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-import calib
+import cutcal
 import mpm
 from calib.material.food import load_material_file
 from calib.material.knife import load_knife
 from calib.multi_specimen.study_file import read_study
-from calib.validation.acceptance import JUDGED, Verdict, judge
+from calib.uncertainty.estimates import FittedNuisance
+from calib.validation.acceptance import NUISANCE_LINES, Conservation, Verdict, judge
 from calib.validation.metrics import compare
 from calib.validation.null_models import null_models
 from calib.validation.numerical_checks import VARIANTS, Check
@@ -63,8 +64,8 @@ DOCUMENTED = re.findall(r"^\.\. auto\w+:: (\S+)", read(DOCS / "api.md"), flags=r
 
 
 def test_every_public_name_is_documented() -> None:
-    """What ``calib`` and ``mpm`` offer is on the page of the interface."""
-    offered = {f"{package.__name__}.{name}" for package in (calib, mpm) for name in package.__all__}
+    """What ``cutcal`` and ``mpm`` offer is on the page of the interface."""
+    offered = {f"{package.__name__}.{name}" for package in (cutcal, mpm) for name in package.__all__}
     assert offered - set(DOCUMENTED) == set()
 
 
@@ -124,15 +125,14 @@ def lines_of_a_report() -> list[Verdict]:
     s = np.linspace(0.0, 0.03, 100)
     real = np.sin(np.pi * s / 0.03)
     nulls = {name: model.metrics for name, model in null_models(s, real).items()}
-    nuisance = {"value": 0.0, "sd": 1.0, "prior_sd": 1.0, "unit": "-", "outside": False}
+    nuisance = FittedNuisance(0.0, 1.0, 1.0, "-", False)
     return judge(
         compare(s, real, real),
         nulls,
-        momentum_residual=0.0,
-        ke_over_ie=0.0,
-        parameters={},
+        conservation=Conservation(0.0, 0.0),
+        fitted={},
         checks=[Check(name, None, 0.0, 0.0, 0.0) for name in VARIANTS],
-        nuisances=dict.fromkeys(JUDGED, nuisance),
+        nuisances=dict.fromkeys(NUISANCE_LINES, nuisance),
     )
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from calib.simulation.workers import Workers
 from intsim.data import pictures
-from intsim.data.pictures import VIEWS
+from intsim.data.cameras import CAMERA_NAMES
 
 PIXELS = 32
 
@@ -50,7 +50,7 @@ class Painter:
         n = len(stored.group["obs/agent/qpos"]) - 1
         assert len(stored.group["mpm/surface"]) == 2
         shades = (10 * np.arange(n) + 40 * self.scene).astype(np.uint8)[:, None, None, None]
-        return {view: np.broadcast_to(shades, (n, self.pixels, self.pixels, 3)).copy() for view in VIEWS}
+        return {view: np.broadcast_to(shades, (n, self.pixels, self.pixels, 3)).copy() for view in CAMERA_NAMES}
 
 
 def paint_with(painter: type, patch: pytest.MonkeyPatch) -> None:

@@ -7,13 +7,12 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from calib.io.progress import ProgressBar
-from calib.problem.objective import ErrorModel
 from calib.problem.request import Request
-from calib.validation.acceptance import Verdict, remedied
-from calib.validation.metrics import IsoRating
+from calib.problem.target import ErrorModel
+from calib.validation.acceptance import remedied
 from cutcal.commands.calibration.describe import description
 from cutcal.options import (
     RESUME_HELP,
@@ -29,7 +28,11 @@ from cutcal.options import (
     titled,
     workers_of,
 )
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
+
+if TYPE_CHECKING:
+    from calib.calibration.result import CalibrationResult
+    from calib.multi_specimen.result import HeldOutCut, InSampleCut, StudyResult
 
 HELP = "fit a food to a measured knife-force trace, and report"
 DESCRIPTION = """Fit a food to a knife-force trace (CSV, JSON, HDF5; units in columns' names)."""
@@ -137,6 +140,7 @@ def measured(args: argparse.Namespace, command: Sequence[str]) -> Request:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate; prints the verdict, or the summary as JSON."""
+    from calib.calibration.result import to_document
     from calib.calibration.run import run as calibrate
 
     command = ["calibrate", *(a for a in sys.argv[1:] if a != "calibrate")]
@@ -152,79 +156,79 @@ def run(args: argparse.Namespace) -> int:
     out = Path(args.out or f"cutcal-{request.food.name}-{request.stem}")
 
     with workers_of(args, note) as pool, ProgressBar() as bar:
-        summary = calibrate(request, out, pool, resume=args.resume, progress=bar, say=note)
+        result = calibrate(request, out, pool, resume=args.resume, progress=bar, say=note)
     if args.json:
-        print_json(summary)
+        print_json(to_document(result))
     else:
-        print(verdict_text(summary, out))
-    return 0 if summary["passed"] else 2
+        print(verdict_text(result))
+    return 0 if result.passed else 2
 
 
 def run_study(args: argparse.Namespace, command: Sequence[str]) -> int:
     """Fit and predict the cuts of a study; prints its table, or the summary as JSON."""
+    from calib.io.typed_document import to_document
     from calib.multi_specimen.run import run as study_run
-    from calib.multi_specimen.study_file import overridden, read_study
+    from calib.multi_specimen.study_file import read_study
 
     if args.check:
         raise CutcalError("--check is for one trace: give --food and --trace, and leave --config out")
     taken = [n for n in ("food", "trace", "air", "material", "fit") if getattr(args, n) is not None]
     if taken:
         raise CutcalError(f"--{taken[0]} beside --config: write it into {args.config}, where it belongs to a trace")
-    read = read_study(args.config)
-    study = overridden(read, budget=args.budget, arch=args.arch, command=tuple(command))
+    study = read_study(args.config).run_with(budget=args.budget, arch=args.arch, command=tuple(command))
     out = Path(args.out or f"cutcal-{Path(args.config).stem}")
 
     with workers_of(args, note) as pool, ProgressBar() as bar:
-        summary = study_run(study, out, pool, resume=args.resume, progress=bar, say=note)
+        result = study_run(study, out, pool, resume=args.resume, progress=bar, say=note)
     if args.json:
-        print_json(summary)
+        print_json(to_document(result))
     else:
-        print(study_text(summary, out))
-    return 0 if summary["passed"] else 2
+        print(study_text(result, out))
+    return 0 if result.passed else 2
 
 
-def study_text(summary: dict[str, Any], out: Path) -> str:
+def study_text(result: StudyResult, out: Path) -> str:
     """What the terminal shows at the end of a study."""
     lines = [f"  {'':24s}{'peak':>8s}{'NRMSE':>8s}{'shape':>8s}{'R':>7s}{'in band':>9s}{'factor':>8s}"]
-    kinds = (("in-sample", summary["traces"]), ("held out", summary["hold_out"]))
-    for words, group in kinds:
-        for name, t in group.items():
-            m, inside = t["metrics"], t["predictive_inside"]
-            within = "" if inside is None else f"{inside:.0%}"
-            lines.append(
-                f"  {'pass' if t['passed'] else 'FAIL'}  {name + ', ' + words:18s}{m['peak_error']:+8.1%}{m['nrmse']:8.3f}"
-                f"{m['shape_error']:8.3f}{m['iso18571']['R']:7.3f}{within:>9s}{t['factor']:8.3g}"
-            )
-            caveat = IsoRating(**m["iso18571"]).caveat
-            lines += [f"        {caveat}"] if caveat else []
+    rows: list[tuple[str, InSampleCut | HeldOutCut]] = [(f"{n}, in-sample", cut) for n, cut in result.traces.items()]
+    rows += [(f"{n}, held out", cut) for n, cut in result.hold_out.items()]
+    for name, cut in rows:
+        m, inside = cut.metrics, cut.predictive_inside
+        within = "" if inside is None else f"{inside:.0%}"
+        lines.append(
+            f"  {'pass' if cut.passed else 'FAIL'}  {name:18s}{m.peak_error:+8.1%}{m.nrmse:8.3f}{m.shape_error:8.3f}"
+            f"{m.iso18571.R:7.3f}{within:>9s}{cut.factor:8.3g}"
+        )
+        lines += [f"        {m.iso18571.caveat}"] if m.iso18571.caveat else []
     lines.append(f"  {'fitted':24s}{'value':>10s} {'':6s}{'95 % interval':>24s}")
-    for name, p in summary["parameters"].items():
-        interval = "" if p["low95"] is None else f"{p['low95']:.3g} to {p['high95']:.3g}"
-        lines.append(f"  {name:24s}{p['value']:>10.4g} {p['unit']:6s}{interval:>24s}  {p['verdict']}")
+    for name, p in result.parameters.items():
+        interval = "" if p.low95 is None else f"{p.low95:.3g} to {p.high95:.3g}"
+        lines.append(f"  {name:24s}{p.value:>10.4g} {p.unit:6s}{interval:>24s}  {p.verdict}")
     head = (
-        f"{summary['food']}, {summary['study']}: {'passed' if summary['passed'] else 'not passed'}; "
-        f"{summary['simulations']} simulations in {summary['wall_s']:.0f} s"
+        f"{result.food}, {result.study}: {'passed' if result.passed else 'not passed'}; "
+        f"{result.simulations} simulations in {result.wall_s:.0f} s"
     )
     return "\n".join([head, *lines, f"  wrote {out}"])
 
 
-def verdict_text(summary: dict[str, Any], out: Path) -> str:
+def verdict_text(result: CalibrationResult) -> str:
     """What the terminal shows at the end."""
     lines = []
-    for v in summary["verdicts"]:
-        mark = {True: "pass", False: "FAIL", None: "not run"}[v["passed"]]
-        value = "" if v["value"] is None else f"{v['value']:.3g}"
-        limit = "" if v["limit"] is None else f"limit {v['limit']:.3g}"
-        lines.append(f"  {mark:8s}{v['name']:42s}{value:>10s}  {limit}")
-        remedy = remedied(Verdict(**v))
+    for v in result.verdicts:
+        mark = {True: "pass", False: "FAIL", None: "not run"}[v.passed]
+        value = "" if v.value is None else f"{v.value:.3g}"
+        limit = "" if v.limit is None else f"limit {v.limit:.3g}"
+        lines.append(f"  {mark:8s}{v.name:42s}{value:>10s}  {limit}")
+        remedy = remedied(v)
         lines += [f"  {'':8s}{remedy}"] if remedy else []
     lines.append(f"  {'fitted':8s}{'95 % interval':>42s}")
-    for name, p in summary["parameters"].items():
-        interval = "" if p["low95"] is None else f"{p['low95']:.3g} to {p['high95']:.3g}"
-        lines.append(f"  {'':8s}{name:18s}{p['value']:>10.4g} {p['unit']:6s}{interval:>24s}  {p['verdict']}")
-    state = "interrupted" if summary["status"] == "interrupted" else "passed" if summary["passed"] else "not passed"
+    for name, p in result.fitted.items():
+        interval = "" if p.low95 is None else f"{p.low95:.3g} to {p.high95:.3g}"
+        lines.append(f"  {'':8s}{name:18s}{p.value:>10.4g} {p.unit:6s}{interval:>24s}  {p.verdict}")
+    state = "interrupted" if result.status == "interrupted" else "passed" if result.passed else "not passed"
+    peak, real = result.agreement.peak_sim_N, result.agreement.peak_real_N
     head = (
-        f"{summary['food']}: {state}; peak {summary['peak_sim_N']:.2f} N against {summary['peak_real_N']:.2f} N "
-        f"({summary['trace']['label']}), {summary['simulations']} simulations in {summary['wall_s']:.0f} s"
+        f"{result.food}: {state}; peak {peak:.2f} N against {real:.2f} N ({result.trace.label}), "
+        f"{result.history.simulations} simulations in {result.wall_s:.0f} s"
     )
-    return "\n".join([head, *lines, f"  wrote {out}"])
+    return "\n".join([head, *lines, f"  wrote {result.folder}"])

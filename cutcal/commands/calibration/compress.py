@@ -16,7 +16,7 @@ from cutcal.options import (
     say,
     whole,
 )
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 if TYPE_CHECKING:
     from calib.compression.result import CompressionResult

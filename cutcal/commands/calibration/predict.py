@@ -5,11 +5,14 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from calib.errors import MaterialError
-from calib.validation.metrics import IsoRating
 from cutcal.commands.calibration.calibrate import add_trace, measured
 from cutcal.options import add_food, add_run, note, print_json
+
+if TYPE_CHECKING:
+    from calib.validation.prediction import PredictionResult
 
 HELP = "predict a measured cut with values calibrated on another"
 DESCRIPTION = """Simulate the cut of a trace with the values of --material, without fitting
@@ -36,28 +39,30 @@ def add_args(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Predict; prints the agreement, or the summary as JSON."""
     from calib.validation.prediction import run as predict
+    from calib.validation.prediction import to_document
 
     if args.material is None:
         raise MaterialError("predict needs the calibrated food: add --material with the material.yaml of a calibration")
     request = measured(args, ["predict", *(a for a in sys.argv[1:] if a != "predict")])
     out = Path(args.out or f"cutcal-predict-{request.food.name}-{request.stem}")
 
-    summary = predict(request, out, scale_width=args.scale_width, say=note)
+    result = predict(request, out, scale_width=args.scale_width, say=note)
     if args.json:
-        print_json(summary)
+        print_json(to_document(result))
     else:
-        m, scale, limits = summary["metrics"], summary["width_scale"], summary["limits"]
-        print(
-            f"{summary['food']}: {'passed' if summary['passed'] else 'not passed'}, predicted without fitting"
-            + ("" if scale is None else f" but one factor {scale:.3g} for the width")
-        )
-        print(
-            f"  peak {m['peak_sim_N']:.2f} N against {m['peak_real_N']:.2f} N ({m['peak_error']:+.1%}), "
-            f"NRMSE {m['nrmse']:.3f} (limit {limits['nrmse']:.2f}), R {m['iso18571']['R']:.3f} (limit {limits['rating']:.2f}), "
-            f"shape {m['shape_error']:.3f}, work {m['work_error']:+.1%}"
-        )
-        caveat = IsoRating(**m["iso18571"]).caveat
-        if caveat:
-            print(f"  {caveat}")
+        print(agreement_text(result))
         print(f"  wrote {out}")
-    return 0 if summary["passed"] else 2
+    return 0 if result.passed else 2
+
+
+def agreement_text(result: PredictionResult) -> str:
+    """What the terminal shows at the end."""
+    m, scale, limits = result.metrics, result.width_scale, result.limits
+    factor = "" if scale is None else f" but one factor {scale:.3g} for the width"
+    lines = [
+        f"{result.food}: {'passed' if result.passed else 'not passed'}, predicted without fitting{factor}",
+        f"  peak {m.peak_sim_N:.2f} N against {m.peak_real_N:.2f} N ({m.peak_error:+.1%}), "
+        f"NRMSE {m.nrmse:.3f} (limit {limits.nrmse:.2f}), R {m.iso18571.R:.3f} (limit {limits.rating:.2f}), "
+        f"shape {m.shape_error:.3f}, work {m.work_error:+.1%}",
+    ]
+    return "\n".join([*lines, *([f"  {m.iso18571.caveat}"] if m.iso18571.caveat else [])])

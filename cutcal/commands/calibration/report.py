@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from calib.io.schema import tag
@@ -38,8 +39,9 @@ def writer(folder: Path) -> Callable[[Path], Path]:
     Raises:
         ReportError: The folder is missing, or holds no finished run.
     """
+    from calib.calibration import result as calibration
+    from calib.material.properties import MEANINGS
     from reports import multi_specimen
-    from reports.calibration import report
     from studies.convergence import result as convergence
     from studies.speed import result as bench
     from studies.stability import result as stability
@@ -60,4 +62,8 @@ def writer(folder: Path) -> Callable[[Path], Path]:
     if not summary.exists():
         names = ", ".join(("summary.json", *found))
         raise ReportError(f"{folder}: holds none of {names}; give the --out of a finished run")
-    return multi_specimen.write_report if multi_specimen.is_study(summary) else report.write_report
+    return (
+        partial(multi_specimen.write_report, meanings=MEANINGS)
+        if multi_specimen.is_study(summary)
+        else calibration.write_report
+    )

@@ -40,7 +40,8 @@ def run(args: argparse.Namespace) -> int:
         print_json({"schema": tag("knife"), knife.name: {n: asdict(f) for n, f in size.items()}})
         return 0
     print(
-        f"{knife.name}: a wedge of {size['angle'].value:g}° up to {wedge_height(knife) * 1e3:.3g} mm above the edge, parallel above"
+        f"{knife.name}: a wedge of {size['angle'].value:g}° up to {wedge_height(knife) * 1e3:.3g} mm above the edge, "
+        "parallel above"
     )
     for name, field in size.items():
         print(f"  {name:8s}{field.value:g} {field.unit:6s}{field.status}: {field.source}")

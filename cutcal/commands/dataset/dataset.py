@@ -6,11 +6,15 @@ import argparse
 import sys
 from collections.abc import Callable
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cutcal.options import KNIFE_HELP, RESUME_HELP, Group, add_workers, number, print_json, say, whole, workers_of
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
+
+if TYPE_CHECKING:
+    from intsim.data.dataset_document import DatasetDocument, DatasetSpec
 
 HELP = "a robot's cuts with force, in shards that learning code loads"
 DESCRIPTION = """generate: a Panda in ManiSkill cuts what it is told, in words; the food is in
@@ -79,7 +83,7 @@ def add_args(p: Group) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Generate or export."""
+    """Generate, export or learn."""
     if args.out is None:
         raise CutcalError("dataset: give --out, the folder of the results")
     document = {"generate": _generate, "export": _export, "clone": _clone}[args.what](args)
@@ -92,8 +96,29 @@ def run(args: argparse.Namespace) -> int:
 
 def _generate(args: argparse.Namespace) -> dict[str, Any]:
     from intsim.data import pictures
-    from intsim.data.generate import available, generate
-    from intsim.data.manifest import TASKS, Manifest
+    from intsim.data.generate import generate, require_simulator
+
+    spec, backgrounds, out = _spec(args), _backgrounds(args), Path(args.out)
+    require_simulator()
+    args.arch = "cpu"
+    with workers_of(args, say) as pool:
+        if backgrounds:
+            pictures.require_renderer(pool, backgrounds, args.pixels)
+        command = ("dataset", *(a for a in sys.argv[1:] if a != "dataset"))
+        document = generate(spec, out, pool, resume=args.resume, say=say, command=command)
+        if backgrounds:
+            pool.renew()
+            rendered = pictures.render_dataset(out, backgrounds, args.pixels, pool, say)
+            document = replace(document, pictures=rendered)
+    if not args.json:
+        print(table(document, rendered=bool(backgrounds)))
+    return document.as_dict()
+
+
+def _spec(args: argparse.Namespace) -> DatasetSpec:
+    """The dataset that the options ask for."""
+    from intsim.data.dataset_document import DatasetSpec
+    from intsim.data.manifest import TRAINING_SUITES, Manifest
     from intsim.task.planner import STYLES
     from intsim.task.suites import FOODS
 
@@ -102,55 +127,38 @@ def _generate(args: argparse.Namespace) -> dict[str, Any]:
     unknown = [name for name in args.food or () if name not in FOODS]
     if unknown:
         raise CutcalError(f"--food {unknown[0]}: not one of {', '.join(FOODS)}")
-    scenes = _scenes(args)
     manifest = Manifest(
         args.episodes,
         foods=args.food or FOODS,
-        suites=args.task or TASKS,
+        suites=args.task or TRAINING_SUITES,
         seed=args.seed,
         styles=args.style or STYLES,
     )
-    available()
-    args.arch = "cpu"
-    with workers_of(args, say) as pool:
-        if scenes:
-            pictures.available(pool, scenes, args.pixels)
-        found = generate(
-            manifest,
-            Path(args.out),
-            pool,
-            demos=args.demos,
-            knife=args.knife,
-            stiffness=args.stiffness,
-            shard=args.shard,
-            resume=args.resume,
-            say=say,
-            command=("dataset", *(a for a in sys.argv[1:] if a != "dataset")),
-        )
-        if scenes:
-            pool.renew()
-            found["pictures"] = pictures.render(Path(args.out), scenes, args.pixels, pool, say)
-    if not args.json:
-        s = found["seconds_per_episode"]
-        print(
-            f"{found['trajectories']} trajectories of {found['steps']} steps: {found['published']} meet the published criteria, "
-            f"{found['severed']} are in pieces\n"
-            f"  {s['solver']:.1f} s of one core in the solver and {s['robot']:.1f} s in the robot simulator each; the longest "
-            f"{found['most_solver_s']:.0f} s\n"
-            f"  21,000 of them: {found['core_hours_of_21000']:.0f} core hours; {found['bytes'] / 1e6:.1f} MB now"
-        )
-        if scenes:
-            p = found["pictures"]
-            print(
-                f"  {p['number']} pictures before {len(scenes)} backgrounds: {p['seconds_per_episode']:.1f} s of one core for each trajectory and "
-                f"background\n  21,000 before 15: {p['core_hours_of_315000']:.0f} core hours; {p['bytes'] / 1e6:.1f} MB now"
-            )
-        for broken in found["broken"]:
-            print(f"  trajectory {broken['index']}: {broken['status']}")
-    return found
+    return DatasetSpec(manifest, args.demos, args.knife, args.stiffness, args.shard)
 
 
-def _scenes(args: argparse.Namespace) -> list[int]:
+def table(document: DatasetDocument, *, rendered: bool) -> str:
+    """What the terminal shows at the end of a finished dataset, with its pictures where they were rendered."""
+    found, pictures = document.totals, document.pictures
+    assert found is not None
+    seconds = found.seconds_per_episode
+    lines = [
+        f"{found.trajectories} trajectories of {found.steps} steps: {found.published} meet the published criteria, "
+        f"{found.severed} are in pieces",
+        f"  {seconds.solver:.1f} s of one core in the solver and {seconds.robot:.1f} s in the robot simulator each; "
+        f"the longest {found.most_solver_s:.0f} s",
+        f"  21,000 of them: {found.core_hours_of_21000:.0f} core hours; {found.bytes / 1e6:.1f} MB now",
+    ]
+    if rendered and pictures is not None:
+        lines += [
+            f"  {pictures.number} pictures before {len(pictures.scenes)} backgrounds: "
+            f"{pictures.seconds_per_episode:.1f} s of one core for each trajectory and background",
+            f"  21,000 before 15: {pictures.core_hours_of_315000:.0f} core hours; {pictures.bytes / 1e6:.1f} MB now",
+        ]
+    return "\n".join([*lines, *(f"  trajectory {broken.index}: {broken.status}" for broken in found.broken)])
+
+
+def _backgrounds(args: argparse.Namespace) -> list[int]:
     """The backgrounds that are asked for, each once."""
     try:
         return list(dict.fromkeys(int(k) for k in args.scenes.split(","))) if args.scenes else []
@@ -171,30 +179,32 @@ def _clone(args: argparse.Namespace) -> dict[str, Any]:
     clone = train(Path(args.folder), keep=args.keep, most=args.most, seed=args.seed)
     clone.save(path)
     if not args.json:
+        about = clone.about
         print(
-            f"learnt from {clone.about['trajectories']} trajectories, {len(clone.vocabulary)} words; mean error {clone.about['loss']:.4f}"
+            f"learnt from {about['trajectories']} trajectories, {len(clone.vocabulary)} words; "
+            f"mean error {about['loss']:.4f}"
         )
     return clone.about
 
 
 def _export(args: argparse.Namespace) -> dict[str, Any]:
-    from intsim.data import lerobot, rdt, rlds
+    from intsim.data.lerobot import export_lerobot
+    from intsim.data.rdt import export_rdt
+    from intsim.data.rlds import export_rlds
 
     if args.folder is None:
         raise CutcalError(
             "dataset export: name the folder of a dataset, such as cutcal dataset export runs/cuts --out runs/lerobot"
         )
-    scenes = _scenes(args)
+    backgrounds, folder, out = _backgrounds(args), Path(args.folder), Path(args.out)
     exports: dict[str, Callable[..., dict[str, Any]]] = {
-        "lerobot": lerobot.export,
-        "rlds": rlds.export,
-        "rdt": rdt.export,
+        "lerobot": export_lerobot,
+        "rlds": export_rlds,
+        "rdt": export_rdt,
     }
     args.arch = "cpu"
-    with workers_of(args, say) if scenes else nullcontext() as pool:
-        found = exports[args.format](
-            Path(args.folder), Path(args.out), scenes=scenes, pixels=args.pixels, pool=pool, say=say
-        )
+    with workers_of(args, say) if backgrounds else nullcontext() as pool:
+        found = exports[args.format](folder, out, backgrounds=backgrounds, pixels=args.pixels, pool=pool, say=say)
     if not args.json and args.format == "rlds":
         print(", ".join(f"{s['shardLengths'][0]} episodes to {s['name']}" for s in found["splits"]))
     elif not args.json and args.format == "rdt":

@@ -6,16 +6,17 @@ import argparse
 import sys
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from calib.io.typed_document import to_document
 from calib.material.food import FoodSpec, load_food, load_material_file
 from cutcal.options import KNIFE_HELP, Group, add_workers, number, print_json, say, whole, workers_of
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 if TYPE_CHECKING:
-    from calib.simulation.workers import Workers
-    from intsim.policy.oracles import Policy
-    from intsim.sim.closed_loop import World
+    from intsim.evaluate import PolicyEvaluation
+    from intsim.outcomes import EvaluationResult, SuccessRate
+    from intsim.task.rollout import Policy
 
 HELP = "evaluate a policy that cuts what it is told, geometrically and in the solver"
 DESCRIPTION = """Rolls a policy out in suites of tasks in words, and counts its successes: the
@@ -70,23 +71,51 @@ def add_args(p: Group) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Evaluate and write."""
-    from intsim.data.generate import available
-    from intsim.policy.behaviour_cloning import Clone
-    from intsim.policy.oracles import POLICIES, make
-    from intsim.policy.remote import Remote
-    from intsim.sim.closed_loop import World
-    from intsim.task.suites import FOODS, SUITES
+    from intsim.data.generate import require_simulator
+    from intsim.evaluate import evaluate
 
     if args.policy == "list" or args.suite == ["list"]:
-        for name, (_, what) in POLICIES.items():
-            print(f"policy {name:12s}{what}")
-        print(f"policy {'clone':12s}does what it has learnt from demonstrations (--weights)")
-        print(f"policy {'remote':12s}is asked of a server, such as those of RDT, Octo and OpenVLA (--server)")
-        for name, suite in SUITES.items():
-            print(f"suite  {name:12s}{suite.what}")
+        _list()
         return 0
-    suites = args.suite or list(SUITES)
-    unknown = [s for s in suites if s not in SUITES]
+    _check(args)
+    evaluation = _evaluation(args)
+    out = Path(args.out or f"cutcal-evaluate-{args.policy}")
+    if evaluation.world is not None:
+        require_simulator()
+    args.arch = "cpu"
+    with nullcontext() if evaluation.world is None else workers_of(args, say) as pool:
+        command = ["cutcal", *sys.argv[1:]]
+        result = evaluate(evaluation, out, pool=pool, resume=args.resume, say=say, command=command)
+    if args.json:
+        print_json(to_document(result))
+    else:
+        print(table(result))
+        print(f"  wrote {out}")
+    return 0
+
+
+def _list() -> None:
+    """Policies and suites, with what they are."""
+    from intsim.policy.oracles import POLICIES
+    from intsim.task.suites import SUITES
+
+    for name, (_, what) in POLICIES.items():
+        print(f"policy {name:12s}{what}")
+    print(f"policy {'clone':12s}does what it has learnt from demonstrations (--weights)")
+    print(f"policy {'remote':12s}is asked of a server, such as those of RDT, Octo and OpenVLA (--server)")
+    for name, suite in SUITES.items():
+        print(f"suite  {name:12s}{suite.what}")
+
+
+def _check(args: argparse.Namespace) -> None:
+    """Refuse options that do not go together.
+
+    Raises:
+        CutcalError: They do not.
+    """
+    from intsim.task.suites import SUITES
+
+    unknown = [s for s in args.suite or () if s not in SUITES]
     if unknown:
         raise CutcalError(f"--suite {unknown[0]}: none of {', '.join(SUITES)}")
     if (args.policy == "noisy") != (args.sigma is not None):
@@ -101,93 +130,77 @@ def run(args: argparse.Namespace) -> int:
         raise CutcalError("--server URL is that of --policy remote: give both or neither")
     if args.world == "table" and args.pixels:
         raise CutcalError("--pixels are of a robot's cameras: add --world intsim")
-    policy: Policy
-    name = args.policy
-    if args.policy == "clone":
-        policy = clone = Clone.load(Path(args.weights))
-        name = (
-            f"clone of {clone.about['trajectories']} trajectories of {clone.about['dataset']} ({clone.about['keep']})"
-        )
-    elif args.policy == "remote":
-        policy = server = Remote(args.server)
-        name = f"remote {server.name}"
-    else:
-        policy = make(args.policy, args.sigma or 0.0)
-    calibrated = {food.name: food for food in map(load_material_file, args.material)}
-    names = args.food or (list(calibrated) if args.material else FOODS)
-    foods = {name: calibrated.get(name) or load_food(name) for name in names}
-    out = Path(args.out or f"cutcal-evaluate-{args.policy}")
-    world = None if args.world == "table" else World(args.world == "intsim", args.stiffness, args.knife, args.pixels)
-    if world is not None:
-        available()
-    args.arch = "cpu"
-    with nullcontext() if world is None else workers_of(args, say) as pool:
-        document = _evaluate(args, policy, name, foods, suites, out, world, pool)
-    if args.json:
-        print_json(document)
-    else:
-        print(table(document))
-        print(f"  wrote {out}")
-    return 0
 
 
-def _evaluate(
-    args: argparse.Namespace,
-    policy: Policy,
-    name: str,
-    foods: dict[str, FoodSpec],
-    suites: list[str],
-    out: Path,
-    world: World | None,
-    pool: Workers | None,
-) -> dict[str, Any]:
+def _evaluation(args: argparse.Namespace) -> PolicyEvaluation:
     """What the options ask for."""
-    from intsim.evaluate import evaluate
-    from intsim.sim.severing import ARM
+    from intsim.evaluate import PolicyEvaluation
+    from intsim.sim.severing import PANDA_ARM
+    from intsim.sim.world import World
+    from intsim.task.suites import SUITES
     from mpm.scene import Arm
 
-    return evaluate(
+    policy, name = _policy(args)
+    world = None if args.world == "table" else World(args.world == "intsim", args.stiffness, args.knife, args.pixels)
+    return PolicyEvaluation(
         policy,
         name,
-        foods,
-        suites,
+        _foods(args),
+        args.suite or list(SUITES),
         args.episodes,
-        out,
         seed=args.seed,
         sigma=args.sigma,
         severing=args.severing,
         knife=args.knife,
-        arm=ARM if args.arm_stiffness is None else Arm(args.arm_stiffness),
+        arm=PANDA_ARM if args.arm_stiffness is None else Arm(args.arm_stiffness),
         world=world,
-        pool=pool,
-        resume=args.resume,
-        say=say,
-        command=["cutcal", *sys.argv[1:]],
     )
 
 
-def table(document: dict[str, Any]) -> str:
+def _policy(args: argparse.Namespace) -> tuple[Policy, str]:
+    """Who moves the knife, and what the results call it."""
+    from intsim.policy.behaviour_cloning import Clone
+    from intsim.policy.oracles import make_policy
+    from intsim.policy.remote import Remote
+
+    if args.policy == "clone":
+        clone = Clone.load(Path(args.weights))
+        about = clone.about
+        return clone, f"clone of {about['trajectories']} trajectories of {about['dataset']} ({about['keep']})"
+    if args.policy == "remote":
+        server = Remote(args.server)
+        return server, f"remote {server.name}"
+    return make_policy(args.policy, args.sigma or 0.0), args.policy
+
+
+def _foods(args: argparse.Namespace) -> dict[str, FoodSpec]:
+    """The foods that are asked for, by name."""
+    from intsim.task.suites import FOODS
+
+    calibrated = {food.name: food for food in map(load_material_file, args.material)}
+    names = args.food or (list(calibrated) if args.material else FOODS)
+    return {name: calibrated.get(name) or load_food(name) for name in names}
+
+
+def table(result: EvaluationResult) -> str:
     """What the terminal shows at the end."""
-    lines = [f"{document['policy']}: successes of {', '.join(f'{n} {c}' for n, c in _trials(document))}"]
+    trials = ", ".join(f"{name} {found.published.trials}" for name, found in result.suites.items())
+    lines = [f"{result.settings.policy}: successes of {trials}"]
     lines.append(f"  {'':14s}{'published':>22s}{'strict':>22s}{'severed':>22s}")
-    for name, found in document["suites"].items():
-        cells = [found["published"], found["strict"], found.get("severing")]
+    for name, found in result.suites.items():
+        cells = [found.published, found.strict, found.severing]
         lines.append(f"  {name:14s}" + "".join(f"{_cell(c):>22s}" for c in cells))
-        failed = [f"{key} {_cell(c)}" for key, c in found["criteria"].items() if c["successes"] < c["trials"]]
+        failed = [f"{key} {_cell(c)}" for key, c in found.criteria.items() if c.successes < c.trials]
         if failed:
             lines.append("      fails: " + ", ".join(failed))
-        if "expected_place" in found:
-            lines.append(f"      place expected of its error: {found['expected_place']:.0%}")
-        if found.get("not_simulated"):
-            lines.append(f"      {found['not_simulated']} cuts could not be simulated: see evaluate.jsonl")
+        if found.expected_place is not None:
+            lines.append(f"      place expected of its error: {found.expected_place:.0%}")
+        if found.not_simulated:
+            lines.append(f"      {found.not_simulated} cuts could not be simulated: see evaluate.jsonl")
     return "\n".join(lines)
 
 
-def _trials(document: dict[str, Any]) -> list[tuple[str, int]]:
-    return [(name, found["published"]["trials"]) for name, found in document["suites"].items()]
-
-
-def _cell(found: dict[str, float] | None) -> str:
+def _cell(found: SuccessRate | None) -> str:
     if found is None:
         return "not simulated"
-    return f"{found['rate']:.0%} ({found['low95']:.0%} to {found['high95']:.0%})"
+    return f"{found.rate:.0%} ({found.low95:.0%} to {found.high95:.0%})"

@@ -15,8 +15,7 @@ from calib.io.provenance import git_commit, versions
 from calib.io.schema import tag
 from calib.material.knife import load_knife
 from calib.material.scene import cut_scene, specimen
-from calib.simulation.evaluation import PARTED, pressed_away
-from calib.validation.acceptance import spent, unbooked
+from calib.simulation.evaluation import FULLY_PARTED, pressed_away
 from cutcal.options import (
     add_food,
     add_run,
@@ -28,8 +27,9 @@ from cutcal.options import (
     sizing_of,
     whole,
 )
+from mpm.output.energy import spent, unbooked
 from mpm.output.record import ForceRecord
-from mpm.output.snapshot import Watch
+from mpm.output.snapshot import SnapshotRecorder
 from mpm.scene import CONTACTS, Arm
 
 HELP = "simulate one cut"
@@ -109,21 +109,24 @@ def run(args: argparse.Namespace) -> int:
         knife,
         stroke=args.stroke,
         dx=args.dx,
-        mach=args.mach,
-        contact=args.contact,
-        grid_shift=(0.0, args.offset, 0.0),
         seed=args.seed,
     )
     scene = replace(
         scene,
         motion=replace(
             scene.motion,
+            mach=args.mach,
             slice_ratio=args.slice_ratio,
             tilt=math.radians(args.tilt),
             retract=args.retract,
             speed=args.speed,
         ),
-        numerics=replace(scene.numerics, grid_turn=math.radians(args.turn)),
+        numerics=replace(
+            scene.numerics,
+            contact=args.contact,
+            grid_shift=(0.0, args.offset, 0.0),
+            grid_turn=math.radians(args.turn),
+        ),
         arm=Arm(args.arm_stiffness, args.force_limit),
     )
     prepare(out, resume=False)
@@ -139,12 +142,12 @@ def run(args: argparse.Namespace) -> int:
         print(f"\r{done:5.0%}  {force:8.2f} N  {clock(left)} left ", end="", file=sys.stderr, flush=True)
 
     simulation = Simulation(scene, Runtime(args.arch, args.threads))
-    watch = Watch(VIDEO_FRAMES) if args.pictures or args.video or args.page else None
-    record = simulation.run(progress=show if sys.stderr.isatty() else None, watch=watch)
+    watch = SnapshotRecorder(VIDEO_FRAMES) if args.pictures or args.video or args.page else None
+    record = simulation.run(progress=show if sys.stderr.isatty() else None, snapshots=watch)
     if sys.stderr.isatty():
         print(file=sys.stderr)
     write_csv(out / "force.csv", record.columns())
-    if record.parted < PARTED:
+    if record.parted < FULLY_PARTED:
         assumed.append(pressed_away(record.parted))
         note(assumed[-1])
     summary = {
@@ -185,7 +188,9 @@ def run(args: argparse.Namespace) -> int:
     return 0 if record.status == "done" else 1
 
 
-def _draw(args: argparse.Namespace, out: Path, simulation: Any, record: ForceRecord, watch: Watch, title: str) -> None:
+def _draw(
+    args: argparse.Namespace, out: Path, simulation: Any, record: ForceRecord, watch: SnapshotRecorder, title: str
+) -> None:
     """Pictures, video and page, whatever was asked for; force.csv and summary.json are written before."""
     if not watch.taken:
         say("nothing to draw: the run broke down before the first look")
@@ -195,7 +200,7 @@ def _draw(args: argparse.Namespace, out: Path, simulation: Any, record: ForceRec
     from reports.base.scene_render import Film, stills, video
 
     scene = simulation.scene
-    surface = Surface(scene.food.shape, simulation.seeds, scene.mirrors)
+    surface = Surface(scene.food.shape, simulation.setup.seeds, scene.mirrors)
     film = Film(scene, surface, watch.taken, record.time, record.stroke, record.resolved)
     if args.pictures:
         say("drawing contact, largest force and end")

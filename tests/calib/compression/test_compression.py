@@ -18,7 +18,7 @@ from calib.compression.modulus_calibration import acceptance_lines
 from calib.compression.press import UnitCurve, homogeneous, press_scene, solver_error, unit_curve
 from cutcal.main import main
 from mpm.runtime import Runtime
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 from mpm.solver import Simulation
 from tests.calib.documents import valid
 from tests.data_dir import data_file

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from calib.fit.surrogate import Surrogate
-from calib.problem.objective import Objective, Target, Trial
+from calib.problem.objective import Objective
 from calib.problem.parameters import Parameter, ParameterSet
+from calib.problem.scored_run import ScoredRun
+from calib.problem.target import Target
 from calib.simulation.evaluation import Evaluation
-from calib.uncertainty.intervals import evidence, uncertainty
+from calib.uncertainty.intervals import linearised_likelihood, uncertainty
 from tests.calib.synthetic import X, correlated_noise
 
 PEAK = 10.0
@@ -36,14 +38,14 @@ def goal() -> Objective:
     return Objective(target, THREE)
 
 
-def trials(count: int, noise: float, spread: float = 0.3, seed: int = 2) -> list[Trial]:
+def trials(count: int, noise: float, spread: float = 0.3, seed: int = 2) -> list[ScoredRun]:
     """Runs at and about the values, with correlated noise (part of the peak)."""
     random, objective = np.random.default_rng(seed), goal()
     points = THREE.start + spread * random.standard_normal((count, 3)) * (np.arange(count) > 0)[:, None]
     out = []
     for z in points:
         force = cut(z) * (1.0 + noise * correlated_noise(random))
-        out.append(objective.trial(Evaluation(0, THREE.to_dict(z), "ok", "", 1.0, 0.04 * X, force)))
+        out.append(objective.score(Evaluation(0, THREE.to_dict(z), "ok", "", 1.0, 0.04 * X, force)))
     return out
 
 
@@ -63,7 +65,8 @@ def test_process_goes_through_the_runs_and_knows_where_it_does_not() -> None:
     process = Surrogate(goal(), runs, runs[0])
     z = THREE.start + np.array([0.15, -0.1, 0.1])
     assert np.abs(process.each[0].predict(z)[0] - cut(z)).max() < 0.01 * PEAK
-    assert process.doubt(z) < 0.3 * process.doubt(z + 3.0)
+    unknown, far = (process.expected(x, 1.0) - process.expected(x, 0.0) for x in (z, z + 3.0))
+    assert unknown < 0.3**2 * far
 
 
 def test_process_scales_force_with_stress_exactly() -> None:
@@ -96,13 +99,13 @@ def test_noise_does_not_pass_for_information() -> None:
     for seed in range(10):
         runs = trials(25, noise=0.02, seed=seed)
         jacobian = Surrogate(goal(), runs, runs[0]).jacobian(THREE.start)
-        found = uncertainty(THREE, evidence(goal(), runs[0], jacobian))
+        found = uncertainty(THREE, linearised_likelihood(goal(), runs[0], jacobian))
         unseen += found.intervals[2].verdict == "not_seen"
         assert found.intervals[0].verdict == "identified"
         plain = jacobian.copy()
         change = trials(1, noise=0.02, seed=100 + seed)[0].residual - runs[0].residual
         plain[:-3, 2] = change[:-3] / math.log(1.1)
-        naive = uncertainty(THREE, evidence(goal(), runs[0], plain))
+        naive = uncertainty(THREE, linearised_likelihood(goal(), runs[0], plain))
         claimed += naive.intervals[2].verdict == "identified"
     assert unseen >= 9 and claimed >= 9
 
@@ -111,7 +114,7 @@ def test_coarse_runs_inform_through_their_common_offset() -> None:
     """Coarse curves that are all 8 % too strong teach the response without moving the fine curve."""
     runs = trials(1, noise=0.0)
     for t in trials(15, noise=0.0, seed=3)[1:]:
-        runs.append(Trial(t.z, t.evaluation, 1.08 * t.curve, t.residual, coarse=True))
+        runs.append(ScoredRun(t.z, t.evaluation, 1.08 * t.curve, t.residual, coarse=True))
     process = Surrogate(goal(), runs, runs[0])
     z = THREE.start + np.array([0.0, 0.25, 0.0])
     assert np.abs(process.each[0].predict(THREE.start)[0] - cut(THREE.start)).max() < 0.015 * PEAK
@@ -124,7 +127,7 @@ def test_broken_runs_are_expected_to_break_again() -> None:
     z = THREE.start + np.array([0.0, 0.0, 1.5])
     part = slice(0, 96)
     broken = Evaluation(0, THREE.to_dict(z), "failed", "inverted", 0.4, 0.04 * X[part], cut(z)[part])
-    runs.append(goal().trial(broken))
+    runs.append(goal().score(broken))
     process = Surrogate(goal(), runs, runs[0])
     assert process.each[0].predict(z)[2] < 0.8 and process.each[0].predict(THREE.start)[2] == 1.0
     assert process.expected(z, 0.0) > process.expected(THREE.start, 0.0) + 100.0
@@ -136,7 +139,7 @@ def test_a_failure_is_no_measurement() -> None:
     z = THREE.start + np.array([0.0, 0.0, 1.5])
     part = slice(0, 96)
     broken = Evaluation(0, THREE.to_dict(z), "failed", "inverted", 0.4, 0.04 * X[part], cut(z)[part])
-    process = Surrogate(goal(), [*runs, goal().trial(broken)], runs[0])
+    process = Surrogate(goal(), [*runs, goal().score(broken)], runs[0])
     assert process.residual(z)[goal().data_rows - 1] > 10.0
     assert np.all(process.jacobian(z)[goal().data_rows - 1] == 0.0)
 
@@ -153,20 +156,21 @@ def test_least_stays_within_bounds_and_radius() -> None:
     assert np.all(z >= THREE.lower) and np.all(z <= THREE.upper)
 
 
-def coarse_trials(count: int, slope: float) -> list[Trial]:
+def coarse_trials(count: int, slope: float) -> list[ScoredRun]:
     """Coarse runs about the values: 5 % too much, and ``slope`` more for each unit by which the depth grows."""
     random, objective = np.random.default_rng(5), goal()
     out = []
     for step in 0.5 * random.standard_normal((count, 3)):
         z = THREE.start + step
         evaluation = Evaluation(0, THREE.to_dict(z), "ok", "", 1.0, 0.04 * X, cut(z) * (1.05 + slope * step[1]))
-        out.append(objective.trial(evaluation, coarse=True))
+        out.append(objective.score(evaluation, coarse=True))
     return out
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.3])
 def test_coarse_runs_say_what_they_share_with_fine_ones(slope: float) -> None:
-    """With ten fine runs, 40 coarse ones whose error changes with a parameter leave the slope of a fine curve where it is."""
+    """With ten fine runs, 40 coarse ones whose error changes with a parameter leave the slope of a fine curve where it
+    is."""
     runs = trials(10, noise=0.003) + coarse_trials(40, slope)
     process = Surrogate(goal(), runs, runs[0]).each[0]
     up, down = (THREE.start + np.array([0.0, side * 0.2, 0.0]) for side in (1.0, -1.0))

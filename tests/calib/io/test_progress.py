@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import io
 import math
-from types import SimpleNamespace
 
 import pytest
 
-from calib.fit.options import FitOptions
-from calib.io.progress import COARSE_TIME, Countdown, Progress, ProgressBar, at_most, clock, onward
+from calib.io.progress import Countdown, Progress, ProgressBar, clock
 
 
 class Terminal(io.StringIO):
@@ -31,30 +29,6 @@ def test_line_tells_count_budget_failures_misfit_and_time() -> None:
         "12 simulations (12 of 80), 2 failed, chi2 12.35, at most 1:15 left, round"
     )
     assert "chi2 -" in progress(1, math.inf).line() and "failed" not in progress(1).line()
-
-
-def test_another_search_is_told_as_part_of_all() -> None:
-    """Its runs, budget and failures are counted with those before it, and its time is that of what all have left."""
-    seen: list[Progress] = []
-    before = [
-        SimpleNamespace(coarse=k < 4, ok=k > 0, misfit=9.0) for k in range(10)
-    ]  # four coarse runs: 7 of the budget
-    told = onward(seen.append, before, before[-1], FitOptions(budget=80.0))  # type: ignore[arg-type]
-    assert told is not None
-    told(Progress(5, 5.0, 39.0, 1, 12.0, 68.0, "round"))
-    assert seen == [Progress(15, 12.0, 80.0, 2, 9.0, 136.0, "round")]
-    assert onward(None, before, before[-1], FitOptions()) is None  # type: ignore[arg-type]
-
-
-def test_time_left_is_that_of_default_runs() -> None:
-    """Coarse runs take less of the time than of the budget, and the rest may be spent on default ones; with no such run yet they tell."""
-    runs = [
-        SimpleNamespace(coarse=coarse, evaluation=SimpleNamespace(seconds=s))
-        for coarse, s in ((True, 0.5), (True, 0.7), (False, 6.0), (False, 8.0))
-    ]
-    options = FitOptions(budget=80.0, batch=2)
-    assert at_most(runs, 10.0, options) == pytest.approx(35.0)  # type: ignore[arg-type]
-    assert at_most(runs[:2], 10.0, options) == pytest.approx(3.0 / COARSE_TIME)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -9,18 +9,17 @@ from typing import Any, get_args
 import pytest
 from jsonschema import Draft202012Validator
 
-from calib.calibration import summary
 from calib.io.folder import write_json
 from calib.io.provenance import versions
 from calib.io.schema import COMMON, FOLDER, names, schema, tag
 from calib.material import properties
-from calib.uncertainty import intervals
+from calib.uncertainty import estimates, intervals
 from cutcal.main import COMMANDS, main
 from cutcal.options import print_json
 from mpm.output.record import ENERGIES
 from mpm.runtime import ARCHES
 from mpm.scene import CONTACTS
-from mpm.shapes import SHAPE_KINDS
+from mpm.scene.shapes import SHAPE_KINDS
 from studies.convergence import gci
 from studies.stability.result import REASONS
 from tests.calib.documents import at, changed, faults, places, valid, validator
@@ -99,10 +98,10 @@ def test_words_are_those_of_the_code():
     """Closed choices list what the code can say, no more and no less."""
     parts = common()["$defs"]
     of = {name: part["enum"] for name, part in parts.items() if "enum" in part}
-    assert set(of["intervalWord"]) == set(get_args(intervals.Verdict))
-    assert set(of["verdictWord"]) == set(of["intervalWord"]) | {"only_as_product", summary.UNKNOWN}
+    assert set(of["intervalWord"]) == set(get_args(intervals.Identifiability))
+    assert set(of["verdictWord"]) == set(of["intervalWord"]) | {"only_as_product", estimates.UNKNOWN}
     assert (of["shapeKind"], of["device"]) == (list(SHAPE_KINDS), list(ARCHES))
-    assert set(of["status"]) == {*properties.LITERATURE, *properties.OWN}
+    assert set(of["status"]) == {*properties.LITERATURE_STATUSES, *properties.OTHER_STATUSES}
     assert list(parts["energy"]["properties"]) == list(ENERGIES)
     assert schema("converge")["properties"]["verdict"]["enum"] == list(gci.TRENDS)
     assert schema("simulate")["properties"]["contact"]["enum"] == list(CONTACTS)
@@ -145,7 +144,8 @@ def test_calibrations_of_every_end_are_documents(kind):
 
 @pytest.mark.parametrize("name", DOCUMENTS)
 def test_what_is_wrong_in_one_place_is_refused(name):
-    """No key may be missing or be another one's; a number is no text with a unit and no NaN, a word none that nobody knows."""
+    """No key may be missing or be another one's; a number is no text with a unit and no NaN, a word none that nobody
+    knows."""
     document = valid(DOCUMENTS[name]())
     own, good = schema(name), validator(name).is_valid
     maps = {k for k, part in own["properties"].items() if isinstance(part.get("additionalProperties"), dict)}
@@ -219,7 +219,8 @@ def test_a_written_report_is_a_document(printed, tmp_path, monkeypatch):
 
 
 def test_schemas_are_listed_and_printed(capsys):
-    """``cutcal schema`` lists them; a name or the tag of a document prints one that needs no other file; a slip is named."""
+    """``cutcal schema`` lists them; a name or the tag of a document prints one that needs no other file; a slip is
+    named."""
     assert main(["schema"]) == 0
     assert capsys.readouterr().out.split() == names()
     for name in ("stress", tag("stress")):

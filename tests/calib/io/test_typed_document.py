@@ -13,7 +13,7 @@ import pytest
 from calib.errors import DocumentError
 from calib.io.folder import write_json
 from calib.io.typed_document import FLAT, from_document, read_document, to_document
-from mpm.errors import SceneError
+from mpm.scene.errors import SceneError
 
 
 @dataclass(frozen=True)

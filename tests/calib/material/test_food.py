@@ -480,7 +480,8 @@ def test_what_yaml_lets_through(line: str, words: str, tmp_path: Path) -> None:
 
 
 def test_values_without_end(tmp_path: Path, document: dict[str, Any]) -> None:
-    """A whole number too large for a float, and anchors that stand for 10^11 words, where a unit or a kind should be."""
+    """A whole number too large for a float, and anchors that stand for 10^11 words, where a unit or a kind should
+    be."""
     document["banana"]["properties"]["E"]["value"] = 10**400
     assert "E.value: is 1000" in message(write(tmp_path, document))
     document["banana"]["properties"]["E"]["value"] = 1e5

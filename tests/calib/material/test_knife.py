@@ -8,9 +8,9 @@ import pytest
 import yaml
 
 from calib.io.yaml_checks import data_path
-from calib.material.knife import TOLERANCE, load_knife, load_knives, wedge_height
+from calib.material.knife import WEDGE_TOLERANCE, load_knife, load_knives, wedge_height
 from cutcal.main import main
-from mpm.errors import SceneError
+from mpm.scene.errors import SceneError
 from tests.calib.documents import valid
 
 GOOD = """\
@@ -41,7 +41,7 @@ def test_shipped_knives(name: str) -> None:
     """Each shipped knife loads, and its wedge reaches the thickness of the spine at or below the spine."""
     knife = load_knife(name)
     assert knife.name == name
-    assert 2 * knife.height * math.tan(knife.angle / 2) >= (1 - TOLERANCE) * knife.spine
+    assert 2 * knife.height * math.tan(knife.angle / 2) >= (1 - WEDGE_TOLERANCE) * knife.spine
 
 
 def test_published_geometry() -> None:

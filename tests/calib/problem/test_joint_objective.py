@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib.fit.multistart import calibrate
+from calib.fit.multistart import multistart_search
 from calib.fit.options import FitOptions
 from calib.fit.surrogate import Surrogate
 from calib.problem.joint_objective import JointEvaluator, JointObjective
@@ -37,7 +37,7 @@ def test_names_say_what_is_shared() -> None:
     """Four shared parameters and two skins; each trace's objective sees its five."""
     joint = JointObjective.of(objectives(), SHARED)
     assert joint.parameters.names == ("E", "yield_stress", "R", "R_skin@a", "mu", "R_skin@b")
-    assert [list(c.index) for c in joint.cases] == [[0, 1, 2, 3, 4], [0, 1, 2, 5, 4]]
+    assert [list(c.index) for c in joint.terms] == [[0, 1, 2, 3, 4], [0, 1, 2, 5, 4]]
     assert list(joint.parameters.stress_like()) == [1, 1, 1, 1, 0, 1]
 
 
@@ -46,9 +46,9 @@ def test_chi_square_is_the_sum_of_the_traces_and_each_prior_once() -> None:
     joint = JointObjective.of(objectives(), SHARED)
     evaluator = JointEvaluator(joint, [Fake(), Fake()])
     values = {**FLESH, "R_skin@a": 200.0, "R_skin@b": 500.0, "E": 6e5}
-    trial = joint.trial(next(iter(evaluator.evaluate([values]))))
+    trial = joint.score(next(iter(evaluator.evaluate([values]))))
     singles = [
-        one.trial(next(iter(Fake().evaluate([FLESH | {"E": 6e5, "R_skin": values[f"R_skin@{name}"]}]))))
+        one.score(next(iter(Fake().evaluate([FLESH | {"E": 6e5, "R_skin": values[f"R_skin@{name}"]}]))))
         for name, one in objectives().items()
     ]
     data = sum(float(np.sum(t.residual[:-5] ** 2)) for t in singles)
@@ -64,21 +64,21 @@ def test_a_joint_run_is_as_good_as_its_worst_part() -> None:
     run = next(iter(evaluator.evaluate([{**FLESH, "R_skin@a": 200.0, "R_skin@b": 500.0}])))
     assert not run.ok and run.reason == "inverted" and run.fraction == pytest.approx(0.7)
     assert [p.ok for p in run.parts] == [True, False]
-    assert np.isfinite(joint.trial(run).residual).all()
+    assert np.isfinite(joint.score(run).residual).all()
 
 
 def test_shared_flesh_is_found_through_two_specimens() -> None:
-    """Skins over R and the narrower specimen's factor are found, although only proportions are known: to 20 and 10 %."""
+    """Skins over R (20 %) and the narrower specimen's factor (10 %) are found; only proportions are known."""
     joint = JointObjective.of(objectives(scaled=True), SHARED)
     fakes = [Fake(), Fake()]
-    result = calibrate(joint, JointEvaluator(joint, fakes), options=FitOptions(budget=60))
+    result = multistart_search(joint, JointEvaluator(joint, fakes), options=FitOptions(budget=60))
     values = result.best.evaluation.parameters
     for name, skin in SKINS.items():
         assert values[f"R_skin@{name}"] / values["R"] == pytest.approx(skin / FLESH["R"], rel=0.2)
     assert all(f.runs == result.simulations for f in fakes)
     found = {
         name: case.objective.factor(trial.curve)
-        for name, case, trial in zip(SKINS, joint.cases, result.best.each, strict=True)
+        for name, case, trial in zip(SKINS, joint.terms, result.best.each, strict=True)
     }
     assert found["b"] == pytest.approx(0.7 * found["a"], rel=0.1)
 
@@ -100,10 +100,10 @@ def test_a_surrogate_of_two_traces_does_not_mix_their_skins() -> None:
     random = np.random.default_rng(0)
     points = joint.parameters.start + 0.2 * random.standard_normal((24, 6))
     points = np.clip(points, joint.parameters.lower, joint.parameters.upper)
-    runs = [joint.trial(e) for e in evaluator.evaluate([joint.parameters.to_dict(z) for z in points])]
+    runs = [joint.score(e) for e in evaluator.evaluate([joint.parameters.to_dict(z) for z in points])]
     surrogate = Surrogate(joint, runs, min(runs, key=lambda t: t.misfit))
     slope = surrogate.jacobian(surrogate.best.z)
-    rows = joint.cases[0].objective.data_rows
+    rows = joint.terms[0].objective.data_rows
     assert np.all(slope[:rows, 5] == 0.0) and np.all(slope[rows : 2 * rows, 3] == 0.0)
     assert np.linalg.norm(slope[:rows, 3]) > 1.0 and np.linalg.norm(slope[rows : 2 * rows, 5]) > 1.0
 
@@ -112,5 +112,5 @@ def test_a_joint_evaluation_is_plain_where_there_are_no_parts() -> None:
     """A trial of a single trace is its own only part."""
     one = objectives()["a"]
     values = FLESH | {"R_skin": 200.0}
-    trial = one.trial(Evaluation(0, values, "ok", "", 1.0, STROKE, three_terms(values)))
-    assert trial.each == (trial,) and one.cases[0].objective is one
+    trial = one.score(Evaluation(0, values, "ok", "", 1.0, STROKE, three_terms(values)))
+    assert trial.each == (trial,) and one.terms[0].objective is one

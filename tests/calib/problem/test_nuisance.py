@@ -16,12 +16,13 @@ from calib.material.food import load_food
 from calib.material.knife import load_knife
 from calib.material.scene import Sizing, cut_scene, specimen
 from calib.problem.nuisance import GAIN_SD, TORQUE_GAIN_SD, Nuisance, Sensor, Whitening, nuisances, sensor_of
-from calib.problem.objective import Objective, Target
+from calib.problem.numerical_uncertainty import numerical_uncertainty
+from calib.problem.objective import Objective
 from calib.problem.parameters import Parameter, ParameterSet
-from calib.problem.setup import numerical
+from calib.problem.target import Target
 from calib.trace.conditioning import Conditioned, condition
 from calib.trace.trace import Trace
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 ONE = ParameterSet((Parameter("E", 1e5, 1e3, 1e7, "Pa", 5e4, 2e5),))
 
@@ -67,7 +68,8 @@ def test_chi_square_is_the_least_over_the_nuisances() -> None:
 
 
 def test_the_peak_is_met_bare() -> None:
-    """No nuisance that the search integrates out explains a peak: the drift only widens its tolerance, by what it may do there."""
+    """No nuisance that the search integrates out explains a peak: the drift only widens its tolerance, by what it may
+    do there."""
     curve = cut()
     given = nuisances(curve, Sensor(0.1, 0.01), width_sd=0.2)
     whole, bare = goal(curve, given), goal(curve, ())
@@ -111,7 +113,8 @@ def test_nothing_makes_a_force_look_right() -> None:
 
 
 def test_a_late_onset_is_not_a_misfit() -> None:
-    """The right curve, measured with an onset that is one standard deviation off, costs about one; without the lag it costs more."""
+    """The right curve, measured with an onset that is one standard deviation off, costs about one; without the lag it
+    costs more."""
     curve = cut()
     given = nuisances(curve, Sensor(0.0, 0.01))
     lag = next(n for n in given if n.name == "lag")
@@ -131,7 +134,8 @@ def test_a_wrench_from_joint_torques_has_an_uncertain_gain() -> None:
 
 
 def test_a_drift_is_not_extrapolated_without_end() -> None:
-    """A short baseline says nothing of the drift over the cut: its standard deviation ends at a twentieth of the peak."""
+    """A short baseline says nothing of the drift over the cut: its standard deviation ends at a twentieth of the
+    peak."""
     curve = replace(cut(), drift_sd_N_per_s=50.0)
     drift = next(n for n in nuisances(curve, Sensor()) if n.name == "drift")
     assert drift.sd == pytest.approx(0.05 * float(curve.curve.max()))
@@ -155,7 +159,7 @@ def test_numerical_uncertainty_enters_at_equal_parts_of_stroke_and_peak(tmp_path
     """2 to 4 % of the study's peak become 2 to 4 % of the trace's, and add to the errors of each point in squares."""
     curve, food = cut(), load_food("banana")
     scene = cut_scene(food, specimen(food, None, Sizing())[0], load_knife("kitchen"), dx=3e-3)
-    found = numerical(study_of(tmp_path), "banana", scene, curve)
+    found = numerical_uncertainty(study_of(tmp_path), "banana", scene, curve)
     peak = float(curve.curve.max())
     assert found[[0, -1]] == pytest.approx([0.02 * peak, 0.04 * peak], rel=1e-6)
     plain = Objective(Target(curve.stroke, curve.curve, 0.0, 0.1, np.interp), ONE)
@@ -180,4 +184,4 @@ def test_a_study_of_something_else_is_refused(tmp_path: Path, changes: dict[str,
     food = load_food("banana")
     scene = cut_scene(food, specimen(food, None, Sizing())[0], load_knife("kitchen"), dx=3e-3)
     with pytest.raises(CutcalError, match=said):
-        numerical(study_of(tmp_path, **changes), "banana", scene, cut())
+        numerical_uncertainty(study_of(tmp_path, **changes), "banana", scene, cut())

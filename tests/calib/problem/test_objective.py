@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from calib.errors import TraceError
-from calib.problem.objective import ErrorModel, Objective, Target
+from calib.problem.objective import Objective
 from calib.problem.parameters import Parameter, ParameterSet
+from calib.problem.target import ErrorModel, Target
 from calib.simulation.evaluation import Evaluation
 from calib.trace.filters import filter_simulated
 
@@ -54,7 +55,7 @@ def cut_off(fraction: float, factor: float = 1.1) -> Evaluation:
 
 def test_the_real_curve_has_no_residual() -> None:
     """A simulation equal to the trace at the centre of the prior has chi-square zero."""
-    trial = objective().trial(run(wave(FINE)))
+    trial = objective().score(run(wave(FINE)))
     assert trial.residual.shape == (240 + 2 + 2,)
     assert trial.misfit < 1e-6
 
@@ -66,7 +67,7 @@ def test_chi_square_of_a_wrong_scale_in_closed_form() -> None:
     0.02)^2.
     """
     expected = 20.0 * 0.005 * 239.0 / 240.0 / 0.03**2 + 25.0
-    assert objective().trial(run(1.1 * wave(FINE))).misfit == pytest.approx(expected, rel=1e-3)
+    assert objective().score(run(1.1 * wave(FINE))).misfit == pytest.approx(expected, rel=1e-3)
 
 
 def test_noise_and_discrepancy_add_in_squares() -> None:
@@ -80,10 +81,10 @@ def test_chi_square_does_not_count_correlated_points_twice() -> None:
     """Twice as fine a grid leaves chi-square alone; half the correlation length doubles the curve's part."""
     fine = np.linspace(0.0, LENGTH, 480)
     strong = run(1.1 * wave(FINE))
-    coarse = objective(peak=1e6).trial(strong).misfit
+    coarse = objective(peak=1e6).score(strong).misfit
     finer = Objective(Target(fine, wave(fine), 0.0, 0.0, interpolate), PARAMETERS, ErrorModel(peak=1e6))
-    assert finer.trial(strong).misfit == pytest.approx(coarse, rel=0.01)
-    assert objective(peak=1e6, correlation=0.025).trial(strong).misfit == pytest.approx(2.0 * coarse, rel=1e-6)
+    assert finer.score(strong).misfit == pytest.approx(coarse, rel=0.01)
+    assert objective(peak=1e6, correlation=0.025).score(strong).misfit == pytest.approx(2.0 * coarse, rel=1e-6)
 
 
 def test_chi_square_of_a_right_model_is_its_number_of_data() -> None:
@@ -100,15 +101,15 @@ def test_chi_square_of_a_right_model_is_its_number_of_data() -> None:
 
 def test_prior_rows_come_last() -> None:
     """A parameter at the end of its literature range costs 1.96 squared, in the last rows."""
-    trial = objective().trial(run(wave(FINE), E=2e5))
+    trial = objective().score(run(wave(FINE), E=2e5))
     assert trial.residual[-2:] == pytest.approx([1.95996, 0.0], abs=1e-4)
 
 
 def test_penalty_grows_as_less_is_computed() -> None:
     """The earlier a run breaks down the worse it is; a whole run with the same error is best."""
     goal = objective()
-    misfits = [goal.trial(run(1.1 * wave(FINE))).misfit]
-    misfits += [goal.trial(cut_off(f)).misfit for f in (0.99, 0.9, 0.7, 0.4, 0.1)]
+    misfits = [goal.score(run(1.1 * wave(FINE))).misfit]
+    misfits += [goal.score(cut_off(f)).misfit for f in (0.99, 0.9, 0.7, 0.4, 0.1)]
     assert np.all(np.diff(misfits) > 0.0)
 
 
@@ -119,7 +120,7 @@ def test_residual_is_continuous_in_the_fraction() -> None:
     """
     goal = objective()
     fractions = np.arange(0.3, 0.32, 1e-4)
-    vectors = [goal.trial(cut_off(f)).residual for f in fractions]
+    vectors = [goal.score(cut_off(f)).residual for f in fractions]
     largest = max(float(np.linalg.norm(b - a)) for a, b in zip(vectors, vectors[1:], strict=False))
     assert largest < 10.0 * 1e-4 * goal.failure_weight
 
@@ -130,15 +131,15 @@ def test_broken_run_passes_into_a_whole_one() -> None:
     Only the last of the 240 points has the mean difference of the last twentieth instead of its own.
     """
     goal = objective()
-    almost = goal.trial(cut_off(1.0 - 1e-6)).residual - goal.trial(run(1.1 * wave(FINE))).residual
+    almost = goal.score(cut_off(1.0 - 1e-6)).residual - goal.score(run(1.1 * wave(FINE))).residual
     assert np.abs(np.delete(almost, 239)).max() < 1e-2 and abs(almost[239]) < 0.1
 
 
 def test_computing_nothing_is_as_bad_as_predicting_nothing() -> None:
     """A run that fails at once costs what a model without any force costs, whatever it says."""
     goal = objective()
-    nothing = goal.trial(run(np.empty(0), np.empty(0), fraction=0.0))
-    no_force = goal.trial(run(np.zeros_like(FINE)))
+    nothing = goal.score(run(np.empty(0), np.empty(0), fraction=0.0))
+    no_force = goal.score(run(np.zeros_like(FINE)))
     assert nothing.misfit == pytest.approx(no_force.misfit, rel=1e-9)
     assert not nothing.ok and no_force.ok
 
@@ -148,9 +149,9 @@ def test_a_spike_or_nan_stays_finite(bad: float) -> None:
     """A run that blows up gives a finite vector: from the first bad sample on it counts as broken down."""
     force = wave(FINE)
     force[1000:] = bad
-    trial = objective().trial(run(force))
+    trial = objective().score(run(force))
     assert np.isfinite(trial.residual).all()
-    assert trial.misfit > objective().trial(run(wave(FINE))).misfit + 100.0
+    assert trial.misfit > objective().score(run(wave(FINE))).misfit + 100.0
 
 
 def test_a_spike_at_the_end_is_not_held() -> None:
@@ -167,13 +168,13 @@ def test_samples_that_do_not_advance_are_left_out() -> None:
     """Repeated strokes and a way back do not disturb the curve."""
     stroke = np.concatenate([FINE[:500], FINE[400:500], FINE[500:]])
     force = np.concatenate([wave(FINE[:500]), np.full(100, 99.0), wave(FINE[500:])])
-    assert objective().trial(run(force, stroke)).misfit < 1e-6
+    assert objective().score(run(force, stroke)).misfit < 1e-6
 
 
 def test_record_that_ends_a_little_early_is_whole() -> None:
     """The last millimetre missing from a finished run is not a failure."""
     kept = FINE <= 0.039
-    trial = objective().trial(run(wave(FINE[kept]), FINE[kept]))
+    trial = objective().score(run(wave(FINE[kept]), FINE[kept]))
     assert trial.residual[241] == 0.0 and trial.misfit < 0.1
 
 
@@ -181,8 +182,8 @@ def test_works_with_the_filter_of_real_curves() -> None:
     """With the filter that conditions traces, the same cut smoothed the same way has no residual."""
     real = filter_simulated(GRID, FINE, wave(FINE))
     goal = Objective(Target(GRID, real, 0.0, 0.0, filter_simulated), PARAMETERS)
-    assert goal.trial(run(wave(FINE))).misfit < 1e-12
-    broken = goal.trial(cut_off(0.4))
+    assert goal.score(run(wave(FINE))).misfit < 1e-12
+    broken = goal.score(cut_off(0.4))
     assert np.isfinite(broken.residual).all() and broken.misfit > 100.0
 
 

@@ -1,4 +1,5 @@
-"""A real Dask cluster on this machine: the same bits as here, nothing lost with a worker, one clear error for the rest."""
+"""A real Dask cluster on this machine: the same bits as here, nothing lost with a worker, one clear error for the
+rest."""
 
 from __future__ import annotations
 
@@ -22,6 +23,7 @@ import numpy as np
 import pytest
 
 from calib.errors import ClusterError
+from calib.io.provenance import code_key
 from calib.material.food import load_food
 from calib.material.knife import load_knife
 from calib.material.scene import Sizing, cut_scene, specimen
@@ -343,6 +345,12 @@ def test_what_cannot_be_used_is_one_clear_error(tmp_path, capsys, monkeypatch):
     assert "port" in refused(capsys, out, "--scheduler", "somewhere")
     monkeypatch.setitem(sys.modules, "distributed", None)
     assert "pip install 'cutcal[cluster]'" in refused(capsys, out, "--scheduler", made.address)
+
+
+def test_the_code_that_workers_run_is_compared():
+    """Each package that is named is there: of one that is not, a worker with other code would pass for the same."""
+    for package in dask_cluster.EXECUTED:
+        assert code_key(package) != code_key("no such package"), package
 
 
 @pytest.mark.slow

@@ -168,7 +168,8 @@ def kill_while_writing(path: Path, after: int, *options: str) -> int:
     return int(rest[-1]) if rest else after - 1
 
 
-# Only a signal that cannot be caught proves this; where there is none (Windows) the next test covers the states it leaves.
+# Only a signal that cannot be caught proves this; where there is none (Windows) the next test covers the states it
+# leaves.
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="this system has no SIGKILL to kill the writer with")
 @pytest.mark.parametrize("options", [(), ("reopen",)], ids=["journal", "journal and HDF5"])
 def test_kill_while_writing(tmp_path: Path, options: tuple[str, ...]) -> None:

@@ -1,4 +1,5 @@
-"""The whole record of the best values: kept in a file, read back as it was, made again where that is of something else."""
+"""The whole record of the best values: kept in a file, read back as it was, made again where that is of something
+else."""
 
 from __future__ import annotations
 
@@ -26,7 +27,8 @@ def whole(scene: Scene, path: Path) -> tuple[ForceRecord, int]:
 
 
 def test_a_record_is_read_back_with_its_section(tmp_path: Path) -> None:
-    """Every number is the same, pieces, counters and section too; another scene or a damaged file is simulated again."""
+    """Every number is the same, pieces, counters and section too; another scene or a damaged file is simulated
+    again."""
     path = tmp_path / "record.h5"
     scene = replace(PRISM, motion=Motion(4e-3, 0.02))
     (first, one), (again, none) = (whole(scene, path) for _ in range(2))

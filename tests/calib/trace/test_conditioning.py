@@ -75,7 +75,8 @@ def test_onset_does_not_wait_for_a_threshold() -> None:
 
 
 def test_the_stroke_ends_at_the_board() -> None:
-    """A stroke of 30 mm through a specimen of 29 mm counts for 29 mm, which is said; through one of 20 mm something is wrong."""
+    """A stroke of 30 mm through a specimen of 29 mm counts for 29 mm, which is said; through one of 20 mm something is
+    wrong."""
     plain = condition(made(position=True))
     cut = condition(made(position=True), board=0.029)
     assert plain.stroke_length_m == pytest.approx(0.030, abs=3e-4)
@@ -459,7 +460,8 @@ def test_forces_of_nothing_are_no_contact() -> None:
 
 
 def test_position_without_a_way_down() -> None:
-    """A position that is at its lowest in the first samples, or never moves, is named before a baseline is looked for."""
+    """A position that is at its lowest in the first samples, or never moves, is named before a baseline is looked
+    for."""
     trace = made(position=True)
     for height in (np.full(len(trace.time), 0.1), np.where(trace.time < 0.02, 0.1, 0.05)):
         with pytest.raises(TraceError, match="column ee_z_m: the position is at its lowest after [0-9]+ samples"):

@@ -43,7 +43,8 @@ AS_WIDE = "Record 4;banana;kitchen knife\nDate;2026-11-01\n"
          ("3 lines above the header were left out", "time_s, force_N, stroke_m follow a comma")),
         ({"above": AS_WIDE, "separator": ";", "header": "time_s;force_N;stroke_m", "comma": True},
          ("2 lines above the header were left out", "follow a comma")),
-        # as wide as each other and narrower than the table; filled up to its width, as spreadsheets do; a number among the words
+        # as wide as each other and narrower than the table; filled up to its width, as spreadsheets do; a number among
+        # the words
         ({"above": "Sample;Gel 7\nDate;12.03.2026\nNumber;7\n", "separator": ";", "header": "time;force;stroke\ns;N;m", "comma": True},
          ("3 lines above the header", "follow a comma")),
         ({"above": "Sample;Gel 7;\nDate;12.03.2026;\nNumber;7;\n", "separator": ";", "header": "time_s;force_N;stroke_m", "comma": True},
@@ -54,7 +55,8 @@ AS_WIDE = "Record 4;banana;kitchen knife\nDate;2026-11-01\n"
     ],
 )  # fmt: skip
 def test_layouts_of_loggers_give_the_same_trace(tmp_path: Path, how: dict, said: tuple[str, ...]) -> None:
-    """Separators, decimals with a comma, words above the header, units below it: the same numbers; what was done is said."""
+    """Separators, decimals with a comma, words above the header, units below it: the same numbers; what was done is
+    said."""
     trace = read_trace(plain(tmp_path, **how))
     np.testing.assert_allclose(trace.time, TIME, atol=1e-9)
     np.testing.assert_allclose(trace.force, LOAD, atol=1e-9)
@@ -95,7 +97,8 @@ def test_units_below_the_header_count(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_damaged_files_are_refused_with_their_place(tmp_path: Path, change, says: str) -> None:
-    """A row too short with and without words above, text among numbers, no header, no table within sixty lines, mixed decimals."""
+    """A row too short with and without words above, text among numbers, no header, no table within sixty lines, mixed
+    decimals."""
     path = plain(tmp_path)
     path.write_text(change(path.read_text()))
     with pytest.raises(TraceError, match=says):
@@ -111,7 +114,8 @@ def test_names_that_mean_nothing_are_listed_with_their_units(tmp_path: Path) -> 
 
 
 def test_a_depth_may_be_named_as_one(tmp_path: Path) -> None:
-    """A column that grows as the knife descends is turned round, whatever its name says; beside --position-col it is refused."""
+    """A column that grows as the knife descends is turned round, whatever its name says; beside --position-col it is
+    refused."""
     path = plain(tmp_path, header="time_s,force_N,Weg [mm]")
     trace = read_trace(path, depth_col="Weg [mm]")
     np.testing.assert_allclose(trace.position, -1e-3 * DEPTH, atol=6e-9)

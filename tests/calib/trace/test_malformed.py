@@ -26,8 +26,8 @@ from calib.trace.conditioning import Conditioned, condition
 from calib.trace.filters import N_STROKE
 from calib.trace.trace import MIN_SAMPLES, read_trace
 from cutcal.main import main
-from mpm.errors import CutcalError
 from mpm.scene import Knife
+from mpm.scene.errors import CutcalError
 from tests.data_dir import ROOT
 
 MORE = int(os.environ.get("CUTCAL_FUZZ", "0"))
@@ -71,7 +71,8 @@ def survives(name: str, call: Callable[[], Any], check: Callable[[Any], None]) -
 
 @st.composite
 def cuts(draw: st.DrawFn) -> Columns:
-    """A cut that could be real: a flat start, a rise, a plateau, with noise; a position or not; sometimes odd as a whole."""
+    """A cut that could be real: a flat start, a rise, a plateau, with noise; a position or not; sometimes odd as a
+    whole."""
     odd = draw(st.integers(0, 3)) == 0
     n = draw(st.sampled_from((120, 400, 60, MIN_SAMPLES) if odd else (120, 400, 60)))
     before = draw(st.sampled_from((6, 2, 0, n - 2, n) if odd else (n // 4, n // 3, n // 2)))

@@ -1,4 +1,5 @@
-"""Traces from JSON, HDF5, exports of ROS messages and DataFrames: the same cut, the same trace, errors with their place."""
+"""Traces from JSON, HDF5, exports of ROS messages and DataFrames: the same cut, the same trace, errors with their
+place."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ from calib.compression.measured import read_repeats
 from calib.errors import TraceError
 from calib.trace.conditioning import condition
 from calib.trace.trace import Trace, read_trace
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 N = 40
 TIME = 0.01 * np.arange(N)
@@ -252,7 +253,8 @@ def rows(folder: Path, **columns: Any) -> Path:
 
 
 def test_rostopic_export(tmp_path: Path) -> None:
-    """The header of rostopic echo -p: nanoseconds, the message's own stamp before the bag's time, unless nobody set it."""
+    """The header of rostopic echo -p: nanoseconds, the message's own stamp before the bag's time, unless nobody set
+    it."""
     stamp = 1_620_000_000_123_456_789 + (1e9 * TIME).astype("i8")
     late = np.sort(stamp + 10**6 * (np.arange(N) % 3))
     columns = {
@@ -308,7 +310,8 @@ def test_nanoseconds_by_name(tmp_path: Path) -> None:
 
 
 def test_milliseconds_of_a_kilohertz_clock(tmp_path: Path) -> None:
-    """A clock that counts 0, 1, 2 is one of milliseconds, not one of seconds; fifty hertz in seconds are no milliseconds."""
+    """A clock that counts 0, 1, 2 is one of milliseconds, not one of seconds; fifty hertz in seconds are no
+    milliseconds."""
     with pytest.raises(TraceError, match="1 s apart; this looks like milliseconds"):
         read_trace(rows(tmp_path, time_s=np.arange(N), force_N=LOAD))
     with pytest.raises(TraceError, match="1e-05 s apart, more than 50000 a second"):

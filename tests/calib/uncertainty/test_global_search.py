@@ -8,15 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib.fit.multistart import FitResult, calibrate
+from calib.fit.multistart import FitResult, multistart_search
 from calib.fit.options import FitOptions
 from calib.fit.surrogate import Surrogate
 from calib.io.progress import Progress
-from calib.problem.objective import Objective, Target
+from calib.problem.objective import Objective
 from calib.problem.parameters import Parameter, ParameterSet
+from calib.problem.target import Target
+from calib.simulation.evaluation import Evaluators
 from calib.uncertainty import global_search
-from calib.uncertainty.analysis import Doubt, at_first_sight, doubt_of
-from calib.uncertainty.global_search import infer
+from calib.uncertainty.analysis import UncertaintyAnalysis, analyse, search_uncertainty
+from calib.uncertainty.global_search import Listener, fit_with_uncertainty
 from tests.calib.fake import GRID, STROKE, Fake
 
 TWO = ParameterSet(
@@ -46,21 +48,25 @@ def objective(force) -> Objective:
     return Objective(Target(GRID, np.interp(GRID, STROKE, force(TRUTH)), 0.05, 0.05, np.interp), TWO)
 
 
-def inferred(force, seed: int, budget: float = 100, told: list[Progress] | None = None) -> tuple[FitResult, Doubt, int]:
+def inferred(
+    force, seed: int, budget: float = 100, told: list[Progress] | None = None
+) -> tuple[FitResult, UncertaintyAnalysis, int]:
     """A fit with its second search, and how many runs the first one took."""
     fake, options = Fake(force, noisy=0.002), FitOptions(budget=budget, seed=seed)
     goal = objective(force)
-    first = calibrate(goal, fake, coarse=fake, replicate=fake, options=options)
-    alone = doubt_of(goal, first, scout=fake, judge=fake, seed=seed)
+    first = multistart_search(goal, fake, coarse=fake, replicate=fake, options=options)
+    alone = analyse(goal, first, coarse=fake, fine=fake, seed=seed)
     report = None if told is None else told.append
-    result, doubt = infer(goal, fake, coarse=fake, again=fake, options=options, progress=report)
-    assert doubt is not None and alone is not None
-    return result, doubt, len(alone.result.history)
+    result, analysis = fit_with_uncertainty(
+        goal, Evaluators(fake, fake, fake), options, listener=Listener(progress=report)
+    )
+    assert analysis is not None and alone is not None
+    return result, analysis, len(alone.result.history)
 
 
-def verdicts(doubt: Doubt) -> dict[str, str]:
+def verdicts(analysis: UncertaintyAnalysis) -> dict[str, str]:
     """By name."""
-    return {i.parameter.name: i.verdict for i in doubt.uncertainty.intervals}
+    return {i.parameter.name: i.verdict for i in analysis.uncertainty.intervals}
 
 
 def test_another_food_that_explains_the_curve_takes_a_claim_back():
@@ -68,12 +74,14 @@ def test_another_food_that_explains_the_curve_takes_a_claim_back():
     nothing is claimed. Of 24 seeds it does so in 21 or 22, and which ones hangs on the processor's last bits; none claims the wrong food."""
     reached = 0
     for seed in range(1, 9):
-        _, doubt, _ = inferred(twofold, seed)
-        e = doubt.uncertainty.intervals[0]
+        _, analysis, _ = inferred(twofold, seed)
+        e = analysis.uncertainty.intervals[0]
         assert e.verdict == "weak"
         far = e.low95 < MIDDLE * math.exp(-0.9 * APART) and e.high95 > MIDDLE * math.exp(0.9 * APART)
-        said = len(doubt.said) == 1 and doubt.said[0].startswith("R_skin: a second search found another food")
-        reached += far and said and verdicts(doubt)["R"] == "identified"
+        said = len(analysis.remarks) == 1 and analysis.remarks[0].startswith(
+            "R_skin: a second search found another food"
+        )
+        reached += far and said and verdicts(analysis)["R"] == "identified"
     assert reached >= 6
 
 
@@ -81,23 +89,23 @@ def test_another_food_that_explains_the_curve_takes_a_claim_back():
 def test_what_no_other_food_refutes_is_claimed_still(seed):
     """The second search finds nothing as good; all its runs are in the history, with the chi-square of the objective itself."""
     told: list[Progress] = []
-    result, doubt, first = inferred(onefold, seed, told=told)
-    r = doubt.uncertainty.intervals[1]
+    result, analysis, first = inferred(onefold, seed, told=told)
+    r = analysis.uncertainty.intervals[1]
     assert r.verdict == "identified" and r.low95 < TRUTH["R"] < r.high95
     more = [t for t in result.history if t.stage != "profile"]
-    assert len(more) > first and doubt.said == ()
+    assert len(more) > first and analysis.remarks == ()
     goal = objective(onefold)
-    assert all(t.misfit == goal.trial(t.evaluation).misfit for t in result.history)
+    assert all(t.misfit == goal.score(t.evaluation).misfit for t in result.history)
     assert told[-1].done == len(more)
     assert all(b.done >= a.done and b.spent >= a.spent for a, b in zip(told[:-1], told[1:], strict=True))
     assert {p.budget for p in told} == {100}
 
 
-def test_what_is_claimed_is_barred():
+def test_what_is_claimed_is_deflated():
     """A point within all claimed intervals has a residual more, the deeper the larger; one outside of any of them has none."""
-    _, doubt, _ = inferred(onefold, 0)
-    both = doubt.uncertainty.intervals
-    barred = global_search._barred(TWO, both)
+    _, analysis, _ = inferred(onefold, 0)
+    both = analysis.uncertainty.intervals
+    barred = global_search._deflated(TWO, both)
     middle = np.array([0.5 * (i.parameter.to_internal(i.low95) + i.parameter.to_internal(i.high95)) for i in both])
     half = np.array([0.5 * (i.parameter.to_internal(i.high95) - i.parameter.to_internal(i.low95)) for i in both])
     points = middle + np.array([[0.0, 0.0], [1.5, 0.0], [0.0, 1.5], [3.1, 0.0], [0.0, -3.1], [1.0, 1.0]]) * half
@@ -109,9 +117,9 @@ def test_what_is_claimed_is_barred():
 
 def stuck(goal: Objective, fake: Fake, shift: float) -> FitResult:
     """A fit whose search has ended at an R so many times the right one, with no better run in its history."""
-    right = calibrate(goal, fake, coarse=fake, replicate=fake, options=FitOptions(seed=0))
+    right = multistart_search(goal, fake, coarse=fake, replicate=fake, options=FitOptions(seed=0))
     values = dict(right.best.evaluation.parameters)
-    poor = goal.trial(next(iter(fake.evaluate([values | {"R": shift * values["R"]}]))), stage="round")
+    poor = goal.score(next(iter(fake.evaluate([values | {"R": shift * values["R"]}]))), stage="round")
     history = (*(t for t in right.history if t.misfit > poor.misfit), poor)
     surrogate = Surrogate(goal, history, poor)
     return replace(
@@ -130,28 +138,28 @@ def test_a_better_food_becomes_the_answer():
     only what holds the first's value as well is claimed."""
     goal, fake = objective(onefold), Fake(onefold, noisy=0.002)
     first = stuck(goal, fake, 1.1)
-    narrow = replace(at_first_sight(goal, first).intervals[1], verdict="identified")  # type: ignore[union-attr]
+    narrow = replace(search_uncertainty(goal, first).intervals[1], verdict="identified")  # type: ignore[union-attr]
     narrow = replace(narrow, low95=0.99 * narrow.parameter.value, high95=1.01 * narrow.parameter.value)
-    result = global_search._searched(goal, first, [narrow], fake, fake, FitOptions(seed=0), None)
+    result = global_search._second_search(goal, first, [narrow], Evaluators(fake, fake, fake), FitOptions(seed=0), None)
     assert result.best.misfit < first.best.misfit - 5.0
     assert result.parameters.to_dict(result.best.z) == result.best.evaluation.parameters
     assert result.surrogate is not None and result.surrogate.best is result.best
-    doubt = doubt_of(goal, result, scout=fake, judge=fake)
-    assert doubt is not None
-    found = global_search._weighed(doubt, first, result, [narrow])
-    assert "better, by" in found.said[0] and verdicts(found)["R"] == "weak", "the first answer lies outside"
-    assert "the food of the first search had another" in found.said[1]
-    assert found.uncertainty.intervals[1].low95 == doubt.uncertainty.intervals[1].low95
-    near = replace(first, best=goal.trial(replace(result.best.evaluation)))
-    assert verdicts(global_search._weighed(doubt, near, result, [narrow]))["R"] == "identified"
+    analysis = analyse(goal, result, coarse=fake, fine=fake)
+    assert analysis is not None
+    found = global_search._compared(analysis, first, result, [narrow])
+    assert "better, by" in found.remarks[0] and verdicts(found)["R"] == "weak", "the first answer lies outside"
+    assert "the food of the first search had another" in found.remarks[1]
+    assert found.uncertainty.intervals[1].low95 == analysis.uncertainty.intervals[1].low95
+    near = replace(first, best=goal.score(replace(result.best.evaluation)))
+    assert verdicts(global_search._compared(analysis, near, result, [narrow]))["R"] == "identified"
 
 
 def test_what_cannot_be_searched_twice_is_not_claimed():
     """Nothing is begun that cannot be paid, and what one search alone has found is weak."""
-    result, doubt, first = inferred(onefold, 0, budget=20)
-    assert len(result.history) == first and verdicts(doubt)["R"] == "weak"
-    r = doubt.uncertainty.intervals[1]
-    assert r.low95 < TRUTH["R"] < r.high95 and "a budget of 40 may" in doubt.said[0]
+    result, analysis, first = inferred(onefold, 0, budget=20)
+    assert len(result.history) == first and verdicts(analysis)["R"] == "weak"
+    r = analysis.uncertainty.intervals[1]
+    assert r.low95 < TRUTH["R"] < r.high95 and "a budget of 40 may" in analysis.remarks[0]
 
 
 def test_what_is_not_proven_is_not_claimed():
@@ -161,24 +169,26 @@ def test_what_is_not_proven_is_not_claimed():
     fake = Fake(lambda p: onefold({"R_skin": p["E"] ** 6 / named["E"] ** 5, "R": p["R"]}), noisy=0.002)
     target = Target(GRID, np.interp(GRID, STROKE, onefold(TRUTH)), 0.05, 0.05, np.interp)
     goal = Objective(target, ParameterSet((stiff, TWO.items[1])))
-    alone = at_first_sight(goal, calibrate(goal, fake, coarse=fake, replicate=fake, options=FitOptions(seed=0)))
+    alone = search_uncertainty(
+        goal, multistart_search(goal, fake, coarse=fake, replicate=fake, options=FitOptions(seed=0))
+    )
     assert alone is not None and alone.intervals[0].verdict == "identified"
-    _, doubt = infer(goal, fake, coarse=fake, again=fake, options=FitOptions(seed=0))
-    assert doubt is not None and verdicts(doubt) == {"E": "weak", "R": "identified"}
-    assert any(said.startswith("E: bounded, but of made-up cuts one of four") for said in doubt.said)
+    _, analysis = fit_with_uncertainty(goal, Evaluators(fake, fake, fake), FitOptions(seed=0))
+    assert analysis is not None and verdicts(analysis) == {"E": "weak", "R": "identified"}
+    assert any(said.startswith("E: bounded, but of made-up cuts one of four") for said in analysis.remarks)
 
 
 def test_what_numerics_decide_is_not_claimed():
     """An answer that does not explain the curve at half the speed and with other particles is none; no second search is made for it."""
     goal, fake = objective(onefold), Fake(onefold, noisy=0.002)
     other = Fake(lambda p: onefold(p) + 0.9 * np.sin(STROKE / 0.003), noisy=0.002)
-    result, doubt = infer(goal, fake, coarse=fake, again=other, options=FitOptions(seed=0))
-    first = calibrate(goal, fake, coarse=fake, replicate=other, options=FitOptions(seed=0))
-    assert doubt is not None and verdicts(doubt)["R"] == "weak" and result.best.misfit < 2.0
+    result, analysis = fit_with_uncertainty(goal, Evaluators(fake, fake, other), FitOptions(seed=0))
+    first = multistart_search(goal, fake, coarse=fake, replicate=other, options=FitOptions(seed=0))
+    assert analysis is not None and verdicts(analysis)["R"] == "weak" and result.best.misfit < 2.0
     assert [t.stage for t in result.history[len(first.history) :]] == ["profile"] * (
         len(result.history) - len(first.history)
     )
-    assert "R: bounded, but the same values at half the speed" in doubt.said[0]
+    assert "R: bounded, but the same values at half the speed" in analysis.remarks[0]
 
 
 def test_the_answer_is_always_run_twice():
@@ -194,5 +204,5 @@ def test_an_interrupted_search_simulates_nothing_more():
     """After Ctrl-C what there is has its intervals, without another run."""
     goal = objective(onefold)
     fake = Fake(onefold, noisy=0.002, interrupt_after=25)
-    result, doubt = infer(goal, fake, coarse=fake, again=fake, options=FitOptions())
-    assert result.status == "interrupted" and doubt is not None and fake.runs == 25
+    result, analysis = fit_with_uncertainty(goal, Evaluators(fake, fake, fake), FitOptions())
+    assert result.status == "interrupted" and analysis is not None and fake.runs == 25

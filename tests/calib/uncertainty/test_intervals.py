@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import t as student
 
 from calib.problem.parameters import Z95, Parameter, ParameterSet
-from calib.uncertainty.intervals import Evidence, Uncertainty, correlation_length, uncertainty
+from calib.uncertainty.intervals import LinearisedLikelihood, Uncertainty, correlation_length, uncertainty
 from tests.calib.synthetic import CORRELATION, WEIGHT, X, correlated_noise
 
 #: Sensitivities of the curve [standard deviations per unit of the internal coordinate]: a plateau, a ramp, a
@@ -23,10 +23,12 @@ def parameters(count: int = 3, value: float = 1.0) -> ParameterSet:
     return ParameterSet(tuple(Parameter(f"p{k}", value, 1e-9, 1e9, "-", 1 / end, end) for k in range(count)))
 
 
-def data_of(rows: np.ndarray, residual: np.ndarray, effective: float) -> Evidence:
+def data_of(rows: np.ndarray, residual: np.ndarray, effective: float) -> LinearisedLikelihood:
     """The data rows of a Jacobian and a residual whose last rows are those of the priors, nothing left open."""
     p = rows.shape[1]
-    return Evidence(rows[:-p], residual[:-p], np.zeros((len(rows) - p, 0)), effective, np.ones(len(rows) - p))
+    return LinearisedLikelihood(
+        rows[:-p], residual[:-p], np.zeros((len(rows) - p, 0)), effective, np.ones(len(rows) - p)
+    )
 
 
 def linear_fit(random: np.random.Generator, noise: float) -> tuple[np.ndarray, Uncertainty]:
@@ -159,5 +161,5 @@ def test_a_residual_of_one_sign_is_no_independent_noise() -> None:
 def test_a_nuisance_that_was_not_searched_widens_the_interval() -> None:
     """Force in proportion to one parameter, known to 1/10, and a gain known to 1/3: variances add, as 1/100 + 1/9."""
     rows, gain = np.full((100, 1), 1.0), np.full((100, 1), 1.0 / 3.0)
-    wide = uncertainty(parameters(1), Evidence(rows, np.zeros(100), gain, 100.0, np.ones(100))).intervals[0]
+    wide = uncertainty(parameters(1), LinearisedLikelihood(rows, np.zeros(100), gain, 100.0, np.ones(100))).intervals[0]
     assert wide.width == pytest.approx((1.0 + 1.0 / (1 / 100 + 1 / 9)) ** -0.5)

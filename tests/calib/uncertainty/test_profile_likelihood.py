@@ -9,16 +9,17 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from calib.fit.multistart import FitResult, calibrate
+from calib.fit.multistart import FitResult, multistart_search
 from calib.fit.options import FitOptions
 from calib.fit.surrogate import Surrogate
-from calib.problem.objective import Objective, Target
+from calib.problem.objective import Objective
 from calib.problem.parameters import Z95, Parameter, ParameterSet
+from calib.problem.target import Target
 from calib.simulation.evaluation import Evaluation
-from calib.uncertainty.analysis import CLOSE, JUDGED, Doubt, doubt_of
-from calib.uncertainty.intervals import evidence
-from calib.uncertainty.predictive import band_of, errors
-from calib.uncertainty.profile_likelihood import RISE, Profile, with_profiles
+from calib.uncertainty.analysis import CLOSE, END_ROUNDS, UncertaintyAnalysis, analyse
+from calib.uncertainty.intervals import linearised_likelihood
+from calib.uncertainty.predictive import error_draws, pointwise_band
+from calib.uncertainty.profile_likelihood import RISE, Profile, with_profile_intervals
 from tests.calib.fake import GRID, NOISE, STROKE, Fake, goal, noise, three_terms
 
 
@@ -61,54 +62,58 @@ def elastic(p: dict[str, float]) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def one_sided() -> tuple[Objective, FitResult, Doubt]:
+def one_sided() -> tuple[Objective, FitResult, UncertaintyAnalysis]:
     """A fit of the elastic cut with 0.4 % of noise."""
     truth = {"E": 5e5, "yield_stress": 4e5, "R": 300.0}
     curve = np.interp(GRID, STROKE, elastic(truth))
     objective = Objective(Target(GRID, curve, 0.05, 0.05, np.interp), ONE_SIDED)
     simulator = Fake(elastic, noisy=0.004)
-    result = calibrate(objective, simulator, coarse=simulator, options=FitOptions(budget=60))
-    doubt = doubt_of(objective, result, scout=simulator, judge=simulator)
-    assert doubt is not None
-    return objective, result, doubt
+    result = multistart_search(objective, simulator, coarse=simulator, options=FitOptions(budget=60))
+    analysis = analyse(objective, result, coarse=simulator, fine=simulator)
+    assert analysis is not None
+    return objective, result, analysis
 
 
-def test_verdicts_say_what_the_trace_bounds(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+def test_verdicts_say_what_the_trace_bounds(one_sided: tuple[Objective, FitResult, UncertaintyAnalysis]) -> None:
     """R is identified; a yield stress that nothing reaches is bounded from below and left to the literature above."""
-    doubt = one_sided[2]
-    found = {i.parameter.name: i for i in doubt.uncertainty.intervals}
+    analysis = one_sided[2]
+    found = {i.parameter.name: i for i in analysis.uncertainty.intervals}
     assert found["R"].verdict == "identified" and found["R"].low95 < 300.0 < found["R"].high95
     assert found["yield_stress"].verdict == "one_sided"
     assert found["yield_stress"].high95 > 2e6 and found["yield_stress"].low95 > 2e4
-    walked = {p.name: p for p in doubt.profiles}
+    walked = {p.name: p for p in analysis.profiles}
     above = walked["yield_stress"].end(1, walked["yield_stress"].data)
     assert above is None or math.exp(above) > 3e6
 
 
-def test_what_would_have_an_interval_was_tried_at_both_ends(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+def test_what_would_have_an_interval_was_tried_at_both_ends(
+    one_sided: tuple[Objective, FitResult, UncertaintyAnalysis],
+) -> None:
     """Runs that count are made where R would end, and again where that turns out to lie elsewhere, and for nothing that is open;
     coarse ones at the ends of all."""
-    objective, result, doubt = one_sided
-    runs = doubt.result.history[len(result.history) :]
+    objective, result, analysis = one_sided
+    runs = analysis.result.history[len(result.history) :]
     judged = [t.z - result.best.z for t in runs if not t.coarse]
     r = objective.parameters.names.index("R")
     below, above = ([abs(d[r]) for d in judged if (d[r] > 0.0) == up] for up in (False, True))
-    assert 1 <= len(below) <= JUDGED and 1 <= len(above) <= JUDGED
+    assert 1 <= len(below) <= END_ROUNDS and 1 <= len(above) <= END_ROUNDS
     sd = objective.parameters.prior_sd
     for a, b in combinations(judged, 2):
         assert np.any(np.abs(a - b) > CLOSE * sd)
     assert sum(t.coarse for t in runs) > 2 * len(objective.parameters)
 
 
-def test_a_better_run_at_the_end_of_an_interval_becomes_the_best(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+def test_a_better_run_at_the_end_of_an_interval_becomes_the_best(
+    one_sided: tuple[Objective, FitResult, UncertaintyAnalysis],
+) -> None:
     """Where the process was wrong and a run at an end is better than the answer of the search, values and intervals are about it."""
     objective, result, _ = one_sided
     values = dict(result.best.evaluation.parameters)
-    poor = objective.trial(next(iter(Fake(elastic).evaluate([values | {"R": 1.15 * values["R"]}]))), stage="round")
+    poor = objective.score(next(iter(Fake(elastic).evaluate([values | {"R": 1.15 * values["R"]}]))), stage="round")
     history = (*result.history, poor)
     assert result.surrogate is not None and poor.misfit > result.best.misfit + 10.0
     before = replace(result, best=poor, history=history, surrogate=Surrogate(objective, history, poor))
-    after = doubt_of(objective, before, judge=Fake(lambda _: elastic(values)))
+    after = analyse(objective, before, fine=Fake(lambda _: elastic(values)))
     assert after is not None
     best = after.result.best
     assert best.stage == "profile" and best.misfit < poor.misfit - 5.0
@@ -116,19 +121,21 @@ def test_a_better_run_at_the_end_of_an_interval_becomes_the_best(one_sided: tupl
     assert after.result.surrogate is not None and after.result.surrogate.best is best
 
 
-def test_an_interval_holds_the_best_value(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+def test_an_interval_holds_the_best_value(one_sided: tuple[Objective, FitResult, UncertaintyAnalysis]) -> None:
     """Where the surrogate puts the optimum beside the best run, the interval reaches to that run's value."""
-    doubt = one_sided[2]
+    analysis = one_sided[2]
     moved = tuple(
         replace(i, parameter=replace(i.parameter, value=1.1 * i.high95)) if i.parameter.name == "R" else i
-        for i in doubt.uncertainty.intervals
+        for i in analysis.uncertainty.intervals
     )
-    found = with_profiles(replace(doubt.uncertainty, intervals=moved), doubt.profiles).intervals
+    found = with_profile_intervals(replace(analysis.uncertainty, intervals=moved), analysis.profiles).intervals
     for i in found:
         assert i.low95 * (1.0 - 1e-9) <= i.parameter.value <= i.high95 * (1.0 + 1e-9)
 
 
-def test_an_interval_is_about_the_value_that_is_reported(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+def test_an_interval_is_about_the_value_that_is_reported(
+    one_sided: tuple[Objective, FitResult, UncertaintyAnalysis],
+) -> None:
     """A value where the profile has risen by 1 belongs to the interval of what has risen by 3.84 more: it ends at 2.2 standard
     deviations from the optimum on both sides, not at 1.96."""
     uncertainty = one_sided[2].uncertainty
@@ -136,46 +143,54 @@ def test_an_interval_is_about_the_value_that_is_reported(one_sided: tuple[Object
     p = found.parameter
     profile = parabola(math.log(p.value), 0.1, 1.0)
     beside = replace(found, parameter=replace(p, value=p.value * math.exp(0.1)))
-    (interval,) = with_profiles(replace(uncertainty, intervals=(beside,)), [profile]).intervals
+    (interval,) = with_profile_intervals(replace(uncertainty, intervals=(beside,)), [profile]).intervals
     ends = np.log([interval.low95, interval.high95]) - math.log(p.value)
     assert ends == pytest.approx([-0.1 * math.sqrt(RISE + 1.0), 0.1 * math.sqrt(RISE + 1.0)], abs=2e-3)
 
 
-def test_nothing_is_identified_where_the_curve_is_not_explained(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+def test_nothing_is_identified_where_the_curve_is_not_explained(
+    one_sided: tuple[Objective, FitResult, UncertaintyAnalysis],
+) -> None:
     """The same profiles with a chi-square of three for each degree of freedom: R, which was identified, is weak."""
-    doubt = one_sided[2]
-    assert doubt.uncertainty.explained
-    off = replace(doubt.uncertainty, reduced_chi2=3.0)
+    analysis = one_sided[2]
+    assert analysis.uncertainty.explained
+    off = replace(analysis.uncertainty, reduced_chi2=3.0)
     assert not off.explained
-    assert [i.verdict for i in doubt.uncertainty.intervals].count("identified") == 1
-    assert [i.verdict for i in with_profiles(off, doubt.profiles).intervals][-1] == "weak"
+    assert [i.verdict for i in analysis.uncertainty.intervals].count("identified") == 1
+    assert [i.verdict for i in with_profile_intervals(off, analysis.profiles).intervals][-1] == "weak"
 
 
-def test_a_curve_that_is_off_for_long_stretches_is_not_explained(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+def test_a_curve_that_is_off_for_long_stretches_is_not_explained(
+    one_sided: tuple[Objective, FitResult, UncertaintyAnalysis],
+) -> None:
     """Its residuals look like few independent rows, so that their chi-square is nothing odd; the search's own is, and R is weak."""
-    objective, result, doubt = one_sided
-    assert result.jacobian is not None and evidence(objective, result.best, result.jacobian).met
+    objective, result, analysis = one_sided
+    assert result.jacobian is not None and linearised_likelihood(objective, result.best, result.jacobian).met
     rows = objective.effective_rows
     for size, met in ((1.5, True), (2.0, False)):  # chi-square over 21 rows: 99 % quantile 38.9
         best = replace(result.best, residual=result.best.residual * math.sqrt(size * rows / result.best.misfit))
-        assert evidence(objective, best, result.jacobian).met is met
-    off = replace(doubt.uncertainty, data=replace(doubt.uncertainty.data, met=False))
+        assert linearised_likelihood(objective, best, result.jacobian).met is met
+    off = replace(analysis.uncertainty, data=replace(analysis.uncertainty.data, met=False))
     assert not off.explained
-    assert [i.verdict for i in with_profiles(off, doubt.profiles).intervals][-1] == "weak"
+    assert [i.verdict for i in with_profile_intervals(off, analysis.profiles).intervals][-1] == "weak"
 
 
-def test_profile_of_a_known_parameter_is_that_of_the_curvature(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+def test_profile_of_a_known_parameter_is_that_of_the_curvature(
+    one_sided: tuple[Objective, FitResult, UncertaintyAnalysis],
+) -> None:
     """Where chi-square is a parabola, profile and normal approximation agree to a quarter in the width."""
-    doubt = one_sided[2]
-    i = doubt.uncertainty.intervals[2]
-    sd = math.sqrt(doubt.uncertainty.covariance[2, 2])
+    analysis = one_sided[2]
+    i = analysis.uncertainty.intervals[2]
+    sd = math.sqrt(analysis.uncertainty.covariance[2, 2])
     assert math.log(i.high95 / i.low95) == pytest.approx(2.0 * Z95 * sd, rel=0.25)
 
 
-def test_the_band_holds_the_curve_it_was_drawn_about(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+def test_the_band_holds_the_curve_it_was_drawn_about(
+    one_sided: tuple[Objective, FitResult, UncertaintyAnalysis],
+) -> None:
     """Nearly all of the measured curve lies in its band, and a curve that is 15 % off does not."""
-    objective, _, doubt = one_sided
-    band = doubt.bands[0]
+    objective, _, analysis = one_sided
+    band = analysis.bands[0]
     assert band.inside > 0.9
     off = 1.15 * objective.target.curve
     assert np.mean((off >= band.low) & (off <= band.high)) < 0.5
@@ -184,14 +199,14 @@ def test_the_band_holds_the_curve_it_was_drawn_about(one_sided: tuple[Objective,
 def test_band_of_normal_draws_is_1_96_wide() -> None:
     """The pointwise band of 4000 draws of unit variance ends at 1.96 to 0.15, and holds 95 % of another one."""
     random = np.random.default_rng(0)
-    band = band_of(random.standard_normal((4000, 50)), np.zeros(50))
+    band = pointwise_band(random.standard_normal((4000, 50)), np.zeros(50))
     assert np.abs(band.high - Z95).max() < 0.15 and np.abs(band.low + Z95).max() < 0.15 and band.inside == 1.0
 
 
 def test_errors_have_the_size_and_the_length_that_they_should() -> None:
     """Variance of each point is sigma^2, and half a correlation length away the correlation is exp(-pi/4)."""
     objective = goal({"E": 3e5, "yield_stress": 4e4, "R": 500.0, "R_skin": 200.0, "mu": 0.2})
-    drawn = errors(objective, 0.1, 2.0, 4000, np.random.default_rng(1))
+    drawn = error_draws(objective, 0.1, 2.0, 4000, np.random.default_rng(1))
     assert np.sqrt((drawn**2).mean()) == pytest.approx(2.0 * objective.sigma, rel=0.03)
     half = round(0.05 * 239)
     seen = np.mean(drawn[:, 100] * drawn[:, 100 + half]) / np.mean(drawn[:, 100] ** 2)
@@ -201,8 +216,8 @@ def test_errors_have_the_size_and_the_length_that_they_should() -> None:
 def test_an_interrupted_search_has_no_doubt() -> None:
     """Fewer runs than parameters: nothing is said instead of something wrong."""
     objective = goal({"E": 3e5, "yield_stress": 4e4, "R": 500.0, "R_skin": 200.0, "mu": 0.2})
-    result = calibrate(objective, Fake(interrupt_after=3), options=FitOptions(budget=60))
-    assert result.status == "interrupted" and doubt_of(objective, result) is None
+    result = multistart_search(objective, Fake(interrupt_after=3), options=FitOptions(budget=60))
+    assert result.status == "interrupted" and analyse(objective, result) is None
 
 
 def test_fake_and_noise_are_repeatable() -> None:
@@ -214,14 +229,14 @@ def test_fake_and_noise_are_repeatable() -> None:
     assert three_terms(values).shape == STROKE.shape
 
 
-def test_a_sample_agrees_with_the_profile(one_sided: tuple[Objective, FitResult, Doubt]) -> None:
+def test_a_sample_agrees_with_the_profile(one_sided: tuple[Objective, FitResult, UncertaintyAnalysis]) -> None:
     """R by the ensemble of walkers and by its profile: the ends within a quarter of the interval."""
     objective, result, _ = one_sided
     scout = Fake(elastic, noisy=0.004)
-    doubt = doubt_of(objective, result, scout=scout, sample=True)
-    assert doubt is not None
-    interval = next(i for i in doubt.uncertainty.intervals if i.parameter.name == "R")
+    analysis = analyse(objective, result, coarse=scout, sample=True)
+    assert analysis is not None
+    interval = next(i for i in analysis.uncertainty.intervals if i.parameter.name == "R")
     width = interval.high95 - interval.low95
-    assert doubt.sampled["R"] == pytest.approx((interval.low95, interval.high95), abs=0.25 * width)
-    again = doubt_of(objective, result, scout=scout, sample=True)
-    assert again is not None and again.sampled == doubt.sampled
+    assert analysis.sampled["R"] == pytest.approx((interval.low95, interval.high95), abs=0.25 * width)
+    again = analyse(objective, result, coarse=scout, sample=True)
+    assert again is not None and again.sampled == analysis.sampled

@@ -12,7 +12,7 @@ import pytest
 from SALib.analyze import sobol as analysis
 from SALib.sample import sobol as sampling
 
-from calib.fit.multistart import calibrate
+from calib.fit.multistart import multistart_search
 from calib.fit.options import FitOptions
 from calib.uncertainty.sobol import indices, quantities, sensitivity
 from tests.calib.fake import FIVE, Fake, goal
@@ -84,7 +84,7 @@ def test_indices_of_a_surrogate_that_is_known() -> None:
 def test_a_fit_says_what_moved_it_and_a_constant_says_nothing() -> None:
     """A surrogate of real runs gives finite indices, repeatably; without one there are none; a constant has none."""
     objective = goal({p.name: p.value for p in FIVE})
-    result = calibrate(objective, Fake(), options=FitOptions(budget=30, batch=1, seed=0))
+    result = multistart_search(objective, Fake(), options=FitOptions(budget=30, batch=1, seed=0))
     got = sensitivity(objective, result)
     assert list(got) == ["peak", "work", "initial_slope"] and list(got["work"]) == list(FIVE.names)
     assert got == sensitivity(objective, result)

@@ -18,8 +18,8 @@ from calib.errors import CurveError
 from calib.io.yaml_checks import data_path
 from calib.material.food import load_food, load_foods
 from calib.material.knife import load_knife
+from calib.problem.food_parameters import fit_parameters
 from calib.problem.parameters import Z95
-from calib.problem.setup import fit_parameters
 from calib.simulation.evaluation import Evaluation
 from calib.validation.prior_predictive import QUANTILES, conclude, draw, plan
 from cutcal.main import main

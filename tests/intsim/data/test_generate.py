@@ -15,20 +15,21 @@ from calib.errors import OutputError
 from calib.simulation.workers import Workers
 from cutcal.main import main
 from intsim.data import generate as g
-from intsim.data.demonstrate import Track
-from intsim.data.manifest import JITTER, TASKS, Manifest
-from intsim.data.shards import META, pack, trajectories
-from intsim.task.language import instructions, parse
-from intsim.task.planner import PHASES, RATE
-from intsim.task.suites import FOODS, TEST
+from intsim.data.dataset_document import DATASET_FILE, DatasetDocument, DatasetSpec, PictureTotals
+from intsim.data.demonstrate import Demonstration
+from intsim.data.manifest import PROPERTY_SCATTER, TRAINING_SUITES, Manifest
+from intsim.data.shards import pack_episode, trajectories
+from intsim.task.language import instructions, parse_instruction
+from intsim.task.planner import CONTROL_RATE, PHASES
+from intsim.task.suites import FIRST_TEST_SEED, FOODS
 from intsim.task.targets import TaskError
 from tests.calib.documents import valid
 
 
-def track(steps: int = 12, seed: int = 0) -> Track:
+def track(steps: int = 12, seed: int = 0) -> Demonstration:
     """A made-up trajectory with contact from its fifth step on, and two cuts."""
     rng = np.random.default_rng(seed)
-    t = Track()
+    t = Demonstration()
     for k in range(steps + 1):
         t.qpos.append(rng.random(9))
         t.qvel.append(rng.random(9))
@@ -63,29 +64,32 @@ def test_the_manifest_counts_the_whole_product_and_draws_each_once():
 
 
 def test_a_trajectory_is_drawn_from_its_number_alone():
-    """Same number, same episode; all foods and tasks come in turn; values stay within their ranges and differ; no seed of a test."""
+    """Same number, same episode; all foods and tasks come in turn; values stay within their ranges and differ; no seed
+    of a test."""
     m = Manifest(trajectories=80)
-    draws = [m.draw(k) for k in range(80)]
-    assert m.draw(7) == draws[7]
+    draws = [m.trajectory(k) for k in range(80)]
+    assert m.trajectory(7) == draws[7]
     assert [d.food.name for d in draws[:15]] == list(FOODS)
-    assert {d.suite for d in draws[:15]} == set(TASKS)
+    assert {d.suite for d in draws[:15]} == set(TRAINING_SUITES)
     assert len({(d.suite, d.food.name) for d in draws[:75]}) == 75
     assert {d.style for d in draws} == {"press", "slice", "rock", "saw"}
-    assert max(d.seed for d in draws) < TEST
+    assert max(d.seed for d in draws) < FIRST_TEST_SEED
     for d in draws:
         names = [d.episode.item.name, *(o.name for o in d.episode.others)]
-        found = parse(d.episode.instruction, names)
+        found = parse_instruction(d.episode.instruction, names)
         assert float(found.ratio) == pytest.approx(float(d.episode.spec.ratio))
         assert replace(found, ratio=d.episode.spec.ratio) == d.episode.spec
-        assert set(d.values) <= set(JITTER) and d.values["R"] > 0
+        assert set(d.values) <= set(PROPERTY_SCATTER) and d.values["R"] > 0
     assert len({d.values["R"] for d in draws if d.food.name == "banana"}) > 1
 
 
-@pytest.mark.parametrize("how", [{"trajectories": 0}, {"suites": ("none",)}, {"seed": TEST}, {"foods": ()}])
+@pytest.mark.parametrize("how", [{"trajectories": 0}, {"suites": ("none",)}, {"seed": FIRST_TEST_SEED}, {"foods": ()}])
 def test_an_impossible_manifest_is_an_error(how):
-    """Nothing to draw, an unknown task, seeds of the tests."""
+    """Nothing to draw, an unknown task, seeds of the tests; demonstrations of a kind that is none."""
     with pytest.raises(TaskError, match="dataset"):
         Manifest(**{"trajectories": 10, **how})
+    with pytest.raises(TaskError, match="demos 'lazy' is none of sustained"):
+        DatasetSpec(Manifest(), demos="lazy")
 
 
 class Inline(Workers):
@@ -98,33 +102,33 @@ class Inline(Workers):
     def close(self) -> None:
         """Nothing to end."""
 
-    def each(self, work, jobs) -> Iterator[tuple[int, dict]]:
+    def each(self, work, jobs) -> Iterator[tuple[int, g.PackedEpisode]]:
         """A made-up episode for each."""
-        for k, (draw, *_) in enumerate(jobs):
+        for k, (spec, *_) in enumerate(jobs):
             if self.most == 0:
                 raise KeyboardInterrupt
             self.most -= 1
-            yield k, made(draw)
+            yield k, made(spec)
 
 
-def made(draw) -> dict:
+def made(spec) -> g.PackedEpisode:
     """What a worker sends back."""
-    t = track(seed=draw.seed)
-    about = {
-        "episode_seed": draw.seed,
-        "index": draw.index,
-        "instruction": draw.episode.instruction,
-        "instructions": instructions(draw.episode.spec, draw.seed),
-        "suite": draw.suite,
+    t = track(seed=spec.seed)
+    entry = {
+        "episode_seed": spec.seed,
+        "index": spec.index,
+        "instruction": spec.episode.instruction,
+        "instructions": instructions(spec.episode.spec, spec.seed),
+        "suite": spec.suite,
         "demos": "sustained",
         "task": {
-            "ratio": float(draw.episode.spec.ratio),
-            "side": draw.episode.spec.side,
-            "pieces": draw.episode.spec.pieces,
+            "ratio": float(spec.episode.spec.ratio),
+            "side": spec.episode.spec.side,
+            "pieces": spec.episode.spec.pieces,
         },
         "elapsed_steps": len(t.action),
-        "food": draw.food.name,
-        "style": draw.style,
+        "food": spec.food.name,
+        "style": spec.style,
         "status": "done",
         "success": True,
         "published": True,
@@ -132,36 +136,52 @@ def made(draw) -> dict:
         "peak_N": 1.0,
         "seconds": {"solver": 2.0, "robot": 1.0, "start": 0.0},
     }
-    return {"about": about, "content": pack(t, about, {"food": draw.food.name, "material": "{}"})}
+    return g.PackedEpisode(entry, pack_episode(t, entry, {"food": spec.food.name, "material": "{}"}))
 
 
 @pytest.fixture(autouse=True)
 def no_simulator(monkeypatch):
     """These tests make episodes up."""
-    monkeypatch.setattr(g, "available", lambda: None)
+    monkeypatch.setattr(g, "require_simulator", lambda: None)
 
 
 def test_a_stopped_dataset_goes_on_and_comes_out_the_same(tmp_path):
-    """Stopped after 4 of 7 and begun again: nothing is made twice, and the shards are those of one go; parts are gone."""
-    m = Manifest(trajectories=7)
+    """Stopped after 4 of 7 and begun again: nothing is made twice, and the shards are those of one go; parts are
+    gone."""
+    m = DatasetSpec(Manifest(trajectories=7), shard=3)
     with pytest.raises(KeyboardInterrupt):
-        g.generate(m, tmp_path / "a", Inline(4), shard=3)
+        g.generate(m, tmp_path / "a", Inline(4))
     (tmp_path / "a" / "part-000001.h5").touch()  # killed when its shard was written and the part not yet removed
     rest = Inline(3)
-    document = valid(g.generate(m, tmp_path / "a", rest, shard=3, resume=True))
-    assert rest.most == 0 and document["trajectories"] == 7
-    g.generate(m, tmp_path / "b", Inline(), shard=3)
+    document = g.generate(m, tmp_path / "a", rest, resume=True)
+    assert DatasetDocument.read(tmp_path / "a") == document and valid(document.as_dict())
+    assert document.totals is not None and rest.most == 0 and document.totals.trajectories == 7
+    g.generate(m, tmp_path / "b", Inline())
     assert sorted(p.name for p in (tmp_path / "a").iterdir()) == sorted(p.name for p in (tmp_path / "b").iterdir())
     assert not list((tmp_path / "a").glob("part-*"))
     for one, two in zip(trajectories(tmp_path / "a"), trajectories(tmp_path / "b"), strict=True):
-        assert one.about == two.about
+        assert one.entry == two.entry
         assert np.array_equal(one.group["actions"], two.group["actions"])
-    assert document["core_hours_of_21000"] == pytest.approx(21_000 * 3.0 / 3600)
+    assert document.totals.core_hours_of_21000 == pytest.approx(21_000 * 3.0 / 3600)
+
+
+def test_a_dataset_that_is_not_finished_has_a_document(tmp_path):
+    """What it is, with a stiffness that nobody gave as null; what its pictures took may be said before it is
+    finished."""
+    spec = DatasetSpec(Manifest(trajectories=7, foods=["plum"]), demos="planned")
+    pictures = PictureTotals((0, 3), 64, 12, 1.5, 10.0, 1000)
+    for document in (DatasetDocument(spec), DatasetDocument(spec, pictures=pictures)):
+        document.write(tmp_path)
+        assert DatasetDocument.read(tmp_path) == document
+    plain = json.loads((tmp_path / DATASET_FILE).read_text())
+    assert list(plain) == ["schema", "manifest", "demos", "knife", "stiffness", "shard", "pictures"]
+    assert plain["stiffness"] is None and plain["manifest"]["foods"] == ["plum"]
 
 
 def test_what_is_stored_has_maniskills_layout_and_keeps_the_force_apart(tmp_path):
-    """Shapes as documented; force and impulse agree; no name outside ``mpm`` has a force in it; the surface comes back to a tenth of a millimetre."""
-    g.generate(Manifest(trajectories=2), tmp_path / "d", Inline(), shard=2)
+    """Shapes as documented; force and impulse agree; no name outside ``mpm`` has a force in it; the surface comes back
+    to a tenth of a millimetre."""
+    g.generate(DatasetSpec(Manifest(trajectories=2), shard=2), tmp_path / "d", Inline())
     listed = json.loads((tmp_path / "d" / "shard-0000.json").read_text())
     assert [e["episode_id"] for e in listed["episodes"]] == [0, 1] and listed["env_info"]["env_id"] == "CutFood-v1"
     for k, stored in enumerate(trajectories(tmp_path / "d")):
@@ -169,7 +189,9 @@ def test_what_is_stored_has_maniskills_layout_and_keeps_the_force_apart(tmp_path
         n = len(t.action)
         assert file["actions"].shape == (n, 8) and file["obs/agent/qpos"].shape == (n + 1, 9)
         assert file["control/delta"].shape == (n, 7) and file["mpm/force"].shape == (n, 5, 3)
-        assert np.allclose(file["mpm/impulse"][-1], file["mpm/force"][()].mean(axis=1).sum(axis=0) / RATE, rtol=1e-5)
+        assert np.allclose(
+            file["mpm/impulse"][-1], file["mpm/force"][()].mean(axis=1).sum(axis=0) / CONTROL_RATE, rtol=1e-5
+        )
         assert np.allclose(
             file["control/delta"][:, :3], (np.array(t.command) - np.array(t.edge)[:-1])[:, :3], atol=1e-6
         )
@@ -186,20 +208,20 @@ def test_what_is_stored_has_maniskills_layout_and_keeps_the_force_apart(tmp_path
 def test_a_folder_that_is_taken_or_damaged_is_an_error(tmp_path):
     """Another dataset, no --resume, no shards, a broken file: one line each."""
     out = tmp_path / "d"
-    g.generate(Manifest(trajectories=1), out, Inline())
+    g.generate(DatasetSpec(Manifest(trajectories=1)), out, Inline())
     with pytest.raises(OutputError, match="--resume"):
-        g.generate(Manifest(trajectories=1), out, Inline())
+        g.generate(DatasetSpec(Manifest(trajectories=1)), out, Inline())
     with pytest.raises(OutputError, match="another dataset"):
-        g.generate(Manifest(trajectories=2), out, Inline(), resume=True)
+        g.generate(DatasetSpec(Manifest(trajectories=2)), out, Inline(), resume=True)
     with pytest.raises(OutputError, match="no shards"):
         next(trajectories(tmp_path))
     with h5py.File(out / "shard-0000.h5", "w"):
         pass
     with pytest.raises(OutputError, match="damaged"):
         list(trajectories(out))
-    (out / META).write_text("{")
+    (out / DATASET_FILE).write_text("{")
     with pytest.raises(OutputError, match="damaged"):
-        g.generate(Manifest(trajectories=1), out, Inline(), resume=True)
+        g.generate(DatasetSpec(Manifest(trajectories=1)), out, Inline(), resume=True)
 
 
 @pytest.mark.parametrize(
@@ -220,7 +242,7 @@ def test_a_folder_that_is_taken_or_damaged_is_an_error(tmp_path):
 def test_wrong_words_on_the_command_line_are_one_line(words, says, capsys, tmp_path, monkeypatch):
     """What was wrong, before anything is made."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("intsim.data.generate.available", lambda: None)
+    monkeypatch.setattr("intsim.data.generate.require_simulator", lambda: None)
     if words.startswith("export nowhere"):
         pytest.importorskip("pyarrow", reason="the extra [data] is not installed")
         pytest.importorskip("av", reason="the extra [data] is not installed")
@@ -235,4 +257,4 @@ def test_without_the_robot_simulator_it_says_what_to_install(monkeypatch, tmp_pa
     monkeypatch.undo()
     monkeypatch.setitem(__import__("sys").modules, "mani_skill", None)
     with pytest.raises(Exception, match=r"cutcal\[robot\]"):
-        g.generate(Manifest(trajectories=1), tmp_path / "d", Inline())
+        g.generate(DatasetSpec(Manifest(trajectories=1)), tmp_path / "d", Inline())

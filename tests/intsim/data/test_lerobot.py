@@ -1,4 +1,5 @@
-"""The export for LeRobot: what its reader needs is there, equal to what was stored, and force is nothing that a policy learns from."""
+"""The export for LeRobot: what its reader needs is there, equal to what was stored, and force is nothing that a policy
+learns from."""
 
 from __future__ import annotations
 
@@ -9,11 +10,12 @@ import pytest
 
 from calib.errors import OutputError
 from intsim.data import generate as g
-from intsim.data.lerobot import FEATURES, columns, export, statistics, together
+from intsim.data.cameras import CAMERA_NAMES
+from intsim.data.dataset_document import DatasetSpec
+from intsim.data.lerobot import FEATURES, episode_columns, export_lerobot, merge_statistics, statistics
 from intsim.data.manifest import Manifest
-from intsim.data.pictures import VIEWS
 from intsim.data.shards import trajectories
-from intsim.task.planner import RATE
+from intsim.task.planner import CONTROL_RATE
 from tests.intsim.data.test_generate import Inline
 from tests.intsim.painter import PIXELS, Here, Painter, paint_with
 
@@ -24,8 +26,8 @@ av = pytest.importorskip("av", reason="the extra [data] is not installed")
 @pytest.fixture
 def stored(tmp_path, monkeypatch):
     """Three made-up trajectories."""
-    monkeypatch.setattr(g, "available", lambda: None)
-    g.generate(Manifest(trajectories=3), tmp_path / "set", Inline(), shard=2)
+    monkeypatch.setattr(g, "require_simulator", lambda: None)
+    g.generate(DatasetSpec(Manifest(trajectories=3), shard=2), tmp_path / "set", Inline())
     return tmp_path / "set"
 
 
@@ -33,12 +35,13 @@ def stored(tmp_path, monkeypatch):
 def painted(stored, tmp_path, monkeypatch):
     """Their export before two backgrounds."""
     paint_with(Painter, monkeypatch)
-    info = export(stored, tmp_path / "lr", scenes=[0, 2], pixels=PIXELS, pool=Here())
+    info = export_lerobot(stored, tmp_path / "lr", backgrounds=[0, 2], pixels=PIXELS, pool=Here())
     return tmp_path / "lr", info
 
 
 def test_the_columns_are_what_was_stored(stored, painted):
-    """Episode by episode, value by value, with indices that run on; every feature of info.json has its column and statistics."""
+    """Episode by episode, value by value, with indices that run on; every feature of info.json has its column and
+    statistics."""
     out, info = painted
     table = pq.read_table(out / "data/chunk-000/file-000.parquet").to_pydict()
     assert info == json.loads((out / "meta/info.json").read_text())
@@ -54,7 +57,7 @@ def test_the_columns_are_what_was_stored(stored, painted):
     stats = json.loads((out / "meta/stats.json").read_text())
     plain = set(table)
     assert plain == set(FEATURES) and set(info["features"]) == set(stats) == plain | {
-        f"observation.images.{v}" for v in VIEWS
+        f"observation.images.{v}" for v in CAMERA_NAMES
     }
     for name, feature in info["features"].items():
         if feature["dtype"] not in ("video", "bool"):
@@ -67,36 +70,39 @@ def test_the_columns_are_what_was_stored(stored, painted):
 
 def trajectories_of(folder) -> list[dict[str, np.ndarray]]:
     """Columns of each, while its file is open."""
-    return [columns(one) for one in trajectories(folder)]
+    return [episode_columns(one) for one in trajectories(folder)]
 
 
 def test_pictures_are_found_by_their_time(painted):
-    """Frame n of a video is at n / fps; each episode's begin where the table of episodes says, before its own background."""
+    """Frame n of a video is at n / fps; each episode's begin where the table of episodes says, before its own
+    background."""
     out, info = painted
     episodes = pq.read_table(out / "meta/episodes/chunk-000/file-000.parquet").to_pylist()
-    for view in VIEWS:
+    for view in CAMERA_NAMES:
         key = f"observation.images.{view}"
         with av.open(str(out / f"videos/{key}/chunk-000/file-000.mp4")) as file:
             frames = [(float(f.time), f.to_ndarray(format="rgb24")) for f in file.decode(video=0)]
         assert len(frames) == info["total_frames"]
-        assert np.allclose([t for t, _ in frames], np.arange(len(frames)) / RATE, atol=1e-4)
+        assert np.allclose([t for t, _ in frames], np.arange(len(frames)) / CONTROL_RATE, atol=1e-4)
         for e in episodes:
-            begin = round(e[f"videos/{key}/from_timestamp"] * RATE)
+            begin = round(e[f"videos/{key}/from_timestamp"] * CONTROL_RATE)
             scene = 0 if e["episode_index"] < 3 else 2
             for k in (0, e["length"] - 1):
                 assert frames[begin + k][1].mean() == pytest.approx((10 * k + 40 * scene) % 256, abs=3)
 
 
 def test_force_is_nothing_that_a_policy_learns_from(painted):
-    """LeRobot takes ``observation*`` for inputs and ``action*`` for outputs: pose, pictures and commanded change alone are."""
+    """LeRobot takes ``observation*`` for inputs and ``action*`` for outputs: pose, pictures and commanded change alone
+    are."""
     _, info = painted
     learned = {n for n in info["features"] if n.startswith(("observation", "action"))}
-    assert learned == {"observation.state", "action", *(f"observation.images.{v}" for v in VIEWS)}
+    assert learned == {"observation.state", "action", *(f"observation.images.{v}" for v in CAMERA_NAMES)}
     assert {"contact.force", "contact.impulse", "extra.qpos"} <= set(info["features"])
 
 
 def test_tasks_are_looked_up_by_their_row(painted):
-    """Row n of tasks.parquet is task n, the sentence its index; an episode of another background has another sentence."""
+    """Row n of tasks.parquet is task n, the sentence its index; an episode of another background has another
+    sentence."""
     out, info = painted
     tasks = pq.read_table(out / "meta/tasks.parquet")
     frame = tasks.to_pandas()
@@ -110,7 +116,7 @@ def test_tasks_are_looked_up_by_their_row(painted):
 
 def test_without_pictures_there_are_no_videos(stored, tmp_path):
     """No renderer is asked for."""
-    info = export(stored, tmp_path / "bare")
+    info = export_lerobot(stored, tmp_path / "bare")
     assert info["video_path"] is None and not (tmp_path / "bare/videos").exists()
     assert not [n for n in info["features"] if "images" in n]
 
@@ -119,7 +125,7 @@ def test_statistics_of_parts_are_those_of_the_whole():
     """Mean and standard deviation exactly, least and largest too."""
     rng = np.random.default_rng(0)
     parts = [rng.normal(k, 1 + k, (10 * (k + 1), 2)) for k in range(3)]
-    both, whole = together([statistics(p) for p in parts]), statistics(np.concatenate(parts))
+    both, whole = merge_statistics([statistics(p) for p in parts]), statistics(np.concatenate(parts))
     for name in ("min", "max", "mean", "std", "count"):
         assert both[name] == pytest.approx(whole[name])
 
@@ -127,9 +133,9 @@ def test_statistics_of_parts_are_those_of_the_whole():
 def test_a_wrong_scene_or_a_taken_folder_is_an_error(stored, tmp_path):
     """Before anything is written."""
     with pytest.raises(OutputError, match="0 to 14"):
-        export(stored, tmp_path / "x", scenes=[15])
+        export_lerobot(stored, tmp_path / "x", backgrounds=[15])
     (tmp_path / "full").mkdir()
     (tmp_path / "full/file").touch()
     with pytest.raises(OutputError, match="never overwritten"):
-        export(stored, tmp_path / "full")
+        export_lerobot(stored, tmp_path / "full")
     assert not (tmp_path / "x").exists()

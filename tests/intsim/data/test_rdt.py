@@ -11,10 +11,11 @@ import pytest
 
 from calib.errors import OutputError
 from intsim.data import generate as g
+from intsim.data.dataset_document import DatasetSpec
 from intsim.data.manifest import Manifest
-from intsim.data.rdt import STATISTICS, TASKS, export, task_of
+from intsim.data.rdt import STATISTICS_FILE, TASKS_FILE, export_rdt, task_name
 from intsim.data.shards import trajectories
-from intsim.task.language import parse, same
+from intsim.task.language import parse_instruction, same_task
 from tests.intsim.data.test_generate import Inline
 from tests.intsim.painter import PIXELS, Here, Painter, paint_with
 
@@ -24,19 +25,22 @@ Image = pytest.importorskip("PIL.Image", reason="the extra [data] is not install
 @pytest.fixture
 def exported(tmp_path, monkeypatch):
     """Made-up trajectories of two foods before two backgrounds."""
-    monkeypatch.setattr(g, "available", lambda: None)
-    g.generate(Manifest(trajectories=10, foods=("plum", "kiwi"), suites=("flips",)), tmp_path / "set", Inline())
+    monkeypatch.setattr(g, "require_simulator", lambda: None)
+    g.generate(
+        DatasetSpec(Manifest(trajectories=10, foods=("plum", "kiwi"), suites=("flips",))), tmp_path / "set", Inline()
+    )
     paint_with(Painter, monkeypatch)
-    tasks = export(tmp_path / "set", tmp_path / "rdt", scenes=[0, 2], pixels=PIXELS, pool=Here())
+    tasks = export_rdt(tmp_path / "set", tmp_path / "rdt", backgrounds=[0, 2], pixels=PIXELS, pool=Here())
     return tmp_path / "set", tmp_path / "rdt", tasks
 
 
 def test_the_loader_finds_every_picture_and_joint(exported):
-    """One .h5 a task; a picture before each step, in the folder of a hundred episodes; actions one fewer than joints; no force."""
+    """One .h5 a task; a picture before each step, in the folder of a hundred episodes; actions one fewer than joints;
+    no force."""
     folder, out, tasks = exported
     lengths = Counter(len(stored.group["actions"]) for stored in trajectories(folder))
     assert sum(t["episodes"] for t in tasks.values()) == 2 * lengths.total()
-    assert json.loads((out / TASKS).read_text()) == tasks
+    assert json.loads((out / TASKS_FILE).read_text()) == tasks
     for name, task in tasks.items():
         (path,) = (out / name / "motionplanning").glob("*.h5")
         with h5py.File(path) as file:
@@ -60,7 +64,7 @@ def test_the_loader_finds_every_picture_and_joint(exported):
 def test_ranges_are_those_of_all_trajectories_and_of_the_gripper(exported):
     """Eight of each; no range is nothing, or the loader would divide by it."""
     folder, out, _ = exported
-    found = {name: np.array(values) for name, values in json.loads((out / STATISTICS).read_text()).items()}
+    found = {name: np.array(values) for name, values in json.loads((out / STATISTICS_FILE).read_text()).items()}
     assert {len(values) for values in found.values()} == {8}
     actions = np.concatenate([s.group["actions"][()] for s in trajectories(folder)])
     assert found["action_min"][:7] == pytest.approx(actions.min(axis=0)[:7])
@@ -75,18 +79,18 @@ def test_a_task_is_one_cut_in_all_its_words(exported):
     meant = {}
     for name, task in tasks.items():
         assert task["instruction"] in task["instructions"] and len(task["instructions"]) >= 5
-        found = [parse(sentence, ("plum", "kiwi")) for sentence in task["instructions"]]
-        assert all(same(found[0], other) for other in found)
+        found = [parse_instruction(sentence, ("plum", "kiwi")) for sentence in task["instructions"]]
+        assert all(same_task(found[0], other) for other in found)
         meant[name] = found[0]
     assert len(set(meant.values())) == len(tasks) > 2
-    assert task_of("plum", {"pieces": 3}) == "plum-in_3"
-    assert task_of("plum", {"pieces": 0, "ratio": 1 / 3, "side": "left"}) == "plum-0_3333-left"
+    assert task_name("plum", {"pieces": 3}) == "plum-in_3"
+    assert task_name("plum", {"pieces": 0, "ratio": 1 / 3, "side": "left"}) == "plum-0_3333-left"
 
 
 def test_what_cannot_be_exported_is_an_error(exported, tmp_path):
     """No background, a folder that is taken."""
     folder, out, _ = exported
     with pytest.raises(OutputError, match="--scenes"):
-        export(folder, tmp_path / "more", scenes=[])
+        export_rdt(folder, tmp_path / "more", backgrounds=[])
     with pytest.raises(OutputError, match="never overwritten"):
-        export(folder, out, scenes=[0])
+        export_rdt(folder, out, backgrounds=[0])

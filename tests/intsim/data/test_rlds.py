@@ -11,9 +11,10 @@ import pytest
 
 from calib.errors import OutputError
 from intsim.data import generate as g
-from intsim.data.lerobot import columns
+from intsim.data.dataset_document import DatasetSpec
+from intsim.data.lerobot import episode_columns
 from intsim.data.manifest import Manifest
-from intsim.data.rlds import VALIDATION, _varint, export
+from intsim.data.rlds import VALIDATION_STRIDE, _varint, export_rlds
 from intsim.data.shards import trajectories
 from tests.intsim.data.test_generate import Inline
 from tests.intsim.painter import PIXELS, Here, Painter, paint_with
@@ -77,10 +78,10 @@ def read(record: bytes) -> dict:
 @pytest.fixture
 def exported(tmp_path, monkeypatch):
     """Twenty-one made-up trajectories before two backgrounds."""
-    monkeypatch.setattr(g, "available", lambda: None)
-    g.generate(Manifest(trajectories=VALIDATION + 1), tmp_path / "set", Inline(), shard=30)
+    monkeypatch.setattr(g, "require_simulator", lambda: None)
+    g.generate(DatasetSpec(Manifest(trajectories=VALIDATION_STRIDE + 1), shard=30), tmp_path / "set", Inline())
     paint_with(Painter, monkeypatch)
-    export(tmp_path / "set", tmp_path / "rlds", scenes=[0, 2], pixels=PIXELS, pool=Here())
+    export_rlds(tmp_path / "set", tmp_path / "rlds", backgrounds=[0, 2], pixels=PIXELS, pool=Here())
     return tmp_path / "set", tmp_path / "rlds" / "cutcal" / "1.0.0"
 
 
@@ -88,11 +89,11 @@ def test_records_hold_what_was_stored(exported):
     """Every episode of both splits: state, action, flags, sentence and pictures; no force anywhere."""
     stored, home = exported
     train = records(home / "cutcal-train.tfrecord-00000-of-00001")
-    wanted = [columns(one) for one in trajectories(stored)]
-    assert len(train) == 2 * VALIDATION
+    wanted = [episode_columns(one) for one in trajectories(stored)]
+    assert len(train) == 2 * VALIDATION_STRIDE
     for k, content in enumerate(train):
         found = read(content)
-        index = k % VALIDATION if k % VALIDATION < VALIDATION - 1 else VALIDATION
+        index = k % VALIDATION_STRIDE if k % VALIDATION_STRIDE < VALIDATION_STRIDE - 1 else VALIDATION_STRIDE
         want = wanted[index]
         n = len(want["timestamp"])
         assert np.array_equal(found["steps/action"].reshape(n, 7), want["action"])
@@ -103,7 +104,7 @@ def test_records_hold_what_was_stored(exported):
         assert len(found["steps/observation/wrist_image"]) == n
         picture = np.array(Image.open(io.BytesIO(found["steps/observation/image"][3])))
         assert picture.shape == (PIXELS, PIXELS, 3)
-        assert picture.mean() == pytest.approx(30 + (0 if k < VALIDATION else 80), abs=2)
+        assert picture.mean() == pytest.approx(30 + (0 if k < VALIDATION_STRIDE else 80), abs=2)
         assert not [name for name in found if "force" in name or "contact" in name]
 
 
@@ -144,4 +145,4 @@ def test_numbers_of_any_size_are_written_as_protocol_buffers_have_them():
 def test_without_a_background_it_says_so(tmp_path):
     """Such a policy looks at pictures."""
     with pytest.raises(OutputError, match="--scenes"):
-        export(tmp_path, tmp_path / "x", scenes=[])
+        export_rlds(tmp_path, tmp_path / "x", backgrounds=[])

@@ -10,14 +10,22 @@ import pytest
 from calib.errors import OutputError
 from calib.material.food import load_food
 from cutcal.main import main
-from intsim.data.demonstrate import Track
+from intsim.data.demonstrate import Demonstration
 from intsim.data.manifest import Manifest
-from intsim.data.shards import PART, keep, pack, write_shard
-from intsim.evaluate import evaluate, roll_out
-from intsim.policy.behaviour_cloning import CHUNK, Clone, absolute, bag, relative, seen, words_of
+from intsim.data.shards import EPISODE_PART, pack_episode, write_part, write_shard
+from intsim.evaluate import PolicyEvaluation, evaluate, roll_out
+from intsim.policy.behaviour_cloning import (
+    ACTION_CHUNK,
+    Clone,
+    bag_of_words,
+    from_food_frame,
+    observed_features,
+    to_food_frame,
+    tokens,
+)
 from intsim.task.language import instructions
-from intsim.task.planner import HOME, plan
-from intsim.task.suites import draw
+from intsim.task.planner import HOME, plan_cut
+from intsim.task.suites import sample_episode
 from intsim.task.targets import Item, TaskError, target
 
 ORANGE = {"orange": load_food("orange")}
@@ -35,10 +43,10 @@ def test_a_pose_seen_from_a_food_comes_back(yaw, turn):
     """Place, height and direction; an edge that is turned round is the same edge."""
     pose = np.array([0.1, 0.2, 0.05, turn, 0.0])
     food = item(yaw)
-    back = absolute(relative(pose, food), food)
+    back = from_food_frame(to_food_frame(pose, food), food)
     assert back[:3] == pytest.approx(pose[:3], abs=1e-12)
     assert math.sin(back[3] - turn) == pytest.approx(0.0, abs=1e-9)
-    assert np.allclose(relative(pose + [0, 0, 0, math.pi, 0], food), relative(pose, food))
+    assert np.allclose(to_food_frame(pose + [0, 0, 0, math.pi, 0], food), to_food_frame(pose, food))
 
 
 def test_what_is_seen_turns_with_the_food():
@@ -50,18 +58,19 @@ def test_what_is_seen_turns_with_the_food():
         return np.array([c * p[0] - s * p[1] + 0.1, s * p[0] + c * p[1] - 0.2, p[2], p[3] + 0.4, 0.0])
 
     other = Item("orange", food.shape, *moved(np.array([food.x, food.y, 0, 0, 0]))[:2], food.yaw + 0.4)
-    assert np.allclose(seen(moved(pose), moved(before), other), seen(pose, before, food))
-    assert seen(pose, before, food).shape == (GIVEN,)
+    assert np.allclose(observed_features(moved(pose), moved(before), other), observed_features(pose, before, food))
+    assert observed_features(pose, before, food).shape == (GIVEN,)
 
 
 def constant(pose: np.ndarray, food: Item, words: tuple[str, ...] = ("cut",)) -> Clone:
     """A clone that always wants to be there."""
-    goal = np.tile(relative(pose, food), CHUNK)
+    goal = np.tile(to_food_frame(pose, food), ACTION_CHUNK)
     return Clone(words, [(np.zeros((len(goal), GIVEN + len(words))), goal)], {"trajectories": 1})
 
 
 def test_it_goes_where_its_network_says_and_stops_when_it_is_back_up():
-    """Changes are from where the edge is; nothing but pose and foods is looked at; down and up again ends the episode, as the time does."""
+    """Changes are from where the edge is; nothing but pose and foods is looked at; down and up again ends the episode,
+    as the time does."""
     food = item()
     goal = np.array([*food.at(0.01), 0.02, food.yaw - math.pi / 2, 0.0])
     clone = constant(goal, food)
@@ -105,8 +114,8 @@ def test_a_file_keeps_it(tmp_path):
 
 def test_words_and_numbers_are_told_apart():
     """Fractions and percentages are words of their own; order and capitals do not matter."""
-    assert words_of("Cut 1/4 of the orange, 25% or 0.25") == ["cut", "1/4", "of", "the", "orange", "25%", "or", "0.25"]
-    assert bag("left cut", ("cut", "left", "right")).tolist() == [1, 1, 0]
+    assert tokens("Cut 1/4 of the orange, 25% or 0.25") == ["cut", "1/4", "of", "the", "orange", "25%", "or", "0.25"]
+    assert bag_of_words("left cut", ("cut", "left", "right")).tolist() == [1, 1, 0]
 
 
 def test_the_command_line_says_what_is_wrong(tmp_path, capsys):
@@ -128,9 +137,9 @@ def dataset(folder, count: int) -> None:
     manifest = Manifest(count, foods=("orange",), suites=("seeds",), styles=("press",))
     folder.mkdir()
     for k in range(count):
-        episode = draw("seeds", k, ORANGE)
-        path = plan(episode.item, target(episode.spec, episode.item))
-        track = Track()
+        episode = sample_episode("seeds", k, ORANGE)
+        path = plan_cut(episode.item, target(episode.spec, episode.item))
+        track = Demonstration()
         track.edge = [np.array([*HOME, 0.0, 0.0]), *path.pose]
         n = len(path.pose)
         track.command, track.phase = list(path.pose), [str(p) for p in path.phase]
@@ -146,28 +155,30 @@ def dataset(folder, count: int) -> None:
             "items": [{"name": i.name, "x": i.x, "y": i.y, "yaw": i.yaw, **vars(i.shape)}],
             "instructions": instructions(episode.spec, k),
         }
-        keep(folder / PART.format(k), pack(track, about, {}))
+        write_part(folder / EPISODE_PART.format(k), pack_episode(track, about, {}))
     write_shard(folder, 0, range(count), {})
-    assert manifest.draw(1).style == "press"
+    assert manifest.trajectory(1).style == "press"
 
 
 def test_it_learns_to_do_what_is_demonstrated(tmp_path):
-    """From 60 planned cuts: most of unseen oranges are cut where they should be, all to the board and across; a broken trajectory and
-    uncut food are left out; the same seed gives the same weights."""
+    """From 60 planned cuts: most of unseen oranges are cut where they should be, all to the board and across; a broken
+    trajectory and uncut food are left out; the same seed gives the same weights."""
     pytest.importorskip("torch", reason="the extra [robot] is not installed")
     from intsim.policy.training import train
 
     dataset(tmp_path / "d", 60)
     clone = train(tmp_path / "d", keep="published")
     assert clone.about["trajectories"] == 59
-    found = evaluate(clone, "clone", ORANGE, ["seeds"], 60, tmp_path / "e")["suites"]["seeds"]
-    assert found["published"]["rate"] > 0.6 and found["criteria"]["angle"]["rate"] > 0.9
+    found = evaluate(PolicyEvaluation(clone, "clone", ORANGE, ["seeds"], 60), tmp_path / "e").suites["seeds"]
+    assert found.published.rate > 0.6 and found.criteria["angle"].rate > 0.9
     few = train(tmp_path / "d", keep="severed", most=3)
     again = train(tmp_path / "d", keep="severed", most=3)
     assert few.about["trajectories"] == 3
     assert all(np.array_equal(a[0], b[0]) for a, b in zip(few.weights, again.weights, strict=True))
     few.save(tmp_path / "few.npz")
-    one, two = (roll_out(c, draw("seeds", 1_000_001, ORANGE))[0] for c in (few, Clone.load(tmp_path / "few.npz")))
+    one, two = (
+        roll_out(c, sample_episode("seeds", 1_000_001, ORANGE))[0] for c in (few, Clone.load(tmp_path / "few.npz"))
+    )
     assert np.array_equal(one.pose, two.pose)
     with pytest.raises(TaskError, match="keep"):
         train(tmp_path / "d", keep="most")

@@ -1,4 +1,5 @@
-"""Policies on a server: the protocol both ways, one clear error for each fault, and published models behind stand-ins of their packages."""
+"""Policies on a server: the protocol both ways, one clear error for each fault, and published models behind stand-ins
+of their packages."""
 
 from __future__ import annotations
 
@@ -14,9 +15,9 @@ import pytest
 from cutcal.main import main
 from intsim.policy import vla_adapters
 from intsim.policy.oracles import Oracle
-from intsim.policy.remote import Remote, Server, packed, unpacked
+from intsim.policy.remote import Remote, Server, decode_png, encode_png
 from intsim.policy.vla_adapters import RDT, Octo, OpenVLA
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 pytest.importorskip("PIL.Image", reason="the extra [data] is not installed")
 
@@ -66,7 +67,8 @@ def served():
 
 
 def test_actions_come_in_their_order_and_end(served):
-    """A question for every three steps, with pose, joints and the picture bit for bit; the model's own end is the policy's."""
+    """A question for every three steps, with pose, joints and the picture bit for bit; the model's own end is the
+    policy's."""
     model = Counting()
     policy = Remote(served(model))
     assert policy.name == "counting"
@@ -87,11 +89,12 @@ def test_actions_come_in_their_order_and_end(served):
 def test_a_picture_comes_back():
     """PNG loses nothing."""
     image = np.random.default_rng(0).integers(0, 256, (5, 7, 3), np.uint8)
-    assert np.array_equal(unpacked(packed(image)), image)
+    assert np.array_equal(decode_png(encode_png(image)), image)
 
 
 def test_what_is_wrong_is_said(served):
-    """Nobody there, something else there, missing pictures and joints, actions of another kind, an error of the model."""
+    """Nobody there, something else there, missing pictures and joints, actions of another kind, an error of the
+    model."""
     with pytest.raises(CutcalError, match="no answer of a policy server"):
         Remote("http://127.0.0.1:9")
     with pytest.raises(CutcalError, match="--pixels"):
@@ -154,9 +157,9 @@ class Asked:
 def test_an_evaluation_asks_a_server(served, tmp_path, capsys):
     """From the command line, on the table: an oracle behind the protocol is still one."""
     from calib.material.food import load_food
-    from intsim.task.suites import TEST, draw
+    from intsim.task.suites import FIRST_TEST_SEED, sample_episode
 
-    episode = draw("seeds", TEST, {"plum": load_food("plum")})
+    episode = sample_episode("seeds", FIRST_TEST_SEED, {"plum": load_food("plum")})
     address = served(Asked((episode.item,)))
     words = ["evaluate", "--policy", "remote", "--server", address, "--suite", "seeds", "--food", "plum"]
     assert main([*words, "--episodes", "1", "--out", str(tmp_path / "e"), "--json"]) == 0
@@ -245,7 +248,8 @@ def test_openvla_is_asked_in_its_own_words(packages, served):
 
 
 def test_octo_remembers_a_picture(packages):
-    """Two steps in a window, the first one masked; sizes of its pictures; another key for each question; nothing left after a reset."""
+    """Two steps in a window, the first one masked; sizes of its pictures; another key for each question; nothing left
+    after a reset."""
     model = Octo("weights", "cutcal")
     model.reset(3, "cut the plum")
     for _ in range(2):
@@ -265,8 +269,8 @@ def test_octo_remembers_a_picture(packages):
 
 
 def test_rdt_gives_joint_targets(packages, tmp_path):
-    """Eight of nine joints, six pictures of which two are there at most, every fourth of its interpolated actions, the statistics of the
-    export in place of its own."""
+    """Eight of nine joints, six pictures of which two are there at most, every fourth of its interpolated actions, the
+    statistics of the export in place of its own."""
     (tmp_path / "configs").mkdir()
     (tmp_path / "configs" / "base.yaml").write_text("common: {}")
     (tmp_path / "statistics.json").write_text(json.dumps({"state_min": [0.0] * 8}))
@@ -289,7 +293,7 @@ def test_the_adapters_command_line(monkeypatch, capsys):
     assert "is not installed" in capsys.readouterr().err
     assert vla_adapters.main(["rdt", "--weights", "w"]) == 1
     assert "--root" in capsys.readouterr().err
-    monkeypatch.setattr(vla_adapters, "make", lambda args: Counting())
+    monkeypatch.setattr(vla_adapters, "load_model", lambda args: Counting())
     monkeypatch.setattr(Server, "serve_forever", lambda self: (_ for _ in ()).throw(KeyboardInterrupt))
     assert vla_adapters.main(["octo", "--weights", "w", "--port", "0"]) == 0
     assert "answers at http://127.0.0.1:" in capsys.readouterr().err

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from calib.material.food import load_food
-from intsim.sim.coupling import CELLS, NEAR, Coupling
-from intsim.sim.severing import LEAST_CELLS, cut_place
-from intsim.task.planner import plan
+from intsim.sim.coupling import MAX_CELLS, READY_CLEARANCE, Coupling
+from intsim.sim.severing import MIN_CELLS, cut_scene_at
+from intsim.task.planner import BladeDescent, plan_cut
 from intsim.task.targets import Item
 from mpm.live import LiveCut
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 FOODS = {"strawberry": load_food("strawberry")}
 BERRY = Item("strawberry", Shape("ellipsoid", 0.04, 0.032, 0.032), x=0.03, y=-0.02, yaw=1.2)
@@ -21,7 +21,8 @@ STIFF, LAG, SPAN = 1754.0, 0.1, 0.01
 
 
 def follow(coupling: Coupling, poses: np.ndarray) -> tuple[float, float]:
-    """Move along commanded poses behind an arm that yields downwards; the largest force and the lowest place of the edge."""
+    """Move along commanded poses behind an arm that yields downwards; the largest force and the lowest place of the
+    edge."""
     pose, force, most, low = poses[0].copy(), np.zeros(3), 0.0, np.inf
     before = poses[0]
     for command in poses:
@@ -37,12 +38,13 @@ def follow(coupling: Coupling, poses: np.ndarray) -> tuple[float, float]:
 
 
 def test_a_plan_to_the_board_stops_short_and_a_deeper_one_cuts_through():
-    """Behind the arm of ManiSkill's Panda; the cut ends with the food in two and its pieces apart, and the impulse is upwards."""
+    """Behind the arm of ManiSkill's Panda; the cut ends with the food in two and its pieces apart, and the impulse is
+    upwards."""
     short = Coupling([BERRY], FOODS)
-    most, low = follow(short, plan(BERRY, 0.004).pose)
+    most, low = follow(short, plan_cut(BERRY, 0.004).pose)
     assert low > 1e-3 and len(short.done) == 1
     through = Coupling([BERRY], FOODS)
-    peak, bottom = follow(through, plan(BERRY, 0.004, depth=-0.03, hold=0.5).pose)
+    peak, bottom = follow(through, plan_cut(BERRY, 0.004, BladeDescent(depth=-0.03, hold=0.5)).pose)
     assert bottom < 1e-3 and through.severed and through.uncut() == 0
     assert peak == pytest.approx(most, rel=0.1)
     (done,) = through.done
@@ -53,7 +55,8 @@ def test_a_plan_to_the_board_stops_short_and_a_deeper_one_cuts_through():
 
 
 def test_a_cut_ends_where_the_knife_stands_and_nothing_holds():
-    """Not while it comes down, and not where it stands in food that holds: with the food in two it need not reach the board."""
+    """Not while it comes down, and not where it stands in food that holds: with the food in two it need not reach the
+    board."""
     coupling = Coupling([BERRY], FOODS)
     pose = np.array([BERRY.x, BERRY.y, 0.045, BERRY.yaw - np.pi / 2, 0.0])
     while coupling.uncut() > 0:
@@ -70,16 +73,18 @@ def test_a_cut_ends_where_the_knife_stands_and_nothing_holds():
 def test_a_knife_that_misses_feels_nothing():
     """Beside the food there is no cut, and above it nothing is simulated."""
     coupling = Coupling([BERRY], FOODS)
-    most, _ = follow(coupling, plan(BERRY, 0.1).pose)
+    most, _ = follow(coupling, plan_cut(BERRY, 0.1).pose)
     assert most == 0 and not coupling.done and coupling.live is None
-    coupling.move(np.array([BERRY.x, BERRY.y, BERRY.shape.height + 2 * NEAR, BERRY.yaw - np.pi / 2, 0.0]), SPAN)
+    coupling.move(
+        np.array([BERRY.x, BERRY.y, BERRY.shape.height + 2 * READY_CLEARANCE, BERRY.yaw - np.pi / 2, 0.0]), SPAN
+    )
     assert coupling.live is None
 
 
 def test_a_cut_begins_from_above_alone():
     """A knife that saws on in the gap, or comes from the side, begins no cut; lifted over the food it does."""
     coupling = Coupling([BERRY], FOODS)
-    poses = plan(BERRY, 0.0, depth=-0.03, hold=0.5).pose
+    poses = plan_cut(BERRY, 0.0, BladeDescent(depth=-0.03, hold=0.5)).pose
     low = int(np.argmin(poses[:, 2]))
     follow(coupling, poses[: low + 10])
     assert coupling.severed
@@ -87,15 +92,17 @@ def test_a_cut_begins_from_above_alone():
     for way in np.linspace(0, 0.015, 30):
         coupling.move(on_the_board + [*(way * BERRY.axis), 0, 0, 0], SPAN)
     assert len(coupling.done) == 1 and coupling.live is None
-    second = plan(BERRY, 0.012, depth=-0.03, hold=0.5, start=on_the_board + [0, 0, 0.1, 0, 0]).pose
+    start = on_the_board + [0, 0, 0.1, 0, 0]
+    second = plan_cut(BERRY, 0.012, BladeDescent(depth=-0.03, hold=0.5), start=start).pose
     follow(coupling, second)
     assert len(coupling.done) == 2 and len(coupling.items[0].pieces) == 3
 
 
 def test_a_slice_too_thin_is_said_once():
-    """Where the solver would need cells that take too long, the cut is not simulated, and nothing else is tried until the knife is up."""
+    """Where the solver would need cells that take too long, the cut is not simulated, and nothing else is tried until
+    the knife is up."""
     coupling = Coupling([BERRY], FOODS)
-    most, _ = follow(coupling, plan(BERRY, -0.0198).pose)
+    most, _ = follow(coupling, plan_cut(BERRY, -0.0198).pose)
     assert most == 0
     (done,) = coupling.done
     assert done.severed is None and "take too long" in done.why and not coupling.severed
@@ -108,26 +115,27 @@ def test_a_cut_that_breaks_down_is_said_and_not_begun_again(monkeypatch):
     def broken(self, height, slide, span):
         calls[0] += 1
         if calls[0] == 40:
-            self._held.k.x.fill(1.0)
+            self._held.state.x.fill(1.0)
         return move(self, height, slide, span)
 
     monkeypatch.setattr(LiveCut, "move", broken)
     coupling = Coupling([BERRY], FOODS)
-    follow(coupling, plan(BERRY, 0.0).pose)
+    follow(coupling, plan_cut(BERRY, 0.0).pose)
     (done,) = coupling.done
     assert done.severed is None and "stopped" in done.why
     assert len(coupling.items[0].pieces) == 1
 
 
 def test_the_draw_along_the_edge_is_passed_on_only_where_it_is_asked_for():
-    """A slice needs less force than a press where the solver sees the draw; the way across the blade is noted, not simulated."""
-    path = plan(BERRY, 0.0, style="slice", depth=-0.03).pose
+    """A slice needs less force than a press where the solver sees the draw; the way across the blade is noted, not
+    simulated."""
+    path = plan_cut(BERRY, 0.0, BladeDescent(style="slice", depth=-0.03)).pose
     pressed, drawn = Coupling([BERRY], FOODS), Coupling([BERRY], FOODS, draws=True)
     hard, _ = follow(pressed, path)
     easy, _ = follow(drawn, path)
     assert 0 < easy < 0.9 * hard
     aside = Coupling([replace(BERRY, yaw=np.pi / 2)], FOODS)
-    poses = plan(aside.items[0], 0.0, depth=-0.03).pose
+    poses = plan_cut(aside.items[0], 0.0, BladeDescent(depth=-0.03)).pose
     poses[:, 1] += np.where(poses[:, 2] < 0.02, 2e-3, 0.0)
     follow(aside, poses)
     assert aside.aside == pytest.approx(2e-3, rel=0.2)
@@ -135,11 +143,11 @@ def test_the_draw_along_the_edge_is_passed_on_only_where_it_is_asked_for():
 
 @pytest.mark.parametrize("flip", [1.0, -1.0])
 def test_a_rock_is_followed_at_the_end_that_is_down(flip):
-    """The lower end cuts first: there the food opens, and there its force pushes, which turns the knife back, whichever direction of the edge its
-    angle is counted in. The edge comes down level and the berry is in two.
+    """The lower end cuts first: there the food opens, and there its force pushes, which turns the knife back, whichever
+    direction of the edge its angle is counted in. The edge comes down level and the berry is in two.
     """
     coupling = Coupling([BERRY], FOODS, draws=True)
-    path = plan(BERRY, 0.0, style="rock", depth=0.0).pose
+    path = plan_cut(BERRY, 0.0, BladeDescent(style="rock", depth=0.0)).pose
     if flip < 0:
         path[:, 3:] = path[:, 3:] + [np.pi, 0.0]
         path[:, 4] *= -1.0
@@ -164,12 +172,12 @@ def test_a_rock_is_followed_at_the_end_that_is_down(flip):
 
 
 def test_a_rock_off_the_foods_middle_is_the_same_cut():
-    """The knife's middle beside the food's axis: what counts is the point of the edge above it; the same largest force to 3 %, and the torque is
-    about that point."""
+    """The knife's middle beside the food's axis: what counts is the point of the edge above it; the same largest force
+    to 3 %, and the torque is about that point."""
     found = []
     for off in (0.0, 0.03):
         coupling = Coupling([BERRY], FOODS, draws=True)
-        path = plan(BERRY, 0.0, style="rock", depth=0.0).pose
+        path = plan_cut(BERRY, 0.0, BladeDescent(style="rock", depth=0.0)).pose
         edge = np.column_stack([np.cos(path[:, 3]), np.sin(path[:, 3]), np.tan(path[:, 4])])
         path[:, :3] -= off * edge
         rows = [(coupling.move(pose, 0.05)[2], np.linalg.norm(coupling.torque)) for pose in path]
@@ -181,7 +189,7 @@ def test_a_rock_off_the_foods_middle_is_the_same_cut():
 def test_its_mesh_lies_on_the_table():
     """Vertices in the world, around the food's place."""
     coupling = Coupling([BERRY], FOODS)
-    poses = plan(BERRY, 0.0).pose
+    poses = plan_cut(BERRY, 0.0).pose
     assert coupling.mesh() is None
     for pose in poses[: int(np.argmax(poses[:, 2] < 0.01))]:
         coupling.move(pose, 0.05)
@@ -193,15 +201,18 @@ def test_its_mesh_lies_on_the_table():
 
 
 def test_a_large_food_has_larger_cells_and_a_small_one_those_of_a_screening_run():
-    """A melon 14 over its height, with an edge that is not narrower than one; a plum's as in an evaluation; a thin slice finer ones all the same."""
+    """A melon 14 over its height, with an edge that is not narrower than one; a plum's as in an evaluation; a thin
+    slice finer ones all the same."""
     found = {}
     for name, along in (("melon", 0.0), ("plum", 0.0), ("melon", 0.045)):
         food = load_food(name)
         item = Item(name, food.to_scene_food().shape)
-        found[name, along] = cut_place(item, along, food, cells=CELLS), cut_place(item, along, food)
+        found[name, along] = cut_scene_at(item, along, food, cells=MAX_CELLS), cut_scene_at(item, along, food)
     large, usual = found["melon", 0.0]
-    assert large.numerics.dx == pytest.approx(0.1 / CELLS) and large.edge.zone >= large.numerics.dx > usual.numerics.dx
+    assert (
+        large.numerics.dx == pytest.approx(0.1 / MAX_CELLS) and large.edge.zone >= large.numerics.dx > usual.numerics.dx
+    )
     small, same = found["plum", 0.0]
     assert small == same
     slice_, _ = found["melon", 0.045]
-    assert slice_.numerics.dx == pytest.approx(0.005 / LEAST_CELLS)
+    assert slice_.numerics.dx == pytest.approx(0.005 / MIN_CELLS)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,18 +19,19 @@ import sapien
 
 from calib.errors import OutputError
 from calib.material.food import load_food
-from intsim.data.demonstrate import DEEPEST, LEVELLED, demonstrate
-from intsim.data.generate import make
+from intsim.data.demonstrate import LEVELLING_GAIN, MAX_COMMAND_DEPTH, demonstrate
+from intsim.data.generate import make_episode
 from intsim.data.manifest import Manifest
-from intsim.data.shards import Stored
-from intsim.evaluate import evaluate
-from intsim.policy.oracles import make as make_policy
-from intsim.sim import environment
-from intsim.sim.closed_loop import World, environment, follow
-from intsim.task.planner import PHASES, plan
-from intsim.task.suites import draw
+from intsim.data.shards import StoredTrajectory
+from intsim.evaluate import PolicyEvaluation, evaluate
+from intsim.policy.oracles import make_policy
+from intsim.sim import environment as robot_environment
+from intsim.sim.closed_loop import make_environment, roll_out_closed_loop
+from intsim.sim.world import World
+from intsim.task.planner import GRIPPER_CLOSED, PHASES, BladeDescent, plan_cut
+from intsim.task.suites import sample_episode
 from intsim.task.targets import target
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 from tests.calib.documents import valid
 from tests.intsim.painter import Here
 
@@ -59,12 +61,14 @@ def cut(env, seed: int, depth: float = 0.0, hold: float = 0.0) -> dict[str, floa
     """One planned cut by joint targets: what came of it."""
     env.reset(seed=seed)
     episode = env.episode
-    path = plan(episode.item, target(episode.spec, episode.item), start=env.pose, depth=depth, hold=hold)
+    path = plan_cut(
+        episode.item, target(episode.spec, episode.item), BladeDescent(depth=depth, hold=hold), start=env.pose
+    )
     joints, worst, peak, low = env.agent.robot.get_qpos()[0].numpy().astype(float), 0.0, 0.0, np.inf
     info = {}
     for pose in path.pose:
         joints, off = env.kinematics.joints(pose, joints)
-        _, _, _, _, info = env.step(np.array([*joints[:7], -1.0], np.float32))
+        _, _, _, _, info = env.step(np.array([*joints[:7], GRIPPER_CLOSED], np.float32))
         worst, peak = max(worst, off), max(peak, float(env.forces[:, 2].max()))
         low = min(low, float(env.pose[2]))
     flags = {name: float(info[name].item()) for name in ("success", "severed", "uncut")}
@@ -75,17 +79,17 @@ def test_it_resets_to_the_same_episode_and_to_a_given_one():
     """A seed is an episode of the suite; the edge begins at home, level."""
     env = made()
     env.reset(seed=SEED)
-    assert env.episode == draw("seeds", SEED, FOODS) and env.instruction == env.episode.instruction
+    assert env.episode == sample_episode("seeds", SEED, FOODS) and env.instruction == env.episode.instruction
     assert env.pose == pytest.approx([-0.25, 0.0, 0.25, 0.0, 0.0], abs=1e-3)
-    other = draw("flips", 5, FOODS)
+    other = sample_episode("flips", 5, FOODS)
     env.reset(seed=1, options={"episode": other})
     assert env.episode is other
     env.close()
 
 
 def test_the_food_stops_the_arm_and_geometry_does_not_see_it():
-    """A plan to the board: without the food's force the knife gets there; with it the criteria are met and the food holds. Commanded
-    deeper the food parts. Inverse kinematics to a tenth of a millimetre.
+    """A plan to the board: without the food's force the knife gets there; with it the criteria are met and the food
+    holds. Commanded deeper the food parts. Inverse kinematics to a tenth of a millimetre.
     """
     env = made()
     short = cut(env, SEED)
@@ -103,13 +107,14 @@ def test_the_food_stops_the_arm_and_geometry_does_not_see_it():
 
 
 def test_a_stiffer_arm_comes_nearer_to_the_board():
-    """Ten times the stiffness of the joints, a tenth of what is missing, within a millimetre of the lag; the agent's class is left alone."""
+    """Ten times the stiffness of the joints, a tenth of what is missing, within a millimetre of the lag; the agent's
+    class is left alone."""
     weak, stiff = made(), made(stiffness=1e4, damping=1e3)
     a, b = cut(weak, SEED), cut(stiff, SEED)
     weak.close()
     stiff.close()
     assert b["low"] < a["low"] / 2
-    assert environment.PandaKnife.arm_stiffness == 1e3
+    assert robot_environment.PandaKnife.arm_stiffness == 1e3
 
 
 @pytest.mark.parametrize("mode", ["pd_joint_pos", "pd_ee_delta_pose", "pd_ee_target_delta_pose", "pd_ee_pose"])
@@ -120,13 +125,26 @@ def test_every_control_mode_takes_a_step(mode):
     size = 8 if mode == "pd_joint_pos" else 7
     assert env.single_action_space.shape == (size,)
     action = (
-        np.array([*env.agent.robot.get_qpos()[0, :7].numpy(), -1.0], np.float32)
+        np.array([*env.agent.robot.get_qpos()[0, :7].numpy(), GRIPPER_CLOSED], np.float32)
         if size == 8
         else np.zeros(7, np.float32)
     )
     obs, reward, _, _, info = env.step(action)
     assert obs.shape[1] >= 9 + 9 + 5 and info["success"].shape == (1,) and float(reward) == 0
     assert info["force"].abs().sum() == 0
+    env.close()
+
+
+@pytest.mark.parametrize("mode", ["pd_joint_pos", "pd_ee_delta_pose"])
+def test_the_gripper_stays_closed_on_the_handle(mode):
+    """At what every action sends the fingers stay together; at 0 the same controller opens each by 15 mm."""
+    env = made(control_mode=mode)
+    for gripper, apart in ((GRIPPER_CLOSED, 0.0), (0.0, 0.015)):
+        env.reset(seed=SEED)
+        arm = env.agent.robot.get_qpos()[0, :7].numpy() if mode == "pd_joint_pos" else np.zeros(6)
+        for _ in range(20):
+            env.step(np.array([*arm, gripper], np.float32))
+        assert env.agent.robot.get_qpos()[0, 7:].numpy() == pytest.approx([apart] * 2, abs=1e-4)
     env.close()
 
 
@@ -141,8 +159,8 @@ def test_the_force_is_no_observation():
 
 
 def test_the_force_of_the_food_is_what_lifts_the_knife():
-    """A constant force on the held knife: the edge rises by force over the arm's stiffness (1 / 0.57 N/mm, measured apart from this code),
-    and twice as far for twice the force.
+    """A constant force on the held knife: the edge rises by force over the arm's stiffness (1 / 0.57 N/mm, measured
+    apart from this code), and twice as far for twice the force.
     """
     env, risen = made(coupled=False), []
     for force in (0.0, 10.0, 20.0):
@@ -153,7 +171,7 @@ def test_the_force_of_the_food_is_what_lifts_the_knife():
         env._force = np.array([0.0, 0.0, force])
         for _ in range(40):
             env._point = env.pose[:3]
-            env.step(np.array([*joints[:7], -1.0], np.float32))
+            env.step(np.array([*joints[:7], GRIPPER_CLOSED], np.float32))
         risen.append(float(env.pose[2]))
     env.close()
     assert risen[1] - risen[0] == pytest.approx(0.57e-3 * 10, rel=0.1)
@@ -161,8 +179,9 @@ def test_the_force_of_the_food_is_what_lifts_the_knife():
 
 
 def test_the_moment_of_the_food_turns_the_knife():
-    """A force at the middle of the edge and a moment about it tilt the knife as the same force does 50 mm along the edge, towards the end where
-    it pushes; to 3 % of the tilt, since the point moves with the edge and the moment does not.
+    """A force at the middle of the edge and a moment about it tilt the knife as the same force does 50 mm along the
+    edge, towards the end where it pushes; to 3 % of the tilt, since the point moves with the edge and the moment does
+    not.
     """
     env, tilts, force, off = made(coupled=False), [], 20.0, 0.05
     for part in (0.0, 0.5, 1.0):  # of the moment by the place of the force
@@ -175,7 +194,7 @@ def test_the_moment_of_the_food_turns_the_knife():
         env.coupling.torque = np.array([0.0, -(1 - part) * off * force, 0.0])  # raises the end at +x
         for _ in range(40):
             env._point = env.pose[:3] + [part * off, 0.0, 0.0]
-            env.step(np.array([*joints[:7], -1.0], np.float32))
+            env.step(np.array([*joints[:7], GRIPPER_CLOSED], np.float32))
         yaw, tilt = env.pose[3:]
         tilts.append(float(tilt if np.cos(yaw) > 0 else -tilt))
     env.close()
@@ -192,8 +211,8 @@ def test_a_criterion_that_is_none_is_an_error():
 
 
 def test_a_sustained_demonstration_parts_what_a_planned_one_leaves_whole():
-    """The same episode: as planned the criteria are met and the food holds; sustained it is in pieces, phases in their order, and
-    the force begins with the contact.
+    """The same episode: as planned the criteria are met and the food holds; sustained it is in pieces, phases in their
+    order, and the force begins with the contact.
     """
     env = made()
     env.reset(seed=SEED)
@@ -213,27 +232,29 @@ def test_a_sustained_demonstration_parts_what_a_planned_one_leaves_whole():
 
 
 def test_pressing_on_levels_the_blade(monkeypatch):
-    """The load turns the hand and one end of the blade rests on the board: turned back, the other end parts the rest; without that it hangs."""
-    draw_ = Manifest(trajectories=1, foods=("banana",), suites=("seeds",), styles=("press",)).draw(0)
-    env = environment(World())
+    """The load turns the hand and one end of the blade rests on the board: turned back, the other end parts the rest;
+    without that it hangs."""
+    draw_ = Manifest(trajectories=1, foods=("banana",), suites=("seeds",), styles=("press",)).trajectory(0)
+    env = make_environment(World())
     env.foods = {**env.foods, "banana": draw_.food}
     found = {}
-    for part in (LEVELLED, 0.0):
-        monkeypatch.setattr("intsim.data.demonstrate.LEVELLED", part)
+    for part in (LEVELLING_GAIN, 0.0):
+        monkeypatch.setattr("intsim.data.demonstrate.LEVELLING_GAIN", part)
         env.reset(seed=draw_.seed, options={"episode": draw_.episode})
         found[part] = demonstrate(env, meshes=False)
     level, hanging = found.values()
     assert level.severed[-1] and level.published[-1] and not hanging.severed[-1] and hanging.uncut[-1] > 0.01
     turned = [p[4] for p in level.command if p[4] != level.command[0][4]]
-    assert 0 < len(turned) and min(p[2] for p in level.command) > -DEEPEST / 2
+    assert 0 < len(turned) and min(p[2] for p in level.command) > -MAX_COMMAND_DEPTH / 2
 
 
 def test_a_drawn_cut_ends_when_the_food_is_in_pieces():
-    """With one end of the blade on the board the middle is above it and stands, and the cut ends as soon as nothing holds; with the way of the
-    commanded middle in place of what the board lets it go, that took nine steps more, in which the pieces were dragged along.
+    """With one end of the blade on the board the middle is above it and stands, and the cut ends as soon as nothing
+    holds; with the way of the commanded middle in place of what the board lets it go, that took nine steps more, in
+    which the pieces were dragged along.
     """
-    draw_ = Manifest(trajectories=1, foods=("cucumber",), suites=("seeds",), styles=("slice",)).draw(0)
-    env = environment(World())
+    draw_ = Manifest(trajectories=1, foods=("cucumber",), suites=("seeds",), styles=("slice",)).trajectory(0)
+    env = make_environment(World())
     env.foods = {**env.foods, "cucumber": draw_.food}
     env.reset(seed=draw_.seed, options={"episode": draw_.episode, "draws": True})
     track = demonstrate(env, style="slice", meshes=False)
@@ -261,41 +282,43 @@ def test_replaying_the_actions_gives_the_same_path_and_force():
 
 def test_a_worker_makes_an_episode_that_can_be_read(tmp_path):
     """What `dataset generate` stores of a real one: layout, task and the time that it took."""
-    draw = Manifest(trajectories=1, foods=("strawberry",), suites=("seeds",)).draw(0)
-    found = make(draw, "sustained", "kitchen", None, "cpu", 1)
-    (tmp_path / "part.h5").write_bytes(found["content"])
+    spec = Manifest(trajectories=1, foods=("strawberry",), suites=("seeds",)).trajectory(0)
+    found = make_episode(spec, "sustained", World(), "cpu", 1)
+    (tmp_path / "part.h5").write_bytes(found.content)
     with h5py.File(tmp_path / "part.h5") as file:
-        n = found["about"]["elapsed_steps"]
+        n = found.entry["elapsed_steps"]
         assert file["actions"].shape == (n, 8) and file["mpm/force"].shape == (n, 5, 3)
         assert file["mpm"].attrs["contact_step"] > 0 and file["mpm"].attrs["food"] == "strawberry"
-        assert file["mpm/force"][()].max() == pytest.approx(found["about"]["peak_N"], rel=1e-6)
-    assert found["about"]["seconds"]["solver"] > 0 and len(found["about"]["instructions"]) >= 5
+        assert file["mpm/force"][()].max() == pytest.approx(found.entry["peak_N"], rel=1e-6)
+    assert found.entry["seconds"]["solver"] > 0 and len(found.entry["instructions"]) >= 5
 
 
 # A picture needs a renderer; everything else of a stored trajectory is tested without one above.
 @pytest.mark.skipif(not VULKAN, reason="no Vulkan device that SAPIEN can render with")
 def test_pictures_of_a_stored_trajectory_show_what_was_simulated(tmp_path):
-    """Rendered from what is stored: the same view twice is the same picture, another background is another, and the cut opens the food."""
+    """Rendered from what is stored: the same view twice is the same picture, another background is another, and the cut
+    opens the food."""
     from intsim.data.rendering import Renderer
 
-    draw = Manifest(trajectories=1, foods=("strawberry",), suites=("seeds",)).draw(0)
-    found = make(draw, "sustained", "kitchen", None, "cpu", 1)
-    (tmp_path / "part.h5").write_bytes(found["content"])
+    spec = Manifest(trajectories=1, foods=("strawberry",), suites=("seeds",)).trajectory(0)
+    found = make_episode(spec, "sustained", World(), "cpu", 1)
+    (tmp_path / "part.h5").write_bytes(found.content)
     with h5py.File(tmp_path / "part.h5") as file:
-        stored = Stored(file, found["about"])
+        stored = StoredTrajectory(file, found.entry)
         one, two = Renderer(0, 64), Renderer(5, 64)
         plain, again, other = one.pictures(stored), one.pictures(stored), two.pictures(stored)
         one.close()
         two.close()
     for view, frames in plain.items():
-        assert frames.shape == (found["about"]["elapsed_steps"], 64, 64, 3) and frames.std() > 10
+        assert frames.shape == (found.entry["elapsed_steps"], 64, 64, 3) and frames.std() > 10
         assert np.array_equal(frames, again[view])
         assert np.abs(frames.astype(int) - other[view]).mean() > 5
 
 
 def test_a_policy_is_judged_in_closed_loop_with_the_food(tmp_path):
-    """The planner's oracle in the robot: its commands are the plan's; where nothing resists the edge reaches the board; with food it
-    meets the published criteria and ends higher by what the force takes; commanded deeper the food parts. Rows go on after a stop.
+    """The planner's oracle in the robot: its commands are the plan's; where nothing resists the edge reaches the board;
+    with food it meets the published criteria and ends higher by what the force takes; commanded deeper the food parts.
+    Rows go on after a stop.
     """
     food = {"strawberry": FOODS["strawberry"]}
     found = {}
@@ -305,39 +328,21 @@ def test_a_policy_is_judged_in_closed_loop_with_the_food(tmp_path):
         ("deep", "overdrive", World()),
     ):
         out = tmp_path / name
-        found[name] = valid(evaluate(make_policy(policy), policy, food, ["seeds"], 2, out, world=world, pool=Here()))
+        evaluate(PolicyEvaluation(make_policy(policy), policy, food, ["seeds"], 2, world=world), out, pool=Here())
+        valid(json.loads((out / "evaluate.json").read_text()))
         rows = [json.loads(line) for line in (out / "evaluate.jsonl").read_text().splitlines()[1:]]
-        found[name]["rows"] = rows
+        found[name] = rows
         assert all(r["published"] for r in rows) and not any(r["clipped"] for r in rows)
-    free, planned, deep = (found[name]["rows"] for name in ("free", "planned", "deep"))
+    free, planned, deep = (found[name] for name in ("free", "planned", "deep"))
     for a, b, c in zip(free, planned, deep, strict=True):
         assert "severing" not in a and a["height_m"] < 2e-3
         assert b["height_m"] > a["height_m"] and b["severing"]["peak"] > 1
         assert c["severing"]["severed"] and c["height_m"] < 1e-3
-    more = evaluate(
-        make_policy("oracle"),
-        "oracle",
-        food,
-        ["seeds"],
-        3,
-        tmp_path / "free",
-        world=World(coupled=False),
-        pool=Here(),
-        resume=True,
-    )
-    assert more["suites"]["seeds"]["published"]["trials"] == 3
+    again = PolicyEvaluation(make_policy("oracle"), "oracle", food, ["seeds"], 3, world=World(coupled=False))
+    more = evaluate(again, tmp_path / "free", pool=Here(), resume=True)
+    assert more.suites["seeds"].published.trials == 3
     with pytest.raises(OutputError, match="something else"):
-        evaluate(
-            make_policy("oracle"),
-            "oracle",
-            food,
-            ["seeds"],
-            3,
-            tmp_path / "free",
-            world=World(),
-            pool=Here(),
-            resume=True,
-        )
+        evaluate(replace(again, world=World()), tmp_path / "free", pool=Here(), resume=True)
 
 
 class Replay:
@@ -356,22 +361,23 @@ class Replay:
 
 
 def test_joint_targets_do_what_they_did_and_keep_within_their_speeds():
-    """A demonstration's own actions part the food again, with the same force; a target that is far away is approached at the joint's speed."""
-    env = environment(World())
+    """A demonstration's own actions part the food again, with the same force; a target that is far away is approached
+    at the joint's speed."""
+    env = make_environment(World())
     env.foods = {"strawberry": FOODS["strawberry"]}
     env.reset(seed=SEED)
     track = demonstrate(env, meshes=False)
     assert track.severed[-1]
     env.reset(seed=SEED)
     policy = Replay(track.action)
-    found = follow(env, policy, 0)
+    found = roll_out_closed_loop(env, policy, 0)
     assert found.severed and found.peak == pytest.approx(max(f[:, 2].max() for f in track.force), rel=0.02)
     assert np.allclose([o["pose"] for o in policy.seen[: len(track.edge)]], track.edge[: len(policy.seen)], atol=1e-3)
     assert policy.seen[0]["joints"].shape == (9,) and policy.seen[0]["images"] == {}
     env.reset(seed=SEED)
     far = track.action[0].copy()
     far[0] += 1.0
-    follow(env, Replay([far]), 0)
+    roll_out_closed_loop(env, Replay([far]), 0)
     assert env.table.rollout.clipped == [("joint",)]
 
 
@@ -379,10 +385,10 @@ def test_joint_targets_do_what_they_did_and_keep_within_their_speeds():
 @pytest.mark.skipif(not VULKAN, reason="SAPIEN finds no device that it can render with")
 def test_a_policy_is_given_pictures_where_it_wants_them():
     """Three cameras, 8 bits, the size that was asked for."""
-    env = environment(World(pixels=32))
+    env = make_environment(World(pixels=32))
     env.reset(seed=SEED)
     policy = Replay([env.agent.robot.get_qpos()[0].numpy()[:8]])
-    follow(env, policy, 0)
+    roll_out_closed_loop(env, policy, 0)
     images = policy.seen[0]["images"]
     assert sorted(images) == ["front", "side", "wrist"]
     assert all(i.shape == (32, 32, 3) and i.dtype == np.uint8 and i.std() > 5 for i in images.values())

@@ -8,7 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from intsim.task.language import TRAINING, UNSEEN, instructions, parse, read_paraphrases, same, sentences
+from intsim.task.language import (
+    TEST_TEMPLATES,
+    TRAINING_TEMPLATES,
+    instructions,
+    parse_instruction,
+    read_paraphrases,
+    same_task,
+    sentences,
+)
 from intsim.task.suites import FOODS
 from intsim.task.targets import CutSpec, TaskError
 
@@ -34,7 +42,7 @@ specs = st.one_of(
 def test_every_sentence_is_read_back_as_its_task(spec, unseen):
     """Whatever the grammar says of a task, among all foods, means that task."""
     for sentence in sentences(spec, unseen=unseen):
-        assert same(parse(sentence, FOODS), spec), sentence
+        assert same_task(parse_instruction(sentence, FOODS), spec), sentence
 
 
 @settings(max_examples=40, deadline=None)
@@ -52,7 +60,7 @@ def test_ratios_have_words_digits_and_multiples():
     said = " | ".join(sentences(CutSpec("apple")))
     for words in ("cut half of", "cut 50% of", "cut two quarters of", "cut 1/2 of", "cut one half of"):
         assert words in said
-    assert len(TRAINING) == len(set(TRAINING)) and not set(TRAINING) & set(UNSEEN)
+    assert len(TRAINING_TEMPLATES) == len(set(TRAINING_TEMPLATES)) and not set(TRAINING_TEMPLATES) & set(TEST_TEMPLATES)
 
 
 @pytest.mark.parametrize(
@@ -68,7 +76,7 @@ def test_ratios_have_words_digits_and_multiples():
 def test_what_is_not_said_is_not_guessed(sentence, says):
     """A task is refused with what is missing or said twice."""
     with pytest.raises(TaskError, match=says):
-        parse(sentence, FOODS)
+        parse_instruction(sentence, FOODS)
 
 
 def test_paraphrases_are_taken_from_a_file(tmp_path):

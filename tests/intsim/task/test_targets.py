@@ -11,8 +11,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from intsim.task.targets import APART, CAMERAS, CutSpec, Item, TaskError, boxed_target, spread, target
-from mpm.shapes import Shape, volume
+from intsim.task.targets import (
+    CAMERAS,
+    CUT_OPENING,
+    CutSpec,
+    Item,
+    TaskError,
+    boxed_target,
+    coefficient_of_variation,
+    target,
+)
+from mpm.scene.shapes import Shape, volume
 
 BANANA = Item("banana", Shape("cylinder", 0.16, 0.033, 0.033), 0.02, -0.03, math.radians(80))
 ratios = st.floats(0.1, 0.9)
@@ -49,7 +58,8 @@ def test_a_food_that_points_to_the_camera_has_no_left_end():
 
 @given(yaws)
 def test_a_bounding_box_is_not_the_food(yaw):
-    """The planner that knows the box alone measures l |sin| + w |cos| in place of l, along the table's axis that the camera sees across."""
+    """The planner that knows the box alone measures l |sin| + w |cos| in place of l, along the table's axis that the
+    camera sees across."""
     item = replace(BANANA, x=0.0, y=0.0, yaw=yaw)
     c, s = abs(math.cos(yaw)), abs(math.sin(yaw))
     length, width = item.shape.length, item.shape.width
@@ -65,15 +75,16 @@ def test_a_bounding_box_is_not_the_food(yaw):
 @pytest.mark.parametrize("count", [2, 3, 4, 6])
 @pytest.mark.parametrize("kind", ["cylinder", "ellipsoid"])
 def test_equal_pieces_are_cut_from_what_is_left(count, kind):
-    """Each cut is planned from the pieces as they have slid apart, and all come out as long; the volumes add up to the food's."""
+    """Each cut is planned from the pieces as they have slid apart, and all come out as long; the volumes add up to the
+    food's."""
     item = Item("cucumber", Shape(kind, 0.2, 0.045, 0.045))
     spec = CutSpec("cucumber", pieces=count)
     for _ in range(spec.cuts):
         item = item.cut_at(target(spec, item))
     assert len(item.pieces) == count
-    assert spread([p.length for p in item.pieces]) < 1e-12
+    assert coefficient_of_variation([p.length for p in item.pieces]) < 1e-12
     assert sum(item.volumes()) == pytest.approx(volume(item.shape), rel=2e-3)
-    assert (spread(item.volumes()) < 1e-9) == (kind == "cylinder" or count == 2)
+    assert (coefficient_of_variation(item.volumes()) < 1e-9) == (kind == "cylinder" or count == 2)
     with pytest.raises(TaskError, match=f"in {count} pieces already"):
         target(spec, item)
 
@@ -84,7 +95,7 @@ def test_cuts_that_are_planned_for_the_whole_food_miss():
     for k in range(1, 6):
         item = item.cut_at(-0.1 + 0.2 * k / 6)
     lengths = [p.length for p in item.pieces]
-    assert len(lengths) == 6 and max(lengths) - min(lengths) > APART
+    assert len(lengths) == 6 and max(lengths) - min(lengths) > CUT_OPENING
     assert item.cut_at(0.5) is item and item.piece_at(0.5) is None
 
 

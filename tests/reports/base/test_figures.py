@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from calib.calibration.result import from_document, write_report
 from mpm.output.section import Section
+from mpm.scene import Knife
 from reports.base import figures
 from reports.base.run_folder import Runs
 from reports.calibration import cut_figure as pictures
 from reports.calibration import failures, parameter_figures, parameter_page
-from reports.calibration.report import write_report
 from tests.reports import sample
 from tests.reports.sample import pages
 
@@ -29,9 +30,9 @@ def test_figures_are_stable_and_need_no_font() -> None:
 
 def test_figures_do_not_change_the_users_style() -> None:
     """Drawing leaves matplotlib's settings as they were, and the user's settings do not reach the report."""
-    plain = figures.nulls(sample.curves(), "measured")
+    plain = figures.null_models(sample.curves(), "measured")
     with matplotlib.rc_context({"axes.facecolor": "red", "lines.linewidth": 9.0}):
-        assert figures.nulls(sample.curves(), "measured") == plain
+        assert figures.null_models(sample.curves(), "measured") == plain
         assert matplotlib.rcParams["lines.linewidth"] == 9.0
 
 
@@ -47,7 +48,7 @@ def test_envelope_keeps_extremes_and_order() -> None:
     y = np.sin(t)
     y[123_456], y[654_321] = 50.0, -40.0
     x, few = figures.envelope(t, y)
-    assert len(x) <= 2 * figures.COLUMNS and np.all(np.diff(x) > 0.0)
+    assert len(x) <= 2 * figures.ENVELOPE_PARTS and np.all(np.diff(x) > 0.0)
     assert few.max() == 50.0 and few.min() == -40.0
     assert np.array_equal(figures.envelope(t[:100], y[:100]), (t[:100], y[:100]))
 
@@ -58,8 +59,8 @@ def test_marks_of_the_conditioning_are_drawn_when_known(tmp_path: Path) -> None:
     time, raw, tared = sample.record()
     draw = {"time": time, "raw": raw, "tared": tared, "onset": s["onset_s"], "onset_sd": 0.006,
             "end": s["end_s"], "baseline_kind": "constant", "peak": 10.8, "peak_sd": 0.1}  # fmt: skip
-    bare = figures.conditioning(figures.Record(**draw, window=None, end_sd=None), sample.curves())
-    full = figures.conditioning(figures.Record(**draw, window=(0.1, 0.7), end_sd=0.02), sample.curves())
+    bare = figures.conditioning(figures.ConditioningRecord(**draw, window=None, end_sd=None), sample.curves())
+    full = figures.conditioning(figures.ConditioningRecord(**draw, window=(0.1, 0.7), end_sd=0.02), sample.curves())
     assert len(full) > len(bare)
     run = sample.write_run(tmp_path, baseline_window_s=[0.1, 0.7], end_sd_s=0.02)
     assert pages(write_report(run).read_bytes()) == 6
@@ -78,18 +79,19 @@ def test_profiles_are_in_the_units_that_people_use() -> None:
     """Pascals become kilopascals, the literature too; a friction has a linear axis; a profile of one point is left out."""
     s = sample.summary()
     s["profiles"]["E"] = {key: value[:1] for key, value in s["profiles"]["E"].items()}
-    panels = {p.title: p for p in parameter_page.panels(s["profiles"], s["parameters"])}
+    result = from_document(s, Path())
+    panels = {p.title: p for p in parameter_page.panels(result.posterior.profiles, result.fitted)}
     assert list(panels) == ["yield_stress [kPa]", "R [J/m²]", "mu", "R_skin [N/m]"]
     panel = panels["yield_stress [kPa]"]
     assert panel.prior == (5.0, 200.0) and panel.value == 31.0 and panel.log and not panels["mu"].log
     assert panel.x[np.argmin(panel.rise)] == pytest.approx(31.0)
-    assert parameter_figures.profiles(list(panels.values())).startswith(b"<?xml")
+    assert parameter_figures.profile_panels(list(panels.values())).startswith(b"<?xml")
 
 
 def test_profiles_and_indices_differ_without_colour() -> None:
     """With and without the literature have different dashes; the two bars differ by a hatch."""
     assert parameter_figures.WITH_PRIOR.get("dashes") != parameter_figures.TRACE_ALONE.get("dashes")
-    drawn = parameter_figures.influence(sample.SENSITIVITY, parameter_page.QUANTITIES)
+    drawn = parameter_figures.influence(from_document(sample.summary(), Path()).sensitivity, parameter_page.QUANTITIES)
     assert b"hatch" in drawn.lower() or b"<pattern" in drawn
 
 
@@ -103,7 +105,7 @@ def test_failures_are_split_by_what_separates_them() -> None:
         "R": np.where(failed, 900.0, 300.0) * np.exp(0.4 * random.standard_normal(40)),
         "other": np.arange(40.0),
     }
-    known = sample.summary()["parameters"]
+    known = from_document(sample.summary(), Path()).fitted
     found = failures.splits(Runs(values, failed), known)
     assert [s.name for s in found] == ["E", "R", "mu"] and found[0].apart < 0.0 < found[1].apart
     assert failures.sentence(Runs(values, failed), found).startswith("Simulations failed at low E (median ")
@@ -114,7 +116,7 @@ def test_failures_are_split_by_what_separates_them() -> None:
         assert failures.picture(Runs(values, failed), split).startswith(b"<?xml")
 
 
-KNIFE = {"spine": 2e-3, "angle": 0.04, "height": 0.05}
+KNIFE = Knife("kitchen", 2e-3, 0.04, 0.05, 0.2)
 
 
 def looked_at(width: float = 0.1, height: float = 0.03) -> Section:

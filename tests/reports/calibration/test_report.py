@@ -16,10 +16,11 @@ import h5py
 import numpy as np
 import pytest
 
+from calib.calibration.result import write_report
+from calib.errors import OutputError
 from reports import ReportError
 from reports.base.format import DASH
 from reports.calibration import report
-from reports.calibration.report import write_report
 from tests.data_dir import ROOT
 from tests.reports import sample
 from tests.reports.sample import pages, spaced
@@ -67,7 +68,7 @@ def test_same_files_give_same_bytes_in_another_process(tmp_path: Path) -> None:
     """Neither the clock, the hash seed, the time zone, the folder nor an existing report changes a byte."""
     first = write_report(sample.write_run(tmp_path / "a")).read_bytes()
     second = sample.write_run(tmp_path / "a folder with another name")
-    code = "import sys; from pathlib import Path; from reports.calibration.report import write_report; " + (
+    code = "import sys; from pathlib import Path; from calib.calibration.result import write_report; " + (
         "[write_report(Path(sys.argv[1])) for _ in range(2)]"
     )
     env = {**os.environ, "PYTHONHASHSEED": "12345", "TZ": "Asia/Tokyo", "PYTHONPATH": str(ROOT)}
@@ -285,13 +286,13 @@ def test_missing_file_is_named_with_the_remedy(tmp_path: Path, name: str) -> Non
     """The error names the file and the option that brings it back."""
     run = sample.write_run(tmp_path)
     (run / name).unlink()
-    with pytest.raises(ReportError, match=rf"{name}: no such file.*--resume"):
+    with pytest.raises(OutputError, match=rf"{name}: no such file.*--resume"):
         write_report(run)
 
 
 def test_missing_folder(tmp_path: Path) -> None:
     """A wrong path is said to be one."""
-    with pytest.raises(ReportError, match="no such folder"):
+    with pytest.raises(OutputError, match="no such folder"):
         write_report(tmp_path / "nothing")
 
 
@@ -310,7 +311,7 @@ def test_missing_key_is_named_by_its_place(tmp_path: Path, place: str) -> None:
     run = sample.write_run(tmp_path)
     (run / "summary.json").write_text(json.dumps(data))
     shown = re.escape(place.replace(".0.", "[0]."))
-    with pytest.raises(ReportError, match=rf"summary\.json: {shown} is missing.*--resume"):
+    with pytest.raises(OutputError, match=rf"summary\.json: {shown} is missing.*--resume"):
         write_report(run)
 
 
@@ -327,7 +328,7 @@ def test_missing_key_is_named_by_its_place(tmp_path: Path, place: str) -> None:
 )  # fmt: skip
 def test_value_of_a_wrong_kind_is_refused(tmp_path: Path, key: str, value: Any) -> None:
     """A text, a null or a flag where a number belongs is an error of the file, not of the program."""
-    with pytest.raises(ReportError, match=rf"summary\.json: {key}.*--resume"):
+    with pytest.raises(OutputError, match=rf"summary\.json: {key}.*--resume"):
         write_report(sample.write_run(tmp_path, **{key: value}))
 
 
@@ -336,7 +337,7 @@ def test_truncated_summary(tmp_path: Path) -> None:
     run = sample.write_run(tmp_path)
     text = (run / "summary.json").read_text()
     (run / "summary.json").write_text(text[: len(text) // 2])
-    with pytest.raises(ReportError, match=r"summary\.json: damaged, not JSON"):
+    with pytest.raises(OutputError, match=r"summary\.json: damaged, not JSON"):
         write_report(run)
 
 

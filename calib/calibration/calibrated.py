@@ -1,0 +1,79 @@
+"""What a calibration has computed when its last simulation has ended, before it is judged and written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from calib.fit.multistart import FitResult
+from calib.material.food import FoodSpec
+from calib.problem.setup import Setup
+from calib.trace.filters import filter_simulated
+from calib.uncertainty.analysis import UncertaintyAnalysis
+from calib.uncertainty.sobol import Indices, sensitivity
+from calib.validation.metrics import Metrics, compare
+from calib.validation.null_models import NullModel, null_models
+from calib.validation.numerical_checks import Check
+from mpm.arrays import FloatArray
+from mpm.output.record import ForceRecord
+
+
+@dataclass(frozen=True, eq=False)
+class Calibrated:
+    """What a calibration has found, before it is written.
+
+    Attributes:
+        setup: What was decided before; its fine cut has the fitted height.
+        fit: The search and its best run.
+        analysis: Its uncertainty; None where it ended too early for that.
+        record: Whole record of the best values.
+        checks: What numerical choices change; none where the search was interrupted.
+        start: Smoothed curve of the literature's values [N] (n,), NaN where that run broke down or was not made.
+    """
+
+    setup: Setup
+    fit: FitResult
+    analysis: UncertaintyAnalysis | None
+    record: ForceRecord
+    checks: list[Check]
+    start: FloatArray
+
+    @cached_property
+    def metrics(self) -> Metrics:
+        """The best curve against the trace."""
+        curve = self.setup.curve
+        return compare(curve.stroke, curve.curve, self.fit.best.curve)
+
+    @cached_property
+    def nulls(self) -> dict[str, NullModel]:
+        """Curves that explain nothing, against the trace."""
+        return null_models(self.setup.curve.stroke, self.setup.curve.curve)
+
+    @cached_property
+    def sensitivity(self) -> Indices:
+        """Sobol indices of the curve; empty where the fit ended too early."""
+        return sensitivity(self.setup.objective, self.fit, seed=self.setup.request.seed)
+
+    def curves(self) -> dict[str, FloatArray]:
+        """Columns of curves.csv, all on the trace's stroke grid."""
+        curve, best, record = self.setup.curve, self.fit.best.curve, self.record
+        columns = {"stroke_m": curve.stroke, "real_N": curve.curve, "sim_N": best, "residual_N": best - curve.curve}
+        columns["edge_N"] = filter_simulated(curve.stroke, record.stroke, record.edge[:, 2])
+        columns["face_N"] = filter_simulated(curve.stroke, record.stroke, record.resolved_face)
+        columns["start_N"] = self.start
+        columns |= {f"{name}_N": null.curve for name, null in self.nulls.items()}
+        if self.analysis is not None:
+            columns |= {"band_low_N": self.analysis.bands[0].low, "band_high_N": self.analysis.bands[0].high}
+        return columns
+
+    def food(self) -> FoodSpec:
+        """The food with the fitted values, and the specimen's sizes that were fitted with its height."""
+        setup, values = self.setup, dict(self.fit.best.evaluation.parameters)
+        fitted = {"status": "fitted", "source": f"fitted to {setup.curve.trace.source}"}
+        height = values.pop("height", None)
+        food = setup.request.food.with_values(values, **fitted)
+        if height is None:
+            return food
+        shape = setup.fine.food.shape
+        sizes = {name: getattr(shape, name) for name in ("height", "width") if name not in setup.kept}
+        return food.with_sizes(sizes, **fitted)

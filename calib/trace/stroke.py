@@ -1,0 +1,167 @@
+"""How far the edge is in the food at each sample: from the position, the knife's speed or the food's height."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib.errors import TraceError
+from calib.trace.contact_onset import SUSTAIN, ContactOnset, first_sustained
+from calib.trace.trace import Trace
+
+DWELL_M = 0.1e-3
+"""Height above the lowest position so far [m] at which the knife still counts as there: a robot arm's
+repeatability. The stroke is over where it comes that near to the lowest of all; higher, it is retracting."""
+RELEASE_SD = 4.0
+"""The force is released when it stays within this many noise standard deviations of the baseline ..."""
+RELEASE_FRACTION = 0.05
+"""... or below this fraction of the peak, whichever is higher: a baseline drifts during a cut."""
+STROKE_RANGE_M = (1e-3, 0.5)
+"""Strokes outside are taken for a unit mix-up [m]: less than a grape's skin, more than any kitchen
+knife's way."""
+STROKE_EXCESS = 0.1
+"""Part of the specimen's height by which a stroke may exceed it: 10 N bend an arm of 3 kN/m by 3 mm, a tenth of a fruit
+of 3 cm."""
+MAX_DESCENT_FRACTION = 0.5
+"""Part of the position's range that must lie before its lowest point for a record to be a downward stroke."""
+
+
+@dataclass(frozen=True)
+class StrokeAxis:
+    """The stroke of a record.
+
+    Attributes:
+        stroke: Way of the edge after contact at each sample, negative before contact [m], shape (n,).
+        end: Stroke at the end of the cut [m].
+        source: Where it comes from: ``position``, ``speed`` or ``height``.
+        warnings: What a reader should know of it, one sentence each.
+    """
+
+    stroke: np.ndarray
+    end: float
+    source: str
+    warnings: tuple[str, ...] = ()
+
+
+def end_of_descent(trace: Trace) -> int:
+    """Index of the sample that ends the descent: the first within ``DWELL_M`` of the lowest position.
+
+    It is the last sample where the trace has no position, or where the lowest position is not at the end of a descent.
+    """
+    if trace.position is None:
+        return len(trace.time) - 1
+    lowest = int(np.argmin(trace.position))
+    descent = float(np.max(trace.position[: lowest + 1]) - trace.position[lowest])
+    if descent < MAX_DESCENT_FRACTION * np.ptp(trace.position):
+        return len(trace.time) - 1
+    top = int(np.argmax(trace.position[: lowest + 1]))
+    return top + int(np.argmax(trace.position[top : lowest + 1] <= trace.position[lowest] + DWELL_M))
+
+
+def stroke_axis(
+    trace: Trace, tared: np.ndarray, contact: ContactOnset, *, last: int, speed: float | None, height: float | None
+) -> StrokeAxis:
+    """The stroke of every sample: from the position where there is one, else from the speed, else from the height.
+
+    Args:
+        trace: The cut.
+        tared: Its force above the baseline [N], shape (n,).
+        contact: Where it touches the food.
+        last: Index of the sample that ends the descent, see :func:`end_of_descent`.
+        speed: Knife speed [m/s], where it is known.
+        height: Height of the food [m], where it is known; contact to release is taken for it when nothing else is
+            known.
+
+    Returns:
+        The stroke, and where it comes from.
+
+    Raises:
+        TraceError: The position does not descend after contact, or the stroke is outside ``STROKE_RANGE_M``.
+    """
+    if trace.position is not None:
+        axis = _from_position(trace, trace.position, contact, last, speed)
+    else:
+        axis = _at_constant_speed(trace, tared, contact, speed, height)
+    low, high = STROKE_RANGE_M
+    if not low <= axis.end <= high:
+        raise TraceError(
+            f"{trace.source}: the stroke after contact is {axis.end:.3g} m (from {axis.source}), outside {low:g} to "
+            f"{high:g} m; check millimetres against metres in the position, speed or height"
+        )
+    return axis
+
+
+def _from_position(
+    trace: Trace, position: np.ndarray, contact: ContactOnset, last: int, speed: float | None
+) -> StrokeAxis:
+    """The way down from the height at contact."""
+    stroke = float(np.interp(contact.onset, trace.time, position)) - position
+    end = float(stroke[last])
+    if not end > 0.0:
+        raise TraceError(
+            f"{trace.source}, column {trace.columns.get('position')}: the position does not descend "
+            f"after contact at {contact.onset:.4g} s (it changes by {-end:.3g} m); it must be a height, "
+            "or a depth (--depth-col); name another with --position-col, or none and give --speed"
+        )
+    unused = () if speed is None else ("the speed is not used: the stroke comes from the position column",)
+    return StrokeAxis(stroke, end, "position", unused)
+
+
+def _at_constant_speed(
+    trace: Trace, tared: np.ndarray, contact: ContactOnset, speed: float | None, height: float | None
+) -> StrokeAxis:
+    """The time since contact at a known speed, or at that which goes through the food from contact to release."""
+    release, released = _release(trace.time, tared, contact)
+    warnings: tuple[str, ...] = ()
+    if speed is not None:
+        rate, source = speed, "speed"
+    else:
+        assert height is not None
+        rate, source = height / (release - contact.onset), "height"
+        until = "release" if released else "the end of the record (the force is not released in it)"
+        warnings = (
+            f"no position and no speed: contact to {until} was taken for the food's height of "
+            f"{1e3 * height:.3g} mm at constant speed ({1e3 * rate:.3g} mm/s); a fitted stiffness or R "
+            "inherits that guess",
+        )
+    return StrokeAxis(rate * (trace.time - contact.onset), rate * (release - contact.onset), source, warnings)
+
+
+def ending_at_board(axis: StrokeAxis, board: float, source: str) -> StrokeAxis:
+    """The stroke, ended where the edge is at the board: what is recorded beyond is no cut.
+
+    Args:
+        axis: The stroke.
+        board: Stroke at which the edge is at the board [m].
+        source: Name of the record for messages.
+
+    Returns:
+        The same, or one that ends at the board, with a warning.
+
+    Raises:
+        TraceError: The stroke goes beyond the board by more than ``STROKE_EXCESS``.
+    """
+    if axis.end <= board * (1 + 1e-9):
+        return axis
+    if axis.end > (1 + STROKE_EXCESS) * board:
+        raise TraceError(
+            f"{source}: the stroke after contact is {1e3 * axis.end:.1f} mm (from {axis.source}), but the specimen is "
+            f"{1e3 * board:.1f} mm high; check the height, or the position or speed, or say with --t-end where the cut "
+            "ends"
+        )
+    said = (
+        f"the stroke of {1e3 * axis.end:.1f} mm goes beyond the specimen's height of {1e3 * board:.1f} mm; what is "
+        "below the board's top is left out"
+    )
+    return replace(axis, end=board, warnings=(*axis.warnings, said))
+
+
+def _release(time: np.ndarray, tared: np.ndarray, contact: ContactOnset) -> tuple[float, bool]:
+    """Time at which the force is back at the baseline for good, and whether the record has it."""
+    limit = max(RELEASE_SD * contact.baseline.noise_sd, RELEASE_FRACTION * contact.peak)
+    after_last = first_sustained((tared > limit)[::-1])
+    last = len(tared) - 1 - (after_last or 0)
+    if last >= len(tared) - SUSTAIN:
+        return float(time[-1]), False
+    return float(time[last + 1]), True

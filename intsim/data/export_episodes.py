@@ -1,0 +1,103 @@
+"""Every trajectory before every background that is asked for, with one of its sentences: what exports go through."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+
+from calib.errors import OutputError
+from calib.io.progress import Countdown
+from calib.simulation.workers import Workers
+from intsim.data.pictures import check_backgrounds, load_pictures, render_dataset
+from intsim.data.shards import StoredTrajectory, trajectories
+
+
+@dataclass(frozen=True, eq=False)
+class ExportEpisode:
+    """A trajectory before a background.
+
+    Attributes:
+        stored: The trajectory.
+        background: Number of the background; None without pictures.
+        sentence: What was asked for, in words.
+        pictures: By camera, 8 bits, shape (T, h, w, 3) each; empty without pictures.
+    """
+
+    stored: StoredTrajectory
+    background: int | None
+    sentence: str
+    pictures: dict[str, np.ndarray]
+
+
+def check_pictured_target(out: Path, backgrounds: Sequence[int], kind: str, *packages: str) -> None:
+    """Check the target of an export that is nothing without pictures, before anything is written.
+
+    Args:
+        out: Folder that will be made.
+        backgrounds: Numbers of the backgrounds.
+        kind: What the export is called.
+        packages: Names of the modules that it is written with.
+
+    Raises:
+        OutputError: Those of :func:`check_target`, no background, or a package that is not installed.
+    """
+    for name in packages:
+        if find_spec(name) is None:
+            raise OutputError(f"dataset export: {name} is not installed; pip install 'cutcal[data]'")
+    if not backgrounds:
+        raise OutputError(f"dataset export: {kind} is pictures and actions; name backgrounds, such as --scenes 0,1,2")
+    check_target(out, backgrounds)
+
+
+def check_target(out: Path, backgrounds: Sequence[int]) -> None:
+    """Check the target of an export, before anything is written.
+
+    Raises:
+        OutputError: A background that does not exist, or a folder that is taken.
+    """
+    check_backgrounds(backgrounds)
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise OutputError(f"--out {out}: exists already and is never overwritten; choose another folder")
+
+
+def export_episodes(
+    folder: Path,
+    backgrounds: Sequence[int],
+    pixels: int,
+    pool: Workers | None = None,
+    say: Callable[[str], None] = lambda text: None,
+) -> Iterator[ExportEpisode]:
+    """Each trajectory for each background; its sentences come in turn. What has to be rendered is, before this returns.
+
+    Args:
+        folder: A dataset of :func:`intsim.data.generate.generate`.
+        backgrounds: Their numbers; without any each trajectory comes once, without pictures.
+        pixels: Width and height of the pictures.
+        pool: Where those are rendered that are not in the folder yet; they are kept there.
+        say: Called with a line after each.
+
+    Returns:
+        The episodes, one background after the other.
+
+    Raises:
+        CutcalError: There is no renderer, or the folder holds no dataset, or not the pictures and there is no pool.
+    """
+    if backgrounds and pool is not None:
+        render_dataset(folder, backgrounds, pixels, pool, say)
+    return _each(folder, backgrounds, pixels, say)
+
+
+def _each(folder: Path, backgrounds: Sequence[int], pixels: int, say: Callable[[str], None]) -> Iterator[ExportEpisode]:
+    total = sum(1 for _ in trajectories(folder)) * max(len(backgrounds), 1)
+    rest, done = Countdown(max(total, 1)), 0
+    for turn, background in enumerate(backgrounds or [None]):
+        for k, stored in enumerate(trajectories(folder)):
+            sentences = stored.entry["instructions"]
+            pictures = {} if background is None else load_pictures(folder, stored, background, pixels)
+            yield ExportEpisode(stored, background, sentences[(k + turn) % len(sentences)], pictures)
+            done += 1
+            say(f"episode {done} of {total}, {rest.left(1)}")

@@ -1,0 +1,39 @@
+"""Errors a user may meet: each says what was wrong, where, and what to do."""
+
+from __future__ import annotations
+
+import math
+
+
+class CutcalError(Exception):
+    """Base of every error that cutcal raises on purpose; the command line prints it without a traceback."""
+
+
+class SceneError(CutcalError):
+    """A scene (food, knife, board, motion, numerics) that cannot be simulated as asked."""
+
+
+class OutputError(CutcalError):
+    """An output folder or file that cannot be written, or that belongs to another run."""
+
+
+class SimulationError(CutcalError):
+    """A run that broke down after it had started.
+
+    Attributes:
+        reason: Typed reason, one of ``not_finite``, ``inverted``, ``left_grid``, ``stopped``,
+            ``worker_died``.
+        fraction: Part of the stroke that was completed [-], 0 to 1.
+    """
+
+    def __init__(self, message: str, *, reason: str, fraction: float) -> None:
+        super().__init__(message)
+        self.reason = reason
+        self.fraction = fraction
+
+
+def check_number(where: str, name: str, value: float, low: float, high: float, unit: str) -> None:
+    """Raise SceneError unless ``low < value < high`` (both open) and ``value`` is a finite number."""
+    ok = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    if not ok or not low < value < high:
+        raise SceneError(f"{where}: {name} = {value!r} {unit} must be a number between {low:g} and {high:g} {unit}")

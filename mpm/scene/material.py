@@ -1,0 +1,134 @@
+"""Constants of one food, validated, in SI units."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from mpm.scene.errors import SceneError, check_number
+
+MAX_POISSON = 0.49  # above it a single-field quadratic MPM locks volumetrically and dt falls as sqrt(1 - 2 nu)
+
+
+@dataclass(frozen=True)
+class Material:
+    """Constants of one food.
+
+    Attributes:
+        E: Young's modulus [Pa].
+        nu: Poisson's ratio [-].
+        rho: Density [kg/m^3].
+        yield_stress: von Mises yield stress (Kirchhoff) [Pa]; ``inf`` keeps the food elastic.
+        R: Cutting (propagation) resistance of the flesh [J/m^2 = N/m] (Atkins 2009, "The Science of Cutting").
+        R_initiation: Force per width at which a cut starts in bare flesh [N/m]; at least R.
+        R_skin: Force per width at which the edge goes through the skin [N/m].
+        skin_thickness: Thickness of the skin [m]; 0 = no skin.
+        initiation_depth: Indentation under the edge at which a cut starts [m]; soft solids go deep before a cut
+            nucleates (Reyssat et al. 2012, Phys. Rev. Lett. 109:244301).
+        mu: Coulomb friction of food on the blade's faces [-].
+        tensile_strength: Stress at which bulk damage starts [Pa], or None.
+        fracture_energy: Energy per crack area of bulk damage [J/m^2], or None. Both or none.
+        loss_factor: Mechanical loss factor tan(delta) [-] at the first axial mode of the specimen, Kelvin-Voigt. Apple
+            tissue loses 0.13-0.4 of the energy of a cycle (J. Texture Stud. 14:155, 1983), i.e. about 0.04-0.13.
+        prony: Relaxation of the shear stiffness as pairs (share [-], time [s]); E is then the instantaneous modulus and
+            the shares add up to less than 1 (Simo 1987). Empty = rate-independent, the default.
+        adhesion: Largest normal traction of the food on the blade's faces [Pa]; 0 = none, the default.
+        adhesion_energy: Work of adhesion [J/m^2], needed with ``adhesion``.
+    """
+
+    E: float
+    nu: float
+    rho: float
+    yield_stress: float = math.inf
+    R: float = 0.0
+    R_initiation: float | None = None
+    R_skin: float | None = None
+    skin_thickness: float = 0.0
+    initiation_depth: float = 1e-3
+    mu: float = 0.0
+    tensile_strength: float | None = None
+    fracture_energy: float | None = None
+    loss_factor: float = 0.0
+    prony: tuple[tuple[float, float], ...] = ()
+    adhesion: float = 0.0
+    adhesion_energy: float = 0.0
+
+    def __post_init__(self) -> None:
+        w = "material"
+        check_number(w, "E", self.E, 0.0, 1e12, "Pa")
+        if not (isinstance(self.nu, (int, float)) and -1.0 < self.nu <= MAX_POISSON):
+            raise SceneError(
+                f"material: nu = {self.nu!r} must lie in (-1, {MAX_POISSON}]; an isotropic solid has nu < 0.5 and the "
+                f"solver locks above {MAX_POISSON}"
+            )
+        check_number(w, "rho", self.rho, 0.0, 1e5, "kg/m^3")
+        if self.yield_stress != math.inf:
+            check_number(w, "yield_stress", self.yield_stress, 0.0, 1e12, "Pa")
+        for name, unit in (
+            ("R", "J/m^2"),
+            ("skin_thickness", "m"),
+            ("mu", ""),
+            ("loss_factor", ""),
+            ("adhesion", "Pa"),
+            ("adhesion_energy", "J/m^2"),
+        ):
+            check_number(w, name, getattr(self, name), -1e-300, 1e6, unit)
+        check_number(w, "initiation_depth", self.initiation_depth, 1e-5, 0.1, "m")
+        for name in ("R_initiation", "R_skin"):
+            if getattr(self, name) is not None:
+                check_number(w, name, getattr(self, name), -1e-300, 1e6, "N/m")
+        if (self.tensile_strength is None) != (self.fracture_energy is None):
+            raise SceneError(
+                "material: tensile_strength and fracture_energy make bulk damage together; give both or none"
+            )
+        if self.tensile_strength is not None and self.fracture_energy is not None:
+            check_number(w, "tensile_strength", self.tensile_strength, 0.0, 1e12, "Pa")
+            check_number(w, "fracture_energy", self.fracture_energy, 0.0, 1e9, "J/m^2")
+        if self.skin_thickness > 0 and self.R_skin is None:
+            raise SceneError(
+                "material: skin_thickness > 0 needs R_skin, the force per width that goes through the skin"
+            )
+        if (self.adhesion > 0) != (self.adhesion_energy > 0):
+            raise SceneError(
+                "material: adhesion [Pa] and adhesion_energy [J/m^2] make sticky faces together; give both"
+            )
+        for share, time in self.prony:
+            check_number(w, "share of a prony branch", share, 0.0, 1.0, "")
+            check_number(w, "time of a prony branch", time, 0.0, 1e9, "s")
+        if sum(share for share, _ in self.prony) >= 1.0:
+            raise SceneError("material: the shares of the prony branches must add up to less than 1, or a solid flows")
+
+    @property
+    def shear(self) -> float:
+        """Shear modulus mu = E / (2 (1 + nu)) [Pa]."""
+        return self.E / (2 * (1 + self.nu))
+
+    @property
+    def lame(self) -> float:
+        """First Lame constant [Pa]."""
+        return self.E * self.nu / ((1 + self.nu) * (1 - 2 * self.nu))
+
+    @property
+    def start(self) -> float:
+        """Force per width at which a cut starts: that of the skin where there is one, never below R [N/m]."""
+        threshold = self.R_skin if self.skin_thickness > 0 else self.R_initiation
+        return max(self.R, threshold or 0.0)
+
+    @property
+    def rate_dependent(self) -> bool:
+        """Whether the force depends on the real speed of the knife."""
+        return bool(self.prony)
+
+    @property
+    def p_wave(self) -> float:
+        """Speed of longitudinal waves sqrt((lambda + 2 mu) / rho) [m/s]."""
+        return math.sqrt((self.lame + 2 * self.shear) / self.rho)
+
+    @property
+    def stability_speed(self) -> float:
+        """Speed that bounds dt [m/s]: sqrt(max(3 K, lambda + 2 mu) / rho).
+
+        A lone particle of quadratic MLS-MPM has the highest frequency (2/dx) sqrt(3 K / rho), above that of the bulk.
+        """
+        bulk3 = 3 * self.lame + 2 * self.shear
+        return math.sqrt(max(bulk3, self.lame + 2 * self.shear) / self.rho)

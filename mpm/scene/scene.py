@@ -1,0 +1,338 @@
+"""What is simulated: food, knife, board, motion and numerics as frozen, validated data in SI units.
+
+Coordinates: x along the blade, y normal to the blade plane, z up; the board's top is z = 0, the food stands on it
+centred on x = y = 0 and the blade plane is y = 0. The stroke is the way of the cutting edge below the food's top.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+from mpm.scene.errors import SceneError, check_number
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
+
+CONTACTS = ("cohesive", "nodal")
+PRECISIONS = ("f64", "f32")
+
+
+@dataclass(frozen=True)
+class Food:
+    """A shape filled with a material."""
+
+    shape: Shape
+    material: Material
+
+
+@dataclass(frozen=True)
+class Knife:
+    """A straight blade: a wedge of the included angle up to the spine's thickness, parallel above it.
+
+    Attributes: name; spine thickness [m]; included angle of the wedge [rad]; blade height [m]; length along x [m];
+    radius of the tip [m], 0 = sharp. A wire is a blade as thick and half as high as its diameter.
+    """
+
+    name: str
+    spine: float
+    angle: float
+    height: float
+    length: float
+    radius: float = 0.0
+
+    def __post_init__(self) -> None:
+        w = f"knife {self.name}"
+        check_number(w, "spine", self.spine, 1e-5, 0.1, "m")
+        check_number(w, "angle", self.angle, 1e-3, math.pi / 2, "rad")
+        check_number(w, "height", self.height, 1e-4, 1.0, "m")
+        check_number(w, "length", self.length, 1e-3, 1.0, "m")
+        check_number(w, "radius", self.radius, -1e-300, 0.05, "m")
+        if 2 * self.radius > self.spine * (1 + 1e-9):
+            raise SceneError(
+                f"{w}: a tip of radius {self.radius * 1e3:g} mm is wider than the spine of {self.spine * 1e3:g} mm"
+            )
+
+
+@dataclass(frozen=True)
+class Press:
+    """A rigid plate, or a wedge with its edge along x, that presses on the food from above and cuts nothing.
+
+    It reaches over the whole food. With a Scene's ``stroke`` it makes the compression and indentation tests that have
+    closed forms and finite-element references.
+
+    Attributes: name; half_angle between the faces and the vertical [rad], pi/2 for a plate; mu, Coulomb friction [-].
+    """
+
+    name: str = "plate"
+    half_angle: float = math.pi / 2
+    mu: float = 0.0
+
+    def __post_init__(self) -> None:
+        w = f"press {self.name}"
+        check_number(w, "half_angle", self.half_angle, 0.1, math.pi / 2 * (1 + 1e-9), "rad")
+        check_number(w, "mu", self.mu, -1e-300, 10.0, "")
+
+
+@dataclass(frozen=True)
+class Board:
+    """The board under the food: Coulomb friction coefficient [-]."""
+
+    mu: float = 0.5
+
+    def __post_init__(self) -> None:
+        check_number("board", "mu", self.mu, -1e-300, 10.0, "")
+
+
+STEEPEST = 1.2
+"""Largest angle of the edge to the board [rad]: at 69 degrees the ends of what lies over the food are 2.6 of its widths apart in height."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The commanded motion of the blade: a stroke at constant speed, a pause, a retraction.
+
+    Attributes:
+        stroke: Way of the edge's middle below the food's top [m].
+        mach: Blade speed over the P-wave speed [-]. All laws are rate-independent by default, so the real speed is
+            replaced by this one; the force changes by less than 1 % up to 0.01 and by 9 % at 0.035.
+        slice_ratio: Speed along the edge over the speed down (slice/push ratio xi) [-].
+        tilt: Angle of the edge to the board, positive when the end at +x is higher [rad].
+        dwell: Pause at the end of the stroke [s], in real time; needs ``speed``.
+        retract: Way back up after it [m].
+        speed: Real speed of the stroke [m/s]; needed by rate-dependent laws and by ``dwell``. Times of the material are
+            then shortened by simulated over real speed, so that the laws see the real duration.
+    """
+
+    stroke: float
+    mach: float = 0.01
+    slice_ratio: float = 0.0
+    tilt: float = 0.0
+    dwell: float = 0.0
+    retract: float = 0.0
+    speed: float | None = None
+
+    def __post_init__(self) -> None:
+        check_number("motion", "stroke", self.stroke, 1e-4, 1.0, "m")
+        check_number("motion", "mach", self.mach, 1e-5, 0.1, "")
+        check_number("motion", "slice_ratio", self.slice_ratio, -20.0, 20.0, "")
+        check_number("motion", "tilt", self.tilt, -STEEPEST, STEEPEST, "rad")
+        check_number("motion", "dwell", self.dwell, -1e-300, 1e5, "s")
+        check_number("motion", "retract", self.retract, -1e-300, 2.0, "m")
+        if self.speed is not None:
+            check_number("motion", "speed", self.speed, 0.0, 100.0, "m/s")
+        elif self.dwell > 0:
+            raise SceneError("motion: a dwell in seconds needs the real speed of the stroke; give motion.speed")
+
+
+@dataclass(frozen=True)
+class Arm:
+    """What holds the knife: a spring between its commanded and its actual height, and the most force it can give.
+
+    Attributes: stiffness [N/m], None = rigid; force_limit [N], None = none. A limit needs a stiffness, as robots have
+    (a Franka arm in impedance control: up to 3000 N/m).
+    """
+
+    stiffness: float | None = None
+    force_limit: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.stiffness is not None:
+            check_number("arm", "stiffness", self.stiffness, 1.0, 1e9, "N/m")
+        if self.force_limit is not None:
+            check_number("arm", "force_limit", self.force_limit, 0.0, 1e6, "N")
+            if self.rigid:
+                raise SceneError("arm: a rigid arm has no force limit; give arm.stiffness, e.g. 3000 N/m")
+
+    @property
+    def rigid(self) -> bool:
+        """Whether the knife is where it is commanded to be."""
+        return self.stiffness is None
+
+
+@dataclass(frozen=True)
+class EdgeLaw:
+    """Regularisation of the cutting edge, fixed in metres so that the force does not follow the grid.
+
+    Attributes:
+        zone: Width of the B-spline over which the edge's line force is spread [m]; at least one cell.
+        slip: Slip of the edge in the material at which the line force is fully developed [m].
+    """
+
+    zone: float = 3e-3
+    slip: float = 1e-3
+
+    def __post_init__(self) -> None:
+        check_number("edge", "zone", self.zone, 1e-5, 0.05, "m")
+        check_number("edge", "slip", self.slip, 1e-5, 0.05, "m")
+
+
+@dataclass(frozen=True)
+class Numerics:
+    """How the scene is discretised.
+
+    Attributes:
+        dx: Cell size [m].
+        ppc: Particles per cell and direction, at least 2.
+        far: Distance from the cut plane beyond which there is one particle a cell across the blade, and within the food one a cell
+            altogether [m]; None: nowhere. Only the outline needs as many there as elsewhere.
+        contact: ``cohesive`` (edge law and particle contact) or ``nodal`` (the plain projection of grid velocities).
+        grid_shift: Position of the grid against the scene along x, y, z [cells].
+        grid_turn: Angle of food and blade against the grid [rad].
+        mirror: Use the mirror planes x = 0 and y = 0 where they are mirrors of the grid.
+        room: Empty grid on either side of the food, for it to widen in while it is pressed, part of half its size, and above it
+            for the ends of halves that tip, part of half its length across the blade.
+        seed: Seed of the particle positions.
+        safety: dt over the stability limit of a lone particle [-].
+        gravity: Acceleration of gravity [m/s^2].
+        output: Stroke between two rows of the record [m].
+        precision: ``f64`` or ``f32`` state.
+    """
+
+    dx: float = 2.5e-3
+    ppc: int = 2
+    far: float | None = None
+    contact: str = "cohesive"
+    grid_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    grid_turn: float = 0.0
+    mirror: bool = True
+    room: float = 0.5
+    seed: int = 0
+    safety: float = 0.7
+    gravity: float = 9.81
+    output: float = 0.25e-3
+    precision: str = "f64"
+
+    def __post_init__(self) -> None:
+        w = "numerics"
+        check_number(w, "dx", self.dx, 1e-5, 0.05, "m")
+        check_number(w, "ppc", self.ppc, 0.5, 8.5, "")
+        if self.ppc < 2:
+            raise SceneError(
+                "numerics: ppc 1: one particle a cell does not integrate the grid's functions, and where a cut starts energy "
+                "comes from nothing; use 2 (8 particles a cell) or 3"
+            )
+        if self.far is not None:
+            check_number(w, "far", self.far, 0.0, 1.0, "m")
+        check_number(w, "room", self.room, 0.0, 100.0, "of half the food's size")
+        check_number(w, "safety", self.safety, 0.0, 0.9001, "of the stability limit")
+        check_number(w, "output", self.output, 0.0, 0.1, "m")
+        if self.contact not in CONTACTS:
+            raise SceneError(f"numerics: contact {self.contact!r} is not one of {', '.join(CONTACTS)}")
+        if self.precision not in PRECISIONS:
+            raise SceneError(f"numerics: precision {self.precision!r} is not one of {', '.join(PRECISIONS)}")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything that determines one cut."""
+
+    food: Food
+    knife: Knife | Press
+    motion: Motion
+    board: Board = field(default_factory=Board)
+    edge: EdgeLaw = field(default_factory=EdgeLaw)
+    numerics: Numerics = field(default_factory=Numerics)
+    arm: Arm = field(default_factory=Arm)
+
+    def __post_init__(self) -> None:
+        dx, shape = self.numerics.dx, self.food.shape
+        if self.cuts and self.numerics.contact == "cohesive" and self.edge.zone < dx * (1 - 1e-9):
+            raise SceneError(
+                f"edge: process zone {self.edge.zone * 1e3:g} mm is narrower than the cell {dx * 1e3:g} mm, so the edge "
+                f"would fall between nodes; use dx <= {self.edge.zone * 1e3:g} mm"
+            )
+        thin = min(shape.length, shape.width, shape.height)
+        if thin < 4 * dx:
+            raise SceneError(f"shape: {thin * 1e3:g} mm is under 4 cells of {dx * 1e3:g} mm; use a smaller dx")
+        least = shape.length / 2 - abs(shape.cut)
+        if shape.cut != 0 and least < 2 * dx:
+            raise SceneError(
+                f"shape: the blade at {shape.cut * 1e3:g} mm from the middle leaves a slice of {least * 1e3:.3g} mm, under 2 cells of "
+                f"{dx * 1e3:g} mm; cut nearer to the middle or use a smaller dx"
+            )
+        self._check_motion()
+        self._check_band()
+
+    @property
+    def cuts(self) -> bool:
+        """Whether the tool is a knife."""
+        return isinstance(self.knife, Knife)
+
+    @property
+    def drop(self) -> float:
+        """How much lower than its middle the tilted edge gets over the food [m]."""
+        return self.lowered(self.motion.tilt)
+
+    def lowered(self, tilt: float, aside: float = 0.0) -> float:
+        """The same of an edge at another angle to the board [rad], whose middle is so far along the blade from the food's [m]."""
+        if not isinstance(self.knife, Knife):
+            return 0.0
+        reach = min(self.food.shape.width / 2 + abs(aside), self.knife.length / 2 * math.cos(tilt))
+        return reach * math.tan(abs(tilt))
+
+    @property
+    def time_scale(self) -> float:
+        """Simulated over real speed of the knife [-]; 1 when the real speed does not matter."""
+        speed = self.motion.speed
+        return 1.0 if speed is None else self.motion.mach * self.food.material.p_wave / speed
+
+    def _check_motion(self) -> None:
+        m, height = self.motion, self.food.shape.height
+        if not self.cuts and (m.tilt != 0 or self.numerics.contact != "cohesive"):
+            raise SceneError(
+                "knife: a press is level and touches particles; leave out motion.tilt and numerics.contact"
+            )
+        if m.stroke + self.drop > height * (1 + 1e-9) and (self.arm.rigid or m.tilt != 0):
+            raise SceneError(
+                f"motion: stroke {m.stroke * 1e3:g} mm goes below the board; the food is {height * 1e3:g} mm high"
+                + (f" and the tilted edge reaches {self.drop * 1e3:.1f} mm lower than its middle" if m.tilt else "")
+            )
+        if self.food.material.rate_dependent and m.speed is None:
+            raise SceneError(
+                "material: prony makes the force depend on the real speed of the knife, and speeding the simulation up "
+                "would change it; give motion.speed [m/s]"
+            )
+
+    def _check_band(self) -> None:
+        m = self.food.material
+        if m.tensile_strength is None or m.fracture_energy is None:
+            return
+        band = BAND_CELLS * self.numerics.dx
+        limit = 2 * m.E * m.fracture_energy / m.tensile_strength**2
+        if band >= limit:
+            raise SceneError(
+                f"bulk damage would snap back (Bazant and Oh 1983): the crack band of {band * 1e3:g} mm must stay below "
+                f"2 E Gf / sigma_t^2 = {limit * 1e3:.3g} mm; use dx < {limit / BAND_CELLS * 1e3:.3g} mm"
+            )
+
+    @property
+    def mirrors(self) -> tuple[bool, bool]:
+        """Whether the planes x = 0 and y = 0 are used as mirrors: only where the motion allows and they mirror the grid.
+
+        They do with nodes on them, and x = 0 also half-way between nodes.
+        """
+        sx, sy, _ = self.numerics.grid_shift
+        cohesive = self.numerics.contact == "cohesive"
+        on = self.numerics.mirror and self.numerics.grid_turn == 0
+        straight = self.motion.slice_ratio == 0 and self.motion.tilt == 0
+        even = self.food.shape.cut == 0
+        return on and straight and float(2 * sx).is_integer(), on and cohesive and even and float(sy).is_integer()
+
+    @property
+    def mirrored_between(self) -> bool:
+        """Whether x = 0 is a mirror that lies half-way between nodes."""
+        return self.mirrors[0] and not float(self.numerics.grid_shift[0]).is_integer()
+
+    def with_material(self, **values: Any) -> Scene:
+        """The same scene with other material constants."""
+        return replace(self, food=replace(self.food, material=replace(self.food.material, **values)))
+
+    def as_dict(self) -> dict[str, Any]:
+        """All numbers of the scene as plain data, for provenance and for the key of a stored run."""
+        return asdict(self)
+
+
+BAND_CELLS = (
+    2.5  # width of a crack band of grid-smoothed damage, in cells (measured: dissipation within 15 % over dx x 4)
+)

@@ -1,0 +1,188 @@
+"""Outlines of foods: inside test, volume, and the top and bottom surface. Plain NumPy."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from mpm.scene.errors import SceneError, check_number
+
+SHAPE_KINDS = (
+    "block",
+    "cylinder",
+    "half_cylinder",
+    "upright_cylinder",
+    "sphere",
+    "hemisphere",
+    "ellipsoid",
+    "capsule",
+)
+_FLAT_DOWN = ("half_cylinder", "hemisphere")
+FLAT_TOP = ("block", "upright_cylinder")
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Outline of the food, standing on z = 0 with the plane of the blade at y = 0.
+
+    A cylinder lies along y, an upright one stands on its end.
+
+    Attributes: kind; length along y, width along x, height along z [m]; cut, place of the blade along y from the food's middle [m].
+    """
+
+    kind: str
+    length: float
+    width: float
+    height: float
+    cut: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.kind not in SHAPE_KINDS:
+            raise SceneError(f"shape: unknown kind {self.kind!r}; one of {', '.join(SHAPE_KINDS)}")
+        for name in ("length", "width", "height"):
+            check_number("shape", name, getattr(self, name), 1e-3, 1.0, "m")
+        if not abs(self.cut) < self.length / 2:
+            raise SceneError(
+                f"shape: the blade at {self.cut * 1e3:g} mm from the middle misses a food {self.length * 1e3:g} mm long"
+            )
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Where the food begins and ends along y [m], the blade being at 0."""
+        return -self.length / 2 - self.cut, self.length / 2 - self.cut
+
+
+def _radius2(shape: Shape, x: np.ndarray, y: np.ndarray, thinner: float = 0.0) -> np.ndarray:
+    """Squared distance from the vertical axis (or plane) in units of the outline, or of one ``thinner`` [m] on all sides: 1 on the rim [-]."""
+    a, b = (max(size / 2 - thinner, 5e-10) for size in (shape.width, shape.length))
+    y = y + shape.cut
+    if shape.kind in ("cylinder", "half_cylinder"):
+        return np.where(np.abs(y) <= b, (x / a) ** 2, np.inf)
+    if shape.kind == "capsule":
+        cap = min(a, b)
+        return (x / a) ** 2 + (np.maximum(np.abs(y) - (b - cap), 0.0) / cap) ** 2
+    return (x / a) ** 2 + (y / b) ** 2
+
+
+def half_width(shape: Shape, y: float) -> float:
+    """Half of the width of the section at y [m], 0 where there is none."""
+    if shape.kind == "block":
+        return shape.width / 2 if abs(y + shape.cut) <= shape.length / 2 else 0.0
+    r2 = float(_radius2(shape, np.zeros(1), np.array([y]))[0])
+    return shape.width / 2 * math.sqrt(max(1.0 - r2, 0.0))
+
+
+def surface(shape: Shape, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Height of the lower and upper surface over points (x, y).
+
+    Args:
+        shape: The outline.
+        x: Positions along the blade [m], any shape.
+        y: Positions across the blade [m], same shape.
+
+    Returns:
+        ``(bottom, top)`` [m], NaN where there is no food above the point.
+    """
+    x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+    if shape.kind == "block":
+        inside = (np.abs(x) <= shape.width / 2) & (np.abs(y + shape.cut) <= shape.length / 2)
+        return np.where(inside, 0.0, np.nan), np.where(inside, shape.height, np.nan)
+    r2 = _radius2(shape, x, y)
+    if shape.kind == "upright_cylinder":
+        return np.where(r2 <= 1, 0.0, np.nan), np.where(r2 <= 1, shape.height, np.nan)
+    rise = np.sqrt(np.where(r2 <= 1, 1 - r2, np.nan))
+    if shape.kind in _FLAT_DOWN:
+        return 0.0 * rise, shape.height * rise
+    half = shape.height / 2
+    return half * (1 - rise), half * (1 + rise)
+
+
+def inside(shape: Shape, points: np.ndarray) -> np.ndarray:
+    """Which points lie in the food. Args: points [m], shape (n, 3). Returns: bool, shape (n,)."""
+    bottom, top = surface(shape, points[:, 0], points[:, 1])
+    with np.errstate(invalid="ignore"):
+        return (points[:, 2] >= bottom) & (points[:, 2] <= top)
+
+
+def volume(shape: Shape) -> float:
+    """Volume of the food [m^3], closed form."""
+    box = shape.length * shape.width * shape.height
+    if shape.kind == "block":
+        return box
+    if shape.kind in ("cylinder", "half_cylinder", "upright_cylinder"):
+        return math.pi / 4 * box
+    if shape.kind == "capsule":
+        cap = min(shape.width, shape.length) / 2
+        section = math.pi / 4 * shape.width * shape.height
+        return section * (shape.length - 2 * cap) + section * 4 / 3 * cap
+    return math.pi / 6 * box
+
+
+def section_area(shape: Shape) -> float:
+    """Area of the section in the blade plane y = 0 [m^2]: what a complete cut severs."""
+    width = 2 * half_width(shape, 0.0)
+    if shape.kind in FLAT_TOP:
+        return width * shape.height
+    return math.pi / 4 * width * shape.height * (width / shape.width)
+
+
+def skin_path(shape: Shape, x: np.ndarray, thickness: float) -> np.ndarray:
+    """Vertical way of the edge through the upper skin in the blade plane.
+
+    The skin is the layer between the outline and the outline shrunk by its thickness, so the way grows towards the
+    flanks, where the edge meets the skin at a slant, up to the whole height where only skin is left.
+
+    Args:
+        shape: The outline.
+        x: Positions along the blade [m], shape (n,).
+        thickness: Skin thickness [m].
+
+    Returns:
+        Way through the skin [m], shape (n,), 0 where there is no food.
+    """
+    x = np.asarray(x, float)
+    bottom, top = surface(shape, x, np.zeros_like(x))
+    inner_width = max(shape.width - 2 * thickness, 1e-9)
+    r2 = _radius2(shape, x, np.zeros_like(x), thickness)
+    lift = 0.0 if shape.kind in (*_FLAT_DOWN, *FLAT_TOP) else thickness
+    inner_height = max(shape.height - thickness - lift, 1e-9)
+    if shape.kind in FLAT_TOP:
+        inner_top = np.where(np.abs(x) <= inner_width / 2, inner_height, bottom)
+    else:
+        rise = np.sqrt(np.maximum(1 - r2, 0.0))
+        inner_top = inner_height * rise if shape.kind in _FLAT_DOWN else shape.height / 2 + inner_height / 2 * rise
+        inner_top = np.where(r2 <= 1, inner_top, bottom)
+    return np.nan_to_num(np.maximum(top - inner_top, 0.0))
+
+
+SLICE_SAMPLES = 64
+"""Points at which a slice's outline is looked up: an even number, so that none lies where the rim of a food of whole or half cells does.
+There the last bit would decide whether it counts, and with it 1.8 % of a strawberry's peak."""
+
+
+def slices(shape: Shape, x: np.ndarray, dx: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Outline in the blade plane, slice by slice.
+
+    Args:
+        shape: The outline.
+        x: Middle of each slice [m], shape (n,).
+        dx: Width of a slice [m].
+
+    Returns:
+        Highest and lowest height of the upper surface over each slice [m], the part of the slice that has food [-], and
+        the highest and lowest height of the lower surface [m], each of shape (n,); a slice without food is 0 high and
+        has the part 0. The highest is above the lowest.
+    """
+    offsets = (np.arange(SLICE_SAMPLES) + 0.5) / SLICE_SAMPLES - 0.5
+    points = x[:, None] + dx * offsets
+    bottom, top = surface(shape, points, np.zeros_like(points))
+    there = np.isfinite(top)
+    some = there.any(axis=1)
+    out = []
+    for heights in (top, bottom):
+        high = np.where(some, np.where(there, heights, -np.inf).max(axis=1), 0.0)
+        low = np.where(some, np.where(there, heights, np.inf).min(axis=1), 0.0)
+        out += [high, np.minimum(low, high - 1e-6 * dx)]
+    return out[0], out[1], there.mean(axis=1), out[2], out[3]
