@@ -256,8 +256,8 @@ class StudyResult:
         hold_out: Cuts that no fit has seen, and what was predicted of them, by name.
         traces: Cuts that were fitted together, in-sample, by name.
         parameters: Fitted parameters; one that a specimen has for itself is NAME@CUT.
-        reduced_chi2: Chi-square of the residuals over their number, correlation considered; null where the fit ended too
-            early.
+        reduced_chi2: Chi-square of the residuals over their number, correlation considered; null where the fit ended
+            too early.
         failed_simulations: Simulations of the joint search that broke down.
         limits: What the result does not show, one sentence each.
         presses: Compression tests of the study, by name.

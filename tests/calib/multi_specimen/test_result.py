@@ -13,7 +13,7 @@ LOCAL = "#/$defs/"
 
 
 def whole(schema: Any, parts: dict[str, Any]) -> Any:
-    """The schema with its own parts where they are referred to, and the keys that are required in alphabetical order."""
+    """The schema with its own parts where they are referred to, and required keys in alphabetical order."""
     if isinstance(schema, dict):
         if schema.get("$ref", "").startswith(LOCAL):
             return whole(parts[schema["$ref"].removeprefix(LOCAL)], parts)
