@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
 from calib.compression.measured import read_repeats, strain_grid
 from calib.compression.modulus import fit_modulus
 from calib.compression.press import homogeneous
+from calib.io.type_schema import Count, NotNegative, Positive, Shared
 from calib.multi_specimen.spec import CompressionSpec
 from calib.problem.parameters import Z95, ParameterSet
 from mpm.scene.shapes import Shape
@@ -22,24 +24,41 @@ frictionless plates and bonded ones (docs/compression.md)."""
 
 
 @dataclass(frozen=True)
-class CompressionModulus:
-    """Young's modulus from a compression test.
+class CompressionFile:
+    """One file.
 
     Attributes:
-        name: Its name in the study.
-        E: Young's modulus, mean of the repeats [Pa].
-        spread: Its relative standard deviation [-]: that of the repeats, and what is not known of the plates.
-        repeats: Number of repeats.
-        nu: Poisson's ratio that was assumed [-].
-        files: The files, each with its hash and columns.
+        name: Name of the file.
+        sha256: SHA-256 of a file's content.
+        compression: Column of the compression.
+        force: Column of the load.
     """
 
     name: str
-    E: float
-    spread: float
-    repeats: int
+    sha256: Annotated[str, Shared("sha256")]
+    compression: str
+    force: str
+
+
+@dataclass(frozen=True)
+class CompressionModulus:
+    """One of them.
+
+    Attributes:
+        name: Its name.
+        E: Young's modulus [Pa].
+        spread: Its relative standard deviation.
+        repeats: Number of repeats.
+        nu: Poisson's ratio that was assumed.
+        files: Files it is from.
+    """
+
+    name: str
+    E: Positive
+    spread: NotNegative
+    repeats: Count
     nu: float
-    files: tuple[Mapping[str, str], ...]
+    files: tuple[CompressionFile, ...]
 
 
 def compression_modulus(spec: CompressionSpec) -> CompressionModulus:
@@ -56,9 +75,8 @@ def compression_modulus(spec: CompressionSpec) -> CompressionModulus:
     grid = strain_grid(COMPRESSION_STRAIN)
     found = fit_modulus(measured, homogeneous(spec.nu, grid))
     spread = float(np.hypot(found.sd / found.mean if len(found.E) > 1 else 0.0, PLATES_SD))
-    return CompressionModulus(
-        spec.name, found.mean, spread, len(found.E), spec.nu, tuple(asdict(f) for f in measured.files)
-    )
+    files = tuple(CompressionFile(**asdict(file)) for file in measured.files)
+    return CompressionModulus(spec.name, found.mean, spread, len(found.E), spec.nu, files)
 
 
 def with_measured_modulus(parameters: ParameterSet, tests: Sequence[CompressionModulus]) -> ParameterSet:

@@ -8,10 +8,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 from calib.io.folder import write_json
 from calib.io.provenance import Invocation, Software
+from calib.io.type_schema import Count, Fraction, NotNegative, Positive, Shared, keywords, one_of
 from calib.io.typed_document import FLAT, read_document, to_document
 from calib.material.properties import Property
 from calib.multi_specimen.compression_modulus import CompressionModulus
@@ -30,20 +31,23 @@ from mpm.scene.shapes import Shape
 
 SUMMARY = "summary.json"
 
+Sha256 = Annotated[str, Shared("sha256")]
+Rating = Annotated[float, keywords(minimum=0, maximum=1)]
+
 
 @dataclass(frozen=True)
 class CutSource:
-    """The record of a cut.
+    """The record.
 
     Attributes:
         source: Name of the file.
-        sha256: SHA-256 of its content.
-        label: Whether it was measured or reconstructed from published figures.
+        sha256: SHA-256 of a file's content.
+        label: Whether the record was measured or reconstructed from published figures.
     """
 
     source: str
-    sha256: str
-    label: str
+    sha256: Sha256
+    label: Annotated[str, one_of("measured", "reconstructed")]
 
     @classmethod
     def of(cls, setup: Setup) -> CutSource:
@@ -54,67 +58,84 @@ class CutSource:
 
 @dataclass(frozen=True)
 class InSampleNull:
-    """A null model beside a fitted cut: rating and curve error [-]."""
+    """A null model against the trace.
 
-    R: float
-    nrmse: float
+    Attributes:
+        R: Overall rating in the style of ISO/TS 18571; 1 is perfect.
+        nrmse: Root mean square difference over the measured peak, a fraction.
+    """
+
+    R: Rating
+    nrmse: NotNegative
 
 
 @dataclass(frozen=True)
 class HeldOutNull:
-    """A null model beside a held-out cut: curve error, shape error and rating [-]."""
+    """A null model against the trace.
 
-    nrmse: float
-    shape_error: float
-    R: float
+    Attributes:
+        nrmse: Root mean square difference over the measured peak, a fraction.
+        shape_error: The same with each curve over its own peak, a fraction.
+        R: Overall rating in the style of ISO/TS 18571; 1 is perfect.
+    """
+
+    nrmse: NotNegative
+    shape_error: NotNegative
+    R: Rating
 
 
 @dataclass(frozen=True)
 class HeldOutLimits:
-    """What a prediction has to reach: largest curve error, least rating, least part within the band [-]."""
+    """Limits of passing.
 
-    nrmse: float = PREDICTION_NRMSE_LIMIT
-    rating: float = PREDICTION_RATING_LIMIT
-    inside: float = INSIDE_LIMIT
+    Attributes:
+        nrmse: Largest curve error.
+        rating: Least rating R.
+        inside: Least part within the band.
+    """
+
+    nrmse: Positive = PREDICTION_NRMSE_LIMIT
+    rating: Positive = PREDICTION_RATING_LIMIT
+    inside: Positive = INSIDE_LIMIT
 
 
 @dataclass(frozen=True)
 class InSampleCut:
-    """A cut that was fitted with the others.
+    """A cut that was fitted.
 
     Attributes:
         trace: The record.
         in_sample: That the figures are of a cut that was fitted.
         passed: Whether no line of its verdict failed.
         verdicts: Lines of its verdict.
-        metrics: The simulated against the measured curve.
-        factor: Factor on the simulated force, for width and gain of this specimen [-].
+        metrics: A simulated curve against a measured one over the stroke.
+        factor: Factor on the simulated force, for width and gain of this specimen.
         nuisances: What the fit says of the measurement, by name.
-        predictive_inside: Part of the measured points within the 95 % band [-]; None where the fit ended too early.
+        predictive_inside: Part of the measured points within the 95 % band; null where the fit ended too early.
         null_models: Curves that explain nothing, by name.
         numerical_checks: What numerical choices change.
         scalars: Numbers of the best simulation, names with units.
         values: Values of the best simulation [SI], by name.
         dx_m: Cell of the grid [m].
-        shape: The specimen.
-        knife: The blade.
+        shape: Specimen as it was simulated.
+        knife: Knife as it was simulated.
     """
 
     trace: CutSource
-    in_sample: bool
+    in_sample: Annotated[bool, keywords(const=True)]
     passed: bool
-    verdicts: tuple[Verdict, ...]
-    metrics: Metrics
-    factor: float
-    nuisances: Mapping[str, FittedNuisance]
-    predictive_inside: float | None
+    verdicts: Annotated[tuple[Annotated[Verdict, Shared("verdict")], ...], keywords(minItems=1)]
+    metrics: Annotated[Metrics, Shared("metrics")]
+    factor: Positive
+    nuisances: Mapping[str, Annotated[FittedNuisance, Shared("nuisance")]]
+    predictive_inside: Fraction | None
     null_models: Mapping[str, InSampleNull]
-    numerical_checks: tuple[Check, ...]
+    numerical_checks: tuple[Annotated[Check, Shared("check")], ...]
     scalars: Mapping[str, float]
     values: Mapping[str, float]
-    dx_m: float
-    shape: Shape
-    knife: Knife
+    dx_m: Positive
+    shape: Annotated[Shape, Shared("shape")]
+    knife: Annotated[Knife, Shared("knife")]
 
     @classmethod
     def of(cls, cut: FittedCut) -> InSampleCut:
@@ -142,35 +163,35 @@ class InSampleCut:
 
 @dataclass(frozen=True)
 class HeldOutCut:
-    """A cut that no fit has seen, and what was predicted of it.
+    """A held-out cut.
 
     Attributes:
         trace: The record.
         trained_on: Cuts whose flesh it is predicted with.
         passed: Whether curve, rating, band and balances are within their limits.
-        metrics: The predicted against the measured curve.
-        factor: Factor on the predicted force, for width and gain of this specimen [-].
+        metrics: A simulated curve against a measured one over the stroke.
+        factor: Factor on the simulated force, for width and gain of this specimen: fitted to this cut.
         fitted: What the specimen has for itself [SI], fitted to this cut, by name.
-        predictive_inside: Part of the measured points within the 95 % band [-].
+        predictive_inside: Part of the measured points within the 95 % band.
         limits: Limits of passing.
         null_models: Curves that explain nothing, by name; one is the mean of the others.
-        beats: Null models that the prediction beats in both rating and shape.
-        simulations: Number of simulations.
-        verdicts: Lines of the balances of the predicted cut.
+        beats: Null models that it beats in rating and shape.
+        simulations: Simulations it took.
+        verdicts: Lines of its balances.
     """
 
     trace: CutSource
     trained_on: tuple[str, ...]
     passed: bool
-    metrics: Metrics
-    factor: float
+    metrics: Annotated[Metrics, Shared("metrics")]
+    factor: Positive
     fitted: Mapping[str, float]
-    predictive_inside: float
+    predictive_inside: Fraction
     limits: HeldOutLimits
     null_models: Mapping[str, HeldOutNull]
     beats: tuple[str, ...]
-    simulations: int
-    verdicts: tuple[Verdict, ...]
+    simulations: Count
+    verdicts: tuple[Annotated[Verdict, Shared("verdict")], ...]
 
     @classmethod
     def of(cls, found: HeldOutPrediction, setup: Setup) -> HeldOutCut:
@@ -218,24 +239,28 @@ class StudyParameter(FittedParameter):
 
 @dataclass(frozen=True)
 class StudyResult:
-    """A study of several cuts.
+    """A calibration on several cuts.
+
+    ``summary.json`` of ``calibrate --config``, and what ``calibrate --config --json`` prints.
 
     Attributes:
-        food: Food of ``materials.yaml``, or of the file given.
+        food: Food of materials.yaml, or of the file given.
         study: File of the study.
         created: When it was made, ISO 8601 with the time zone.
-        status: ``done``.
-        search: How the search of the final fit ended.
+        status: That the run came to its end.
+        search: How the search ended: no gain in sight; gains promised, none realised; budget spent; stopped by Ctrl-C.
         passed: Whether every fitted and every held-out cut passed.
-        held_out: Names of the cuts under ``hold_out``.
-        scatter: Standard deviation of the logarithm of each property of the flesh among specimens [-].
-        hold_out: Cuts that no fit has seen, by name.
-        traces: Cuts that were fitted together, by name.
+        held_out: Names of the cuts under hold_out.
+        scatter: Standard deviation of the logarithm of each property of the flesh among specimens, in the bands of
+            held-out cuts.
+        hold_out: Cuts that no fit has seen, and what was predicted of them, by name.
+        traces: Cuts that were fitted together, in-sample, by name.
         parameters: Fitted parameters; one that a specimen has for itself is NAME@CUT.
-        reduced_chi2: Chi-square of the residuals over their number [-]; None where the fit ended too early.
-        failed_simulations: Simulations of the final fit that broke down.
-        limits: What the study does not show, one sentence each.
-        presses: Compression tests, by name.
+        reduced_chi2: Chi-square of the residuals over their number, correlation considered; null where the fit ended
+            too early.
+        failed_simulations: Simulations of the joint search that broke down.
+        limits: What the result does not show, one sentence each.
+        presses: Compression tests of the study, by name.
         warnings: What a reader of the numbers must know about the input, one sentence each.
         simulations: All simulations that are stored.
         wall_s: Run time [s].
@@ -247,22 +272,22 @@ class StudyResult:
 
     food: str
     study: str
-    created: str
-    status: str
-    search: str
+    created: Annotated[str, Shared("created")]
+    status: Annotated[str, one_of("done")]
+    search: Annotated[str, one_of("converged", "stalled", "budget", "interrupted")]
     passed: bool
     held_out: tuple[str, ...]
-    scatter: float
+    scatter: NotNegative
     hold_out: Mapping[str, HeldOutCut]
-    traces: Mapping[str, InSampleCut]
-    parameters: Mapping[str, StudyParameter]
+    traces: Annotated[Mapping[str, InSampleCut], keywords(minProperties=1)]
+    parameters: Annotated[Mapping[str, Annotated[StudyParameter, Shared("parameter")]], keywords(minProperties=1)]
     reduced_chi2: float | None
-    failed_simulations: int
-    limits: tuple[str, ...]
+    failed_simulations: Count
+    limits: Annotated[tuple[str, ...], Shared("limits")]
     presses: Mapping[str, CompressionModulus]
-    warnings: tuple[str, ...]
-    simulations: int
-    wall_s: float
+    warnings: Annotated[tuple[str, ...], Shared("warnings")]
+    simulations: Count
+    wall_s: NotNegative
     invocation: Invocation = field(metadata=FLAT)
     software: Software = field(metadata=FLAT)
 

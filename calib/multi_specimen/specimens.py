@@ -115,7 +115,7 @@ class Specimens:
         evaluators = Evaluators(
             JointEvaluator(objective, [e.fine for e in each]),
             JointEvaluator(objective, [e.coarse for e in each]),
-            JointEvaluator(objective, [e.repeat for e in each]),
+            JointEvaluator(objective, [e.replicate for e in each]),
         )
         options = FitOptions(budget=self.study.budget, batch=self.pool.batch, seed=self.study.seed)
         listener = Listener(self.staged(f"fit of {', '.join(names)}"), self.say)
