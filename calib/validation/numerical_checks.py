@@ -29,7 +29,7 @@ VARIANTS: Mapping[str, Callable[[Scene], Scene]] = {
     "grid and particles elsewhere": lambda scene: elsewhere(scene, 1),
     FINER_GRID: _finer,
 }
-"""What should not matter, by name. The order of convergence, and an uncertainty, are the business of a convergence study."""
+"""What should not matter, by name. Order of convergence and uncertainty are the business of a convergence study."""
 VARIED = "at half the speed, with the grid and the particles elsewhere, and on cells of two thirds"
 
 
@@ -90,6 +90,9 @@ def check(scene: Scene, own: Evaluation, store: EvaluationStore, stroke: float) 
         own: Its simulation.
         store: Where :func:`check_errands` were kept.
         stroke: What the trace has of the stroke [m].
+
+    Returns:
+        A check for each variant.
 
     Raises:
         KeyError: They were not made.
