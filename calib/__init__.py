@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 from calib._version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from calib.api import Calibration
+    from calib.api import Calibration, Study
     from calib.material.food import FoodSpec as Food
-    from calib.multi_specimen.study_file import Study
     from calib.trace.trace import Trace
 
 __all__ = ["Calibration", "Food", "Study", "Trace"]
@@ -22,7 +21,7 @@ __all__ = ["Calibration", "Food", "Study", "Trace"]
 _PLACES = {
     "Calibration": ("calib.api", "Calibration"),
     "Food": ("calib.material.food", "FoodSpec"),
-    "Study": ("calib.multi_specimen.study_file", "Study"),
+    "Study": ("calib.api", "Study"),
     "Trace": ("calib.trace.trace", "Trace"),
 }
 

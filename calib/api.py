@@ -1,4 +1,4 @@
-"""Calibrating from Python as from the command line: a request in plain values, and what a finished folder holds."""
+"""Calibrating from Python as from the command line: one trace, what a finished folder holds, and several cuts."""
 
 from __future__ import annotations
 
@@ -14,10 +14,14 @@ import pandas as pd
 from calib.calibration.result import SUMMARY, read_result, read_summary
 from calib.calibration.result import CalibrationResult as CalibrationResult
 from calib.errors import OutputError
+from calib.io.folder import finite
 from calib.io.progress import Progress
+from calib.io.typed_document import to_document
 from calib.io.wording import brief
 from calib.material.food import FoodSpec
 from calib.material.scene import MIDDLE, Sizing
+from calib.multi_specimen.spec import StudySpec
+from calib.multi_specimen.study_file import read_study
 from calib.problem.request import Request
 from calib.trace.trace import Trace, read_trace
 from mpm.errors import CutcalError, check_number
@@ -182,6 +186,57 @@ class Calibration:
             elif value != item.default:
                 words.append(f"{item.name}={str(value) if isinstance(value, Path) else value!r}")
         return f"Calibration({', '.join(words)})"
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Several cuts of one food, with what they share and what is held out; :meth:`run` fits and predicts them.
+
+    Attributes:
+        spec: What the file of the study says.
+    """
+
+    spec: StudySpec
+
+    @staticmethod
+    def read(path: str | Path) -> Study:
+        """The study of a YAML file, as ``calibrate --config`` takes it.
+
+        Raises:
+            CutcalError: Anything wrong with the file; the message names the place in it.
+        """
+        return Study(read_study(path))
+
+    def run(
+        self,
+        out: str | Path,
+        *,
+        workers: int = 2,
+        resume: bool = False,
+        progress: Callable[[Progress], None] | None = None,
+        say: Callable[[str], None] | None = None,
+    ) -> dict[str, Any]:
+        """Fit and predict, and write what ``calibrate --config`` writes.
+
+        Args:
+            out: Output folder, which is made and never overwritten.
+            workers: Simulations at a time.
+            resume: Go on with the study in ``out``; nothing is simulated twice.
+            progress: Called after each simulation.
+            say: Called with each warning and stage, as one sentence.
+
+        Returns:
+            The content of ``summary.json``.
+
+        Raises:
+            CutcalError: Anything wrong with the input; nothing that was computed is lost.
+        """
+        from calib.multi_specimen.run import run
+        from calib.simulation.process_pool import Pool
+
+        with script_hidden(), Pool(workers, self.spec.first.arch) as pool:
+            result = run(self.spec, Path(out), pool, resume=resume, progress=progress, say=say)
+        return dict(finite(to_document(result)))
 
 
 def _record(given: str | Path | Trace | pd.DataFrame) -> Trace:

@@ -1,8 +1,8 @@
 """One calibration from files to files. The command line is a thin layer over it.
 
-:func:`run` conditions the trace and decides the problem (:mod:`calib.problem.setup`), fits and quantifies the uncertainty of
-the fit (:mod:`calib.uncertainty.global_search`), repeats the best values for their whole record and the numerical
-checks, judges, and writes.
+:func:`run` conditions the trace and decides the problem (:mod:`calib.problem.setup`), fits and quantifies the
+uncertainty of the fit (:mod:`calib.uncertainty.global_search`), repeats the best values for their whole record and the
+numerical checks, judges, and writes.
 """
 
 from __future__ import annotations
@@ -85,8 +85,8 @@ def run(
 class _Calibration:
     """A calibration while its simulations run.
 
-    Attributes: what was decided; where the simulations run and where they are kept; the output folder; and who is told of
-    each stage.
+    Attributes: what was decided; where the simulations run and where they are kept; the output folder; and who is told
+    of each stage.
     """
 
     setup: Setup

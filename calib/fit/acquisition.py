@@ -1,8 +1,8 @@
 """Which points are worth a simulation: acquisition on the surrogate of a search.
 
-What is minimised is the *expected* chi-square of a point: that of the expected curves, and what not knowing the curves adds
-to it, times a weight. A weight of 1 is the expectation. Less of it gives a promising point that is little known a chance
-(composite objectives: Astudillo & Frazier 2019, Proc. ICML 97).
+What is minimised is the *expected* chi-square of a point: that of the expected curves, and what not knowing the curves
+adds to it, times a weight. A weight of 1 is the expectation. Less of it gives a promising point that is little known a
+chance (composite objectives: Astudillo & Frazier 2019, Proc. ICML 97).
 """
 
 from __future__ import annotations
@@ -16,20 +16,21 @@ from calib.fit.surrogate import Surrogate
 from calib.problem.scored_run import ScoredRun
 from mpm.arrays import FloatArray
 
-#: Points are rounded to this part of a coordinate unit (0.1 % of a log parameter) [-]: far below the noise of a run, and a
-#: resumed fit asks for exactly the points that are in the store.
+#: Points are rounded to this part of a coordinate unit (0.1 % of a log parameter) [-]: far below the noise of a run,
+#: and a resumed fit asks for exactly the points that are in the store.
 LATTICE = 1e-3
 #: The surrogate is trusted this far from the best point [coordinate units]: a factor e of a log parameter.
 TRUST_RADIUS = 1.0
-#: Weight of not knowing the curves in the expected chi-square [-]: near the best point, where it is the expectation; far from
-#: it, for the sake of promising basins; and for a second fine run beside the most promising one, nearly the surrogate's word.
+#: Weight of not knowing the curves in the expected chi-square [-]: near the best point, where it is the expectation;
+#: far from it, for the sake of promising basins; and for a second fine run beside the most promising one, nearly the
+#: surrogate's word.
 LOCAL_WEIGHT, GLOBAL_WEIGHT, GREEDY_WEIGHT = 1.0, 0.3, 0.1
 #: Random points from which, besides all runs, the most promising one is sought, and how many of them all are followed
 #: (docs/theory.md, "Measured choices").
 GLOBAL_STARTS, GLOBAL_DESCENTS = 100, 5
 #: Probes are drawn from the normal approximation of the posterior, this much wider, and may cost this much more in
-#: chi-square than the best run: about a 90 % region of one parameter, where curvature matters for the intervals. The last
-#: number is how many are drawn (docs/theory.md, "Measured choices").
+#: chi-square than the best run: about a 90 % region of one parameter, where curvature matters for the intervals. The
+#: last number is how many are drawn (docs/theory.md, "Measured choices").
 PROBE_SPREAD, PROBE_COST, PROBES = 1.5, 3.0, 200
 
 

@@ -11,8 +11,8 @@ from calib.io.progress import Progress
 from calib.problem.scored_run import ScoredRun
 
 COARSE_TIME = 0.09
-"""Time of a coarse run over that of a default one [-] (docs/theory.md, "Measured choices"). The budget counts it as more
-(``FitOptions.coarse_cost``)."""
+"""Time of a coarse run over that of a default one [-] (docs/theory.md, "Measured choices"). The budget counts it as
+more (``FitOptions.coarse_cost``)."""
 
 
 def longest_time_left(runs: Sequence[ScoredRun], rest: float, options: FitOptions) -> float:

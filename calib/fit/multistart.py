@@ -1,10 +1,10 @@
 """A multi-start search (:mod:`calib.fit.search`), and the choice of the answer among its runs.
 
-The best run ever made is returned, not the last one. Where simulations can be repeated slower and with other particles, it
-is the best of the most promising ones run twice: the best of fifty noisy runs owes part of that to its noise (selection by
-replication: Bechhofer 1954, Ann. Math. Statist. 25:16), and a force that hangs on the simulated speed is not the food's. A
-search that has stalled above what the right material would leave is started once more from another design, with the budget
-as its stopping rule.
+The best run ever made is returned, not the last one. Where simulations can be repeated slower and with other
+particles, it is the best of the most promising ones run twice: the best of fifty noisy runs owes part of that to its
+noise (selection by replication: Bechhofer 1954, Ann. Math. Statist. 25:16), and a force that hangs on the simulated
+speed is not the food's. A search that has stalled above what the right material would leave is started once more from
+another design, with the budget as its stopping rule.
 """
 
 from __future__ import annotations
@@ -130,10 +130,10 @@ def multistart_search(
 
 
 def _restarted(search: Search) -> str:
-    """Search once more from another design, with nothing of what a stalled search has learnt, for the rest of its budget.
+    """Spend the rest of the budget of a stalled search on one from another design, with nothing of what it has learnt.
 
-    That is where the right material would more likely than not have left a smaller chi-square, the budget holds a search,
-    and the first has not already looked elsewhere for long in vain. The runs of both are then the search's.
+    That is where the right material would more likely than not have left a smaller chi-square, the budget holds a
+    search, and the first has not already looked elsewhere for long in vain. The runs of both are then the search's.
 
     Returns:
         How the better of the two ended.
@@ -157,7 +157,7 @@ def _restarted(search: Search) -> str:
 
 
 def _best_of_finalists(search: Search, replicate: Evaluator) -> tuple[ScoredRun, list[ScoredRun]]:
-    """Run the most promising runs once more, slower and with other particles; the one of least mean chi-square, and those.
+    """Repeat the most promising runs, slower and with other particles; the one of least mean chi-square, and those.
 
     A run whose repetition breaks down is not the answer; where all break down, the next ones are repeated, promising or
     not.
@@ -192,8 +192,8 @@ def _best_of_finalists(search: Search, replicate: Evaluator) -> tuple[ScoredRun,
 def _may_win(run: ScoredRun, surrogate: Surrogate, tried: list[ScoredRun], replicates: list[ScoredRun]) -> bool:
     """Whether a second run of a finalist may make it the answer (a race: Maron & Moore 1994, NIPS 6:59).
 
-    Not if it would have to gain more over what is expected of it than those run twice so far have gained, on average, and
-    the noise.
+    Not if it would have to gain more over what is expected of it than those run twice so far have gained, on average,
+    and the noise.
     """
     sound = [(t, again) for t, again in zip(tried, replicates, strict=True) if again.ok]
     if not sound:

@@ -18,8 +18,8 @@ class FitOptions:
         batch: Simulations that run at the same time (worker processes).
         design: Space-filling runs at the start, besides the given values and the prior centre.
         coarse_cost: Cost of a coarse simulation in fine ones [-]; half the resolution costs about a quarter or less.
-        tolerance: Gain in chi-square that is worth a round [-], times the reduced chi-square where that exceeds 1. 0.5 is
-            an eighth of what bounds a 95 % interval (3.84), and moves its ends by 6 % of its half width
+        tolerance: Gain in chi-square that is worth a round [-], times the reduced chi-square where that exceeds 1. 0.5
+            is an eighth of what bounds a 95 % interval (3.84), and moves its ends by 6 % of its half width
             (docs/theory.md, "Measured choices").
         seed: Seed of the design and of the probes.
 

@@ -1,27 +1,28 @@
 """The search for the material: few, noisy, expensive simulations, run two or more at a time.
 
-0. Screening, where there is a coarse evaluator: steps 1 to 3 with it alone, within a part of the budget. Its curves stay
-   in the surrogate, with an offset of their own, and the fine search starts at its best points.
+0. Screening, where there is a coarse evaluator: steps 1 to 3 with it alone, within a part of the budget. Its curves
+   stay in the surrogate, with an offset of their own, and the fine search starts at its best points.
 1. Design: the given values, the centre of the prior and a scrambled Sobol sample of its 95 % box. Quasi-static forces
-   scale with the stress-like parameters, so every run of the design stands for a whole line of materials; the best points
-   of the best lines are run next.
+   scale with the stress-like parameters, so every run of the design stands for a whole line of materials; the best
+   points of the best lines are run next.
 2. Differences: one wide step along each parameter from the best point.
 3. Rounds of one batch each. A Gaussian process through all smoothed curves so far (not through the misfit, which hides
-   which part of a curve is wrong) proposes the point of least *expected* chi-square near the best one, the most promising
-   point elsewhere if that is another one, and probes inside the present 95 % region (:mod:`calib.fit.acquisition`). Where
-   there is a coarse evaluator, the latter two are run on it first, and only points near the best one on the fine one.
+   which part of a curve is wrong) proposes the point of least *expected* chi-square near the best one, the most
+   promising point elsewhere if that is another one, and probes inside the present 95 % region
+   (:mod:`calib.fit.acquisition`). Where there is a coarse evaluator, the latter two are run on it first, and only
+   points near the best one on the fine one.
 4. The end, when neither the surrogate nor the runs give a gain worth its noise. If the curve is still not explained
-   (chi-square above its 99 % quantile), the screening is begun anew from another design, with nothing of what is known,
-   so that it ends in a valley of its own. Its best points are run on fine cells, and rounds follow whose fine runs are
-   made only where the coarse ones promise a gain; at most so many times, or until nothing was gained for long. Without a
-   coarse evaluator, differences about the best point, and again 3 if they bring or promise a gain; with one the profiles
-   step along each parameter anyway. The Jacobian is that of the surrogate, in which the noise of single runs is averaged
-   out; plain differences of noisy curves would make every parameter look well identified.
+   (chi-square above its 99 % quantile), the screening is begun anew from another design, with nothing of what is
+   known, so that it ends in a valley of its own. Its best points are run on fine cells, and rounds follow whose fine
+   runs are made only where the coarse ones promise a gain; at most so many times, or until nothing was gained for
+   long. Without a coarse evaluator, differences about the best point, and again 3 if they bring or promise a gain;
+   with one the profiles step along each parameter anyway. The Jacobian is that of the surrogate, in which the noise of
+   single runs is averaged out; plain differences of noisy curves would make every parameter look well identified.
 
 What these choices save on real and made-up cuts is in docs/theory.md, "Measured choices".
 
-Sources: composite objectives, Astudillo & Frazier (2019), Proc. ICML 97; regression models for noisy least squares, Cartis
-et al. (2019), ACM TOMS 45:32, doi 10.1145/3338517.
+Sources: composite objectives, Astudillo & Frazier (2019), Proc. ICML 97; regression models for noisy least squares,
+Cartis et al. (2019), ACM TOMS 45:32, doi 10.1145/3338517.
 """
 
 from __future__ import annotations
@@ -52,9 +53,9 @@ BASIN_DISTANCE = 0.2
 COARSE_PER_WORKER = 2
 #: Part of the chi-square that the noise of one run makes which a round must bring [-].
 NOISE_TOLERANCE = 0.1
-#: Gain worth a round, as ``FitOptions.tolerance``, while the best curve is not explained: a quarter of what bounds a 95 %
-#: interval. A curve that no food of the model follows is not followed better for polishing it, and another basin is found
-#: by looking elsewhere.
+#: Gain worth a round, as ``FitOptions.tolerance``, while the best curve is not explained: a quarter of what bounds a
+#: 95 % interval. A curve that no food of the model follows is not followed better for polishing it, and another basin
+#: is found by looking elsewhere.
 UNEXPLAINED_TOLERANCE = 1.0
 #: Rounds without promise and gain after which the search has converged; rounds without gain after which it has stalled.
 #: Half of either after a further screening: what that did not bring at once it has not brought.
@@ -63,11 +64,11 @@ CONVERGED_ROUNDS, STALLED_ROUNDS = 2, 4
 MAX_DESIGNS = 3
 #: Further screenings of a curve that is not explained, and what each adds to the seed.
 MAX_RESCREENINGS, RESCREENING_SEED = 3, 77
-#: The best curve is off by more than twice its tolerance where chi-square exceeds so many times the number of independent
-#: data [-]: no model's error explains that, and what is left of the budget is spent on looking elsewhere.
+#: The best curve is off by more than twice its tolerance where chi-square exceeds so many times the number of
+#: independent data [-]: no model's error explains that, and what is left of the budget is spent on looking elsewhere.
 FAR_OFF = 4.0
-#: Spent without a gain worth a round [fine simulations], after which a search whose curve is not explained, but not far off,
-#: ends: nearly what one that explains its curve takes in all.
+#: Spent without a gain worth a round [fine simulations], after which a search whose curve is not explained, but not
+#: far off, ends: nearly what one that explains its curve takes in all.
 IDLE_BUDGET = 25.0
 #: Part of the budget that the coarse evaluator may spend on the screening [-]: 60 runs of the default budget.
 SCREENING_BUDGET = 0.15
@@ -118,7 +119,7 @@ class Search:
 
     @property
     def finished(self) -> list[ScoredRun]:
-        """Finished runs on the fine evaluator, while screening those on the coarse one; those that cut the food, if any."""
+        """Finished runs that cut the food, else all finished ones; while screening of the coarse evaluator."""
         runs = [run for run in self.runs if run.ok and run.coarse == self.screening]
         return [run for run in runs if run.cut] or runs
 
@@ -134,7 +135,7 @@ class Search:
 
     @property
     def idle(self) -> bool:
-        """Whether the curve is not explained, by no more than a model's error may, and nothing has been gained for long."""
+        """Whether nothing has been gained for long, and the curve is off by no more than a model's error may be."""
         off = not self.screening and self.enough < self.best.misfit <= FAR_OFF * self.objective.effective_rows
         return off and self.spent - self.gained_at >= IDLE_BUDGET
 
@@ -236,7 +237,10 @@ class Search:
         self._follow_lines(first)
 
     def _follow_lines(self, first: int) -> None:
-        """Run the best points of the best lines through the runs from ``first`` on, on fine cells where there is no run yet."""
+        """Run the best points of the best lines through the runs from ``first`` on.
+
+        That is on coarse cells where some of these runs are coarse and any run has finished, else on fine ones.
+        """
         lines = sorted((self._best_scaled(run) for run in self.runs[first:] if run.ok), key=lambda line: line[0])
         coarse = bool(self.finished) and any(run.coarse for run in self.runs[first:])
         self._evaluate([z for _, z in lines[: self.options.batch]], "scaled", coarse=coarse)
@@ -280,8 +284,8 @@ class Search:
     def _rounds(self, patience: float = 1.0) -> str:
         """Rounds of one batch each, until they are calm or the budget is spent.
 
-        ``patience`` shortens the wait for gain; where it is short, only what still promises a gain after the coarse runs
-        of a round is run on fine cells, also far from the best point.
+        ``patience`` shortens the wait for gain; where it is short, only what still promises a gain after the coarse
+        runs of a round is run on fine cells, also far from the best point.
         """
         calm = stalled = 0
         while self._affordable() > 0 and not self.idle:
@@ -300,7 +304,7 @@ class Search:
         return "stalled" if self.idle else "budget"
 
     def _proposed(self, surrogate: Surrogate, near: FloatArray, least_gain: float, patience: float) -> list[FloatArray]:
-        """The points of a round, after its coarse runs where there is a coarse evaluator; none where nothing is promised."""
+        """The points of a round, after its coarse runs where it has them; none where nothing is promised."""
         batch = self.options.batch
         far = global_optimum(surrogate, self.runs, self.random)
         elsewhere = [far] if np.abs((far - near) / self.unit).max() > BASIN_DISTANCE else []

@@ -1,8 +1,8 @@
 """The curve between the simulated ones: a Gaussian process through all runs of a fit, which expects the chi-square of a
 point and gives the Jacobian.
 
-Sources: Rasmussen & Williams (2006), Gaussian Processes for Machine Learning, MIT Press, chapters 2 and 5; coarse runs as fine
-ones plus a process of their own, Kennedy & O'Hagan (2000), Biometrika 87:1.
+Sources: Rasmussen & Williams (2006), Gaussian Processes for Machine Learning, MIT Press, chapters 2 and 5; coarse runs
+as fine ones plus a process of their own, Kennedy & O'Hagan (2000), Biometrika 87:1.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from mpm.arrays import FloatArray
 #: Standard deviations in the process, parts of the peak: what a broken-down and a coarse run say about the curve of a
 #: whole, fine one; the offset common to all coarse curves; the offset of the best curve by its own noise.
 BROKEN_SD, COARSE_SD, COARSE_OFFSET, OFFSET = 0.3, 0.02, 0.2, 0.05
-#: Log-normal priors (mean, sd) and ranges of the process's hyperparameters: amplitude of its curved and its linear part and
-#: its noise (parts of the peak), and the length scale of each parameter (coordinate units).
+#: Log-normal priors (mean, sd) and ranges of the process's hyperparameters: amplitude of its curved and its linear
+#: part and its noise (parts of the peak), and the length scale of each parameter (coordinate units).
 AMPLITUDE_PRIOR = (math.log(0.4), 1.0, math.log(0.08), math.log(2.0))
 LENGTH_PRIOR = (math.log(1.5), 0.7, math.log(0.3), math.log(8.0))
 NOISE_PRIOR = (math.log(0.012), 0.4, math.log(0.004), math.log(0.04))
@@ -32,8 +32,8 @@ NOISE_PRIOR = (math.log(0.012), 0.4, math.log(0.004), math.log(0.04))
 #: offset.
 DIFFERENCE_PRIOR = (math.log(0.007), 1.2, math.log(0.003), math.log(0.5))
 
-#: 95 % point of chi-square with 20 degrees of freedom over 20: how much more than its mean the information that noise makes
-#: along one direction may be in 20 independent points of a curve.
+#: 95 % point of chi-square with 20 degrees of freedom over 20: how much more than its mean the information that noise
+#: makes along one direction may be in 20 independent points of a curve.
 NOISE_MARGIN = 1.57
 
 #: Width of the differences of expected curves in a Jacobian [coordinate units].
@@ -41,8 +41,8 @@ JACOBIAN_STEP = 1e-3
 #: The same where a fit follows them downhill.
 GRADIENT_STEP = 1e-6
 
-#: An expected missing part of the stroke up to this is not held against a point [-]: the process is smooth, the limit of
-#: what can be simulated is not, so that whole runs beside it would be shunned.
+#: An expected missing part of the stroke up to this is not held against a point [-]: the process is smooth, the limit
+#: of what can be simulated is not, so that whole runs beside it would be shunned.
 OVERSHOOT = 0.1
 
 
@@ -73,9 +73,9 @@ class CurveProcess:
 
         curve(z) = e^s (c + q g(x)),   x = (z - z_best) / unit
 
-    s is the mean of z - z_best over the stress-like parameters, c and q are the best run's curve and peak; g has mean zero
-    and the covariance :meth:`_kernel`, the same for each point of the curve. One more output is the part of the stroke that
-    is missing.
+    s is the mean of z - z_best over the stress-like parameters, c and q are the best run's curve and peak; g has mean
+    zero and the covariance :meth:`_kernel`, the same for each point of the curve. One more output is the part of the
+    stroke that is missing.
 
     Args:
         objective: That of the trace.
@@ -126,7 +126,7 @@ class CurveProcess:
         return out
 
     def _covariance(self, h: FloatArray) -> FloatArray:
-        """Covariance of the runs (m, m) with their noise; coarse ones share the process of their difference to fine ones."""
+        """Covariance (m, m) of the runs with their noise; coarse ones share the process of their difference."""
         own = self._kernel(self._x, self._x, h) + np.diag(self._extra + math.exp(2.0 * h[-1]))
         gap = ((self._x[:, None] - self._x[None]) / np.exp(h[2:-2])) ** 2
         difference = COARSE_OFFSET**2 + self._change(gap, h)
@@ -134,7 +134,7 @@ class CurveProcess:
         return out
 
     def _change(self, gap: FloatArray, h: FloatArray) -> FloatArray:
-        """Covariance (m, m) of the part of coarse runs' difference that changes with the parameters: linear + curved."""
+        """Covariance (m, m) of that difference beside its common offset: linear + curved."""
         out: FloatArray = math.exp(2.0 * h[-2]) * (self._x @ self._x.T + np.exp(-0.5 * gap.sum(axis=2)))
         return out
 
@@ -211,8 +211,8 @@ class CurveProcess:
     def noise_information(self, z: FloatArray) -> FloatArray:
         """Information (p, p) that the noise of the runs alone makes in differences of expected curves at z (p,).
 
-        A noisy Jacobian J + D has the information (J + D)^T (J + D), on average J^T J + E[D^T D]. E[D^T D] follows from the
-        weights that the process gives to each run.
+        A noisy Jacobian J + D has the information (J + D)^T (J + D), on average J^T J + E[D^T D]. E[D^T D] follows
+        from the weights that the process gives to each run.
         """
         objective, p = self.objective, len(self.unit)
         steps = JACOBIAN_STEP * self.unit
@@ -336,8 +336,8 @@ class Surrogate:
     def jacobian(self, z: FloatArray) -> FloatArray:
         """Derivative of ``residual`` at z by internal coordinates, less what is only the noise of the runs.
 
-        The directions of each trace's Jacobian are shrunk until its information is without what the noise makes, to zero
-        where there is nothing else; a parameter without influence would look identified otherwise.
+        The directions of each trace's Jacobian are shrunk until its information is without what the noise makes, to
+        zero where there is nothing else; a parameter without influence would look identified otherwise.
 
         Args:
             z: Internal coordinates [-] (p,).

@@ -1,24 +1,26 @@
 """A held-out cut predicted with the flesh of the others.
 
-Fitted to it is only what its own specimen has for itself: its skin, its size, one factor for width and sensor.  The band comes
-from simulating materials drawn from the posterior of the flesh and moved as far as specimens lie apart, and from errors of the size and
-correlation that the fit of the others showed. Each material has its own factor, and what the specimen has for itself is fitted to
-each: by a Gauss-Newton step from the best values, with what the material changes of the curve on coarse cells, and drawn about that.
+Fitted to it is only what its own specimen has for itself: its skin, its size, one factor for width and sensor. The band
+comes from simulating materials drawn from the posterior of the flesh and moved as far as specimens lie apart, and from
+errors of the size and correlation that the fit of the others showed. Each material has its own factor, and what the
+specimen has for itself is fitted to each: by a Gauss-Newton step from the best values, with what the material changes
+of the curve on coarse cells, and drawn about that.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib.fit.multistart import FitResult, multistart_search
 from calib.fit.options import FitOptions
-from calib.multi_specimen.specimens import Fitted, Specimens
+from calib.multi_specimen.specimens import JointFit, Specimens
 from calib.problem.objective import Objective
-from calib.problem.parameters import ParameterSet, property_of
+from calib.problem.parameters import ParameterSet, is_shared
+from calib.problem.setup import COARSE, FINE
 from calib.simulation.evaluation import Evaluation
 from calib.trace.filters import filter_simulated
 from calib.uncertainty.intervals import linearised_likelihood, uncertainty
@@ -30,27 +32,27 @@ from calib.validation.prediction import PREDICTION_NRMSE_LIMIT, PREDICTION_RATIN
 from mpm.arrays import FloatArray
 from mpm.errors import SimulationError
 
-BUDGET = 40.0
-"""Simulations at most for the few parameters of a specimen."""
-DESIGN = 5
-DRAWS = 32
-"""Materials of the posterior that are simulated for the band; errors are drawn for each a hundred times. With 16 the part of a potato's
-points within it was 88 or 91 %, as they were drawn."""
-REPEATED = 100
+SPECIMEN_BUDGET, SPECIMEN_DESIGN = 40.0, 5
+"""Simulations at most for the few parameters of a specimen, and those of their design."""
+PREDICTIVE_MATERIALS = 32
+"""Materials of the posterior that are simulated for the band (docs/theory.md, "Measured choices")."""
+ERRORS_PER_MATERIAL = 100
+"""Errors that are drawn for each of them."""
 INSIDE_LIMIT = 0.90
-"""Least part of the measured points within their 95 % band."""
+"""Least part of the measured points within their 95 % band [-]."""
+MEAN_CURVE = "mean of the others"
+"""The null model that only several traces have."""
 
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
+class HeldOutPrediction:
     """A held-out cut and what was predicted of it.
 
     Attributes:
         name: The trace.
-        trained: Traces whose flesh it is predicted with.
+        trained_on: Traces whose flesh it is predicted with.
         curve: Predicted force with the specimen's factor [N] (n,).
-        values: All values [SI] of the simulation by property.
-        fitted: Those of them that are the specimen's own.
+        fitted: Values [SI] by property that are the specimen's own.
         factor: That factor [-].
         metrics: Prediction against the measured curve.
         nulls: Curves that explain nothing against it, by name.
@@ -60,10 +62,9 @@ class Prediction:
     """
 
     name: str
-    trained: tuple[str, ...]
+    trained_on: tuple[str, ...]
     curve: FloatArray
-    values: dict[str, float]
-    fitted: tuple[str, ...]
+    fitted: dict[str, float]
     factor: float
     metrics: Metrics
     nulls: dict[str, Metrics]
@@ -84,153 +85,153 @@ class Prediction:
         )
 
     @property
-    def beaten(self) -> tuple[str, ...]:
+    def beats(self) -> tuple[str, ...]:
         """Null models that the prediction beats in both rating and shape."""
         m = self.metrics
         return tuple(n for n, x in self.nulls.items() if m.iso18571.R > x.iso18571.R and m.shape_error < x.shape_error)
 
-    def as_dict(self) -> dict[str, object]:
-        """Plain data."""
-        return {
-            "trained_on": list(self.trained),
-            "passed": self.passed,
-            "metrics": self.metrics.as_dict(),
-            "factor": self.factor,
-            "fitted": {n: self.values[n] for n in self.fitted},
-            "predictive_inside": self.band.inside,
-            "limits": {"nrmse": PREDICTION_NRMSE_LIMIT, "rating": PREDICTION_RATING_LIMIT, "inside": INSIDE_LIMIT},
-            "null_models": {
-                n: {"nrmse": x.nrmse, "shape_error": x.shape_error, "R": x.iso18571.R} for n, x in self.nulls.items()
-            },
-            "beats": list(self.beaten),
-            "simulations": self.simulations,
-            "verdicts": [v.as_dict() for v in self.balances],
-        }
 
+def predict(specimens: Specimens, fit: JointFit, name: str) -> HeldOutPrediction:
+    """Predict the cut of a trace that a fit has not seen.
 
-def predict(specimens: Specimens, fitted: Fitted, name: str) -> Prediction:
-    """Predict the cut of a trace that the fit has not seen.
+    Args:
+        specimens: The traces and where their simulations run.
+        fit: The fit of the others.
+        name: The trace.
+
+    Returns:
+        The prediction.
 
     Raises:
         CutcalError: No simulation of it reached the end of its stroke.
     """
-    setup = specimens.setups[name]
-    goal = setup.objective
-    flesh = fitted.flesh()
-    found = _specimen(specimens, flesh, name)
-    best = {} if found is None else dict(found.result.best.evaluation.parameters)
-    values = {**flesh, **best}
-    others = _drawn(fitted, specimens.study.scatter, specimens.study.seed)
-    drawn = [{**x, **own} for x, own in zip(others, _adapted(specimens, found, flesh, others, name), strict=True)]
-    runs = _runs(specimens, name, [values, *drawn])
-    count = 0 if found is None else len(found.result.history) + 1 + len(others)
-    if not runs[0].ok:
-        raise SimulationError(
-            f"{name}: the predicted cut did not reach the end of its stroke with {values}; give its height if you measured it",
-            reason="held out",
-            fraction=0.0,
-        )
-    own_curve, *curves = (filter_simulated(goal.target.stroke, e.stroke, e.force) for e in runs if e.ok)
-    scalars = runs[0].scalars
-    k = goal.factor(own_curve)
-    real, stroke = goal.target.curve, goal.target.stroke
+    objective, seed = specimens.setups[name].objective, specimens.study.seed
+    shared = fit.shared_values()
+    own = _own_fit(specimens, shared, name)
+    best = {} if own is None else own.values
+    others = _drawn(fit, specimens.study.scatter, seed)
+    drawn = [{**x, **y} for x, y in zip(others, _adapted(specimens, own, shared, others, name), strict=True)]
+    runs = _simulated(specimens, name, [{**shared, **best}, *drawn])
+    curve, *others_curves = (filter_simulated(objective.target.stroke, e.stroke, e.force) for e in runs if e.ok)
+    factor, scalars = objective.factor(curve), runs[0].scalars
+    stroke, real = objective.target.stroke, objective.target.curve
     nulls = {n: m.metrics for n, m in null_models(stroke, real).items()}
-    nulls |= {"mean of the others": compare(stroke, real, _mean(specimens, fitted.names, name))}
-    return Prediction(
+    return HeldOutPrediction(
         name=name,
-        trained=fitted.names,
-        curve=k * own_curve,
-        values=values,
-        fitted=tuple(best),
-        factor=k,
-        metrics=compare(stroke, real, k * own_curve),
-        nulls=nulls,
-        band=_band(goal, [own_curve, *curves], fitted, specimens.study.seed),
-        simulations=count + len(runs),
+        trained_on=fit.names,
+        curve=factor * curve,
+        fitted=best,
+        factor=factor,
+        metrics=compare(stroke, real, factor * curve),
+        nulls=nulls | {MEAN_CURVE: compare(stroke, real, _mean_curve(specimens, fit.names, name))},
+        band=_band(objective, [curve, *others_curves], fit, seed),
+        simulations=len(runs) + (0 if own is None else len(own.result.history) + 1 + len(others)),
         balances=tuple(balances(scalars["momentum_residual"], scalars["ke_over_ie"], runs[0].parted)),
     )
 
 
 @dataclass(frozen=True, eq=False)
-class _Specimen:
-    """What was fitted to a held-out trace with the flesh of the others."""
+class _OwnFit:
+    """What was fitted to a held-out trace alone, with the flesh of the others."""
 
-    goal: Objective
+    objective: Objective
     result: FitResult
 
+    @property
+    def values(self) -> dict[str, float]:
+        """The specimen's own values [SI]."""
+        return dict(self.result.best.evaluation.parameters)
 
-def _specimen(specimens: Specimens, flesh: Mapping[str, float], name: str) -> _Specimen | None:
+
+def _own_fit(specimens: Specimens, shared: Mapping[str, float], name: str) -> _OwnFit | None:
     """The specimen's own values with the flesh held; None where it has none."""
     setup, chosen = specimens.setups[name], specimens.own_parameters(name)
     if not chosen:
         return None
-    goal = replace(setup.objective, parameters=ParameterSet(chosen))
+    objective = replace(setup.objective, parameters=ParameterSet(chosen))
     fine, coarse = (
-        specimens.evaluator(scene.with_material(**flesh), name, fidelity)
-        for fidelity, scene in (("fine", setup.fine), ("coarse", setup.coarse))
+        specimens.evaluator(scene.with_material(**shared), name, fidelity)
+        for scene, fidelity in ((setup.fine, FINE), (setup.coarse, COARSE))
     )
-    options = FitOptions(budget=BUDGET, batch=specimens.pool.batch, design=DESIGN, seed=specimens.study.seed)
-    result = multistart_search(
-        goal, fine, coarse=coarse, options=options, progress=specimens.staged(f"specimen of {name}, held out")
+    options = FitOptions(
+        budget=SPECIMEN_BUDGET, batch=specimens.pool.batch, design=SPECIMEN_DESIGN, seed=specimens.study.seed
     )
+    progress = specimens.staged(f"specimen of {name}, held out")
+    result = multistart_search(objective, fine, coarse=coarse, options=options, progress=progress)
     if result.status == "interrupted":
         raise KeyboardInterrupt
-    return _Specimen(goal, result)
+    return _OwnFit(objective, result)
 
 
 def _adapted(
-    specimens: Specimens, found: _Specimen | None, flesh: Mapping[str, float], others: list[dict[str, float]], name: str
+    specimens: Specimens,
+    own: _OwnFit | None,
+    shared: Mapping[str, float],
+    others: Sequence[Mapping[str, float]],
+    name: str,
 ) -> list[dict[str, float]]:
     """The specimen's own values for each of some other materials, with what their fit does not know of them.
 
     A run that breaks down on coarse cells says nothing: the best values stay.
     """
-    if found is None:
+    if own is None:
         return [{}] * len(others)
-    goal, result = found.goal, found.result
-    best = result.best.evaluation.parameters
+    objective, result = own.objective, own.result
     if result.jacobian is None:
-        return [dict(best)] * len(others)
-    evaluator = specimens.evaluator(specimens.setups[name].coarse, name, "coarse")
-    runs = sorted(evaluator.evaluate([{**x, **best} for x in (flesh, *others)]), key=lambda e: e.index)
-    own, *trials = (goal.score(e, coarse=True) for e in runs)
-    sd = np.linalg.cholesky(
-        uncertainty(result.parameters, linearised_likelihood(goal, result.best, result.jacobian)).alone
-    )
+        return [own.values] * len(others)
+    evaluator = specimens.evaluator(specimens.setups[name].coarse, name, COARSE)
+    runs = sorted(evaluator.evaluate([{**x, **own.values} for x in (shared, *others)]), key=lambda e: e.index)
+    base, *moved = (objective.score(e, coarse=True) for e in runs)
+    found = uncertainty(result.parameters, linearised_likelihood(objective, result.best, result.jacobian))
+    sd = np.linalg.cholesky(found.alone)
     steps = np.random.default_rng(specimens.study.seed).standard_normal((len(others), len(sd))) @ sd.T
-    low, high = goal.parameters.box
+    low, high = objective.parameters.box
     out = []
-    for trial, step in zip(trials, steps, strict=True):
-        known = trial.ok and own.ok
-        change = np.linalg.lstsq(result.jacobian, own.residual - trial.residual)[0] if known else 0.0
+    for run, step in zip(moved, steps, strict=True):
+        known = run.ok and base.ok
+        change = np.linalg.lstsq(result.jacobian, base.residual - run.residual)[0] if known else 0.0
         z = np.clip(result.best.z + change, np.minimum(low, result.best.z), np.maximum(high, result.best.z))
-        out.append(goal.parameters.to_dict(goal.parameters.clip(z + step)))
+        out.append(objective.parameters.to_dict(objective.parameters.clip(z + step)))
     return out
 
 
-def _runs(specimens: Specimens, name: str, batch: list[dict[str, float]]) -> list[Evaluation]:
-    """Simulations of a trace's cut, in their order."""
-    return sorted(specimens.evaluator(specimens.setups[name].fine, name, "fine").evaluate(batch), key=lambda e: e.index)
+def _simulated(specimens: Specimens, name: str, batch: list[dict[str, float]]) -> list[Evaluation]:
+    """Simulations of a trace's cut in the order of their values, of which the first has ended its stroke.
+
+    Raises:
+        SimulationError: It has not.
+    """
+    evaluator = specimens.evaluator(specimens.setups[name].fine, name, FINE)
+    runs = sorted(evaluator.evaluate(batch), key=lambda e: e.index)
+    if not runs[0].ok:
+        raise SimulationError(
+            f"{name}: the predicted cut did not reach the end of its stroke with {batch[0]}; give its height if you "
+            "measured it",
+            reason="held out",
+            fraction=0.0,
+        )
+    return runs
 
 
-def _drawn(fitted: Fitted, scatter: float, seed: int) -> list[dict[str, float]]:
-    """Flesh of another specimen: materials from the posterior of the fit, as its own band draws them, moved by what specimens differ.
+def _drawn(fit: JointFit, scatter: float, seed: int) -> list[dict[str, float]]:
+    """Flesh of another specimen: materials from the posterior of a fit, each moved by the scatter.
 
     The fitted flesh is the mean of n specimens, from which another one differs by a variance of 1 + 1/n of theirs.
     """
-    if fitted.analysis is None or fitted.result.surrogate is None:
+    if fit.analysis is None or fit.result.surrogate is None:
         return []
     random = np.random.default_rng(seed)
-    points = posterior_draws(fitted.result.surrogate, fitted.result.best.z, fitted.analysis.uncertainty, random)[:DRAWS]
-    parameters = fitted.objective.parameters
-    moved = np.array([p.log and p.name == property_of(p.name) for p in parameters])
-    apart = scatter * math.sqrt(1.0 + 1.0 / len(fitted.names))
+    points = posterior_draws(fit.result.surrogate, fit.result.best.z, fit.analysis.uncertainty, random)
+    points = points[:PREDICTIVE_MATERIALS]
+    parameters = fit.objective.parameters
+    moved = np.array([p.log and is_shared(p.name) for p in parameters])
+    apart = scatter * math.sqrt(1.0 + 1.0 / len(fit.names))
     steps = apart * random.standard_normal(points.shape) * moved
-    return [fitted.flesh(parameters.clip(z)) for z in points + steps]
+    return [fit.shared_values(parameters.clip(z)) for z in points + steps]
 
 
-def _mean(specimens: Specimens, names: tuple[str, ...], held: str) -> FloatArray:
-    """Mean of the other traces' curves over their own peaks and strokes, scaled to the held-out one [N]."""
+def _mean_curve(specimens: Specimens, names: tuple[str, ...], held: str) -> FloatArray:
+    """Mean of the other traces' curves over their own peaks and strokes, scaled to the held-out one [N] (n,)."""
     curves = [specimens.setups[n].curve.curve for n in names]
     mean = np.mean([c / c.max() for c in curves], axis=0)
     real = specimens.setups[held].curve.curve
@@ -238,13 +239,15 @@ def _mean(specimens: Specimens, names: tuple[str, ...], held: str) -> FloatArray
     return out
 
 
-def _band(goal: Objective, curves: list[FloatArray], fitted: Fitted, seed: int) -> Band:
+def _band(objective: Objective, curves: Sequence[FloatArray], fit: JointFit, seed: int) -> Band:
     """Band of the simulated curves, each with its own factor, and of errors as the fit showed them."""
     random = np.random.default_rng(seed)
-    analysis = fitted.analysis
-    widened = 1.0 if analysis is None else float(np.sqrt(analysis.uncertainty.widened))
-    length = goal.errors.correlation if analysis is None else float(np.mean(analysis.uncertainty.data.lengths))
+    found = None if fit.analysis is None else fit.analysis.uncertainty
+    widened = 1.0 if found is None else float(np.sqrt(found.widened))
+    length = objective.errors.correlation if found is None else float(np.mean(found.data.lengths))
     drawn = [
-        goal.factor(c) * c + error for c in curves for error in error_draws(goal, length, widened, REPEATED, random)
+        objective.factor(curve) * curve + error
+        for curve in curves
+        for error in error_draws(objective, length, widened, ERRORS_PER_MATERIAL, random)
     ]
-    return pointwise_band(np.array(drawn), goal.target.curve)
+    return pointwise_band(np.array(drawn), objective.target.curve)

@@ -1,7 +1,7 @@
-"""Several cuts of one food, fitted together and held out in turn: the test that a fit to one trace is not.
+"""The specimens of a study: cuts of one food, fitted together.
 
-Flesh and blade are shared; skin, size and the one factor of width and sensor belong to each specimen.  A held-out cut is
-predicted with the flesh of the others: only what its own specimen has for itself is fitted to it (:mod:`calib.multi_specimen.held_out`).
+Flesh and blade are shared; skin, size and the one factor of width and sensor belong to each specimen. A fit to one
+trace is no test: a held-out cut is predicted with the flesh of the others (:mod:`calib.multi_specimen.held_out`).
 """
 
 from __future__ import annotations
@@ -9,95 +9,31 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
-from calib.compression.measured import area, read_repeats, strain_grid
-from calib.compression.modulus import fit
-from calib.compression.press import UnitCurve, homogeneous
 from calib.fit.multistart import FitResult
 from calib.fit.options import FitOptions
 from calib.io.progress import Progress
-from calib.io.provenance import code_key
-from calib.multi_specimen.study_file import Press, Study
+from calib.multi_specimen.compression_modulus import CompressionModulus, with_measured_modulus
+from calib.multi_specimen.spec import StudySpec
 from calib.problem.joint_objective import JointEvaluator, JointObjective
-from calib.problem.parameters import Z95, Parameter, ParameterSet, parameter_of, property_of
-from calib.problem.setup import Setup, repeated, set_up
+from calib.problem.parameters import Parameter, is_shared, parameter_of, property_of
+from calib.problem.scored_run import ScoredRun
+from calib.problem.setup import Setup, set_up
 from calib.simulation.evaluation import Evaluators
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore
 from calib.simulation.workers import Workers
 from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.global_search import Listener, fit_with_uncertainty
+from calib.uncertainty.predictive import Band
 from mpm.arrays import FloatArray
 from mpm.scene import Scene
-from mpm.shapes import Shape
-
-PRESS_STRAIN = 0.2
-"""Strain up to which a compression test is fitted [-]: flesh yields beyond."""
-PLATES = 0.13
-"""Relative standard deviation of a modulus from plates whose friction is not known: half of what lies between frictionless plates
-and bonded ones, which give 26 % less for thirteen silicones (docs/compression.md)."""
-
-
-@dataclass(frozen=True)
-class Pressed:
-    """Young's modulus from a compression test.
-
-    Attributes: name; E [Pa]; spread, its relative standard deviation [-], of the repeats and of what is not known of the plates;
-    repeats; nu assumed; files.
-    """
-
-    name: str
-    E: float
-    spread: float
-    repeats: int
-    nu: float
-    files: list[dict[str, str]]
-
-
-def pressed(press: Press) -> Pressed:
-    """Young's modulus of a compression test between frictionless plates, in closed form of the solver's law.
-
-    Raises:
-        CutcalError: The test cannot be used.
-    """
-    sizes = press.sizes
-    wide = sizes.get("diameter", sizes.get("width", 0.0))
-    kind = "upright_cylinder" if "diameter" in sizes else "block"
-    shape = Shape(kind, sizes.get("length", wide), wide, sizes["height"])
-    measured = read_repeats(press.traces, shape, PRESS_STRAIN)
-    grid = strain_grid(PRESS_STRAIN)
-    found = fit(measured, UnitCurve(grid, homogeneous(press.nu, grid), {"area_m2": area(shape)}))
-    spread = float(np.hypot(found.sd / found.mean if len(found.E) > 1 else 0.0, PLATES))
-    return Pressed(press.name, found.mean, spread, len(found.E), press.nu, measured.files)
-
-
-def pinned(parameters: ParameterSet, tests: Sequence[Pressed]) -> ParameterSet:
-    """The parameters with the prior of E sharpened by compression tests, as independent lognormal measurements."""
-    if not tests or "E" not in parameters.names:
-        return parameters
-    old = parameters["E"]
-    means = [old.prior_mean, *(float(np.log(t.E)) for t in tests)]
-    precisions = np.array([old.prior_sd**-2, *(t.spread**-2 for t in tests)])
-    mean = float(np.dot(means, precisions) / precisions.sum())
-    half = Z95 / float(np.sqrt(precisions.sum()))
-    low, high = float(np.exp(mean - half)), float(np.exp(mean + half))
-    new = replace(
-        old,
-        value=float(np.exp(mean)),
-        low=min(old.low, low / 2.0),
-        high=max(old.high, high * 2.0),
-        prior_low=low,
-        prior_high=high,
-    )
-    return ParameterSet(tuple(new if p.name == "E" else p for p in parameters))
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
-    """A joint fit.
+class JointFit:
+    """A fit of several traces.
 
     Attributes:
-        names: Its traces.
+        names: The traces.
         objective: What was fitted.
         result: How.
         analysis: Its uncertainty, None where it ended too early.
@@ -108,97 +44,102 @@ class Fitted:
     result: FitResult
     analysis: UncertaintyAnalysis | None
 
-    def flesh(self, z: FloatArray | None = None) -> dict[str, float]:
-        """Shared values [SI] by property: the best ones, or those at internal coordinates ``z`` (p,)."""
+    def run(self, name: str) -> ScoredRun:
+        """The best run of one trace."""
+        return self.result.best.each[self.names.index(name)]
+
+    def band(self, name: str) -> Band | None:
+        """Posterior predictive band of one trace, None where the fit ended too early."""
+        return None if self.analysis is None else self.analysis.bands[self.names.index(name)]
+
+    def shared_values(self, z: FloatArray | None = None) -> dict[str, float]:
+        """Values [SI] of flesh and blade by property: the best ones, or those at internal coordinates ``z`` (p,)."""
         values = self.result.best.evaluation.parameters if z is None else self.objective.parameters.to_dict(z)
-        return {name: x for name, x in values.items() if name == property_of(name)}
+        return {name: x for name, x in values.items() if is_shared(name)}
 
     def values(self, name: str) -> dict[str, float]:
         """All values [SI] of one trace by property."""
         values = self.result.best.evaluation.parameters
-        return {
-            property_of(n): x
-            for n, x in values.items()
-            if n == property_of(n) or n == parameter_of(property_of(n), name)
-        }
+        return {property_of(n): x for n, x in values.items() if is_shared(n) or n == parameter_of(property_of(n), name)}
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
 class Specimens:
     """The traces of a study and where their simulations run.
 
     Attributes:
         study: The study.
+        setups: What was decided for each trace.
+        moduli: What compression tests say.
         pool: Where simulations run.
         store: Where they are kept.
-        progress: Called after each simulation.
+        progress: Called after each simulation of a search.
         say: Called with each stage, as one sentence.
-        setups: What was decided for each trace.
-        tests: Compression tests.
     """
 
-    study: Study
+    study: StudySpec
     setups: Mapping[str, Setup]
-    tests: tuple[Pressed, ...]
+    moduli: tuple[CompressionModulus, ...]
     pool: Workers
     store: EvaluationStore
     progress: Callable[[Progress], None] | None = None
     say: Callable[[str], None] = field(default=lambda text: None)
 
     def own_parameters(self, name: str) -> tuple[Parameter, ...]:
-        """What the specimen of a trace has for itself."""
-        return tuple(p for p in self.setups[name].objective.parameters if p.name in self.study.own)
+        """The parameters that the specimen of a trace has of its own."""
+        chosen = self.study.specimen_properties
+        return tuple(p for p in self.setups[name].objective.parameters if p.name in chosen)
 
     def evaluator(self, scene: Scene, name: str, fidelity: str) -> CachedEvaluator:
-        """Evaluator of candidates of a trace's scene, through the store."""
-        kept = self.setups[name].kept
-        return CachedEvaluator(
-            self.pool.evaluator(scene, kept),
-            self.store,
-            scene=scene.as_dict() | {"kept": kept},
-            code=code_key(),
-            fidelity=f"{name} {fidelity}",
-        )
+        """What runs candidates of a scene of one trace.
 
-    def fit(self, names: Sequence[str]) -> Fitted:
+        Args:
+            scene: The scene.
+            name: The trace.
+            fidelity: What its simulations are called in the store, beside the trace.
+
+        Returns:
+            The evaluator.
+        """
+        return self.setups[name].evaluator(scene, self.pool, self.store, f"{name} {fidelity}")
+
+    def fit(self, names: Sequence[str]) -> JointFit:
         """Fit some traces together.
 
         Raises:
             CutcalError: A budget too small, or no simulation that ends its stroke.
             KeyboardInterrupt: Interrupted; every simulation made so far is stored.
         """
-        setups = {name: self.setups[name] for name in names}
-        objectives = {
-            name: replace(s.objective, parameters=pinned(s.objective.parameters, self.tests))
-            for name, s in setups.items()
-        }
-        present = {p.name for o in objectives.values() for p in o.parameters}
-        joint = JointObjective.of(objectives, sorted(present - set(self.study.own)))
-        fine, coarse, again = (
-            JointEvaluator(joint, [self.evaluator(scene(s), name, fidelity) for name, s in setups.items()])
-            for fidelity, scene in (
-                ("fine", lambda s: s.fine),
-                ("coarse", lambda s: s.coarse),
-                ("again", lambda s: repeated(s.fine)),
-            )
+        objective = self._joint_objective(names)
+        each = [self.setups[name].evaluators(self.pool, self.store, f"{name} ") for name in names]
+        evaluators = Evaluators(
+            JointEvaluator(objective, [e.fine for e in each]),
+            JointEvaluator(objective, [e.coarse for e in each]),
+            JointEvaluator(objective, [e.replicate for e in each]),
         )
         options = FitOptions(budget=self.study.budget, batch=self.pool.batch, seed=self.study.seed)
-        words = f"fit of {', '.join(names)}"
-        staged = self.staged(words)
-        result, analysis = fit_with_uncertainty(
-            joint, Evaluators(fine, coarse, again), options, listener=Listener(staged, self.say)
-        )
+        listener = Listener(self.staged(f"fit of {', '.join(names)}"), self.say)
+        result, analysis = fit_with_uncertainty(objective, evaluators, options, listener=listener)
         if result.status == "interrupted":
             raise KeyboardInterrupt
-        return Fitted(tuple(names), joint, result, analysis)
+        return JointFit(tuple(names), objective, result, analysis)
 
-    def staged(self, words: str) -> Callable[[Progress], None] | None:
+    def _joint_objective(self, names: Sequence[str]) -> JointObjective:
+        """The objectives of some traces in one, with what the compression tests say."""
+        objectives = {}
+        for name in names:
+            own = self.setups[name].objective
+            objectives[name] = replace(own, parameters=with_measured_modulus(own.parameters, self.moduli))
+        properties = {p.name for o in objectives.values() for p in o.parameters}
+        return JointObjective.of(objectives, sorted(properties - set(self.study.specimen_properties)))
+
+    def staged(self, stage: str) -> Callable[[Progress], None] | None:
         """The progress callback with what is being fitted before each stage."""
         call = self.progress
-        return None if call is None else lambda p: call(replace(p, stage=f"{words}: {p.stage}"))
+        return None if call is None else lambda p: call(replace(p, stage=f"{stage}: {p.stage}"))
 
 
-def set_ups(study: Study) -> dict[str, Setup]:
+def set_ups(study: StudySpec) -> dict[str, Setup]:
     """What is decided for each trace before the first simulation.
 
     Raises:

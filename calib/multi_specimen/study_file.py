@@ -14,119 +14,38 @@ Paths are taken from the folder of the file.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from calib.errors import MaterialError
-from calib.io.progress import Progress
 from calib.io.yaml_checks import Place, check_keys, choice, mapping, number, read_yaml, text
 from calib.material.food import FoodSpec, load_food, load_material_file
 from calib.material.properties import check_override
 from calib.material.scene import MIDDLE, Sizing
+from calib.multi_specimen.spec import COMPRESSION, CUT, SCATTER, SPECIMEN_PROPERTIES, CompressionSpec, StudySpec
 from calib.problem.parameters import OF_TRACE
 from calib.problem.request import Request
 
-CUT, COMPRESSION = "cut", "compression"
-OWN = ("R_skin", "skin_thickness", "initiation_depth", "height")
-"""What each specimen has of its own unless the study says otherwise: its skin, how its surface gives way, its size. The rest is
-flesh and blade, which are the same."""
-SCATTER = 0.25
-"""Standard deviation of the logarithm of each stiffness, strength and resistance of flesh among specimens [-]: the rupture force over
-the stiffness of 51 bananas and of 26 kiwis gripped whole (FruitRuptureEstimate) scatters by 0.42 and 0.36, that is 0.30 and 0.25 for
-each of two independent properties. What all of them have in common is in the specimen's own factor."""
-MOST_SCATTER = 1.0  # a factor of seven either way
+LARGEST_SCATTER = 1.0
+"""Standard deviation of a logarithm [-]: a factor of seven either way."""
 EACH = "each"
+"""What ``hold_out`` says where each cut is held out in turn."""
 TOP = ("material", "knife", "fit", "own", "hold_out", "scatter", "budget", "seed", "dx", "set")
 NUMBERS = ("speed", "t_end", "height", "width", "length", "at", "gain_sd", "lag_sd")
 TEXTS = ("time_col", "force_col", "position_col", "depth_col", "sign", "shape", "knife")
-SIZES = ("height", "diameter", "width", "length")
+COMPRESSION_SIZES = ("height", "diameter", "width", "length")
 
 
-@dataclass(frozen=True)
-class Press:
-    """A compression test that pins Young's modulus.
+def read_study(path: Path | str) -> StudySpec:
+    """Read a study of several cuts.
 
-    Attributes:
-        name: Its name in the study.
-        traces: CSV files, each one repeat or several.
-        sizes: ``height`` and ``diameter``, or ``height``, ``width`` and ``length`` [m].
-        nu: Poisson's ratio that is assumed.
-    """
+    Args:
+        path: The YAML file.
 
-    name: str
-    traces: tuple[Path, ...]
-    sizes: Mapping[str, float]
-    nu: float
-
-
-@dataclass(frozen=True)
-class Study:
-    """Several cuts of one food.
-
-    Attributes:
-        source: The file.
-        food: The food with its literature ranges.
-        requests: What to calibrate, by the name of the trace.
-        presses: Compression tests.
-        own: Properties that each specimen has for itself.
-        hold_out: Traces that are predicted from the others, in turn.
-        budget: Largest number of simulations of each trace, in each fit.
-        seed: Seed of particles and search.
-        scatter: Standard deviation of the logarithm of each property of the flesh among specimens [-].
-    """
-
-    source: str
-    food: FoodSpec
-    requests: Mapping[str, Request]
-    presses: tuple[Press, ...]
-    own: tuple[str, ...]
-    hold_out: tuple[str, ...]
-    budget: float
-    seed: int
-    scatter: float = SCATTER
-
-    @staticmethod
-    def read(path: Path | str) -> Study:
-        """The study of a file, as :func:`read_study` reads it."""
-        return read_study(path)
-
-    def run(
-        self,
-        out: Path | str,
-        *,
-        workers: int = 2,
-        resume: bool = False,
-        progress: Callable[[Progress], None] | None = None,
-        say: Callable[[str], None] | None = None,
-    ) -> dict[str, Any]:
-        """Fit and predict, and write what ``calibrate --config`` writes.
-
-        Args:
-            out: Output folder, which is made and never overwritten.
-            workers: Simulations at a time.
-            resume: Go on with the study in ``out``; nothing is simulated twice.
-            progress: Called after each simulation.
-            say: Called with each warning and stage, as one sentence.
-
-        Returns:
-            The content of ``summary.json``.
-
-        Raises:
-            CutcalError: Anything wrong with the input; nothing that was computed is lost.
-        """
-        from calib.api import script_hidden
-        from calib.multi_specimen.run import run
-        from calib.simulation.process_pool import Pool
-
-        arch = next(iter(self.requests.values())).arch
-        with script_hidden(), Pool(workers, arch) as pool:
-            return run(self, Path(out), pool, resume=resume, progress=progress, say=say)
-
-
-def read_study(path: Path | str) -> Study:
-    """Read a study.
+    Returns:
+        The study.
 
     Raises:
         CutcalError: Anything wrong with the file; the message names the place in it.
@@ -135,7 +54,6 @@ def read_study(path: Path | str) -> Study:
     check_keys(top, content, ("food", "traces"), TOP, {"specimens": "traces", "holdout": "hold_out"})
     folder = Path(path).resolve().parent
     food = _food(top, content, folder)
-    traces = mapping(top.at("traces"), content["traces"])
     base = Request(
         food=food,
         trace=folder,
@@ -146,30 +64,19 @@ def read_study(path: Path | str) -> Study:
         scaled=True,
         knife=text(top.at("knife"), content.get("knife", "kitchen")),
     )
-    requests, presses = {}, []
-    for name, raw in traces.items():
-        place = top.at("traces").at(name)
-        if OF_TRACE in name or "," in name:
-            raise place.error(f"a name of a trace may not hold {OF_TRACE!r} or a comma; write letters, digits and _")
-        given = mapping(place, raw)
-        if choice(place.at("kind"), given.get("kind", CUT), (CUT, COMPRESSION)) == COMPRESSION:
-            presses.append(_press(place, name, given, folder))
-        else:
-            requests[name] = _request(place, given, folder, base)
-    if not requests:
-        raise top.at("traces").error("holds no cut; add one with trace: FILE")
+    requests, compressions = _traces(top.at("traces"), content["traces"], folder, base)
     hold_out = _hold_out(top.at("hold_out"), content.get("hold_out"), tuple(requests))
     own = _names(top.at("own"), content.get("own"))
-    return Study(
-        Path(path).name,
-        food,
-        requests,
-        tuple(presses),
-        OWN if own is None else own,
-        hold_out,
-        base.budget,
-        base.seed,
-        _scatter(top.at("scatter"), content.get("scatter", SCATTER)),
+    return StudySpec(
+        source=Path(path).name,
+        food=food,
+        requests=requests,
+        compressions=compressions,
+        specimen_properties=SPECIMEN_PROPERTIES if own is None else own,
+        hold_out=hold_out,
+        budget=base.budget,
+        seed=base.seed,
+        scatter=_scatter(top.at("scatter"), content.get("scatter", SCATTER)),
     )
 
 
@@ -187,6 +94,25 @@ def _food(top: Place, content: Mapping[str, Any], folder: Path) -> FoodSpec:
         return food
     place = top.at("set")
     return food.with_values({n: check_override(n, number(place.at(n), x)) for n, x in mapping(place, given).items()})
+
+
+def _traces(
+    top: Place, content: Any, folder: Path, base: Request
+) -> tuple[dict[str, Request], tuple[CompressionSpec, ...]]:
+    """The cuts by name, and the compression tests."""
+    requests, compressions = {}, []
+    for name, raw in mapping(top, content).items():
+        place = top.at(name)
+        if OF_TRACE in name or "," in name:
+            raise place.error(f"a name of a trace may not hold {OF_TRACE!r} or a comma; write letters, digits and _")
+        given = mapping(place, raw)
+        if choice(place.at("kind"), given.get("kind", CUT), (CUT, COMPRESSION)) == COMPRESSION:
+            compressions.append(_compression(place, name, given, folder))
+        else:
+            requests[name] = _request(place, given, folder, base)
+    if not requests:
+        raise top.error("holds no cut; add one with trace: FILE")
+    return requests, tuple(compressions)
 
 
 def _request(place: Place, given: Mapping[str, Any], folder: Path, base: Request) -> Request:
@@ -213,14 +139,14 @@ def _knife(name: str, folder: Path) -> str:
     return str(folder / name) if name.endswith((".yaml", ".yml")) else name
 
 
-def _press(place: Place, name: str, given: Mapping[str, Any], folder: Path) -> Press:
-    check_keys(place, given, ("kind", "trace", "height", "nu"), SIZES)
+def _compression(place: Place, name: str, given: Mapping[str, Any], folder: Path) -> CompressionSpec:
+    check_keys(place, given, ("kind", "trace", "height", "nu"), COMPRESSION_SIZES)
     raw = given["trace"] if isinstance(given["trace"], list) else [given["trace"]]
     files = tuple(folder / text(place.at("trace"), entry) for entry in raw)
-    sizes = {n: number(place.at(n), given[n]) for n in SIZES if n in given}
+    sizes = {n: number(place.at(n), given[n]) for n in COMPRESSION_SIZES if n in given}
     if ("diameter" in sizes) == ("width" in sizes and "length" in sizes):
         raise place.error("give height and diameter of an upright cylinder, or height, width and length of a block [m]")
-    return Press(name, files, sizes, number(place.at("nu"), given["nu"]))
+    return CompressionSpec(name, files, sizes, number(place.at("nu"), given["nu"]))
 
 
 def _hold_out(place: Place, given: Any, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -237,8 +163,8 @@ def _hold_out(place: Place, given: Any, names: tuple[str, ...]) -> tuple[str, ..
 
 def _scatter(place: Place, given: Any) -> float:
     x = number(place, given)
-    if not 0.0 <= x <= MOST_SCATTER:
-        raise place.error(f"is {x:g}; give 0 to {MOST_SCATTER:g}, the standard deviation of a logarithm")
+    if not 0.0 <= x <= LARGEST_SCATTER:
+        raise place.error(f"is {x:g}; give 0 to {LARGEST_SCATTER:g}, the standard deviation of a logarithm")
     return x
 
 
@@ -257,10 +183,3 @@ def _number(place: Place, given: Mapping[str, Any], name: str) -> float | None:
     if not x > 0.0:
         raise place.at(name).error(f"is {x:g}; it must be positive")
     return x
-
-
-def overridden(study: Study, *, budget: float | None, arch: str, command: tuple[str, ...]) -> Study:
-    """The study with what the command line says of how to run it."""
-    spend = study.budget if budget is None else budget
-    requests = {n: replace(r, budget=spend, arch=arch, command=command) for n, r in study.requests.items()}
-    return replace(study, requests=requests, budget=spend)

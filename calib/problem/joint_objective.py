@@ -1,8 +1,8 @@
 """Traces fitted together: shared flesh, and what each specimen has of its own.
 
-A parameter named ``R_skin@cut2`` belongs to the trace ``cut2`` alone; one without ``@`` is shared by all. Data rows of the
-traces stand one after the other, then the priors of all parameters, each once. A joint evaluation is one simulation for
-each trace.
+A parameter named ``R_skin@cut2`` belongs to the trace ``cut2`` alone; one without ``@`` is shared by all. Data rows of
+the traces stand one after the other, then the priors of all parameters, each once. A joint evaluation is one
+simulation for each trace.
 """
 
 from __future__ import annotations

@@ -47,8 +47,8 @@ def numerical_uncertainty(folder: Path, food: str, scene: Scene, curve: Conditio
     ):
         if own != theirs:
             raise CurveError(
-                f"--u-num {folder}: its {what} is {theirs}, that of this calibration {own}; repeat cutcal converge with "
-                "the same, its coarsest --dx the cell of the calibration"
+                f"--u-num {folder}: its {what} is {theirs}, that of this calibration {own}; repeat cutcal converge "
+                "with the same, its coarsest --dx the cell of the calibration"
             )
     parts = curve.stroke / curve.stroke[-1]
     out: FloatArray = np.interp(parts, stroke / stroke[-1], u_num) / peak * float(curve.curve.max())

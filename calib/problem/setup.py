@@ -23,12 +23,12 @@ from calib.trace.filters import filter_simulated
 from mpm.scene import Scene
 
 COARSE_SPEED = 2.0
-"""Speed of a search's coarse simulations over that of a screening scene [-] (docs/theory.md, "Surrogate and search"). The
-surrogate takes their common offset from the fine ones away."""
-FINE, COARSE, AGAIN = "fine", "coarse", "again"
-"""What the fidelities of a search are called in its store; that of repeated runs is the last."""
-REPEAT = 2
-"""Which of the shifted grids, with its own particles, a repeated run has; the numerical checks take another one."""
+"""Speed of a search's coarse simulations over that of a screening scene [-] (docs/theory.md, "Surrogate and search").
+The surrogate takes their common offset from the fine ones away."""
+FINE, COARSE, REPLICATED = "fine", "coarse", "again"
+"""What the fidelities of a search are called in its store; a replicate is called ``again``."""
+REPLICATE = 2
+"""Which of the shifted grids, with its own particles, a replicate has; the numerical checks take another one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ class Setup:
         return replace(self, fine=scene)
 
     def scene(self, values: Mapping[str, float]) -> Scene:
-        """The fine cut at some values [SI] by name: those of the material, and the specimen's height where it is fitted."""
+        """The fine cut at some values [SI] by name: the material's, and the specimen's height where that is fitted."""
         scene, material = place(self.fine, values, self.kept)
         return scene.with_material(**material)
 
@@ -97,7 +97,7 @@ class Setup:
         return Evaluators(
             self.evaluator(self.fine, pool, store, label + FINE),
             self.evaluator(self.coarse, pool, store, label + COARSE),
-            self.evaluator(repeated(self.fine), pool, store, label + AGAIN),
+            self.evaluator(replicated(self.fine), pool, store, label + REPLICATED),
         )
 
     def evaluator(self, scene: Scene, pool: Workers, store: EvaluationStore, fidelity: str) -> CachedEvaluator:
@@ -182,6 +182,6 @@ def slower(scene: Scene) -> Scene:
     return replace(scene, motion=replace(scene.motion, mach=scene.motion.mach / 2))
 
 
-def repeated(scene: Scene) -> Scene:
+def replicated(scene: Scene) -> Scene:
     """The scene at half the speed, with other particles and the grid elsewhere: what an answer should not depend on."""
-    return elsewhere(slower(scene), REPEAT)
+    return elsewhere(slower(scene), REPLICATE)

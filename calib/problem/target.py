@@ -18,8 +18,9 @@ Smoother = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 #: (docs/theory.md, "Measured choices").
 DISCREPANCY = 0.03
 
-#: Correlation length of that discrepancy as a part of the stroke [-]: a structural misfit (a peak of the skin, a slope, a
-#: plateau) extends over about a twentieth of a cut, so that at most 20 of the grid points count as independent.
+#: Correlation length of that discrepancy as a part of the stroke [-]: a structural misfit (a peak of the skin, a
+#: slope, a plateau) extends over about a twentieth of a cut, so that at most 20 of the grid points count as
+#: independent.
 CORRELATION = 0.05
 
 #: Tolerance of the peak, as a part of it [-], so that an error of 5 % (the limit of a passed calibration) costs 2.5

@@ -115,9 +115,9 @@ class Evaluators:
     Attributes:
         fine: Simulations at the resolution that counts.
         coarse: Cheaper ones, on coarse cells.
-        repeat: Those of ``fine`` with what should not matter changed: speed, particles and the place of the grid.
+        replicate: Those of ``fine`` with what should not matter changed: speed, particles and the place of the grid.
     """
 
     fine: Evaluator
     coarse: Evaluator
-    repeat: Evaluator
+    replicate: Evaluator

@@ -108,14 +108,16 @@ def fit_with_uncertainty(
         KeyboardInterrupt: Interrupted before any simulation reached the end of its stroke.
     """
     told = listener or Listener()
-    fine, coarse, repeat = evaluators.fine, evaluators.coarse, evaluators.repeat
-    first = multistart_search(objective, fine, coarse=coarse, replicate=repeat, options=options, progress=told.progress)
+    fine, coarse, replicate = evaluators.fine, evaluators.coarse, evaluators.replicate
+    first = multistart_search(
+        objective, fine, coarse=coarse, replicate=replicate, options=options, progress=told.progress
+    )
     if first.status == "interrupted":
         return first, analyse(objective, first, seed=options.seed, sample=sample)
     alone = search_uncertainty(objective, first)
     claimed = [] if alone is None else [i for i in alone.intervals if i.verdict == "identified" and _claimable(i)]
     if claimed:
-        first = _repeated(objective, first, repeat)
+        first = _replicated(objective, first, replicate)
     result, second = first, None
     affordable = options.budget - options.cost(first.history) >= options.least(len(objective.parameters))
     if claimed and affordable and _robust(objective, first):
@@ -125,7 +127,7 @@ def fit_with_uncertainty(
     analysis = analyse(objective, result, coarse=coarse, fine=fine, seed=options.seed, sample=sample, say=told.say)
     if analysis is None:
         return result, None
-    analysis = _reviewed(objective, analysis, _Searches(first, second, claimed), repeat, options.budget)
+    analysis = _reviewed(objective, analysis, _Searches(first, second, claimed), replicate, options.budget)
     for sentence in analysis.remarks:
         told.say(sentence[:-1])
     return analysis.result, analysis
@@ -144,7 +146,7 @@ def _reviewed(
     objective: Objective | JointObjective,
     analysis: UncertaintyAnalysis,
     searches: _Searches,
-    repeat: Evaluator,
+    replicate: Evaluator,
     budget: float,
 ) -> UncertaintyAnalysis:
     """The uncertainty with no claim that a second search, a repeated run or experience with made-up cuts refutes."""
@@ -154,7 +156,7 @@ def _reviewed(
         lambda i: not _claimable(i),
     )
     if any(i.verdict == "identified" for i in analysis.uncertainty.intervals):
-        analysis = replace(analysis, result=_repeated(objective, analysis.result, repeat))
+        analysis = replace(analysis, result=_replicated(objective, analysis.result, replicate))
     if searches.second is not None:
         analysis = _compared(analysis, searches.first, searches.second, searches.claimed)
     if not _robust(objective, analysis.result):
@@ -167,11 +169,11 @@ def _reviewed(
     return analysis
 
 
-def _repeated(objective: Objective | JointObjective, fit: FitResult, repeat: Evaluator) -> FitResult:
+def _replicated(objective: Objective | JointObjective, fit: FitResult, replicate: Evaluator) -> FitResult:
     """The fit with a second run of its answer, if there is none yet."""
     if _second_run(fit) is not None:
         return fit
-    run = next(iter(repeat.evaluate([fit.best.evaluation.parameters])))
+    run = next(iter(replicate.evaluate([fit.best.evaluation.parameters])))
     return replace(fit, replicates=(*fit.replicates, objective.score(run, stage="replicate")))
 
 

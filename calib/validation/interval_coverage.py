@@ -31,7 +31,7 @@ from calib.material.knife import load_knife
 from calib.material.scene import Sizing, cut_scene, specimen
 from calib.problem.food_parameters import fit_parameters
 from calib.problem.request import Request
-from calib.problem.setup import repeated, set_up
+from calib.problem.setup import replicated, set_up
 from calib.problem.target import ErrorModel
 from calib.simulation.evaluation import Evaluators
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, Header
@@ -230,7 +230,7 @@ def _one(plan: CoveragePlan, k: int, path: Path, store: EvaluationStore, pool: W
             CachedEvaluator(
                 pool.evaluator(scene, setup.kept), store, scene=scene.as_dict(), code=code_key(), fidelity=name
             )
-            for name, scene in (("fine", setup.fine), ("coarse", setup.coarse), ("again", repeated(setup.fine)))
+            for name, scene in (("fine", setup.fine), ("coarse", setup.coarse), ("again", replicated(setup.fine)))
         )
         options = FitOptions(budget=request.budget, batch=pool.batch, seed=k)
         result, analysis = fit_with_uncertainty(setup.objective, Evaluators(fine, coarse, again), options)

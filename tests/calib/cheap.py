@@ -1,4 +1,5 @@
-"""Studies without their physics: a formula in place of the solver, in real worker processes, which write down what they do."""
+"""Studies without their physics: a formula in place of the solver, in real worker processes, which write down what
+they do."""
 
 from __future__ import annotations
 

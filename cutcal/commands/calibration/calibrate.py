@@ -13,7 +13,6 @@ from calib.io.progress import ProgressBar
 from calib.problem.request import Request
 from calib.problem.target import ErrorModel
 from calib.validation.acceptance import remedied
-from calib.validation.metrics import IsoRating
 from cutcal.commands.calibration.describe import description
 from cutcal.options import (
     RESUME_HELP,
@@ -33,6 +32,7 @@ from mpm.errors import CutcalError
 
 if TYPE_CHECKING:
     from calib.calibration.result import CalibrationResult
+    from calib.multi_specimen.result import HeldOutCut, InSampleCut, StudyResult
 
 HELP = "fit a food to a measured knife-force trace, and report"
 DESCRIPTION = """Fit a food to a knife-force trace (CSV, JSON, HDF5; units in columns' names)."""
@@ -166,48 +166,47 @@ def run(args: argparse.Namespace) -> int:
 
 def run_study(args: argparse.Namespace, command: Sequence[str]) -> int:
     """Fit and predict the cuts of a study; prints its table, or the summary as JSON."""
+    from calib.io.typed_document import to_document
     from calib.multi_specimen.run import run as study_run
-    from calib.multi_specimen.study_file import overridden, read_study
+    from calib.multi_specimen.study_file import read_study
 
     if args.check:
         raise CutcalError("--check is for one trace: give --food and --trace, and leave --config out")
     taken = [n for n in ("food", "trace", "air", "material", "fit") if getattr(args, n) is not None]
     if taken:
         raise CutcalError(f"--{taken[0]} beside --config: write it into {args.config}, where it belongs to a trace")
-    read = read_study(args.config)
-    study = overridden(read, budget=args.budget, arch=args.arch, command=tuple(command))
+    study = read_study(args.config).run_with(budget=args.budget, arch=args.arch, command=tuple(command))
     out = Path(args.out or f"cutcal-{Path(args.config).stem}")
 
     with workers_of(args, note) as pool, ProgressBar() as bar:
-        summary = study_run(study, out, pool, resume=args.resume, progress=bar, say=note)
+        result = study_run(study, out, pool, resume=args.resume, progress=bar, say=note)
     if args.json:
-        print_json(summary)
+        print_json(to_document(result))
     else:
-        print(study_text(summary, out))
-    return 0 if summary["passed"] else 2
+        print(study_text(result, out))
+    return 0 if result.passed else 2
 
 
-def study_text(summary: dict[str, Any], out: Path) -> str:
+def study_text(result: StudyResult, out: Path) -> str:
     """What the terminal shows at the end of a study."""
     lines = [f"  {'':24s}{'peak':>8s}{'NRMSE':>8s}{'shape':>8s}{'R':>7s}{'in band':>9s}{'factor':>8s}"]
-    kinds = (("in-sample", summary["traces"]), ("held out", summary["hold_out"]))
-    for words, group in kinds:
-        for name, t in group.items():
-            m, inside = t["metrics"], t["predictive_inside"]
-            within = "" if inside is None else f"{inside:.0%}"
-            lines.append(
-                f"  {'pass' if t['passed'] else 'FAIL'}  {name + ', ' + words:18s}{m['peak_error']:+8.1%}{m['nrmse']:8.3f}"
-                f"{m['shape_error']:8.3f}{m['iso18571']['R']:7.3f}{within:>9s}{t['factor']:8.3g}"
-            )
-            caveat = IsoRating(**m["iso18571"]).caveat
-            lines += [f"        {caveat}"] if caveat else []
+    rows: list[tuple[str, InSampleCut | HeldOutCut]] = [(f"{n}, in-sample", cut) for n, cut in result.traces.items()]
+    rows += [(f"{n}, held out", cut) for n, cut in result.hold_out.items()]
+    for name, cut in rows:
+        m, inside = cut.metrics, cut.predictive_inside
+        within = "" if inside is None else f"{inside:.0%}"
+        lines.append(
+            f"  {'pass' if cut.passed else 'FAIL'}  {name:18s}{m.peak_error:+8.1%}{m.nrmse:8.3f}{m.shape_error:8.3f}"
+            f"{m.iso18571.R:7.3f}{within:>9s}{cut.factor:8.3g}"
+        )
+        lines += [f"        {m.iso18571.caveat}"] if m.iso18571.caveat else []
     lines.append(f"  {'fitted':24s}{'value':>10s} {'':6s}{'95 % interval':>24s}")
-    for name, p in summary["parameters"].items():
-        interval = "" if p["low95"] is None else f"{p['low95']:.3g} to {p['high95']:.3g}"
-        lines.append(f"  {name:24s}{p['value']:>10.4g} {p['unit']:6s}{interval:>24s}  {p['verdict']}")
+    for name, p in result.parameters.items():
+        interval = "" if p.low95 is None else f"{p.low95:.3g} to {p.high95:.3g}"
+        lines.append(f"  {name:24s}{p.value:>10.4g} {p.unit:6s}{interval:>24s}  {p.verdict}")
     head = (
-        f"{summary['food']}, {summary['study']}: {'passed' if summary['passed'] else 'not passed'}; "
-        f"{summary['simulations']} simulations in {summary['wall_s']:.0f} s"
+        f"{result.food}, {result.study}: {'passed' if result.passed else 'not passed'}; "
+        f"{result.simulations} simulations in {result.wall_s:.0f} s"
     )
     return "\n".join([head, *lines, f"  wrote {out}"])
 

@@ -199,7 +199,8 @@ def test_a_coarse_run_is_never_the_answer() -> None:
 
 
 def test_a_screening_begun_anew_finds_what_is_not_felt_at_the_best_point() -> None:
-    """Stuck where a yield stress is never reached, a screening that knows nothing of it finds where it is; on the coarse grid."""
+    """Stuck where a yield stress is never reached, a screening that knows nothing of it finds where it is; on the
+    coarse grid."""
 
     def capped(p: Mapping[str, float]) -> np.ndarray:
         return two_terms(p) * (1.0 if p["yield_stress"] > 3.3e4 else 1.0 + 0.3 * np.sin(6.0 * STROKE / LENGTH))
@@ -237,7 +238,8 @@ def wiggly(size: float) -> Objective:
 
 @pytest.mark.parametrize(("size", "anew"), [(0.06, False), (0.075, True)])
 def test_only_a_curve_beyond_chance_is_screened_anew(size: float, anew: bool) -> None:
-    """A wiggle that nothing explains calls for another screening where one cut in a hundred would not show it, not before."""
+    """A wiggle that nothing explains calls for another screening where one cut in a hundred would not show it, not
+    before."""
     objective, options = wiggly(size), FitOptions(budget=60)
     result = multistart_search(objective, Fake(two_terms), coarse=Fake(two_terms), options=options)
     assert result.best.misfit > objective.effective_rows
@@ -261,9 +263,10 @@ def test_a_curve_far_off_is_sought_as_long_as_the_budget_holds(
 def test_a_curve_that_nothing_follows_is_not_polished(
     size: float, polished: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What is gained where the errors are as large is less than what bounds an interval, and no fine run is made for it; where the curve is
-    explained the same gain, by its errors, is worth a round. How much shorter searches get is a matter of chance: 12 seeds took 38.7
-    and 40.5 of the budget in place of 46.7 and 47.0, with one kind of processor and another.
+    """What is gained where the errors are as large is less than what bounds an interval, and no fine run is made for
+    it; where the curve is explained the same gain, by its errors, is worth a round. How much shorter searches get is a
+    matter of chance: 12 seeds took 38.7 and 40.5 of the budget in place of 46.7 and 47.0, with one kind of processor
+    and another.
     """
     plain = goal(TRUTHS[0])
     target = replace(plain.target, curve=plain.target.curve + size * np.sin(GRID / 0.0025))
@@ -283,7 +286,8 @@ def test_a_curve_that_nothing_follows_is_not_polished(
 
 
 def test_what_is_not_polished_loses_less_than_an_interval(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The chi-square that rounds of small gains would have brought is less than what bounds an interval where the errors are as large."""
+    """The chi-square that rounds of small gains would have brought is less than what bounds an interval where the
+    errors are as large."""
     plain = goal(TRUTHS[0])
     target = replace(plain.target, curve=plain.target.curve + 2.0 * np.sin(GRID / 0.0025))
     objective = Objective(target, FIVE)
@@ -300,8 +304,8 @@ def test_what_is_not_polished_loses_less_than_an_interval(monkeypatch: pytest.Mo
 
 @pytest.mark.parametrize(("size", "given_up"), [(2.0, True), (4.0, False)])
 def test_a_search_without_gain_ends(size: float, given_up: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What no material explains is given up when as much as a whole search takes has brought nothing, unless it is far off; and is not begun
-    afresh then.
+    """What no material explains is given up when as much as a whole search takes has brought nothing, unless it is far
+    off; and is not begun afresh then.
     """
     plain = goal(TRUTHS[0])
     objective = Objective(replace(plain.target, curve=plain.target.curve + size * np.sin(GRID / 0.0025)), FIVE)
@@ -404,7 +408,8 @@ def test_progress_is_reported_after_each_run() -> None:
 def test_noise_is_not_fitted() -> None:
     """Noise alone must not keep the search going: it stops well before a large budget.
 
-    With five times the usual noise the process of three in ten seeds keeps promising gains, and only the lack of them ends it.
+    With five times the usual noise the process of three in ten seeds keeps promising gains, and only the lack of them
+    ends it.
     """
     statuses = []
     for size in (0.01, 0.05):
@@ -431,8 +436,8 @@ def stuck(monkeypatch: pytest.MonkeyPatch, start: Mapping[str, float]) -> None:
 
 
 def test_a_search_that_stalled_is_begun_afresh(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Stalled far from the curve, the rest of the budget goes to another search, which knows nothing of the first, and whose answer is the
-    better one's. Progress counts both.
+    """Stalled far from the curve, the rest of the budget goes to another search, which knows nothing of the first, and
+    whose answer is the better one's. Progress counts both.
     """
     far = {"R": 200.0, "mu": 0.5}
     stuck(monkeypatch, far)
@@ -447,7 +452,8 @@ def test_a_search_that_stalled_is_begun_afresh(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_search_that_stalled_at_a_curve_that_is_met_is_not_begun_afresh(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A chi-square below the median that the right material leaves needs no second search, and no budget for one is no error."""
+    """A chi-square below the median that the right material leaves needs no second search, and no budget for one is no
+    error."""
     stuck(monkeypatch, TWO_TRUTH)
     met = multistart_search(two_goal(), Fake(two_terms), options=QUICK)
     assert met.status == "stalled" and len(met.history) == 1
@@ -490,8 +496,8 @@ def test_an_answer_whose_repetition_breaks_down_is_not_chosen() -> None:
 
 
 def test_a_finalist_that_cannot_win_is_not_run_twice() -> None:
-    """One that was much worse than the best is not run again, whatever the second run has cost both alike; one that was hardly worse is,
-    and any where no second run stands.
+    """One that was much worse than the best is not run again, whatever the second run has cost both alike; one that
+    was hardly worse is, and any where no second run stands.
     """
     search = Search(two_goal(), Fake(two_terms), None, QUICK, None)
     search.run()
@@ -512,7 +518,8 @@ def test_a_finalist_that_cannot_win_is_not_run_twice() -> None:
 
 
 def test_a_run_that_presses_the_food_away_counts_as_one_that_broke_down() -> None:
-    """It has completed nothing of the cut where the edge took half of R, all where it took 0.8; in a joint run each trace counts."""
+    """It has completed nothing of the cut where the edge took half of R, all where it took 0.8; in a joint run each
+    trace counts."""
     run = Evaluation(0, {}, "ok", "", 1.0, STROKE, STROKE)
     assert run.completed == 1.0
     for parted, completed in ((1.3, 1.0), (0.8, 1.0), (0.65, 0.5), (0.5, 0.0), (0.1, 0.0), (math.nan, 1.0)):

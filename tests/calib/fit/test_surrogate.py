@@ -169,7 +169,8 @@ def coarse_trials(count: int, slope: float) -> list[ScoredRun]:
 
 @pytest.mark.parametrize("slope", [0.0, 0.3])
 def test_coarse_runs_say_what_they_share_with_fine_ones(slope: float) -> None:
-    """With ten fine runs, 40 coarse ones whose error changes with a parameter leave the slope of a fine curve where it is."""
+    """With ten fine runs, 40 coarse ones whose error changes with a parameter leave the slope of a fine curve where it
+    is."""
     runs = trials(10, noise=0.003) + coarse_trials(40, slope)
     process = Surrogate(goal(), runs, runs[0]).each[0]
     up, down = (THREE.start + np.array([0.0, side * 0.2, 0.0]) for side in (1.0, -1.0))

@@ -1,4 +1,5 @@
-"""What the band of a held-out cut is drawn from: flesh of other specimens, and what its own specimen then has for itself."""
+"""What the band of a held-out cut is drawn from: flesh of other specimens, and what its own specimen then has for
+itself."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ import pytest
 import calib.multi_specimen.held_out
 from calib.fit.multistart import multistart_search
 from calib.fit.options import FitOptions
-from calib.multi_specimen.held_out import _adapted, _drawn, _Specimen
+from calib.multi_specimen.held_out import _adapted, _drawn, _OwnFit
 from calib.problem.parameters import ParameterSet
 from tests.calib.fake import FIVE, Fake, goal, three_terms
 
@@ -28,7 +29,7 @@ def fitted(specimens: int) -> Any:
         analysis=SimpleNamespace(uncertainty=None),
         result=SimpleNamespace(surrogate=object(), best=SimpleNamespace(z=z)),
         objective=SimpleNamespace(parameters=FIVE),
-        flesh=lambda point: {n: x for n, x in FIVE.to_dict(point).items() if n in FLESH},
+        shared_values=lambda point: {n: x for n, x in FIVE.to_dict(point).items() if n in FLESH},
     )
 
 
@@ -36,8 +37,9 @@ def fitted(specimens: int) -> Any:
 def test_flesh_of_another_specimen_scatters_about_the_mean_of_the_fitted_ones(
     specimens: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By the root of 1 + 1/n of the scatter, in the logarithm; friction is the blade's as well and stays; without scatter nothing moves."""
-    monkeypatch.setattr(calib.multi_specimen.held_out, "DRAWS", 4000)
+    """By the root of 1 + 1/n of the scatter, in the logarithm; friction is the blade's as well and stays; without
+    scatter nothing moves."""
+    monkeypatch.setattr(calib.multi_specimen.held_out, "PREDICTIVE_MATERIALS", 4000)
     monkeypatch.setattr(calib.multi_specimen.held_out, "posterior_draws", lambda s, z, u, random: np.tile(z, (4000, 1)))
     drawn = _drawn(fitted(specimens), 0.25, 0)
     assert len(drawn) == 4000 and {d["mu"] for d in drawn} == {FLESH["mu"]}
@@ -50,8 +52,8 @@ def test_flesh_of_another_specimen_scatters_about_the_mean_of_the_fitted_ones(
 
 @pytest.mark.filterwarnings("ignore")
 def test_the_specimens_own_values_are_fitted_to_each_flesh(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With a fifth more or less stiffness or resistance the skin goes at least two fifths of the way to what would be fitted anew; a
-    run that breaks down on coarse cells leaves the best one.
+    """With a fifth more or less stiffness or resistance the skin goes at least two fifths of the way to what would be
+    fitted anew; a run that breaks down on coarse cells leaves the best one.
     """
     monkeypatch.setattr(
         calib.multi_specimen.held_out, "uncertainty", lambda parameters, data: SimpleNamespace(alone=1e-18 * np.eye(1))
@@ -71,7 +73,7 @@ def test_the_specimens_own_values_are_fitted_to_each_flesh(monkeypatch: pytest.M
         setups={"b": SimpleNamespace(coarse=None)}, evaluator=evaluator, study=SimpleNamespace(seed=0)
     )
     others = [FLESH | {name: FLESH[name] * k} for name in ("E", "R") for k in (0.8, 1.2)] + [FLESH | {"E": 2e6}]
-    found = _adapted(specimens, _Specimen(objective, result), FLESH, others, "b")
+    found = _adapted(specimens, _OwnFit(objective, result), FLESH, others, "b")
     assert asked == [("b", "coarse")] and all(set(own) == {"R_skin"} for own in found)
     best = result.best.evaluation.parameters
 

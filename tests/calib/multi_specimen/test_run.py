@@ -13,8 +13,13 @@ import pandas as pd
 import pytest
 
 import cutcal.commands.calibration.calibrate
+from calib import Study
+from calib.errors import DocumentError
+from calib.io.folder import finite
+from calib.io.typed_document import to_document
 from calib.material.food import load_material_file
 from calib.material.scene import place
+from calib.multi_specimen.result import read_result
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.workers import Errand, Workers
 from cutcal.main import main
@@ -154,7 +159,8 @@ def test_each_cut_is_predicted_from_the_others(finished: tuple[Path, Path, int])
 
 @pytest.mark.slow
 def test_what_is_written_can_be_read(finished: tuple[Path, Path, int]) -> None:
-    """material.yaml holds the flesh, the curves of each trace the fit and the prediction with their bands, records the looks."""
+    """material.yaml holds the flesh, the curves of each trace the fit and the prediction with their bands, records the
+    looks."""
     out = finished[1]
     summary = json.loads((out / "summary.json").read_text())
     food = load_material_file(out / "material.yaml")
@@ -166,6 +172,36 @@ def test_what_is_written_can_be_read(finished: tuple[Path, Path, int]) -> None:
     assert all(read_section(out / f"record-{name}.h5") is not None for name in SPECIMENS)
     assert summary["traces"]["b"]["shape"]["height"] == HEIGHT and summary["traces"]["b"]["knife"]["name"] == "kitchen"
     assert any("hold_out are predictions" in text for text in summary["limits"])
+
+
+@pytest.mark.slow
+def test_the_result_is_read_back_as_it_was_written(finished: tuple[Path, Path, int]) -> None:
+    """The document gives the typed result back, which makes the very same document; a damaged one is one line."""
+    out = finished[1]
+    document = json.loads((out / "summary.json").read_text())
+    result = read_result(out)
+    assert finite(to_document(result)) == document
+    assert result.hold_out["a"].metrics.iso18571.R == document["hold_out"]["a"]["metrics"]["iso18571"]["R"]
+    assert result.passed and result.traces["b"].shape.height == HEIGHT
+    damaged = out.parent / "damaged"
+    damaged.mkdir()
+    del document["traces"]["b"]["factor"]
+    (damaged / "summary.json").write_text(json.dumps(document))
+    with pytest.raises(DocumentError, match=r"summary\.json: traces\.b\.factor is missing"):
+        read_result(damaged)
+
+
+@pytest.mark.slow
+def test_a_study_runs_from_python(study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two lines of a script do what the command does: the folder holds the document that they return."""
+    monkeypatch.setattr("calib.simulation.process_pool.Pool", lambda workers, arch: FakePool())
+    text = study.read_text().replace("hold_out: each\n", "budget: 30\n")
+    study.write_text("\n".join(line for line in text.splitlines() if not line.startswith("  c:")))
+    said: list[str] = []
+    summary = Study.read(study).run(tmp_path / "out", say=said.append)
+    assert summary == json.loads((tmp_path / "out" / "summary.json").read_text()) == valid(summary)
+    assert list(summary["traces"]) == ["a", "b"] and not summary["hold_out"]
+    assert "fitting a, b together" in said
 
 
 @pytest.mark.slow
@@ -185,8 +221,8 @@ def test_resuming_a_finished_study_simulates_nothing(finished: tuple[Path, Path,
 
 @pytest.mark.slow
 def test_one_cut_is_held_out_for_good(study: Path, tmp_path: Path) -> None:
-    """Named, not in turn: the final fit leaves it out as well, so nothing of it is in the material. Its band knows that specimens
-    differ, unless the study says that they do not, and its prediction is the same.
+    """Named, not in turn: the final fit leaves it out as well, so nothing of it is in the material. Its band knows
+    that specimens differ, unless the study says that they do not, and its prediction is the same.
     """
     study.write_text(study.read_text().replace("hold_out: each", "hold_out: [b]"))
     _, summary = ran(study, tmp_path / "out")
@@ -204,7 +240,8 @@ def test_one_cut_is_held_out_for_good(study: Path, tmp_path: Path) -> None:
 def test_a_void_phase_is_said_and_does_not_pass(
     study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A prediction whose phase search ends at its bound fails by R, and terminal and limits say what R is without its phase."""
+    """A prediction whose phase search ends at its bound fails by R, and terminal and limits say what R is without its
+    phase."""
     monkeypatch.setattr("calib.validation.metrics._best_shift", lambda r, m, most: most)
     study.write_text(study.read_text().replace("hold_out: each", "hold_out: [b]"))
     code, summary = ran(study, tmp_path / "out")

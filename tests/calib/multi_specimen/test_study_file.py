@@ -9,8 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calib.multi_specimen.specimens import pinned, pressed
-from calib.multi_specimen.study_file import OWN, SCATTER, overridden, read_study
+from calib.multi_specimen.compression_modulus import compression_modulus, with_measured_modulus
+from calib.multi_specimen.spec import SCATTER, SPECIMEN_PROPERTIES
+from calib.multi_specimen.study_file import read_study
 from mpm.errors import CutcalError
 from tests.calib.fake import FIVE, goal
 
@@ -42,8 +43,9 @@ def test_a_study_is_read_with_paths_from_its_folder(tmp_path: Path) -> None:
     assert (a.knife, b.knife) == ("edc", "kitchen") and (a.sizing.width, b.sizing.width) == (0.03, None)
     assert b.speed == 0.02 and b.gain_sd == 0.1 and b.columns["sign"] == "-"
     assert a.scaled and b.scaled and a.fit == ("E", "R", "R_skin") and a.food.value("nu") == 0.4
-    assert study.hold_out == ("b",) and study.own == OWN and study.budget == 100.0 and study.scatter == SCATTER
-    assert study.presses[0].traces == (tmp_path / "one.csv", tmp_path / "two.csv")
+    assert study.hold_out == ("b",) and study.specimen_properties == SPECIMEN_PROPERTIES
+    assert study.budget == 100.0 and study.scatter == SCATTER
+    assert study.compressions[0].traces == (tmp_path / "one.csv", tmp_path / "two.csv")
 
 
 def test_each_is_all_in_turn(tmp_path: Path) -> None:
@@ -55,7 +57,7 @@ def test_each_is_all_in_turn(tmp_path: Path) -> None:
 def test_the_command_line_says_how_to_run_it(tmp_path: Path) -> None:
     """Budget, device and command reach every trace."""
     study = read_study(written(tmp_path, GOOD))
-    new = overridden(study, budget=30.0, arch="cpu", command=("calibrate",))
+    new = study.run_with(budget=30.0, arch="cpu", command=("calibrate",))
     assert {(r.budget, r.arch, r.command) for r in new.requests.values()} == {(30.0, "cpu", ("calibrate",))}
     assert new.budget == 30.0
 
@@ -105,15 +107,15 @@ def test_a_compression_test_pins_the_modulus(tmp_path: Path) -> None:
     for name, modulus in (("one", 0.97e6), ("two", 1.03e6)):
         force = modulus * (strain + 0.9 * strain**2) * np.pi / 4 * 0.05**2  # near the law's own curve at nu 0.45
         pd.DataFrame({"compression_m": 0.03 * strain, "force_N": force}).to_csv(tmp_path / f"{name}.csv", index=False)
-    test = pressed(read_study(written(tmp_path, GOOD)).presses[0])
+    test = compression_modulus(read_study(written(tmp_path, GOOD)).compressions[0])
     assert test.repeats == 2 and test.E == pytest.approx(1e6, rel=0.1) and 0.1 < test.spread < 0.15
-    before, after = FIVE["E"], pinned(FIVE, [test])["E"]
+    before, after = FIVE["E"], with_measured_modulus(FIVE, [test])["E"]
     assert after.prior_sd < 0.25 * before.prior_sd and after.prior_low < test.E < after.prior_high
-    assert pinned(FIVE, []) is FIVE
+    assert with_measured_modulus(FIVE, []) is FIVE
 
 
 def test_factor_of_a_specimen_is_least_squares_with_its_prior() -> None:
-    """Without a scale nuisance the factor is 1; with a wide one it is that of the curves, with a narrow one nearly 1."""
+    """Without a scale nuisance the factor is 1, with a wide one that of the curves, with a narrow one nearly 1."""
     one = goal({"E": 3e5, "yield_stress": 4e4, "R": 500.0, "R_skin": 200.0, "mu": 0.2})
     curve = one.target.curve
     assert one.factor(0.5 * curve) == 1.0

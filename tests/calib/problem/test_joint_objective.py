@@ -68,7 +68,7 @@ def test_a_joint_run_is_as_good_as_its_worst_part() -> None:
 
 
 def test_shared_flesh_is_found_through_two_specimens() -> None:
-    """Skins over R and the narrower specimen's factor are found, although only proportions are known: to 20 and 10 %."""
+    """Skins over R (20 %) and the narrower specimen's factor (10 %) are found; only proportions are known."""
     joint = JointObjective.of(objectives(scaled=True), SHARED)
     fakes = [Fake(), Fake()]
     result = multistart_search(joint, JointEvaluator(joint, fakes), options=FitOptions(budget=60))

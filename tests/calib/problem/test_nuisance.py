@@ -68,7 +68,8 @@ def test_chi_square_is_the_least_over_the_nuisances() -> None:
 
 
 def test_the_peak_is_met_bare() -> None:
-    """No nuisance that the search integrates out explains a peak: the drift only widens its tolerance, by what it may do there."""
+    """No nuisance that the search integrates out explains a peak: the drift only widens its tolerance, by what it may
+    do there."""
     curve = cut()
     given = nuisances(curve, Sensor(0.1, 0.01), width_sd=0.2)
     whole, bare = goal(curve, given), goal(curve, ())
@@ -112,7 +113,8 @@ def test_nothing_makes_a_force_look_right() -> None:
 
 
 def test_a_late_onset_is_not_a_misfit() -> None:
-    """The right curve, measured with an onset that is one standard deviation off, costs about one; without the lag it costs more."""
+    """The right curve, measured with an onset that is one standard deviation off, costs about one; without the lag it
+    costs more."""
     curve = cut()
     given = nuisances(curve, Sensor(0.0, 0.01))
     lag = next(n for n in given if n.name == "lag")
@@ -132,7 +134,8 @@ def test_a_wrench_from_joint_torques_has_an_uncertain_gain() -> None:
 
 
 def test_a_drift_is_not_extrapolated_without_end() -> None:
-    """A short baseline says nothing of the drift over the cut: its standard deviation ends at a twentieth of the peak."""
+    """A short baseline says nothing of the drift over the cut: its standard deviation ends at a twentieth of the
+    peak."""
     curve = replace(cut(), drift_sd_N_per_s=50.0)
     drift = next(n for n in nuisances(curve, Sensor()) if n.name == "drift")
     assert drift.sd == pytest.approx(0.05 * float(curve.curve.max()))

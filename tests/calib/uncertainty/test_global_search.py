@@ -195,9 +195,9 @@ def test_the_answer_is_always_run_twice():
     """Also one that was found after the finalists were; once only."""
     goal, fake = objective(onefold), Fake(onefold, noisy=0.002)
     fit = stuck(goal, fake, 1.01)
-    once = global_search._repeated(goal, fit, fake)
+    once = global_search._replicated(goal, fit, fake)
     assert len(once.replicates) == 1 and np.array_equal(once.replicates[0].z, fit.best.z)
-    assert global_search._repeated(goal, once, fake) is once and once.simulations == fit.simulations + 1
+    assert global_search._replicated(goal, once, fake) is once and once.simulations == fit.simulations + 1
 
 
 def test_an_interrupted_search_simulates_nothing_more():
