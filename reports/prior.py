@@ -39,7 +39,13 @@ def height(names: Sequence[str]) -> float:
 
 
 def draw(figure: Figure, folder: Path, names: Sequence[str]) -> None:
-    """Fill a figure with one panel for each food: bands of 95 and 50 % of the draws, their median, the default values."""
+    """Fill a figure with a panel for each food: bands of 95 and 50 % of the draws, their median, the default values.
+
+    Args:
+        figure: The figure.
+        folder: Folder with a CSV file of each food.
+        names: The foods.
+    """
     columns = min(COLUMNS, len(names))
     rows = math.ceil(len(names) / columns)
     panels = list(figure.subplots(rows, columns, squeeze=False).flat)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -14,18 +13,29 @@ from calib.trace.columns import candidates, choose, numbers
 from calib.trace.reader import read_table
 from calib.trace.table import Table
 from calib.trace.trace import MIN_SAMPLES
+from mpm.arrays import FloatArray
 from mpm.shapes import Shape, volume
 
-STEP = 0.001
+STRAIN_STEP = 0.001
 """Step of the common strain grid, about [-]."""
-SMALL = 0.05
+SMALL_STRAIN = 0.05
 """Strain up to which the slope of the stress is the small-strain modulus [-]: the window of published moduli."""
-REPLICATE = "replicate"
+REPEAT_COLUMN = "replicate"
 """Column that splits a file into repeats."""
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredFile:
+    """A file of a compression test: its name and SHA-256, and the columns of the compression and of the load."""
+
+    name: str
+    sha256: str
+    compression: str
+    force: str
+
+
+@dataclass(frozen=True)
+class MeasuredCompression:
     """Repeats of one compression test on a common strain grid.
 
     Attributes:
@@ -33,17 +43,17 @@ class Measured:
         stress: Engineering stress of each repeat [Pa], shape (repeats, n).
         slope: Slope of the stress over 0 to 5 % strain of each repeat [Pa], shape (repeats,).
         names: Name of each repeat.
-        files: Name, SHA-256 and columns of each file.
+        files: The files.
     """
 
-    strain: np.ndarray
-    stress: np.ndarray
-    slope: np.ndarray
+    strain: FloatArray
+    stress: FloatArray
+    slope: FloatArray
     names: list[str]
-    files: list[dict[str, Any]]
+    files: tuple[MeasuredFile, ...]
 
     @property
-    def mean(self) -> np.ndarray:
+    def mean(self) -> FloatArray:
         """Mean stress of the repeats [Pa], shape (n,)."""
         return self.stress.mean(axis=0)
 
@@ -53,22 +63,23 @@ def area(shape: Shape) -> float:
     return volume(shape) / shape.height
 
 
-def strain_grid(strain: float) -> np.ndarray:
+def strain_grid(strain: float) -> FloatArray:
     """Strains from 0 to ``strain`` [-].
 
     Raises:
         CurveError: It ends before the window of the small-strain modulus.
     """
-    if strain < SMALL:
+    if strain < SMALL_STRAIN:
         raise CurveError(
-            f"--strain {strain:g}: the modulus over 0 to {SMALL:g} is part of the result; give {SMALL:g} or more"
+            f"--strain {strain:g}: the modulus over 0 to {SMALL_STRAIN:g} is part of the result; give {SMALL_STRAIN:g} "
+            "or more"
         )
-    return np.linspace(0.0, strain, round(strain / STEP) + 1)
+    return np.linspace(0.0, strain, round(strain / STRAIN_STEP) + 1)
 
 
-def slope(strain: np.ndarray, stress: np.ndarray) -> float:
+def slope(strain: FloatArray, stress: FloatArray) -> float:
     """Slope of the least-squares line through stress over 0 to 5 % strain; its offset is free [Pa]."""
-    on = strain <= SMALL * (1 + 1e-9)
+    on = strain <= SMALL_STRAIN * (1 + 1e-9)
     return float(np.polyfit(strain[on], stress[on], 1)[0])
 
 
@@ -79,7 +90,7 @@ def read_repeats(
     *,
     compression_col: str | None = None,
     force_col: str | None = None,
-) -> Measured:
+) -> MeasuredCompression:
     """Read the repeats of a compression test.
 
     The first sample of a repeat is its zero of compression and of load; no toe is corrected. Of each repeat the first
@@ -91,6 +102,9 @@ def read_repeats(
         strain: Largest engineering strain [-].
         compression_col: Column of the way of the plate; metres if its name has no unit.
         force_col: Column of the load; newtons if its name has no unit.
+
+    Returns:
+        The repeats on a common strain grid.
 
     Raises:
         TraceError: A file, a column or a repeat cannot be used; the message says which and why.
@@ -120,15 +134,13 @@ def read_repeats(
             e, s = _loading(f"{table.source}{f', repeat {name}' if name else ''}", way[on], load[on], shape, strain)
             rows.append(np.interp(grid, e, s))
             slopes.append(slope(e, s))
-        files.append(
-            {"name": table.source, "sha256": table.sha256, "compression": compression.name, "force": force.name}
-        )
-    return Measured(grid, np.array(rows), np.array(slopes), names, files)
+        files.append(MeasuredFile(table.source, table.sha256, compression.name, force.name))
+    return MeasuredCompression(grid, np.array(rows), np.array(slopes), names, tuple(files))
 
 
 def _repeats(table: Table) -> list[tuple[str, np.ndarray]]:
     """Name and rows of each repeat of a file; one without a name where there is no such column."""
-    column = next((cells for name, cells in table.columns.items() if name.lower() == REPLICATE), None)
+    column = next((cells for name, cells in table.columns.items() if name.lower() == REPEAT_COLUMN), None)
     if column is None:
         return [("", np.arange(len(table.rows)))]
     of = np.array([str(cell).strip() for cell in column])
@@ -136,8 +148,8 @@ def _repeats(table: Table) -> list[tuple[str, np.ndarray]]:
 
 
 def _loading(
-    where: str, way: np.ndarray, load: np.ndarray, shape: Shape, strain: float
-) -> tuple[np.ndarray, np.ndarray]:
+    where: str, way: FloatArray, load: FloatArray, shape: Shape, strain: float
+) -> tuple[FloatArray, FloatArray]:
     """Strain and stress of the first loading of a repeat, strain increasing and reaching ``strain``.
 
     Args:
@@ -157,7 +169,8 @@ def _loading(
     if way[last] >= shape.height:
         raise TraceError(
             f"{where}: a compression of {way[last]:g} m is more than the height of {shape.height:g} m; if it is in "
-            "millimetres call the column compression_mm, and check that --compression-col and --force-col are not swapped"
+            "millimetres call the column compression_mm, and check that --compression-col and --force-col are not "
+            "swapped"
         )
     if way[last] < strain * shape.height * (1 - 1e-9):
         raise TraceError(
@@ -169,8 +182,8 @@ def _loading(
     ahead[int(np.argmax(e >= strain * (1 - 1e-9))) + 1 :] = False
     if np.count_nonzero(ahead) < MIN_SAMPLES:
         raise TraceError(
-            f"{where}: {np.count_nonzero(ahead)} samples of loading up to a strain of {strain:g}, at least {MIN_SAMPLES} "
-            "are needed; record at a higher rate"
+            f"{where}: {np.count_nonzero(ahead)} samples of loading up to a strain of {strain:g}, at least "
+            f"{MIN_SAMPLES} are needed; record at a higher rate"
         )
     e, s = e[ahead], load[ahead] / area(shape)
     part = len(s) // 10 + 1
@@ -182,9 +195,9 @@ def _loading(
             f"{where}: the load falls with compression; count it positive in compression, or exchange "
             "--compression-col and --force-col if they are swapped"
         )
-    if np.count_nonzero(e <= SMALL) < 3:
+    if np.count_nonzero(e <= SMALL_STRAIN) < 3:
         raise TraceError(
-            f"{where}: fewer than 3 samples up to a strain of {SMALL:g}, where the small-strain modulus is taken; "
-            "record at a higher rate"
+            f"{where}: fewer than 3 samples up to a strain of {SMALL_STRAIN:g}, where the small-strain modulus is "
+            "taken; record at a higher rate"
         )
     return e, s

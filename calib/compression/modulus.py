@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-from calib.compression.measured import Measured, slope
-from calib.compression.press import UnitCurve, homogeneous, largest_error
+from calib.compression.measured import MeasuredCompression, slope
+from calib.compression.press import homogeneous, largest_error
+from mpm.arrays import FloatArray
 
 NU_STEP = 0.05
 """Change of Poisson's ratio whose effect on the modulus is reported [-]."""
@@ -18,7 +19,7 @@ NU_TOP = 0.499
 
 
 @dataclass(frozen=True)
-class Fit:
+class ModulusFit:
     """Young's modulus and how well its curve fits.
 
     Attributes:
@@ -34,12 +35,12 @@ class Fit:
         force_error_at: Strain where it is [-].
     """
 
-    E: np.ndarray
+    E: FloatArray
     mean: float
     sd: float
     low: float
     high: float
-    stress: np.ndarray
+    stress: FloatArray
     slope: float
     slope_error: float
     nrmse: float
@@ -47,21 +48,29 @@ class Fit:
     force_error_at: float
 
 
-def scale(unit: np.ndarray, stress: np.ndarray) -> np.ndarray:
+def scaled_modulus(unit: FloatArray, stress: FloatArray) -> FloatArray:
     """Least-squares modulus of one or several stresses, shapes (n,) and (..., n) [Pa]."""
     return stress @ unit / (unit @ unit)
 
 
-def fit(measured: Measured, unit: UnitCurve) -> Fit:
-    """Fit Young's modulus to each repeat."""
-    moduli = scale(unit.stress, measured.stress)
+def fit_modulus(measured: MeasuredCompression, unit: FloatArray) -> ModulusFit:
+    """Fit Young's modulus to each repeat.
+
+    Args:
+        measured: The repeats.
+        unit: Stress over Young's modulus [-] at their strains, shape (n,).
+
+    Returns:
+        The fit.
+    """
+    moduli = scaled_modulus(unit, measured.stress)
     n, mean = len(moduli), float(moduli.mean())
     sd = float(moduli.std(ddof=1)) if n > 1 else math.nan
     half = float(student.ppf(0.975, n - 1)) * sd / math.sqrt(n) if n > 1 else math.nan
-    fitted, want = mean * unit.stress, measured.mean
+    fitted, want = mean * unit, measured.mean
     error, at = largest_error(measured.strain, fitted, want)
-    small = slope(unit.strain, fitted)
-    return Fit(
+    small = slope(measured.strain, fitted)
+    return ModulusFit(
         E=moduli,
         mean=mean,
         sd=sd,
@@ -76,7 +85,15 @@ def fit(measured: Measured, unit: UnitCurve) -> Fit:
     )
 
 
-def sensitivity(measured: Measured, nu: float, modulus: float) -> list[dict[str, float]]:
+@dataclass(frozen=True)
+class ModulusAtNu:
+    """Young's modulus [Pa] that the same curve gives at another Poisson's ratio [-]."""
+
+    nu: float
+    E_Pa: float
+
+
+def modulus_at_other_nu(measured: MeasuredCompression, nu: float, modulus: float) -> tuple[ModulusAtNu, ModulusAtNu]:
     """Modulus that the same curve gives at other Poisson's ratios, between frictionless plates, by the closed form.
 
     Args:
@@ -85,11 +102,12 @@ def sensitivity(measured: Measured, nu: float, modulus: float) -> list[dict[str,
         modulus: Fitted modulus [Pa].
 
     Returns:
-        Poisson's ratio [-] and modulus [Pa] below and above.
+        The moduli below and above.
     """
-    base = float(scale(homogeneous(nu, measured.strain), measured.mean))
-    out = []
-    for other in (nu - NU_STEP, min(nu + NU_STEP, NU_TOP)):
-        refitted = float(scale(homogeneous(other, measured.strain), measured.mean))
-        out.append({"nu": other, "E_Pa": modulus * refitted / base})
-    return out
+    base = float(scaled_modulus(homogeneous(nu, measured.strain), measured.mean))
+
+    def refitted(other: float) -> ModulusAtNu:
+        again = float(scaled_modulus(homogeneous(other, measured.strain), measured.mean))
+        return ModulusAtNu(other, modulus * again / base)
+
+    return refitted(nu - NU_STEP), refitted(min(nu + NU_STEP, NU_TOP))

@@ -1,4 +1,4 @@
-"""The press as it is simulated: one unit curve, its closed form between frictionless plates, and the errors of the grid."""
+"""The press as it is simulated: a unit curve, its closed form between frictionless plates, the errors of the grid."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -14,6 +13,7 @@ from scipy.optimize import brentq
 from calib.compression.measured import area, strain_grid
 from calib.errors import CurveError
 from calib.io.progress import clock
+from mpm.arrays import FloatArray
 from mpm.errors import SimulationError
 from mpm.material import Material
 from mpm.runtime import Runtime
@@ -21,26 +21,47 @@ from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
 from mpm.shapes import Shape
 from mpm.solver import Simulation
 
-CONTACT = 0.02
+CONTACT_STRAIN = 0.02
 """Strain from which relative errors count [-]: below it they divide by nearly nothing."""
-REFERENCE = Material(E=1e5, nu=0.3, rho=1000.0, loss_factor=0.05)
+PRESSED_MATERIAL = Material(E=1e5, nu=0.3, rho=1000.0, loss_factor=0.05)
 """What is pressed. The loss factor damps the ringing; at this speed its force is that of a strain of 1e-4."""
-SPEED = 0.004
-"""Speed of the plate over that of the longitudinal wave in a bar, sqrt(E / rho) [-]; half of it changes the force by
-less than 0.2 % beyond 2 % strain (nu 0.49, 10 and 15 cells over the height)."""
-STICKS = 9.9
+PLATE_SPEED = 0.004
+"""Speed of the plate over that of the longitudinal wave in a bar, sqrt(E / rho) [-]. See docs/theory.md, "Measured
+choices"."""
+NO_SLIP_FRICTION = 9.9
 """Friction with which nothing slides [-]."""
-BEYOND = 1.03
+OVERSTROKE = 1.03
 """Stroke over the largest fitted one [-]: the end of the fitted curve has samples on both sides."""
-TELL = 5.0
+TELL_EVERY = 5.0
 """Time between two lines that say how far a press is [s]."""
-ROWS = 400
+RECORD_ROWS = 400
 """Rows of the record of a press."""
-DEGREE = 5
-"""Degree of the polynomial through the origin that smooths force times (1 - strain)^2, which takes out the ringing after
-the plate has met the food. It follows the closed form within 0.1 % up to a strain of 0.7, and 0.6 % up to 0.8."""
+SMOOTHING_DEGREE = 5
+"""Degree of the polynomial through the origin that smooths force times (1 - strain)^2, which takes out the ringing
+after the plate has met the food. See docs/theory.md, "Measured choices"."""
 
 Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class PressRun:
+    """A press that was simulated.
+
+    Attributes:
+        cells: Cells over the height.
+        dx_m: Cell size [m].
+        mach: Speed of the plate over that of the P-wave [-].
+        particles: Particles.
+        steps: Time steps.
+        wall_s: Run time [s].
+    """
+
+    cells: int
+    dx_m: float
+    mach: float
+    particles: int
+    steps: int
+    wall_s: float
 
 
 @dataclass(frozen=True)
@@ -50,15 +71,15 @@ class UnitCurve:
     Attributes:
         strain: Engineering strain [-], shape (n,).
         stress: Engineering stress / E [-], shape (n,).
-        about: Cells, particles, steps and speed of the simulation.
+        run: The simulation.
     """
 
-    strain: np.ndarray
-    stress: np.ndarray
-    about: dict[str, Any]
+    strain: FloatArray
+    stress: FloatArray
+    run: PressRun
 
 
-def homogeneous(nu: float, strain: np.ndarray) -> np.ndarray:
+def homogeneous(nu: float, strain: FloatArray) -> FloatArray:
     """Stress / E of the press between frictionless plates, closed form of the solver's corotated law.
 
     The press is homogeneous: the height changes by the factor l = 1 - strain, both widths by s, the volume by
@@ -96,22 +117,27 @@ def press_scene(shape: Shape, nu: float, strain: float, *, cells: int, bonded: b
         bonded: The food sticks to both plates; else they are frictionless.
         seed: Seed of the particles.
 
+    Returns:
+        The press.
+
     Raises:
         CurveError: Too few cells.
         SceneError: Impossible Poisson's ratio or sizes.
     """
     if cells < 4:
         raise CurveError(f"--cells {cells}: the press needs 4 or more over the height; 10 to 15 are usual")
-    material = Material(**{**vars(REFERENCE), "nu": nu})
-    end = min(BEYOND * strain, 0.5 * (1 + strain)) * shape.height
-    friction = STICKS if bonded else 0.0
+    material = Material(**{**vars(PRESSED_MATERIAL), "nu": nu})
+    end = min(OVERSTROKE * strain, 0.5 * (1 + strain)) * shape.height
+    friction = NO_SLIP_FRICTION if bonded else 0.0
     wider = 1 / math.sqrt(1 - strain) - 1  # at constant volume
     return Scene(
         Food(shape, material),
         Press(mu=friction),
-        Motion(end, SPEED * math.sqrt(material.E / material.rho) / material.p_wave),
+        Motion(end, PLATE_SPEED * math.sqrt(material.E / material.rho) / material.p_wave),
         Board(friction),
-        numerics=Numerics(dx=shape.height / cells, gravity=0.0, output=end / ROWS, room=1.5 * wider + 0.1, seed=seed),
+        numerics=Numerics(
+            dx=shape.height / cells, gravity=0.0, output=end / RECORD_ROWS, room=1.5 * wider + 0.1, seed=seed
+        ),
     )
 
 
@@ -124,6 +150,9 @@ def unit_curve(scene: Scene, strain: float, *, arch: str = "cpu", say: Say | Non
         arch: Device.
         say: Called every few seconds with a line that says how far the press is.
 
+    Returns:
+        The unit curve.
+
     Raises:
         SimulationError: The run broke down.
     """
@@ -132,7 +161,7 @@ def unit_curve(scene: Scene, strain: float, *, arch: str = "cpu", say: Say | Non
     def show(part: float, _: float) -> None:
         nonlocal told
         now = time.monotonic()
-        if say is not None and now - told >= TELL and part > 0.02:  # before that most of the time was compilation
+        if say is not None and now - told >= TELL_EVERY and part > 0.02:  # before that most of the time was compilation
             told = now
             say(f"  {part:.0%} of the press, about {clock((now - began) * (1 - part) / part)} left")
 
@@ -149,19 +178,19 @@ def unit_curve(scene: Scene, strain: float, *, arch: str = "cpu", say: Say | Non
     middle = (record.stroke - np.diff(record.stroke, prepend=0.0) / 2) / shape.height
     touched = middle > 0
     middle, force = middle[touched], record.face[touched, 2]
-    powers = np.arange(1, DEGREE + 1)
+    powers = np.arange(1, SMOOTHING_DEGREE + 1)
     constants = np.linalg.lstsq(middle[:, None] ** powers, force * (1 - middle) ** 2, rcond=None)[0]
     grid = strain_grid(strain)
     smooth = grid[:, None] ** powers @ constants / (1 - grid) ** 2
-    about = {
-        "cells": round(shape.height / scene.numerics.dx),
-        "dx_m": scene.numerics.dx,
-        "mach": scene.motion.mach,
-        "particles": record.particles,
-        "steps": record.steps,
-        "wall_s": record.wall,
-    }
-    return UnitCurve(grid, smooth / (material.E * area(shape)), about)
+    run = PressRun(
+        cells=round(shape.height / scene.numerics.dx),
+        dx_m=scene.numerics.dx,
+        mach=scene.motion.mach,
+        particles=record.particles,
+        steps=record.steps,
+        wall_s=record.wall,
+    )
+    return UnitCurve(grid, smooth / (material.E * area(shape)), run)
 
 
 def solver_error(unit: UnitCurve, nu: float) -> float:
@@ -174,9 +203,18 @@ def grid_change(unit: UnitCurve, coarse: UnitCurve) -> float:
     return largest_error(unit.strain, unit.stress, coarse.stress)[0]
 
 
-def largest_error(strain: np.ndarray, got: np.ndarray, want: np.ndarray) -> tuple[float, float]:
-    """Largest relative error beyond 2 % strain, with its sign, and the strain where it is [-]."""
-    on = strain >= CONTACT
+def largest_error(strain: FloatArray, got: FloatArray, want: FloatArray) -> tuple[float, float]:
+    """Largest relative error beyond 2 % strain, with its sign, and the strain where it is [-].
+
+    Args:
+        strain: Engineering strain [-], shape (n,).
+        got: Stress [Pa] or stress over Young's modulus [-], shape (n,).
+        want: What it should be, in the same unit [Pa or -], shape (n,).
+
+    Returns:
+        The error, and the strain.
+    """
+    on = strain >= CONTACT_STRAIN
     errors = got[on] / want[on] - 1
     k = int(np.argmax(np.abs(errors)))
     return float(errors[k]), float(strain[on][k])

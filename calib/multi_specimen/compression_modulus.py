@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Annotated
 
 import numpy as np
 
-from calib.compression.measured import area, read_repeats, strain_grid
-from calib.compression.modulus import fit
-from calib.compression.press import UnitCurve, homogeneous
+from calib.compression.measured import read_repeats, strain_grid
+from calib.compression.modulus import fit_modulus
+from calib.compression.press import homogeneous
 from calib.io.type_schema import Count, NotNegative, Positive, Shared
 from calib.multi_specimen.spec import CompressionSpec
 from calib.problem.parameters import Z95, ParameterSet
@@ -73,9 +73,9 @@ def compression_modulus(spec: CompressionSpec) -> CompressionModulus:
     shape = Shape(kind, sizes.get("length", width), width, sizes["height"])
     measured = read_repeats(spec.traces, shape, COMPRESSION_STRAIN)
     grid = strain_grid(COMPRESSION_STRAIN)
-    found = fit(measured, UnitCurve(grid, homogeneous(spec.nu, grid), {"area_m2": area(shape)}))
+    found = fit_modulus(measured, homogeneous(spec.nu, grid))
     spread = float(np.hypot(found.sd / found.mean if len(found.E) > 1 else 0.0, PLATES_SD))
-    files = tuple(CompressionFile(**file) for file in measured.files)
+    files = tuple(CompressionFile(**asdict(file)) for file in measured.files)
     return CompressionModulus(spec.name, found.mean, spread, len(found.E), spec.nu, files)
 
 

@@ -1,7 +1,7 @@
 """Published numbers of cuts without a curve: a largest force, an energy per cut area, and the specimen they are of.
 
-A file names the food, what is known of it beyond ``materials.yaml``, the knife, and specimens; each number of a specimen is
-either given, so that it is fitted to, or predicted, so that it is compared with what the others predict of it.
+A file names the food, what is known of it beyond ``materials.yaml``, the knife, and specimens. Each number of a
+specimen is either given or predicted: it is fitted to, or compared with what the fit to the others gives.
 """
 
 from __future__ import annotations
@@ -23,23 +23,30 @@ from mpm.errors import CutcalError, SceneError
 from mpm.scene import Knife
 from mpm.shapes import SHAPE_KINDS, Shape, section_area
 
-PEAK, ENERGY = "peak_N", "energy_J_m2"
-QUANTITIES = {PEAK: "largest force [N]", ENERGY: "work over the area of the cut [J/m^2]"}
-FIT = ("R", "mu")  # what two numbers of one cut are spent on unless the file says otherwise
-LIMIT = 0.2  # error of a prediction that passes: two specimens of a food differ by as much
-LARGEST_SD = 1.0
-SIZES = {"width": "width_m", "height": "height_m", "length": "length_m"}
+PEAK_FORCE, CUT_ENERGY = "peak_N", "energy_J_m2"
+QUANTITIES = {PEAK_FORCE: "largest force [N]", CUT_ENERGY: "work over the area of the cut [J/m^2]"}
+DEFAULT_FIT = ("R", "mu")  # what two numbers of one cut are spent on unless the file says otherwise
+ERROR_LIMIT = 0.2  # error of a prediction that passes: two specimens of a food differ by as much
+LARGEST_RELATIVE_SD = 1.0
+SIZE_KEYS = {"width": "width_m", "height": "height_m", "length": "length_m"}
 _SYNONYMS = {
-    "peak": PEAK, "force": PEAK, "force_n": PEAK, "max_force": PEAK, "energy": ENERGY, "specific_energy": ENERGY,
-    "energy_j": ENERGY, "work": ENERGY, "sd": "relative_sd", "spread": "relative_sd", "uncertainty": "relative_sd",
+    "peak": PEAK_FORCE, "force": PEAK_FORCE, "force_n": PEAK_FORCE, "max_force": PEAK_FORCE,
+    "energy": CUT_ENERGY, "specific_energy": CUT_ENERGY, "energy_j": CUT_ENERGY, "work": CUT_ENERGY,
+    "sd": "relative_sd", "spread": "relative_sd", "uncertainty": "relative_sd",
     "diameter": "width_m", "diameter_m": "width_m", "width": "width_m", "height": "height_m", "length": "length_m",
     "kind": "shape", "predict": "predicted", "measured": "given", "tolerance": "limit",
 }  # fmt: skip
 
 
 @dataclass(frozen=True)
-class Scalar:
-    """One published number. Attributes: quantity, one of ``QUANTITIES``; value in its unit; relative_sd, of its mean [-]."""
+class PublishedNumber:
+    """One published number.
+
+    Attributes:
+        quantity: One of :data:`QUANTITIES`.
+        value: Its value [unit of the quantity].
+        relative_sd: Standard deviation of its mean, a fraction of it [-].
+    """
 
     quantity: str
     value: float
@@ -47,7 +54,7 @@ class Scalar:
 
 
 @dataclass(frozen=True)
-class Cut:
+class PublishedCut:
     """A specimen that was cut through.
 
     Attributes:
@@ -59,8 +66,8 @@ class Cut:
 
     name: str
     shape: Shape
-    given: tuple[Scalar, ...] = ()
-    predicted: tuple[Scalar, ...] = ()
+    given: tuple[PublishedNumber, ...] = ()
+    predicted: tuple[PublishedNumber, ...] = ()
 
     @property
     def area(self) -> float:
@@ -77,7 +84,7 @@ class Cut:
         values = {s.quantity: s.value for s in (*self.given, *self.predicted)}
         if len(values) < len(QUANTITIES):
             return None
-        return values[PEAK] * self.shape.height / (values[ENERGY] * self.area)
+        return values[PEAK_FORCE] * self.shape.height / (values[CUT_ENERGY] * self.area)
 
     @property
     def uniform_fullness(self) -> float:
@@ -86,7 +93,7 @@ class Cut:
 
 
 @dataclass(frozen=True)
-class Published:
+class PublishedData:
     """Published numbers of cuts of one food with one knife.
 
     Attributes:
@@ -102,10 +109,10 @@ class Published:
     source: str
     food: FoodSpec
     knife: Knife
-    cuts: tuple[Cut, ...]
+    cuts: tuple[PublishedCut, ...]
     fit: tuple[str, ...]
     vary: tuple[str, ...]
-    limit: float = LIMIT
+    limit: float = ERROR_LIMIT
 
     def __post_init__(self) -> None:
         twice = sorted(set(self.fit) & set(self.vary))
@@ -115,14 +122,15 @@ class Published:
             raise PublishedError("specimens: no number is given, so there is nothing to fit to; move one to 'given'")
         if len(self.fit) > len(self.given):
             raise PublishedError(
-                f"fit: {len(self.given)} given numbers do not determine {', '.join(self.fit)}; fit at most {len(self.given)}"
+                f"fit: {len(self.given)} given numbers do not determine {', '.join(self.fit)}; "
+                f"fit at most {len(self.given)}"
             )
         for names in (self.fit, self.vary):
             if names:
                 fit_parameters(self.food, names)
 
     @property
-    def given(self) -> tuple[tuple[Cut, Scalar], ...]:
+    def given(self) -> tuple[tuple[PublishedCut, PublishedNumber], ...]:
         """All given numbers with their specimens, in order."""
         return tuple((cut, scalar) for cut in self.cuts for scalar in cut.given)
 
@@ -136,7 +144,7 @@ class Published:
         """The drawn properties with their priors; None where there is none."""
         return fit_parameters(self.food, self.vary) if self.vary else None
 
-    def fitting(self, names: tuple[str, ...]) -> Published:
+    def fitting(self, names: tuple[str, ...]) -> PublishedData:
         """The same numbers with other properties fitted; those fitted before are drawn now.
 
         Raises:
@@ -145,13 +153,13 @@ class Published:
         vary = tuple(n for n in dict.fromkeys((*self.vary, *self.fit)) if n not in names)
         return replace(self, fit=names, vary=vary)
 
-    def together(self) -> Published:
+    def all_given(self) -> PublishedData:
         """The same with all numbers given: whether any values of the fitted properties meet all of them."""
         cuts = (replace(cut, given=(*cut.given, *cut.predicted), predicted=()) for cut in self.cuts)
         return replace(self, cuts=tuple(cuts))
 
 
-def load_published(path: Path | str) -> Published:
+def load_published(path: Path | str) -> PublishedData:
     """Read a file of published numbers.
 
     Raises:
@@ -161,17 +169,17 @@ def load_published(path: Path | str) -> Published:
     needed = ("source", "food", "knife", "specimens")
     check_keys(top, content, needed, ("properties", "fit", "vary", "limit"), _SYNONYMS)
     food = _food(top, content)
-    fit = _names(top.at("fit"), content.get("fit", list(FIT)))
+    fit = _names(top.at("fit"), content.get("fit", list(DEFAULT_FIT)))
     default = [name for name in food.default_fit if name not in fit]
     try:
-        return Published(
+        return PublishedData(
             source=text(top.at("source"), content["source"]),
             food=food,
             knife=_knife(top.at("knife"), content["knife"], Path(path).parent),
             cuts=_cuts(top.at("specimens"), content["specimens"]),
             fit=fit,
             vary=_names(top.at("vary"), content.get("vary", default)),
-            limit=_within(top.at("limit"), content.get("limit", LIMIT), 1.0),
+            limit=_within(top.at("limit"), content.get("limit", ERROR_LIMIT), 1.0),
         )
     except CutcalError as e:
         raise e if str(e).startswith(top.file) else top.error(str(e)) from None
@@ -205,15 +213,15 @@ def _names(place: Place, raw: Any) -> tuple[str, ...]:
     return tuple(text(place.at(str(k)), name) for k, name in enumerate(raw))
 
 
-def _cuts(place: Place, raw: Any) -> tuple[Cut, ...]:
+def _cuts(place: Place, raw: Any) -> tuple[PublishedCut, ...]:
     return tuple(_cut(place.at(name), name, one) for name, one in mapping(place, raw).items())
 
 
-def _cut(place: Place, name: str, raw: Any) -> Cut:
+def _cut(place: Place, name: str, raw: Any) -> PublishedCut:
     given = mapping(place, raw)
     check_keys(place, given, ("shape", "width_m", "height_m"), ("length_m", "given", "predicted"), _SYNONYMS)
     kind = choice(place.at("shape"), given["shape"], SHAPE_KINDS)
-    size = {n: _size(place.at(key), given[key], DIMENSIONS[n]) for n, key in SIZES.items() if key in given}
+    size = {n: _size(place.at(key), given[key], DIMENSIONS[n]) for n, key in SIZE_KEYS.items() if key in given}
     size.setdefault("length", (LENGTH_PER_HEIGHT if kind in PRISMS else 1.0) * size["height"])
     try:
         shape = Shape(kind, **size)
@@ -226,10 +234,10 @@ def _cut(place: Place, name: str, raw: Any) -> Cut:
     twice = sorted({n for n in names if names.count(n) > 1})
     if twice:
         raise place.error(f"{', '.join(twice)} is given and predicted; leave it in one of both")
-    return Cut(name, shape, **roles)
+    return PublishedCut(name, shape, **roles)
 
 
-def _scalars(place: Place, raw: Any) -> tuple[Scalar, ...]:
+def _scalars(place: Place, raw: Any) -> tuple[PublishedNumber, ...]:
     entries = mapping(place, raw)
     check_keys(place, entries, (), QUANTITIES, _SYNONYMS)
     found = []
@@ -242,7 +250,9 @@ def _scalars(place: Place, raw: Any) -> tuple[Scalar, ...]:
             raise here.at("value").error(f"is {value:g}; {QUANTITIES[quantity]} of a cut is positive")
         if "source" in one:
             text(here.at("source"), one["source"])
-        found.append(Scalar(quantity, value, _within(here.at("relative_sd"), one["relative_sd"], LARGEST_SD)))
+        found.append(
+            PublishedNumber(quantity, value, _within(here.at("relative_sd"), one["relative_sd"], LARGEST_RELATIVE_SD))
+        )
     return tuple(found)
 
 

@@ -41,7 +41,15 @@ CLOSE = 0.15  # marks that are nearer than this part of their place share a labe
 
 @dataclass(frozen=True)
 class Measured:
-    """What a report needs of a benchmark, measured: run times of the published configuration, the default cut, others."""
+    """What a report needs of a benchmark: a benchmark that was interrupted early has not measured all of it.
+
+    Attributes:
+        rate: Rates of the kernels.
+        paper: The published configuration.
+        cut: The default cut.
+        ratio_to_paper: Run time of the published configuration over that of the default cut [-].
+        ablations: The default cut with one thing changed.
+    """
 
     rate: Throughput
     paper: PublishedConfiguration
@@ -52,7 +60,15 @@ class Measured:
 
 @dataclass(frozen=True)
 class Mark:
-    """A mark of the figure: a way of simulating the cut, its run time over that of the default cut [-], its errors."""
+    """A mark of the figure: a way of simulating the cut.
+
+    Attributes:
+        name: Its name.
+        time_ratio: Run time over that of the default cut [-].
+        particles: Particles.
+        steps: Time steps.
+        errors: Errors against the reference.
+    """
 
     name: str
     time_ratio: float

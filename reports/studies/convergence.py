@@ -29,10 +29,10 @@ FIGURE_ALT = (
     "finest grid"
 )
 ESTIMATES = (
-    "Order from the three finest grids; grid convergence index (GCI) with a factor of safety after Roache, which is 1.25 "
-    "where the order is as expected and 3 elsewhere; uncertainty of the finest grid by least squares over all grids "
-    "(Eça and Hoekstra 2014). A trend that is smaller than what other particles change is called noise-limited: it has no "
-    "order."
+    "Order from the three finest grids; grid convergence index (GCI) with a factor of safety after Roache, which is "
+    "1.25 where the order is as expected and 3 elsewhere; uncertainty of the finest grid by least squares over all "
+    "grids (Eça and Hoekstra 2014). A trend that is smaller than what other particles change is called noise-limited: "
+    "it has no order."
 )
 APART = (
     "Each is varied with all else as on the coarsest grid, repeats on the second; peak and work are within so much of "

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 ROW_HEIGHT = 4.2  # [mm]
 LEAST_SHARE, LARGEST_SHARE = 1e-3, 1e2  # parts of the tolerance beyond these are drawn at them
 NOT_SHOWN = (
-    "That the equations are solved says nothing of whether they are a food's: that is what a calibration against measured "
-    "cuts is for.",
-    "The finite elements have the same laws as the particles, so an error of a law that both share is not seen; the laws "
-    "have closed forms of their own.",
+    "That the equations are solved says nothing of whether they are a food's: that is what a calibration against "
+    "measured cuts is for.",
+    "The finite elements have the same laws as the particles, so an error of a law that both share is not seen; the "
+    "laws have closed forms of their own.",
     "A tolerance is what the discretisation may cost on the cells of the case; other cells are the business of cutcal "
     "converge.",
 )
@@ -88,8 +88,8 @@ def _brief(result: Verification) -> Brief:
         kind="Verification of the solver",
         name="The solver and known answers",
         passed=result.passed,
-        sentence=f"{said}, of {len(rows)}, against closed forms, conservation laws and finite elements of the same laws."
-        + (f" {_many(len(broken), 'case')} broke down." if broken else ""),
+        sentence=f"{said}, of {len(rows)}, against closed forms, conservation laws and finite elements of the same "
+        "laws." + (f" {_many(len(broken), 'case')} broke down." if broken else ""),
         facts=facts,
         parts=parts,
         limits=NOT_SHOWN if not result.quick else (*NOT_SHOWN, "Coarse versions were run, and the fast cases alone."),

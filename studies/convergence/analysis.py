@@ -6,17 +6,15 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from calib.errors import CurveError
 from calib.io.provenance import git_commit, versions
 from calib.simulation.evaluation import FULLY_PARTED, Evaluation, pressed_away
 from calib.trace.filters import N_STROKE, filter_simulated
+from mpm.arrays import FloatArray
 from studies.convergence.gci import curve_estimate, estimate
 from studies.convergence.plan import CutDescription, PlannedRun
 from studies.convergence.result import AxisResult, ConvergenceLimits, ConvergenceResult, ForceCurves, RunResult
-
-FloatArray = npt.NDArray[np.float64]
 
 LIMITS_OF_CHANGE = ConvergenceLimits(work=0.02, peak=0.03)
 """Largest change between the two finest grids that counts as converged [-]."""

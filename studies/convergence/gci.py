@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.errors import CurveError
+from mpm.arrays import FloatArray
 
 SAFETY_FACTOR = 1.25
 """Factor of safety with three grids and an order that was observed (Celik et al. 2008)."""
@@ -95,7 +96,7 @@ def estimate(h: Sequence[float], values: Sequence[float], repeat_sd: float = 0.0
     return Estimate(verdict, order, extrapolated, change, gci, far, fitted, p, math.hypot(band / scale, noise))
 
 
-def observed_order(h: np.ndarray, values: np.ndarray) -> float | None:
+def observed_order(h: FloatArray, values: FloatArray) -> float | None:
     """Observed order of three grids [-] (Celik et al. 2008, eq. 3), None where two of the values agree.
 
     Args:
@@ -135,13 +136,13 @@ class CurveEstimate:
     """
 
     order: float | None
-    gci: np.ndarray
-    u_num: np.ndarray
-    u_coarsest: np.ndarray
+    gci: FloatArray
+    u_num: FloatArray
+    u_coarsest: FloatArray
 
 
 def curve_estimate(
-    h: Sequence[float], curves: Sequence[np.ndarray], repeat_sd: np.ndarray | float = 0.0
+    h: Sequence[float], curves: Sequence[FloatArray], repeat_sd: FloatArray | float = 0.0
 ) -> CurveEstimate:
     """Index along a curve, with one order for all of it (local orders of a wavy curve mean nothing).
 
@@ -174,7 +175,7 @@ def curve_estimate(
     return CurveEstimate(order, near / peak, *(np.hypot(band / COVERAGE, repeat_sd) for band in (near, far)))
 
 
-def _sorted(h: Sequence[float], values: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+def _sorted(h: Sequence[float], values: Sequence[float]) -> tuple[FloatArray, FloatArray]:
     cells, phi = np.asarray(h, float), np.asarray(values, float)
     if cells.ndim != 1 or cells.shape != phi.shape or len(cells) < 2:
         raise CurveError(f"convergence needs the same number of cells and values, at least 2; got {len(cells)}")
@@ -186,7 +187,7 @@ def _sorted(h: Sequence[float], values: Sequence[float]) -> tuple[np.ndarray, np
     return cells[place], phi[place]
 
 
-def _verdict(h: np.ndarray, fine: float, coarse: float, repeat_sd: float) -> str:
+def _verdict(h: FloatArray, fine: float, coarse: float, repeat_sd: float) -> str:
     if max(abs(fine), abs(coarse)) < REPEATABILITY * repeat_sd or (fine == 0 and coarse == 0):
         return "noise-limited"
     if not _shrinks(h, fine, coarse):
@@ -194,7 +195,7 @@ def _verdict(h: np.ndarray, fine: float, coarse: float, repeat_sd: float) -> str
     return "oscillatory" if fine * coarse < 0 else "monotone"
 
 
-def _shrinks(h: np.ndarray, fine: float, coarse: float) -> bool:
+def _shrinks(h: FloatArray, fine: float, coarse: float) -> bool:
     """Whether the difference of the two finest of three grids is smaller than that of order 0 would be."""
     return bool(abs(fine) * math.log(h[2] / h[1]) < abs(coarse) * math.log(h[1] / h[0]))
 
@@ -209,7 +210,7 @@ def _credible(order: float | None) -> tuple[float, float]:
     return SAFETY_FACTOR_DOUBT, min(max(order, low), high)
 
 
-def _least_squares(h: np.ndarray, phi: np.ndarray) -> tuple[float, float, float]:
+def _least_squares(h: FloatArray, phi: FloatArray) -> tuple[float, float, float]:
     """Fit phi = phi0 + a h^p; returns phi0, p and the uncertainty of the finest value at about 95 %.
 
     The order is free between the credible limits; outside, the better of first and second order is taken, with the

@@ -7,17 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
-import numpy as np
-import numpy.typing as npt
 import pandas as pd
 
 from calib.errors import DocumentError
 from calib.io.folder import write_csv, write_json
 from calib.io.typed_document import REMEDY, read_document, to_document
+from mpm.arrays import FloatArray
 from mpm.shapes import Shape
 from studies.convergence.gci import Estimate
-
-FloatArray = npt.NDArray[np.float64]
 
 RESULT_FILE, CURVES_FILE = "converge.json", "curves.csv"
 

@@ -1,4 +1,4 @@
-"""Which cuts are recorded as references, what is kept of each, and how much another seed of the particles changes it."""
+"""Which cuts are recorded as references, what is kept of each, and how much another seed of the particles changes."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from studies.regression.reference_curves import CHECKED
 
 RECORDED_KNIFE = "kitchen"  # of every recorded cut
 MOST_CELLS = 12
-"""Cells over the height of a food at most. The screening grid of a melon has 25 and takes long to simulate; a changed law
-shows with fewer as well. See docs/theory.md, "Measured choices"."""
+"""Cells over the height of a food at most. The screening grid of a melon has 25 and takes long to simulate; a changed
+law shows with fewer as well. See docs/theory.md, "Measured choices"."""
 UNEVEN = 0.97
 """Cells over those that divide a food evenly. Where a size is a whole number of cells, the last bit of the cell decides
 what lies at its end, and the curve jumps. See docs/theory.md, "Measured choices"."""
@@ -64,7 +64,7 @@ class BaselineCut:
         return f"{self.food.name}, {self.contact}"
 
     def scene(self, seed: int = RECORDED_SEED) -> Scene:
-        """The cut, with cells of :data:`UNEVEN` of those that a fit screens with, or that :data:`MOST_CELLS` would have.
+        """The cut, with uneven cells (:data:`UNEVEN`) about as large as those that a fit screens with.
 
         Raises:
             SceneError: A food that cannot be cut.
@@ -179,7 +179,7 @@ def scales(columns: Mapping[str, FloatArray]) -> dict[str, float]:
 def limit_factor(runs: int) -> float:
     """Repeatability limit over a standard deviation that so many runs gave [-]: 95 of 100 pairs of runs differ by less.
 
-    It is the root of two times Student's t, 3.34 for eight runs, and not below the 2.8 of ISO 5725-6, which is for many.
+    It is the root of two times Student's t, 3.34 for eight runs, and not below the 2.8 of ISO 5725-6 for many runs.
     """
     return max(REPEATABILITY, math.sqrt(2) * float(student.ppf(0.975, runs - 1)))
 

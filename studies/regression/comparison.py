@@ -1,9 +1,9 @@
 """One cut against what is recorded of it: verdict, change of peak, work and shape, and what else is another.
 
 Two questions have two tolerances. The same seed gives the same curve on every machine but for rounding
-(:data:`studies.regression.baseline.SAME`): more is another solver, food or library. Whether that change matters is asked of
-the tolerances of the record, the repeatability limits (ISO 5725-6): what is no more than another draw of the particles
-passes.
+(:data:`studies.regression.baseline.SAME`): more is another solver, food or library. Whether that change matters is
+asked of the tolerances of the record, the repeatability limits (ISO 5725-6): what is no more than another draw of the
+particles passes.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from calib.errors import CurveError
 from calib.io.provenance import code_key, versions
 from calib.validation.metrics import compare
+from mpm.arrays import FloatArray
 from studies.regression.baseline import KEY_LENGTH, SAME, BaselineCut, CutOutcome, cut_numbers, scales
 from studies.regression.reference_curves import CHECKED, Reference
 from studies.regression.result import CutComparison, LargestDeviation, NumberChange, NumberChanges
 
-FloatArray = npt.NDArray[np.float64]
-
 UNCHANGED = 1e-6
-"""Part of a column's largest value below which a record is kept as it is: what rounding and the digits of a file leave."""
+"""Part of a column's largest value below which a record is kept as it is:
+what rounding and the digits of a file leave.
+"""
 LIBRARIES = ("cutcal", "taichi", "numpy")  # that a curve depends on
 
 

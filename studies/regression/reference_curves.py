@@ -1,8 +1,9 @@
-"""Recorded force curves: one file of columns for each food and contact mode, and one that says where all of them come from.
+"""Recorded force curves: a file of columns for each food and contact mode, and one that says where they come from.
 
-``FOOD-CONTACT.csv`` holds the columns :data:`COLUMNS`; ``reference.json`` holds the origin of each, the scatter between seeds,
-the tolerances and the hash of its columns. Replacing one is a single step, the renaming of ``reference.json``: the new columns
-lie whole beside the old ones before it, and whoever is killed after it has them put in place by the next reader who may write.
+``FOOD-CONTACT.csv`` holds the columns :data:`COLUMNS`; ``reference.json`` holds the origin of each, the scatter between
+seeds, the tolerances and the hash of its columns. Replacing one is a single step, the renaming of ``reference.json``:
+the new columns lie whole beside the old ones before it, and whoever is killed after it has them put in place by the
+next reader who may write.
 """
 
 from __future__ import annotations
@@ -32,10 +33,14 @@ SCHEMA = 1  # layout of that file
 DIGITS = 8  # of a recorded number: a hundredth of what keeps a record (comparison.UNCHANGED)
 ABOUT = (
     "Recorded cuts of this project's own solver: a reference for changes of its code, no measurement.",
-    "results: peak of the force on the knife [N], its stroke [m], work [J]; tolerances by column of the CSV file of the same name.",
-    "s_r: repeatability standard deviation (ISO 5725-2) between runs with these seeds of the particles, the largest over the stroke;",
-    "s_r_results: that of the results. limits and tolerances: 3.34 s_r, the repeatability limit (ISO 5725-6: 2.8 s_r) of eight runs,",
-    "and at least a thousandth of the largest force or work, which is what the same seed may differ by between machines.",
+    "results: peak of the force on the knife [N], its stroke [m], work [J]; tolerances by column of the CSV file of "
+    "the same name.",
+    "s_r: repeatability standard deviation (ISO 5725-2) between runs with these seeds of the particles, the largest "
+    "over the stroke;",
+    "s_r_results: that of the results. limits and tolerances: 3.34 s_r, the repeatability limit (ISO 5725-6: 2.8 s_r) "
+    "of eight runs,",
+    "and at least a thousandth of the largest force or work, which is what the same seed may differ by between "
+    "machines.",
     "Written by cutcal regress --update alone: it keeps hash and columns together.",
 )
 ENTRY: Mapping[str, type] = {
@@ -69,7 +74,9 @@ class Reference:
 
     @property
     def limits(self) -> dict[str, float]:
-        """Repeatability limits of ``peak_N``, ``work_J`` and ``peak_stroke_m``: 95 of 100 pairs of seeds differ by less."""
+        """Repeatability limits of ``peak_N``, ``work_J`` and ``peak_stroke_m``:
+        95 of 100 pairs of seeds differ by less.
+        """
         return {name: float(x) for name, x in self.origin["repeatability"]["limits"].items()}
 
 
@@ -122,7 +129,7 @@ class References:
 
         Args:
             name: The case.
-            columns: By the names of :data:`COLUMNS`, (60,) each.
+            columns: By the names of :data:`COLUMNS`, which end in their units [m, N or J], shape (60,) each.
             origin: Its entry, without ``columns_sha256``.
             order: Names of all cases, in which order the entries are written.
 
@@ -146,8 +153,8 @@ class References:
         """
         if (PACKAGE / "data") in self.folder.resolve().parents:
             raise RegressionError(
-                "--update: the references belong to a checkout, and this cutcal is an installed copy; run it from a checkout "
-                "that is installed with pip install -e"
+                "--update: the references belong to a checkout, and this cutcal is an installed copy; run it from a "
+                "checkout that is installed with pip install -e"
             )
         try:
             self.folder.mkdir(parents=True, exist_ok=True)

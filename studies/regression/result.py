@@ -8,14 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
 
-import numpy as np
-import numpy.typing as npt
-
 from calib.io.folder import write_csv, write_json
 from calib.io.typed_document import to_document
+from mpm.arrays import FloatArray
 from studies.regression.reference_curves import DIGITS
-
-FloatArray = npt.NDArray[np.float64]
 
 RESULT_FILE = "regress.json"
 VERDICT_MEANINGS = {
@@ -83,7 +79,8 @@ class CutComparison:
         recorded: Whether a new reference was written.
         because: What is another than when the reference was recorded.
         results: Peak and work; None where the cut broke down.
-        shape_error: Difference of the curves, each over its own peak [-]; NaN where one has no force, None without curves.
+        shape_error: Difference of the curves, each over its own peak [-]; NaN where one has no force, None without
+            curves.
         nrmse: Root mean square difference of the curves over the recorded peak [-]; the same.
         verdict: One of :data:`VERDICT_MEANINGS`.
         largest: The largest deviation; None where there is nothing to compare.

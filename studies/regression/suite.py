@@ -7,13 +7,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
 from calib.errors import RegressionError
 from calib.io.progress import Countdown
 from calib.io.provenance import code_key, git_commit, versions
 from calib.simulation.workers import DIED, Workers
+from mpm.arrays import FloatArray
 from studies.regression.baseline import (
     KEY_LENGTH,
     OTHER_SEEDS,
@@ -28,7 +26,6 @@ from studies.regression.comparison import compare_cut, is_another, library_versi
 from studies.regression.reference_curves import Reference, References
 from studies.regression.result import CutComparison, RegressionResult
 
-FloatArray = npt.NDArray[np.float64]
 Say = Callable[[str], None]
 
 KILLED = CutOutcome(DIED, None)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from calib.io.progress import clock
+from mpm.arrays import FloatArray
 from mpm.material import Material
 from mpm.scene import EdgeLaw, Food, Knife, Motion, Numerics, Scene
 from mpm.shapes import Shape
@@ -183,7 +184,7 @@ def bandwidth(threads: int) -> float:
     """Bytes a second that so many threads read and write together when each copies an array that no cache holds."""
     arrays = [(np.ones(COPIED_NUMBERS), np.empty(COPIED_NUMBERS)) for _ in range(threads)]
 
-    def copy(pair: tuple[np.ndarray, np.ndarray]) -> None:
+    def copy(pair: tuple[FloatArray, FloatArray]) -> None:
         np.copyto(pair[1], pair[0])  # lets other threads run meanwhile
 
     best = np.inf

@@ -1,7 +1,7 @@
 """Simulations that are timed: kept with their kernels, and run in turns.
 
-All ratios are of runs that take turns in one process, the least time of each: a machine that is slow for a while is slow
-for both. Compilation is not counted; the time of the first run, with it, is given apart.
+All ratios are of runs that take turns in one process, the least time of each: a machine that is slow for a while is
+slow for both. Compilation is not counted; the time of the first run, with it, is given apart.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
+from mpm.arrays import FloatArray
 from mpm.runtime import Runtime
 from mpm.scene import Scene
 from mpm.solver import Simulation
@@ -70,7 +70,7 @@ class RateMeter:
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
-        self._least: npt.NDArray[np.float64] | None = None
+        self._least: FloatArray | None = None
         self.rate = 0.0
 
     def run(self, turns: int = 1) -> float:

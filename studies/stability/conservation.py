@@ -60,8 +60,8 @@ def energy_gain(record: ForceRecord, *, stored: float = 0.0, least: float = 0.0)
     """Largest lasting energy that nothing has put in, over what was put in so far [-]; negative where there is none.
 
     Put in: work of the knife and of gravity, and what was stored at the start. Found: kinetic and elastic energy, and
-    what flow, damage, the loss factor, friction and the edge have taken. The transfers only take energy, so more than was
-    put in is never there.
+    what flow, damage, the loss factor, friction and the edge have taken. The transfers only take energy, so more than
+    was put in is never there.
 
     Args:
         record: Of a run that reached its end or not.

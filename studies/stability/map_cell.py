@@ -1,9 +1,9 @@
 """A cell of the stability map: one small cut with one or two things pushed to the end of their range or past it.
 
 All cells of the map are cuts of a block of 20 mm with a process zone of 5 mm, so that cells of the grid of 5 mm are
-allowed. Resistance and yield stress follow the stiffness, because the ratios decide whether a food is cut or crushed. The
-knife moves at a Mach number, so its real speed matters only to foods that relax. A scene holds one material, so a contrast
-of density is one between foods, not inside one.
+allowed. Resistance and yield stress follow the stiffness, because the ratios decide whether a food is cut or crushed.
+The knife moves at a Mach number, so its real speed matters only to foods that relax. A scene holds one material, so a
+contrast of density is one between foods, not inside one.
 """
 
 from __future__ import annotations

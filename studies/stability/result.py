@@ -37,7 +37,8 @@ class CellResult:
         physical: Whether a cut like this one exists, so that it must be stable.
         forced: Whether checks that would refuse it were passed by.
         status: ``stable``, ``refused``, ``stopped`` or ``unexplained``.
-        reason: Why it is not stable: of :data:`REASONS`, another word where it is unexplained, empty where it is stable.
+        reason: Why it is not stable: of :data:`REASONS`, another word where it is unexplained, empty where it is
+            stable.
         message: The reason in words.
         fraction: Part of the stroke that was reached [-]; this and all that follows is None where nothing was run.
         particle_steps: Particles times steps; the rest but the time is None where the run was too long.

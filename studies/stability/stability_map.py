@@ -1,4 +1,4 @@
-"""Where the solver is stable: every cell of the map ends stable, refused, or stopped for one of a closed set of reasons."""
+"""Where the solver is stable: each cell of the map ends stable, refused, or stopped for one of a set of reasons."""
 
 from __future__ import annotations
 
@@ -55,7 +55,8 @@ def run_map(
         What stress.json holds.
 
     Raises:
-        CutcalError: A device that is missing, or results of something else in ``out``; nothing that was computed is lost.
+        CutcalError: A device that is missing, or results of something else in ``out``; nothing that was computed is
+            lost.
     """
     prepare(out, resume=resume)
     with EvaluationStore(out / "evaluations.h5", Header("", "stability map"), resume=resume) as store:

@@ -1,1 +1,1 @@
-"""Verification: cases with a closed form or an independent reference, what the solver gives, and how far it may be off."""
+"""Verification: cases with a closed form or an independent reference, and how far the solver may be off."""

@@ -11,6 +11,7 @@ import numpy as np
 from fem_reference.laws import Corotated
 from fem_reference.meshes import box
 from fem_reference.solid import Solid
+from mpm.arrays import FloatArray
 from mpm.material import Material
 from mpm.shapes import Shape
 from studies.verification.case import SuiteOptions, VerificationCase
@@ -24,12 +25,12 @@ WEIGHT = 8.0  # acceleration downwards of what hangs [m/s^2]
 PERIODS = 2.0  # of the lowest bending, critically damped, after which the beam is at rest
 
 
-def _lift(y: np.ndarray) -> np.ndarray:
+def _lift(y: FloatArray) -> FloatArray:
     """Acceleration upwards [m/s^2]: a body force holds the middle, so that nothing is clamped and nothing falls."""
     return np.where(np.abs(y) < GRIP, WEIGHT * (HALF - GRIP) / GRIP, -WEIGHT)
 
 
-def elements() -> tuple[np.ndarray, np.ndarray]:
+def elements() -> tuple[FloatArray, FloatArray]:
     """Sag of the finite elements' axis: places from the middle [m] and way down against the middle [m], shape (n,)."""
     mesh = box(np.linspace(0, WIDTH / 2, 2), np.linspace(0, HALF, 25), np.linspace(0, DEPTH, 5))
     solid = Solid(mesh, Corotated(BEAM_MATERIAL.shear, BEAM_MATERIAL.lame), 2)
@@ -49,9 +50,18 @@ def elements() -> tuple[np.ndarray, np.ndarray]:
 
 
 def particles(options: SuiteOptions, dx: float, ppc: int) -> tuple[float, float]:
-    """A section near the end: its place from the middle [m] and its way down against the middle [m].
+    """A section near the end of a beam of particles.
 
-    The beam lies across the blade and bends along x, where the grid has room; a quarter of a cell takes the mirror across x away.
+    The beam lies across the blade and bends along x, where the grid has room; a quarter of a cell takes the mirror
+    across x away.
+
+    Args:
+        options: Seed and device.
+        dx: Cell size [m].
+        ppc: Particles per cell and direction.
+
+    Returns:
+        Its place from the middle [m], and its way down against the middle [m].
     """
     grid = replace(numerics(dx, room=1.5, ppc=ppc), mirror=True, grid_shift=(0.25, 0.0, 0.0))
     body = options.body(Shape("block", 2 * HALF, DEPTH, WIDTH), BEAM_MATERIAL, grid)
@@ -69,7 +79,8 @@ def particles(options: SuiteOptions, dx: float, ppc: int) -> tuple[float, float]
 def sagging(options: SuiteOptions) -> Iterator[Comparison]:
     """A beam held in its middle, whose ends hang down.
 
-    Of a food that is bent far, the sum over the particles is noisier than at rest and the beam softer: less so with more.
+    Of a food that is bent far, the sum over the particles is noisier than at rest and the beam softer; less so with
+    more particles.
     """
     places, sag = elements()
     dx = DEPTH / 8

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from mpm.arrays import FloatArray
 from mpm.material import Material
 from mpm.scene import Board, Food, Motion, Press, Scene
 from mpm.shapes import Shape
@@ -19,6 +20,9 @@ from studies.verification.result import Comparison
 
 G = 9.81
 DAMPED = replace(SOFT, loss_factor=0.5)
+CONTACT_SHARE = 0.1
+"""Half the width of a Hertzian contact over the radius [-], small enough for Hertz's formula. See docs/theory.md,
+"Measured choices"."""
 
 
 def resting(options: SuiteOptions) -> Iterator[Comparison]:
@@ -112,12 +116,12 @@ def tilted(options: SuiteOptions) -> Iterator[Comparison]:
         yield Comparison(name, "force on the board [N]", -normal, float(force[2]), 0.01, "m g cos")
 
 
-def _constant(pull: np.ndarray, time: float) -> np.ndarray:
+def _constant(pull: FloatArray, time: float) -> FloatArray:
     return pull
 
 
 def discs(options: SuiteOptions) -> Iterator[Comparison]:
-    """Two discs that meet on a shared grid feel each other before they touch, and the transfers take energy from them."""
+    """Two discs that meet on a shared grid feel each other before they touch; the transfers take energy from them."""
     source = "two discs (Sulsky, Chen and Schreyer 1994)"
     losses = []
     for cells in (20,) if options.quick else (20, 40):
@@ -141,11 +145,11 @@ def _meet(options: SuiteOptions, dx: float) -> tuple[float, float, float]:
     radius, thick, apart, speed = 0.02, 0.01, 0.016, 0.5
     material = Material(E=1e5, nu=0.3, rho=1000.0)
 
-    def place(x: np.ndarray) -> np.ndarray:
+    def place(x: FloatArray) -> FloatArray:
         upper = x[:, 2] > thick
         return x + np.where(upper[:, None], [apart, apart, -thick], [-apart, -apart, 0.0])
 
-    def velocity(x: np.ndarray) -> np.ndarray:
+    def velocity(x: FloatArray) -> FloatArray:
         return np.where(x[:, :1] + x[:, 1:2] > 0, [-speed, -speed, 0.0], [speed, speed, 0.0])
 
     body = options.body(
@@ -175,10 +179,10 @@ def _meet(options: SuiteOptions, dx: float) -> tuple[float, float, float]:
 def hertz(options: SuiteOptions) -> Iterator[Comparison]:
     """A plate on half a lying cylinder of nu = 0, for which plane strain and free ends are the same.
 
-    Not on a ball, whose far side Hertz leaves out: at a contact of a fifth of the radius finite elements give 7 % more. For a
-    cylinder it is in the formula.
+    Not on a ball, whose far side Hertz leaves out; for a cylinder it is in the formula. See docs/theory.md, "Measured
+    choices".
     """
-    radius, share = 0.04, 0.1  # at 0.2 the force of finite elements is 4 % below Hertz's, as that of the particles is
+    radius, share = 0.04, CONTACT_SHARE
     for cells in (4,) if options.quick else (4, 8):
         half = share * radius  # half the width of the contact
         dx = half / cells

@@ -15,6 +15,7 @@ import math
 
 import numpy as np
 
+from mpm.arrays import FloatArray
 from mpm.material import Material
 from mpm.scene import Numerics
 from mpm.shapes import Shape
@@ -25,7 +26,7 @@ INNER, OUTER = 0.75, 1.25  # radii of the ring, in units of its mean radius
 TABLE = 4001  # radii at which the body force is tabulated
 
 
-def profile(r: np.ndarray) -> np.ndarray:
+def profile(r: FloatArray) -> FloatArray:
     """Angle over radius, 1 in the middle of the ring and 0 with its slope on its rims [-]."""
     out = 1 - 32 * (r - 1) ** 2 + 256 * (r - 1) ** 4
     return np.where((r > INNER) & (r < OUTER), out, 0.0)
@@ -34,7 +35,11 @@ def profile(r: np.ndarray) -> np.ndarray:
 class Vortex:
     """The motion and its body force.
 
-    Attributes: radius, mean radius of the ring [m]; material; angle, largest rotation [rad]; span, time of half a swing [s].
+    Attributes:
+        radius: Mean radius of the ring [m].
+        material: Its constants.
+        angle: Largest rotation [rad].
+        span: Time of half a swing [s].
     """
 
     def __init__(self, radius: float, material: Material, angle: float, span: float) -> None:
@@ -43,14 +48,14 @@ class Vortex:
         self.h = profile(self.r)
         self.slope = np.gradient(self.h, self.r)
 
-    def places(self, start: np.ndarray, t: float) -> np.ndarray:
+    def places(self, start: FloatArray, t: float) -> FloatArray:
         """Where material points are at a time [m], shape (n, 3)."""
         r = np.hypot(start[:, 0], start[:, 1]) / self.radius
         a = self.angle * math.sin(math.pi * t / self.span) * profile(r)
         c, s = np.cos(a), np.sin(a)
         return np.stack([c * start[:, 0] - s * start[:, 1], s * start[:, 0] + c * start[:, 1], start[:, 2]], axis=1)
 
-    def force(self, start: np.ndarray, t: float) -> np.ndarray:
+    def force(self, start: FloatArray, t: float) -> FloatArray:
         """Body force per mass on material points [m/s^2], shape (n, 3)."""
         w = math.pi / self.span
         g = self.angle * math.sin(w * t)
@@ -75,13 +80,16 @@ class Vortex:
 
 
 def errors(options: SuiteOptions, cells: int, *, angle: float = 0.5, swing: float = 0.5) -> tuple[float, float]:
-    """Root-mean-square and largest error of place of the ring's particles, over its mean radius [-].
+    """Error of place of the ring's particles, over its mean radius.
 
     Args:
         options: Seed and device.
         cells: Grid cells across the ring.
         angle: Largest rotation [rad].
         swing: Part of half a swing that is simulated, 0.5 up to the largest rotation.
+
+    Returns:
+        Root mean square of the error, and its largest value [-].
     """
     radius = 0.04
     dx = (OUTER - INNER) * radius / cells
@@ -91,11 +99,11 @@ def errors(options: SuiteOptions, cells: int, *, angle: float = 0.5, swing: floa
     side = 2 * math.ceil(1.4 * radius / dx) * dx
     grid = Numerics(dx=dx, gravity=0.0, room=0.1, mirror=False, safety=0.35)
 
-    def velocity(x: np.ndarray) -> np.ndarray:
+    def velocity(x: FloatArray) -> FloatArray:
         rate = angle * math.pi / span * profile(np.hypot(x[:, 0], x[:, 1]) / radius)
         return np.stack([-rate * x[:, 1], rate * x[:, 0], 0 * rate], axis=1)
 
-    def slope(x: np.ndarray) -> np.ndarray:
+    def slope(x: FloatArray) -> FloatArray:
         d = 1e-6 * radius
         columns = [(velocity(x + d * e) - velocity(x - d * e)) / (2 * d) for e in np.eye(3)]
         return np.stack(columns, axis=2)

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import spherical_jn
 
+from mpm.arrays import FloatArray
 from mpm.material import Material
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
 from mpm.shapes import Shape
@@ -24,7 +25,18 @@ SHEAR = np.array([[0.2, 3.0, -1.0], [-2.0, 0.5, 0.7], [1.1, -0.4, -0.6]])
 
 
 def numerics(dx: float = DX, gravity: float = 0.0, room: float = 0.5, safety: float = 0.7, ppc: int = 2) -> Numerics:
-    """A grid for a whole body."""
+    """A grid for a whole body.
+
+    Args:
+        dx: Cell size [m].
+        gravity: Acceleration downwards [m/s^2].
+        room: Room beside the body, over its size [-].
+        safety: Time step over its limit [-].
+        ppc: Particles per cell and direction.
+
+    Returns:
+        The grid.
+    """
     return Numerics(dx=dx, gravity=gravity, room=room, mirror=False, safety=safety, ppc=ppc)
 
 
@@ -115,8 +127,8 @@ def falling(options: SuiteOptions) -> Iterator[Comparison]:
 def vibrating(options: SuiteOptions) -> Iterator[Comparison]:
     """A free bar swings lengthwise in its first mode.
 
-    Particles at random places make the bar softer by the noise of the sum over them, which falls with their number and
-    not with the cells: the period is 1 % long with 8 particles a cell and 0.3 % with 27.
+    Particles at random places make the bar softer by the noise of the sum over them, which falls with their number in a
+    cell and not with the cells. See docs/theory.md, "Measured choices".
     """
     period, loss = _swing(options, 3e-3, 3, 2)
     yield Comparison(
@@ -137,7 +149,7 @@ def _swing(options: SuiteOptions, dx: float, ppc: int, swings: int) -> tuple[tup
     bar = Shape("block", 0.078, 0.012, 0.012)
     k = math.pi / bar.length
 
-    def velocity(x: np.ndarray) -> np.ndarray:
+    def velocity(x: FloatArray) -> FloatArray:
         return 0.02 * np.outer(-np.sin(k * x[:, 1]), [0.0, 1.0, 0.0])
 
     body = options.body(bar, SOFT, numerics(dx, room=0.1, ppc=ppc), InitialState(velocity=velocity))
@@ -162,7 +174,7 @@ def breathing(options: SuiteOptions) -> Iterator[Comparison]:
     x = brentq(lambda s: math.sin(s) * (1 - s * s / (4 * ratio)) - s * math.cos(s), 0.6 * math.pi, 0.99 * math.pi)
     period = 2 * math.pi * radius / (x * material.p_wave)
 
-    def velocity(places: np.ndarray) -> np.ndarray:
+    def velocity(places: FloatArray) -> FloatArray:
         r = places - [0.0, 0.0, radius]
         s = x * np.linalg.norm(r, axis=1, keepdims=True) / radius
         return 0.05 * r / np.linalg.norm(r, axis=1, keepdims=True) * spherical_jn(1, s)
@@ -181,7 +193,7 @@ def breathing(options: SuiteOptions) -> Iterator[Comparison]:
     yield Comparison("ball breathes", "period [s]", period, got, 0.03 if options.quick else 0.02, source)
 
 
-def _period(t: np.ndarray, a: np.ndarray) -> tuple[float, np.ndarray]:
+def _period(t: FloatArray, a: FloatArray) -> tuple[float, FloatArray]:
     """Period of an oscillation and the times at which it crosses zero upwards [s]."""
     up = np.flatnonzero((a[:-1] < 0) & (a[1:] >= 0))
     zeros = t[up] - a[up] * (t[up + 1] - t[up]) / (a[up + 1] - a[up])

@@ -1,4 +1,7 @@
-"""The particle solver's laws at one point, called from Python. Taichi reads the annotations of kernels, so they are real."""
+"""The particle solver's laws at one point, called from Python.
+
+Taichi reads the annotations of kernels, so they are no strings here.
+"""
 
 import numpy as np
 import taichi as ti
@@ -29,7 +32,16 @@ class Point:
         return self.f.to_numpy(), self.tau.to_numpy()
 
     def damage(self, kappa, eps0, eps_f):
-        """Damage at a largest strain [-]."""
+        """Damage at a largest strain [-].
+
+        Args:
+            kappa: Largest strain so far [-].
+            eps0: Strain at which damage begins [-].
+            eps_f: Strain that sets how fast it grows [-].
+
+        Returns:
+            The damage [-], from 0 to 1.
+        """
         self.numbers.from_numpy(np.array([kappa, eps0, eps_f, 0.0]))
         self._soften()
         return self.numbers[3]

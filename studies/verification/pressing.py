@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fem_reference.press import press
+from mpm.arrays import FloatArray
 from mpm.material import Material
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
 from mpm.shapes import Shape
@@ -17,7 +18,7 @@ from studies.verification.case import SuiteOptions, VerificationCase
 from studies.verification.result import Comparison
 
 PRESSED_MATERIAL = Material(E=1e5, nu=0.35, rho=1000.0, loss_factor=0.05)
-"""The loss factor takes the ringing out; its part of the force at this speed is below 0.2 %."""
+"""The loss factor takes the ringing out and adds little to the force. See docs/theory.md, "Measured choices"."""
 MACH = 0.003  # speed of the plate over that of the P-wave
 PRESS_CELLS = (2e-3, 1e-3)
 STICKS = 9.9  # friction with which nothing slides [-]
@@ -26,11 +27,20 @@ WINDOW = 0.12  # part of the last stroke, on either side, over which the particl
 
 @dataclass(frozen=True)
 class PressTest:
-    """A press.
+    """A press of particles beside finite elements.
 
-    Attributes: name; shape; strokes [m]; half_angle of the tool [rad]; bonded, whether it and the board stick; yield_stress
-    [Pa]; tolerance [-]; reference, options of the finite elements; sizes, cells of the particles [m]; slow and cost as of
-    a case.
+    Attributes:
+        name: Its name.
+        shape: Outline of the food.
+        strokes: Strokes at which forces are compared [m].
+        half_angle: Half the angle of the tool [rad]; a right angle is a plate.
+        bonded: Whether tool and board stick to the food.
+        yield_stress: Yield stress of the food [Pa].
+        tolerance: Largest error of a force that passes [-].
+        reference: Options of the finite elements.
+        sizes: Cell sizes of the particles [m].
+        slow: Whether it is left out of the quick part.
+        cost: About the time that it takes [s].
     """
 
     name: str
@@ -82,7 +92,7 @@ PRESS_TESTS = (
     PressTest(
         "sphere",
         Shape("sphere", 0.03, 0.03, 0.03),
-        (0.004, 0.005, 0.006),  # below, few elements touch: references differ by 2 % at 2 mm and by 5 % at 1.5 mm
+        (0.004, 0.005, 0.006),  # below, few elements touch and references differ (docs/theory.md, "Measured choices")
         reference=(("cells", 4), ("order", 2), ("grade", 1.2)),
         cost=300.0,
     ),
@@ -96,7 +106,7 @@ PRESS_TESTS = (
     PressTest(
         "wedge of 140 degrees on a block",
         Shape("block", 0.03, 0.016, 0.02),
-        (0.002, 0.003, 0.004),  # below, one row of elements is not enough: references differ by 3 % at 1 mm
+        (0.002, 0.003, 0.004),  # below, one row of elements is not enough (docs/theory.md, "Measured choices")
         half_angle=math.radians(70),
         reference=(("cells", 5), ("order", 2), ("grade", 1.3)),
         cost=300.0,
@@ -131,8 +141,19 @@ PRESS_TESTS = (
 
 def particles(
     options: SuiteOptions, test: PressTest, dx: float, *, material: Material = PRESSED_MATERIAL, mach: float = MACH
-) -> np.ndarray:
-    """Force of the particles at the strokes of a test [N], shape (n,)."""
+) -> FloatArray:
+    """Force of the particles at the strokes of a press.
+
+    Args:
+        options: Seed and device.
+        test: The press.
+        dx: Cell size [m].
+        material: Constants of the food; its yield stress is that of the press.
+        mach: Speed of the plate over that of the P-wave [-].
+
+    Returns:
+        The forces [N], shape (n,); NaN where the run broke down.
+    """
     friction = STICKS if test.bonded else 0.0
     end = test.strokes[-1] * (1 + WINDOW)
     scene = Scene(
@@ -150,14 +171,23 @@ def particles(
     return np.array([_at(middle, record.face[1:, 2], s, near) for s in test.strokes])
 
 
-def _at(stroke: np.ndarray, force: np.ndarray, s: float, near: float) -> float:
-    """Force at a stroke from a parabola through what is near it: without the ringing of the body between the tools [N]."""
+def _at(stroke: FloatArray, force: FloatArray, s: float, near: float) -> float:
+    """Force at a stroke from a parabola through what is near it, without the ringing of the body [N]."""
     on = np.abs(stroke - s) < near
     return float(np.polyfit(stroke[on] - s, force[on], 2)[2])
 
 
 def compare(options: SuiteOptions, test: PressTest, sizes: Sequence[float]) -> Iterator[Comparison]:
-    """Rows of one press: the largest error over the strokes, on each grid."""
+    """Comparisons of one press: the largest error over the strokes, on each grid.
+
+    Args:
+        options: Quick or whole, seed, device.
+        test: The press.
+        sizes: Cell sizes [m].
+
+    Yields:
+        A comparison for each grid.
+    """
     material = replace(PRESSED_MATERIAL, yield_stress=test.yield_stress)
     # a law with a memory wants small steps; a wedge's first contact is one row of nodes
     strokes = sorted({*test.strokes, *(np.arange(1, 9) / 8 * test.strokes[-1])})

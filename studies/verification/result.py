@@ -20,7 +20,8 @@ class Comparison:
     Attributes:
         case: What is simulated.
         quantity: What is compared, with its unit.
-        expected: Value of the closed form or the reference [unit of the quantity]; with ``least`` the least that passes.
+        expected: Value of the closed form or the reference [unit of the quantity]; with ``least`` the least that
+            passes.
         got: What the solver gives [unit of the quantity]; NaN where that is no number.
         tolerance: Largest error that passes [-].
         source: Where the expected value comes from.

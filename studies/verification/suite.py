@@ -65,24 +65,9 @@ def run_suite(
     Raises:
         CurveError: No case has such a name, or ``out`` holds cases of another seed, device, extent or version.
     """
-    todo = [c for c in cases() if (c.fast or not options.quick) and (only is None or only.lower() in c.name.lower())]
-    if not todo:
-        names = ", ".join(c.name for c in cases())
-        raise CurveError(f"--only {only}: no case has this in its name; there are {names}")
+    todo = _chosen(options, only)
     prepare(out, resume=resume)
-    none = Verification(
-        command=tuple(command),
-        quick=options.quick,
-        seed=options.seed,
-        device=options.arch,
-        code=code_key(),
-        versions=versions(),
-        git=git_commit(),
-        complete=False,
-        rows=(),
-        seconds={},
-        broken={},
-    )
+    none = _nothing_run(options, command)
     found = _known(out, none) if resume else {}
     new = sorted((c for c in todo if c.name not in found), key=lambda c: -c.cost)
     if len(new) < len(todo):
@@ -103,6 +88,33 @@ def run_suite(
     write_figure(result, out)
     write_report(out)
     return result
+
+
+def _chosen(options: SuiteOptions, only: str | None) -> list[VerificationCase]:
+    """The cases to run."""
+    every = cases()
+    chosen = [c for c in every if (c.fast or not options.quick) and (only is None or only.lower() in c.name.lower())]
+    if not chosen:
+        names = ", ".join(c.name for c in every)
+        raise CurveError(f"--only {only}: no case has this in its name; there are {names}")
+    return chosen
+
+
+def _nothing_run(options: SuiteOptions, command: Sequence[str]) -> Verification:
+    """The verification before any case is run."""
+    return Verification(
+        command=tuple(command),
+        quick=options.quick,
+        seed=options.seed,
+        device=options.arch,
+        code=code_key(),
+        versions=versions(),
+        git=git_commit(),
+        complete=False,
+        rows=(),
+        seconds={},
+        broken={},
+    )
 
 
 def _case_outcome(name: str, options: SuiteOptions, arch: str, threads: int) -> CaseOutcome:

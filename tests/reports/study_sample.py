@@ -78,12 +78,15 @@ def _nulls(name: str) -> dict[str, Any]:
 def _fitted(name: str) -> dict[str, Any]:
     return {
         "trace": {"source": f"{name}.csv", "sha256": "3b5d5c3712955042212316173ccf37be" * 2, "label": "measured"},
-        "shape": sample.summary()["shape"], "knife": sample.summary()["knife"], "in_sample": True, "passed": True, "metrics": _compared(name).as_dict(), "factor": 1.04, "predictive_inside": 1.0,
+        "shape": sample.summary()["shape"], "knife": sample.summary()["knife"], "in_sample": True, "passed": True,
+        "metrics": _compared(name).as_dict(), "factor": 1.04, "predictive_inside": 1.0,
         "nuisances": {"tare": {"value": 0.01, "sd": 0.02, "prior_sd": 0.03, "unit": "N", "outside": False},
                       "scale": {"value": 0.04, "sd": 0.06, "prior_sd": 0.15, "unit": "-", "outside": False}},
         "null_models": {n: {k: m[k] for k in ("R", "nrmse")} for n, m in _nulls(name).items()},
-        "numerical_checks": [{"name": "half the simulated speed", "reason": None, "peak_change": 0.004, "work_change": -0.002},
-                             {"name": "cells of two thirds", "reason": None, "peak_change": -0.012, "work_change": 0.006}],
+        "numerical_checks": [
+            {"name": "half the simulated speed", "reason": None, "peak_change": 0.004, "work_change": -0.002},
+            {"name": "cells of two thirds", "reason": None, "peak_change": -0.012, "work_change": 0.006},
+        ],
     }  # fmt: skip
 
 

@@ -5,16 +5,21 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from calib.errors import CurveError
+from calib.io.typed_document import to_document
 from cutcal.options import (
     add_run,
     number,
     print_json,
+    say,
     whole,
 )
 from mpm.shapes import Shape
+
+if TYPE_CHECKING:
+    from calib.compression.result import CompressionResult
 
 HELP = "Young's modulus from a compression test between two plates"
 DESCRIPTION = """Calibrate Young's modulus on the force of a specimen that is compressed between
@@ -59,36 +64,25 @@ def add_args(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate; prints the result, or compress.json."""
-    from calib.compression.study import run as calibrate
+    from calib.compression.modulus_calibration import CompressionTest, PressOptions, calibrate_modulus
 
     shape = shape_of(args)
     if args.nu is None:
         raise CurveError(
-            "--nu is missing: a compression force alone does not tell Young's modulus from Poisson's ratio; give it, for "
-            "instance 0.49 for a gel or a rubber, 0.2 to 0.4 for a food with pores"
+            "--nu is missing: a compression force alone does not tell Young's modulus from Poisson's ratio; give it, "
+            "for instance 0.49 for a gel or a rubber, 0.2 to 0.4 for a food with pores"
         )
     out = Path(args.out or f"cutcal-compress-{Path(args.trace[0]).stem}")
-    document = calibrate(
-        args.trace,
-        shape,
-        args.nu,
-        out,
-        strain=args.strain,
-        cells=args.cells if args.cells is not None else 15 if args.bonded else 10,
-        bonded=args.bonded,
-        bracket=args.bracket,
-        compression_col=args.compression_col,
-        force_col=args.force_col,
-        seed=args.seed,
-        arch=args.arch,
-        about={"command": ["compress", *(a for a in sys.argv[1:] if a != "compress")]},
-        say=lambda text: print(text, file=sys.stderr, flush=True),
-    )
+    test = CompressionTest(args.trace, shape, args.nu, args.strain, args.bonded, args.compression_col, args.force_col)
+    cells = args.cells if args.cells is not None else 15 if args.bonded else 10
+    options = PressOptions(cells, args.bracket, args.seed, args.arch)
+    command = ("compress", *(a for a in sys.argv[1:] if a != "compress"))
+    result = calibrate_modulus(test, options, out, command=command, say=say)
     if args.json:
-        print_json(document)
+        print_json(to_document(result))
     else:
-        print(f"{table(document)}\n  wrote {out}")
-    return 0 if document["passed"] else 2
+        print(f"{table(result)}\n  wrote {out}")
+    return 0 if result.passed else 2
 
 
 def shape_of(args: argparse.Namespace) -> Shape:
@@ -113,31 +107,30 @@ def shape_of(args: argparse.Namespace) -> Shape:
     return Shape("block", args.length, args.width, args.height)
 
 
-def table(document: dict[str, Any]) -> str:
+def table(result: CompressionResult) -> str:
     """What the terminal shows at the end."""
-    modulus, small, force = document["E"], document["slope"], document["force_error"]
-    window = f"over 0-{modulus['window'][1]:.0%} strain"
-    count = modulus["repeats"]
+    modulus, small, force = result.E, result.slope, result.force_error
+    window = f"over 0-{modulus.window[1]:.0%} strain"
     spread = "one repeat, no interval"
-    if count > 1:
+    if modulus.repeats > 1:
         spread = (
-            f"sd {modulus['sd_Pa'] / 1e3:.3g} kPa, 95 % interval {modulus['low_Pa'] / 1e3:.4g} to "
-            f"{modulus['high_Pa'] / 1e3:.4g} kPa, {count} repeats"
+            f"sd {modulus.sd_Pa / 1e3:.3g} kPa, 95 % interval {modulus.low_Pa / 1e3:.4g} to "
+            f"{modulus.high_Pa / 1e3:.4g} kPa, {modulus.repeats} repeats"
         )
     lines = [
-        f"E = {modulus['mean_Pa'] / 1e3:.4g} kPa {window} ({spread})",
-        f"  modulus 0-5 %: measured {small['measured_Pa'] / 1e3:.4g} kPa, fitted {small['fitted_Pa'] / 1e3:.4g} kPa "
-        f"({small['error']:+.1%})",
-        f"  largest force error beyond {force['from_strain']:.0%} strain: {force['value']:+.1%} at {force['strain']:.1%}",
+        f"E = {modulus.mean_Pa / 1e3:.4g} kPa {window} ({spread})",
+        f"  modulus 0-5 %: measured {small.measured_Pa / 1e3:.4g} kPa, fitted {small.fitted_Pa / 1e3:.4g} kPa "
+        f"({small.error:+.1%})",
+        f"  largest force error beyond {force.from_strain:.0%} strain: {force.value:+.1%} at {force.strain:.1%}",
     ]
-    for other in document["sensitivity"] or ():
-        lines.append(f"  at nu {other['nu']:.3g} the same force is E = {other['E_Pa'] / 1e3:.4g} kPa {window}")
-    if document["bracket"]:
-        other = document["bracket"]
-        lines.append(f"  with {other['plates']} plates it is E = {other['E_Pa'] / 1e3:.4g} kPa {window}")
-    for line in document["verdicts"]:
-        word = "ok  " if line["passed"] else "FAIL"
-        note = f": {line['note']}" if line["note"] else ""
-        lines.append(f"  {word} {line['value']:6.1%} (limit {line['limit']:.0%})  {line['name']}{note}")
-    lines += [f"  note: {text}" for text in document["not_shown"]]
+    for other in result.sensitivity or ():
+        lines.append(f"  at nu {other.nu:.3g} the same force is E = {other.E_Pa / 1e3:.4g} kPa {window}")
+    if result.bracket is not None:
+        plates = result.bracket
+        lines.append(f"  with {plates.plates} plates it is E = {plates.E_Pa / 1e3:.4g} kPa {window}")
+    for line in result.verdicts:
+        word = "ok  " if line.passed else "FAIL"
+        note = f": {line.note}" if line.note else ""
+        lines.append(f"  {word} {line.value:6.1%} (limit {line.limit:.0%})  {line.name}{note}")
+    lines += [f"  note: {text}" for text in result.not_shown]
     return "\n".join(lines)

@@ -41,7 +41,7 @@ def writer(folder: Path) -> Callable[[Path], Path]:
     """
     from calib.calibration import result as calibration
     from calib.material.properties import MEANINGS
-    from reports import study
+    from reports import multi_specimen
     from studies.convergence import result as convergence
     from studies.speed import result as bench
     from studies.stability import result as stability
@@ -62,4 +62,5 @@ def writer(folder: Path) -> Callable[[Path], Path]:
     if not summary.exists():
         names = ", ".join(("summary.json", *found))
         raise ReportError(f"{folder}: holds none of {names}; give the --out of a finished run")
-    return partial(study.write_report, meanings=MEANINGS) if study.is_study(summary) else calibration.write_report
+    study = partial(multi_specimen.write_report, meanings=MEANINGS)
+    return study if multi_specimen.is_study(summary) else calibration.write_report

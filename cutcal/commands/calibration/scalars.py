@@ -6,8 +6,9 @@ import argparse
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
+from calib.io.typed_document import to_document
 from calib.material.knife import load_knife
 from cutcal.options import (
     RESUME_HELP,
@@ -20,6 +21,9 @@ from cutcal.options import (
     whole,
     workers_of,
 )
+
+if TYPE_CHECKING:
+    from calib.scalars.result import FittedNumbers
 
 HELP = "fit properties to published peaks and energies"
 DESCRIPTION = """Fit properties (R and mu, or those of the file) to the given numbers of FILE, a
@@ -57,19 +61,19 @@ def add_args(p: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Fit and predict; prints the table, or scalars.json."""
     from calib.scalars.published_data import load_published
-    from calib.scalars.scalar_fit import run as study
+    from calib.scalars.scalar_fit import fit_scalars
 
     published = load_published(args.file)
     if args.knife is not None:
         published = replace(published, knife=load_knife(args.knife))
     if args.together:
-        published = published.together()
+        published = published.all_given()
     if args.fit is not None:
         published = published.fitting(tuple(name.strip() for name in args.fit.split(",")))
     out = Path(args.out or f"cutcal-scalars-{Path(args.file).stem}")
 
     with workers_of(args, say) as pool:
-        document = study(
+        result = fit_scalars(
             published,
             out,
             pool,
@@ -79,41 +83,40 @@ def run(args: argparse.Namespace) -> int:
             say=say,
         )
     if args.json:
-        print_json(document)
+        print_json(to_document(result))
     else:
-        print(f"{table(document)}\nwrote {out}")
-    return 0 if document["passed"] else 2
+        print(f"{table(result.fitted)}\nwrote {out}")
+    return 0 if result.fitted.passed else 2
 
 
-def table(document: dict[str, Any]) -> str:
+def table(result: FittedNumbers) -> str:
     """What the terminal shows at the end."""
     lines = [f"{'':18s} {'value':>10s} {'95 % of the draws':>22s} {'prior':>22s}"]
-    for name, row in document["parameters"].items():
-        span, prior = (_span(row[a], row[b]) for a, b in (("low95", "high95"), ("prior_low", "prior_high")))
-        lines.append(f"{name:18s} {row['value']:10.4g} {span:>22s} {prior:>22s}  {row['unit']}, {row['role']}")
+    for name, one in result.parameters.items():
+        span, prior = _span(one.low95, one.high95), _span(one.prior_low, one.prior_high)
+        lines.append(f"{name:18s} {one.value:10.4g} {span:>22s} {prior:>22s}  {one.unit}, {one.role}")
     lines += ["", f"{'':18s} {'':12s} {'published':>10s} {'simulated':>10s} {'error':>8s} {'95 % of the draws':>22s}"]
-    for row in document["numbers"]:
-        span = _span(row["low95"], row["high95"])
+    for row in result.numbers:
         lines.append(
-            f"{row['specimen']:18s} {row['quantity']:12s} {row['published']:10.4g} {row['simulated']:10.4g} "
-            f"{row['error']:+8.1%} {span:>22s}  {row['role']}"
+            f"{row.specimen:18s} {row.quantity:12s} {row.published:10.4g} {row.simulated:10.4g} "
+            f"{row.error:+8.1%} {_span(row.low95, row.high95):>22s}  {row.role}"
         )
     lines += ["", "largest over mean force: published, simulated, and where the force goes with the width"]
-    for row in document["fullness"]:
-        known = "-" if row["published"] is None else f"{row['published']:.3f}"
-        lines.append(f"{row['specimen']:18s} {known:>8s} {row['simulated']:8.3f} {row['uniform']:8.3f}")
-    draws = document["draws"]
+    for cut in result.fullness:
+        known = "-" if cut.published is None else f"{cut.published:.3f}"
+        lines.append(f"{cut.specimen:18s} {known:>8s} {cut.simulated:8.3f} {cut.uniform:8.3f}")
+    draws = result.draws
     lines += [
         "",
-        f"draws: {draws['met']} met the given numbers, {draws['unmet']} could not, {draws['broke_down']} broke down",
+        f"draws: {draws.met} met the given numbers, {draws.unmet} could not, {draws.broke_down} broke down",
     ]
-    if document["consistent"]:
+    if result.consistent:
         lines.append("ok   given numbers met within two of their standard deviations")
     else:
         lines.append("FAIL the given numbers contradict each other: no values within the bounds meet all of them")
-    if any(row["role"] == "predicted" for row in document["numbers"]):
-        word = "ok  " if document["predicted"] else "FAIL"
-        lines.append(f"{word} predicted numbers within {document['limit']:.0%}")
+    if any(row.role == "predicted" for row in result.numbers):
+        word = "ok  " if result.predicted else "FAIL"
+        lines.append(f"{word} predicted numbers within {result.limit:.0%}")
     return "\n".join(lines)
 
 

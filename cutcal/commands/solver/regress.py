@@ -127,7 +127,7 @@ def line(one: CutComparison, recording: bool = False) -> str:
 
 
 def argument(one: CutComparison) -> list[str]:
-    """Why a reviewer should look: each change beside what another seed changes, and what else is another than it was."""
+    """Why a reviewer should look: each change beside what another seed changes, and what else has changed."""
     far, results, shape = one.largest, one.results, one.shape_error
     if far is None or results is None:
         return []

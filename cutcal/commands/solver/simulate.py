@@ -34,9 +34,9 @@ from mpm.scene import CONTACTS, Arm
 
 HELP = "simulate one cut"
 DESCRIPTION = "Simulate one cut and write force.csv and summary.json."
-LOOKS = 72  # at the cut, of a video: five seconds
-PAGES = 2  # looks of which a page has one
-TOLD = 12  # pictures of a video after which a line says how many there are
+VIDEO_FRAMES = 72  # of a video: five seconds
+FRAMES_PER_PAGE_FRAME = 2  # frames of a video of which a page has one
+FRAMES_PER_LINE = 12  # pictures of a video after which a line says how many there are
 EPILOG = "example:\n  cutcal simulate --food cucumber --knife edc --out runs/cucumber"
 
 
@@ -139,7 +139,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"\r{done:5.0%}  {force:8.2f} N  {clock(left)} left ", end="", file=sys.stderr, flush=True)
 
     simulation = Simulation(scene, Runtime(args.arch, args.threads))
-    watch = Watch(LOOKS) if args.pictures or args.video or args.page else None
+    watch = Watch(VIDEO_FRAMES) if args.pictures or args.video or args.page else None
     record = simulation.run(progress=show if sys.stderr.isatty() else None, watch=watch)
     if sys.stderr.isatty():
         print(file=sys.stderr)
@@ -177,8 +177,8 @@ def run(args: argparse.Namespace) -> int:
         if part is not None:
             rate = "" if fracture is None else f" ({fracture['released_J_m2']:.3g} J/m^2)"
             print(
-                f"where the work went: {spent(record.budget)}; released at the front of the crack or lost by the discretisation "
-                f"{part:.1%}{rate}"
+                f"where the work went: {spent(record.budget)}; released at the front of the crack or lost by the "
+                f"discretisation {part:.1%}{rate}"
             )
         if record.pieces is not None:
             print(record.pieces.words())
@@ -202,13 +202,17 @@ def _draw(args: argparse.Namespace, out: Path, simulation: Any, record: ForceRec
         stills(film, out)
     if args.page:
         say("writing cut.html")
-        page(replace(film, looks=watch.taken[PAGES - 1 :: PAGES]), out / "cut.html", title)
+        page(
+            replace(film, looks=watch.taken[FRAMES_PER_PAGE_FRAME - 1 :: FRAMES_PER_PAGE_FRAME]),
+            out / "cut.html",
+            title,
+        )
     if args.video:
         rest = Countdown(len(watch.taken))
 
         def told(done: int) -> None:
             left = rest.left(1.0)
-            if done % TOLD == 0:
+            if done % FRAMES_PER_LINE == 0:
                 say(f"drawing cut.mp4: {done} of {len(watch.taken)} pictures, {left}")
 
         say("drawing cut.mp4")

@@ -40,7 +40,21 @@ def scatter(
     mu: float,
     lam: float,
 ):
-    """Stress, momentum and mass of the particles to the grid."""
+    """Stress, momentum and mass of the particles to the grid.
+
+    Args:
+        x: Places [m], shape (n,).
+        v: Velocities [m/s], shape (n,).
+        c: Affine velocities [1/s], shape (n,).
+        f: Deformation gradients [-], shape (n,).
+        grid: Momentum [kg m/s] and mass [kg] of the nodes.
+        dx: Cell size [m].
+        dt: Time step [s].
+        mass: Mass of a particle [kg].
+        volume: Its volume [m^3].
+        mu: Shear modulus [Pa].
+        lam: First Lame constant [Pa].
+    """
     p = wp.tid()
     eye = wp.identity(n=3, dtype=float)
     new = (eye + dt * c[p]) @ f[p]
@@ -65,7 +79,14 @@ def scatter(
 
 @wp.kernel
 def update(grid: wp.array3d(dtype=wp.vec4), dt: float, gravity: float, floor: int):
-    """Momentum to velocity, gravity, and a floor that holds."""
+    """Momentum to velocity, gravity, and a floor that holds.
+
+    Args:
+        grid: Momentum [kg m/s] and mass [kg] of the nodes; velocity [m/s] in place of momentum afterwards.
+        dt: Time step [s].
+        gravity: Acceleration downwards [m/s^2].
+        floor: Index of the nodes on the floor.
+    """
     i, j, k = wp.tid()
     q = grid[i, j, k]
     if q[3] > 0.0:
@@ -85,7 +106,16 @@ def gather(
     dx: float,
     dt: float,
 ):
-    """Velocity, its gradient and the position of the particles from the grid."""
+    """Velocity, its gradient and the position of the particles from the grid.
+
+    Args:
+        x: Places [m], shape (n,).
+        v: Velocities [m/s], shape (n,).
+        c: Affine velocities [1/s], shape (n,).
+        grid: Velocity [m/s] and mass [kg] of the nodes.
+        dx: Cell size [m].
+        dt: Time step [s].
+    """
     p = wp.tid()
     at = x[p] / dx
     bx, by, bz = int(at[0] - 0.5), int(at[1] - 0.5), int(at[2] - 0.5)

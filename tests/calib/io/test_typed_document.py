@@ -62,7 +62,9 @@ DOCUMENT = {
 
 
 def test_a_result_is_its_document_and_comes_back():
-    """Keys in their order; one that may be missing is left out, one that follows is written and not read; the way back is exact."""
+    """Keys in their order; one that may be missing is left out, one that follows is written and not read;
+    the way back is exact.
+    """
     assert to_document(WHOLE) == DOCUMENT and list(to_document(WHOLE)) == list(DOCUMENT)
     assert from_document(Whole, json.loads(json.dumps(DOCUMENT))) == WHOLE
     assert from_document(Whole, DOCUMENT | {"best": {"name": "c", "size_m": 0.0}}).best == Part("c", 0.0)

@@ -1,4 +1,6 @@
-"""Published numbers: the file, least squares with few evaluations, closed forms, a study killed and resumed, Kachru 1995."""
+"""Published numbers: the file, least squares with few evaluations, closed forms,
+a study killed and resumed, Kachru 1995.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +17,12 @@ import pytest
 
 from calib.errors import PublishedError
 from calib.problem.parameters import Parameter, ParameterSet
-from calib.scalars.gauss_newton import Aim, descent, together
-from calib.scalars.published_data import ENERGY, PEAK, load_published
-from calib.scalars.scalar_fit import Bench, band, conclude, fit
+from calib.scalars.cut_simulator import CutSimulator
+from calib.scalars.fitted_numbers import fitted_numbers
+from calib.scalars.gauss_newton import LeastSquaresProblem, gauss_newton, solve_together
+from calib.scalars.given_numbers_fit import fit_given_numbers
+from calib.scalars.published_data import CUT_ENERGY, PEAK_FORCE, load_published
+from calib.scalars.randomised_likelihood import randomised_fits
 from calib.simulation.evaluation import Evaluation
 from cutcal.main import main
 from tests.calib.documents import valid
@@ -27,7 +32,8 @@ KACHRU = ROOT / "force_data" / "kachru1995.yaml"
 PATIENCE_S = 120.0
 R = 400.0  # J/m^2
 WIDTH = 0.024  # m
-# A blade of 0.1 mm between frictionless faces; R_initiation = R, so that the force is R times the width from start to end.
+# A blade of 0.1 mm between frictionless faces; R_initiation = R, so that the force is R times the width from start to
+# end.
 KNIFE = """thin:
   spine: {value: 1.0e-4, unit: m}
   angle: {value: 0.2, unit: deg}
@@ -68,11 +74,13 @@ def prism(tmp_path):
 
 
 def test_kachru_is_what_the_abstract_says():
-    """Both slices with their numbers; the largest over the mean force is 1.34 and 1.78, where a round section has 4 / pi."""
+    """Both slices with their numbers; the largest over the mean force is 1.34 and 1.78,
+    where a round section has 4 / pi.
+    """
     published = load_published(KACHRU)
     nendran, dwarf = published.cuts
-    assert [(s.quantity, s.value) for s in nendran.given] == [(PEAK, 28.2), (ENERGY, 724.46)]
-    assert [(s.quantity, s.value) for s in dwarf.predicted] == [(PEAK, 22.4), (ENERGY, 686.81)]
+    assert [(s.quantity, s.value) for s in nendran.given] == [(PEAK_FORCE, 28.2), (CUT_ENERGY, 724.46)]
+    assert [(s.quantity, s.value) for s in dwarf.predicted] == [(PEAK_FORCE, 22.4), (CUT_ENERGY, 686.81)]
     assert nendran.area == pytest.approx(math.pi / 4 * 0.03708**2)
     assert (nendran.fullness, dwarf.fullness) == pytest.approx((1.337, 1.779), abs=1e-3)
     assert nendran.uniform_fullness == pytest.approx(4 / math.pi)
@@ -87,8 +95,8 @@ def test_other_roles():
     other = published.fitting(("R", "R_initiation"))
     assert other.fit == ("R", "R_initiation")
     assert set(other.vary) == {"E", "yield_stress", "initiation_depth", "mu"}
-    assert len(published.together().given) == 4
-    assert not any(cut.predicted for cut in published.together().cuts)
+    assert len(published.all_given().given) == 4
+    assert not any(cut.predicted for cut in published.all_given().cuts)
     with pytest.raises(PublishedError, match="fit at most 2"):
         published.fitting(("R", "mu", "E"))
 
@@ -139,20 +147,22 @@ def test_nothing_given_is_refused(prism):
 # Least squares ------------------------------------------------------------------------------------
 
 
-def aim(target, low=0.1, high=1000.0):
+def problem(target, low=0.1, high=1000.0):
     """Two parameters on log scales with wide priors, and a target known to 1 %."""
     items = tuple(Parameter(name, 10.0, low, high, "-", 0.1, 1000.0) for name in ("a", "b"))
-    return Aim(ParameterSet(items), np.log(target), np.full(len(target), 0.01))
+    return LeastSquaresProblem(ParameterSet(items), np.log(target), np.full(len(target), 0.01))
 
 
 def run(one, model, start=(2.0, 2.0), **options):
     """A descent of a model of one point at a time."""
-    return together([descent(one, np.array(start), **options)], lambda asked: [model(z) for _, z in asked])[0]
+    return solve_together([gauss_newton(one, np.array(start), **options)], lambda asked: [model(z) for _, z in asked])[
+        0
+    ]
 
 
 def test_power_laws_are_solved_in_few_evaluations():
     """Products of powers are linear in logarithms: a Jacobian and one or two steps, and the target is met."""
-    end = run(aim([50.0, 8.0]), lambda z: np.array([z[0] + z[1], z[0] - 0.5 * z[1]]))
+    end = run(problem([50.0, 8.0]), lambda z: np.array([z[0] + z[1], z[0] - 0.5 * z[1]]))
     assert end.converged and end.evaluations <= 8
     assert np.exp(end.y) == pytest.approx([50.0, 8.0], rel=2e-3)
 
@@ -163,7 +173,7 @@ def test_kinks_and_breakdowns_are_passed():
     def model(z):
         return None if z[0] > 4.2 else np.array([max(z[0], z[1] + 1.0), 0.3 * z[1] + 0.7 * z[0]])
 
-    end = run(aim(np.exp([4.0, 3.1])), model, jacobian=np.eye(2))
+    end = run(problem(np.exp([4.0, 3.1])), model, jacobian=np.eye(2))
     assert end.y == pytest.approx([4.0, 3.1], abs=0.01)
 
 
@@ -175,7 +185,7 @@ def test_bounds_are_never_passed():
         seen.append(z)
         return np.array([z[0], z[1]])
 
-    end = run(aim([5000.0, 5.0]), model)
+    end = run(problem([5000.0, 5.0]), model)
     assert np.exp(np.array(seen)).max() <= 1000.0 * (1 + 1e-9)
     assert np.exp(end.z) == pytest.approx([1000.0, 5.0], rel=0.01)
 
@@ -183,11 +193,12 @@ def test_bounds_are_never_passed():
 def test_descents_side_by_side_are_those_alone():
     """Batches do not mix the values of descents; one whose start breaks down ends without values, the others go on."""
     models = [lambda z: np.array([z[0], z[1]]), lambda z: None, lambda z: np.array([z[0] + z[1], z[1]])]
-    aims = [aim([3.0, 4.0]), aim([1.0, 1.0]), aim([30.0, 4.0])]
-    ends = together([descent(one, np.full(2, 2.0)) for one in aims], lambda asked: [models[k](z) for k, z in asked])
+    problems = [problem([3.0, 4.0]), problem([1.0, 1.0]), problem([30.0, 4.0])]
+    descents = [gauss_newton(one, np.full(2, 2.0)) for one in problems]
+    ends = solve_together(descents, lambda asked: [models[k](z) for k, z in asked])
     assert ends[1].y is None and not ends[1].converged
     for k in (0, 2):
-        assert ends[k].z == pytest.approx(run(aims[k], models[k]).z)
+        assert ends[k].z == pytest.approx(run(problems[k], models[k]).z)
 
 
 # The study on closed forms ------------------------------------------------------------------------
@@ -208,19 +219,20 @@ class Closed:
             yield Evaluation(k, dict(values), "ok", "", 1.0, np.empty(0), np.empty(0), scalars)
 
 
-def bench(published, grid=1.0):
+def simulator(published, grid=1.0):
     """Closed forms whose coarse grid is off by a factor."""
     both = (("fine", 1.0), ("coarse", grid))
-    return Bench(published, {f: {c.name: Closed(c, g) for c in published.cuts} for f, g in both}, lambda text: None)
+    evaluators = {f: {c.name: Closed(c, g) for c in published.cuts} for f, g in both}
+    return CutSimulator(published, evaluators, lambda text: None)
 
 
-def document(published, grid=1.0, draws=0):
-    """The study on closed forms."""
-    where = bench(published, grid)
-    best = fit(where)
+def fitted(published, grid=1.0, draws=0):
+    """The fit on closed forms."""
+    where = simulator(published, grid)
+    best = fit_given_numbers(where)
     values = published.fitted.to_dict(best.z)
-    found = {c.name: where.cut(c, [values], "fine")[0] for c in published.cuts}
-    return conclude(published, best, found, band(where, best, draws, 0))
+    found = {c.name: where.simulate(c, [values], "fine")[0] for c in published.cuts}
+    return fitted_numbers(published, best, found, randomised_fits(where, best, draws, 0))
 
 
 def starting(published, high):
@@ -233,53 +245,57 @@ def starting(published, high):
 @pytest.mark.parametrize("grid", [1.0, 0.8])
 def test_correction_takes_the_coarse_grid_out(prism, grid):
     """R comes from the default grid whatever factor the coarse one is off by; its energy is then R."""
-    result = document(load_published(prism), grid)
-    assert result["parameters"]["R"]["value"] == pytest.approx(R, rel=2e-3)
-    energy = result["numbers"][1]
-    assert (energy["role"], energy["quantity"]) == ("predicted", ENERGY)
-    assert energy["simulated"] == pytest.approx(R, rel=2e-3)
-    assert result["passed"] and result["fullness"][0]["simulated"] == pytest.approx(1.0)
+    result = fitted(load_published(prism), grid)
+    assert result.parameters["R"].value == pytest.approx(R, rel=2e-3)
+    energy = result.numbers[1]
+    assert (energy.role, energy.quantity) == ("predicted", CUT_ENERGY)
+    assert energy.simulated == pytest.approx(R, rel=2e-3)
+    assert result.passed and result.fullness[0].simulated == pytest.approx(1.0)
 
 
 def test_numbers_that_contradict_each_other_are_told(prism):
-    """A peak of R w and an energy of 0.7 R cannot both be: both given, no R meets them; the same numbers alone, each has its R."""
+    """A peak of R w and an energy of 0.7 R cannot both be: both given, no R meets them;
+    the same numbers alone, each has its R.
+    """
     published = load_published(prism)
     (cut,) = published.cuts
     lower = replace(cut.predicted[0], value=0.7 * R)
     wrong = replace(published, cuts=(replace(cut, predicted=(lower,)),))
-    alone, both = document(wrong), document(wrong.together())
-    assert alone["consistent"] and not alone["predicted"] and not alone["passed"]
-    assert alone["numbers"][1]["error"] == pytest.approx(1 / 0.7 - 1, rel=0.02)
-    assert not both["consistent"] and not both["passed"]
-    assert both["parameters"]["R"]["value"] == pytest.approx(R * math.sqrt(0.7), rel=0.02)
-    blamed = document(replace(starting(wrong, high=1600.0).together(), fit=("R", "R_initiation"), vary=()))
-    assert blamed["consistent"], "a start of 1.4 R explains it, and is found from a first minimum without one"
+    alone, both = fitted(wrong), fitted(wrong.all_given())
+    assert alone.consistent and not alone.predicted and not alone.passed
+    assert alone.numbers[1].error == pytest.approx(1 / 0.7 - 1, rel=0.02)
+    assert not both.consistent and not both.passed
+    assert both.parameters["R"].value == pytest.approx(R * math.sqrt(0.7), rel=0.02)
+    blamed = fitted(replace(starting(wrong, high=1600.0).all_given(), fit=("R", "R_initiation"), vary=()))
+    assert blamed.consistent, "a start of 1.4 R explains it, and is found from a first minimum without one"
 
 
 def test_band_is_of_what_is_drawn_and_of_the_given_numbers(prism):
-    """Without an effect of what is drawn the band of the energy is that of the given peak; draws that cannot meet it are out."""
+    """Without an effect of what is drawn the band of the energy is that of the given peak;
+    draws that cannot meet it are out.
+    """
     published = load_published(prism)
-    energy = document(published, draws=64)["numbers"][1]
-    half = (energy["high95"] - energy["low95"]) / 2 / R
-    assert half == pytest.approx(1.96 * 0.02, rel=0.25) and energy["inside"]
+    energy = fitted(published, draws=64).numbers[1]
+    half = (energy.high95 - energy.low95) / 2 / R
+    assert half == pytest.approx(1.96 * 0.02, rel=0.25) and energy.inside
     started = starting(published, high=1600.0)
-    result = document(replace(started, vary=("R_initiation",)), draws=64)
-    draws, row = result["draws"], result["parameters"]["R_initiation"]
-    assert draws["met"] + draws["unmet"] == 64 and 20 <= draws["unmet"] <= 44
-    assert row["high95"] == pytest.approx(R, rel=0.1)
+    result = fitted(replace(started, vary=("R_initiation",)), draws=64)
+    draws, row = result.draws, result.parameters["R_initiation"]
+    assert draws.met + draws.unmet == 64 and 20 <= draws.unmet <= 44
+    assert row.high95 == pytest.approx(R, rel=0.1)
 
 
 def test_band_keeps_open_what_the_numbers_leave_open(prism):
     """Peak and energy are both R (1 + mu): its band is that of the numbers, and mu keeps the width of its prior."""
-    published = load_published(prism).together()
+    published = load_published(prism).all_given()
     food = published.food
     mu = replace(food.properties["mu"], value=0.3, low=0.1, high=0.5)
     wide = replace(
         published, food=replace(food, properties=dict(food.properties) | {"mu": mu}), fit=("R", "mu"), vary=()
     )
-    where = bench(wide)
-    best = fit(where)
-    drawn = band(where, best, 64, 0)
+    where = simulator(wide)
+    best = fit_given_numbers(where)
+    drawn = randomised_fits(where, best, 64, 0)
     values = np.array([[v["R"] * (1 + v["mu"]), v["mu"]] for v in drawn.values])
     assert len(values) > 60
     assert values[:, 0].std() / values[:, 0].mean() == pytest.approx(0.02 / math.sqrt(2), rel=0.3)
@@ -296,7 +312,9 @@ def known(journal):
 
 @pytest.mark.slow
 def test_solver_recovers_R_of_a_prism_after_a_kill(prism, tmp_path, capsys):
-    """A thin frictionless blade through a block: peak = R w gives R, and energy = R; killed, resumed, nothing run twice."""
+    """A thin frictionless blade through a block: peak = R w gives R, and energy = R;
+    killed, resumed, nothing run twice.
+    """
     out = tmp_path / "out"
     words = ["scalars", str(prism), "--draws", "1", "--workers", "1", "--out", str(out)]
     process = subprocess.Popen(

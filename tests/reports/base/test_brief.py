@@ -1,4 +1,6 @@
-"""Reports of convergence, verification, stability and speed: what they say follows from their documents, and damage is one line."""
+"""Reports of convergence, verification, stability and speed:
+what they say follows from their documents, and damage is one line.
+"""
 
 from __future__ import annotations
 
@@ -46,10 +48,12 @@ def converge(folder: Path, **changes: Any) -> Path:
     estimate |= {"gci_coarsest": 0.05, "fitted": 12.1, "fitted_order": 2.0, "uncertainty": 0.03}
     mach = {"rows": [grid(3e-3, 13.0, mach=m) for m in (0.005, 0.01)], "spread_peak": 0.0042, "spread_work": 0.001}
     document = {
-        "food": "shine_muscat", "knife": "kitchen", "shape": {"kind": "sphere", "length": 0.03, "width": 0.03, "height": 0.03},
-        "warnings": ["E is assumed"], "grids": [grid(3e-3, 13.0), grid(2e-3, 12.5), grid(1e-3, 0.0, status="failed", reason="inverted")],
+        "food": "shine_muscat", "knife": "kitchen",
+        "shape": {"kind": "sphere", "length": 0.03, "width": 0.03, "height": 0.03}, "warnings": ["E is assumed"],
+        "grids": [grid(3e-3, 13.0), grid(2e-3, 12.5), grid(1e-3, 0.0, status="failed", reason="inverted")],
         "limits": {"work": 0.02, "peak": 0.03}, "peak": estimate, "work": estimate | {"order": None},
-        "order_curve": 2.0, "gci_curve_median": 0.01, "gci_curve_max": 0.04, "repeat_sd_peak_N": 0.1, "repeat_sd_work_J": 0.002, "mach": mach, "safety": None, "ppc": None, "offset": None,
+        "order_curve": 2.0, "gci_curve_median": 0.01, "gci_curve_max": 0.04, "repeat_sd_peak_N": 0.1,
+        "repeat_sd_work_J": 0.002, "mach": mach, "safety": None, "ppc": None, "offset": None,
         "repeat": None, **ORIGIN, **changes,
     }  # fmt: skip
     x = np.linspace(0, 0.03, 20)
@@ -81,7 +85,8 @@ def verify(folder: Path, **changes: Any) -> Path:
         "passed": True,
     }
     document = {
-        "quick": False, "seed": 0, "code": "c0de", "complete": True, "passed": False, "rows": [row, order], "seconds": {"bar": 1.0, "order": 2.0},
+        "quick": False, "seed": 0, "code": "c0de", "complete": True, "passed": False, "rows": [row, order],
+        "seconds": {"bar": 1.0, "order": 2.0},
         "broken": {"two discs": "its process was killed"}, **ORIGIN, **changes,
     }  # fmt: skip
     return written(folder / "verify.json", document)
@@ -106,8 +111,9 @@ def stress(folder: Path, **changes: Any) -> Path:
         "message": "more energy",
     }
     document = {
-        "seed": 0, "cells": [good, bad], "unexplained": 0, "unexplained_cells": [], "counts": {"stable": 1, "energy_growth": 1},
-        "physical": {"cells": 2, "stable": 1, "not_stable": ["loss: odd"]}, "reasons": {"energy_growth": "more energy than was put in"},
+        "seed": 0, "cells": [good, bad], "unexplained": 0, "unexplained_cells": [],
+        "counts": {"stable": 1, "energy_growth": 1}, "physical": {"cells": 2, "stable": 1, "not_stable": ["loss: odd"]},
+        "reasons": {"energy_growth": "more energy than was put in"},
         "limits": {"dt_over_limit": 0.8, "particle_steps": 3e8, "time_s": 300.0}, "passed": False, **ORIGIN, **changes,
     }  # fmt: skip
     return written(folder / "stress.json", document)
@@ -138,16 +144,20 @@ def speed(folder: Path, **changes: Any) -> Path:
     stiff |= {"steps": 2817, "nodes": 20000}
     paper = {"nodes": 120, "dx_m": 2e-3, "dt_s": 2e-5, "particles": 128792, "steps": 33000, "step_s": 0.167}
     paper |= {"wall_s_extrapolated": 5507.0}
+    warp = {"name": "Warp", "version": "1.19", "seconds": 0.05, "particles": 128000, "Mps": 2.7, "ours_Mps": 6.6}
+    warp |= {"ratio": 2.46}
     rate = {"particles": 128000, "bandwidth_GBps": 23.3, "bytes_per_particle_step": 624, "memory_bound_Mps": 37.3}
     rate |= {"full_physics_Mps": 5.8, "single_Mps": 6.1, "textbook_Mps": 0.81, "ratio": 7.2, "cut_Mps": 4.6}
     document = {
-        "food": "banana", "knife": "kitchen", "complete": True, "threads": 2, "default_cut": cut, "ratio_to_paper": 1455.9, "exponent": 1.02,
+        "food": "banana", "knife": "kitchen", "complete": True, "threads": 2, "default_cut": cut,
+        "ratio_to_paper": 1455.9, "exponent": 1.02,
         "ablations": [cut | {"name": "single precision", "time_ratio": 1.05, "status": "done"}, stiff],
         "paper_config": paper,
         "throughput": rate,
-        "peers": [{"name": "Warp", "version": "1.19", "seconds": 0.05, "particles": 128000, "Mps": 2.7, "ours_Mps": 6.6, "ratio": 2.46}, {"name": "Genesis", "error": "no module"}],
+        "peers": [warp, {"name": "Genesis", "error": "no module"}],
         "processes": {"processes": 2, "speed_up": 1.7, "cut_Mps": 7.8, "start_up_s": 1.4},
-        "batches": [{"cuts": 1, "wall_s": 1.5, "per_cut": 1.0}, {"cuts": 8, "wall_s": 6.6, "per_cut": 0.55}], **ORIGIN, **changes,
+        "batches": [{"cuts": 1, "wall_s": 1.5, "per_cut": 1.0}, {"cuts": 8, "wall_s": 6.6, "per_cut": 0.55}],
+        **ORIGIN, **changes,
     }  # fmt: skip
     return written(folder / "bench.json", document)
 
@@ -181,16 +191,26 @@ PASSED = {"converge": True, "verify": False, "stress": False, "bench": None}
 KINDS = {"converge": converge, "verify": verify, "stress": stress, "bench": speed}
 WRITERS = {"converge": convergence, "verify": verification, "stress": stability, "bench": bench}
 SAID = {
-    "converge": ["Shine muscat", "changes by +1.2 %", "broke down: inverted", "0.005 and 0.01", "Not varied here", "E is assumed"],
-    "verify": ["1 row fails, of 2", "1 case broke down", "two discs", "its process was killed", "≥ 2.000", '"no"', "Closed form"],
+    "converge": [
+        "Shine muscat", "changes by +1.2 %", "broke down: inverted", "0.005 and 0.01", "Not varied here",
+        "E is assumed",
+    ],
+    "verify": [
+        "1 row fails, of 2", "1 case broke down", "two discs", "its process was killed", "≥ 2.000", '"no"',
+        "Closed form",
+    ],
     "stress": ["1 of 2 cells", "more energy than was put in", "loss: odd", "1.7 %"],
-    "bench": ["1/1456", "2.3 % at most", "single precision", "Warp 1.19", "2.46", "not measured: no module", "extrapolated"],
+    "bench": [
+        "1/1456", "2.3 % at most", "single precision", "Warp 1.19", "2.46", "not measured: no module", "extrapolated",
+    ],
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_report_says_what_its_document_says(kind: str, tmp_path: Path, capsys, typeset) -> None:
-    """``cutcal report`` knows the folder; verdict, what failed, numbers in people's units, provenance; the same bytes twice."""
+    """``cutcal report`` knows the folder; verdict, what failed, numbers in people's units, provenance;
+    the same bytes twice.
+    """
     folder = KINDS[kind](tmp_path)
     assert main(["report", str(folder)]) == 0 and "report.pdf" in capsys.readouterr().out
     first = (folder / "report.pdf").read_bytes()
@@ -220,7 +240,9 @@ def test_a_damaged_document_is_one_line_and_the_old_report_stays(kind: str, tmp_
 
 
 def test_what_was_interrupted_or_coarse_is_said(tmp_path: Path, typeset) -> None:
-    """An interrupted benchmark and a quick verification are not whole; a verification that failed nowhere but did not end has not passed."""
+    """An interrupted benchmark and a quick verification are not whole;
+    a verification that failed nowhere but did not end has not passed.
+    """
     for name in ("a", "b", "c"):
         (tmp_path / name).mkdir()
     bench.write_report(speed(tmp_path / "a", complete=False))

@@ -32,7 +32,9 @@ def test_oscillatory_example_of_celik_2008():
 
 @pytest.mark.parametrize("order", [0.7, 1.0, 1.5, 2.0])
 def test_exact_power_is_recovered(order):
-    """phi0 + a h^p gives back phi0 and p, from three grids and from the least squares of four, in any order of input."""
+    """phi0 + a h^p gives back phi0 and p, from three grids and from the least squares of four,
+    in any order of input.
+    """
     e = estimate(H[::-1], 5.0 + 0.1 * H[::-1] ** order)
     assert e.verdict == "monotone"
     assert e.order == pytest.approx(order, abs=1e-3)

@@ -59,7 +59,9 @@ def test_resume_simulates_nothing_twice(study, capsys):
 
 
 def test_a_food_that_is_pressed_away_is_said_to_be(study, capsys, monkeypatch):
-    """A study whose edge took too little of R times the new area says so on the terminal, in its document and its report."""
+    """A study whose edge took too little of R times the new area says so on the terminal,
+    in its document and its report.
+    """
     out, code = study
     assert json.loads((out / "converge.json").read_text())["grids"][0]["parted"] is None  # too short a stroke to judge
     monkeypatch.setattr(Evaluation, "parted", property(lambda self: 0.4))

@@ -37,10 +37,11 @@ from studies.regression.suite import compare_with_references, record_changes
 from tests.calib.documents import valid
 
 ALL = {case.name: case for case in baseline_cuts(list(load_foods().values()), load_knife(RECORDED_KNIFE))}
-# By default, those of a second or less, with skin and without, that flow and that do not; nodal kernels take seconds to compile.
+# By default, those of a second or less, with skin and without, that flow and that do not; nodal kernels take seconds to
+# compile.
 QUICK = (
-    "banana-cohesive", "strawberry-cohesive", "kiwi-cohesive", "grape-cohesive", "shine_muscat-cohesive", "plum-cohesive",
-    "cherry-cohesive", "grape-nodal", "shine_muscat-nodal",
+    "banana-cohesive", "strawberry-cohesive", "kiwi-cohesive", "grape-cohesive", "shine_muscat-cohesive",
+    "plum-cohesive", "cherry-cohesive", "grape-nodal", "shine_muscat-nodal",
 )  # fmt: skip
 ORDER = [f"{food}-{contact}" for food in load_foods() for contact in CONTACTS]
 FOLDER = References().folder
@@ -68,7 +69,9 @@ def test_every_food_and_contact_is_recorded():
 
 @pytest.mark.parametrize("name", ALL)
 def test_reference_is_of_this_food_and_scene(name):
-    """It was recorded from the values that materials.yaml and knives.yaml have now, in the scene that is simulated now."""
+    """It was recorded from the values that materials.yaml and knives.yaml have now,
+    in the scene that is simulated now.
+    """
     origin, case = References().read(name).origin, ALL[name]
     assert origin["inputs"] == case.inputs, f"record it again: cutcal regress {case.food.name} --update"
     assert origin["scene"] == json.loads(json.dumps(case.scene().as_dict()))
@@ -77,7 +80,9 @@ def test_reference_is_of_this_food_and_scene(name):
 
 @pytest.mark.parametrize("name", ALL)
 def test_tolerances_are_those_of_measured_repeatability(name):
-    """2.8 s_r in each column at least, 3.34 as it is from eight seeds; where they hardly differ, a thousandth; no more."""
+    """2.8 s_r in each column at least, 3.34 as it is from eight seeds;
+    where they hardly differ, a thousandth; no more.
+    """
     reference = References().read(name)
     spread, least = reference.origin["repeatability"], scales(reference.columns)
     assert spread["seeds"] == [RECORDED_SEED, *OTHER_SEEDS]
@@ -103,13 +108,17 @@ def test_cut_is_that_of_the_reference(name, dataframe_regression):
 
 
 def test_screening_cells_are_those_of_the_record():
-    """A grape has nearly the cells that a fit screens with; a melon, whose cut would take twenty seconds, twelve over its height."""
+    """A grape has nearly the cells that a fit screens with;
+    a melon, whose cut would take twenty seconds, twelve over its height.
+    """
     cells = {name: ALL[f"{name}-cohesive"].scene().numerics.dx for name in ("grape", "melon")}
     assert cells == {"grape": pytest.approx(0.97 * 2.5e-3), "melon": pytest.approx(0.97 * 0.1 / 12)}
 
 
 def test_last_bit_of_a_cell_moves_no_curve():
-    """A cell that is longer by a part in 1e12 gives the same curve: rounding in another machine's libraries does not decide it."""
+    """A cell that is longer by a part in 1e12 gives the same curve:
+    rounding in another machine's libraries does not decide it.
+    """
     scene = ALL["strawberry-cohesive"].scene()
     longer = replace(scene, numerics=replace(scene.numerics, dx=scene.numerics.dx * (1 + 1e-12)))
     one, other = (run_cut(s, "cpu", 1).columns for s in (scene, longer))
@@ -149,7 +158,9 @@ class Here(Workers):
     [("cherry-cohesive", {"R": 1.1}), ("strawberry-cohesive", {"R": 1.1}), ("grape-nodal", {"E": 1.2})],
 )
 def test_changed_physics_is_outside(name, change):
-    """A tenth more resistance of the flesh, or a fifth more stiffness where contact has no edge, is found, and named."""
+    """A tenth more resistance of the flesh, or a fifth more stiffness where contact has no edge,
+    is found, and named.
+    """
     case = replace(ALL[name], food=scaled(ALL[name].food, **change))
     (row,) = compare_with_references([case], References(), Here(), lambda _: None)
     assert row.verdict == "outside" and row.largest.over_tolerance > 1
@@ -185,7 +196,9 @@ def curves(level, n=60, length=0.03):
 
 
 def test_scatter_of_known_curves():
-    """Peaks of 9, 10 and 11 N have a standard deviation of 1 N, edge and work their parts of it; the limit of three runs is 6.08."""
+    """Peaks of 9, 10 and 11 N have a standard deviation of 1 N, edge and work their parts of it;
+    the limit of three runs is 6.08.
+    """
     found, tolerances = repeatability([curves(10.0), curves(9.0), curves(11.0)])
     assert found.s_r == pytest.approx({"knife_N": 1, "edge_N": 2 / 3, "face_N": 1 / 3, "work_J": 0.06 / np.pi})
     assert tolerances == pytest.approx({name: 6.085 * x for name, x in found.s_r.items()}, rel=1e-3)
@@ -203,7 +216,9 @@ def test_limit_of_few_runs():
 
 
 def test_seeds_that_agree_leave_the_floor():
-    """Where seeds do not differ, a thousandth of the largest force or work is allowed, in a column without force too."""
+    """Where seeds do not differ, a thousandth of the largest force or work is allowed,
+    in a column without force too.
+    """
     flat = curves(10.0) | {"edge_N": np.zeros(60)}
     _, tolerances = repeatability([flat, flat])
     force, work = 0.01, 1e-3 * 10 * 0.06 / np.pi
@@ -224,7 +239,9 @@ def made_up(scene):
 
 @pytest.fixture
 def play(tmp_path, monkeypatch):
-    """A folder of made-up references of two foods, and cuts that are made up alike; yields folder and ``use(work, most)``."""
+    """A folder of made-up references of two foods, and cuts that are made up alike;
+    yields folder and ``use(work, most)``.
+    """
 
     def use(work=made_up, most=None):
         monkeypatch.setattr("cutcal.commands.solver.regress.workers_of", lambda *_: Here(work, most))
@@ -260,7 +277,9 @@ def refused(capsys, *words):
 
 
 def test_same_is_said_and_kept_to_the_byte(play, capsys):
-    """What was recorded is the same when it is simulated again; recording again changes no byte, and repeats no seed."""
+    """What was recorded is the same when it is simulated again;
+    recording again changes no byte, and repeats no seed.
+    """
     folder, use = play
     before = content(folder)
     names = [name for name in ORDER if name.startswith(PLAY)]
@@ -276,24 +295,26 @@ def test_same_is_said_and_kept_to_the_byte(play, capsys):
 
 
 def test_change_is_outside_and_said_in_terms_of_physics(play, capsys, monkeypatch):
-    """A tenth more force is exit code 2: peak, work and shape, what other seeds change, and the value that is another."""
+    """A tenth more force is exit code 2: peak, work and shape, what other seeds change,
+    and the value that is another.
+    """
     tougher(monkeypatch, "grape")
     capsys.readouterr()
     assert main(["regress", *PLAY, "--contact", "cohesive"]) == 2
     said = capsys.readouterr().out
     assert "1 outside" in said and "1 same" in said and "OUTSIDE" in said
     sd = np.std([0.08 * w for w in WOBBLE], ddof=1)
-    assert (
-        f"peak 8 -> 8.8 N (+10.0 %, {0.8 / (limit_factor(8) * sd):.1f} times what another seed changes), at the same place"
-        in said
-    )
+    times = 0.8 / (limit_factor(8) * sd)
+    assert f"peak 8 -> 8.8 N (+10.0 %, {times:.1f} times what another seed changes), at the same place" in said
     assert "work" in said and "shape error 0.0000" in said
     assert "food.material.R 80.0 -> 88.0" in said
     assert said.count("changed since") == 1
 
 
 def test_update_records_the_change_and_nothing_else(play, capsys, monkeypatch):
-    """The changed food is recorded, with the argument for a review; the other's file and entry stay; then all is the same."""
+    """The changed food is recorded, with the argument for a review; the other's file and entry stay;
+    then all is the same.
+    """
     folder, _ = play
     before = content(folder)
     tougher(monkeypatch, "grape")
@@ -312,7 +333,9 @@ def test_update_records_the_change_and_nothing_else(play, capsys, monkeypatch):
 
 
 def test_value_without_effect_is_recorded(play, capsys, monkeypatch):
-    """A value that the cut does not feel leaves it the same, but the record says which values it is of: it is written anew."""
+    """A value that the cut does not feel leaves it the same, but the record says which values it is of:
+    it is written anew.
+    """
     folder, _ = play
     before = content(folder)
     known = load_foods()
@@ -328,7 +351,9 @@ def test_value_without_effect_is_recorded(play, capsys, monkeypatch):
 
 
 def test_value_beside_the_scene_is_recorded(play, capsys, monkeypatch):
-    """So does one that no scene has, such as a strength without a fracture energy: it is in the hash of the inputs alone."""
+    """So does one that no scene has, such as a strength without a fracture energy:
+    it is in the hash of the inputs alone.
+    """
     known = load_foods()
     torn = known["grape"].with_values({"tensile_strength": 1e4})
     monkeypatch.setattr("cutcal.commands.solver.regress.load_foods", lambda: known | {"grape": torn})
@@ -361,7 +386,9 @@ def test_height_that_is_another(play, capsys, monkeypatch):
 
 
 def test_other_code_that_moves_the_peak(play, capsys):
-    """The same scene gives a curve of the same peak and work that comes later: the place is said, and it can be recorded."""
+    """The same scene gives a curve of the same peak and work that comes later:
+    the place is said, and it can be recorded.
+    """
 
     def later(scene):
         columns = dict(made_up(scene).columns)
@@ -537,7 +564,9 @@ def test_damaged_reference_is_recorded_anew(play, capsys):
 
 
 def test_installed_copy_does_not_record(play, capsys, monkeypatch):
-    """An installed package has copies of the references; --update there is refused in one sentence, and writes nothing."""
+    """An installed package has copies of the references;
+    --update there is refused in one sentence, and writes nothing.
+    """
     data = calib.__path__[0] + "/data"
     monkeypatch.setattr("studies.regression.reference_curves.data_path", lambda name: type(play[0])(data) / name)
     line = refused(capsys, "grape", "--update")

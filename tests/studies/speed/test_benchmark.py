@@ -71,7 +71,9 @@ class Yardstick:
 
 
 class Workers:
-    """Processes that divide eight seconds' work among them, after a minute for the first, or two seconds for a further one."""
+    """Processes that divide eight seconds' work among them, after a minute for the first,
+    or two seconds for a further one.
+    """
 
     now = 0.0
     compiled: set[int] = set()

@@ -34,7 +34,9 @@ WEIGHT = 0.08  # [N]
 
 
 def record(**changes):
-    """A sound record: 1 N over 10 mm, half of the work dissipated by flow, a tenth stored, the food at rest; it weighs 0.08 N."""
+    """A sound record: 1 N over 10 mm, half of the work dissipated by flow, a tenth stored,
+    the food at rest; it weighs 0.08 N.
+    """
     zero, up = np.zeros(ROWS), np.tile([0.0, 0.0, 1.0], (ROWS, 1))
     stroke = np.linspace(0.25e-3, 0.01, ROWS)
     values = dict.fromkeys(("slide", "kinetic", "damage", "viscous", "friction", "parting", "moment", "tilt"), zero)
@@ -107,7 +109,9 @@ def test_energy_at_the_start_is_no_growth():
 
 
 def test_free_fall_makes_no_energy():
-    """Kinetic energy is the work of gravity on a falling body, to the trapezoidal rule; without gravity it is from nothing."""
+    """Kinetic energy is the work of gravity on a falling body, to the trapezoidal rule;
+    without gravity it is from nothing.
+    """
     g, mass = 9.81, WEIGHT / 9.81
     time = np.linspace(1e-3, ROWS * 1e-3, ROWS)
     none, momentum = np.zeros((ROWS, 3)), np.zeros((ROWS, 3))
@@ -270,7 +274,9 @@ def test_known_cells_are_not_run_again(tmp_path):
 
 
 def test_a_run_ends_at_its_limits():
-    """More particle steps than allowed are not begun, and a run that takes too long is ended; both say what they need."""
+    """More particle steps than allowed are not begun, and a run that takes too long is ended;
+    both say what they need.
+    """
     from studies.stability.cell_run import run_cell
 
     one = quick_map_cells()[1]
@@ -282,7 +288,9 @@ def test_a_run_ends_at_its_limits():
 
 
 def test_contact_makes_no_energy_where_waves_allow_the_longest_step():
-    """A very soft food of nu = 0, which gravity squeezes on the board, ends sound; the contact's spring needs a shorter step."""
+    """A very soft food of nu = 0, which gravity squeezes on the board, ends sound;
+    the contact's spring needs a shorter step.
+    """
     from studies.stability.cell_run import run_cell
 
     one = next(c for c in map_cells() if c.words == "E and nu: E_Pa 1000, nu 0")

@@ -147,7 +147,9 @@ def test_an_unknown_case_and_a_used_folder_are_errors(monkeypatch, tmp_path, cap
 
 
 def test_resume_runs_what_did_not_end(monkeypatch, tmp_path, capsys):
-    """Cases that ended are kept, one that broke down or whose process was killed runs again; another seed is refused."""
+    """Cases that ended are kept, one that broke down or whose process was killed runs again;
+    another seed is refused.
+    """
     seen = []
     counted = VerificationCase("good", lambda options: seen.append("good") or good(options))
     again = ["verify", "--out", str(tmp_path / "a"), "--resume"]
@@ -189,7 +191,9 @@ def test_parts_are_modules_with_cases():
 
 
 def test_the_hanging_beam_is_free_to_bend(monkeypatch):
-    """In a fiftieth of the time to rest its ends have begun to fall; a mirror across the way that it bends would hold it straight."""
+    """In a fiftieth of the time to rest its ends have begun to fall;
+    a mirror across the way that it bends would hold it straight.
+    """
     monkeypatch.setattr(bending, "PERIODS", 0.04)
     place, down = bending.particles(SuiteOptions(), bending.DEPTH / 8, 2)
     assert bending.HALF - bending.DEPTH / 8 < place < bending.HALF and down > 1e-5

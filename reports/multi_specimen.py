@@ -1,4 +1,4 @@
-"""The report of a study of several cuts: ``summary.json`` and the ``curves-NAME.csv`` become ``report.pdf``."""
+"""The report of a study of several specimens: ``summary.json`` and the ``curves-NAME.csv`` become ``report.pdf``."""
 
 from __future__ import annotations
 
@@ -23,8 +23,9 @@ from reports.base.run_folder import Data, check_kind, read_columns, read_date, r
 from reports.calibration import cut_figure, measurement
 
 PREDICTED: dict[str, Any] = {"color": BLUE, "lw": 1.8, "dashes": (1.4, 1.2)}
-#: Height of the figure of a trace [mm], with the food under the blade beside it, and what is added on the first page.
-HEIGHT, BESIDE_HEIGHT, MORE = 60.0, 78.0, 22.0
+FIGURE_HEIGHT = 60.0  # of the figure of a trace [mm]
+BESIDE_HEIGHT = 78.0  # with the food under the blade beside it [mm]
+MORE_HEIGHT = 22.0  # added on the first page [mm]
 
 _NUM, _OPT, _TEXT, _MAYBE = (int, float), (int, float, type(None)), (str,), (str, type(None))
 _METRICS: Data = {
@@ -50,7 +51,7 @@ SCHEMA: Data = {
 
 
 @dataclass(frozen=True)
-class Study:
+class FinishedStudy:
     """A finished study.
 
     Attributes:
@@ -98,7 +99,7 @@ def is_study(summary: Path) -> bool:
     return isinstance(found, dict) and "study" in found
 
 
-def read_study(folder: Path, meanings: Mapping[str, str] | None = None) -> Study:
+def read_study(folder: Path, meanings: Mapping[str, str] | None = None) -> FinishedStudy:
     """Read a study's folder.
 
     Raises:
@@ -117,20 +118,23 @@ def read_study(folder: Path, meanings: Mapping[str, str] | None = None) -> Study
     curves = {n: read_columns(folder / f"curves-{n}.csv", complete, complete) for n in names}
     drawn = [n for n, t in summary["traces"].items() if "shape" in t and "sim_N" in curves[n]]
     looks = {n: look for n in drawn if (look := read_section(folder / f"record-{n}.h5")) is not None}
-    return Study(summary, created, curves, looks, meanings or {})
+    return FinishedStudy(summary, created, curves, looks, meanings or {})
 
 
 def _changed(path: Path) -> datetime:
     return datetime.fromtimestamp(int(path.stat().st_mtime), tz=timezone.utc)
 
 
-def first(done: Study) -> str:
+def first(done: FinishedStudy) -> str:
     """The cut of the first page: one that is also seen under the blade, if there is one."""
     return next((name for name in done.curves if name in done.sections), next(iter(done.curves)))
 
 
-def picture(done: Study, name: str) -> bytes:
-    """Measured, simulated and predicted force of a trace with their bands, beside the food about the blade where it was fitted."""
+def picture(done: FinishedStudy, name: str) -> bytes:
+    """Forces of a trace with their bands: measured, simulated, predicted; beside them the food about the blade.
+
+    The food about the blade is shown where the trace was fitted.
+    """
     curves, s = done.curves[name], done.summary
     held, fitted = s["hold_out"].get(name), s["traces"].get(name)
 
@@ -155,8 +159,8 @@ def picture(done: Study, name: str) -> bytes:
         axes.set_ylabel("force on the knife [N]")
         figure.legend(loc="outside upper left", ncols=3 if len(axes.get_legend_handles_labels()[1]) == 3 else 2)
 
-    height = HEIGHT if look is None else BESIDE_HEIGHT
-    return svg(draw, height + MORE * (name == first(done)))
+    height = FIGURE_HEIGHT if look is None else BESIDE_HEIGHT
+    return svg(draw, height + MORE_HEIGHT * (name == first(done)))
 
 
 def _label(s: Data, name: str) -> str:
@@ -169,7 +173,7 @@ def _source(s: Data, name: str) -> Data:
     return found
 
 
-def content(done: Study) -> Data:
+def content(done: FinishedStudy) -> Data:
     """Everything the template prints, as text."""
     s = done.summary
     return {
@@ -272,16 +276,23 @@ def _caption(s: Data, name: str) -> str:
         return "Fitted with the others: in-sample."
     own = listed(list(held.get("fitted", {}))) or "nothing"
     return breakable(
-        f"Predicted with the flesh of {listed(held['trained_on'])}. Fitted to this cut: {own}, and one factor on its force."
+        f"Predicted with the flesh of {listed(held['trained_on'])}. "
+        f"Fitted to this cut: {own}, and one factor on its force."
     )
+
+
+def _property_of(name: str) -> str:
+    """The property that a parameter is: one of a single specimen is called PROPERTY@SPECIMEN."""
+    return name.split("@")[0]
 
 
 def _parameter(name: str, p: Data, meanings: Mapping[str, str]) -> list[str]:
     unit = p["unit"]
     shared = "all cuts" if p.get("shared", True) else "one cut"
     return [
-        breakable(name), meanings.get(name.partition("@")[0], ""), quantity(p["value"], unit), interval(p["low95"], p["high95"], unit),
-        interval(p["prior_low"], p["prior_high"], unit), in_words(p["verdict"]), shared,
+        breakable(name), meanings.get(_property_of(name), ""), quantity(p["value"], unit),
+        interval(p["low95"], p["high95"], unit), interval(p["prior_low"], p["prior_high"], unit),
+        in_words(p["verdict"]), shared,
     ]  # fmt: skip
 
 

@@ -8,7 +8,7 @@ import h5py
 import pytest
 
 from reports import ReportError
-from reports.study import content, picture, read_study, write_report
+from reports.multi_specimen import content, picture, read_study, write_report
 from tests.reports import study_sample as sample
 from tests.reports.base.test_figures import looked_at
 from tests.reports.sample import pages, spaced
@@ -86,7 +86,9 @@ def test_picture_shows_what_there_is(tmp_path: Path) -> None:
 
 
 def test_a_fitted_cut_is_seen_under_the_blade(tmp_path: Path) -> None:
-    """A cut with a look at the food is on the first page, its picture beside its forces; the others are as they were."""
+    """A cut with a look at the food is on the first page, its picture beside its forces;
+    the others are as they were.
+    """
     run = sample.write_study(tmp_path)
     before = read_study(run)
     with h5py.File(run / "record-second.h5", "w") as file:
