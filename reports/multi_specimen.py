@@ -291,8 +291,8 @@ def _parameter(name: str, p: Data, meanings: Mapping[str, str]) -> list[str]:
     shared = "all cuts" if p.get("shared", True) else "one cut"
     return [
         breakable(name), meanings.get(_property_of(name), ""), quantity(p["value"], unit),
-        interval(p["low95"], p["high95"], unit), interval(p["prior_low"], p["prior_high"], unit), in_words(p["verdict"]),
-        shared,
+        interval(p["low95"], p["high95"], unit), interval(p["prior_low"], p["prior_high"], unit),
+        in_words(p["verdict"]), shared,
     ]  # fmt: skip
 
 

@@ -56,8 +56,8 @@ class CalibrationResult:
 
     ``summary.json`` of ``calibrate``, and what ``calibrate --json`` prints.
 
-    It comes with its folder, in which there are the curves, the calibrated food and the report as well. SI units, errors
-    as fractions; what is null in the document is None, or NaN among the metrics.
+    It comes with its folder, in which there are the curves, the calibrated food and the report as well. SI units,
+    errors as fractions; what is null in the document is None, or NaN among the metrics.
 
     Attributes:
         folder: The output folder.
@@ -72,8 +72,8 @@ class CalibrationResult:
         conditioning: How the record became a curve over the stroke.
         agreement: The simulated curve, and curves that explain nothing, against the trace.
         fitted: Fitted parameters, by name.
-        nuisances: What the fit says of the measurement, by name: tare, drift, lag, gain, width; empty where the fit ended
-            too early.
+        nuisances: What the fit says of the measurement, by name: tare, drift, lag, gain, width; empty where the fit
+            ended too early.
         posterior: What is known of all parameters together.
         fixed_parameters: Properties that were not fitted, by name.
         history: The simulations of the search.
@@ -83,11 +83,11 @@ class CalibrationResult:
         numerical_checks: What numerical choices change; empty where the fit was interrupted.
         warnings: What a reader of the numbers must know about the input, one sentence each.
         limits: What the result does not show, one sentence each.
-        sensitivity: Sobol indices over the prior, by quantity (peak, work, initial_slope) and parameter; empty where the
-            fit ended too early.
+        sensitivity: Sobol indices over the prior, by quantity (peak, work, initial_slope) and parameter; empty where
+            the fit ended too early.
         wall_s: Run time [s].
-        at_literature: The simulation at the literature's values against the trace. It is not in the document but follows
-            from the curves; None where that simulation did not end.
+        at_literature: The simulation at the literature's values against the trace. It is not in the document but
+            follows from the curves; None where that simulation did not end.
     """
 
     DOCUMENT: ClassVar[str] = "calibrate"
@@ -225,8 +225,8 @@ def _check(result: CalibrationResult) -> None:
     """Refuse what the types let pass.
 
     Raises:
-        DocumentError: A word that nobody knows, a number that must be known and is not, or lists of a profile that do not
-            belong together.
+        DocumentError: A word that nobody knows, a number that must be known and is not, or lists of a profile that do
+            not belong together.
     """
     for place, word, words in (
         ("status", result.status, ("done", "interrupted")),

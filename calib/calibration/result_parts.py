@@ -195,9 +195,10 @@ class Posterior:
 
     Attributes:
         profiles: Profile likelihoods, by parameter; empty where the fit ended too early.
-        reduced_chi2: Chi-square of the residuals over their number, correlation considered; null where the fit ended too
+        reduced_chi2: Chi-square of the residuals over their number, correlation considered; null where the fit ended
+            too early.
+        correlation_length_m: Correlation length of the residuals along the stroke [m]; null where the fit ended too
             early.
-        correlation_length_m: Correlation length of the residuals along the stroke [m]; null where the fit ended too early.
         predictive_inside: Part of the measured points within the 95 % band; null where the fit ended too early.
         correlations: Posterior correlation of two parameters, by "one,other".
     """
@@ -256,9 +257,10 @@ class SearchHistory:
         coarse_simulations: Those on the screening grid.
         failed_simulations: Those that broke down.
         failures: Simulations that broke down.
-        misfit_history: Least misfit so far, after each simulation from the first sound one: number of the simulation and
-            misfit.
-        repeatability: Noise of a simulated curve as the fit sees it, part of the peak; null where the fit ended too early.
+        misfit_history: Least misfit so far, after each simulation from the first sound one: number of the simulation
+            and misfit.
+        repeatability: Noise of a simulated curve as the fit sees it, part of the peak; null where the fit ended too
+            early.
     """
 
     simulations: Count
@@ -285,8 +287,8 @@ class SimulatedCut:
         ripple_N: Ripple of the simulated force [N].
         energy_J: Where the work of knife and gravity has gone [J].
         fracture: Energy of new surface; null where nothing was cut.
-        parted: Energy that the edge has taken over R times the new area; below 0.8 the food was pressed away rather than
-            cut; null where there is nothing to judge.
+        parted: Energy that the edge has taken over R times the new area; below 0.8 the food was pressed away rather
+            than cut; null where there is nothing to judge.
         counters: How often each exceptional branch was taken, by name; all zero in a sound run.
         shape: Specimen as it was simulated.
         knife: Knife as it was simulated.

@@ -32,8 +32,8 @@ RELEASE_REMARKED = 0.1  # energy released ahead of the edge over that spent at i
 NATURAL_LIMITS = {"mu": 0.0}
 SIZE = "height"  # the specimen's, bounded by what is possible: a bound that is reached is a result
 NUISANCE_LINES = {"lag": "delay of the trace within its uncertainty", "gain": "sensor's gain within its uncertainty"}
-"""Nuisances that the validation hangs on, and their lines: a trace that asks for more of one than its sensor leaves open
-fails."""
+"""Nuisances that the validation hangs on, and their lines: a trace that asks for more of one than its sensor leaves
+open fails."""
 HELD_WEAK = {"R": 0.92, "R_skin": 0.90, "E": 0.88, "yield_stress": 0.80, "initiation_depth": 0.84}
 """Part of the weak 95 % intervals that held the truth on 100 made-up bananas, where it is less and there are
 more than ten (docs/pitfalls.md, how far to trust an interval)."""
@@ -276,14 +276,14 @@ def _limits_of_simulation(fracture: Mapping[str, float] | None) -> list[str]:
         edge, released = fracture["edge_J_m2"], fracture["released_J_m2"]
         said.append(
             f"R is the resistance at the edge, not all that new surface costs: {edge:.3g} J/m² went there and "
-            f"{released:.3g} J/m² were released where the blade bends the halves apart ahead of it. Compare their sum with "
-            "published works of fracture."
+            f"{released:.3g} J/m² were released where the blade bends the halves apart ahead of it. Compare their sum "
+            "with published works of fracture."
         )
     return [
         *said,
         "One cut of one specimen says nothing about the scatter between specimens.",
-        "The laws are independent of rate; relaxation, adhesion and moisture were not simulated, and the lower skin of a "
-        "whole fruit is not cut.",
+        "The laws are independent of rate; relaxation, adhesion and moisture were not simulated, and the lower skin of "
+        "a whole fruit is not cut.",
         "The blade lay on a plane of the grid's nodes. Between two planes the same values give other work, by 1 % in a "
         "stiff food with little friction and by 10 to 20 % where a soft one flows or rubs hard (cutcal converge "
         "--material --offset 0.5 measures it).",
@@ -297,6 +297,6 @@ def remedied(line: Verdict) -> str:
     if line.name != FINER_GRID or line.passed is not False:
         return ""
     return (
-        "values and intervals answer for these cells alone: cutcal converge --material measures what they leave out, and "
-        "the same calibration with --u-num takes it into the likelihood"
+        "values and intervals answer for these cells alone: cutcal converge --material measures what they leave out, "
+        "and the same calibration with --u-num takes it into the likelihood"
     )

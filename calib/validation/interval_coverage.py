@@ -1,9 +1,9 @@
-"""Do the intervals hold? Cuts simulated with known values, measured with a made-up sensor, and calibrated like real ones.
+"""Do the intervals hold? Cuts simulated with known values, measured by a made-up sensor and calibrated like real ones.
 
-Each truth is drawn from the middle of the food's prior ranges and simulated with other particles than the fit will use.  Its
-sensor has a baseline, a drift, a gain, white noise and a ripple like that of a robot's arm, and its record goes the whole way:
-tare, contact, filter, search, profiles.  The fit is told that the model is right, but for the noise of the particles of two
-simulations: that of the truth and its own.
+Each truth is drawn from the middle of the food's prior ranges and simulated with other particles than the fit will use.
+Its sensor has a baseline, a drift, a gain, white noise and a ripple like that of a robot's arm, and its record goes the
+whole way: tare, contact, filter, search, profiles. The fit is told that the model is right, but for the noise of the
+particles of two simulations: that of the truth and its own.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import json
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ import numpy as np
 import pandas as pd
 
 from calib.errors import OutputError
+from calib.fit.multistart import FitResult
 from calib.fit.options import FitOptions
 from calib.io.folder import finite, prepare, write_json
 from calib.io.progress import Countdown
@@ -34,25 +36,29 @@ from calib.problem.target import ErrorModel
 from calib.simulation.evaluation import Evaluators
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, Header
 from calib.simulation.workers import Workers
+from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.global_search import fit_with_uncertainty
+from mpm.arrays import FloatArray
 from mpm.scene import Scene
 from mpm.scene.errors import CutcalError
+from mpm.scene.shapes import Shape
 
-RIGHT = ErrorModel(discrepancy=0.01, peak=0.02)
-"""Error model of a fit with the very model that made the trace: with other particles a simulated cut of a banana repeats its curve to
-0.04 to 0.6 % of its peak and the peak to 0.03 to 1.4 % (five cuts of six simulations each), and two differ by the root of two times
-that.  On cells of 4 mm, larger than the process zone, it is 1.1 and 1.3 %."""
-MIDDLE = 0.8
-"""Part of each prior range, about its middle, from which truths are drawn."""
+RIGHT_MODEL = ErrorModel(discrepancy=0.01, peak=0.02)
+"""Error model of a fit with the very model that made the trace: what other particles change of curve and peak
+(docs/theory.md, "Measured choices")."""
+TRUTH_PART = 0.8
+"""Part of each prior range, about its middle, from which truths are drawn [-]."""
+TRUTH_SEED = 10_000
+"""Added to the number of a trace for the seed of its truth's particles, which no fit has."""
 TRIES = 40
-"""Truths drawn until one is cut to the end of the stroke: of 24 bananas drawn, 13 flowed under the edge and 6 broke down."""
-COVERED = (0.90, 0.99)
-"""Part of the intervals that must hold the truth, where they are 95 % intervals. The upper limit needs a hundred of them: of 25, all
-hold it in one study of four that is right."""
-HUNDRED = 100
-MEDIAN = 0.10
+"""Truths drawn until one is cut to the end of the stroke (docs/theory.md, "Measured choices")."""
+COVERAGE_LIMITS = (0.90, 0.99)
+"""Part of the intervals that must hold the truth, where they are 95 % intervals [-]. The upper limit needs
+:data:`FEWEST_FOR_UPPER` of them: of 25, all hold it in one study of four that is right."""
+FEWEST_FOR_UPPER = 100
+MEDIAN_ERROR_LIMIT = 0.10
 """Largest median error of a parameter that is called identified [-]."""
-FEWEST = 20
+FEWEST_INTERVALS = 20
 """Intervals of one parameter from which its coverage is judged."""
 
 
@@ -60,8 +66,16 @@ FEWEST = 20
 class MadeUpSensor:
     """How a simulated force is measured; the defaults are those of panda-force's air runs where it has them.
 
-    Attributes: rate [Hz]; speed of the knife [m/s]; approach before contact [s]; baseline [N]; drift_sd [N/s]; gain_sd [-]; noise
-    [N], white; ripple [N] of a frequency [Hz].
+    Attributes:
+        rate: Samples a second [Hz].
+        speed: Speed of the knife [m/s].
+        approach: Time before contact [s].
+        baseline: Force without load [N].
+        drift_sd: Standard deviation of its drift [N/s].
+        gain_sd: Standard deviation of the gain about 1 [-].
+        noise: Standard deviation of white noise [N].
+        ripple: Amplitude of a ripple like that of a robot's arm [N].
+        frequency: Frequency of the ripple [Hz].
     """
 
     rate: float = 200.0
@@ -74,8 +88,17 @@ class MadeUpSensor:
     ripple: float = 0.2
     frequency: float = 12.0
 
-    def measure(self, stroke: np.ndarray, force: np.ndarray, random: np.random.Generator) -> pd.DataFrame:
-        """A record of a simulated force [N] (k,) over its stroke [m] (k,)."""
+    def measure(self, stroke: FloatArray, force: FloatArray, random: np.random.Generator) -> pd.DataFrame:
+        """A record of a simulated force.
+
+        Args:
+            stroke: Stroke [m] (k,), rising.
+            force: Force over it [N] (k,).
+            random: Source of gain, drift, phase and noise.
+
+        Returns:
+            Columns ``time_s``, ``force_N`` and ``position_m``.
+        """
         length = float(stroke[-1])
         t = np.arange(0.0, self.approach + length / self.speed, 1.0 / self.rate)
         way = self.speed * (t - self.approach)
@@ -89,34 +112,77 @@ class MadeUpSensor:
         )
 
 
-def run(
-    food: FoodSpec,
-    out: Path,
-    pool: Workers,
-    *,
-    traces: int,
-    knife: str,
-    dx: float | None,
-    seed: int,
-    resume: bool,
-    command: tuple[str, ...],
-    say: Callable[[str], None],
-    sensor: MadeUpSensor | None = None,
-) -> dict[str, Any]:
-    """Make up traces, calibrate each, and write coverage.json.
+@dataclass(frozen=True)
+class CoveragePlan:
+    """What a study of coverage makes up and calibrates.
 
-    Args:
+    Attributes:
         food: The food; its ranges are those that truths are drawn from.
-        out: Output folder; a line for each trace is there as soon as it is calibrated.
-        pool: Where the simulations run.
-        traces: How many.
+        traces: How many traces.
         knife: Name or YAML file.
         dx: Cell of truths and fits [m], or None for the food's own.
         seed: Seed of truths, sensors and fits.
-        resume: Go on with the study in ``out``.
+        sensor: How a simulated force is measured.
         command: Command line, for provenance.
+    """
+
+    food: FoodSpec
+    traces: int
+    knife: str = "kitchen"
+    dx: float | None = None
+    seed: int = 0
+    sensor: MadeUpSensor = MadeUpSensor()
+    command: tuple[str, ...] = ()
+
+    @cached_property
+    def shape(self) -> Shape:
+        """The specimen."""
+        return specimen(self.food, None, Sizing())[0]
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The cut that truths are simulated with, at the food's own values."""
+        return cut_scene(self.food, self.shape, load_knife(self.knife), dx=self.dx)
+
+    @property
+    def header(self) -> Header:
+        """What the store of the study belongs to."""
+        return Header("", key_of({"scene": self.scene.as_dict(), "sensor": vars(self.sensor), "seed": self.seed}))
+
+    def request(self, k: int, trace: Path, arch: str) -> Request:
+        """How the trace of a number is calibrated.
+
+        Args:
+            k: Number of the trace.
+            trace: Its file.
+            arch: Device of the simulations.
+
+        Returns:
+            The request.
+        """
+        shape = self.shape
+        return Request(
+            food=self.food,
+            trace=trace,
+            knife=self.knife,
+            sizing=Sizing(shape.kind, shape.height, shape.width, shape.length),
+            dx=self.dx,
+            gain_sd=self.sensor.gain_sd,
+            errors=RIGHT_MODEL,
+            seed=k,
+            arch=arch,
+        )
+
+
+def run(plan: CoveragePlan, out: Path, pool: Workers, *, resume: bool, say: Callable[[str], None]) -> dict[str, Any]:
+    """Make up traces, calibrate each, and write coverage.json.
+
+    Args:
+        plan: What is made up and calibrated.
+        out: Output folder; a line for each trace is there as soon as it is calibrated.
+        pool: Where the simulations run.
+        resume: Go on with the study in ``out``.
         say: Called with a line after each trace.
-        sensor: How it is measured.
 
     Returns:
         The content of ``coverage.json``.
@@ -124,41 +190,26 @@ def run(
     Raises:
         CutcalError: Anything wrong with the input; nothing that was computed is lost.
     """
-    sensor = sensor or MadeUpSensor()
     prepare(out, resume=resume)
-    shape, _ = specimen(food, None, Sizing())
-    truth = cut_scene(food, shape, load_knife(knife), dx=dx)
     began = time.monotonic()
-    header = Header("", key_of({"scene": truth.as_dict(), "sensor": vars(sensor), "seed": seed}))
-    request = Request(
-        food=food,
-        trace=out,
-        knife=knife,
-        sizing=Sizing(shape.kind, shape.height, shape.width, shape.length),
-        dx=dx,
-        gain_sd=sensor.gain_sd,
-        errors=RIGHT,
-        arch=pool.arch,
-    )
     lines = out / "coverage.jsonl"
-    done = _known(lines)
-    todo = [k for k in range(traces) if k not in done]
+    header, done = plan.header, _known(lines)
+    todo = [k for k in range(plan.traces) if k not in done]
     rest = Countdown(len(todo))
     with EvaluationStore(out / "evaluations.h5", header, resume=resume) as store:
         for k in todo:
-            own = replace(request, trace=out / f"trace-{k:03d}.csv", seed=k)
-            done[k] = _one(k, seed, own, truth, sensor, store, pool)
+            done[k] = _one(plan, k, out / f"trace-{k:03d}.csv", store, pool)
             _append(lines, done[k])
-            say(f"trace {k + 1} of {traces}: {_words(done[k])}; {rest.left(1.0)}")
-    document = {"schema": tag("coverage"), **summarise([done[k] for k in range(traces)])}
+            say(f"trace {k + 1} of {plan.traces}: {_words(done[k])}; {rest.left(1.0)}")
+    document = {"schema": tag("coverage"), **coverage_of([done[k] for k in range(plan.traces)])}
     document |= {
-        "food": food.name,
-        "knife": knife,
-        "dx_m": truth.numerics.dx,
-        "sensor": vars(sensor),
-        "seed": seed,
+        "food": plan.food.name,
+        "knife": plan.knife,
+        "dx_m": plan.scene.numerics.dx,
+        "sensor": vars(plan.sensor),
+        "seed": plan.seed,
         "wall_s": time.monotonic() - began,
-        "command": list(command),
+        "command": list(plan.command),
         "versions": versions(),
         "git": git_commit(),
     }
@@ -166,24 +217,22 @@ def run(
     return document
 
 
-def _one(
-    k: int, seed: int, request: Request, truth: Scene, sensor: MadeUpSensor, store: EvaluationStore, pool: Workers
-) -> dict[str, Any]:
+def _one(plan: CoveragePlan, k: int, path: Path, store: EvaluationStore, pool: Workers) -> dict[str, Any]:
     """Make up a trace, calibrate it, and compare with the truth."""
-    random = np.random.default_rng([seed, k])
-    values, force = _truth(k, random, request.food, truth, store, pool)
-    sensor.measure(*force, random).to_csv(request.trace, index=False, float_format="%.6g")
+    random = np.random.default_rng([plan.seed, k])
+    values, force = _truth(plan, k, random, store, pool)
+    plan.sensor.measure(*force, random).to_csv(path, index=False, float_format="%.6g")
     row: dict[str, Any] = {"trace": k, "truth": values, "peak_N": float(force[1].max())}
+    request = plan.request(k, path, pool.arch)
     try:
         setup = set_up(request)
-        evaluators = [
+        fine, coarse, again = (
             CachedEvaluator(
                 pool.evaluator(scene, setup.kept), store, scene=scene.as_dict(), code=code_key(), fidelity=name
             )
             for name, scene in (("fine", setup.fine), ("coarse", setup.coarse), ("again", replicated(setup.fine)))
-        ]
+        )
         options = FitOptions(budget=request.budget, batch=pool.batch, seed=k)
-        fine, coarse, again = evaluators
         result, analysis = fit_with_uncertainty(setup.objective, Evaluators(fine, coarse, again), options)
     except CutcalError as e:
         return row | {"error": str(e)}
@@ -191,7 +240,12 @@ def _one(
         raise KeyboardInterrupt
     if analysis is None:
         return row | {"error": "the search ended before there were intervals"}
-    return row | {
+    return row | _found(result, analysis)
+
+
+def _found(result: FitResult, analysis: UncertaintyAnalysis) -> dict[str, Any]:
+    """What the row of a calibrated trace says of its fit."""
+    return {
         "parameters": {i.parameter.name: i.as_dict() for i in analysis.uncertainty.intervals},
         "inside": analysis.bands[0].inside,
         "misfit": result.best.misfit,
@@ -204,37 +258,44 @@ def _one(
 
 
 def _truth(
-    k: int, random: np.random.Generator, food: FoodSpec, truth: Scene, store: EvaluationStore, pool: Workers
-) -> tuple[dict[str, float], tuple[np.ndarray, np.ndarray]]:
+    plan: CoveragePlan, k: int, random: np.random.Generator, store: EvaluationStore, pool: Workers
+) -> tuple[dict[str, float], tuple[FloatArray, FloatArray]]:
     """Values of a food that is cut to the end of the stroke, and that cut: stroke [m] and force [N]."""
+    food, scene = plan.food, plan.scene
     parameters = fit_parameters(food, food.default_fit)
     low, high = parameters.box
-    scene = replace(truth, numerics=replace(truth.numerics, seed=10_000 + k))
+    scene = replace(scene, numerics=replace(scene.numerics, seed=TRUTH_SEED + k))
     evaluator = CachedEvaluator(pool.evaluator(scene), store, scene=scene.as_dict(), code=code_key(), fidelity="truth")
     for _ in range(TRIES):
-        z = low + (high - low) * (0.5 + MIDDLE * (random.random(len(low)) - 0.5))
+        z = low + (high - low) * (0.5 + TRUTH_PART * (random.random(len(low)) - 0.5))
         values = parameters.to_dict(z)
         found = next(iter(evaluator.evaluate([values])))
         if found.completed == 1.0:
             return values, (found.stroke, found.force)
     raise OutputError(
-        f"none of {TRIES} foods drawn from the ranges of {food.name} reached the end of its cut; give another --food or --dx"
+        f"none of {TRIES} foods drawn from the ranges of {food.name} reached the end of its cut; "
+        "give another --food or --dx"
     )
 
 
-def summarise(rows: list[dict[str, Any]]) -> dict[str, Any]:
+def coverage_of(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Coverage and errors by parameter and verdict.
 
     Args:
         rows: One per trace, as written to ``coverage.jsonl``.
+
+    Returns:
+        That part of ``coverage.json``.
     """
     sound = [r for r in rows if "parameters" in r]
     names = list(sound[0]["parameters"]) if sound else []
     by_name = {name: _parameter(sound, name) for name in names}
-    judged = [p for p in by_name.values() if p["identified"] >= FEWEST]
+    judged = [p for p in by_name.values() if p["identified"] >= FEWEST_INTERVALS]
     passed = bool(judged) and all(
-        COVERED[0] <= p["covered_identified"] <= (COVERED[1] if p["identified"] >= HUNDRED else 1.0)
-        and p["median_error_identified"] <= MEDIAN
+        COVERAGE_LIMITS[0]
+        <= p["covered_identified"]
+        <= (COVERAGE_LIMITS[1] if p["identified"] >= FEWEST_FOR_UPPER else 1.0)
+        and p["median_error_identified"] <= MEDIAN_ERROR_LIMIT
         for p in judged
     )
     return {
@@ -245,7 +306,7 @@ def summarise(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "predictive_inside": float(np.mean([r["inside"] for r in sound])) if sound else None,
         "simulations": float(np.mean([r["simulations"] for r in sound])) if sound else None,
         "coarse_simulations": float(np.mean([r["coarse_simulations"] for r in sound])) if sound else None,
-        "limits": {"covered": list(COVERED), "median_error": MEDIAN, "fewest": FEWEST},
+        "limits": {"covered": list(COVERAGE_LIMITS), "median_error": MEDIAN_ERROR_LIMIT, "fewest": FEWEST_INTERVALS},
         "passed": passed and len(sound) == len(rows),
     }
 

@@ -15,7 +15,7 @@ from calib.errors import CurveError
 from calib.io.typed_document import NULL
 
 ISO_SAMPLES = 240
-"""Samples to which curves are brought for the ISO rating; its slope part changes by 0.07 from 80 to 600."""
+"""Samples to which curves are brought for the ISO rating (docs/theory.md, "Measured choices")."""
 ISO_INNER = 0.05
 """Half width of the corridor's inner band over the largest reference value [-] (ISO/TS 18571)."""
 ISO_OUTER = 0.50
@@ -68,8 +68,8 @@ class IsoRating:
         EM: Magnitude rating.
         ES: Slope rating.
         R: Overall rating, 0.4 Z + 0.2 (EP + EM + ES).
-        shift: Samples by which the model lags the reference (negative: leads), of 240; None where an older document does
-            not say.
+        shift: Samples by which the model lags the reference (negative: leads), of 240; None where an older document
+            does not say.
         at_bound: Whether the shift stopped at the end of the searched range; EP then says nothing.
         without_phase: Where at_bound what Z, EM and ES of the curves as they are give, in R's proportions; else None.
     """
@@ -193,11 +193,22 @@ def compare(stroke: np.ndarray, real: np.ndarray, sim: np.ndarray) -> Metrics:
 
 
 def sprague_geers_from_integrals(mm: float, rr: float, mr: float) -> SpragueGeers:
-    """Sprague-Geers errors from the integrals of m^2, r^2 and m r over the stroke [all in the same unit].
+    """Sprague-Geers errors from integrals over the stroke.
 
     M = sqrt(mm/rr) - 1, P = arccos(mr / sqrt(mm rr)) / pi, C = hypot(M, P).
 
     Source: Schwer (2007), Engineering with Computers 23, 295, doi 10.1007/s00366-007-0070-1.
+
+    Args:
+        mm: Integral of the squared model [N^2 m, or any unit that all three have].
+        rr: Integral of the squared reference [the same].
+        mr: Integral of their product [the same].
+
+    Returns:
+        The errors.
+
+    Raises:
+        CurveError: A curve that is zero.
 
     >>> round(sprague_geers_from_integrals(1.21, 1.0, 1.1).M, 6)
     0.1
@@ -208,12 +219,22 @@ def sprague_geers_from_integrals(mm: float, rr: float, mr: float) -> SpragueGeer
 
 
 def russell_from_integrals(mm: float, rr: float, mr: float) -> Russell:
-    """Russell's errors from the integrals of m^2, r^2 and m r over the stroke [all in the same unit].
+    """Russell's errors from integrals over the stroke.
 
-    q = (mm - rr) / sqrt(mm rr), M = sign(q) log10(1 + |q|), P as Sprague and Geers, C = sqrt(pi/4 (M^2 +
-    P^2)).
+    q = (mm - rr) / sqrt(mm rr), M = sign(q) log10(1 + |q|), P as Sprague and Geers, C = sqrt(pi/4 (M^2 + P^2)).
 
     Source: Russell (1997), Proc. 68th Shock and Vibration Symposium.
+
+    Args:
+        mm: Integral of the squared model [N^2 m, or any unit that all three have].
+        rr: Integral of the squared reference [the same].
+        mr: Integral of their product [the same].
+
+    Returns:
+        The errors.
+
+    Raises:
+        CurveError: A curve that is zero.
 
     >>> round(russell_from_integrals(1.21, 1.0, 1.1).M, 4)
     0.0759

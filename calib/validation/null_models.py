@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from calib.errors import CurveError
 from calib.validation.metrics import Metrics, compare
+from mpm.arrays import FloatArray
 
 BUMP_STARTS = (0.05, 0.15, 0.3)
 """Centres of the skin bump over the stroke from which the three-term fit starts, beside the peak's
@@ -24,6 +25,40 @@ MAX_EVALUATIONS = 200
 
 
 @dataclass(frozen=True)
+class ThreeTermCurve:
+    """A descriptive cutting curve: an edge term, a skin bump, and a face term that grows to a depth.
+
+    F(s) = edge (1 - exp(-s/rise)) + skin exp(-((s - centre)/width)^2 / 2) + face min(s, depth).
+
+    >>> float(ThreeTermCurve(5.0, 1e-9, 0.0, 0.0, 1e-3, 100.0, 0.005).force(np.array([0.01]))[0])
+    5.5
+
+    Attributes:
+        edge_N: Plateau of the edge term [N].
+        rise_m: Stroke in which it rises [m].
+        skin_N: Height of the skin bump [N].
+        skin_centre_m: Its place [m].
+        skin_width_m: Its width [m].
+        face_N_per_m: Slope of the face term [N/m].
+        face_depth_m: Stroke at which it stops growing [m].
+    """
+
+    edge_N: float
+    rise_m: float
+    skin_N: float
+    skin_centre_m: float
+    skin_width_m: float
+    face_N_per_m: float
+    face_depth_m: float
+
+    def force(self, stroke: FloatArray) -> FloatArray:
+        """Force [N] (n,) over a stroke from contact [m] (n,)."""
+        edge = self.edge_N * (1.0 - np.exp(-stroke / self.rise_m))
+        skin = self.skin_N * np.exp(-0.5 * ((stroke - self.skin_centre_m) / self.skin_width_m) ** 2)
+        return np.asarray(edge + skin + self.face_N_per_m * np.minimum(stroke, self.face_depth_m))
+
+
+@dataclass(frozen=True)
 class NullModel:
     """A null curve and its comparison with the measured one.
 
@@ -35,18 +70,18 @@ class NullModel:
     """
 
     name: str
-    curve: np.ndarray
+    curve: FloatArray
     metrics: Metrics
     parameters: dict[str, float]
 
 
-def null_models(stroke: np.ndarray, real: np.ndarray) -> dict[str, NullModel]:
+def null_models(stroke: FloatArray, real: FloatArray) -> dict[str, NullModel]:
     """The null curves of a measured curve.
 
     ``ramp`` is the straight line from zero at contact to the measured peak at the end of the stroke: a linear
     spring. ``half_sine`` is half a sine period over the stroke with the measured peak as its height. Both
-    know one number. ``three_term`` is a description with seven numbers fitted to the curve by least squares,
-    see three_term.
+    know one number. ``three_term`` is a description with seven numbers fitted to the curve by least squares
+    (:class:`ThreeTermCurve`).
 
     Args:
         stroke: Stroke from contact, strictly increasing [m], shape (n,).
@@ -61,38 +96,16 @@ def null_models(stroke: np.ndarray, real: np.ndarray) -> dict[str, NullModel]:
     compare(stroke, real, real)
     peak = float(np.max(real))
     x = (stroke - stroke[0]) / (stroke[-1] - stroke[0])
-    numbers = fit_three_term(stroke, real)
+    three = fit_three_term(stroke, real)
     curves = {
         "ramp": (peak * x, {"peak_N": peak}),
         "half_sine": (peak * np.sin(np.pi * x), {"peak_N": peak}),
-        "three_term": (three_term(stroke - stroke[0], **numbers), numbers),
+        "three_term": (three.force(stroke - stroke[0]), asdict(three)),
     }
     return {name: NullModel(name, curve, compare(stroke, real, curve), p) for name, (curve, p) in curves.items()}
 
 
-def three_term(
-    stroke: np.ndarray,
-    edge_N: float,
-    rise_m: float,
-    skin_N: float,
-    skin_centre_m: float,
-    skin_width_m: float,
-    face_N_per_m: float,
-    face_depth_m: float,
-) -> np.ndarray:
-    """Descriptive cutting curve: edge term, skin bump, and a face term that grows to a depth [N].
-
-    F(s) = edge (1 - exp(-s/rise)) + skin exp(-((s - centre)/width)^2 / 2) + face min(s, depth).
-
-    >>> float(three_term(np.array([0.01]), 5.0, 1e-9, 0.0, 0.0, 1e-3, 100.0, 0.005)[0])
-    5.5
-    """
-    edge = edge_N * (1.0 - np.exp(-stroke / rise_m))
-    skin = skin_N * np.exp(-0.5 * ((stroke - skin_centre_m) / skin_width_m) ** 2)
-    return np.asarray(edge + skin + face_N_per_m * np.minimum(stroke, face_depth_m))
-
-
-def fit_three_term(stroke: np.ndarray, real: np.ndarray) -> dict[str, float]:
+def fit_three_term(stroke: FloatArray, real: FloatArray) -> ThreeTermCurve:
     """Fit the three-term curve by bounded least squares from a few fixed starts.
 
     Args:
@@ -100,7 +113,7 @@ def fit_three_term(stroke: np.ndarray, real: np.ndarray) -> dict[str, float]:
         real: Measured force with a positive peak [N], shape (n,).
 
     Returns:
-        The seven arguments of three_term by name.
+        The curve.
 
     Raises:
         CurveError: No start converged to a finite curve.
@@ -108,8 +121,8 @@ def fit_three_term(stroke: np.ndarray, real: np.ndarray) -> dict[str, float]:
     length, peak = float(stroke[-1] - stroke[0]), float(np.max(real))
     x, y = (stroke - stroke[0]) / length, real / peak
 
-    def residual(p: np.ndarray) -> np.ndarray:
-        return three_term(x, *p) - y
+    def residual(p: FloatArray) -> FloatArray:
+        return ThreeTermCurve(*p).force(x) - y
 
     best, least = None, np.inf
     for centre in (float(x[np.argmax(y)]), *BUMP_STARTS):
@@ -121,5 +134,4 @@ def fit_three_term(stroke: np.ndarray, real: np.ndarray) -> dict[str, float]:
     if best is None:
         raise CurveError("the three-term curve could not be fitted: the measured curve is not finite")
     scale = np.array([peak, length, peak, length, length, peak / length, length])
-    names = ("edge_N", "rise_m", "skin_N", "skin_centre_m", "skin_width_m", "face_N_per_m", "face_depth_m")
-    return {name: float(value) for name, value in zip(names, best * scale, strict=True)}
+    return ThreeTermCurve(*map(float, best * scale))

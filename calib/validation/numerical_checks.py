@@ -1,4 +1,4 @@
-"""What numerical choices do to a calibrated force: the best values once more, slower and with_other_particles on the grid."""
+"""What numerical choices do to a calibrated force: the best values once more, slower and elsewhere on the grid."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ def _finer(scene: Scene) -> Scene:
 FINER_GRID = "cells of two thirds"
 VARIANTS: Mapping[str, Callable[[Scene], Scene]] = {
     "half the simulated speed": slower,
-    "grid and particles with_other_particles": lambda scene: with_other_particles(scene, 1),
+    "grid and particles elsewhere": lambda scene: with_other_particles(scene, 1),
     FINER_GRID: _finer,
 }
-"""What should not matter, by name. The order of convergence, and an uncertainty, are the business of a convergence study."""
-VARIED = "at half the speed, with the grid and the particles with_other_particles, and on cells of two thirds"
+"""What should not matter, by name. Order of convergence and uncertainty are the business of a convergence study."""
+VARIED = "at half the speed, with the grid and the particles elsewhere, and on cells of two thirds"
 
 
 def check_errands(scene: Scene, store: EvaluationStore) -> list[Errand]:
@@ -90,6 +90,9 @@ def check(scene: Scene, own: Evaluation, store: EvaluationStore, stroke: float) 
         own: Its simulation.
         store: Where :func:`check_errands` were kept.
         stroke: What the trace has of the stroke [m].
+
+    Returns:
+        A check for each variant.
 
     Raises:
         KeyError: They were not made.

@@ -1,7 +1,7 @@
-"""What the literature alone predicts of a cut: its default values, and draws from the priors of a fit, before any trace.
+"""What the literature predicts of a cut before any trace: its default values, and draws from the priors of a fit.
 
-Every cut is the default one (whole height, food and knife as shipped) on the coarse grid that a fit screens with. Curves
-are filtered as a calibration filters them, so that a conditioned trace compares with them.
+Every cut is the default one (whole height, food and knife as shipped) on the coarse grid that a fit screens with.
+Curves are filtered as a calibration filters them, so that a conditioned trace compares with them.
 """
 
 from __future__ import annotations
@@ -35,13 +35,18 @@ from mpm.arrays import FloatArray
 from mpm.scene import Knife, Scene
 from mpm.scene.shapes import volume
 
-DRAWS = 32
+PRIOR_DRAWS = 32
+"""Draws from the priors of each food."""
 QUANTILES: Mapping[str, float] = {"q025": 0.025, "q25": 0.25, "q50": 0.5, "q75": 0.75, "q975": 0.975}
-DIGITS = 6  # of a recorded number; a repeated run moves the sixth at most
-KEY_LENGTH = 16  # letters of a hash that a file shows
-DYNAMIC = 0.1  # kinetic energy over work above which a cut is not quasi-static any more
-START = 0.1  # seconds that each run takes apart from what follows, for the estimate of the time left
-RATE = 1e4  # cells times cells of stroke a second, for that estimate alone
+DIGITS = 6
+"""Digits of a recorded number; a repeated run moves the sixth at most."""
+KEY_LENGTH = 16
+"""Letters of a hash that a file shows."""
+DYNAMIC = 0.1
+"""Kinetic energy over work above which a cut is not quasi-static any more [-]."""
+START_UP, CELL_RATE = 0.1, 1e4
+"""For the estimate of the time left: seconds that each run takes apart from its cells, and cells times cells of stroke
+a second."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +76,7 @@ class Plan:
     def cost(self) -> float:
         """Seconds of one run, roughly."""
         motion, dx = self.scene.motion, self.scene.numerics.dx
-        return START + volume(self.scene.food.shape) / dx**3 * motion.stroke / dx / RATE
+        return START_UP + volume(self.scene.food.shape) / dx**3 * motion.stroke / dx / CELL_RATE
 
     @property
     def inputs(self) -> str:
@@ -83,7 +88,7 @@ class Plan:
         return key_of([food.shape_kind, values, priors, blade])[:KEY_LENGTH]
 
 
-def plan(food: FoodSpec, knife: Knife, draws: int = DRAWS, seed: int = 0) -> Plan:
+def plan(food: FoodSpec, knife: Knife, draws: int = PRIOR_DRAWS, seed: int = 0) -> Plan:
     """The cuts of one food.
 
     Args:
@@ -91,6 +96,9 @@ def plan(food: FoodSpec, knife: Knife, draws: int = DRAWS, seed: int = 0) -> Pla
         knife: The knife.
         draws: How many draws from the priors.
         seed: Seed of the draws and of the particles.
+
+    Returns:
+        The cuts.
 
     Raises:
         CutcalError: A food that cannot be cut, or whose priors cannot be fitted.
@@ -103,9 +111,17 @@ def plan(food: FoodSpec, knife: Knife, draws: int = DRAWS, seed: int = 0) -> Pla
 
 
 def draw(parameters: ParameterSet, count: int, seed: int = 0) -> list[dict[str, float]]:
-    """Scrambled Sobol draws from the priors, cut off at the hard bounds: values [SI] by name.
+    """Scrambled Sobol draws from the priors, cut off at the hard bounds.
 
     The first draws of a larger number are those of a smaller one.
+
+    Args:
+        parameters: The parameters with their priors.
+        count: How many draws.
+        seed: Seed of the draws.
+
+    Returns:
+        Values [SI] by name, of each draw.
 
     Raises:
         CurveError: Fewer than one draw.
@@ -119,28 +135,40 @@ def draw(parameters: ParameterSet, count: int, seed: int = 0) -> list[dict[str, 
     return [parameters.to_dict(z) for z in truncnorm.ppf(sample, low, high, loc=mean, scale=sd)]
 
 
-def run(
-    foods: Sequence[FoodSpec],
-    out: Path,
-    knife: Knife,
-    pool: Workers,
-    *,
-    draws: int = DRAWS,
-    seed: int = 0,
-    resume: bool = False,
-    say: Callable[[str], None],
-) -> dict[str, Any]:
+@dataclass(frozen=True)
+class PriorStudy:
+    """What is cut.
+
+    Attributes:
+        foods: The foods.
+        knife: The knife.
+        draws: Draws from the priors of each food.
+        seed: Seed of the draws and of the particles.
+    """
+
+    foods: tuple[FoodSpec, ...]
+    knife: Knife
+    draws: int = PRIOR_DRAWS
+    seed: int = 0
+
+    def plans(self) -> list[Plan]:
+        """The cuts of each food.
+
+        Raises:
+            CutcalError: A food that cannot be cut, or whose priors cannot be fitted.
+        """
+        return [plan(food, self.knife, self.draws, self.seed) for food in self.foods]
+
+
+def run(study: PriorStudy, out: Path, pool: Workers, *, resume: bool, say: Callable[[str], None]) -> dict[str, Any]:
     """Simulate, and write prior.json, prior.svg and one CSV file for each food.
 
     A folder that is gone on with keeps the other foods that it has.
 
     Args:
-        foods: The foods.
+        study: What is cut.
         out: Output folder.
-        knife: The knife.
         pool: Where the simulations run.
-        draws: Draws from the priors of each food.
-        seed: Seed of the draws and of the particles.
         resume: Go on with the runs in ``out``.
         say: Called with a line after each run.
 
@@ -150,11 +178,11 @@ def run(
     Raises:
         CutcalError: Anything wrong with the input; nothing that was computed is lost.
     """
-    plans = [plan(food, knife, draws, seed) for food in foods]
+    plans = study.plans()
     prepare(out, resume=resume)
     with EvaluationStore(out / "evaluations.h5", Header("", "prior predictive"), resume=resume) as store:
         results = evaluate(plans, store, pool, say)
-    about = {"knife": knife.name, "draws": draws, "seed": seed, "device": pool.arch}
+    about = {"knife": study.knife.name, "draws": study.draws, "seed": study.seed, "device": pool.arch}
     about |= {"cutcal": __version__, "commit": git_commit(), "solver": code_key()[:KEY_LENGTH]}
     rows = _before(out)
     for one, runs in zip(plans, results, strict=True):
@@ -188,7 +216,17 @@ def _before(out: Path) -> dict[str, Any]:
 def evaluate(
     plans: Sequence[Plan], store: EvaluationStore, pool: Workers, say: Callable[[str], None]
 ) -> list[list[Evaluation]]:
-    """Results of all candidates of all plans, in their order; what the store knows is not run again."""
+    """Results of all candidates of all plans; what the store knows is not run again.
+
+    Args:
+        plans: The cuts of each food.
+        store: Where results are kept.
+        pool: Where the simulations run.
+        say: Called with a line after each run.
+
+    Returns:
+        Results of each plan, in the order of its candidates.
+    """
     code = code_key()
     places = [(i, k) for i, one in enumerate(plans) for k in range(len(one.candidates))]
     keys = {(i, k): content_key(plans[i].scene.as_dict(), plans[i].candidates[k], code) for i, k in places}
@@ -219,6 +257,9 @@ def conclude(one: Plan, runs: Sequence[Evaluation]) -> tuple[dict[str, FloatArra
     Args:
         one: The plan.
         runs: Results in the order of its candidates.
+
+    Returns:
+        The columns by name, and the row.
     """
     grid = one.stroke
     curves = [filter_simulated(grid, r.stroke, r.force) if r.ok else np.full_like(grid, np.nan) for r in runs]
@@ -258,16 +299,21 @@ def _head(name: str, row: Mapping[str, Any]) -> list[str]:
         x = row[key]
         spans.append(f"{key[:4]}: {x['default']:.4g} {unit}, draws {x['q025']:.4g} to {x['q975']:.4g} {unit} (95 %)")
     return [
-        f"Prior predictive of {name}: simulated, not measured. Force on the knife over stroke before any trace is seen.",
+        f"Prior predictive of {name}: simulated, not measured. "
+        "Force on the knife over stroke before any trace is seen.",
         f"command: cutcal prior {name} --knife {row['knife']} --draws {row['draws']} --seed {row['seed']}",
-        f"scene: default specimen, cut through its whole height, coarse grid ({row['dx_m'] * 1e3:.4g} mm), filtered as a fit does",
+        "scene: default specimen, cut through its whole height, "
+        f"coarse grid ({row['dx_m'] * 1e3:.4g} mm), filtered as a fit does",
         "default_N: at the values of materials.yaml",
         "q025_N to q975_N: quantiles, at each stroke, of scrambled Sobol draws from the priors of "
         + ", ".join(row["parameters"]),
-        "  (95 % ranges of materials.yaml; log-normal, mu normal; cut off at the bounds of a fit); all else as in materials.yaml",
+        "  (95 % ranges of materials.yaml; log-normal, mu normal; cut off at the bounds of a fit); "
+        "all else as in materials.yaml",
         f"draws: {row['draws']}, broke down: {failed}{left_out}",
-        f"  pressed away, not cut: {row['pressed']} of the others (the edge takes less than {FULLY_PARTED:g} of R times the new area), in the quantiles",
-        f"  not quasi-static: {row['dynamic']} of the others (kinetic energy over {DYNAMIC * 100:g} % of the work: soft, and cut late)",
+        f"  pressed away, not cut: {row['pressed']} of the others "
+        f"(the edge takes less than {FULLY_PARTED:g} of R times the new area), in the quantiles",
+        f"  not quasi-static: {row['dynamic']} of the others "
+        f"(kinetic energy over {DYNAMIC * 100:g} % of the work: soft, and cut late)",
         *spans,
         f"cutcal {row['cutcal']}, solver {row['solver']}, commit {row['commit'] or 'unknown'}",
         f"inputs: {row['inputs']}",

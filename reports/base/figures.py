@@ -117,7 +117,7 @@ def forces(
     inside: str = "",
     beside: Callable[[Axes], None] | None = None,
 ) -> bytes:
-    """Measured and simulated force over stroke, with the parts of the simulation and the predictive band if there is one.
+    """Measured and simulated force over stroke, with the parts of the simulation and a predictive band if there is one.
 
     Args:
         curves: Columns of ``curves.csv``: stroke [m] and forces [N], shape (n,).
@@ -125,6 +125,9 @@ def forces(
         height: Height of the figure [mm].
         inside: What the legend says of the trace within the band, in brackets.
         beside: Draws a picture of the cut beside the forces.
+
+    Returns:
+        An SVG document.
     """
 
     def draw(figure: Figure) -> None:
@@ -155,7 +158,16 @@ def next_to(figure: Figure, beside: Callable[[Axes], None] | None) -> Axes:
 
 
 def predictive(axes: Axes, x: np.ndarray, curves: Curves, low: str, high: str, label: str) -> None:
-    """A predictive band behind the curves, nothing where the columns are absent or empty."""
+    """A predictive band behind the curves, nothing where the columns are absent or empty.
+
+    Args:
+        axes: Where to draw.
+        x: Stroke [mm], shape (n,).
+        curves: Forces [N] by name of the column, each (n,).
+        low: Name of the column of the lower end.
+        high: Name of the column of the upper end.
+        label: What the legend says.
+    """
     if low in curves and high in curves and np.any(np.isfinite(curves[low])):
         axes.fill_between(x, curves[low], curves[high], label=label, zorder=0.5, **PREDICTIVE)
 
@@ -181,6 +193,9 @@ def fit(curves: Curves, noise_sd: float, trace: str) -> bytes:
         curves: Columns of ``curves.csv``.
         noise_sd: Standard deviation of one unfiltered sample before contact [N].
         trace: What the real curve is called: measured or reconstructed.
+
+    Returns:
+        An SVG document.
     """
 
     def draw(figure: Figure) -> None:
@@ -258,7 +273,8 @@ def envelope(x: np.ndarray, y: np.ndarray, columns: int = ENVELOPE_PARTS) -> tup
     """A long record with only the lowest and highest sample of each of ``columns`` equal parts, in order.
 
     Args:
-        x, y: ConditioningRecord, shape (n,).
+        x: Times of the record [s], shape (n,).
+        y: Its values [N], shape (n,).
         columns: Number of parts.
 
     Returns:
@@ -290,7 +306,14 @@ def stroke_axis(axes: Axes, x: np.ndarray) -> None:
 
 
 def log_ticks(axis: Axis, low: float, high: float, few: float = FEW_DECADES) -> None:
-    """Plain numbers at 1, 2 and 5 of each decade, or at 1 only where there are many decades."""
+    """Plain numbers at 1, 2 and 5 of each decade, or at 1 only where there are many decades.
+
+    Args:
+        axis: The axis.
+        low: Its lower end, in its unit.
+        high: Its upper end.
+        few: Ratio of the ends up to which there is room for 2 and 5.
+    """
     subs = (1.0, 2.0, 5.0) if high / low < few else (1.0,)
     axis.set_major_locator(LogLocator(subs=subs))
     axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))

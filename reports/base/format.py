@@ -100,6 +100,9 @@ def quantity(value: float | None, unit: str, *, digits: int | None = 3, signed: 
         digits: Significant digits; None for the shortest text (limits, settings).
         signed: Whether a positive value gets its sign.
 
+    Returns:
+        Number and unit.
+
     >>> quantity(3.2e5, "Pa").replace(NBSP, " "), quantity(0.033, "m").replace(NBSP, " ")
     ('320 kPa', '33.0 mm')
     """
@@ -114,6 +117,14 @@ def quantity(value: float | None, unit: str, *, digits: int | None = 3, signed: 
 
 def interval(low: float | None, high: float | None, unit: str) -> str:
     """A range to three digits; a bound if one end is not known, a dash if neither is.
+
+    Args:
+        low: Lower end in the SI unit, or None.
+        high: Upper end in the SI unit, or None.
+        unit: SI unit, as of :func:`quantity`.
+
+    Returns:
+        Both numbers with one unit, or each with its own where they lie far apart.
 
     >>> interval(0.8e6, 2e6, "Pa").replace(NBSP, " "), interval(5e4, 2e6, "Pa").replace(NBSP, " ")
     ('0.8 to 2 MPa', '50 kPa to 2 MPa')
@@ -134,6 +145,14 @@ def interval(low: float | None, high: float | None, unit: str) -> str:
 
 def uncertain(value: float | None, sd: float | None, unit: str) -> str:
     """A value with its standard uncertainty, both to the second digit of the uncertainty.
+
+    Args:
+        value: In the SI unit, or None.
+        sd: Its standard uncertainty in the SI unit, or None.
+        unit: SI unit, as of :func:`quantity`.
+
+    Returns:
+        Both with one unit; the value alone where there is no uncertainty.
 
     >>> uncertain(12.5271, 0.112, "N").replace(NBSP, " ")
     '12.53 ± 0.11 N'

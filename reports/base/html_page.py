@@ -1,4 +1,4 @@
-"""A cut as one HTML file that needs no network: the food to turn around, a slider over the stroke, the forces beside it."""
+"""A cut as one HTML file that needs no network: the food to turn around, a slider over the stroke, and the forces."""
 
 from __future__ import annotations
 

@@ -51,8 +51,8 @@ class Finished:
     Attributes:
         result: What the calibration ended with.
         created: When the run was made.
-        curves: Columns of ``curves.csv`` by name: stroke [m] and forces [N], shape (n,); those of the band only where the
-            file has them.
+        curves: Columns of ``curves.csv`` by name: stroke [m] and forces [N], shape (n,); those of the band only where
+            the file has them.
         time: Time of the whole record [s], shape (k,).
         raw: Force as recorded [N], shape (k,).
         tared: Force less its baseline [N], shape (k,).
@@ -119,6 +119,13 @@ def read_date(path: Path, data: Data) -> datetime:
 
 def check_kind(path: Path, place: str, value: Any, kind: Any) -> None:
     """Refuse a value of another kind than a schema says, and name its place.
+
+    Args:
+        path: The file, for the error.
+        place: Where in it the value stands; empty at the top.
+        value: The value.
+        kind: Types it may have; or a mapping of names (several in one text, ``*`` for any) to kinds; or a list of one
+            kind.
 
     Raises:
         ReportError: It is of another kind, or something is missing in it.

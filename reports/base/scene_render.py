@@ -1,4 +1,4 @@
-"""Pictures of a cut: the food as it deforms, under the stress it bears, with knife and board, drawn without a screen."""
+"""Pictures of a cut: the food as it deforms, coloured by its stress, with knife and board, drawn without a screen."""
 
 from __future__ import annotations
 
@@ -80,7 +80,15 @@ class Film:
 
 
 def blade(knife: Knife, length: float) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (10, 3) [m] of ``length`` [m] of a blade whose edge lies along x through the origin, and its triangles (t, 3)."""
+    """A blade whose edge lies along x through the origin.
+
+    Args:
+        knife: The blade.
+        length: How much of its length [m].
+
+    Returns:
+        Corners (10, 3) [m], and triangles (t, 3).
+    """
     half, high = knife.spine / 2, knife.spine / 2 / math.tan(knife.angle / 2)
     outline = np.array([[0.0, 0.0], [half, high], [half, knife.height], [-half, knife.height], [-half, high]])
     ends = [np.column_stack([np.full(5, x), outline]) for x in (-length / 2, length / 2)]
@@ -220,9 +228,9 @@ def _drawing(path: Path) -> Iterator[None]:
     try:
         yield
     except (RuntimeError, ImportError) as e:
+        why = str(e).splitlines()[0] if str(e) else type(e).__name__
         raise OutputError(
-            f"{path}: cannot draw here ({str(e).splitlines()[0] if str(e) else type(e).__name__}); cutcal doctor tells what is missing. "
-            "What was computed is written"
+            f"{path}: cannot draw here ({why}); cutcal doctor tells what is missing. What was computed is written"
         ) from None
     except OSError as e:
         raise OutputError(f"{path}: cannot be written ({e.strerror or e})") from None

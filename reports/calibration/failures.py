@@ -36,7 +36,8 @@ class Split:
         name: The parameter.
         unit: Its SI unit.
         values: Its values [unit] (m,).
-        apart: Median of the failed less that of the finished runs, over the spread of all [-]; in logarithms where ``log``.
+        apart: Median of the failed less that of the finished runs, over the spread of all [-]; in logarithms where
+            ``log``.
         log: Whether its axis is logarithmic.
     """
 

@@ -55,13 +55,13 @@ def errors(posterior: Posterior, stroke: float, points: int) -> list[str]:
     if length is not None and length > 0.0:
         independent = max(round(stroke / length), 1)
         said.append(
-            f"The residuals hang together over {quantity(length, 'm', digits=2)} of stroke, so that the {count(points)} "
-            f"points of the curve count as about {count(independent)} independent readings."
+            f"The residuals hang together over {quantity(length, 'm', digits=2)} of stroke, so that the {count(points)}"
+            f" points of the curve count as about {count(independent)} independent readings."
         )
     if reduced is not None and reduced > 1.0:
         said.append(
-            f"Reduced chi-square {plain(reduced)}: what is left is {plain(math.sqrt(reduced), 2)} times as large as the "
-            "stated errors of trace and simulation explain, and all intervals were widened by that."
+            f"Reduced chi-square {plain(reduced)}: what is left is {plain(math.sqrt(reduced), 2)} times as large as "
+            "the stated errors of trace and simulation explain, and all intervals were widened by that."
         )
     elif reduced is not None:
         said.append(

@@ -29,10 +29,13 @@ if TYPE_CHECKING:
     from calib.calibration.result_parts import Agreement, NullRating
     from calib.validation.acceptance import Verdict
 
-#: First page [mm]: what title, a sentence of two lines and facts leave, a line of the table and one more in it, a line of the
-#: sentence, a banner; letters in a line of a name, a note and the sentence; least and largest height of the main figure.
+#: First page [mm]: what title, a sentence of two lines and facts leave; a line of the table and one more line in it; a
+#: line of the sentence; a banner.
 PAGE_ROOM, LINE_HEIGHT, NEXT_LINE, SENTENCE_LINE, BANNER_HEIGHT = 200.0, 4.9, 3.7, 5.2, 20.0
-NAME_LETTERS, NOTE_LETTERS, SENTENCE_LETTERS, FIGURE_HEIGHT = 42, 47, 92, (60.0, 125.0)
+#: Letters in a line of a name, a note and the sentence.
+NAME_LETTERS, NOTE_LETTERS, SENTENCE_LETTERS = 42, 47, 92
+#: Least and largest height of the main figure [mm].
+FIGURE_HEIGHT = (60.0, 125.0)
 #: What the null models are compared in: key, label, unit, and whether more is better.
 MEASURES = (
     ("nrmse", "NRMSE", "fraction", False),

@@ -22,7 +22,7 @@ class RefinementPlan:
     Attributes:
         scene: The cut; its cell size is not used.
         axes: Values to try, by axis of :data:`AXES`; cell sizes [m] under ``dx``.
-        repeats: Runs with other particles and the grid with_other_particles, to tell noise from trend.
+        repeats: Runs with other particles and the grid elsewhere, to tell noise from trend.
     """
 
     scene: Scene

@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 
 from calib.validation.metrics import compare
-from calib.validation.null_models import NullModel, null_models, three_term
+from calib.validation.null_models import NullModel, ThreeTermCurve, null_models
 from reports.base.format import NBSP
 
 STROKE_M = 0.033
@@ -55,9 +55,9 @@ def curves(kind: str = "good") -> dict[str, np.ndarray]:
     """Columns of curves.csv: a cut with a skin peak, a fitted and an unfitted simulation, null models."""
     strength, dulled = (0.72, 2.5) if kind == "failed" else (1.0, 1.0)
     s, real = _measured()
-    edge = strength * three_term(s, 5.3, 2.0e-3 * dulled, 2.3, 4.4e-3, 1.5e-3 * dulled, 0.0, 0.021)
-    face = three_term(s, 0.0, 1e-3, 0.0, 0.0, 1e-3, 252.0, 0.0215)
-    start = three_term(s, 6.4, 1.0e-3, 1.4, 3.0e-3, 1.5e-3, 90.0, 0.03)
+    edge = strength * ThreeTermCurve(5.3, 2.0e-3 * dulled, 2.3, 4.4e-3, 1.5e-3 * dulled, 0.0, 0.021).force(s)
+    face = ThreeTermCurve(0.0, 1e-3, 0.0, 0.0, 1e-3, 252.0, 0.0215).force(s)
+    start = ThreeTermCurve(6.4, 1.0e-3, 1.4, 3.0e-3, 1.5e-3, 90.0, 0.03).force(s)
     out = {"stroke_m": s, "real_N": real, "sim_N": edge + face, "residual_N": edge + face - real,
            "edge_N": edge, "face_N": face, "start_N": start}  # fmt: skip
     out |= {f"{name}_N": model.curve for name, model in _nulls().items()}
@@ -131,7 +131,7 @@ def _measured() -> tuple[np.ndarray, np.ndarray]:
     """Stroke [m] and force [N] of the cut."""
     s = np.linspace(0.0, STROKE_M, 240)
     wobble = 0.18 * np.sin(2 * np.pi * s / 0.007) * np.clip(s / 0.004, 0.0, 1.0)
-    return s, three_term(s, 5.2, 1.8e-3, 2.6, 4.5e-3, 1.4e-3, 260.0, 0.021) + wobble
+    return s, ThreeTermCurve(5.2, 1.8e-3, 2.6, 4.5e-3, 1.4e-3, 260.0, 0.021).force(s) + wobble
 
 
 @lru_cache

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from calib.validation.metrics import Metrics, compare
-from calib.validation.null_models import null_models, three_term
+from calib.validation.null_models import ThreeTermCurve, null_models
 from tests.reports import sample
 
 STROKE = np.linspace(0.0, 0.033, 240)
@@ -22,7 +22,7 @@ HELD = "third"
 def curves(name: str) -> dict[str, np.ndarray]:
     """Columns of curves-NAME.csv."""
     strength, skin, error = CUTS[name]
-    real = strength * three_term(STROKE, 5.2, 1.8e-3, skin, 4.5e-3, 1.4e-3, 260.0, 0.021)
+    real = strength * ThreeTermCurve(5.2, 1.8e-3, skin, 4.5e-3, 1.4e-3, 260.0, 0.021).force(STROKE)
     sim = real * (1.0 + error * np.cos(2.0 * np.pi * STROKE / 0.02))
     half = 0.3 + 0.04 * sim
     out = {"stroke_m": STROKE, "real_N": real}

@@ -47,24 +47,16 @@ def add_args(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the study; prints its table, or coverage.json."""
+    from calib.validation.interval_coverage import CoveragePlan
     from calib.validation.interval_coverage import run as study
 
     food = food_of(args)
+    command = ("coverage", *(a for a in sys.argv[1:] if a != "coverage"))
+    plan = CoveragePlan(food, args.traces, args.knife, args.dx, args.seed, command=command)
     out = Path(args.out or f"cutcal-coverage-{food.name}")
 
     with workers_of(args, say) as pool:
-        document = study(
-            food,
-            out,
-            pool,
-            traces=args.traces,
-            knife=args.knife,
-            dx=args.dx,
-            seed=args.seed,
-            resume=args.resume,
-            command=("coverage", *(a for a in sys.argv[1:] if a != "coverage")),
-            say=say,
-        )
+        document = study(plan, out, pool, resume=args.resume, say=say)
     if args.json:
         print_json(document)
     else:

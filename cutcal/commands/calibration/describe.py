@@ -15,7 +15,7 @@ SOURCES = {
 
 
 def description(request: Request) -> str:
-    """What a calibration would start from: columns, tare, contact, stroke, specimen, cells, parameters, budget, warnings.
+    """What a calibration would start from: columns, tare, contact, stroke, specimen, cells, parameters and warnings.
 
     Raises:
         CutcalError: Anything wrong with the input.

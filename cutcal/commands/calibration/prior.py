@@ -51,22 +51,15 @@ def add_args(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Simulate; prints the table, or prior.json."""
+    from calib.validation.prior_predictive import PriorStudy
     from calib.validation.prior_predictive import run as study
 
     foods = [load_food(name) for name in dict.fromkeys(args.names)] or list(load_foods().values())
     out = Path(args.out or "cutcal-prior")
 
     with workers_of(args, say) as pool:
-        document = study(
-            foods,
-            out,
-            load_knife(args.knife),
-            pool,
-            draws=args.draws,
-            seed=args.seed,
-            resume=args.resume,
-            say=say,
-        )
+        asked = PriorStudy(tuple(foods), load_knife(args.knife), args.draws, args.seed)
+        document = study(asked, out, pool, resume=args.resume, say=say)
     if args.json:
         print_json(document)
         return 0 if document["passed"] else 2
@@ -81,7 +74,8 @@ def run(args: argparse.Namespace) -> int:
 def table(document: dict[str, Any]) -> str:
     """What the terminal shows at the end."""
     lines = [
-        f"{'food':13s} {'peak [N]':>9s} {'95 % of the draws':>19s} {'work [J]':>9s} {'pressed away':>13s}  draws that broke down"
+        f"{'food':13s} {'peak [N]':>9s} {'95 % of the draws':>19s} {'work [J]':>9s} {'pressed away':>13s}  "
+        "draws that broke down"
     ]
     for name, row in document["foods"].items():
         peak, work = row["peak_N"], row["work_J"]

@@ -62,8 +62,5 @@ def writer(folder: Path) -> Callable[[Path], Path]:
     if not summary.exists():
         names = ", ".join(("summary.json", *found))
         raise ReportError(f"{folder}: holds none of {names}; give the --out of a finished run")
-    return (
-        partial(multi_specimen.write_report, meanings=MEANINGS)
-        if multi_specimen.is_study(summary)
-        else calibration.write_report
-    )
+    study = partial(multi_specimen.write_report, meanings=MEANINGS)
+    return study if multi_specimen.is_study(summary) else calibration.write_report

@@ -12,6 +12,7 @@ import pytest
 from calib.calibration.result import CalibrationResult, from_document, to_document
 from calib.calibration.result_parts import FixedParameter
 from calib.errors import DocumentError
+from calib.io import typed_document
 from calib.io.folder import finite
 from calib.io.schema import FOLDER, shared_part, tag
 from calib.io.type_schema import ALWAYS, Positive, Shared, document_schema, keywords, one_of
@@ -124,6 +125,32 @@ def test_a_schema_says_what_the_type_says() -> None:
         "words": {"description": "In words", "type": "string", "maxLength": 9},
     }
     assert own["required"] == ["schema", "name", "size_m", "since", "colour", "words"]
+
+
+def test_fields_are_read_as_they_are_described() -> None:
+    """Null where a key may be null, nothing where it may be missing; another name; any kind; what is only read."""
+    content = {"name": "a", "size_m": 1.5, "since": None, "colour": "red", "words": "b"}
+    own = typed_document.from_document(Sized, content)
+    assert own == Sized(name="a", size_m=1.5, colour="red", note="b")
+    assert typed_document.to_document(own) == {"schema": tag("stress")} | content
+    older = {"name": "a", "size_m": None, "colour": ["red", 3], "words": "b", "before": "c"}
+    read = typed_document.from_document(Sized, older)
+    assert (read.size_m, read.since, read.weight_N, read.before) == (None, None, None, "c")
+    assert read.colour == ["red", 3] and "before" not in typed_document.to_document(read)
+    with pytest.raises(DocumentError, match="^words is missing"):
+        typed_document.from_document(Sized, {"name": "a", "size_m": 1.0, "colour": "red", "note": "b"})
+
+
+def test_a_pair_has_two_items() -> None:
+    """A list of another length, or of other kinds, is no pair."""
+    history = sample.summary() | {"misfit_history": [[1, 2.5], [3, 2.0]]}
+    assert from_document(history, Path()).history.misfit_history == ((1, 2.5), (3, 2.0))
+    for wrong, said in (
+        ([1, 2.5, 3.0], r"misfit_history\[0\] is not a list of 2"),
+        ([1.5, 2.5], r"misfit_history\[0\]\[0\] is 1.5"),
+    ):
+        with pytest.raises(DocumentError, match=said):
+            from_document(history | {"misfit_history": [wrong]}, Path())
 
 
 def test_shared_parts_exist() -> None:

@@ -12,7 +12,7 @@ import pytest
 import cutcal.commands.calibration.coverage
 from calib.trace.conditioning import condition
 from calib.trace.trace import read_trace
-from calib.validation.interval_coverage import MadeUpSensor, summarise
+from calib.validation.interval_coverage import MadeUpSensor, coverage_of
 from cutcal.main import main
 from tests.calib.documents import valid
 from tests.calib.multi_specimen.test_run import FakePool
@@ -43,7 +43,7 @@ def test_a_made_up_record_is_what_it_says(tmp_path: Path) -> None:
 def test_coverage_is_counted_where_it_is_claimed() -> None:
     """25 identified intervals of which 24 hold the truth, 5 weak ones that do not: 96 % and 80 %, median error 4 %."""
     rows = [row(104.0, 90.0, 110.0)] * 24 + [row(130.0, 120.0, 140.0)] + [row(50.0, 40.0, 60.0, "weak")] * 5
-    found = summarise(rows)
+    found = coverage_of(rows)
     r = found["parameters"]["R"]
     assert r["covered_identified"] == 0.96 and r["covered"] == 0.8 and r["identified"] == 25
     assert r["median_error_identified"] == pytest.approx(0.04) and r["verdicts"] == {"identified": 25, "weak": 5}
@@ -69,7 +69,7 @@ def test_coverage_is_counted_where_it_is_claimed() -> None:
 )
 def test_it_does_not_pass_by_chance(rows: list[dict[str, Any]]) -> None:
     """88 % coverage, a median error of 15 %, ten intervals, all of a hundred, a trace that was lost: none passes."""
-    assert not summarise(rows)["passed"]
+    assert not coverage_of(rows)["passed"]
 
 
 @pytest.mark.slow

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from calib.errors import CurveError
 from calib.trace.conditioning import condition
 from calib.trace.trace import read_trace
 from calib.validation.metrics import Metrics
-from calib.validation.null_models import fit_three_term, null_models, three_term
+from calib.validation.null_models import ThreeTermCurve, fit_three_term, null_models
 from tests.data_dir import data_file
 
 S = np.linspace(0.0, 0.04, 240)
@@ -43,17 +45,17 @@ def test_half_sine_is_exact_on_a_half_sine() -> None:
 def test_three_term_by_hand() -> None:
     """Each of the three terms alone has the value that its formula gives."""
     s = np.array([0.0, 2e-3, 0.04])
-    edge = three_term(s, 8.0, 2e-3, 0.0, 0.0, 1e-3, 0.0, 0.01)
+    edge = ThreeTermCurve(8.0, 2e-3, 0.0, 0.0, 1e-3, 0.0, 0.01).force(s)
     np.testing.assert_allclose(edge, 8.0 * (1.0 - np.exp([0.0, -1.0, -20.0])))
-    skin = three_term(s, 0.0, 1e-3, 5.0, 2e-3, 1e-3, 0.0, 0.01)
+    skin = ThreeTermCurve(0.0, 1e-3, 5.0, 2e-3, 1e-3, 0.0, 0.01).force(s)
     np.testing.assert_allclose(skin, 5.0 * np.exp([-2.0, 0.0, -722.0]))
-    face = three_term(s, 0.0, 1e-3, 0.0, 0.0, 1e-3, 100.0, 0.01)
+    face = ThreeTermCurve(0.0, 1e-3, 0.0, 0.0, 1e-3, 100.0, 0.01).force(s)
     np.testing.assert_allclose(face, [0.0, 0.2, 1.0])
 
 
 def test_three_term_fit_recovers_its_own_curve() -> None:
     """A curve made of the three terms is found again, numbers included, through 0.5 % of noise."""
-    clean = three_term(S, **TRUE)
+    clean = ThreeTermCurve(**TRUE).force(S)
     real = clean + 0.005 * clean.max() * np.random.default_rng(0).normal(size=len(S))
     null = null_models(S, real)["three_term"]
     assert null.metrics.nrmse < 0.006
@@ -63,8 +65,8 @@ def test_three_term_fit_recovers_its_own_curve() -> None:
 
 def test_fit_does_not_depend_on_units() -> None:
     """A curve a thousand times stronger over a stroke ten times longer gives the same numbers, scaled."""
-    real = three_term(S, **TRUE)
-    one, two = fit_three_term(S, real), fit_three_term(10.0 * S, 1000.0 * real)
+    real = ThreeTermCurve(**TRUE).force(S)
+    one, two = (asdict(fit_three_term(k * S, f * real)) for k, f in ((1.0, 1.0), (10.0, 1000.0)))
     for name, value in one.items():
         factor = {"_N": 1e3, "_m": 10.0, "er_m": 100.0}["er_m" if name.endswith("per_m") else name[-2:]]
         assert two[name] == pytest.approx(factor * value, rel=1e-6), name
@@ -72,7 +74,7 @@ def test_fit_does_not_depend_on_units() -> None:
 
 def test_nulls_carry_their_comparison() -> None:
     """Three models, each with its curve on the grid and metrics against the measured curve."""
-    nulls = null_models(S, three_term(S, **TRUE))
+    nulls = null_models(S, ThreeTermCurve(**TRUE).force(S))
     assert list(nulls) == ["ramp", "half_sine", "three_term"]
     for name, null in nulls.items():
         assert null.name == name
