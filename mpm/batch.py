@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
-from mpm.motion import REST, Course
+from mpm.kernels.time_step import advance
 from mpm.output.record import ForceRecord
+from mpm.run import REST, CutRun
 from mpm.runtime import Runtime
 from mpm.scene import Scene
-from mpm.solver import Simulation, kernels
+from mpm.solver import Simulation, state_of
+from mpm.state import host_transfer
+from mpm.state.state import Configuration
 
 
 def simulate_together(scenes: Sequence[Scene], *, runtime: Runtime | None = None) -> list[ForceRecord]:
@@ -25,27 +27,28 @@ def simulate_together(scenes: Sequence[Scene], *, runtime: Runtime | None = None
     """
     found: dict[int, ForceRecord] = {}
     for precision in dict.fromkeys(scene.numerics.precision for scene in scenes):
-        alike: dict[tuple[Any, ...], dict[int, Simulation]] = {}
+        alike: dict[Configuration, dict[int, Simulation]] = {}
         for k, scene in enumerate(scenes):
             if scene.numerics.precision == precision:
                 simulation = Simulation(scene, runtime, alone=False)
-                alike.setdefault(simulation.kind(0), {})[k] = simulation
+                alike.setdefault(simulation.setup.configuration(0), {})[k] = simulation
         for group in alike.values():
             found |= zip(group, _run(list(group.values())), strict=True)
     return [found[k] for k in range(len(scenes))]
 
 
 def _run(cuts: Sequence[Simulation]) -> list[ForceRecord]:
-    """Run cuts whose fields are of one kind."""
-    k: Any = kernels(cuts[0].kind(min(cuts[0].threads(), 1), len(cuts)), cuts[0].serial)
+    """Run cuts whose fields are of one configuration."""
+    setup = cuts[0].setup
+    state = state_of(setup.configuration(min(setup.threads(), 1), len(cuts)), cuts[0].serial)
     for place, cut in enumerate(cuts):
-        cut.k, cut.place = k, place
-    k.user = cuts
-    k.begin([cut.contents(cut.scene.food.material) for cut in cuts])
-    courses = [Course(cut, cut.scene) for cut in cuts]
-    while any(orders := [course.order() for course in courses]):
-        reports = k.go([order or REST for order in orders])
-        for course, order, report in zip(courses, orders, reports, strict=False):
+        cut.state, cut.place = state, place
+    state.owner = cuts
+    host_transfer.begin(state, [cut.setup.contents(cut.scene.food.material) for cut in cuts])
+    runs = [CutRun(cut.setup, cut.scene) for cut in cuts]
+    while any(orders := [run.order() for run in runs]):
+        reports = advance(state, [order or REST for order in orders])
+        for cut, run, order, report in zip(cuts, runs, orders, reports, strict=False):
             if order is not None:
-                course.take(report[: -(-order[0] // order[1])])
-    return [course.record() for course in courses]
+                run.take(report[: -(-order.steps // order.steps_per_row)], cut.snapshot)
+    return [run.record(cut.topology) for cut, run in zip(cuts, runs, strict=True)]

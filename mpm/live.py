@@ -9,13 +9,16 @@ import numpy as np
 
 from mpm.errors import SceneError, SimulationError
 from mpm.output.record import ForceRecord
-from mpm.output.recorder import Ledger
+from mpm.output.recorder import Recorder
 from mpm.output.snapshot import Snapshot
 from mpm.output.surface import Surface
 from mpm.output.topology import Topology
+from mpm.run import Order
 from mpm.runtime import Runtime, running
 from mpm.scene import STEEPEST, Scene
-from mpm.solver import APPROACH, Simulation
+from mpm.setup.setup import CLEARANCE
+from mpm.solver import Simulation
+from mpm.state.host_transfer import of_particles
 
 ON_FACE = 1e-9  # distance from the plane of the cut at which a vertex lies on its face [m]
 CLEAR = 2.0  # height of the edge above the uncut food at which nothing touches the blade any more [cells]
@@ -56,19 +59,19 @@ class LiveCut:
             raise SceneError("live cut: the blade is held from outside; leave the scene's arm rigid")
         self.scene = scene
         self._simulation = Simulation(scene, runtime or Runtime(threads=1))
-        self._simulation._load(scene.food.material)
-        self._dt = self._simulation.time_step(scene.food.material)
-        self._top = scene.food.shape.height + APPROACH * scene.numerics.dx
+        self._simulation.load(scene.food.material)
+        self._dt = self._simulation.setup.time_step(scene.food.material)
+        self._top = scene.food.shape.height + CLEARANCE * scene.numerics.dx
         self._z, self._s, self._tilt, self._first = math.inf, 0.0, 0.0, 0.0
-        self._ledger, self._wall = Ledger(self._simulation, scene.food.material), 0.0
-        self._looks: Surface | None = None
+        self._recorder, self._wall = Recorder(self._simulation.setup, scene.food.material), 0.0
+        self._surface: Surface | None = None
         self.status, self.time, self.impulse, self.moment = "done", 0.0, np.zeros(3), 0.0
 
     @property
     def _held(self) -> Simulation:
         """The simulation, as long as its fields are this cut's."""
         simulation = self._simulation
-        if simulation.serial != running() or simulation.k.user is not simulation:
+        if simulation.serial != running() or simulation.state.owner is not simulation:
             raise RuntimeError(
                 "another simulation has taken over the fields of this live cut: follow one to its end before the next is made"
             )
@@ -77,19 +80,19 @@ class LiveCut:
     @property
     def begun(self) -> bool:
         """Whether the edge has come near the food."""
-        return bool(self._ledger.rows)
+        return bool(self._recorder.intervals)
 
     @property
     def weight(self) -> float:
         """Weight of the food [N]."""
-        simulation, gravity = self._simulation, self.scene.numerics.gravity
-        return self.scene.food.material.rho * simulation.seeds.total * simulation.images * gravity
+        setup, gravity = self._simulation.setup, self.scene.numerics.gravity
+        return self.scene.food.material.rho * setup.seeds.total * setup.grid.images * gravity
 
     @property
     def uncut(self) -> float:
         """Part of the section that the edge has not passed [-]."""
-        beside = self._simulation.seeds.beside
-        return float((beside & (self._held.k.of_particles(self._held.k.side) == 0)).sum() / beside.sum())
+        beside, state = self._simulation.setup.seeds.beside, self._held.state
+        return float((beside & (of_particles(state, state.side) == 0)).sum() / beside.sum())
 
     @property
     def height(self) -> float:
@@ -154,41 +157,40 @@ class LiveCut:
         steps = max(math.ceil(span / self.scene.time_scale / self._dt - 1e-9), math.ceil(way / most - 1e-9))
         sim = steps * self._dt
         began = clock.perf_counter()
-        order = steps, steps, self._dt, down / sim, along / sim, turn / sim
-        self._ledger.book(self._simulation.advance(order)[0], steps, self._dt)
+        order = Order(steps, steps, self._dt, down / sim, along / sim, turn / sim)
+        self._recorder.book(self._simulation.advance(order)[0], steps, self._dt)
         self._wall += clock.perf_counter() - began
         self._z, self._s, self._tilt, self.time = height, slide, tilt, self.time + span
-        self.moment, self.status = self._ledger.moment, self._ledger.status
+        self.moment, self.status = self._recorder.moment, self._recorder.status
         if self.status != "done":
             raise SimulationError(
                 f"the live cut stopped with the edge at {1e3 * height:.1f} mm: {self.status}",
                 reason=self.status,
                 fraction=0.0,
             )
-        force = self._ledger.force
+        force = self._recorder.force
         self.impulse = self.impulse + span * force
         return force
 
     def _place(self) -> None:
         """Put the blade where it is, clear of the food."""
-        self._simulation._set_pose(self._z, self._s - self._first, self._tilt)
+        self._simulation.set_pose(self._z, self._s - self._first, self._tilt)
 
     def pieces(self) -> Topology:
         """Connected pieces of the food now."""
         return self._held.topology()
 
-    def look(self) -> Snapshot:
+    def snapshot(self) -> Snapshot:
         """The particles now, in the scene's axes."""
-        return self._held.look(self._ledger.time, self.scene.food.shape.height - self._z, self._s)
+        return self._held.snapshot(self._recorder.time, self.scene.food.shape.height - self._z, self._s)
 
     def surface(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The food's surface now: vertices [m] (m, 3) in the scene's axes, triangles (t, 3), and whether each vertex is flesh (m,):
         of the face of the cut."""
-        if self._looks is None:
-            simulation = self._simulation
-            self._looks = Surface(self.scene.food.shape, simulation.seeds, self.scene.mirrors)
-        flesh = np.abs(self._looks.rest[:, 1]) < ON_FACE
-        return self._looks.points(self.look()), self._looks.triangles, flesh
+        if self._surface is None:
+            self._surface = Surface(self.scene.food.shape, self._simulation.setup.seeds, self.scene.mirrors)
+        flesh = np.abs(self._surface.rest[:, 1]) < ON_FACE
+        return self._surface.points(self.snapshot()), self._surface.triangles, flesh
 
     def record(self) -> ForceRecord:
         """The cut so far, a row for each move that was simulated.
@@ -200,6 +202,9 @@ class LiveCut:
             raise SimulationError(
                 "the live cut has not begun: the edge never came down", reason="no_contact", fraction=0.0
             )
-        _ = self._held  # the pieces are read from its fields
-        fraction = min(max(row[0] for row in self._ledger.rows) / self.scene.food.shape.height, 1.0)
-        return self._ledger.record(dt=self._dt, fraction=max(fraction, 0.0), wall=self._wall)
+        held = self._held  # the pieces are read from its fields
+        fraction = min(
+            max(interval.stroke for interval in self._recorder.intervals) / self.scene.food.shape.height, 1.0
+        )
+        pieces = held.topology() if self.status == "done" else None
+        return self._recorder.record(pieces, dt=self._dt, fraction=max(fraction, 0.0), wall=self._wall)

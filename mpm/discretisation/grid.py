@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mpm.kernels.fields import MIRROR
 from mpm.scene import Scene
 
+MIRROR = 2  # index of the first node plane that is no mirror image across x
 PAD = 3  # empty cells around the food: a quadratic kernel reaches 1.5 cells, the rest is room to move
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
+class Grid:
     """The grid of a scene.
 
     Attributes:
@@ -30,7 +30,7 @@ class Layout:
     stations: np.ndarray
 
 
-def lay_out(scene: Scene) -> Layout:
+def lay_out(scene: Scene) -> Grid:
     """Place the grid: around the food with room to widen, mirror planes on nodes or half-way between them."""
     shape, num = scene.food.shape, scene.numerics
     dx, mirror = num.dx, (*scene.mirrors, False)
@@ -62,4 +62,4 @@ def lay_out(scene: Scene) -> Layout:
         half = math.ceil(shape.width / 2 / dx) + PAD
         stations = dx * np.arange(-half, half + 1)
     images = (2 if mirror[0] else 1) * (2 if mirror[1] else 1)
-    return Layout(nodes, origin, images, stations)
+    return Grid(nodes, origin, images, stations)

@@ -27,10 +27,10 @@ class Seeds:
         x: Positions [m], shape (n, 3); only the modelled half or quarter when mirrors are on.
         volume: Volume of a lattice cell [m^3]; the particles of all mirror images add up to the shape's volume.
         spacing: Lattice spacing [m].
-        bulk: Lattice cells that each particle stands for, shape (n,): 1 but far from the cut.
-        foot: Distance at which each particle meets the board [m], shape (n,): its own from the lower surface in the first
+        volume_ratio: Lattice cells that each particle stands for, shape (n,): 1 but far from the cut.
+        board_gap: Distance at which each particle meets the board [m], shape (n,): its own from the lower surface in the first
             layer, half a spacing behind it.
-        head: The same from the upper surface.
+        top_gap: The same from the upper surface.
         bottom: Whether a particle is in the first layer above the lower surface, shape (n,).
         top: The same below the upper surface.
         cells: Lattice cells, counted from the cut plane along y (-1, 0 on either side of it), shape (m, 3).
@@ -40,9 +40,9 @@ class Seeds:
     x: np.ndarray
     volume: float
     spacing: float
-    bulk: np.ndarray
-    foot: np.ndarray
-    head: np.ndarray
+    volume_ratio: np.ndarray
+    board_gap: np.ndarray
+    top_gap: np.ndarray
     bottom: np.ndarray
     top: np.ndarray
     cells: np.ndarray
@@ -51,16 +51,16 @@ class Seeds:
     @property
     def total(self) -> float:
         """Volume of all particles [m^3], mirror images not counted."""
-        return self.volume * float(self.bulk.sum())
+        return self.volume * float(self.volume_ratio.sum())
 
     @property
     def areas(self) -> np.ndarray:
         """Area of each particle of the first or last layer seen from above [m^2], shape (n,); those of several cells lie along y."""
-        return self.spacing**2 * self.bulk
+        return self.spacing**2 * self.volume_ratio
 
     @property
-    def gap(self) -> np.ndarray:
-        """Distance at which each particle meets the blade [m], shape (n,), from the cut plane as ``foot`` from the board."""
+    def blade_gap(self) -> np.ndarray:
+        """Distance at which each particle meets the blade [m], shape (n,), from the cut plane as ``board_gap`` from the board."""
         return _depth(np.abs(self.x[:, 1]), self.spacing)
 
     @property
@@ -69,6 +69,25 @@ class Seeds:
         out = np.zeros(len(self.x), bool)
         out[self.owner[np.isin(self.cells[:, 1], (-1, 0))]] = True
         return out
+
+
+@dataclass(frozen=True, eq=False)
+class Particles:
+    """Particles of a cut after some steps.
+
+    Attributes:
+        x: Places in the grid's axes [m], shape (n, 3).
+        side: 0 where the cut has not passed, else 1 or 2 for the half.
+        F: Deformation gradients, shape (n, 3, 3).
+        tau: Kirchhoff stresses [Pa], xx, yy, zz, yz, xz, xy, shape (n, 6).
+        kappa: Largest equivalent strain that has acted on bulk damage so far; 0 without it.
+    """
+
+    x: np.ndarray
+    side: np.ndarray
+    F: np.ndarray
+    tau: np.ndarray
+    kappa: np.ndarray
 
 
 def seed(scene: Scene) -> Seeds:

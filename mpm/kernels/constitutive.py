@@ -230,7 +230,7 @@ def norm_squared(xx, yy, zz, yz, xz, xy):
 
 
 @ti.func
-def exchange(xx, yy, zz, yz, xz, xy, j, rxx, ryy, rzz, ryz, rxz, rxy, a, b, c):
+def replace_stretch(xx, yy, zz, yz, xz, xy, j, rxx, ryy, rzz, ryz, rxz, rxy, a, b, c):
     """One column (a, b, c) of F after its left stretch V gave way to R: of R V^-1 F, from the entries of V and R."""
     cx, cy, cz, cyz, cxz, cxy = cofactors(xx, yy, zz, yz, xz, xy)
     u, v, w = (cx * a + cxy * b + cxz * c) / j, (cxy * a + cy * b + cyz * c) / j, (cxz * a + cyz * b + cz * c) / j

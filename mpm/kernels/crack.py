@@ -2,101 +2,127 @@
 
 import taichi as ti
 
-from mpm.kernels.fields import DX, FIRST, INV, OZ, STATIONS, ZONE
-from mpm.kernels.loops import Loops
+from mpm.kernels.tool import edge_height, under_blade
+from mpm.state.accessors import to_scene_axes
+from mpm.state.stencil import node_position
+from mpm.state.tables import DX, FIRST_STATION, INV_DX, ORIGIN_Z, SECOND_OFFSET, STATIONS, ZONE
 
-WHOLE = 0x3FFFF  # of Split.split where all nodes are shared
-# The bit above it in Fields.layers: the particle has a moment of contact, from one transfer back to the next.
-PUSHED = WHOLE + 1
-CRACK_LEAD = 0.5  # cells by which the split of the nodes lags the crack it makes; see Split.split
+ALL_VISIBLE = 0x3FFFF  # of visible_layers where all nodes are shared
+# The bit above it in State.visibility: the particle has a moment of contact, from one transfer back to the next.
+IN_CONTACT = ALL_VISIBLE + 1
+FRONT_OFFSET = 0.5  # cells by which the split of the nodes lags the crack it makes; see visible_layers
 
 
-class Split(Loops):
-    """The crack as the transfers between particles and grid see it."""
+@ti.func
+def front_height(s: ti.template(), cut, place):
+    """Height of the crack front at a place along the cut [m], between the slices; far up where nothing is cut."""
+    r = (place - s.par[cut, FIRST_STATION]) * s.par[cut, INV_DX]
+    i = ti.math.clamp(ti.floor(r, ti.i32), s.first_slice, s.size[cut, STATIONS] - 2)
+    t = ti.math.clamp(r - i, 0.0, 1.0)
+    out = 1e3
+    if ti.max(s.crack_front[cut, i], s.crack_front[cut, i + 1]) < 1e2:
+        out = (1 - t) * s.crack_front[cut, i] + t * s.crack_front[cut, i + 1]
+    elif t < 0.5:
+        out = s.crack_front[cut, i]
+    else:
+        out = s.crack_front[cut, i + 1]
+    return out
 
-    @ti.func
-    def front_at(self, cut, s):
-        """Height of the crack front at a place along the cut [m], between the slices; far up where nothing is cut."""
-        r = (s - self.par[cut, FIRST]) * self.par[cut, INV]
-        i = ti.math.clamp(ti.floor(r, ti.i32), self.first, self.size[cut, STATIONS] - 2)
-        t = ti.math.clamp(r - i, 0.0, 1.0)
-        out = 1e3
-        if ti.max(self.front[cut, i], self.front[cut, i + 1]) < 1e2:
-            out = (1 - t) * self.front[cut, i] + t * self.front[cut, i + 1]
-        elif t < 0.5:
-            out = self.front[cut, i]
-        else:
-            out = self.front[cut, i + 1]
-        return out
 
-    @ti.func
-    def split(self, cut, p, base, q, mine):
-        """From which of the three node layers on, for each of the nine node columns, a particle meets the other side.
+@ti.func
+def visible_layers(s: ti.template(), cut, p, base, q, mine):
+    """From which of the three node layers on, for each of the nine node columns, a particle meets the other side.
 
-        Node and particle see each other across the cut plane when the line between them passes it below the crack
-        front, as in the crack algorithm of Nairn (2003, CMES 4:649). Three lengths place that front:
+    Node and particle see each other across the cut plane when the line between them passes it below the crack
+    front, as in the crack algorithm of Nairn (2003, CMES 4:649). Three lengths place that front:
 
-        - The crack leads the edge by half a process zone, the equivalent elastic crack of Irwin: food opens ahead of
-          the edge, as far on any grid. Held at the edge itself, the force of the wedge grows without end as the cells
-          shrink (0.31, 0.35, 0.37 J for dx = 3, 2, 1.5 mm against 0.321, 0.320, 0.315 J so).
-        - The nodes part early, so the front is held half a cell higher: then a crack that is loaded far away is as long as
-          it should be, to 0.2 cells over offsets and cell sizes (tests/mpm/kernels/test_crack.py), and a wedge in a slit needs the
-          force that finite elements need, to 3 %: 0.175, 0.174, 0.175, 0.175 and 0.175 N on 3, 2.5, 2, 1.5 and 1 mm where they
-          need 0.179 N (studies/verification/cutting.py). That is with the blade on a plane of nodes, where every scene has it whose
-          grid is not turned. Between two planes the food near the front opens less: 0.195, 0.189, 0.185, 0.181 N on 3, 2,
-          1.5 and 1 mm.
+    - The crack leads the edge by half a process zone, the equivalent elastic crack of Irwin: food opens ahead of
+      the edge, as far on any grid. Held at the edge itself, the force of the wedge grows without end as the cells
+      shrink (0.31, 0.35, 0.37 J for dx = 3, 2, 1.5 mm against 0.321, 0.320, 0.315 J so).
+    - The nodes part early, so the front is held half a cell higher: then a crack that is loaded far away is as long as
+      it should be, to 0.2 cells over offsets and cell sizes (tests/mpm/kernels/test_crack.py), and a wedge in a slit needs the
+      force that finite elements need, to 3 %: 0.175, 0.174, 0.175, 0.175 and 0.175 N on 3, 2.5, 2, 1.5 and 1 mm where they
+      need 0.179 N (studies/verification/cutting.py). That is with the blade on a plane of nodes, where every scene has it whose
+      grid is not turned. Between two planes the food near the front opens less: 0.195, 0.189, 0.185, 0.181 N on 3, 2,
+      1.5 and 1 mm.
 
-        All particles have the same front, so the nodes part row by row. That is a ripple with the period of a cell,
-        which the moving mean over one cell takes out (ForceRecord.resolved_face). Spreading the fronts of the particles
-        over a cell would hide it and cost more: those that are held longest carry the force. It was 6.8 N at 4 and 5.1 N
-        at 2 mm then, and its work followed the seed by 2 to 4 %.
+    All particles have the same front, so the nodes part row by row. That is a ripple with the period of a cell,
+    which the moving mean over one cell takes out (ForceRecord.resolved_face). Spreading the fronts of the particles
+    over a cell would hide it and cost more: those that are held longest carry the force. It was 6.8 N at 4 and 5.1 N
+    at 2 mm then, and its work followed the seed by 2 to 4 %.
 
-        Args:
-            p: The particle.
-            base: Its lowest node.
-            q: Position in the scene's axes [m].
-            mine: Half that the particle belongs to.
+    Args:
+        p: The particle.
+        base: Its lowest node.
+        q: Position in the scene's axes [m].
+        mine: Half that the particle belongs to.
 
-        Returns:
-            Layers, two bits a column in the order of :meth:`layer`; 3 where all nodes are shared.
-        """
-        code = WHOLE
-        if ti.static(self.cuts):
-            reach = ti.static(2.2 if self.turned else 1.6) * self.par[cut, DX]
-            if ti.abs(q[1]) < reach:
-                front = self.front_at(cut, q[0]) - 0.5 * self.par[cut, ZONE]
-                front += CRACK_LEAD * self.par[cut, DX]
-                if front < 1e2:
-                    code = 0
-                    for column in range(ti.static(9 if self.turned else 3)):
-                        n = self.blade_axes(cut, self.node(cut, base[0] + column // 3, base[1] + column % 3, base[2]))[
-                            1
-                        ]
-                        layer = 3
-                        if self.half_of_node(cut, n) != mine:
-                            t = q[1] / (q[1] - n) if ti.abs(q[1] - n) > 1e-9 * self.par[cut, DX] else 1.0
-                            t = ti.math.clamp(t, 1e-6, 1.0)
-                            # the line passes the plane at z_p + t (z_node - z_p); above the front it is cut
-                            level = (q[2] + (front - q[2]) / t - self.par[cut, OZ]) * self.par[cut, INV]
-                            layer = ti.math.clamp(ti.floor(level - base[2], ti.i32) + 1, 0, 3)
-                        code |= layer << (2 * column)
-        return code
+    Returns:
+        Layers, two bits a column in the order of :meth:`layer`; 3 where all nodes are shared.
+    """
+    code = ALL_VISIBLE
+    if ti.static(s.cuts):
+        reach = ti.static(2.2 if s.turned else 1.6) * s.par[cut, DX]
+        if ti.abs(q[1]) < reach:
+            front = front_height(s, cut, q[0]) - 0.5 * s.par[cut, ZONE]
+            front += FRONT_OFFSET * s.par[cut, DX]
+            if front < 1e2:
+                code = 0
+                for column in range(ti.static(9 if s.turned else 3)):
+                    n = to_scene_axes(
+                        s, cut, node_position(s, cut, base[0] + column // 3, base[1] + column % 3, base[2])
+                    )[1]
+                    layer = 3
+                    if node_half(s, cut, n) != mine:
+                        t = q[1] / (q[1] - n) if ti.abs(q[1] - n) > 1e-9 * s.par[cut, DX] else 1.0
+                        t = ti.math.clamp(t, 1e-6, 1.0)
+                        # the line passes the plane at z_p + t (z_node - z_p); above the front it is cut
+                        level = (q[2] + (front - q[2]) / t - s.par[cut, ORIGIN_Z]) * s.par[cut, INV_DX]
+                        layer = ti.math.clamp(ti.floor(level - base[2], ti.i32) + 1, 0, 3)
+                    code |= layer << (2 * column)
+    return code
 
-    @ti.func
-    def layer(self, code, i, j):
-        """Layer from which on node column (i, j) of a particle carries the other side; columns differ along j only
-        where the grid is not turned."""
-        return (code >> (2 * (3 * i + j if ti.static(self.turned) else j))) & 3
 
-    @ti.func
-    def half(self, cut, p, n):
-        """Half of the food that a particle belongs to, 0 left, 1 right: fixed when it is severed, by its side before."""
-        out = 0  # the modelled half of a mirror is the left
-        if ti.static(not self.my):
-            out = self.side[cut, p] - 1 if self.side[cut, p] > 0 else ti.cast(n >= 0, ti.i32)
-        return out
+@ti.func
+def hidden_from(s: ti.template(), code, i, j):
+    """Layer from which on node column (i, j) of a particle carries the other side; columns differ along j only
+    where the grid is not turned."""
+    return (code >> (2 * (3 * i + j if ti.static(s.turned) else j))) & 3
 
-    @ti.func
-    def half_of_node(self, cut, n):
-        """Half that a node belongs to; a node on the plane belongs to the right."""
-        return ti.cast(n > -1e-6 * self.par[cut, DX], ti.i32)
+
+@ti.func
+def particle_half(s: ti.template(), cut, p, n):
+    """Half of the food that a particle belongs to, 0 left, 1 right: fixed when it is severed, by its side before."""
+    out = 0  # the modelled half of a mirror is the left
+    if ti.static(not s.mirror_y):
+        out = s.side[cut, p] - 1 if s.side[cut, p] > 0 else ti.cast(n >= 0, ti.i32)
+    return out
+
+
+@ti.func
+def node_half(s: ti.template(), cut, n):
+    """Half that a node belongs to; a node on the plane belongs to the right."""
+    return ti.cast(n > -1e-6 * s.par[cut, DX], ti.i32)
+
+
+@ti.func
+def sever(s: ti.template(), cut, p, q):
+    """Material that the edge has passed belongs to the left (1) or right (2) half for good.
+
+    At the board that is all of it, also what is pressed a little into the board.
+    """
+    if ti.static(s.cuts):
+        tip = edge_height(s, cut, q[0])
+        if s.side[cut, p] == 0 and (q[2] > tip or tip <= 0) and under_blade(s, cut, q[0]):
+            s.side[cut, p] = 1 + particle_half(s, cut, p, q[1])
+
+
+@ti.func
+def field_offsets(s: ti.template(), cut, i, code):
+    """Where the fields of the nodes of a particle are stored along y from the lowest on, (j, k): its own side's or the other one's."""
+    at, second = ti.Matrix.zero(ti.i32, 3, 3), s.size[cut, SECOND_OFFSET]
+    for j, k in ti.static(ti.ndrange(3, 3)):
+        at[j, k] = j
+        if ti.static(s.cuts):
+            at[j, k] += 0 if k < hidden_from(s, code, i, j) else second
+    return at

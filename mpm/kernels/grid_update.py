@@ -2,155 +2,236 @@
 
 import taichi as ti
 
-from mpm.kernels.crack import Split
-from mpm.kernels.fields import (
-    BLADE,
+from mpm.kernels.crack import node_half
+from mpm.kernels.signed_distance import blade_distance, coulomb
+from mpm.kernels.tool import blade_velocity, book_impulse, book_knife_impulse, edge_height, under_blade
+from mpm.state.accessors import multiplicity, step_size, to_grid_axes, to_scene_axes
+from mpm.state.loops import locate_active, node_row, repetitions
+from mpm.state.state import NODE_LINES, NODE_ROWS
+from mpm.state.stencil import has_second_field, node_index, node_position, thread_node_index
+from mpm.state.tables import (
+    BLADE_HEIGHT,
+    BLADE_MU,
     BOARD,
     BOARD_MU,
-    COS,
     DX,
     FACE,
-    FRICTION,
     GRAVITY,
-    PAIR,
-    PLANE,
-    RADIUS,
-    SECOND,
-    SIN,
+    MIRROR_SUM,
+    PLANE_Y,
+    SECOND_OFFSET,
     SPINE,
+    TIP_RADIUS,
+    WEDGE_COS,
+    WEDGE_SIN,
 )
-from mpm.kernels.signed_distance import blade_distance, coulomb
 
 
-class Nodes(Split):
-    """Updates of the grid between the two transfers."""
+@ti.func
+def clear_row(s: ti.template(), cut, r):
+    """Empty the grids of all threads at a row of nodes."""
+    i, j, low, high = node_row(s, cut, r, NODE_ROWS)
+    for k in range(low, high):
+        for thread in ti.static(range(s.threads)):
+            s.g[thread_node_index(s, cut, thread, i, j, k)] = ti.Vector.zero(float, 4)
+    if ti.static(s.second_fields):
+        if has_second_field(s, cut, j):
+            for k in range(low, high):
+                for thread in ti.static(range(s.threads)):
+                    s.g[thread_node_index(s, cut, thread, i, s.size[cut, SECOND_OFFSET] + j, k)] = ti.Vector.zero(
+                        float, 4
+                    )
 
-    @ti.func
-    def add_mirrored(self, cut, i, m, j, k):
-        """Make node i and its image m across x carry the sum of both."""
-        a, b = self.g[self.own(cut, 0, i, j, k)], self.g[self.own(cut, 0, m, j, k)]
-        b[0] = -b[0]
-        a += b
-        self.g[self.own(cut, 0, i, j, k)] = a
-        a[0] = -a[0]
-        self.g[self.own(cut, 0, m, j, k)] = a
 
-    @ti.func
-    def fold_x(self, cut, j, k):
-        """Add the mirror images across x = 0 to one line of nodes."""
-        for m in ti.static(range(self.i0)):
-            self.add_mirrored(cut, self.size[cut, PAIR] - m, m, j, k)
-        if self.size[cut, PAIR] == 2 * self.i0:
-            c = 2.0 * self.g[self.own(cut, 0, self.i0, j, k)]
-            c[0] = 0.0
-            self.g[self.own(cut, 0, self.i0, j, k)] = c
+@ti.func
+def sum_row(s: ti.template(), cut, r):
+    """Sum the private grids of all threads at a row of nodes."""
+    i, j, low, high = node_row(s, cut, r, NODE_ROWS)
+    for k in range(low, high):
+        sum_threads(s, cut, i, j, k)
+    if ti.static(s.second_fields):
+        if has_second_field(s, cut, j):
+            for k in range(low, high):
+                sum_threads(s, cut, i, s.size[cut, SECOND_OFFSET] + j, k)
 
-    @ti.func
-    def nodal_contact(self, cut, i, j, k, q, u):
-        """The plain rule: velocities at nodes inside a tool are projected, with Coulomb friction."""
-        at = self.blade_axes(cut, self.node(cut, i, j, k))
-        u = self.blade_axes(cut, u)
-        mult = self.images(cut, i, j)
-        for which in ti.static(range(2)):
-            d, nrm, vel, mu = at[2], ti.Vector([0.0, 0.0, 1.0]), ti.Vector.zero(float, 3), self.par[cut, BOARD_MU]
+
+@ti.func
+def sum_threads(s: ti.template(), cut, i, j, k):
+    """Sum the private grids of all threads at one node."""
+    q = s.g[thread_node_index(s, cut, 0, i, j, k)]
+    for t in ti.static(range(1, s.threads)):
+        q += s.g[thread_node_index(s, cut, t, i, j, k)]
+    s.g[thread_node_index(s, cut, 0, i, j, k)] = q
+
+
+@ti.func
+def add_mirror_image(s: ti.template(), cut, i, m, j, k):
+    """Make node i and its image m across x carry the sum of both."""
+    a, b = s.g[thread_node_index(s, cut, 0, i, j, k)], s.g[thread_node_index(s, cut, 0, m, j, k)]
+    b[0] = -b[0]
+    a += b
+    s.g[thread_node_index(s, cut, 0, i, j, k)] = a
+    a[0] = -a[0]
+    s.g[thread_node_index(s, cut, 0, m, j, k)] = a
+
+
+@ti.func
+def fold_mirror_x(s: ti.template(), cut, j, k):
+    """Add the mirror images across x = 0 to one line of nodes."""
+    for m in ti.static(range(s.plane_x)):
+        add_mirror_image(s, cut, s.size[cut, MIRROR_SUM] - m, m, j, k)
+    if s.size[cut, MIRROR_SUM] == 2 * s.plane_x:
+        c = 2.0 * s.g[thread_node_index(s, cut, 0, s.plane_x, j, k)]
+        c[0] = 0.0
+        s.g[thread_node_index(s, cut, 0, s.plane_x, j, k)] = c
+
+
+@ti.func
+def nodal_contact(s: ti.template(), cut, i, j, k, q, u):
+    """The plain rule: velocities at nodes inside a tool are projected, with Coulomb friction."""
+    at = to_scene_axes(s, cut, node_position(s, cut, i, j, k))
+    u = to_scene_axes(s, cut, u)
+    mult = multiplicity(s, cut, i, j)
+    for which in ti.static(range(2)):
+        d, nrm, vel, mu = at[2], ti.Vector([0.0, 0.0, 1.0]), ti.Vector.zero(float, 3), s.par[cut, BOARD_MU]
+        if ti.static(which == 1):
+            above = at[2] - edge_height(s, cut, at[0])
+            d, nrm = blade_distance(
+                ti.abs(at[1]),
+                above,
+                s.par[cut, SPINE],
+                s.par[cut, WEDGE_COS],
+                s.par[cut, WEDGE_SIN],
+                s.par[cut, TIP_RADIUS],
+            )
+            if ti.abs(at[1]) < 1e-6 * s.par[cut, DX]:  # both faces are equally near: their mean normal is downwards
+                nrm = ti.Vector([0.0, 0.0, -1.0])
+            elif at[1] < 0:
+                nrm[1] = -nrm[1]
+            vel = blade_velocity(s, cut, at[0], at[2])
+            mu = s.par[cut, BLADE_MU]
+            if above < 0 or above > s.par[cut, BLADE_HEIGHT] or not under_blade(s, cut, at[0]):
+                d = 1.0
+        rel = u - vel
+        vn = rel.dot(nrm)
+        if d <= 0 and vn < 0:
+            t = rel - vn * nrm
+            new = vel + t + coulomb(-vn, t, mu)
             if ti.static(which == 1):
-                above = at[2] - self.edge_height(cut, at[0])
-                d, nrm = blade_distance(
-                    ti.abs(at[1]),
-                    above,
-                    self.par[cut, SPINE],
-                    self.par[cut, COS],
-                    self.par[cut, SIN],
-                    self.par[cut, RADIUS],
-                )
-                if (
-                    ti.abs(at[1]) < 1e-6 * self.par[cut, DX]
-                ):  # both faces are equally near: their mean normal is downwards
-                    nrm = ti.Vector([0.0, 0.0, -1.0])
-                elif at[1] < 0:
-                    nrm[1] = -nrm[1]
-                vel = self.blade_velocity(cut, at[0], at[2])
-                mu = self.par[cut, FRICTION]
-                if above < 0 or above > self.par[cut, BLADE] or not self.under_blade(cut, at[0]):
-                    d = 1.0
-            rel = u - vel
-            vn = rel.dot(nrm)
-            if d <= 0 and vn < 0:
-                t = rel - vn * nrm
-                new = vel + t + coulomb(-vn, t, mu)
-                if ti.static(which == 1):
-                    self.knife(cut, FACE, mult * q[3] * (u - new), at[0], at[2])
-                else:
-                    self.tool(cut, BOARD, mult * q[3] * (u - new))
-                u = new
-        return self.grid_axes(cut, u)
+                book_knife_impulse(s, cut, FACE, mult * q[3] * (u - new), at[0], at[2])
+            else:
+                book_impulse(s, cut, BOARD, mult * q[3] * (u - new))
+            u = new
+    return to_grid_axes(s, cut, u)
 
-    @ti.func
-    def scattered(self, cut, i, j, k):
-        """Momentum and mass that all threads have scattered to a node; where x has a mirror they are added up before it."""
-        q = self.g[self.own(cut, 0, i, j, k)]
-        if ti.static(not self.mx):
-            for s in ti.static(range(1, self.threads)):
-                q += self.g[self.own(cut, s, i, j, k)]
-        return q
 
-    @ti.func
-    def both(self, cut, i, j, k):
-        """Momentum and mass of the first and the second field at a node, mirror images across y included, and the masses
-        without them."""
-        a, b = self.scattered(cut, i, j, k), ti.Vector.zero(float, 4)
-        masses = ti.Vector([a[3], 0.0])
-        if ti.static(self.twins):
-            if self.twin(cut, j):
-                second = self.size[cut, SECOND]
-                b = self.scattered(cut, i, second + j, k)
-                masses[1] = b[3]
-                if ti.static(self.my):
-                    m = 2 * self.size[cut, PLANE] - j
-                    if self.twin(cut, m):
-                        flip = ti.Vector([1.0, -1.0, 1.0, 1.0])
-                        a += flip * self.scattered(cut, i, m, k)
-                        if j != self.size[cut, PLANE]:
-                            b += flip * self.scattered(cut, i, second + m, k)
-        return a, b, masses
+@ti.func
+def scattered(s: ti.template(), cut, i, j, k):
+    """Momentum and mass that all threads have scattered to a node; where x has a mirror they are added up before it."""
+    q = s.g[thread_node_index(s, cut, 0, i, j, k)]
+    if ti.static(not s.mirror_x):
+        for thread in ti.static(range(1, s.threads)):
+            q += s.g[thread_node_index(s, cut, thread, i, j, k)]
+    return q
 
-    @ti.func
-    def update_node(self, cut, i, j, k, dt):
-        """Momentum to velocity at a node, for the food on its own side and for the severed food of the other side."""
-        a, b, masses = self.both(cut, i, j, k)
-        fall = ti.Vector([0.0, 0.0, -self.par[cut, GRAVITY] * dt])
-        va, vb = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
-        if a[3] > 0:
-            va = ti.Vector([a[0], a[1], a[2]]) / a[3] + fall
-            if ti.static(self.nodal):
-                va = self.nodal_contact(cut, i, j, k, a, va)
-        if ti.static(self.twins):
-            if b[3] > 0:
-                vb = ti.Vector([b[0], b[1], b[2]]) / b[3] + fall
-                va, vb = self.keep_apart(cut, i, j, k, a, b, va, vb)
-            if self.twin(cut, j):
-                # velocity of all that shares the field, mass of what was scattered here
-                at = self.size[cut, SECOND] + j
-                self.u[self.shared(cut, i, at, k)] = ti.Vector([vb[0], vb[1], vb[2], masses[1]])
-        self.u[self.shared(cut, i, j, k)] = ti.Vector([va[0], va[1], va[2], masses[0]])
 
-    @ti.func
-    def keep_apart(self, cut, i, j, k, a, b, va, vb):
-        """Where no blade is between them, the severed halves may close on each other but not pass through."""
-        at = self.blade_axes(cut, self.node(cut, i, j, k))
-        above = at[2] - self.edge_height(cut, at[0])
-        if not (-0.5 * self.par[cut, DX] < above < self.par[cut, BLADE] and self.under_blade(cut, at[0])):
-            n = self.grid_axes(cut, ti.Vector([0.0, 1.0, 0.0]))
-            sign = 1.0 if self.half_of_node(cut, at[1]) == 1 else -1.0
-            na, nb = va.dot(n), vb.dot(n)
-            on_mirror = False
-            if ti.static(self.my):
-                on_mirror = j == self.size[cut, PLANE]
-            if on_mirror:  # the other half is the image of the second field
-                if nb > 0:
-                    vb -= nb * n
-            elif sign * (nb - na) > 0 and a[3] > 0:
-                mean = (a[3] * na + b[3] * nb) / (a[3] + b[3])
-                va += (mean - na) * n
-                vb += (mean - nb) * n
-        return va, vb
+@ti.func
+def both_fields(s: ti.template(), cut, i, j, k):
+    """Momentum and mass of the first and the second field at a node, mirror images across y included, and the masses
+    without them."""
+    a, b = scattered(s, cut, i, j, k), ti.Vector.zero(float, 4)
+    masses = ti.Vector([a[3], 0.0])
+    if ti.static(s.second_fields):
+        if has_second_field(s, cut, j):
+            second = s.size[cut, SECOND_OFFSET]
+            b = scattered(s, cut, i, second + j, k)
+            masses[1] = b[3]
+            if ti.static(s.mirror_y):
+                m = 2 * s.size[cut, PLANE_Y] - j
+                if has_second_field(s, cut, m):
+                    flip = ti.Vector([1.0, -1.0, 1.0, 1.0])
+                    a += flip * scattered(s, cut, i, m, k)
+                    if j != s.size[cut, PLANE_Y]:
+                        b += flip * scattered(s, cut, i, second + m, k)
+    return a, b, masses
+
+
+@ti.func
+def update_node(s: ti.template(), cut, i, j, k, dt):
+    """Momentum to velocity at a node, for the food on its own side and for the severed food of the other side."""
+    a, b, masses = both_fields(s, cut, i, j, k)
+    fall = ti.Vector([0.0, 0.0, -s.par[cut, GRAVITY] * dt])
+    va, vb = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
+    if a[3] > 0:
+        va = ti.Vector([a[0], a[1], a[2]]) / a[3] + fall
+        if ti.static(s.nodal):
+            va = nodal_contact(s, cut, i, j, k, a, va)
+    if ti.static(s.second_fields):
+        if b[3] > 0:
+            vb = ti.Vector([b[0], b[1], b[2]]) / b[3] + fall
+            va, vb = crack_face_contact(s, cut, i, j, k, a, b, va, vb)
+        if has_second_field(s, cut, j):
+            # velocity of all that shares the field, mass of what was scattered here
+            at = s.size[cut, SECOND_OFFSET] + j
+            s.u[node_index(s, cut, i, at, k)] = ti.Vector([vb[0], vb[1], vb[2], masses[1]])
+    s.u[node_index(s, cut, i, j, k)] = ti.Vector([va[0], va[1], va[2], masses[0]])
+
+
+@ti.func
+def crack_face_contact(s: ti.template(), cut, i, j, k, a, b, va, vb):
+    """Where no blade is between them, the severed halves may close on each other but not pass through."""
+    at = to_scene_axes(s, cut, node_position(s, cut, i, j, k))
+    above = at[2] - edge_height(s, cut, at[0])
+    if not (-0.5 * s.par[cut, DX] < above < s.par[cut, BLADE_HEIGHT] and under_blade(s, cut, at[0])):
+        n = to_grid_axes(s, cut, ti.Vector([0.0, 1.0, 0.0]))
+        sign = 1.0 if node_half(s, cut, at[1]) == 1 else -1.0
+        na, nb = va.dot(n), vb.dot(n)
+        on_mirror = False
+        if ti.static(s.mirror_y):
+            on_mirror = j == s.size[cut, PLANE_Y]
+        if on_mirror:  # the other half is the image of the second field
+            if nb > 0:
+                vb -= nb * n
+        elif sign * (nb - na) > 0 and a[3] > 0:
+            mean = (a[3] * na + b[3] * nb) / (a[3] + b[3])
+            va += (mean - na) * n
+            vb += (mean - nb) * n
+    return va, vb
+
+
+@ti.func
+def clear_grid(s: ti.template(), cut: ti.template()):
+    """Empty the grids of all threads."""
+    for q in range(repetitions(s, cut, NODE_ROWS)):
+        c, r, mine = locate_active(s, cut, q, NODE_ROWS)
+        if mine:
+            clear_row(s, c, r)
+
+
+@ti.func
+def fold_mirror_images(s: ti.template(), cut: ti.template()):
+    """Add the mirror images across x = 0 to the nodes."""
+    if ti.static(s.threads > 1):
+        for q in range(repetitions(s, cut, NODE_ROWS)):
+            sum_row(s, cut, q)
+    for q in range(repetitions(s, cut, NODE_LINES)):
+        c, r, mine = locate_active(s, cut, q, NODE_LINES)
+        if mine:
+            deep = s.window[c, 5] - s.window[c, 2]
+            j, k = s.window[c, 1] + r // deep, s.window[c, 2] + r % deep
+            fold_mirror_x(s, c, j, k)
+            if ti.static(s.second_fields):
+                if has_second_field(s, c, j):
+                    fold_mirror_x(s, c, s.size[c, SECOND_OFFSET] + j, k)
+
+
+@ti.func
+def update_grid(s: ti.template(), cut: ti.template()):
+    """Momentum to velocity at every node in reach."""
+    for q in range(repetitions(s, cut, NODE_ROWS)):
+        c, r, mine = locate_active(s, cut, q, NODE_ROWS)
+        if mine:
+            dt = step_size(s, c)
+            i, j, low, high = node_row(s, c, r, NODE_ROWS)
+            for k in range(low, high):
+                update_node(s, c, i, j, k, dt)

@@ -3,134 +3,133 @@
 import taichi as ti
 
 from mpm.kernels.constitutive import damage_of, deviatoric_energy, left_cauchy_green, left_stretch, unit
-from mpm.kernels.crack import PUSHED
-from mpm.kernels.fields import (
-    BOOKED,
+from mpm.kernels.crack import IN_CONTACT
+from mpm.state.accessors import deformation_gradient, velocity_gradient
+from mpm.state.loops import block_range, extent, locate, repetitions
+from mpm.state.state import BEYOND_GRID, CUTS, DAMAGE_ROWS, NODE_LINES, NODE_ROWS, PARTS
+from mpm.state.stencil import base_node
+from mpm.state.tables import (
+    BOOKED_IMPULSE,
     COUNT,
     DX,
-    EACH,
     EDGE,
     EPS0,
     EPSF,
     FACE,
-    FAR,
-    HOT,
     LAM,
-    LINE,
     MASS,
     MU,
+    N_PARTICLE_SUMS,
     N_POSE,
-    N_STATE,
     N_SUMS,
     NODES,
-    PART,
-    PLANE,
-    ROW,
-    VOL,
+    PLANE_Y,
+    VOLUME,
 )
-from mpm.kernels.stress import Stress
 
 MARGIN = 3  # cells by which the window exceeds the particles; it is renewed at every output
 
 
-class Survey(Stress):
-    """Loops over all particles that change none."""
+@ti.func
+def momentum_and_energy(s: ti.template(), cut, p):
+    """Momentum (3), kinetic and elastic energy of a particle [N s, J].
 
-    @ti.func
-    def measured(self, cut, p):
-        """Momentum (3), kinetic and elastic energy of a particle [N s, J].
+    The kinetic energy is that of the motion, without what contact has just given, as the stress that will balance it has
+    not acted yet: food at rest on a board would else have the energy of the fall that the board stops in every step.
+    """
+    m, u = s.par[cut, MASS] * s.volume_ratio[cut, p], s.v[cut, p]
+    spin = velocity_gradient(s, cut, p).norm_sqr()
+    f = deformation_gradient(s, cut, p)
+    j = f.determinant()
+    v = unit()
+    if j > 0:
+        v = left_stretch(left_cauchy_green(f), j)
+    d = 0.0
+    if ti.static(s.damage):
+        d = damage_of(s.kappa[cut, p], s.par[cut, EPS0], s.par[cut, EPSF])
+    vol = 0.5 * s.par[cut, LAM] * (j - 1) ** 2
+    dev = deviatoric_energy(v, s.par[cut, MU])
+    if ti.static(s.branches > 0):
+        held = 1.0
+        stored = 0.0
+        for b in ti.static(range(s.branches)):
+            held -= s.prony_share[cut, b]
+            stored += s.prony_stress[cut, b, p].norm_sqr() / (4 * s.par[cut, MU] * s.prony_share[cut, b])
+        dev = held * dev + stored
+    keep = 1.0 - d
+    gift = s.contact_moment[cut, p, 0][3] if s.visibility[cut, p] & IN_CONTACT else 0.0
+    kinetic = m * (0.5 * u.norm_sqr() - gift + 0.125 * s.par[cut, DX] * s.par[cut, DX] * spin)
+    energy = s.par[cut, VOLUME] * s.volume_ratio[cut, p] * (keep * dev + (keep if j > 1 else 1.0) * vol)
+    return ti.Vector([m * u[0], m * u[1], m * u[2], kinetic, energy])
 
-        The kinetic energy is that of the motion, without what contact has just given, as the stress that will balance it has
-        not acted yet: food at rest on a board would else have the energy of the fall that the board stops in every step.
-        """
-        m, u = self.par[cut, MASS] * self.bulk[cut, p], self.v[cut, p]
-        spin = self.gradient_of(cut, p).norm_sqr()
-        f = self.deformation_of(cut, p)
-        j = f.determinant()
-        v = unit()
-        if j > 0:
-            v = left_stretch(left_cauchy_green(f), j)
-        d = 0.0
-        if ti.static(self.damage):
-            d = damage_of(self.kappa[cut, p], self.par[cut, EPS0], self.par[cut, EPSF])
-        vol = 0.5 * self.par[cut, LAM] * (j - 1) ** 2
-        dev = deviatoric_energy(v, self.par[cut, MU])
-        if ti.static(self.branches > 0):
-            held = 1.0
-            stored = 0.0
-            for b in ti.static(range(self.branches)):
-                held -= self.share_of[cut, b]
-                stored += self.memory[cut, b, p].norm_sqr() / (4 * self.par[cut, MU] * self.share_of[cut, b])
-            dev = held * dev + stored
-        keep = 1.0 - d
-        gift = self.lever[cut, p, 0][3] if self.layers[cut, p] & PUSHED else 0.0
-        kinetic = m * (0.5 * u.norm_sqr() - gift + 0.125 * self.par[cut, DX] * self.par[cut, DX] * spin)
-        energy = self.par[cut, VOL] * self.bulk[cut, p] * (keep * dev + (keep if j > 1 else 1.0) * vol)
-        return ti.Vector([m * u[0], m * u[1], m * u[2], kinetic, energy])
 
-    @ti.func
-    def report(self, cut, row, out: ti.template()):
-        """Write what was booked since the last report, the state of the particles and the pose; clear what was booked.
+@ti.func
+def report(s: ti.template(), cut, row, out: ti.template()):
+    """Write what was booked since the last report, the state of the particles and the pose; clear what was booked.
 
-        Images of mirrors are not counted.
-        """
-        for q in range(self.loop(cut, EACH)):
-            c, _, _ = self.whose(cut, q, EACH)
-            for r in range(N_STATE):
-                self.state[c, r] = 0.0
-        for q in range(self.loop(cut, PART)):
-            c, part, there = self.whose(cut, q, PART)
-            first, last, _ = self.share(c, part)
-            if there and first < last:
-                total = ti.Vector.zero(ti.f64, N_STATE)
-                for p in range(first * self.lanes, ti.min(last * self.lanes, self.size[c, COUNT])):
-                    total += self.measured(c, p)
-                for r in ti.static(range(N_STATE)):
-                    self.state[c, r] += total[r]
-        for q in range(self.loop(cut, EACH)):
-            c, _, _ = self.whose(cut, q, EACH)
-            for r in range(N_STATE):
-                out[c, row, N_SUMS + r] = self.state[c, r]
-            for r in range(N_POSE):
-                out[c, row, N_SUMS + N_STATE + r] = self.pose[c, r]
-            self.pose[c, BOOKED] -= self.sums[c, EDGE + 2] + self.sums[c, FACE + 2]  # the arm has felt that
-            for r in range(N_SUMS):
-                out[c, row, r] = self.sums[c, r]
-                self.sums[c, r] = 0.0
+    Images of mirrors are not counted.
+    """
+    for q in range(repetitions(s, cut, CUTS)):
+        c, _, _ = locate(s, cut, q, CUTS)
+        for r in range(N_PARTICLE_SUMS):
+            s.particle_sums[c, r] = 0.0
+    for q in range(repetitions(s, cut, PARTS)):
+        c, part, there = locate(s, cut, q, PARTS)
+        first, last, _ = block_range(s, c, part)
+        if there and first < last:
+            total = ti.Vector.zero(ti.f64, N_PARTICLE_SUMS)
+            for p in range(first * s.lanes, ti.min(last * s.lanes, s.size[c, COUNT])):
+                total += momentum_and_energy(s, c, p)
+            for r in ti.static(range(N_PARTICLE_SUMS)):
+                s.particle_sums[c, r] += total[r]
+    for q in range(repetitions(s, cut, CUTS)):
+        c, _, _ = locate(s, cut, q, CUTS)
+        for r in range(N_PARTICLE_SUMS):
+            out[c, row, N_SUMS + r] = s.particle_sums[c, r]
+        for r in range(N_POSE):
+            out[c, row, N_SUMS + N_PARTICLE_SUMS + r] = s.pose[c, r]
+        s.pose[c, BOOKED_IMPULSE] -= s.sums[c, EDGE + 2] + s.sums[c, FACE + 2]  # the arm has felt that
+        for r in range(N_SUMS):
+            out[c, row, r] = s.sums[c, r]
+            s.sums[c, r] = 0.0
 
-    @ti.func
-    def look_around(self, cut):
-        """Find the window: the nodes that any particle touches, some more, and those that mirrors fold back."""
-        for q in range(self.loop(cut, EACH)):
-            c, _, _ = self.whose(cut, q, EACH)
-            for d in ti.static(range(3)):
-                self.window[c, d], self.window[c, d + 3] = FAR, -FAR
-            if ti.static(self.atomic):
-                for what in ti.static((ROW, LINE, HOT)):
-                    self.most[what] = 0
-        for q in range(self.loop(cut, PART)):
-            c, part, there = self.whose(cut, q, PART)
-            first, last, _ = self.share(c, part)
-            if there and first < last:
-                low, high = ti.Vector([FAR, FAR, FAR]), ti.Vector([-FAR, -FAR, -FAR])
-                for p in range(first * self.lanes, ti.min(last * self.lanes, self.size[c, COUNT])):
-                    base, fx = self.local(c, self.x[c, p])
-                    for d in ti.static(range(3)):
-                        place = ti.min(ti.max(base[d], -FAR // 2), FAR // 2)
-                        low[d], high[d] = ti.min(low[d], place), ti.max(high[d], place)
+
+@ti.func
+def find_window(s: ti.template(), cut):
+    """Find the window: the nodes that any particle touches, some more, and those that mirrors fold back."""
+    for q in range(repetitions(s, cut, CUTS)):
+        c, _, _ = locate(s, cut, q, CUTS)
+        for d in ti.static(range(3)):
+            s.window[c, d], s.window[c, d + 3] = BEYOND_GRID, -BEYOND_GRID
+        if ti.static(s.atomic):
+            for what in ti.static((NODE_ROWS, NODE_LINES, DAMAGE_ROWS)):
+                s.extents[what] = 0
+    for q in range(repetitions(s, cut, PARTS)):
+        c, part, there = locate(s, cut, q, PARTS)
+        first, last, _ = block_range(s, c, part)
+        if there and first < last:
+            low, high = (
+                ti.Vector([BEYOND_GRID, BEYOND_GRID, BEYOND_GRID]),
+                ti.Vector([-BEYOND_GRID, -BEYOND_GRID, -BEYOND_GRID]),
+            )
+            for p in range(first * s.lanes, ti.min(last * s.lanes, s.size[c, COUNT])):
+                base, fx = base_node(s, c, s.x[c, p])
                 for d in ti.static(range(3)):
-                    ti.atomic_min(self.window[c, d], low[d])
-                    ti.atomic_max(self.window[c, d + 3], high[d])
-        for q in range(self.loop(cut, EACH)):
-            c, _, _ = self.whose(cut, q, EACH)
+                    place = ti.min(ti.max(base[d], -BEYOND_GRID // 2), BEYOND_GRID // 2)
+                    low[d], high[d] = ti.min(low[d], place), ti.max(high[d], place)
             for d in ti.static(range(3)):
-                low, high = self.window[c, d] - MARGIN, self.window[c, d + 3] + MARGIN + 3
-                if ti.static((self.mx, self.my, False)[d]):
-                    plane = self.i0 if ti.static(d == 0) else self.size[c, PLANE]
-                    low, high = ti.min(low, plane - 2), ti.max(high, plane + 3)
-                self.window[c, d] = ti.max(low, 0)
-                self.window[c, d + 3] = ti.max(ti.min(high, self.size[c, NODES + d]), self.window[c, d])
-            if ti.static(self.atomic):
-                for what in ti.static((ROW, LINE)):
-                    ti.atomic_max(self.most[what], self.places(c, what))
-                ti.atomic_max(self.most[HOT], self.places(c, ROW))
+                ti.atomic_min(s.window[c, d], low[d])
+                ti.atomic_max(s.window[c, d + 3], high[d])
+    for q in range(repetitions(s, cut, CUTS)):
+        c, _, _ = locate(s, cut, q, CUTS)
+        for d in ti.static(range(3)):
+            low, high = s.window[c, d] - MARGIN, s.window[c, d + 3] + MARGIN + 3
+            if ti.static((s.mirror_x, s.mirror_y, False)[d]):
+                plane = s.plane_x if ti.static(d == 0) else s.size[c, PLANE_Y]
+                low, high = ti.min(low, plane - 2), ti.max(high, plane + 3)
+            s.window[c, d] = ti.max(low, 0)
+            s.window[c, d + 3] = ti.max(ti.min(high, s.size[c, NODES + d]), s.window[c, d])
+        if ti.static(s.atomic):
+            for what in ti.static((NODE_ROWS, NODE_LINES)):
+                ti.atomic_max(s.extents[what], extent(s, c, what))
+            ti.atomic_max(s.extents[DAMAGE_ROWS], extent(s, c, NODE_ROWS))

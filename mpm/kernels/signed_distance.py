@@ -33,7 +33,7 @@ def blade_distance(y, above, spine, cos_h, sin_h, radius):
 
 
 @ti.func
-def tack(opening, gap):
+def adhesive_traction(opening, gap):
     """Traction of a sticky face over its strength when it has opened by ``opening`` [-]; ``gap`` [m] ends it.
 
     Triangular law: full strength at a tenth of the gap, work of adhesion = strength times gap / 2.
@@ -69,25 +69,4 @@ def stick_slip(stick, slide, own, most):
     size = out.norm()
     if size > most:
         out *= most / size
-    return out
-
-
-@ti.func
-def edge_level(cut, softening, start, resistance):
-    """Line force that the edge can carry after cutting ``cut`` deep [N/m].
-
-    It falls from the force at which the cut started to the propagation resistance over the softening length.
-    """
-    return resistance + (start - resistance) * ti.exp(-cut / softening)
-
-
-@ti.func
-def bspline(r):
-    """Quadratic B-spline of unit width [-]."""
-    q = ti.abs(r)
-    out = 0.0
-    if q < 0.5:
-        out = 0.75 - q * q
-    elif q < 1.5:
-        out = 0.5 * (1.5 - q) ** 2
     return out

@@ -1,129 +1,193 @@
-"""What a run has booked so far: a row for each output interval, from which its record is made."""
+"""What a run has booked so far: an entry for each output interval, from which its record is made."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 
-from mpm.kernels import fields as kn
 from mpm.material import Material
 from mpm.output.health import health
 from mpm.output.record import ForceRecord
+from mpm.output.topology import Topology
+from mpm.setup.setup import Setup
 from mpm.shapes import section_area
+from mpm.state import tables as row
+from mpm.state.tables import Report, parts_of_report
 
-if TYPE_CHECKING:
-    from mpm.solver import Simulation
+
+@dataclass(frozen=True, eq=False)
+class Interval:
+    """What an output interval adds to the record; forces act on the tools.
+
+    Attributes:
+        stroke: Way of the edge below the food's top at its end [m].
+        command: Stroke that was commanded [m].
+        slide: Way of the blade along its edge [m].
+        time: Simulated time at its end [s].
+        momentum: Of the food at its end [N s], shape (3,).
+        edge: Force of the food on the cutting edge [N], shape (3,).
+        face: Force of the food on the blade's faces [N], shape (3,).
+        board: Force of the food on the board [N], shape (3,).
+        gravity: Weight [N], shape (3,).
+        residual: Momentum balance that does not close [N], shape (3,).
+        kinetic: Kinetic energy at its end [J].
+        elastic: Elastic energy at its end [J].
+        plastic: Energy that J2 flow has taken in it [J].
+        damage: Energy that bulk damage has taken in it [J].
+        viscous: Energy that the loss factor has taken in it [J].
+        friction: Energy that friction has taken in it [J].
+        parting: Energy that the cutting edge has taken in it [J].
+        moment: Of the food on the knife about the middle of the edge [N m].
+        tilt: Angle of the edge to the board at its end [rad].
+    """
+
+    stroke: float
+    command: float
+    slide: float
+    time: float
+    momentum: np.ndarray
+    edge: np.ndarray
+    face: np.ndarray
+    board: np.ndarray
+    gravity: np.ndarray
+    residual: np.ndarray
+    kinetic: float
+    elastic: float
+    plastic: float
+    damage: float
+    viscous: float
+    friction: float
+    parting: float
+    moment: float
+    tilt: float
 
 
-class Ledger:
-    """Rows of a cut.
+class Recorder:
+    """Books the output intervals of a cut.
 
     Args:
-        simulation: The cut.
+        setup: The cut.
         material: Its constants.
 
     Attributes:
-        rows: One for each output interval.
+        intervals: Those that are booked.
         steps: Time steps so far.
         time: Simulated time so far [s].
         status: ``done``, or why the run cannot go on.
     """
 
-    def __init__(self, simulation: Simulation, material: Material) -> None:
-        self._simulation, self._material = simulation, material
-        self.rows: list[list[float]] = []
+    def __init__(self, setup: Setup, material: Material) -> None:
+        self._setup, self._material = setup, material
+        self.intervals: list[Interval] = []
         self.steps, self.time, self.status = 0, 0.0, "done"
-        self._momentum = np.zeros(3)
         self._counters = {"inverted": 0, "outside": 0}
 
     def book(self, report: np.ndarray, steps: int, dt: float) -> None:
         """Book an interval.
 
         Args:
-            report: What the kernels say of it, shape (N_REPORT,).
+            report: What the kernels say of it in SI units [-], shape (N_REPORT,).
             steps: Its time steps.
             dt: Length of one [s].
         """
-        sums, state, pose = np.split(report, (kn.N_SUMS, kn.N_SUMS + kn.N_STATE))
+        parts = parts_of_report(report)
         self.steps, self.time = self.steps + steps, self.time + steps * dt
-        self._counters["inverted"] += int(sums[kn.INVERTED])
-        self._counters["outside"] += int(sums[kn.OUTSIDE])
-        parts = self._parts(sums, state, steps * dt)
-        self._momentum = np.array(parts[0])
-        height = self._simulation.scene.food.shape.height
-        place = [height - pose[kn.Z], height - pose[kn.COMMAND], pose[kn.S]]
-        self.rows.append([*place, self.time, *(v for part in parts for v in part), pose[kn.TILT]])
-        self.status = health(sums, state)
+        self._counters["inverted"] += int(parts.sums[row.INVERTED])
+        self._counters["outside"] += int(parts.sums[row.OUTSIDE])
+        self.intervals.append(self._interval(parts, steps * dt))
+        self.status = health(parts.sums, parts.particles)
 
     @property
     def force(self) -> np.ndarray:
         """Force of the food on the knife in the last interval [N], shape (3,)."""
-        return np.array(self.rows[-1][7:10]) + np.array(self.rows[-1][10:13])
+        return self.intervals[-1].edge + self.intervals[-1].face
 
     @property
     def moment(self) -> float:
         """Moment of the food on the knife about the middle of the edge in the last interval [N m]."""
-        return self.rows[-1][-2]
+        return self.intervals[-1].moment
 
-    def _parts(self, sums: np.ndarray, state: np.ndarray, span: float) -> list[list[float]]:
-        """Momentum, edge, face, board, gravity, residual, energies and moment of an interval."""
-        s, material = self._simulation, self._material
-        mirror = np.array([0.0 if m else 1.0 for m in (*s.scene.mirrors, False)])
-        momentum = s.turned(state[None, :3], -1.0)[0] * s.images * mirror
-        edge, face, board = (sums[r : r + 3] / span for r in (kn.EDGE, kn.FACE, kn.BOARD))
-        weight = np.array([0.0, 0.0, -material.rho * s.seeds.total * s.images * s.scene.numerics.gravity])
-        residual = (momentum - self._momentum) / span - weight + edge + face + board
-        lost = [s.images * s.seeds.volume * sums[r] for r in (kn.PLASTIC, kn.DAMAGE, kn.VISCOUS)]
-        energy = [state[3] * s.images, state[4] * s.images, *lost, sums[kn.RUBBED], sums[kn.PARTED]]
-        moment = [sums[kn.MOMENT] / span]
-        return [list(momentum), list(edge), list(face), list(board), list(weight), list(residual), energy, moment]
+    def _interval(self, parts: Report, span: float) -> Interval:
+        """An interval of a length [s] from what the kernels say of it; mirror images are counted here."""
+        setup, sums, pose = self._setup, parts.sums, parts.pose
+        scene, images, height = setup.scene, setup.grid.images, setup.scene.food.shape.height
+        mirror = np.array([0.0 if m else 1.0 for m in (*scene.mirrors, False)])
+        momentum = setup.to_scene_axes(parts.particles[None, row.MOMENTUM : row.KINETIC])[0] * images * mirror
+        before = self.intervals[-1].momentum if self.intervals else np.zeros(3)
+        edge, face, board = (sums[r : r + 3] / span for r in (row.EDGE, row.FACE, row.BOARD))
+        weight = np.array([0.0, 0.0, -self._material.rho * setup.seeds.total * images * scene.numerics.gravity])
+        volume = images * setup.seeds.volume
+        return Interval(
+            stroke=height - pose[row.EDGE_Z],
+            command=height - pose[row.COMMAND],
+            slide=pose[row.EDGE_S],
+            time=self.time,
+            momentum=momentum,
+            edge=edge,
+            face=face,
+            board=board,
+            gravity=weight,
+            residual=(momentum - before) / span - weight + edge + face + board,
+            kinetic=parts.particles[row.KINETIC] * images,
+            elastic=parts.particles[row.ELASTIC] * images,
+            plastic=volume * sums[row.PLASTIC],
+            damage=volume * sums[row.DAMAGE],
+            viscous=volume * sums[row.VISCOUS],
+            friction=sums[row.FRICTION_WORK],
+            parting=sums[row.CUTTING_WORK],
+            moment=sums[row.MOMENT] / span,
+            tilt=pose[row.TILT],
+        )
 
-    def record(self, *, dt: float, fraction: float, wall: float) -> ForceRecord:
-        """Columns of the rows as a record.
+    def _column(self, name: str) -> np.ndarray:
+        """One quantity of all intervals."""
+        return np.array([getattr(interval, name) for interval in self.intervals])
+
+    def record(self, pieces: Topology | None, *, dt: float, fraction: float, wall: float) -> ForceRecord:
+        """The intervals so far as a record.
 
         Args:
+            pieces: What is left of the food, None where the run broke down.
             dt: Time step [s].
             fraction: Part of the motion that is done [-].
             wall: Run time [s].
+
+        Returns:
+            The record.
         """
-        s, material, a = self._simulation, self._material, np.array(self.rows)
-        scene = s.scene
-        parts = {n: a[:, 4 + 3 * k : 7 + 3 * k] for k, n in enumerate(("p", "edge", "face", "board", "g", "res"))}
-        kinetic, elastic = a[:, 22], a[:, 23]
-        plastic, damage, viscous, friction, parting = np.cumsum(a[:, 24:29], axis=0).T
-        pieces = s.topology() if self.status == "done" else None
+        setup, material, scene = self._setup, self._material, self._setup.scene
         cohesive = scene.cuts and scene.numerics.contact != "nodal"
         return ForceRecord(
-            stroke=a[:, 0],
-            command=a[:, 1],
-            slide=a[:, 2],
-            time=a[:, 3],
-            edge=parts["edge"],
-            face=parts["face"],
-            board=parts["board"],
-            gravity=parts["g"],
-            momentum=parts["p"],
-            residual=parts["res"],
-            kinetic=kinetic,
-            elastic=elastic,
-            plastic=plastic,
-            damage=damage,
-            viscous=viscous,
-            friction=friction,
-            parting=parting,
-            moment=a[:, 29],
-            tilt=a[:, 30],
-            mass=material.rho * s.seeds.total * s.images,
+            stroke=self._column("stroke"),
+            command=self._column("command"),
+            slide=self._column("slide"),
+            time=self._column("time"),
+            edge=self._column("edge"),
+            face=self._column("face"),
+            board=self._column("board"),
+            gravity=self._column("gravity"),
+            momentum=self._column("momentum"),
+            residual=self._column("residual"),
+            kinetic=self._column("kinetic"),
+            elastic=self._column("elastic"),
+            plastic=np.cumsum(self._column("plastic")),
+            damage=np.cumsum(self._column("damage")),
+            viscous=np.cumsum(self._column("viscous")),
+            friction=np.cumsum(self._column("friction")),
+            parting=np.cumsum(self._column("parting")),
+            moment=self._column("moment"),
+            tilt=self._column("tilt"),
+            mass=material.rho * setup.seeds.total * setup.grid.images,
             lagging=scene.numerics.contact != "nodal",
             cell=scene.numerics.dx,
             speed=scene.motion.mach * material.p_wave,
             dt=dt,
             steps=self.steps,
-            particles=len(s.seeds.x),
-            images=s.images,
-            cells=int(np.prod(s.nodes)),
+            particles=len(setup.seeds.x),
+            images=setup.grid.images,
+            cells=int(np.prod(setup.grid.nodes)),
             severed_area=section_area(scene.food.shape) - pieces.uncut_area if pieces is not None else 0.0,
             pieces=pieces,
             counters=self._counters,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mpm.discretisation.particles import Seeds
-from mpm.output.snapshot import Snapshot, Watch
+from mpm.output.snapshot import Snapshot, SnapshotRecorder
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,13 +31,13 @@ class Section:
     mirrored: bool
 
 
-class Looks(Watch):
-    """Looks at the section of a run.
+class SectionRecorder(SnapshotRecorder):
+    """Keeps the section of a run at even parts of it and at its end.
 
     Args:
         seeds: Particles of the run.
         mirrors: Whether x = 0 and y = 0 are mirrors.
-        times: How often to look.
+        times: How often.
     """
 
     def __init__(self, seeds: Seeds, mirrors: tuple[bool, bool], times: int) -> None:
@@ -46,16 +46,16 @@ class Looks(Watch):
         self._which, self._size = _pieces(seeds, mirrors[0])
 
     def take(self, now: Snapshot) -> None:
-        """Look, and keep what is in the section."""
+        """Keep what is in the section."""
         which = self._which
         super().take(replace(now, x=now.x[which], mises=now.mises[which], severed=now.severed[which]))
 
     def section(self) -> Section | None:
-        """All looks; None where there was none."""
+        """All that was kept; None where nothing was."""
         if not self.taken:
             return None
-        y, z, mises = np.stack([(*look.x.T[1:], look.mises) for look in self.taken], axis=1)
-        return Section(np.array([look.stroke for look in self.taken]), y, z, mises, self._size, self._mirrored)
+        y, z, mises = np.stack([(*kept.x.T[1:], kept.mises) for kept in self.taken], axis=1)
+        return Section(np.array([kept.stroke for kept in self.taken]), y, z, mises, self._size, self._mirrored)
 
 
 def _pieces(seeds: Seeds, mirrored: bool) -> tuple[np.ndarray, np.ndarray]:

@@ -1,30 +1,13 @@
-"""Who looks at a run as it goes on, and what there is to see."""
+"""The particles of a run at one moment, and who keeps them as it goes on."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-
-class Particles(NamedTuple):
-    """Particles of a cut after some steps.
-
-    Attributes:
-        x: Places in the grid's axes [m], shape (n, 3).
-        side: 0 where the cut has not passed, else 1 or 2 for the half.
-        F: Deformation gradients, shape (n, 3, 3).
-        tau: Kirchhoff stresses [Pa], xx, yy, zz, yz, xz, xy, shape (n, 6).
-        kappa: Largest equivalent strain that has acted on bulk damage so far; 0 without it.
-    """
-
-    x: np.ndarray
-    side: np.ndarray
-    F: np.ndarray
-    tau: np.ndarray
-    kappa: np.ndarray
+from mpm.discretisation.particles import Particles
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +47,8 @@ def snapshot(time: float, stroke: float, slide: float, now: Particles, x: np.nda
     return Snapshot(time, stroke, slide, x, mises, now.side > 0)
 
 
-class Watch:
-    """Looks at a run at even parts of it and at its end.
+class SnapshotRecorder:
+    """Keeps the particles at even parts of a run and at its end.
 
     Args:
         times: How often.
@@ -76,9 +59,9 @@ class Watch:
         self.taken: list[Snapshot] = []
 
     def due(self, total: int) -> int:
-        """Step at which to look next, of a run of ``total`` steps."""
+        """Step at which to keep them next, of a run of ``total`` steps."""
         return math.ceil((len(self.taken) + 1) * total / self.times)
 
     def take(self, now: Snapshot) -> None:
-        """Look."""
+        """Keep the particles."""
         self.taken.append(now)

@@ -275,7 +275,7 @@ class Bench:
             "first_run_s": first,
             "particles": self.record.particles,
             "steps": self.record.steps,
-            "nodes": math.prod(cut.nodes),
+            "nodes": math.prod(cut.setup.grid.nodes),
             "reference_dx_m": self.finest,
             "reference_wall_s": self.reference.wall,
             **self._errors(self.record),
@@ -341,10 +341,10 @@ class Bench:
         ours = self._simulation(scene, self.runtime)
         shape, dx, law = scene.food.shape, BLOCK.numerics.dx, scene.food.material
         size = np.array([shape.width, shape.length, shape.height])
-        room = np.array(ours.nodes) * dx - size
+        room = np.array(ours.setup.grid.nodes) * dx - size
         block = {
             "dx": dx,
-            "nodes": [int(n) for n in ours.nodes],
+            "nodes": [int(n) for n in ours.setup.grid.nodes],
             "low": [float(room[0]) / 2, float(room[1]) / 2, PEER_FLOOR * dx],
             "counts": [round(s / dx * BLOCK.numerics.ppc) for s in size],
             "dt": ours.run().dt,
@@ -426,7 +426,7 @@ class Bench:
             "time_ratio": record.wall / min(r.wall for r in ours),
             "particles": record.particles,
             "steps": record.steps,
-            "nodes": math.prod(simulation.nodes),
+            "nodes": math.prod(simulation.setup.grid.nodes),
         }
         return row if variant.physics else row | self._errors(record)
 

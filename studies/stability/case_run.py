@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from mpm.kernels import fields as kn
 from mpm.material import Material
 from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.solver import Simulation
+from mpm.state.tables import COMMAND, EDGE_S, EDGE_Z
 from studies.stability.audit import Audit, audit
 from studies.stability.cases import Cell
 
@@ -39,13 +39,14 @@ class Trial(Simulation):
         assert cell.scene is not None
         self.cell = cell
         super().__init__(cell.scene, runtime)
+        self.setup.step_scale = cell.step
 
     @property
     def steps(self) -> float:
         """Time steps that the run takes [-]."""
         m, material = self.scene.motion, self.scene.food.material
-        dt = self.time_step(material)
-        way = m.stroke + self.gap + m.retract
+        dt = self.setup.time_step(material)
+        way = m.stroke + self.setup.gap + m.retract
         return way / (m.mach * material.p_wave * dt) + m.dwell / self.scene.time_scale / dt
 
     @property
@@ -54,7 +55,7 @@ class Trial(Simulation):
         start, m = self.cell.start, self.scene.food.material
         s = start.squeeze if start.strained else 1.0
         density = 3 * m.shear * (s - 1) ** 2 + 0.5 * m.lame * (s**3 - 1) ** 2
-        return self.images * self.seeds.total * density
+        return self.setup.grid.images * self.setup.seeds.total * density
 
     def go(self, longest: float) -> tuple[ForceRecord, Audit]:
         """Run and audit.
@@ -69,7 +70,7 @@ class Trial(Simulation):
                 raise TooLong(fraction)
 
         record = self.run(progress=watch)
-        n, volume = self.scene.numerics, self.images * self.seeds.total
+        n, volume = self.scene.numerics, self.setup.grid.images * self.setup.seeds.total
         return record, audit(
             record,
             precision=n.precision,
@@ -77,27 +78,23 @@ class Trial(Simulation):
             least=ROUNDING * self.scene.food.material.E * volume,
         )
 
-    def time_step(self, material: Material) -> float:
-        """The sound step times the factor of the cell [s]."""
-        return self.cell.step * super().time_step(material)
-
-    def _load(self, material: Material) -> None:
+    def load(self, material: Material) -> None:
         """Fields of a cut, changed as the start says."""
-        super()._load(material)
-        s, k = self.cell.start, self.k
+        super().load(material)
+        s, state = self.cell.start, self.state
         if s.lift or s.squeeze != 1:
-            x = k.x.to_numpy()
-            k.x.from_numpy(x * s.squeeze + np.array([0.0, 0.0, s.lift], x.dtype))
+            x = state.x.to_numpy()
+            state.x.from_numpy(x * s.squeeze + np.array([0.0, 0.0, s.lift], x.dtype))
         if s.strained:
-            f = k.F.to_numpy()
+            f = state.F.to_numpy()
             f[0, :, [0, 4, 8]] = s.squeeze
-            k.F.from_numpy(f)
+            state.F.from_numpy(f)
         if s.depth or s.aside:
-            pose = k.pose.to_numpy()
+            pose = state.pose.to_numpy()
             if s.depth:
-                pose[0, [kn.Z, kn.COMMAND]] = self.scene.food.shape.height - s.depth
-            pose[0, kn.S] = s.aside
-            k.pose.from_numpy(pose)
+                pose[0, [EDGE_Z, COMMAND]] = self.scene.food.shape.height - s.depth
+            pose[0, EDGE_S] = s.aside
+            state.pose.from_numpy(pose)
 
 
 def attempt(cell: Cell, most: float, longest: float, arch: str, threads: int) -> dict[str, Any]:
@@ -114,7 +111,7 @@ def attempt(cell: Cell, most: float, longest: float, arch: str, threads: int) ->
         Fields of an Evaluation; reason ``too_long`` where it was not run to its end.
     """
     trial = Trial(cell, Runtime(arch, threads))
-    scalars = {"particle_steps": trial.steps * len(trial.seeds.x), "particles": float(len(trial.seeds.x))}
+    scalars = {"particle_steps": trial.steps * len(trial.setup.seeds.x), "particles": float(len(trial.setup.seeds.x))}
     if scalars["particle_steps"] > most:
         return _result("too_long", 0.0, scalars, 0.0)
     try:

@@ -8,15 +8,17 @@ from typing import Any
 import numpy as np
 
 from mpm.errors import SimulationError
-from mpm.kernels import fields as kn
 from mpm.material import Material
 from mpm.output.health import health
+from mpm.run import Order
 from mpm.runtime import Runtime
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
 from mpm.shapes import Shape
 from mpm.solver import Simulation
+from mpm.state.host_transfer import fill, of_particles, set_velocity_gradients, velocity_gradients
+from mpm.state.tables import BOARD, ELASTIC, FRICTION_WORK, KINETIC, N_PARTICLE_SUMS, parts_of_report
 
-FAR = 1.0  # distance of what must not touch [m]
+OUT_OF_REACH = 1.0  # distance of what must not touch [m]
 
 Places = Callable[[np.ndarray], np.ndarray]
 
@@ -61,47 +63,47 @@ class FreeBody:
     ) -> None:
         scene = Scene(Food(shape, material), Press(), Motion(shape.height), Board(board or 0.0), numerics=numerics)
         self._simulation = Simulation(scene, runtime or Runtime(threads=1))
-        self._k: Any = self._simulation.k
-        self._simulation._load(material)
-        self._simulation._set_pose(FAR)
+        self._state: Any = self._simulation.state
+        self._simulation.load(material)
+        self._simulation.set_pose(OUT_OF_REACH)
         if board is None:
-            self._k.foot.fill(-FAR)
-        seeds = self._k.of_particles(self._k.x)
+            self._state.board_gap.fill(-OUT_OF_REACH)
+        seeds = of_particles(self._state, self._state.x)
         self.start = (place(seeds) if place else seeds) + [0.0, 0.0, lift]
-        self._k.fill(self._k.x, self.start)
+        fill(self._state, self._state.x, self.start)
         if velocity is not None:
-            self._k.fill(self._k.v, velocity(self.start).astype(self.start.dtype))
+            fill(self._state, self._state.v, velocity(self.start).astype(self.start.dtype))
         if slope is not None:
-            self._k.set_gradient(slope(self.start))
-        self.dt, self.time = self._simulation.time_step(material), 0.0
-        self.mass = material.rho * self._simulation.seeds.volume
+            set_velocity_gradients(self._state, slope(self.start))
+        self.dt, self.time = self._simulation.setup.time_step(material), 0.0
+        self.mass = material.rho * self._simulation.setup.seeds.volume
         self.impulse, self.friction = np.zeros(3), 0.0
-        self._state = np.zeros(kn.N_STATE)
+        self._sums = np.zeros(N_PARTICLE_SUMS)
 
     @property
     def x(self) -> np.ndarray:
         """Places [m], shape (n, 3)."""
-        return self._k.of_particles(self._k.x)
+        return of_particles(self._state, self._state.x)
 
     @property
     def v(self) -> np.ndarray:
         """Velocities [m/s], shape (n, 3)."""
-        return self._k.of_particles(self._k.v)
+        return of_particles(self._state, self._state.v)
 
     @property
     def gradient(self) -> np.ndarray:
         """Velocity gradients [1/s], shape (n, 3, 3)."""
-        return self._k.gradient()
+        return velocity_gradients(self._state)
 
     @property
     def kinetic(self) -> float:
         """Kinetic energy at the end of the last step [J]."""
-        return float(self._state[3])
+        return float(self._sums[KINETIC])
 
     @property
     def elastic(self) -> float:
         """Elastic energy at the end of the last step [J]."""
-        return float(self._state[4])
+        return float(self._sums[ELASTIC])
 
     def spin(self) -> np.ndarray:
         """Angular momentum about the origin, that of the affine velocities included [kg m^2/s], shape (3,)."""
@@ -111,7 +113,7 @@ class FreeBody:
 
     def kick(self, velocity: np.ndarray) -> None:
         """Add a velocity to all particles [m/s], shape (3,)."""
-        self._k.fill(self._k.v, self.v + velocity)
+        fill(self._state, self._state.v, self.v + velocity)
 
     def step(
         self, count: int = 1, *, dt: float | None = None, pull: Callable[[float], np.ndarray] | None = None
@@ -129,14 +131,14 @@ class FreeBody:
         span = dt or self.dt
         for _ in range(count if pull else 1):
             if pull:
-                self._k.fill(self._k.v, self.v + span * pull(self.time))
+                fill(self._state, self._state.v, self.v + span * pull(self.time))
             n = 1 if pull else count
-            row = self._simulation.advance((n, n, span, 0.0, 0.0, 0.0))[0]
-            sums, self._state, _ = np.split(row, (kn.N_SUMS, kn.N_SUMS + kn.N_STATE))
+            row = self._simulation.advance(Order(n, n, span, 0.0, 0.0))[0]
+            sums, self._sums, _ = parts_of_report(row)
             self.time += n * span
-            self.impulse += sums[kn.BOARD : kn.BOARD + 3]
-            self.friction += float(sums[kn.RUBBED])
-            reason = health(sums, self._state)
+            self.impulse += sums[BOARD : BOARD + 3]
+            self.friction += float(sums[FRICTION_WORK])
+            reason = health(sums, self._sums)
             if reason != "done":
                 raise SimulationError(
                     f"the free body stopped at {self.time:.3g} s: {reason}", reason=reason, fraction=0.0

@@ -12,6 +12,7 @@ from mpm.discretisation.capacity import batch_capacity
 from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import Scene
+from mpm.setup.setup import Setup
 from mpm.solver import Simulation
 from tests.mpm.scenes import PRISM, WEDGE
 
@@ -54,7 +55,7 @@ def test_one_launch_for_all_cuts(scenes: tuple[Scene, ...], monkeypatch: pytest.
     momentum closes.
     """
     one = alone(scenes)
-    monkeypatch.setattr(Simulation, "threads", lambda self: 0)
+    monkeypatch.setattr(Setup, "threads", lambda self: 0)
     for record, want in zip(simulate_together(scenes, runtime=Runtime(threads=2)), one, strict=True):
         assert record.status == "done" and record.steps == want.steps and record.momentum_residual < 1e-9
         for part in ("edge", "face", "board"):
@@ -69,7 +70,7 @@ def test_a_cut_that_breaks_down_stops_alone(threads: int, monkeypatch: pytest.Mo
     """Food that leaves the grid ends its own run with its reason; the one beside it goes on to its end. Scenes of another kind, or in
     another precision, may be among them.
     """
-    monkeypatch.setattr(Simulation, "threads", lambda self: threads)
+    monkeypatch.setattr(Setup, "threads", lambda self: threads)
     tight = replace(
         SCENES[0], numerics=replace(CUT.numerics, room=1e-3), motion=replace(CUT.motion, stroke=SHAPE.height)
     )

@@ -10,9 +10,10 @@ import taichi as ti
 
 from mpm.discretisation.particles import Seeds
 from mpm.errors import SceneError
+from mpm.kernels.crack import front_height
 from mpm.material import Material
 from mpm.output.record import ForceRecord
-from mpm.output.snapshot import Watch
+from mpm.output.snapshot import SnapshotRecorder
 from mpm.runtime import Runtime
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
 from mpm.shapes import Shape
@@ -78,8 +79,8 @@ def test_halves_that_tip_stay_on_the_grid():
         Scene(Food(shape, fruit), blade, Motion(0.033, 0.01), edge=EdgeLaw(zone=4e-3), numerics=numerics),
         Runtime(threads=1),
     )
-    watch = Watch(10)
-    record = simulation.run(watch=watch)
+    watch = SnapshotRecorder(10)
+    record = simulation.run(snapshots=watch)
     assert record.status == "done" and record.counters["outside"] == 0
     assert max(now.x[:, 2].max() for now in watch.taken) > 0.033 + 10e-3
 
@@ -152,7 +153,7 @@ def test_mirror_between_the_nodes_is_the_whole_on_the_same_grid(quarter):
     scene = replace(PRISM, knife=WEDGE, motion=motion, numerics=replace(PRISM.numerics, grid_shift=(0.5, 0.0, 0.0)))
     part = Simulation(scene, Runtime(threads=1))
     whole = Simulation(replace(scene, numerics=replace(scene.numerics, mirror=False)), Runtime(threads=1))
-    whole.seeds = with_images(part.seeds)
+    whole.setup.seeds = with_images(part.setup.seeds)
     a, b = (simulation.run(replace(FLESH, mu=0.3)) for simulation in (part, whole))
     assert (a.images, b.images) == (4, 1)
     np.testing.assert_allclose(a.knife[:, 2], b.knife[:, 2], atol=1e-8 * b.peak)
@@ -164,20 +165,20 @@ def test_front_beside_the_mirror_is_that_of_the_first_slice():
     """Slices that are mirror images take no part: between the mirror and the first slice the front is the first slice's."""
     scene = replace(PRISM, numerics=replace(PRISM.numerics, grid_shift=(0.5, 0.0, 0.0)))
     simulation = Simulation(scene, Runtime(threads=1))
-    simulation._load(FLESH)
-    k = simulation.k
-    fronts = np.full(k.front.shape, 0.02)
-    fronts[:, : k.i0] = 0.01
-    k.front.from_numpy(fronts)
+    simulation.load(FLESH)
+    k = simulation.state
+    fronts = np.full(k.crack_front.shape, 0.02)
+    fronts[:, : k.plane_x] = 0.01
+    k.crack_front.from_numpy(fronts)
 
-    assert simulation.stations[k.i0] == pytest.approx(0.5 * scene.numerics.dx)
+    assert simulation.setup.grid.stations[k.plane_x] == pytest.approx(0.5 * scene.numerics.dx)
     places = ti.field(ti.f64, 4)
     places.from_numpy(scene.numerics.dx * np.array([0.0, 0.2, 0.49, 0.7]))
 
     @ti.kernel
     def look():
         for n in range(4):
-            places[n] = k.front_at(0, places[n])
+            places[n] = front_height(k, 0, places[n])
 
     look()
     np.testing.assert_allclose(places.to_numpy(), 0.02, rtol=1e-12)
@@ -191,7 +192,9 @@ def with_images(seeds: Seeds) -> Seeds:
         x=np.concatenate([seeds.x * sign for sign in signs]),
         cells=np.concatenate([np.where(sign > 0, seeds.cells, -1 - seeds.cells) for sign in signs]),
         owner=np.concatenate([seeds.owner + k * len(seeds.x) for k in range(4)]),
-        **{name: np.tile(getattr(seeds, name), 4) for name in ("bulk", "foot", "head", "bottom", "top")},
+        **{
+            name: np.tile(getattr(seeds, name), 4) for name in ("volume_ratio", "board_gap", "top_gap", "bottom", "top")
+        },
     )
 
 
@@ -383,7 +386,7 @@ def test_section_has_all_food_across_the_blade(mirror):
     assert section is not None and section.mirrored is mirror
     wide, high = section.size
     assert (wide * high).sum() * (2 if mirror else 1) == pytest.approx(0.03 * 0.024, rel=1e-9)
-    assert len(set(np.round(wide * high / simulation.seeds.spacing**2))) > 1  # of one cell and of several
+    assert len(set(np.round(wide * high / simulation.setup.seeds.spacing**2))) > 1  # of one cell and of several
     assert section.y.shape == section.z.shape == section.mises.shape == (4, len(wide))
     np.testing.assert_allclose(section.stroke, 0.018 * np.arange(1, 5) / 4, atol=1e-3)
     assert section.stroke[-1] == record.stroke[-1]

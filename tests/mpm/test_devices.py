@@ -15,6 +15,7 @@ from mpm.errors import SceneError
 from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import Scene
+from mpm.setup.setup import Setup
 from mpm.solver import Simulation
 from tests.mpm.scenes import PRISM, WEDGE
 
@@ -40,9 +41,9 @@ def test_the_layout_of_a_gpu_gives_the_same_cut(
     """
     scene = replace(scene, numerics=replace(scene.numerics, precision=precision))
     one = Simulation(scene, Runtime(threads=1)).run()
-    monkeypatch.setattr(Simulation, "threads", lambda self: 0)
+    monkeypatch.setattr(Setup, "threads", lambda self: 0)
     other = Simulation(scene, Runtime(threads=2))
-    assert other.k.atomic and other.k.lanes == 1
+    assert other.state.atomic and other.state.lanes == 1
     record = other.run()
     assert record.status == one.status == "done" and len(record.stroke) == len(one.stroke)
     assert apart(one, record) < close and record.momentum_residual < close

@@ -190,7 +190,7 @@ def test_its_surface_opens_with_the_cut(scene):
     points, triangles, flesh = live.surface()
     assert triangles.max() < len(points) == len(flesh) and 0 < flesh.sum() < len(points) / 2
     assert np.abs(points[flesh, 1]).max() > 0.3e-3
-    assert live.look().x.shape[1] == 3 and live.weight == pytest.approx(0.15, rel=0.8)
+    assert live.snapshot().x.shape[1] == 3 and live.weight == pytest.approx(0.15, rel=0.8)
 
 
 def test_what_it_cannot_do_is_an_error(scene):

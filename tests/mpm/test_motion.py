@@ -44,7 +44,7 @@ def test_slicing_lowers_the_push_as_atkins_says(sliding, xi):
     At half the usual Mach number: the food swings sideways when a blade at twice its speed sets off along it.
     """
     motion = replace(PRISM.motion, slice_ratio=max(xi, 1e-9), mach=0.005)  # a ratio of 0 would be mirrored
-    sliding.scene = replace(HELD, motion=motion)
+    sliding.setup.scene = replace(HELD, motion=motion)
     record = sliding.run()
     push, pull = (between(record, record.edge[:, axis], 11e-3, 16e-3) for axis in (2, 0))
     assert push == pytest.approx(R_W / (1 + xi**2), rel=0.03)

@@ -57,7 +57,7 @@ def test_particles_add_up_to_the_food(kind, mirror, cut):
     assert seeds.total * images == pytest.approx(volume(sc.food.shape), rel=1e-12)
     assert inside(sc.food.shape, seeds.x).all()
     assert seeds.volume == pytest.approx(seeds.spacing**3, rel=0.06)
-    assert (seeds.foot >= 0).all() and seeds.foot.max() <= seeds.spacing
+    assert (seeds.board_gap >= 0).all() and seeds.board_gap.max() <= seeds.spacing
     if mirror:
         assert seeds.x[:, 0].min() >= 0
     if images == 4:
@@ -87,17 +87,17 @@ def test_far_from_the_cut_a_particle_stands_for_a_cell_across_the_blade(kind, mi
     """Half as many, within the food an eighth; those beside the cut, the mass and its middle are the same, and so is the outline."""
     far, sc = 6e-3, scene(kind, mirror=mirror)
     all_, some = seed(sc), seed(replace(sc, numerics=replace(sc.numerics, far=far)))
-    assert some.total == pytest.approx(all_.total, rel=1e-12) and set(some.bulk) <= {1.0, 2.0, 8.0}
-    np.testing.assert_allclose(some.bulk @ some.x, all_.bulk @ all_.x, atol=1e-9)
+    assert some.total == pytest.approx(all_.total, rel=1e-12) and set(some.volume_ratio) <= {1.0, 2.0, 8.0}
+    np.testing.assert_allclose(some.volume_ratio @ some.x, all_.volume_ratio @ all_.x, atol=1e-9)
     a, b = (s.x[np.abs(s.x[:, 1]) < far] for s in (all_, some))
     np.testing.assert_allclose(a, b, atol=1e-15)
     assert len(some.x) - len(b) < 0.7 * (len(all_.x) - len(a))
     outer = some.bottom | some.top
-    assert some.bulk[outer].max() == 2.0 and some.areas @ some.bottom == pytest.approx(
+    assert some.volume_ratio[outer].max() == 2.0 and some.areas @ some.bottom == pytest.approx(
         all_.areas @ all_.bottom, rel=0.03
     )
     assert (some.beside == (np.abs(some.x[:, 1]) < some.spacing)).all()
-    np.testing.assert_array_equal(np.bincount(some.owner), some.bulk)
+    np.testing.assert_array_equal(np.bincount(some.owner), some.volume_ratio)
 
 
 def test_seeds_repeat_and_differ():
@@ -121,11 +121,11 @@ def test_first_layer_meets_a_surface_at_its_own_distance():
     """Between flat ends the first layer touches at its own distance, so all of it at once; the layers behind at half a cell."""
     seeds = seed(scene("block", mirror=False))
     first = seeds.x[:, 2] < seeds.spacing
-    np.testing.assert_allclose(seeds.foot[first], seeds.x[first, 2])
-    assert (seeds.foot[~first] == seeds.spacing / 2).all()
+    np.testing.assert_allclose(seeds.board_gap[first], seeds.x[first, 2])
+    assert (seeds.board_gap[~first] == seeds.spacing / 2).all()
     beside = seeds.beside
-    np.testing.assert_allclose(seeds.gap[beside], np.abs(seeds.x[beside, 1]))
-    assert (seeds.gap[~beside] == seeds.spacing / 2).all()
+    np.testing.assert_allclose(seeds.blade_gap[beside], np.abs(seeds.x[beside, 1]))
+    assert (seeds.blade_gap[~beside] == seeds.spacing / 2).all()
 
 
 def test_mirrors_follow_the_grid():

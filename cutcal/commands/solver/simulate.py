@@ -29,7 +29,7 @@ from cutcal.options import (
     whole,
 )
 from mpm.output.record import ForceRecord
-from mpm.output.snapshot import Watch
+from mpm.output.snapshot import SnapshotRecorder
 from mpm.scene import CONTACTS, Arm
 
 HELP = "simulate one cut"
@@ -139,8 +139,8 @@ def run(args: argparse.Namespace) -> int:
         print(f"\r{done:5.0%}  {force:8.2f} N  {clock(left)} left ", end="", file=sys.stderr, flush=True)
 
     simulation = Simulation(scene, Runtime(args.arch, args.threads))
-    watch = Watch(LOOKS) if args.pictures or args.video or args.page else None
-    record = simulation.run(progress=show if sys.stderr.isatty() else None, watch=watch)
+    watch = SnapshotRecorder(LOOKS) if args.pictures or args.video or args.page else None
+    record = simulation.run(progress=show if sys.stderr.isatty() else None, snapshots=watch)
     if sys.stderr.isatty():
         print(file=sys.stderr)
     write_csv(out / "force.csv", record.columns())
@@ -185,7 +185,9 @@ def run(args: argparse.Namespace) -> int:
     return 0 if record.status == "done" else 1
 
 
-def _draw(args: argparse.Namespace, out: Path, simulation: Any, record: ForceRecord, watch: Watch, title: str) -> None:
+def _draw(
+    args: argparse.Namespace, out: Path, simulation: Any, record: ForceRecord, watch: SnapshotRecorder, title: str
+) -> None:
     """Pictures, video and page, whatever was asked for; force.csv and summary.json are written before."""
     if not watch.taken:
         say("nothing to draw: the run broke down before the first look")
@@ -195,7 +197,7 @@ def _draw(args: argparse.Namespace, out: Path, simulation: Any, record: ForceRec
     from reports.base.scene_render import Film, stills, video
 
     scene = simulation.scene
-    surface = Surface(scene.food.shape, simulation.seeds, scene.mirrors)
+    surface = Surface(scene.food.shape, simulation.setup.seeds, scene.mirrors)
     film = Film(scene, surface, watch.taken, record.time, record.stroke, record.resolved)
     if args.pictures:
         say("drawing contact, largest force and end")

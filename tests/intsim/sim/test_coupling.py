@@ -108,7 +108,7 @@ def test_a_cut_that_breaks_down_is_said_and_not_begun_again(monkeypatch):
     def broken(self, height, slide, span):
         calls[0] += 1
         if calls[0] == 40:
-            self._held.k.x.fill(1.0)
+            self._held.state.x.fill(1.0)
         return move(self, height, slide, span)
 
     monkeypatch.setattr(LiveCut, "move", broken)

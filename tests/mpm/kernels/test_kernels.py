@@ -8,15 +8,18 @@ import taichi as ti
 from scipy.linalg import polar
 
 from mpm.discretisation.capacity import OFF, node_capacity, particle_capacity
-from mpm.kernels import fields as kn
-from mpm.kernels.crack import WHOLE
-from mpm.kernels.kernels import Kernels
-from mpm.kernels.surface_contact import CONTACT
+from mpm.kernels.crack import ALL_VISIBLE
+from mpm.kernels.stress import elastic_block
+from mpm.kernels.surface_contact import CONTACT_STIFFNESS, friction_limit
+from mpm.kernels.time_step import advance
 from mpm.material import Material
 from mpm.runtime import Runtime
 from mpm.scene import EdgeLaw, Food, Motion, Numerics, Scene
 from mpm.shapes import Shape
-from mpm.solver import Simulation, kernels
+from mpm.solver import Simulation, state_of
+from mpm.state import tables as kn
+from mpm.state.host_transfer import of_particles, particles, set_velocity_gradients, velocity_gradients
+from mpm.state.state import Configuration, State
 from tests.mpm import twins
 from tests.mpm.scenes import FLESH, PRISM, WEDGE
 
@@ -46,7 +49,7 @@ BRITTLE = Scene(
 def elastic(k: ti.template(), dt: float):
     """The elastic pass alone."""
     for block in range(k.size[0, kn.BLOCKS]):
-        k.elastic(0, block, dt)
+        elastic_block(k, 0, block, dt)
 
 
 def padded(k, f):
@@ -65,8 +68,8 @@ def strained(request):
     viscous = replace(PRISM.food.material, loss_factor=0.1)
     scene = replace(PRISM, food=Food(PRISM.food.shape, viscous))
     sim = Simulation(scene, Runtime(threads=1))
-    sim._load(viscous)
-    k, rng = sim.k, np.random.default_rng(0)
+    sim.load(viscous)
+    k, rng = sim.state, np.random.default_rng(0)
     f = np.eye(3) + rng.uniform(-0.2, 0.2, (k.n[0], 3, 3)) * rng.uniform(0, 1, (k.n[0], 1, 1))
     f[:5] = np.diag([-0.5, 1.0, 1.0])
     slope = rng.uniform(-1, 1, (k.n[0], 3, 3))
@@ -78,20 +81,20 @@ def strained(request):
         table = k.tau.to_numpy()
         table[0, :, 8].ravel()[: len(f)] = starts
         k.tau.from_numpy(table)
-    k.set_gradient(slope)
-    np.testing.assert_array_equal(k.particles().F, f)
-    np.testing.assert_array_equal(k.gradient(), slope)
+    set_velocity_gradients(k, slope)
+    np.testing.assert_array_equal(particles(k).F, f)
+    np.testing.assert_array_equal(velocity_gradients(k), slope)
     dt = 1e-5
     elastic(k, dt)
     tau = k.tau.to_numpy()[0].transpose(0, 2, 1).reshape(-1, 9)[: k.n[0]]
-    return sim, dt, f, slope, tau, k.particles().F
+    return sim, dt, f, slope, tau, particles(k).F
 
 
 def test_stress_of_four_particles_at_once(strained):
     """Deformation gradient, Kirchhoff stress with the viscous part, and the losses are those of the formulas, also where
     some of the four flow: to 1e-9, flowing ones to 1e-6."""
     sim, dt, f, slope, tau, new = strained
-    par, m = sim.k.par.to_numpy()[0], sim.scene.food.material
+    par, m = sim.state.par.to_numpy()[0], sim.scene.food.material
     flowing = 0
     for p in np.flatnonzero(tau[:, 8] > 0)[::3]:
         want = f[p] + dt * slope[p] @ f[p]
@@ -128,20 +131,20 @@ def test_strain_is_smoothed_wherever_it_can_matter():
     """About a few strongly strained particles the smoothed strain is the one over all particles, and most are spared."""
     tough = replace(BRITTLE.food.material, yield_stress=np.inf)
     sim = Simulation(replace(BRITTLE, food=Food(BRITTLE.food.shape, tough)), Runtime(threads=1))
-    sim._load(tough)
-    k, par = sim.k, sim.k.par.to_numpy()[0]
+    sim.load(tough)
+    k, par = sim.state, sim.state.par.to_numpy()[0]
     calm = np.random.default_rng(0).uniform(0, 0.9 * par[kn.EPS0], (k.n[0], 1, 1))
     f = (1 + calm) * np.eye(3)
-    f[np.linalg.norm(k.of_particles(k.x) - [0.002, 0.004, 0.008], axis=1) < 1.5e-3] += 9.0 * np.eye(
+    f[np.linalg.norm(of_particles(k, k.x) - [0.002, 0.004, 0.008], axis=1) < 1.5e-3] += 9.0 * np.eye(
         3
     )  # far beyond what food bears, so that it is felt two cells away
     k.F.from_numpy(padded(k, f))
     k.v.fill(1.0)  # what the grid carried before must be gone
-    k.go([(1, 1, 1e-12, 0.0, 0.0, 0.0)])
-    x = (k.of_particles(k.x) - sim.origin) / sim.scene.numerics.dx
+    advance(k, [(1, 1, 1e-12, 0.0, 0.0, 0.0)])
+    x = (of_particles(k, k.x) - sim.setup.grid.origin) / sim.scene.numerics.dx
     base = np.floor(x - 0.5).astype(int)
-    strain = np.array([np.linalg.eigvalsh(polar(f, side="left")[1])[-1] - 1 for f in k.particles().F])
-    weight, total = np.zeros(sim.nodes), np.zeros(sim.nodes)
+    strain = np.array([np.linalg.eigvalsh(polar(f, side="left")[1])[-1] - 1 for f in particles(k).F])
+    weight, total = np.zeros(sim.setup.grid.nodes), np.zeros(sim.setup.grid.nodes)
     near = [(i, j, m) for i in range(3) for j in range(3) for m in range(3)]
     shape = [np.prod(twins.bspline(base + d - x), axis=1) for d in near]
     for d, w in zip(near, shape, strict=True):
@@ -151,7 +154,7 @@ def test_strain_is_smoothed_wherever_it_can_matter():
     smooth = sum(w * mean[tuple((base + d).T)] for d, w in zip(near, shape, strict=True))
     hit = smooth > par[kn.EPS0]
     assert 100 < hit.sum() < 0.2 * k.n[0]
-    ours = k.of_particles(k.strain)
+    ours = of_particles(k, k.driving_strain)
     np.testing.assert_allclose(ours[hit], smooth[hit], rtol=1e-9)
     assert (ours[~hit] <= par[kn.EPS0]).all()
     assert (ours == 0).sum() > 0.5 * k.n
@@ -169,7 +172,7 @@ def test_many_threads_repeat_one(alone, threads):
     """Split among two threads, or as on a GPU (here on the CPU), a cut with flow, friction, damage and both halves gives
     the same force to 1e-9."""
     sim = Simulation(BRITTLE, Runtime(threads=2))
-    sim.k = kernels(sim.kind(threads), sim.serial)
+    sim.state = state_of(sim.setup.configuration(threads), sim.serial)
     record = sim.run()
     assert alone.damage[-1] > 0
     assert alone.plastic[-1] > 0
@@ -189,8 +192,8 @@ def test_two_threads_repeat_one_beside_mirrors(shift, mirrors):
     assert scene.mirrors == mirrors
     one = Simulation(scene, Runtime(threads=1)).run()
     sim = Simulation(scene, Runtime(threads=2))
-    sim.k = kernels(sim.kind(2), sim.serial)
-    assert sim.k.threads == 2
+    sim.state = state_of(sim.setup.configuration(2), sim.serial)
+    assert sim.state.threads == 2
     two = sim.run()
     for part in ("edge", "face", "board"):
         np.testing.assert_allclose(getattr(two, part), getattr(one, part), atol=1e-9 * one.resolved.max())
@@ -222,9 +225,9 @@ def test_many_simulations_wait_side_by_side():
 
 def test_fields_have_room_for_what_they_hold_and_come_in_few_sizes():
     """Up to 65,536 particles and 96 nodes there are three sizes each; beyond, no more than one step is empty."""
-    particles, nodes = range(1, 300_000, 501), range(3, 400)
+    counts, nodes = range(1, 300_000, 501), range(3, 400)
     for of, sizes, whole, step in (
-        (particle_capacity, particles, 65_536, 65_536),
+        (particle_capacity, counts, 65_536, 65_536),
         (node_capacity, nodes, 96, 32),
     ):
         assert all(of(n) >= n for n in sizes)
@@ -240,15 +243,16 @@ def test_scenes_of_a_class_share_kernels_and_keep_their_force():
     shape = replace(PRISM.food.shape, width=1.3 * PRISM.food.shape.width, height=1.2 * PRISM.food.shape.height)
     one = Simulation(small, Runtime(threads=1))
     other = Simulation(replace(small, food=replace(PRISM.food, shape=shape)), Runtime(threads=1))
-    assert one.nodes != other.nodes
-    assert one.k is other.k
+    assert one.setup.grid.nodes != other.setup.grid.nodes
+    assert one.state is other.state
     force = one.run().resolved
     assert other.run().resolved.max() > 1.1 * force.max()
     with pytest.raises(RuntimeError, match="another simulation"):
         one.advance((1, 1, 1e-6, 0.0, 0.0, 0.0))
     np.testing.assert_array_equal(one.run().resolved, force)
-    tight = (len(one.seeds.x), one.nodes, small.mirrors, len(one.stations))
-    one.k = Kernels(*tight, threads=1, nodal=False, press=False, damage=False)
+    seeds, grid = one.setup.seeds, one.setup.grid
+    tight = (len(seeds.x), grid.nodes, small.mirrors, len(grid.stations))
+    one.state = State(Configuration(*tight, threads=1, nodal=False, press=False, damage=False))
     np.testing.assert_allclose(one.run().resolved, force, atol=1e-9 * force.max())
 
 
@@ -256,9 +260,9 @@ def test_a_run_does_not_feel_the_one_before():
     """What a run left on the grid is gone before the next: the edge also reads nodes that no particle has reached."""
     sim = Simulation(replace(PRISM, motion=replace(PRISM.motion, stroke=1e-3)), Runtime(threads=1))
     sim.run()
-    assert sim.k.u.to_numpy().any()
-    sim._load(PRISM.food.material)
-    assert not sim.k.u.to_numpy().any()
+    assert sim.state.u.to_numpy().any()
+    sim.load(PRISM.food.material)
+    assert not sim.state.u.to_numpy().any()
 
 
 def test_food_without_resistance_is_cut():
@@ -278,10 +282,10 @@ def test_a_moment_of_contact_is_read_where_there_is_one(where, value, same, monk
 
     def spoil(order):
         out = advance(order)
-        lever, has = sim.k.lever.to_numpy(), sim.k.layers.to_numpy() > WHOLE
+        lever, has = sim.state.contact_moment.to_numpy(), sim.state.visibility.to_numpy() > ALL_VISIBLE
         lever[has == where] = value
-        sim.k.lever.from_numpy(lever)
-        touched.append(has[0, : sim.k.n[0]].mean())
+        sim.state.contact_moment.from_numpy(lever)
+        touched.append(has[0, : sim.state.n[0]].mean())
         return out
 
     monkeypatch.setattr(sim, "advance", spoil)
@@ -295,15 +299,15 @@ def most_friction(k: ti.template(), dt: float) -> ti.f64:
     """Largest friction of the cut face under an endless pressure [N]."""
     total = ti.cast(0.0, ti.f64)
     for p in range(k.size[0, kn.COUNT]):
-        if k.shell[0, p][1] > 0:
-            stiffness = CONTACT * k.par[0, kn.MASS] * k.bulk[0, p] / dt**2
-            total += stiffness * k.friction(0, p, 1e9, dt)
+        if k.surface_volume[0, p][1] > 0:
+            stiffness = CONTACT_STIFFNESS * k.par[0, kn.MASS] * k.volume_ratio[0, p] / dt**2
+            total += stiffness * friction_limit(k, 0, p, 1e9, dt)
     return total
 
 
 def test_a_face_bears_its_yield_stress_in_shear_times_its_area():
     """The largest friction of all particles of the cut face, a quarter of them simulated, is that of the face."""
     sim = Simulation(PRISM, Runtime(threads=1))
-    sim._load(replace(FLESH, mu=0.3))
+    sim.load(replace(FLESH, mu=0.3))
     half_face = 0.012 * 0.024
-    assert most_friction(sim.k, 1e-5) == pytest.approx(FLESH.yield_stress / np.sqrt(3) * half_face, rel=0.02)
+    assert most_friction(sim.state, 1e-5) == pytest.approx(FLESH.yield_stress / np.sqrt(3) * half_face, rel=0.02)

@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpm.kernels import fields as kn
 from mpm.material import Material
 from mpm.runtime import Runtime
 from mpm.scene import Board, Food, Knife, Motion, Numerics, Scene
 from mpm.shapes import Shape
 from mpm.solver import Simulation
+from mpm.state import tables as kn
+from mpm.state.host_transfer import fill, of_particles, particles, set_velocity_gradients, velocity_gradients
 
 DX = 3e-3
 KNIFE = Knife("thin", 1e-3, 0.1, 0.04, 0.2)
@@ -30,19 +31,19 @@ class Free:
 
     def __init__(self, shape: Shape, gravity: float = 0.0) -> None:
         self.sim = Simulation(scene(shape, gravity=gravity), Runtime(threads=1))
-        self.k, self.dt, self.x0 = self.sim.k, self.sim.time_step(MATERIAL), self.sim.seeds.x
+        self.k, self.dt, self.x0 = self.sim.state, self.sim.setup.time_step(MATERIAL), self.sim.setup.seeds.x
         self.load()
 
     def load(self) -> None:
         """Back to the beginning: another body may have had the fields."""
-        self.sim._load(MATERIAL)
-        self.sim._set_pose(1.0)
-        self.k.foot.fill(-1.0)  # nothing touches the board
+        self.sim.load(MATERIAL)
+        self.sim.set_pose(1.0)
+        self.k.board_gap.fill(-1.0)  # nothing touches the board
 
     def start(self, velocity: np.ndarray, gradient: np.ndarray) -> None:
         """Give every particle a velocity [m/s] (n, 3) and its gradient [1/s] (3, 3) or (n, 3, 3)."""
-        self.k.fill(self.k.v, velocity)
-        self.k.set_gradient(np.broadcast_to(gradient, (len(velocity), 3, 3)))
+        fill(self.k, self.k.v, velocity)
+        set_velocity_gradients(self.k, np.broadcast_to(gradient, (len(velocity), 3, 3)))
 
     def advance(self, steps: int) -> np.ndarray:
         """Run with the knife far above; returns a row of the report for each 20 steps."""
@@ -51,7 +52,7 @@ class Free:
     def momenta(self) -> tuple[np.ndarray, np.ndarray, float]:
         """Linear momentum, angular momentum with the affine part, and mass."""
         m = self.k.par.to_numpy()[0, kn.MASS]
-        x, v, c = self.k.of_particles(self.k.x), self.k.of_particles(self.k.v), self.k.gradient()
+        x, v, c = of_particles(self.k, self.k.x), of_particles(self.k, self.k.v), velocity_gradients(self.k)
         spin = DX**2 / 4 * np.stack([c[:, 2, 1] - c[:, 1, 2], c[:, 0, 2] - c[:, 2, 0], c[:, 1, 0] - c[:, 0, 1]], -1)
         return m * v.sum(0), m * (np.cross(x, v) + spin).sum(0), m * len(x)
 
@@ -88,8 +89,8 @@ def test_affine_velocity_is_reproduced(block):
     block.k.par.from_numpy(free)
     block.advance(1)
     block.k.par.from_numpy(soft)
-    np.testing.assert_allclose(block.k.of_particles(block.k.v), block.x0 @ grad.T, atol=1e-13)
-    np.testing.assert_allclose(block.k.gradient(), np.broadcast_to(grad, (len(block.x0), 3, 3)), atol=1e-9)
+    np.testing.assert_allclose(of_particles(block.k, block.k.v), block.x0 @ grad.T, atol=1e-13)
+    np.testing.assert_allclose(velocity_gradients(block.k), np.broadcast_to(grad, (len(block.x0), 3, 3)), atol=1e-9)
 
 
 def test_rigid_spin_stays_free_of_stress(block):
@@ -99,7 +100,7 @@ def test_rigid_spin_stays_free_of_stress(block):
     block.load()
     block.start((block.x0 - block.x0.mean(0)) @ spin.T, spin)
     block.advance(int(2 * np.pi / 10 / (omega * dt)))
-    f = block.k.particles().F
+    f = particles(block.k).F
     assert np.abs(np.swapaxes(f, 1, 2) @ f - np.eye(3)).max() < 5e-2
     assert np.abs(np.linalg.det(f) - 1).max() < 5e-2
 
@@ -110,7 +111,7 @@ def test_free_fall_is_exact():
     body.start(np.zeros_like(body.x0), np.zeros((3, 3)))
     n = 60
     body.advance(n)
-    fall = body.x0.mean(0) - body.k.of_particles(body.k.x).mean(0)
+    fall = body.x0.mean(0) - of_particles(body.k, body.k.x).mean(0)
     np.testing.assert_allclose(fall, [0, 0, 9.81 * body.dt**2 * n * (n + 1) / 2], atol=1e-15)
 
 
@@ -131,7 +132,7 @@ def test_bar_vibrates_with_its_wave_speed():
     steps = int(1.3 * period / bar.dt / 20)
     for _ in range(steps):
         bar.advance(20)
-        signal.append(bar.k.of_particles(bar.k.v)[:, 1] @ mode)
+        signal.append(of_particles(bar.k, bar.k.v)[:, 1] @ mode)
     # stress is that of the strain at the end of a step, so the velocity after n steps belongs to half a step later
     t = bar.dt * (20 * np.arange(1, steps + 1) + 0.5)
     down = np.flatnonzero((np.array(signal[:-1]) > 0) & (np.array(signal[1:]) <= 0))[0]
@@ -144,9 +145,9 @@ def test_block_at_rest_weighs_its_weight():
     sc = scene(Shape("block", 0.024, 0.024, 0.024), replace(MATERIAL, loss_factor=0.3), gravity=9.81)
     sc = replace(sc, knife=replace(KNIFE, name="away"), motion=Motion(2e-3, 1e-3))
     sim = Simulation(sc, Runtime(threads=1))
-    sim._load(sc.food.material)
-    sim._set_pose(1.0)
-    dt = sim.time_step(sc.food.material)
+    sim.load(sc.food.material)
+    sim.set_pose(1.0)
+    dt = sim.setup.time_step(sc.food.material)
     report = sim.advance((1200, 20, dt, 0.0, 0.0, 0.0))
     weight = 1000 * 9.81 * 0.024**3
     assert -report[30:, kn.BOARD + 2].sum() / (600 * dt) == pytest.approx(weight, rel=0.02)
@@ -157,5 +158,5 @@ def test_food_that_leaves_the_grid_is_counted_and_does_not_crash(block):
     block.load()
     block.start(np.full_like(block.x0, 1e4), np.zeros((3, 3)))
     assert block.advance(40)[:, kn.OUTSIDE].sum() > 0
-    block.k.fill(block.k.x, np.full_like(block.x0, np.nan))
+    fill(block.k, block.k.x, np.full_like(block.x0, np.nan))
     block.advance(2)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 import taichi as ti
 
-from mpm.kernels import signed_distance
+from mpm.kernels import cutting_edge, signed_distance
 from mpm.runtime import Runtime, start
+from mpm.state import stencil
 from tests.mpm import twins
 
 SPINE, ANGLE = 2e-3, 2 * np.deg2rad(5.5)
@@ -34,11 +35,11 @@ def evaluate():
 
     @ti.kernel
     def level():
-        out[0] = signed_distance.edge_level(inp[0], inp[1], inp[2], inp[3])
+        out[0] = cutting_edge.softening_law(inp[0], inp[1], inp[2], inp[3])
 
     @ti.kernel
     def spline():
-        out[0] = signed_distance.bspline(inp[0])
+        out[0] = stencil.bspline(inp[0])
 
     kernels = {f.__name__: f for f in (blade, stick, level, spline)}
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mpm.discretisation.particles import seed
-from mpm.output.snapshot import Snapshot, Watch
+from mpm.output.snapshot import Snapshot, SnapshotRecorder
 from mpm.output.surface import Surface, half_of
 from mpm.runtime import Runtime
 from mpm.scene import Numerics, Scene
@@ -93,14 +93,14 @@ def test_stress_of_the_surface_lies_within_that_of_the_particles() -> None:
 
 def test_a_watch_looks_at_even_parts_of_a_run_and_sees_the_cut() -> None:
     """Time and stroke rise evenly up to the end, particles are severed behind the edge, and the surface stays above the board."""
-    simulation, watch = Simulation(PRISM, Runtime(threads=1)), Watch(5)
-    record = simulation.run(watch=watch)
+    simulation, watch = Simulation(PRISM, Runtime(threads=1)), SnapshotRecorder(5)
+    record = simulation.run(snapshots=watch)
     looks = watch.taken
     np.testing.assert_allclose([look.time for look in looks], record.time[-1] * np.arange(1, 6) / 5, rtol=0.05)
     assert looks[-1].stroke == record.stroke[-1]
     assert [look.severed.sum() for look in looks] == sorted(look.severed.sum() for look in looks)
     assert looks[0].severed.sum() < looks[-1].severed.sum() < len(looks[-1].x)
-    surface = Surface(PRISM.food.shape, simulation.seeds, PRISM.mirrors)
+    surface = Surface(PRISM.food.shape, simulation.setup.seeds, PRISM.mirrors)
     end = surface.points(looks[-1])
     assert end[:, 2].min() > -0.5e-3
     assert enclosed(end, surface.triangles) == pytest.approx(volume(PRISM.food.shape), rel=0.02)

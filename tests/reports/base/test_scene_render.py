@@ -16,7 +16,7 @@ import pytest
 from matplotlib.image import imread
 
 from calib.errors import OutputError
-from mpm.output.snapshot import Watch
+from mpm.output.snapshot import SnapshotRecorder
 from mpm.output.surface import Surface
 from mpm.runtime import Runtime
 from mpm.scene import Knife, Motion
@@ -31,9 +31,9 @@ BAR = 800  # row of a picture below which the scale of the colours stands
 @pytest.fixture(scope="module")
 def film() -> Film:
     """A cut of a second, seen six times."""
-    simulation, watch = Simulation(PRISM, Runtime(threads=1)), Watch(6)
-    record = simulation.run(watch=watch)
-    surface = Surface(PRISM.food.shape, simulation.seeds, PRISM.mirrors)
+    simulation, watch = Simulation(PRISM, Runtime(threads=1)), SnapshotRecorder(6)
+    record = simulation.run(snapshots=watch)
+    surface = Surface(PRISM.food.shape, simulation.setup.seeds, PRISM.mirrors)
     return Film(PRISM, surface, watch.taken, record.time, record.stroke, record.resolved)
 
 

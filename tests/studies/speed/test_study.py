@@ -28,7 +28,8 @@ class Solver:
     def __init__(self, scene: Scene, runtime: Runtime) -> None:
         self.scene, self.runtime = scene, runtime
         self.compile = 100.0
-        self.nodes = (round(0.08 * (1 + scene.numerics.room) / scene.numerics.dx),) * 3
+        nodes = (round(0.08 * (1 + scene.numerics.room) / scene.numerics.dx),) * 3
+        self.setup = SimpleNamespace(grid=SimpleNamespace(nodes=nodes))
 
     def run(self, progress: Callable[[float, float], None] | None = None) -> SimpleNamespace:
         """A record with the columns that are looked at; tells its progress at a fifth, two thirds and the end."""

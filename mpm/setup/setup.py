@@ -1,0 +1,135 @@
+"""A scene made ready: its particles, its grid, and the tables that its fields begin with."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mpm.discretisation.capacity import batch_capacity, node_capacity, particle_capacity
+from mpm.discretisation.grid import lay_out
+from mpm.discretisation.particles import seed
+from mpm.material import Material
+from mpm.runtime import Runtime
+from mpm.scene import Scene
+from mpm.setup.parameters import parameters, pose
+from mpm.setup.stable_step import stable_step
+from mpm.shapes import skin_path
+from mpm.shapes import slices as outline
+from mpm.state import contents as column
+from mpm.state.contents import Contents
+from mpm.state.state import Configuration
+
+PARTICLES_PER_THREAD = 20_000  # for which another thread pays (docs/theory.md, "Measured choices")
+CLEARANCE = 0.1  # way of the blade above the food before contact, in cells
+
+
+class Setup:
+    """A scene made ready to run.
+
+    Args:
+        scene: What to simulate.
+        runtime: Device.
+
+    Attributes:
+        seeds: Particles at rest.
+        grid: Where the grid lies.
+        step_scale: Time step over the largest sound one [-].
+
+    Raises:
+        SceneError: The scene does not fit into memory.
+    """
+
+    def __init__(self, scene: Scene, runtime: Runtime) -> None:
+        self.scene, self.runtime, self.step_scale = scene, runtime, 1.0
+        self.seeds, self.grid = seed(scene), lay_out(scene)
+
+    def threads(self) -> int:
+        """CPU threads that pay for a scene of this size, 0 on a GPU."""
+        if self.runtime.arch != "cpu":
+            return 0
+        return min(self.runtime.cpu_threads, 1 + len(self.seeds.x) // PARTICLES_PER_THREAD)
+
+    def configuration(self, threads: int, batch: int = 1) -> Configuration:
+        """What the fields must be for so many CPU threads, 0 for a GPU, and cuts side by side: alike for scenes of about this size."""
+        scene = self.scene
+        return Configuration(
+            room=particle_capacity(len(self.seeds.x)),
+            nodes=tuple(node_capacity(n) for n in self.grid.nodes),
+            mirrors=scene.mirrors,
+            stations=node_capacity(len(self.grid.stations)),
+            threads=threads,
+            nodal=scene.numerics.contact == "nodal",
+            press=not scene.cuts,
+            damage=scene.food.material.tensile_strength is not None,
+            turned=scene.numerics.grid_turn != 0,
+            branches=len(scene.food.material.prony),
+            batch=batch_capacity(batch),
+        )
+
+    @property
+    def gap(self) -> float:
+        """Way of the edge's middle above the food before contact [m]."""
+        return CLEARANCE * self.scene.numerics.dx + self.scene.drop
+
+    def time_step(self, material: Material) -> float:
+        """Time step [s]."""
+        return self.step_scale * stable_step(self.scene, material, self.seeds.spacing)
+
+    def to_grid_axes(self, vectors: np.ndarray) -> np.ndarray:
+        """Vectors of the scene's axes, shape (n, 3), in the grid's."""
+        return self._turned(vectors, self.scene.numerics.grid_turn)
+
+    def to_scene_axes(self, vectors: np.ndarray) -> np.ndarray:
+        """Vectors of the grid's axes, shape (n, 3), in the scene's."""
+        return self._turned(vectors, -self.scene.numerics.grid_turn)
+
+    @staticmethod
+    def _turned(vectors: np.ndarray, angle: float) -> np.ndarray:
+        """Vectors (n, 3) turned about the vertical by an angle [rad]."""
+        c, s = math.cos(angle), math.sin(angle)
+        return vectors @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+    def contents(self, material: Material) -> Contents:
+        """What the fields begin with."""
+        scene = self.scene
+        return Contents(
+            nodes=self.grid.nodes,
+            plane=round(-self.grid.origin[1] / scene.numerics.dx),
+            between=scene.mirrored_between,
+            particles=self._particles(material),
+            slices=self._slices(material),
+            parameters=parameters(scene, material, self.seeds, self.grid),
+            pose=pose(scene.food.shape.height + self.gap, 0.0, scene.motion.tilt),
+            relaxation=self._relaxation(material),
+        )
+
+    def _particles(self, material: Material) -> np.ndarray:
+        """The table of particles (n, N_PARTICLE)."""
+        seeds, cuts = self.seeds, self.scene.cuts
+        gap, outer = (seeds.blade_gap, seeds.beside) if cuts else (seeds.top_gap, seeds.top)
+        out = np.empty((len(seeds.x), column.N_PARTICLE))
+        out[:, column.POSITION : column.BOARD_GAP] = self.to_grid_axes(seeds.x)
+        out[:, column.BOARD_GAP], out[:, column.TOOL_GAP], out[:, column.VOLUME_RATIO] = (
+            seeds.board_gap,
+            gap,
+            seeds.volume_ratio,
+        )
+        out[:, column.SURFACE_VOLUME] = seeds.areas * seeds.board_gap * seeds.bottom
+        out[:, column.SURFACE_VOLUME + 1] = seeds.areas * gap * outer
+        out[:, column.ADHERING] = np.where(seeds.beside & (material.adhesion > 0), 0, -1)
+        return out
+
+    def _slices(self, material: Material) -> np.ndarray:
+        """The table of slices (m, N_SLICE)."""
+        scene, xs = self.scene, self.grid.stations
+        path = skin_path(scene.food.shape, xs, material.skin_thickness) if material.skin_thickness > 0 else 0 * xs
+        out = np.empty((len(xs), column.N_SLICE))
+        out[:, : column.SOFTENING] = np.transpose(outline(scene.food.shape, xs, scene.numerics.dx))
+        out[:, column.SOFTENING] = scene.edge.slip + path
+        return out
+
+    def _relaxation(self, material: Material) -> np.ndarray:
+        """Share of each Prony branch, and time step over its time (2, branches)."""
+        step = self.time_step(material) * self.scene.time_scale
+        return np.array([[share, step / time] for share, time in material.prony]).reshape(-1, 2).T

@@ -1,0 +1,48 @@
+"""The largest sound time step."""
+
+from __future__ import annotations
+
+import math
+
+from mpm.kernels.surface_contact import CONTACT_STIFFNESS
+from mpm.material import Material
+from mpm.scene import Scene
+
+EDGE_STABILITY = 0.5  # dt times the frequency of the edge's cohesive spring, 2 is unstable
+ADHESION_STABILITY = 0.5  # the same for the rising part of the adhesive traction
+# Least stiffness of the contact's spring over that of the layer of particles it holds, for which Nitsche's method is
+# stable (docs/theory.md, "Measured choices"). Only foods of nu < 0.2 ask for a shorter step than waves do.
+COERCIVITY = 1.5
+
+
+def retardation_time(scene: Scene, material: Material) -> float:
+    """Kelvin-Voigt retardation time that gives the loss factor at the first axial mode c/(4 height) [s]."""
+    return material.loss_factor * 4 * scene.food.shape.height / (2 * math.pi * material.p_wave)
+
+
+def stable_step(scene: Scene, material: Material, spacing: float) -> float:
+    """Largest sound step: elastic limit of a lone particle, of contact, of the edge's spring and of adhesion.
+
+    Args:
+        scene: What is simulated.
+        material: Its constants.
+        spacing: Lattice spacing of the particles [m].
+
+    Returns:
+        Time step [s].
+    """
+    num, edge = scene.numerics, scene.edge
+    speed = scene.motion.mach * material.p_wave
+    omega = 2 * (material.stability_speed + speed) / num.dx  # highest frequency of a lone particle
+    zeta = retardation_time(scene, material) * omega / 2
+    dt = num.safety * 2 / omega * (math.sqrt(1 + zeta * zeta) - zeta)
+    if num.contact == "cohesive":
+        layer = min(spacing, num.dx / 2)
+        dt = min(dt, math.sqrt(CONTACT_STIFFNESS / COERCIVITY) * layer / material.p_wave)
+    if num.contact == "cohesive" and scene.cuts:
+        spring = math.sqrt(max(material.start, 1e-12) / (edge.slip * material.rho * edge.zone**2))
+        dt = min(dt, EDGE_STABILITY / spring)
+        if material.adhesion > 0:
+            pull = material.adhesion / (material.rho * spacing)  # acceleration at full strength
+            dt = min(dt, ADHESION_STABILITY * math.sqrt(0.1 * 2 * material.adhesion_energy / material.adhesion / pull))
+    return dt

@@ -1,0 +1,43 @@
+"""What the fields of a cut begin with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+# Columns of the tables of particles and of slices that a run begins with.
+POSITION, BOARD_GAP, TOOL_GAP, VOLUME_RATIO, SURFACE_VOLUME, ADHERING = 0, 3, 4, 5, 6, 8
+N_PARTICLE = 9
+TOP_HIGH, TOP_LOW, WIDTH, FLOOR_HIGH, FLOOR_LOW, SOFTENING = range(6)
+N_SLICE = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """What the fields of one cut begin with.
+
+    Attributes:
+        nodes: Grid nodes along x, y, z.
+        plane: Index of the node plane along y that is nearest to y = 0: the mirror plane across y where there is one.
+        between: Whether the mirror plane across x lies half-way between the first nodes and their images and not on the
+            first nodes.
+        particles: Table, shape (n, N_PARTICLE): position in the grid's axes, distances at which board and tool are met
+            [m], volume over that of a particle beside the cut [-], reference volumes before the board and before the
+            tool [m^3], 0 for a surface that can stick and -1 for others.
+        slices: Table, shape (m, N_SLICE): outline of the food in each slice [m], and the slip over which the edge's
+            resistance falls [m].
+        parameters: Shape (N_PARAMETERS,), rows as in :mod:`mpm.state.tables`.
+        pose: Of the tool, shape (N_POSE,), rows as in :mod:`mpm.state.tables`.
+        relaxation: Share of each Prony branch [-], and time step over its time [-], shape (2, branches).
+    """
+
+    nodes: Sequence[int]
+    plane: int
+    between: bool
+    particles: np.ndarray
+    slices: np.ndarray
+    parameters: np.ndarray
+    pose: np.ndarray
+    relaxation: np.ndarray

@@ -1,0 +1,226 @@
+"""What the host writes into the fields before a run, and what it reads from them.
+
+Each by one kernel for all fields: to make a cached kernel ready takes some 25 ms however small it is, and one for each
+field would be a third of what a process needs before its first step.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import taichi as ti
+
+from mpm.discretisation.particles import Particles
+from mpm.state.contents import (
+    ADHERING,
+    BOARD_GAP,
+    FLOOR_HIGH,
+    FLOOR_LOW,
+    N_PARTICLE,
+    N_SLICE,
+    POSITION,
+    SOFTENING,
+    SURFACE_VOLUME,
+    TOOL_GAP,
+    TOP_HIGH,
+    TOP_LOW,
+    VOLUME_RATIO,
+    WIDTH,
+    Contents,
+)
+from mpm.state.state import CUTS, N_LOOPS, PARTS, SECOND_FIELD_CELLS, SLICES, State
+from mpm.state.tables import BLOCKS, COUNT, N_PARAMETERS, N_POSE, N_SIZES, STATIONS, STRETCH, STRETCH_AT_REST
+
+# Columns of the table of particles that is read after some steps: position, half, deformation gradient, Kirchhoff stress
+# and the largest strain of bulk damage.
+HALF, DEFORMATION, STRESS, STRAIN = 3, 4, 13, 19
+N_PARTICLE_NOW = 20
+
+INTEGERS = ti.types.ndarray(dtype=ti.i32, ndim=2)
+ROWS = ti.types.ndarray(dtype=ti.f64, ndim=2)
+TABLES = ti.types.ndarray(dtype=ti.f64, ndim=3)
+
+
+def begin(state: State, cuts: Sequence[Contents]) -> None:
+    """Put cuts side by side, their particles at rest and unstrained, nothing cut and nothing booked.
+
+    Args:
+        state: Fields with room for them.
+        cuts: What each begins with.
+    """
+    sizes = np.zeros((state.batch, N_SIZES), np.int32)
+    sizes[: len(cuts)] = [_sizes(state, cut) for cut in cuts]
+    state.n = sizes[:, COUNT]
+    most = np.zeros((1, N_LOOPS), np.int32)
+    most[0, [CUTS, PARTS, SLICES]] = 1, sizes[:, BLOCKS].max(), sizes[:, STATIONS].max()
+    _write(
+        state,
+        sizes,
+        most,
+        _table(state, (state.n.max(), N_PARTICLE), [cut.particles for cut in cuts]),
+        _table(state, (sizes[:, STATIONS].max(), N_SLICE), [cut.slices for cut in cuts]),
+        _table(state, (N_PARAMETERS,), [cut.parameters for cut in cuts]),
+        _table(state, (N_POSE,), [cut.pose for cut in cuts]),
+        _table(state, (2, max(state.branches, 1)), [cut.relaxation for cut in cuts]),
+    )
+
+
+def _sizes(state: State, cut: Contents) -> list[int]:
+    """Row of the table of sizes."""
+    n, nodes = len(cut.particles), cut.nodes
+    first = 0 if state.turned else max(cut.plane - SECOND_FIELD_CELLS, 0)
+    end = nodes[1] if state.turned else min(cut.plane + SECOND_FIELD_CELLS + 1, nodes[1])
+    blocks, mirror_sum = -(-n // state.lanes), 2 * state.plane_x - cut.between
+    return [n, blocks, *nodes, len(cut.slices), cut.plane, first, end, nodes[1] - first, mirror_sum]
+
+
+def _table(state: State, shape: tuple[int, ...], parts: Sequence[np.ndarray]) -> np.ndarray:
+    """Tables of cuts in one, filled up with zeros."""
+    out = np.zeros((state.batch, *shape))
+    for one, given in zip(out, parts, strict=False):
+        one[tuple(slice(n) for n in given.shape)] = given
+    return out
+
+
+@ti.kernel
+def _write(
+    s: ti.template(),
+    sizes: INTEGERS,
+    most: INTEGERS,
+    particles: TABLES,
+    slices: TABLES,
+    parameters: ROWS,
+    pose: ROWS,
+    relaxation: TABLES,
+):
+    """Write the tables into the fields, and empty those that a run begins with empty."""
+    for c, k in s.size:
+        s.size[c, k] = sizes[c, k]
+    for k in s.extents:
+        s.extents[k] = most[0, k]
+    for c, k in s.par:
+        s.par[c, k] = ti.cast(parameters[c, k], float)
+    for c, k in s.pose:
+        s.pose[c, k] = pose[c, k]
+    for c, b in s.prony_rate:
+        s.prony_share[c, b] = ti.cast(relaxation[c, 0, b], float)
+        s.prony_rate[c, b] = ti.cast(relaxation[c, 1, b], float)
+    for c, p in s.x:
+        row = ti.Vector.zero(float, N_PARTICLE)
+        if p < sizes[c, COUNT]:
+            for k in ti.static(range(N_PARTICLE)):
+                row[k] = ti.cast(particles[c, p, k], float)
+        s.x[c, p] = ti.Vector([row[POSITION], row[POSITION + 1], row[POSITION + 2]])
+        s.board_gap[c, p], s.tool_gap[c, p], s.volume_ratio[c, p] = row[BOARD_GAP], row[TOOL_GAP], row[VOLUME_RATIO]
+        s.surface_volume[c, p] = ti.Vector([row[SURFACE_VOLUME], row[SURFACE_VOLUME + 1]])
+        s.adhering[c, p] = ti.cast(row[ADHERING], ti.i32)
+        s.v[c, p] = ti.Vector.zero(float, 3)
+        s.side[c, p] = 0
+        s.visibility[c, p] = 0
+        for b in ti.static(range(2)):
+            s.stick[c, b, p] = ti.Vector.zero(float, 3)
+        if ti.static(s.branches > 0):
+            s.prony_before[c, p] = ti.Matrix.zero(float, 3, 3)
+            for b in ti.static(range(s.branches)):
+                s.prony_stress[c, b, p] = ti.Matrix.zero(float, 3, 3)
+    for c, p, d in s.C:
+        s.C[c, p, d] = ti.Vector.zero(float, 4)
+    for c, b, r in s.F:
+        for lane in ti.static(range(s.lanes)):
+            s.F[c, b, r][lane] = 1.0 if r % 4 == 0 else 0.0
+            s.tau[c, b, r][lane] = STRETCH_AT_REST if r == STRETCH else 0.0
+    for q in s.u:  # the edge also looks at nodes that no particle has reached yet
+        s.u[q] = ti.Vector.zero(float, 4)
+    for c, p in s.kappa:
+        s.kappa[c, p] = 0.0
+        s.driving_strain[c, p] = 0.0
+    for c, i in s.cut_depth:
+        row = ti.Vector.zero(float, N_SLICE)
+        if i < sizes[c, STATIONS]:
+            for k in ti.static(range(N_SLICE)):
+                row[k] = ti.cast(slices[c, i, k], float)
+        s.top_high[c, i], s.top_low[c, i], s.width[c, i] = row[TOP_HIGH], row[TOP_LOW], row[WIDTH]
+        s.floor_high[c, i], s.floor_low[c, i] = row[FLOOR_HIGH], row[FLOOR_LOW]
+        s.softening[c, i] = row[SOFTENING]
+        s.slip[c, i] = ti.Vector.zero(float, 2)
+        s.reaction[c, i] = ti.Vector.zero(float, 2)
+        s.zone_velocity[c, i] = ti.Vector.zero(float, 3)
+        s.cut_depth[c, i] = 0.0
+        s.front_drift[c, i] = 0.0
+        s.start_force[c, i] = 0.0
+        s.contact_part[c, i] = 0.0
+        s.crack_front[c, i] = 1e3
+    for c, k in s.sums:
+        s.sums[c, k] = 0.0
+
+
+def particles(state: State, cut: int = 0) -> Particles:
+    """The particles of a cut now."""
+    out = np.zeros((state.n[cut], N_PARTICLE_NOW))
+    _read(state, cut, out)
+    x, side, f, tau, kappa = np.split(out, (HALF, DEFORMATION, STRESS, STRAIN), axis=1)
+    return Particles(x, side[:, 0].astype(int), f.reshape(-1, 3, 3), tau, kappa[:, 0])
+
+
+@ti.kernel
+def _read(s: ti.template(), cut: int, out: ROWS):
+    """Write a row for each particle."""
+    for p in range(s.size[cut, COUNT]):
+        block, lane = p // s.lanes, p % s.lanes
+        for d in ti.static(range(3)):
+            out[p, d] = s.x[cut, p][d]
+        out[p, HALF] = s.side[cut, p]
+        for r in ti.static(range(9)):
+            out[p, DEFORMATION + r] = s.F[cut, block, r][lane]
+        for r in ti.static(range(6)):
+            out[p, STRESS + r] = s.tau[cut, block, r][lane]
+        if ti.static(s.damage):
+            out[p, STRAIN] = s.kappa[cut, p]
+
+
+def of_particles(state: State, field: Any, cut: int = 0) -> np.ndarray:
+    """A field's entries of the particles of a cut.
+
+    Args:
+        state: The fields.
+        field: One of them.
+        cut: Which of the cuts side by side.
+
+    Returns:
+        Its entries, shape (n, ...).
+    """
+    out: np.ndarray = field.to_numpy()[cut, : state.n[cut]]
+    return out
+
+
+def fill(state: State, field: Any, values: np.ndarray) -> None:
+    """Set the entries of a field of the particles of the first cut.
+
+    Args:
+        state: The fields.
+        field: One of them.
+        values: In the field's unit [-], shape (n, ...).
+    """
+    out = field.to_numpy()
+    out[0, : state.n[0]] = values
+    field.from_numpy(out)
+
+
+def velocity_gradients(state: State, cut: int = 0) -> np.ndarray:
+    """Velocity gradients of the particles of a cut [1/s], shape (n, 3, 3)."""
+    out: np.ndarray = state.C.to_numpy()[cut, : state.n[cut], :, :3].transpose(0, 2, 1)
+    return out
+
+
+def set_velocity_gradients(state: State, values: np.ndarray) -> None:
+    """Set the velocity gradients of the particles of the first cut [1/s], shape (n, 3, 3)."""
+    c = state.C.to_numpy()
+    c[0, : state.n[0], :, :3] = np.transpose(values, (0, 2, 1))
+    state.C.from_numpy(c)
+
+
+def set_pose(state: State, values: np.ndarray) -> None:
+    """Set the tool's pose of the first cut, shape (N_POSE,)."""
+    out = state.pose.to_numpy()
+    out[0] = values
+    state.pose.from_numpy(out)

@@ -1,0 +1,163 @@
+"""Fields and tables of the cuts that are simulated side by side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import taichi as ti
+
+from mpm.discretisation.grid import MIRROR
+from mpm.runtime import adds_doubles
+from mpm.state.tables import N_ORDER, N_PARAMETERS, N_PARTICLE_SUMS, N_POSE, N_SIZES, N_STRESS, N_SUMS
+
+BEYOND_GRID = 1 << 20  # a node that no grid has
+SECOND_FIELD_CELLS = 3  # cells on either side of the cut plane whose nodes may carry both halves
+REGISTER = 32  # bytes of a register of a CPU: as many particles as fill it have their elastic stress found at once
+CPU_BLOCK = 512  # Taichi runs CPU loops shorter than this on one thread, so one iteration in 512 works for a thread
+# What a loop goes over: each cut, rows of nodes in reach, lines of nodes across the mirror, parts of the particles, slices
+# along the edge, rows of nodes about what could be damaged.
+CUTS, NODE_ROWS, NODE_LINES, PARTS, SLICES, DAMAGE_ROWS = range(6)
+N_LOOPS = 6
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """What is compiled into the kernels; scenes of one configuration share fields and compiled code.
+
+    Attributes:
+        room: Most particles.
+        nodes: Most grid nodes along x, y, z.
+        mirrors: Whether there are mirror planes (x, y).
+        stations: Most slices along the edge.
+        threads: CPU threads, 0 on a GPU.
+        nodal: Plain nodal projection instead of the cohesive edge and particle contact.
+        press: The tool presses on the food's surface instead of cutting.
+        damage: Bulk damage on.
+        turned: The grid is turned against the blade.
+        branches: Number of Prony branches.
+        batch: Most cuts side by side; more than one on a GPU or with one thread a cut.
+    """
+
+    room: int
+    nodes: tuple[int, ...]
+    mirrors: tuple[bool, bool]
+    stations: int
+    threads: int
+    nodal: bool
+    press: bool
+    damage: bool
+    turned: bool = False
+    branches: int = 0
+    batch: int = 1
+
+
+@ti.data_oriented
+class State:
+    """Particles, grid, edge and tables, with room for a class of scenes; :func:`mpm.state.host_transfer.begin` fits them to some.
+
+    They hold one cut or a batch of them side by side, each with scene, material, time step and blade of its own; the
+    first index of every field says which. On a GPU one launch does a loop of all cuts, on CPUs a thread does all loops
+    of a cut (:func:`mpm.state.loops.locate`).
+
+    Deformation gradients are stored entry by entry for ``lanes`` particles, [block, 3 row + column, lane], so that the
+    same operation on all of them is one instruction; velocity gradients column by column, each filled up to four.
+
+    The grid stores two velocity fields: the first at ``[i, j, k]``, the second, which only nodes beside the cut plane
+    have, at ``[i, second + j, k]`` of each cut.
+
+    Args:
+        configuration: What is compiled into the kernels.
+    """
+
+    def __init__(self, configuration: Configuration) -> None:
+        own = configuration
+        self.mirror_x, self.mirror_y = own.mirrors
+        self.plane_x = MIRROR if self.mirror_x else -1  # node plane of the mirror across x
+        self.first_slice = max(self.plane_x, 0)  # that is no mirror image
+        self.threads, self.nodal, self.damage, self.turned = max(own.threads, 1), own.nodal, own.damage, own.turned
+        self.press, self.cuts = own.press, not (own.nodal or own.press)
+        self.atomic = own.threads == 0
+        self.serial = not self.atomic  # short loops run where the kernel was launched
+        self.parts = 1 if self.threads == 1 else self.threads * CPU_BLOCK
+        self.branches, self.second_fields = own.branches, not own.nodal
+        self.owner: Any = None  # whose cuts the fields hold
+        self.n = np.zeros(own.batch, np.int32)  # particles of each cut
+        real = ti.lang.impl.get_runtime().default_fp
+        self.real = np.float64 if real == ti.f64 else np.float32  # of the entries of fields, to fill them from the host
+        self.lanes = 1 if self.atomic else REGISTER // (8 if real == ti.f64 else 4)
+        self.blocks = -(-own.room // self.lanes)
+        self.batch, self.room, self.slices = own.batch, self.blocks * self.lanes, own.stations
+        # What is double on every device is laid out by itself: beside fields of four bytes Taichi's Vulkan puts it where
+        # it may not begin at a multiple of eight, and then writes the end of its neighbour.
+        self.pose, self.order = ti.field(ti.f64, (own.batch, N_POSE)), ti.field(ti.f64, (own.batch, N_ORDER))
+        ti.sync()
+        booked = ti.f64 if adds_doubles() else ti.f32
+        self.sums, self.particle_sums = (ti.field(booked, (own.batch, n)) for n in (N_SUMS, N_PARTICLE_SUMS))
+        self._add_particles(real, own.damage)
+        self._add_grid(real, own.nodes)
+        self._add_edge(real)
+        self._add_tables(real)
+        ti.sync()  # lays these fields out by themselves; Taichi does not manage those of eight scenes at once
+
+    def _add_particles(self, real: Any, damage: bool) -> None:
+        """Fields of the particles."""
+        vec3, vec4, mat3 = ti.types.vector(3, real), ti.types.vector(4, real), ti.types.matrix(3, 3, real)
+        batch, room, branches = self.batch, self.room, max(self.branches, 1)
+        worn, aged = room if damage else 1, room if self.branches else 1
+        self.x, self.v = (vec3.field(shape=(batch, room)) for _ in range(2))
+        self.C, self.F = vec4.field(shape=(batch, room, 3)), ti.Vector.field(self.lanes, real, (batch, self.blocks, 9))
+        self.tau = ti.Vector.field(self.lanes, real, (batch, self.blocks, N_STRESS))
+        # 0 where the cut has not passed, else 1 or 2 for the half; distances at which tool and board are met
+        self.side, self.tool_gap = ti.field(ti.i32, (batch, room)), ti.field(real, (batch, room))
+        self.board_gap = ti.field(real, (batch, room))
+        self.volume_ratio = ti.field(real, (batch, room))  # volume over that of a particle beside the cut
+        # reference volume between a particle of the first layer and the board, and the tool; 0 behind the first layer
+        self.surface_volume = ti.Vector.field(2, real, (batch, room))
+        # moment of the contact's last impulse as a gradient of the velocity: upwards, and across the blade; the fourth
+        # entry upwards is the kinetic energy per mass that this impulse gave
+        self.contact_moment = vec4.field(shape=(batch, room, 2))
+        self.kappa, self.driving_strain = (ti.field(real, (batch, worn)) for _ in range(2))
+        self.stick = vec3.field(shape=(batch, 2, room))  # stretch of the friction's spring on board and tool
+        # visibility: what mpm.kernels.crack.visible_layers found in the last step, with IN_CONTACT where `contact_moment` is of this
+        # step; elsewhere it means nothing
+        self.adhering, self.visibility = (ti.field(ti.i32, (batch, room)) for _ in range(2))
+        self.prony_stress = mat3.field(shape=(batch, branches, aged))
+        self.prony_before = mat3.field(shape=(batch, aged))
+        self.prony_share, self.prony_rate = (ti.field(real, (batch, branches)) for _ in range(2))
+
+    def _add_grid(self, real: Any, nodes: tuple[int, ...]) -> None:
+        """Fields of the grid, one for each thread to add to."""
+        vec4, batch = ti.types.vector(4, real), self.batch
+        more = 0 if self.nodal else nodes[1] if self.turned else 2 * SECOND_FIELD_CELLS + 1
+        self.stride_y, self.stride_x = nodes[2], (nodes[1] + more) * nodes[2]  # to the next node along y and along x
+        self.nodes_per_grid = nodes[0] * self.stride_x
+        grids = batch * self.threads
+        self.index_mask = (1 << (grids * self.nodes_per_grid).bit_length()) - 1
+        self.g = vec4.field(shape=grids * self.nodes_per_grid)  # momentum and mass
+        self.u = vec4.field(shape=batch * self.nodes_per_grid)  # velocity and mass
+        self.planes = vec4.field(shape=(batch, self.threads, 16))  # of the nodes of the particle that a thread moves
+        # box of the lowest nodes of particles whose strain could damage something
+        self.damage_box = ti.field(ti.i32, (batch, 6))
+
+    def _add_edge(self, real: Any) -> None:
+        """Fields of the slices along the cutting edge."""
+        vec2, vec3, shape = ti.types.vector(2, real), ti.types.vector(3, real), (self.batch, self.slices)
+        self.slip, self.reaction = (vec2.field(shape=shape) for _ in range(2))
+        self.zone_velocity = vec3.field(shape=shape)  # mean velocity of the material at the edge
+        self.crack_front, self.front_drift, self.cut_depth = (ti.field(real, shape) for _ in range(3))
+        self.softening, self.start_force, self.contact_part = (ti.field(real, shape) for _ in range(3))
+        self.started_beside = ti.field(ti.i32, shape)
+        self.top_high, self.top_low, self.width = (ti.field(real, shape) for _ in range(3))
+        self.floor_high, self.floor_low = (ti.field(real, shape) for _ in range(2))
+
+    def _add_tables(self, real: Any) -> None:
+        """Tables of numbers that the host sets, and of what the loops go over."""
+        self.par = ti.field(real, (self.batch, N_PARAMETERS))
+        self.size = ti.field(ti.i32, (self.batch, N_SIZES))
+        # nodes that particles can reach before it is renewed: first, last + 1
+        self.window = ti.field(ti.i32, (self.batch, 6))
+        # steps that a cut has yet to do before the next row of the report, on a GPU
+        self.steps_left = ti.field(ti.i32, self.batch)
+        self.extents = ti.field(ti.i32, N_LOOPS)  # most places that a loop goes over in any cut

@@ -1,0 +1,80 @@
+"""Rows of the tables that host and kernels share, by name."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+# Rows of the table of parameters, which kernels read at run time.
+MU, LAM, YIELD, MASS, VOLUME, BLADE_MU, BOARD_MU = range(7)
+R_FLESH, R_START, INITIATION_DEPTH, SLIP, ZONE, ZONE_MASS, EPS0, EPSF = range(7, 15)
+SPINE, WEDGE_COS, WEDGE_SIN, HALF_LENGTH, BLADE_HEIGHT, GRAVITY, TIP_RADIUS, ETA_S, ETA_B = range(15, 24)
+YAW_COS, YAW_SIN, ADHESION, ADHESION_GAP = range(24, 28)
+ARM_K, ARM_C, ARM_MASS, ARM_LIMIT = range(28, 32)
+DX, INV_DX, ORIGIN_X, ORIGIN_Y, ORIGIN_Z, FIRST_STATION = range(32, 38)
+N_PARAMETERS = 38
+
+# Rows of the table of sizes: particles, blocks of them, nodes along x, y, z, slices along the edge, the node plane along
+# y that is nearest to y = 0, the first and last + 1 node plane along y whose nodes have a second field, how far behind
+# the first that is stored, and the sum of the indices of two nodes that are mirror images across x.
+COUNT, BLOCKS, NODES, STATIONS, PLANE_Y, SECOND_BEGIN, SECOND_END, SECOND_OFFSET, MIRROR_SUM = (
+    0,
+    1,
+    2,
+    5,
+    6,
+    7,
+    8,
+    9,
+    10,
+)
+N_SIZES = 11
+
+# Rows of the table of sums over an output interval: impulses on edge, faces and board (three each), losses of the
+# particles, how many were inverted or left the grid, work of friction and of the edge, moment on the knife.
+EDGE, FACE, BOARD = 0, 3, 6
+PLASTIC, DAMAGE, VISCOUS, INVERTED, OUTSIDE, FRICTION_WORK, CUTTING_WORK, MOMENT = range(9, 17)
+N_SUMS = 17
+
+# Rows of the sums over all particles at an output: momentum (three), kinetic and elastic energy.
+MOMENTUM, KINETIC, ELASTIC = 0, 3, 4
+N_PARTICLE_SUMS = 5
+
+# Rows of the tool's pose: height of the edge in the middle of the blade, its middle along the blade, their velocities,
+# the height that is commanded, the vertical impulse booked before this step; the edge's angle to the board, how fast
+# that grows, its cosine and sine.
+EDGE_Z, EDGE_S, EDGE_VZ, EDGE_VS, COMMAND, BOOKED_IMPULSE, TILT, TILT_RATE, TILT_COS, TILT_SIN = range(10)
+N_POSE = 10
+
+# Rows of the table of orders: how many steps, after how many each a row of the report, time step, velocity upwards and
+# along the blade and rate of its tilt that are commanded.
+STEPS, STEPS_PER_ROW, DT, SPEED_UP, SPEED_ALONG, SPEED_TILT = range(6)
+N_ORDER = 6
+
+# Entries of a particle's stress: Kirchhoff stress (xx, yy, zz, yz, xz, xy), viscous and plastic loss per volume, and the
+# trace of the left stretch, negative where the particle must be done by itself.
+VISCOUS_LOSS, PLASTIC_LOSS, STRETCH = 6, 7, 8
+N_STRESS = 9
+STRETCH_AT_REST = 3.0  # trace of the stretch of food that is not strained
+
+N_REPORT = N_SUMS + N_PARTICLE_SUMS + N_POSE
+
+
+class Report(NamedTuple):
+    """What the kernels say of an output interval.
+
+    Attributes:
+        sums: Sums over the interval, shape (N_SUMS,).
+        particles: Sums over all particles at its end, shape (N_PARTICLE_SUMS,).
+        pose: Of the tool at its end, shape (N_POSE,).
+    """
+
+    sums: np.ndarray
+    particles: np.ndarray
+    pose: np.ndarray
+
+
+def parts_of_report(row: np.ndarray) -> Report:
+    """Parts of a row of the report, shape (N_REPORT,)."""
+    return Report(*np.split(row, (N_SUMS, N_SUMS + N_PARTICLE_SUMS)))
