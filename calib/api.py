@@ -19,9 +19,9 @@ from calib.material.food import FoodSpec, load_material_file
 from calib.material.scene import MIDDLE, Sizing
 from calib.problem.request import Request
 from calib.trace.trace import Trace, read_trace
-from mpm.errors import CutcalError, check_number
 from mpm.runtime import ARCHES
-from mpm.shapes import SHAPE_KINDS
+from mpm.scene.errors import CutcalError, check_number
+from mpm.scene.shapes import SHAPE_KINDS
 
 LIMITS: dict[str, tuple[float, float, str]] = {
     "speed": (0.0, 10.0, "m/s"),
@@ -49,7 +49,7 @@ class Calibration:
         knife: Name in ``knives.yaml``, or path of a YAML file.
         speed: Knife speed [m/s], where the trace has no position.
         t_end: Time after which the record is ignored [s], or None.
-        shape: Outline of the specimen, one of ``mpm.shapes.SHAPE_KINDS``; None for the food's.
+        shape: Outline of the specimen, one of ``mpm.scene.shapes.SHAPE_KINDS``; None for the food's.
         height, width, length: Sizes of the specimen [m], None where they were not measured.
         at: Where the blade cuts, as the part of the length on one side [-].
         fit: Names of the fitted properties; None for those that cutting sees.

@@ -20,10 +20,10 @@ from typing import Any
 from calib._version import __version__
 from calib.material.food import load_foods
 from calib.material.knife import load_knives
-from mpm.errors import CutcalError
-from mpm.material import Material
 from mpm.scene import EdgeLaw, Food, Knife, Motion, Numerics, Scene
-from mpm.shapes import Shape
+from mpm.scene.errors import CutcalError
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 
 FLESH = Material(E=1e6, nu=0.35, rho=1000, yield_stress=2e5, R=300.0, R_initiation=300.0)
 BLADE = Knife("thin", 0.2e-3, math.radians(1.0), 0.05, 0.4)

@@ -86,7 +86,7 @@ def calibrate() -> int:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; returns its exit code."""
     from cutcal.parsing import Misused, parse
-    from mpm.errors import CutcalError
+    from mpm.scene.errors import CutcalError
 
     words = sys.argv[1:] if argv is None else argv
     for stream in (sys.stdout, sys.stderr):

@@ -15,9 +15,9 @@ from calib.material.scene import MIDDLE, Sizing
 from calib.simulation.dask_cluster import Cluster
 from calib.simulation.process_pool import Pool
 from calib.simulation.workers import Workers
-from mpm.errors import CutcalError
 from mpm.runtime import ARCHES
-from mpm.shapes import SHAPE_KINDS
+from mpm.scene.errors import CutcalError
+from mpm.scene.shapes import SHAPE_KINDS
 
 Group: TypeAlias = argparse._ActionsContainer
 """A parser, or a group of its options."""

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from calib.io.yaml_checks import suggest
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 COLUMN = 24  # where the explanations of options begin
 

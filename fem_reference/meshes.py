@@ -11,8 +11,8 @@ import numpy as np
 import skfem as sk
 from skfem.io.meshio import from_meshio
 
-from mpm.errors import CutcalError
-from mpm.shapes import Shape
+from mpm.scene.errors import CutcalError
+from mpm.scene.shapes import Shape
 
 CORE = 0.55  # part of the radius that the middle block of a disc or ball reaches along the axes
 BULGE = 0.5  # how round that block is: 0 a cube, 1 a ball

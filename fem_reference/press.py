@@ -12,8 +12,8 @@ from fem_reference.contact import Contact, Obstacle, Plane, Wedge
 from fem_reference.laws import Corotated, Law, Plastic
 from fem_reference.meshes import MeshError, quarter, surface
 from fem_reference.solid import EquilibriumError, Solid
-from mpm.material import Material
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 
 STIFF = 100.0  # penalty of a contact over the modulus of the food and the size of its elements
 SHARP = 1e-4  # penetration that is small enough, over the size of the elements

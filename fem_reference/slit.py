@@ -12,9 +12,9 @@ from fem_reference.laws import Corotated
 from fem_reference.meshes import box, surface
 from fem_reference.press import SHARP, STIFF
 from fem_reference.solid import EquilibriumError, Solid
-from mpm.material import Material
 from mpm.scene import Knife
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 
 LAYERS = 3  # elements over half the width
 ACROSS = 12  # elements over half the length, smaller near the slit

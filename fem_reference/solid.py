@@ -15,7 +15,7 @@ import skfem as sk
 
 from fem_reference.contact import Contact
 from fem_reference.laws import Law, Plastic, determinant, identity
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 ELEMENTS = {
     ("hex", 1): (sk.ElementHex1, 2),

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 
-from mpm.errors import CutcalError, SceneError, SimulationError
-from mpm.material import Material
 from mpm.output.record import ForceRecord
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
-from mpm.shapes import Shape
+from mpm.scene.errors import CutcalError, SceneError, SimulationError
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")  # stdout belongs to the caller
 os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")  # Taichi would tell its makers once a day that it was started

@@ -7,7 +7,6 @@ import time as clock
 
 import numpy as np
 
-from mpm.errors import SceneError, SimulationError
 from mpm.output.record import ForceRecord
 from mpm.output.recorder import Recorder
 from mpm.output.snapshot import Snapshot
@@ -16,6 +15,7 @@ from mpm.output.topology import Topology
 from mpm.run import Order
 from mpm.runtime import Runtime, running
 from mpm.scene import STEEPEST, Scene
+from mpm.scene.errors import SceneError, SimulationError
 from mpm.setup.setup import CLEARANCE
 from mpm.solver import Simulation
 from mpm.state.host_transfer import of_particles

@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from mpm.errors import SimulationError
 from mpm.kernels.time_step import advance
-from mpm.material import Material
 from mpm.output.record import ForceRecord
 from mpm.output.snapshot import Snapshot, SnapshotRecorder, snapshot
 from mpm.output.topology import Topology, topology
 from mpm.run import CutRun, Progress
 from mpm.runtime import Runtime, start
 from mpm.scene import Scene
+from mpm.scene.errors import SimulationError
+from mpm.scene.material import Material
 from mpm.setup.parameters import pose
 from mpm.setup.setup import Setup
 from mpm.state import host_transfer

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 __all__ = ["ReportError"]
 

@@ -13,7 +13,7 @@ from calib.errors import CurveError, TraceError
 from calib.trace.columns import candidates, choose, numbers
 from calib.trace.table import Table, read_table
 from calib.trace.trace import MIN_SAMPLES
-from mpm.shapes import Shape, volume
+from mpm.scene.shapes import Shape, volume
 
 STEP = 0.001
 """Step of the common strain grid, about [-]."""

@@ -14,11 +14,11 @@ from scipy.optimize import brentq
 from calib.compression.measured import area, strain_grid
 from calib.errors import CurveError
 from calib.io.progress import clock
-from mpm.errors import SimulationError
-from mpm.material import Material
 from mpm.runtime import Runtime
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
-from mpm.shapes import Shape
+from mpm.scene.errors import SimulationError
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from mpm.solver import Simulation
 
 CONTACT = 0.02

@@ -17,7 +17,7 @@ from calib.io.folder import prepare, write_csv, write_json
 from calib.io.provenance import git_commit, versions
 from calib.io.schema import tag
 from calib.validation.acceptance import Verdict
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 NRMSE_LIMIT = 0.05
 SLOPE_LIMIT = 0.10

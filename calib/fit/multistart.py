@@ -25,7 +25,7 @@ from calib.problem.joint_objective import JointObjective
 from calib.problem.objective import Objective, Trial
 from calib.problem.parameters import ParameterSet
 from calib.simulation.evaluation import Evaluator
-from mpm.errors import SimulationError
+from mpm.scene.errors import SimulationError
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -41,7 +41,7 @@ from calib.problem.joint_objective import JointObjective, residual
 from calib.problem.objective import Objective, Trial
 from calib.simulation.evaluation import Evaluation, Evaluator
 from calib.uncertainty.intervals import EXPLAINED
-from mpm.errors import SimulationError
+from mpm.scene.errors import SimulationError
 
 FloatArray = npt.NDArray[np.float64]
 

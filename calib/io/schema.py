@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from calib.io.yaml_checks import suggest
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 FOLDER = Path(__file__).with_name("schemas")
 COMMON = "common"  # parts that several schemas share

@@ -18,7 +18,7 @@ import yaml
 
 from calib.errors import MaterialError
 from calib.io.wording import brief, quoted
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 PACKAGE = Path(__file__).resolve().parents[1]
 """Folder of the package ``calib``; an installed one has the data in it, a checkout beside it."""

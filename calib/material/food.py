@@ -29,7 +29,7 @@ from calib.material.properties import (
     check_override,
     rule_of,
 )
-from mpm.shapes import SHAPE_KINDS
+from mpm.scene.shapes import SHAPE_KINDS
 
 if TYPE_CHECKING:
     from mpm.scene import Food
@@ -58,7 +58,7 @@ class FoodSpec:
 
     Attributes:
         name: Lower case with underscores.
-        shape_kind: One of ``mpm.shapes.SHAPE_KINDS``.
+        shape_kind: One of ``mpm.scene.shapes.SHAPE_KINDS``.
         dims: ``length``, ``width``, ``height`` [m].
         properties: By name; a property the food has no value for (null in the file) is absent.
         calibration: Provenance of a calibrated food, or None.
@@ -190,9 +190,9 @@ class FoodSpec:
         Raises:
             SceneError: A shape or size that the solver cannot take.
         """
-        from mpm.material import Material
         from mpm.scene import Food
-        from mpm.shapes import Shape
+        from mpm.scene.material import Material
+        from mpm.scene.shapes import Shape
 
         sizes = {"length": length, "width": width, "height": height}
         size = {n: self.dims[n].value if given is None else given for n, given in sizes.items()}

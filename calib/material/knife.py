@@ -20,8 +20,8 @@ from calib.io.yaml_checks import (
     suggest,
     text,
 )
-from mpm.errors import SceneError
 from mpm.scene import Knife
+from mpm.scene.errors import SceneError
 
 #: Unit of each field in the file.
 UNITS = {"spine": "m", "angle": "deg", "height": "m", "length": "m"}

@@ -8,7 +8,7 @@ from typing import Any
 
 from calib.errors import MaterialError
 from calib.io.yaml_checks import Place, check_unit, choice, number, suggest, text
-from mpm.material import MAX_POISSON
+from mpm.scene.material import MAX_POISSON
 
 #: Where a literature value comes from: measured on this food; Table 2 of the CulinaryCut paper; another food,
 #: another test or a second-hand quotation; nobody's measurement.

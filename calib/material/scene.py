@@ -11,7 +11,7 @@ import numpy as np
 from calib.material.food import FoodSpec
 from calib.trace.conditioning import Conditioned
 from mpm.scene import EdgeLaw, Knife, Motion, Numerics, Scene
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 ZONE_M = 4e-3  # process zone of the edge; small foods get an eighth of their height
 ZONE_PARTS = 8

@@ -27,7 +27,7 @@ from calib.validation.acceptance import Verdict, balances
 from calib.validation.metrics import Metrics, compare
 from calib.validation.null_models import null_models
 from calib.validation.prediction import NRMSE_LIMIT, RATING_LIMIT
-from mpm.errors import SimulationError
+from mpm.scene.errors import SimulationError
 
 FloatArray = np.ndarray
 

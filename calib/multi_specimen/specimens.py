@@ -29,7 +29,7 @@ from calib.uncertainty.analysis import Doubt
 from calib.uncertainty.global_search import infer
 from calib.validation.numerical_checks import otherwise
 from mpm.scene import Scene
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 FloatArray = np.ndarray
 

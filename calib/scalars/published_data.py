@@ -19,9 +19,9 @@ from calib.material.properties import DIMENSIONS, Rule
 from calib.material.scene import LENGTH_PER_HEIGHT, PRISMS
 from calib.problem.parameters import ParameterSet
 from calib.problem.setup import fit_parameters
-from mpm.errors import CutcalError, SceneError
 from mpm.scene import Knife
-from mpm.shapes import SHAPE_KINDS, Shape, section_area
+from mpm.scene.errors import CutcalError, SceneError
+from mpm.scene.shapes import SHAPE_KINDS, Shape, section_area
 
 PEAK, ENERGY = "peak_N", "energy_J_m2"
 QUANTITIES = {PEAK: "largest force [N]", ENERGY: "work over the area of the cut [J/m^2]"}

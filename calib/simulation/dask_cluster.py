@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 from calib.errors import ClusterError
 from calib.io.provenance import code_key
 from calib.simulation.workers import Result, Workers
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 if TYPE_CHECKING:
     from distributed import Client, Future

@@ -12,10 +12,10 @@ import numpy as np
 
 from calib.material.scene import place
 from calib.simulation.evaluation import Evaluation
-from mpm.errors import SimulationError
-from mpm.material import Material
 from mpm.output.record import ForceRecord
 from mpm.scene import Scene
+from mpm.scene.errors import SimulationError
+from mpm.scene.material import Material
 
 Result = TypeVar("Result")
 Kind = TypeVar("Kind", bound="Workers")

@@ -30,7 +30,7 @@ from calib.simulation.evaluation import Evaluator
 from calib.uncertainty.analysis import Doubt, as_good, at_first_sight, doubt_of
 from calib.uncertainty.intervals import EXPLAINED, Interval
 from calib.uncertainty.profile_likelihood import RISE
-from mpm.errors import SimulationError
+from mpm.scene.errors import SimulationError
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -34,8 +34,8 @@ from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, 
 from calib.simulation.workers import Workers
 from calib.uncertainty.global_search import infer
 from calib.validation.numerical_checks import otherwise
-from mpm.errors import CutcalError
 from mpm.scene import Scene
+from mpm.scene.errors import CutcalError
 
 RIGHT = ErrorModel(discrepancy=0.01, peak=0.02)
 """Error model of a fit with the very model that made the trace: with other particles a simulated cut of a banana repeats its curve to

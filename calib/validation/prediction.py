@@ -16,7 +16,7 @@ from calib.problem.request import Request
 from calib.problem.setup import conditioned
 from calib.trace.filters import filter_simulated
 from calib.validation.metrics import Metrics, compare
-from mpm.errors import SimulationError
+from mpm.scene.errors import SimulationError
 
 NRMSE_LIMIT, RATING_LIMIT = 0.10, 0.80
 """Largest curve error and smallest ISO-18571-style rating of a prediction that passes [-]."""

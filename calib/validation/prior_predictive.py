@@ -33,7 +33,7 @@ from calib.simulation.evaluation_store import EvaluationStore, Header, content_k
 from calib.simulation.workers import Workers
 from calib.trace.filters import N_STROKE, filter_simulated
 from mpm.scene import Knife, Scene
-from mpm.shapes import volume
+from mpm.scene.shapes import volume
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from intsim.sim.closed_loop import ENV
 from intsim.sim.scenery import COLOURS
 from intsim.task.suites import Episode
 from intsim.task.targets import CutSpec
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 
 class Renderer:

@@ -38,7 +38,7 @@ from calib.io.folder import finite
 from intsim.data.demonstrate import OPEN, Track
 from intsim.task.planner import PHASES, RATE
 from intsim.task.targets import Item
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 SHARD = "shard-{:04d}"
 PART = "part-{:06d}.h5"  # an episode whose shard is not complete

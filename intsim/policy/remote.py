@@ -26,7 +26,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 PROTOCOL = 1
 NUMBERS = {"pose": 7, "joints": 8}

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from intsim.policy.remote import Model, Server
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 FRONT = "front"  # the picture that all three are given
 STRIDE = 4  # RDT's actions are interpolated four times finer than its control

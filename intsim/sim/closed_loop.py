@@ -15,7 +15,7 @@ from intsim.sim.severing import Severed
 from intsim.task.kinematic_table import Rollout, guard
 from intsim.task.planner import RATE
 from intsim.task.suites import draw
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 ENV = "CutFood-v1"
 STEPS = 400  # of an episode, at most: 20 s

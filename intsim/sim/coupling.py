@@ -12,10 +12,10 @@ from intsim.sim.severing import cut_place
 from intsim.task.kinematic_table import crossing
 from intsim.task.planner import SPEED
 from intsim.task.targets import Item
-from mpm.errors import SceneError, SimulationError
 from mpm.live import LiveCut
 from mpm.output.record import ForceRecord
 from mpm.scene import Scene
+from mpm.scene.errors import SceneError, SimulationError
 
 ROOM = 2.0  # empty grid around the food, over half its size: a knife that comes back takes pieces along
 REST = 1e-4  # height at which the edge is on the board [m]

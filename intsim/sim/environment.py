@@ -28,7 +28,7 @@ from intsim.task.planner import HOME, RATE
 from intsim.task.success import judge
 from intsim.task.suites import FOODS, Episode, draw
 from intsim.task.targets import CAMERAS
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 PHYSICS = 100  # steps of the robot's physics a second
 STEPS = 400  # of an episode, at most

@@ -11,9 +11,9 @@ from calib.material.knife import load_knife
 from calib.material.scene import CELL_PER_ZONE, Sizing, cut_scene, specimen
 from intsim.task.planner import RATE
 from intsim.task.targets import Item
-from mpm.errors import SceneError
 from mpm.output.record import ForceRecord
 from mpm.scene import Arm, Scene
+from mpm.scene.errors import SceneError
 from mpm.solver import Simulation
 
 ARM = Arm(1 / 0.57e-3)

@@ -12,7 +12,7 @@ import numpy as np
 from calib.material.food import FoodSpec, load_foods
 from intsim.task.language import instructions
 from intsim.task.targets import ALONG_VIEW, CutSpec, Item, TaskError
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 FOODS = (
     "banana", "cucumber", "apple", "peach", "melon", "orange", "strawberry", "pear", "kiwi", "tomato", "lemon", "grape",

@@ -9,8 +9,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from mpm.errors import CutcalError
-from mpm.shapes import Shape, half_width, section_area
+from mpm.scene.errors import CutcalError
+from mpm.scene.shapes import Shape, half_width, section_area
 
 SIDES = ("left", "right", "centre")
 ALONG_VIEW = math.radians(15.0)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mpm.errors import SceneError
 from mpm.scene import Numerics, Scene
-from mpm.shapes import inside, surface, volume
+from mpm.scene.errors import SceneError
+from mpm.scene.shapes import inside, surface, volume
 
 MAX_PARTICLES = 20_000_000
 JITTER = 0.25

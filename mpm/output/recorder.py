@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mpm.material import Material
 from mpm.output.health import health
 from mpm.output.record import ForceRecord
 from mpm.output.topology import Topology
+from mpm.scene.material import Material
+from mpm.scene.shapes import section_area
 from mpm.setup.setup import Setup
-from mpm.shapes import section_area
 from mpm.state import tables as row
 from mpm.state.tables import Report, parts_of_report
 

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from mpm.discretisation.particles import Seeds
 from mpm.output.snapshot import Snapshot
-from mpm.shapes import FLAT_TOP, Shape, half_width, surface
+from mpm.scene.shapes import FLAT_TOP, Shape, half_width, surface
 
 NEAR = 16  # particles that a vertex goes with
 AROUND = 64  # vertices of a ring

@@ -8,10 +8,10 @@ import numpy as np
 
 from mpm.discretisation.grid import Grid
 from mpm.discretisation.particles import Seeds
-from mpm.material import Material
 from mpm.scene import BAND_CELLS, Press, Scene
+from mpm.scene.material import Material
+from mpm.scene.shapes import section_area
 from mpm.setup.stable_step import retardation_time
-from mpm.shapes import section_area
 from mpm.state import tables as row
 
 ENDLESS = 1e3  # thickness of a wedge that never becomes a plate with parallel faces [m]

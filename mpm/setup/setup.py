@@ -9,13 +9,13 @@ import numpy as np
 from mpm.discretisation.capacity import batch_capacity, node_capacity, particle_capacity
 from mpm.discretisation.grid import lay_out
 from mpm.discretisation.particles import seed
-from mpm.material import Material
 from mpm.runtime import Runtime
 from mpm.scene import Scene
+from mpm.scene.material import Material
+from mpm.scene.shapes import skin_path
+from mpm.scene.shapes import slices as outline
 from mpm.setup.parameters import parameters, pose
 from mpm.setup.stable_step import stable_step
-from mpm.shapes import skin_path
-from mpm.shapes import slices as outline
 from mpm.state import contents as column
 from mpm.state.contents import Contents
 from mpm.state.state import Configuration

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from mpm.kernels.surface_contact import CONTACT_STIFFNESS
-from mpm.material import Material
 from mpm.scene import Scene
+from mpm.scene.material import Material
 
 EDGE_STABILITY = 0.5  # dt times the frequency of the edge's cohesive spring, 2 is unstable
 ADHESION_STABILITY = 0.5  # the same for the rising part of the adhesive traction

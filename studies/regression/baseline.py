@@ -16,7 +16,7 @@ from calib.material.food import FoodSpec
 from calib.material.scene import CELL_PER_ZONE, Sizing, cut_scene, specimen
 from mpm.output.record import ForceRecord
 from mpm.scene import CONTACTS, Knife, Scene
-from mpm.shapes import volume
+from mpm.scene.shapes import volume
 from studies.convergence.gci import REPEATABILITY
 from studies.regression.reference_curves import CHECKED
 

@@ -28,11 +28,11 @@ from calib.simulation.process_pool import Pool
 from calib.trace.filters import filter_simulated
 from calib.validation.metrics import compare
 from mpm.batch import simulate_together
-from mpm.material import Material
 from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import EdgeLaw, Food, Knife, Motion, Numerics, Scene
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from mpm.solver import Simulation
 from studies.speed.peers import PEERS, measure
 

@@ -14,10 +14,10 @@ import numpy as np
 import taichi as ti
 
 from mpm.discretisation.particles import seed
-from mpm.errors import SceneError
 from mpm.kernels.signed_distance import blade_distance, coulomb
 from mpm.runtime import Runtime, start
 from mpm.scene import Knife, Scene
+from mpm.scene.errors import SceneError
 
 BOTTOM = 4  # index of the nodes on the board
 THRESHOLD = 1e30  # yield stress and strain of a material without plasticity or damage

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from mpm.material import Material
 from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
+from mpm.scene.material import Material
 from mpm.solver import Simulation
 from mpm.state.tables import COMMAND, EDGE_S, EDGE_Z
 from studies.stability.audit import Audit, audit

@@ -15,10 +15,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 from calib.io.provenance import key_of
-from mpm.errors import SceneError
-from mpm.material import Material
 from mpm.scene import EdgeLaw, Food, Knife, Motion, Numerics, Scene
-from mpm.shapes import Shape
+from mpm.scene.errors import SceneError
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 
 SIZE = 0.02  # edge of the block [m]
 CUTTING_LENGTH = 1e-3  # R / E [m]; 0.04 to 1.3 mm for the foods of materials.yaml

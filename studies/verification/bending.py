@@ -11,8 +11,8 @@ import numpy as np
 from fem_reference.laws import Corotated
 from fem_reference.meshes import box
 from fem_reference.solid import Solid
-from mpm.material import Material
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from studies.verification.case import Case, How, Row
 from studies.verification.motion import numerics
 

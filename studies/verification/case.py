@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from mpm.material import Material
 from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import Numerics, Scene
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from mpm.solver import Simulation
 from studies.verification.free_body import FreeBody
 

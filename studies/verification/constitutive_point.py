@@ -9,8 +9,8 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from mpm.material import Material
 from mpm.runtime import start
+from mpm.scene.material import Material
 from studies.verification.case import Case, How, Row
 
 UNIT = Material(E=1.0, nu=0.35, rho=1.0)

@@ -9,9 +9,9 @@ from functools import partial
 
 import numpy as np
 
-from mpm.material import Material
 from mpm.scene import Board, Food, Motion, Press, Scene
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from studies.verification.case import Case, How, Row
 from studies.verification.motion import BLOCK, SOFT, numerics
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from calib.validation.acceptance import unbooked
 from fem_reference.slit import cleave
-from mpm.material import Material
 from mpm.output.record import ForceRecord
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from studies.verification.case import Case, How, Row
 
 THIN = Knife("thin", 0.2e-3, math.radians(1.0), 0.05, 0.4)

@@ -12,8 +12,8 @@ from fem_reference.laws import Corotated, Law, Plastic
 from fem_reference.meshes import bent, box, surface
 from fem_reference.press import press
 from fem_reference.solid import Solid
-from mpm.material import Material
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from studies.verification.case import Case, How, Row
 
 STEEL = Material(E=210e9, nu=0.3, rho=7800.0)

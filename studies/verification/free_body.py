@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from mpm.errors import SimulationError
-from mpm.material import Material
 from mpm.output.health import health
 from mpm.run import Order
 from mpm.runtime import Runtime
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
-from mpm.shapes import Shape
+from mpm.scene.errors import SimulationError
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from mpm.solver import Simulation
 from mpm.state.host_transfer import fill, of_particles, set_velocity_gradients, velocity_gradients
 from mpm.state.tables import BOARD, ELASTIC, FRICTION_WORK, KINETIC, N_PARTICLE_SUMS, parts_of_report

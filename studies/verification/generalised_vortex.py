@@ -15,9 +15,9 @@ import math
 
 import numpy as np
 
-from mpm.material import Material
 from mpm.scene import Numerics
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from studies.verification.case import How
 
 INNER, OUTER = 0.75, 1.25  # radii of the ring, in units of its mean radius

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from fem_reference.press import press
-from mpm.material import Material
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from studies.verification.case import Case, How, Row
 
 FOOD = Material(E=1e5, nu=0.35, rho=1000.0, loss_factor=0.05)

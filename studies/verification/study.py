@@ -14,7 +14,7 @@ from calib.io.progress import Countdown
 from calib.io.provenance import code_key, git_commit, versions
 from calib.io.schema import tag
 from calib.simulation.workers import Workers
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 from studies.verification.case import Case, How, cases
 
 Say = Callable[[str], None]

@@ -38,11 +38,11 @@ from calib.validation.metrics import compare
 from calib.validation.null_models import null_models
 from calib.validation.numerical_checks import Check, check, check_errands
 from mpm.discretisation.particles import seed
-from mpm.errors import SceneError, SimulationError
 from mpm.output.record import ENERGIES, ForceRecord
 from mpm.runtime import Runtime, start
 from mpm.scene import Scene
-from mpm.shapes import SHAPE_KINDS
+from mpm.scene.errors import SceneError, SimulationError
+from mpm.scene.shapes import SHAPE_KINDS
 from tests.calib.cheap import LOG, SECONDS, CheapPool, noted
 from tests.calib.cheap import cut as cheap_cut
 from tests.data_dir import ROOT

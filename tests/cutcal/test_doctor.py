@@ -12,8 +12,8 @@ import taichi
 
 from cutcal import doctor
 from cutcal.main import main
-from mpm.errors import SceneError
 from mpm.runtime import Runtime, start
+from mpm.scene.errors import SceneError
 from tests.calib.documents import valid
 
 

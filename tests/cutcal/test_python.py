@@ -20,7 +20,7 @@ from calib import Calibration, Food, Trace
 from calib.material.food import FoodSpec, load_food
 from calib.problem.request import Request
 from calib.problem.setup import conditioned
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 from tests.data_dir import ROOT
 
 BANANA = ROOT / "force_data" / "banana_reconstructed.csv"

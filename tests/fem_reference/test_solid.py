@@ -14,9 +14,9 @@ from fem_reference.laws import Corotated, NeoHookean
 from fem_reference.press import press
 from fem_reference.slit import Opening, cleave
 from fem_reference.solid import EquilibriumError, Solid
-from mpm.material import Material
 from mpm.scene import Knife
-from mpm.shapes import Shape, volume
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape, volume
 from tests.mpm import twins
 
 FOOD = Material(E=1e5, nu=0.35, rho=1000.0)

@@ -20,7 +20,7 @@ from intsim.task.success import TIP, judge, wilson
 from intsim.task.suites import FOODS, SUITES, TEST, Episode, draw
 from intsim.task.targets import CutSpec, Item, TaskError, target
 from mpm.scene import Arm
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 from tests.calib.documents import valid
 
 ALL = {name: load_food(name) for name in FOODS}

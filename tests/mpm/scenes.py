@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from mpm.material import Material
 from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import EdgeLaw, Food, Knife, Motion, Numerics, Scene
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from mpm.solver import Simulation
 
 THIN = Knife("thin", 0.2e-3, np.deg2rad(1.0), 0.05, 0.4)

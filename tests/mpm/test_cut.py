@@ -9,14 +9,14 @@ import pytest
 import taichi as ti
 
 from mpm.discretisation.particles import Seeds
-from mpm.errors import SceneError
 from mpm.kernels.crack import front_height
-from mpm.material import Material
 from mpm.output.record import ForceRecord
 from mpm.output.snapshot import SnapshotRecorder
 from mpm.runtime import Runtime
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
-from mpm.shapes import Shape
+from mpm.scene.errors import SceneError
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from mpm.solver import Simulation
 from tests.mpm.scenes import FLESH, PRISM, WEDGE
 

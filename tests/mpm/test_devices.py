@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import taichi as ti
 
-from mpm import runtime
 from mpm.batch import simulate_together
-from mpm.errors import SceneError
 from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
+from mpm.runtime import device as runtime
 from mpm.scene import Scene
+from mpm.scene.errors import SceneError
 from mpm.setup.setup import Setup
 from mpm.solver import Simulation
 from tests.mpm.scenes import PRISM, WEDGE

@@ -10,11 +10,11 @@ import pytest
 from calib.material.food import load_food
 from calib.material.knife import load_knife
 from calib.material.scene import Sizing, cut_scene, specimen
-from mpm.errors import SceneError, SimulationError
 from mpm.live import LiveCut
 from mpm.runtime import Runtime
 from mpm.scene import Arm, Board, Food, Motion, Press, Scene
-from mpm.shapes import Shape
+from mpm.scene.errors import SceneError, SimulationError
+from mpm.scene.shapes import Shape
 from mpm.solver import Simulation
 from tests.mpm import scenes
 

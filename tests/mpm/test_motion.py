@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpm.errors import SceneError
 from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import Arm, Board, Food, Motion
-from mpm.shapes import Shape
+from mpm.scene.errors import SceneError
+from mpm.scene.shapes import Shape
 from mpm.solver import Simulation
 from tests.mpm import scenes
 from tests.mpm.scenes import WEDGE, cut

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from mpm.errors import SceneError
-from mpm.material import Material
 from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
-from mpm.shapes import Shape
+from mpm.scene.errors import SceneError
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from mpm.solver import Simulation
 
 SOFT = Material(E=1e5, nu=0.35, rho=1000.0, loss_factor=0.1)

@@ -29,7 +29,7 @@ from cutcal.options import (
     titled,
     workers_of,
 )
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 HELP = "fit a food to a measured knife-force trace, and report"
 DESCRIPTION = """Fit a food to a knife-force trace (CSV, JSON, HDF5; units in columns' names)."""

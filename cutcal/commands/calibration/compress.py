@@ -14,7 +14,7 @@ from cutcal.options import (
     print_json,
     whole,
 )
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 HELP = "Young's modulus from a compression test between two plates"
 DESCRIPTION = """Calibrate Young's modulus on the force of a specimen that is compressed between

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cutcal.options import KNIFE_HELP, RESUME_HELP, Group, add_workers, number, print_json, say, whole, workers_of
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 HELP = "a robot's cuts with force, in shards that learning code loads"
 DESCRIPTION = """generate: a Panda in ManiSkill cuts what it is told, in words; the food is in

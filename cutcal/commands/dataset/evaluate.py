@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from calib.material.food import FoodSpec, load_food, load_material_file
 from cutcal.options import KNIFE_HELP, Group, add_workers, number, print_json, say, whole, workers_of
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 if TYPE_CHECKING:
     from calib.simulation.workers import Workers

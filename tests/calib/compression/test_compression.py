@@ -18,7 +18,7 @@ from calib.compression.press import UnitCurve, homogeneous, press_scene, solver_
 from calib.compression.study import judge
 from cutcal.main import main
 from mpm.runtime import Runtime
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 from mpm.solver import Simulation
 from tests.calib.documents import valid
 from tests.data_dir import data_file

@@ -22,7 +22,7 @@ from calib.problem.parameters import Parameter, ParameterSet
 from calib.simulation.evaluation import Evaluation, Evaluator
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, Header
 from calib.uncertainty.intervals import EXPLAINED, evidence, uncertainty
-from mpm.errors import SimulationError
+from mpm.scene.errors import SimulationError
 from tests.calib.fake import (
     FIVE,
     GRID,

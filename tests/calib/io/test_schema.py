@@ -20,7 +20,7 @@ from cutcal.options import print_json
 from mpm.output.record import ENERGIES
 from mpm.runtime import ARCHES
 from mpm.scene import CONTACTS
-from mpm.shapes import SHAPE_KINDS
+from mpm.scene.shapes import SHAPE_KINDS
 from studies.convergence import gci
 from studies.stability.study import REASONS
 from tests.calib.documents import at, changed, faults, places, valid, validator

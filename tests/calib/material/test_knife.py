@@ -10,7 +10,7 @@ import yaml
 from calib.io.yaml_checks import data_path
 from calib.material.knife import TOLERANCE, load_knife, load_knives, wedge_height
 from cutcal.main import main
-from mpm.errors import SceneError
+from mpm.scene.errors import SceneError
 from tests.calib.documents import valid
 
 GOOD = """\

@@ -11,7 +11,7 @@ import pytest
 
 from calib.multi_specimen.specimens import pinned, pressed
 from calib.multi_specimen.study_file import OWN, SCATTER, overridden, read_study
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 from tests.calib.fake import FIVE, goal
 
 GOOD = """

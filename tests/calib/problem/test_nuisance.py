@@ -21,7 +21,7 @@ from calib.problem.parameters import Parameter, ParameterSet
 from calib.problem.setup import numerical
 from calib.trace.conditioning import Conditioned, condition
 from calib.trace.trace import Trace
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 ONE = ParameterSet((Parameter("E", 1e5, 1e3, 1e7, "Pa", 5e4, 2e5),))
 

@@ -26,8 +26,8 @@ from calib.trace.conditioning import Conditioned, condition
 from calib.trace.filters import N_STROKE
 from calib.trace.trace import MIN_SAMPLES, read_trace
 from cutcal.main import main
-from mpm.errors import CutcalError
 from mpm.scene import Knife
+from mpm.scene.errors import CutcalError
 from tests.data_dir import ROOT
 
 MORE = int(os.environ.get("CUTCAL_FUZZ", "0"))

@@ -17,7 +17,7 @@ from calib.compression.measured import read_repeats
 from calib.errors import TraceError
 from calib.trace.conditioning import condition
 from calib.trace.trace import Trace, read_trace
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 N = 40
 TIME = 0.01 * np.arange(N)

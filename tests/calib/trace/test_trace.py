@@ -11,7 +11,7 @@ import pytest
 
 from calib.errors import TraceError
 from calib.trace.trace import MIN_SAMPLES, Trace, read_trace
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 from tests.data_dir import ROOT, data_file
 
 N = 40

@@ -17,7 +17,7 @@ from calib.validation.metrics import (
     russell_from_integrals,
     sprague_geers_from_integrals,
 )
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 from tests.data_dir import data_file
 
 N = 2001

@@ -16,7 +16,7 @@ from intsim.data.manifest import Manifest
 from intsim.data.pictures import VIEWS, available, pictures_of, render
 from intsim.data.shards import META, trajectories
 from intsim.data.views import views
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 from tests.calib.documents import valid
 from tests.intsim.data.test_generate import Inline
 from tests.intsim.painter import PIXELS, Here, Painter, paint_with

@@ -16,7 +16,7 @@ from intsim.policy import vla_adapters
 from intsim.policy.oracles import Oracle
 from intsim.policy.remote import Remote, Server, packed, unpacked
 from intsim.policy.vla_adapters import RDT, Octo, OpenVLA
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 
 pytest.importorskip("PIL.Image", reason="the extra [data] is not installed")
 

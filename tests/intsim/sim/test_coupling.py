@@ -13,7 +13,7 @@ from intsim.sim.severing import LEAST_CELLS, cut_place
 from intsim.task.planner import plan
 from intsim.task.targets import Item
 from mpm.live import LiveCut
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 FOODS = {"strawberry": load_food("strawberry")}
 BERRY = Item("strawberry", Shape("ellipsoid", 0.04, 0.032, 0.032), x=0.03, y=-0.02, yaw=1.2)

@@ -29,7 +29,7 @@ from intsim.sim.closed_loop import World, environment, follow
 from intsim.task.planner import PHASES, plan
 from intsim.task.suites import draw
 from intsim.task.targets import target
-from mpm.errors import CutcalError
+from mpm.scene.errors import CutcalError
 from tests.calib.documents import valid
 from tests.intsim.painter import Here
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from intsim.task.kinematic_table import FASTEST, PUSHING, TURNING, Table, crossing, guard
 from intsim.task.planner import HOME, PHASES, RATE, ROCKED, STROKE, STYLES, minimum_jerk, plan
 from intsim.task.targets import Item, TaskError
-from mpm.shapes import Shape
+from mpm.scene.shapes import Shape
 
 APPLE = Item("apple", Shape("ellipsoid", 0.075, 0.075, 0.07), 0.03, 0.05, math.radians(70))
 

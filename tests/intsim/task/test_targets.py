@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from intsim.task.targets import APART, CAMERAS, CutSpec, Item, TaskError, boxed_target, spread, target
-from mpm.shapes import Shape, volume
+from mpm.scene.shapes import Shape, volume
 
 BANANA = Item("banana", Shape("cylinder", 0.16, 0.033, 0.033), 0.02, -0.03, math.radians(80))
 ratios = st.floats(0.1, 0.9)

@@ -8,8 +8,8 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from mpm.kernels import constitutive as law
-from mpm.material import Material
 from mpm.runtime import Runtime, start
+from mpm.scene.material import Material
 from tests.mpm import twins
 
 M = Material(E=1.0, nu=0.35, rho=1.0)

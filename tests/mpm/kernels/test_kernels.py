@@ -12,10 +12,10 @@ from mpm.kernels.crack import ALL_VISIBLE
 from mpm.kernels.stress import elastic_block
 from mpm.kernels.surface_contact import CONTACT_STIFFNESS, friction_limit
 from mpm.kernels.time_step import advance
-from mpm.material import Material
 from mpm.runtime import Runtime
 from mpm.scene import EdgeLaw, Food, Motion, Numerics, Scene
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from mpm.solver import Simulation, state_of
 from mpm.state import tables as kn
 from mpm.state.host_transfer import of_particles, particles, set_velocity_gradients, velocity_gradients

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpm.material import Material
 from mpm.runtime import Runtime
 from mpm.scene import Board, Food, Knife, Motion, Numerics, Scene
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from mpm.solver import Simulation
 from mpm.state import tables as kn
 from mpm.state.host_transfer import fill, of_particles, particles, set_velocity_gradients, velocity_gradients

@@ -12,7 +12,7 @@ from mpm.output.snapshot import Snapshot, SnapshotRecorder
 from mpm.output.surface import Surface, half_of
 from mpm.runtime import Runtime
 from mpm.scene import Numerics, Scene
-from mpm.shapes import SHAPE_KINDS, Shape, volume
+from mpm.scene.shapes import SHAPE_KINDS, Shape, volume
 from mpm.solver import Simulation
 from tests.mpm.scenes import PRISM
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mpm.material import Material
 from mpm.runtime import Runtime
 from mpm.scene import Food, Motion, Numerics, Scene
-from mpm.shapes import Shape
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 from mpm.solver import Simulation
 from studies.speed.textbook import Textbook
 from tests.mpm.scenes import WEDGE

@@ -9,7 +9,7 @@ import pytest
 
 from calib.simulation.process_pool import Pool
 from cutcal.main import main
-from mpm.errors import SceneError
+from mpm.scene.errors import SceneError
 from studies.verification import bending, case
 from studies.verification.case import Case, How, Row, cases
 from tests.calib.documents import valid

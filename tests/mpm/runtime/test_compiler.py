@@ -7,11 +7,10 @@ import pytest
 import taichi as ti
 from taichi.lang import kernel_impl
 
-from mpm import compiler
 from mpm.kernels import constitutive
 from mpm.kernels.p2g import p2g_particle
 from mpm.kernels.time_step import time_step
-from mpm.runtime import Runtime, start
+from mpm.runtime import Runtime, compiler, start
 
 
 @pytest.fixture(autouse=True, scope="module")

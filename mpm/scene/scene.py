@@ -10,9 +10,9 @@ import math
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from mpm.errors import SceneError, check_number
-from mpm.material import Material
-from mpm.shapes import Shape
+from mpm.scene.errors import SceneError, check_number
+from mpm.scene.material import Material
+from mpm.scene.shapes import Shape
 
 CONTACTS = ("cohesive", "nodal")
 PRECISIONS = ("f64", "f32")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mpm.errors import SceneError, check_number
+from mpm.scene.errors import SceneError, check_number
 
 SHAPE_KINDS = (
     "block",

@@ -8,8 +8,8 @@ import os
 from dataclasses import dataclass, replace
 from typing import Any
 
-from mpm.compiler import hasten
-from mpm.errors import SceneError
+from mpm.runtime.compiler import hasten
+from mpm.scene.errors import SceneError
 
 ARCHES = ("cpu", "cuda", "vulkan", "gpu")
 """Devices; not Metal, which has no doubles: the way of the blade needs them."""

@@ -10,11 +10,11 @@ import pytest
 
 from mpm.discretisation.grid import lay_out
 from mpm.discretisation.particles import seed
-from mpm.errors import SceneError
-from mpm.material import Material
 from mpm.output.record import _moving_mean
 from mpm.scene import Food, Knife, Motion, Numerics, Scene
-from mpm.shapes import SHAPE_KINDS, Shape, inside, section_area, skin_path, slices, surface, volume
+from mpm.scene.errors import SceneError
+from mpm.scene.material import Material
+from mpm.scene.shapes import SHAPE_KINDS, Shape, inside, section_area, skin_path, slices, surface, volume
 
 MATERIAL = Material(E=1e6, nu=0.35, rho=1000.0)
 KNIFE = Knife("k", 2e-3, 0.1, 0.04, 0.2)

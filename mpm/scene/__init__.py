@@ -1,0 +1,33 @@
+"""What is simulated: food, knife, board, motion and numerics as frozen, validated data in SI units."""
+
+from mpm.scene.scene import (
+    BAND_CELLS,
+    CONTACTS,
+    PRECISIONS,
+    STEEPEST,
+    Arm,
+    Board,
+    EdgeLaw,
+    Food,
+    Knife,
+    Motion,
+    Numerics,
+    Press,
+    Scene,
+)
+
+__all__ = [
+    "BAND_CELLS",
+    "CONTACTS",
+    "PRECISIONS",
+    "STEEPEST",
+    "Arm",
+    "Board",
+    "EdgeLaw",
+    "Food",
+    "Knife",
+    "Motion",
+    "Numerics",
+    "Press",
+    "Scene",
+]
