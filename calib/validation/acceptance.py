@@ -74,32 +74,7 @@ def _nuisance(name: str, n: Mapping[str, Any]) -> Verdict:
     return Verdict(JUDGED[name], size, OUTSIDE, "sd", not n["outside"], note)
 
 
-SPENT = {
-    "parting": "parting the food",
-    "friction": "friction",
-    "plastic": "flow",
-    "damage": "damage",
-    "viscous": "loss factor",
-    "elastic": "elastic",
-    "kinetic": "kinetic",
-}
-"""Where the work of a cut goes, in words."""
 WORTH_SAYING = 0.1  # energy released ahead of the edge, over that spent at it
-LEAST = 0.005  # part of the work that is named
-
-
-def spent(energy: Mapping[str, float]) -> str:
-    """Where the work of a cut has gone, in words, largest first; what is less than half a per cent is left out."""
-    total = sum(energy.values())
-    parts = {words: energy[name] / total for name, words in SPENT.items()} if total > 0 else {}
-    large = sorted((part, words) for words, part in parts.items() if part >= LEAST)
-    return ", ".join(f"{words} {part:.0%}" for part, words in reversed(large))
-
-
-def unbooked(energy: Mapping[str, float]) -> float | None:
-    """Part of the work of a cut that no law has taken [-]; None where no work was done."""
-    total = sum(energy.values())
-    return energy["unbooked"] / total if total > 0 and "unbooked" in energy else None
 
 
 def _loss(finer: Check) -> Verdict:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 
 from calib.material.properties import PROPERTIES
-from calib.validation.acceptance import spent, unbooked
+from mpm.output.energy import spent, unbooked
 from reports.base.format import breakable, count, duration, interval, plain, quantity
 from reports.base.labels import shown, words
 from reports.base.run_folder import Data

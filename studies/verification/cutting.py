@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from calib.validation.acceptance import unbooked
 from fem_reference.slit import cleave
+from mpm.output.energy import unbooked
 from mpm.output.record import ForceRecord
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
 from mpm.scene.material import Material

@@ -33,11 +33,12 @@ from calib.simulation.process_pool import Pool
 from calib.simulation.workers import DIED, Errand, SceneEvaluator, plain
 from calib.trace.conditioning import condition
 from calib.trace.trace import Trace
-from calib.validation.acceptance import balances, changes, judge, limits, remedied, spent, unbooked
+from calib.validation.acceptance import balances, changes, judge, limits, remedied
 from calib.validation.metrics import compare
 from calib.validation.null_models import null_models
 from calib.validation.numerical_checks import Check, check, check_errands
 from mpm.discretisation.particles import seed
+from mpm.output.energy import spent, unbooked
 from mpm.output.record import ENERGIES, ForceRecord
 from mpm.runtime import Runtime, start
 from mpm.scene import Scene

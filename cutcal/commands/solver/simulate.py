@@ -16,7 +16,6 @@ from calib.io.schema import tag
 from calib.material.knife import load_knife
 from calib.material.scene import cut_scene, specimen
 from calib.simulation.evaluation import PARTED, pressed_away
-from calib.validation.acceptance import spent, unbooked
 from cutcal.options import (
     add_food,
     add_run,
@@ -28,6 +27,7 @@ from cutcal.options import (
     sizing_of,
     whole,
 )
+from mpm.output.energy import spent, unbooked
 from mpm.output.record import ForceRecord
 from mpm.output.snapshot import SnapshotRecorder
 from mpm.scene import CONTACTS, Arm
