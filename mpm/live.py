@@ -27,24 +27,24 @@ CLEAR = 2.0  # height of the edge above the uncut food at which nothing touches 
 class LiveCut:
     """A food under a blade whose place is given at short intervals, in between which it moves evenly.
 
-    Real time passes as much faster in it as the scene's blade is faster than the real one (``time_scale``), and a motion faster than
-    the scene's takes more steps, so that the food never sees a higher Mach number. Until the edge comes near, and once it is
-    clear of the food again, nothing is simulated.
+    Real time passes as much faster in it as the scene's blade is faster than the real one (``time_scale``), and a
+    motion faster than the scene's takes more steps, so that the food never sees a higher Mach number. Until the edge
+    comes near, and once it is clear of the food again, nothing is simulated.
 
     Another simulation of about this size takes over its fields: one is followed to its end before the next is made.
 
     Args:
-        scene: The cut. Its motion says how fast the blade usually is (``speed`` [m/s]) and as what that is simulated (``mach``); a
-            ``slice_ratio`` other than 0 that it may also be drawn along its edge and tilted. The stroke is not used. The arm is
-            rigid: what holds the blade is outside.
+        scene: The cut. Its motion says how fast the blade usually is (``speed`` [m/s]) and as what that is simulated
+            (``mach``); a ``slice_ratio`` other than 0 that it may also be drawn along its edge and tilted. The stroke
+            is not used. The arm is rigid: what holds the blade is outside.
         runtime: Device.
 
     Attributes:
         status: ``done`` as long as the food is sound, else why it is not.
         time: Real time that was simulated [s].
         impulse: Impulse of the food on the blade, in real time [N s], shape (3,).
-        moment: Of the food on the blade about the middle of its edge, which raises the end at +x [N m]: the mean of the last move; 0 where
-            the blade is neither drawn nor tilted.
+        moment: Of the food on the blade about the middle of its edge, which raises the end at +x [N m]: the mean of the
+            last move; 0 where the blade is neither drawn nor tilted.
 
     Raises:
         SceneError: A scene without a blade or a real speed, or with an arm of its own.
@@ -73,7 +73,8 @@ class LiveCut:
         simulation = self._simulation
         if simulation.serial != running() or simulation.state.owner is not simulation:
             raise RuntimeError(
-                "another simulation has taken over the fields of this live cut: follow one to its end before the next is made"
+                "another simulation has taken over the fields of this live cut: follow one to its end before the next "
+                "is made"
             )
         return simulation
 
@@ -103,7 +104,8 @@ class LiveCut:
         """Move the edge.
 
         Args:
-            height: Of its middle above the board at the end [m]; the board stops it where its lowest end over the food is at 0.
+            height: Of its middle above the board at the end [m]; the board stops it where its lowest end over the food
+                is at 0.
             slide: Way along the edge since the beginning, at the end [m].
             span: Real time that passes [s].
             tilt: Angle of the edge to the board at the end, positive when the end at +x is higher [rad].
@@ -112,7 +114,8 @@ class LiveCut:
             Mean force of the food on the blade: along the edge, across the blade, upwards [N], shape (3,).
 
         Raises:
-            SceneError: A draw along the edge or a tilt in a scene that has none, a tilt beyond :data:`mpm.scene.STEEPEST`, or numbers that are not finite.
+            SceneError: A draw along the edge or a tilt in a scene that has none, a tilt beyond
+                :data:`mpm.scene.STEEPEST`, or numbers that are not finite.
             SimulationError: The food broke down now or before.
         """
         if self.status != "done":
@@ -185,8 +188,8 @@ class LiveCut:
         return self._held.snapshot(self._recorder.time, self.scene.food.shape.height - self._z, self._s)
 
     def surface(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The food's surface now: vertices [m] (m, 3) in the scene's axes, triangles (t, 3), and whether each vertex is flesh (m,):
-        of the face of the cut."""
+        """The food's surface now: vertices [m] (m, 3) in the scene's axes, triangles (t, 3), and whether each vertex is
+        flesh (m,): of the face of the cut."""
         if self._surface is None:
             self._surface = Surface(self.scene.food.shape, self._simulation.setup.seeds, self.scene.mirrors)
         flesh = np.abs(self._surface.rest[:, 1]) < ON_FACE

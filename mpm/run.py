@@ -1,4 +1,4 @@
-"""A cut from its first step to its record: the commanded motion in orders of steps, and what is booked and kept on the way."""
+"""A cut from its first step to its record: the commanded motion in orders of steps, and what is kept on the way."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 # The smallest size, the factor by which sizes grow, up to where, and the step by which they grow beyond.
 PARTICLE_ROOM = (4096, 4, 65_536, 65_536)
-OFF = 132  # particles beside that: 33 blocks of four
+EXTRA_PARTICLES = 132  # beside that: 33 blocks of four
 NODE_ROOM = (24, 2, 96, 32)
 BATCH_ROOM = (1, 2, 64, 64)
 
@@ -16,13 +16,16 @@ def _capacity(size: int, room: tuple[int, int, int, int]) -> int:
 
 
 def particle_capacity(n: int) -> int:
-    """Particles that fields for n of them have room for; off a power of two, or what belongs to a particle would share the cache's sets in
-    all fields: a step of 128,000 takes 12 % longer so."""
-    return _capacity(n, PARTICLE_ROOM) + OFF
+    """Particles that fields for n of them have room for.
+
+    Off a power of two, or what belongs to a particle would share the cache's sets in all fields (docs/theory.md,
+    "Measured choices").
+    """
+    return _capacity(n, PARTICLE_ROOM) + EXTRA_PARTICLES
 
 
 def node_capacity(nodes: int) -> int:
-    """Nodes along an axis that a grid of so many has room for; odd, or neighbours along it would share the cache's sets."""
+    """Nodes along an axis that a grid of so many has room for; odd, or neighbours would share the cache's sets."""
     return _capacity(nodes, NODE_ROOM) + 1
 
 

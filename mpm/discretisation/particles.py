@@ -13,10 +13,9 @@ from mpm.scene.shapes import inside, surface, volume
 
 MAX_PARTICLES = 20_000_000
 JITTER = 0.25
-"""Part of its lattice cell in which a particle may lie. The noise of the sum over particles makes a solid softer and damps
-it: with the whole cell a bar of 26 cells swings 1.3 % slower than sqrt(E / rho) says and loses 4 % of its amplitude in a
-period, with half of it 0.5 and 1.1 %, with a quarter 0.16 % and less than 0.1 %. On a lattice, planes of particles would
-touch a plate or pass the crack front all at once."""
+"""Part of its lattice cell in which a particle may lie. The noise of the sum over particles makes a solid softer and
+damps it (docs/theory.md, "Measured choices"). On a lattice, planes of particles would touch a plate or pass the crack
+front all at once."""
 
 
 @dataclass(frozen=True)
@@ -28,8 +27,8 @@ class Seeds:
         volume: Volume of a lattice cell [m^3]; the particles of all mirror images add up to the shape's volume.
         spacing: Lattice spacing [m].
         volume_ratio: Lattice cells that each particle stands for, shape (n,): 1 but far from the cut.
-        board_gap: Distance at which each particle meets the board [m], shape (n,): its own from the lower surface in the first
-            layer, half a spacing behind it.
+        board_gap: Distance at which each particle meets the board [m], shape (n,): its own from the lower surface in
+            the first layer, half a spacing behind it.
         top_gap: The same from the upper surface.
         bottom: Whether a particle is in the first layer above the lower surface, shape (n,).
         top: The same below the upper surface.
@@ -55,12 +54,12 @@ class Seeds:
 
     @property
     def areas(self) -> np.ndarray:
-        """Area of each particle of the first or last layer seen from above [m^2], shape (n,); those of several cells lie along y."""
+        """Area of each particle of the outer layers from above [m^2], shape (n,); several cells lie along y."""
         return self.spacing**2 * self.volume_ratio
 
     @property
     def blade_gap(self) -> np.ndarray:
-        """Distance at which each particle meets the blade [m], shape (n,), from the cut plane as ``board_gap`` from the board."""
+        """Distance at which each particle meets the blade [m], shape (n,): as ``board_gap``, from the cut plane."""
         return _depth(np.abs(self.x[:, 1]), self.spacing)
 
     @property
@@ -128,8 +127,9 @@ def seed(scene: Scene) -> Seeds:
 def _thin(cells: np.ndarray, num: Numerics, mirrored: bool) -> tuple[np.ndarray, np.ndarray]:
     """The particle that stands for each lattice cell (m, 3), and how many each stands for.
 
-    Beyond ``num.far`` the lattice cells of a grid cell that lie side by side across the blade share one, and all of them where it and
-    all grid cells around it are full: nothing touches the food there, and its outline stays as fine as elsewhere.
+    Beyond ``num.far`` the lattice cells of a grid cell that lie side by side across the blade share one, and all of
+    them where it and all grid cells around it are full: nothing touches the food there, and its outline stays as fine
+    as elsewhere.
     """
     if num.far is None:
         return np.arange(len(cells)), np.ones(len(cells))
@@ -154,5 +154,5 @@ def _thin(cells: np.ndarray, num: Numerics, mirrored: bool) -> tuple[np.ndarray,
 
 
 def _depth(distance: np.ndarray, spacing: float) -> np.ndarray:
-    """Distance at which particles meet a surface: their own in the first layer, half a spacing in those behind it [m]."""
+    """Distance at which particles meet a surface [m]: their own in the first layer, half a spacing behind it."""
     return np.where(distance < spacing, distance, spacing / 2)

@@ -140,7 +140,7 @@ def mises_squared(xx, yy, zz, yz, xz, xy):
 
 @ti.func
 def cube_root(r):
-    """Cube root of a number near one by Halley's iteration: to rounding between 0.5 and 2, to 2e-7 between 0.1 and 10."""
+    """Cube root by Halley's iteration from 1: to rounding between 0.5 and 2, to 2e-7 between 0.1 and 10."""
     y = 0.0 * r + 1.0
     for _ in ti.static(range(CUBE_ROOT_STEPS)):
         y *= (y * y * y + 2 * r) / (2 * y * y * y + r)

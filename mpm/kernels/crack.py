@@ -1,16 +1,43 @@
-"""On which side of the cut a particle is, and from which layer of nodes on it meets the other side."""
+"""The crack as the transfers see it: on which side of it a particle is, and which nodes it sees across it.
+
+The crack lies in the cut plane. Its front is a height in each slice along the edge.
+"""
 
 import taichi as ti
 
-from mpm.kernels.tool import edge_height, under_blade
+from mpm.kernels.tool import covered_part, edge_height, under_blade
 from mpm.state.accessors import to_scene_axes
+from mpm.state.loops import locate_active, repetitions
+from mpm.state.state import SLICES
 from mpm.state.stencil import node_position
 from mpm.state.tables import DX, FIRST_STATION, INV_DX, ORIGIN_Z, SECOND_OFFSET, STATIONS, ZONE
 
-ALL_VISIBLE = 0x3FFFF  # of visible_layers where all nodes are shared
+ALL_VISIBLE = 0x3FFFF  # of visible_layers where a particle sees all of its nodes
 # The bit above it in State.visibility: the particle has a moment of contact, from one transfer back to the next.
 IN_CONTACT = ALL_VISIBLE + 1
-FRONT_OFFSET = 0.5  # cells by which the split of the nodes lags the crack it makes; see visible_layers
+# The front that hides nodes from particles, over that of the edge: lower by a part of the process zone (Irwin's crack),
+# and higher by a part of a cell, as the nodes part early (docs/theory.md, "Measured choices").
+LEAD_ZONES, LAG_CELLS = 0.5, 0.5
+
+
+@ti.func
+def advance_crack_fronts(s: ti.template(), cut: ti.template()):
+    """Move the crack front of every slice."""
+    ti.loop_config(serialize=s.serial)
+    for q in range(repetitions(s, cut, SLICES)):
+        c, i, mine = locate_active(s, cut, q, SLICES)
+        if mine:
+            advance_front(s, c, i)
+
+
+@ti.func
+def advance_front(s: ti.template(), cut, i):
+    """Move the crack front of slice i: down with the edge, and with the food where the blade has gone."""
+    place = s.par[cut, FIRST_STATION] + i * s.par[cut, DX]
+    tip = edge_height(s, cut, place)
+    s.crack_front[cut, i] += s.front_drift[cut, i]
+    if covered_part(s, cut, place) > 0 and tip < s.crack_front[cut, i]:
+        s.crack_front[cut, i] = tip
 
 
 @ti.func
@@ -31,25 +58,21 @@ def front_height(s: ti.template(), cut, place):
 
 @ti.func
 def visible_layers(s: ti.template(), cut, p, base, q, mine):
-    """From which of the three node layers on, for each of the nine node columns, a particle meets the other side.
+    """Visibility of a particle's nodes: from which of the three layers on they are hidden, in each of the nine columns.
 
-    Node and particle see each other across the cut plane when the line between them passes it below the crack
-    front, as in the crack algorithm of Nairn (2003, CMES 4:649). Three lengths place that front:
+    Node and particle see each other across the cut plane when the line between them passes it below the crack front, as
+    in the crack algorithm of Nairn (2003, CMES 4:649). A hidden node has the field of the other half. That front is not
+    the edge:
 
-    - The crack leads the edge by half a process zone, the equivalent elastic crack of Irwin: food opens ahead of
-      the edge, as far on any grid. Held at the edge itself, the force of the wedge grows without end as the cells
-      shrink (0.31, 0.35, 0.37 J for dx = 3, 2, 1.5 mm against 0.321, 0.320, 0.315 J so).
+    - The crack leads the edge by half a process zone, the equivalent elastic crack of Irwin: food opens ahead of the
+      edge, as far on any grid. Held at the edge itself, the force of a wedge grows without end as the cells shrink.
     - The nodes part early, so the front is held half a cell higher: then a crack that is loaded far away is as long as
-      it should be, to 0.2 cells over offsets and cell sizes (tests/mpm/kernels/test_crack.py), and a wedge in a slit needs the
-      force that finite elements need, to 3 %: 0.175, 0.174, 0.175, 0.175 and 0.175 N on 3, 2.5, 2, 1.5 and 1 mm where they
-      need 0.179 N (studies/verification/cutting.py). That is with the blade on a plane of nodes, where every scene has it whose
-      grid is not turned. Between two planes the food near the front opens less: 0.195, 0.189, 0.185, 0.181 N on 3, 2,
-      1.5 and 1 mm.
+      it should be (tests/mpm/kernels/test_crack.py), and a wedge in a slit needs the force that finite elements need
+      (studies/verification/cutting.py).
 
-    All particles have the same front, so the nodes part row by row. That is a ripple with the period of a cell,
-    which the moving mean over one cell takes out (ForceRecord.resolved_face). Spreading the fronts of the particles
-    over a cell would hide it and cost more: those that are held longest carry the force. It was 6.8 N at 4 and 5.1 N
-    at 2 mm then, and its work followed the seed by 2 to 4 %.
+    All particles have the same front, so the nodes part row by row. That is a ripple with the period of a cell, which
+    the moving mean over one cell takes out (ForceRecord.resolved_face). Spreading the fronts of the particles over a
+    cell would hide it and cost more: those that are held longest carry the force.
 
     Args:
         p: The particle.
@@ -58,14 +81,14 @@ def visible_layers(s: ti.template(), cut, p, base, q, mine):
         mine: Half that the particle belongs to.
 
     Returns:
-        Layers, two bits a column in the order of :meth:`layer`; 3 where all nodes are shared.
+        Layers, two bits a column, read by :func:`hidden_from`; 3 where a column is seen as a whole.
     """
     code = ALL_VISIBLE
     if ti.static(s.cuts):
         reach = ti.static(2.2 if s.turned else 1.6) * s.par[cut, DX]
         if ti.abs(q[1]) < reach:
-            front = front_height(s, cut, q[0]) - 0.5 * s.par[cut, ZONE]
-            front += FRONT_OFFSET * s.par[cut, DX]
+            front = front_height(s, cut, q[0]) - LEAD_ZONES * s.par[cut, ZONE]
+            front += LAG_CELLS * s.par[cut, DX]
             if front < 1e2:
                 code = 0
                 for column in range(ti.static(9 if s.turned else 3)):
@@ -85,8 +108,7 @@ def visible_layers(s: ti.template(), cut, p, base, q, mine):
 
 @ti.func
 def hidden_from(s: ti.template(), code, i, j):
-    """Layer from which on node column (i, j) of a particle carries the other side; columns differ along j only
-    where the grid is not turned."""
+    """Layer from which node column (i, j) of a particle is hidden; the same for all i where the grid is not turned."""
     return (code >> (2 * (3 * i + j if ti.static(s.turned) else j))) & 3
 
 
@@ -119,7 +141,10 @@ def sever(s: ti.template(), cut, p, q):
 
 @ti.func
 def field_offsets(s: ti.template(), cut, i, code):
-    """Where the fields of the nodes of a particle are stored along y from the lowest on, (j, k): its own side's or the other one's."""
+    """Where the fields of the nodes (j, k) of a particle are stored, in nodes along y from the lowest one on.
+
+    Those that it sees have their first field, the hidden ones the second.
+    """
     at, second = ti.Matrix.zero(ti.i32, 3, 3), s.size[cut, SECOND_OFFSET]
     for j, k in ti.static(ti.ndrange(3, 3)):
         at[j, k] = j

@@ -1,8 +1,9 @@
-"""The cutting edge as a line that moves through the grid with a cohesive law, slice by slice along the blade."""
+"""The cutting edge: a line that moves through the grid, slice by slice along the blade, and its reaction there."""
 
 import taichi as ti
 
-from mpm.kernels.tool import blade_velocity, book_knife_impulse, edge_height
+from mpm.kernels.cohesive_law import count_started_beside, line_force
+from mpm.kernels.tool import blade_velocity, book_knife_impulse, covered_part, edge_height
 from mpm.state.accessors import multiplicity_x, step_size, to_grid_axes, to_scene_axes
 from mpm.state.loops import locate_active, repetitions
 from mpm.state.state import SLICES
@@ -11,21 +12,15 @@ from mpm.state.tables import (
     CUTTING_WORK,
     DX,
     EDGE,
-    EDGE_S,
     FIRST_STATION,
-    HALF_LENGTH,
-    INITIATION_DEPTH,
     INV_DX,
     MIRROR_SUM,
     NODES,
     ORIGIN_X,
     ORIGIN_Y,
     ORIGIN_Z,
-    R_FLESH,
-    R_START,
     SECOND_OFFSET,
     SLIP,
-    STATIONS,
     TILT_COS,
     TILT_SIN,
     ZONE,
@@ -39,99 +34,28 @@ EMPTY_ZONE = 0.15  # filled less than this the zone carries no edge; at the boar
 
 
 @ti.func
-def softening_law(cut, softening, start, resistance):
-    """Line force that the edge can carry after cutting ``cut`` deep [N/m].
-
-    It falls from the force at which the cut started to the propagation resistance over the softening length.
-    """
-    return resistance + (start - resistance) * ti.exp(-cut / softening)
-
-
-@ti.func
-def zone_nodes(s: ti.template(), cut, i):
-    """Nodes whose velocity slice i feels, as the corners (low 3, high 3) of a box."""
-    reach = 1.5 * s.par[cut, ZONE]
-    place = s.par[cut, FIRST_STATION] + i * s.par[cut, DX]
-    mid = to_grid_axes(s, cut, ti.Vector([place, 0.0, s.crack_front[cut, i] - 0.5 * s.par[cut, ZONE]]))
-    wide, deep = 0.0, reach
-    if ti.static(s.turned):
-        e = ti.abs(to_grid_axes(s, cut, ti.Vector([s.par[cut, DX], 0.0, 0.0])))
-        f = ti.abs(to_grid_axes(s, cut, ti.Vector([0.0, reach, 0.0])))
-        wide, deep = e[0] + f[0], e[1] + f[1]
-    r = (mid - ti.Vector([s.par[cut, ORIGIN_X], s.par[cut, ORIGIN_Y], s.par[cut, ORIGIN_Z]])) * s.par[cut, INV_DX]
-    h = ti.Vector([wide + 1e-6 * s.par[cut, DX], deep, reach]) * s.par[cut, INV_DX]
-    out = ti.Vector([0, 0, 0, 0, 0, 0])
-    for d in ti.static(range(3)):
-        out[d] = ti.max(0, ti.ceil(r[d] - h[d], ti.i32))
-        out[d + 3] = ti.min(s.size[cut, NODES + d], ti.floor(r[d] + h[d], ti.i32) + 1)
-    return out
-
-
-@ti.func
-def zone_weight(s: ti.template(), cut, i, a, j, k):
-    """Weight of node (a, j, k) in the process zone of slice i, which is centred half a zone below the edge."""
-    z = s.par[cut, ZONE]
-    at = to_scene_axes(s, cut, node_position(s, cut, a, j, k))
-    w = bspline(at[1] / z) * bspline((at[2] - s.crack_front[cut, i]) / z + 0.5)
-    if ti.static(s.turned):
-        w *= ti.max(0.0, 1.0 - ti.abs(at[0] - s.par[cut, FIRST_STATION] - i * s.par[cut, DX]) * s.par[cut, INV_DX])
-    return w
-
-
-@ti.func
-def line_force(s: ti.template(), cut, i, tangential, forward, part):
-    """Force per length of the edge in one slice after it moved against the material [N/m]: along the edge, forward.
-
-    The slip is elastic up to a limit and points where the edge goes. A cut starts where the force reaches the
-    threshold, at the indentation that belongs to it, and from there runs along the blade to every slice that
-    already carries the propagation resistance: growing a crack takes less than starting one. Then the force falls
-    to that resistance. Until the start the slip is the mean over the part of the slice that the edge has reached: on
-    a round top more of it comes into contact, unslipped, as the edge goes down. The force acts against the motion
-    and only the way forward makes new surface, so that with a slice/push ratio xi the forward force is
-    R / (1 + xi^2) (Atkins, Xu and Jeronimidis 2004).
-    """
-    limit, flesh = s.par[cut, SLIP], s.par[cut, R_FLESH]
-    held = 1.0
-    if s.start_force[cut, i] <= 0:  # what has come into contact since has not slipped yet
-        held = ti.min(1.0, s.contact_part[cut, i] / part)
-    s.contact_part[cut, i] = part
-    e = held * s.slip[cut, i] + ti.Vector([tangential, forward])
-    e[1] = ti.max(e[1], 0.0)
-    size = e.norm()
-    steep = e[1] / size if size > 0 else 0.0
-    level = 0.0
-    if s.start_force[cut, i] <= 0:
-        level = s.par[cut, R_START] * size / s.par[cut, INITIATION_DEPTH]
-        if level >= s.par[cut, R_START] or (s.started_beside[cut, i] > 0 and level >= flesh):
-            s.start_force[cut, i] = ti.max(level, 1e-9)
-            e *= limit / ti.max(size, 1e-30)  # without resistance a cut starts before the edge has slipped
-    else:
-        if size > limit:
-            s.cut_depth[cut, i] += (size - limit) * steep
-            e *= limit / size
-            size = limit
-        level = softening_law(s.cut_depth[cut, i], s.softening[cut, i], s.start_force[cut, i], flesh) * size / limit
-    s.slip[cut, i] = e
-    return level * steep * e / ti.max(e.norm(), 1e-30)
-
-
-@ti.func
-def covered_part(s: ti.template(), cut, place):
-    """Part of a slice that is under the blade [-]."""
-    reach = s.par[cut, HALF_LENGTH] * ti.cast(s.pose[cut, TILT_COS], float) - ti.abs(
-        place - ti.cast(s.pose[cut, EDGE_S], float)
-    )
-    return ti.math.clamp(reach * s.par[cut, INV_DX] + 0.5, 0.0, 1.0)
-
-
-@ti.func
-def advance_front(s: ti.template(), cut, i):
-    """Move the crack front of slice i: down with the edge, and with the food where the blade has gone."""
-    place = s.par[cut, FIRST_STATION] + i * s.par[cut, DX]
-    tip = edge_height(s, cut, place)
-    s.crack_front[cut, i] += s.front_drift[cut, i]
-    if covered_part(s, cut, place) > 0 and tip < s.crack_front[cut, i]:
-        s.crack_front[cut, i] = tip
+def apply_edge_law(s: ti.template(), cut: ti.template()):
+    """Find the edge's reaction on every slice, give it to the grid, and see how the material moves then."""
+    ti.loop_config(serialize=s.serial)
+    for q in range(repetitions(s, cut, SLICES)):
+        c, i, mine = locate_active(s, cut, q, SLICES)
+        if mine:
+            count_started_beside(s, c, i)
+    ti.loop_config(serialize=s.serial)
+    for q in range(repetitions(s, cut, SLICES)):
+        c, i, mine = locate_active(s, cut, q, SLICES)
+        if mine and i >= s.plane_x:
+            find_reaction(s, c, i, step_size(s, c))
+    ti.loop_config(serialize=s.serial)
+    for q in range(repetitions(s, cut, SLICES)):
+        c, i, mine = locate_active(s, cut, q, SLICES)
+        if mine and i >= s.plane_x:
+            apply_reaction(s, c, i)
+    ti.loop_config(serialize=s.serial)
+    for q in range(repetitions(s, cut, SLICES)):
+        c, i, mine = locate_active(s, cut, q, SLICES)
+        if mine and i >= s.plane_x:
+            follow_material(s, c, i)
 
 
 @ti.func
@@ -175,36 +99,6 @@ def find_reaction(s: ti.template(), cut, i, dt):
 
 
 @ti.func
-def follow_material(s: ti.template(), cut, i):
-    """Mean velocity of the process zone of slice i after the edge's reaction.
-
-    The slip of the next step is counted against it. Counted against the velocity before the reaction, the slip would
-    run ahead by force x dt / mass in every step, and the edge would do work on the food that nobody did on the edge.
-    """
-    box = zone_nodes(s, cut, i)
-    total = ti.Vector.zero(float, 4)
-    for a in range(box[0], box[3]):
-        for j in range(box[1], box[4]):
-            for k in range(box[2], box[5]):
-                total += zone_weight(s, cut, i, a, j, k) * node_momentum(s, cut, a, j, k)
-    s.zone_velocity[cut, i] = ti.Vector.zero(float, 3)
-    if total[3] > 0:
-        s.zone_velocity[cut, i] = to_scene_axes(s, cut, ti.Vector([total[0], total[1], total[2]]) / total[3])
-
-
-@ti.func
-def node_momentum(s: ti.template(), cut, a, j, k):
-    """Momentum and mass of both fields of a node."""
-    q = s.u[node_index(s, cut, a, j, k)]
-    out = q[3] * ti.Vector([q[0], q[1], q[2], 1.0])
-    if ti.static(s.second_fields):
-        if has_second_field(s, cut, j):
-            other = s.u[node_index(s, cut, a, s.size[cut, SECOND_OFFSET] + j, k)]
-            out += other[3] * ti.Vector([other[0], other[1], other[2], 1.0])
-    return out
-
-
-@ti.func
 def apply_reaction(s: ti.template(), cut, i):
     """Give the grid the reaction of slice i."""
     if s.reaction[cut, i].norm_sqr() > 0:
@@ -223,6 +117,67 @@ def apply_reaction(s: ti.template(), cut, i):
 
 
 @ti.func
+def follow_material(s: ti.template(), cut, i):
+    """Mean velocity of the process zone of slice i after the edge's reaction.
+
+    The slip of the next step is counted against it. Counted against the velocity before the reaction, the slip would
+    run ahead by force x dt / mass in every step, and the edge would do work on the food that nobody did on the edge.
+    """
+    box = zone_nodes(s, cut, i)
+    total = ti.Vector.zero(float, 4)
+    for a in range(box[0], box[3]):
+        for j in range(box[1], box[4]):
+            for k in range(box[2], box[5]):
+                total += zone_weight(s, cut, i, a, j, k) * node_momentum(s, cut, a, j, k)
+    s.zone_velocity[cut, i] = ti.Vector.zero(float, 3)
+    if total[3] > 0:
+        s.zone_velocity[cut, i] = to_scene_axes(s, cut, ti.Vector([total[0], total[1], total[2]]) / total[3])
+
+
+@ti.func
+def zone_nodes(s: ti.template(), cut, i):
+    """Nodes whose velocity slice i feels, as the corners (low 3, high 3) of a box."""
+    reach = 1.5 * s.par[cut, ZONE]
+    place = s.par[cut, FIRST_STATION] + i * s.par[cut, DX]
+    mid = to_grid_axes(s, cut, ti.Vector([place, 0.0, s.crack_front[cut, i] - 0.5 * s.par[cut, ZONE]]))
+    wide, deep = 0.0, reach
+    if ti.static(s.turned):
+        e = ti.abs(to_grid_axes(s, cut, ti.Vector([s.par[cut, DX], 0.0, 0.0])))
+        f = ti.abs(to_grid_axes(s, cut, ti.Vector([0.0, reach, 0.0])))
+        wide, deep = e[0] + f[0], e[1] + f[1]
+    r = (mid - ti.Vector([s.par[cut, ORIGIN_X], s.par[cut, ORIGIN_Y], s.par[cut, ORIGIN_Z]])) * s.par[cut, INV_DX]
+    h = ti.Vector([wide + 1e-6 * s.par[cut, DX], deep, reach]) * s.par[cut, INV_DX]
+    out = ti.Vector([0, 0, 0, 0, 0, 0])
+    for d in ti.static(range(3)):
+        out[d] = ti.max(0, ti.ceil(r[d] - h[d], ti.i32))
+        out[d + 3] = ti.min(s.size[cut, NODES + d], ti.floor(r[d] + h[d], ti.i32) + 1)
+    return out
+
+
+@ti.func
+def zone_weight(s: ti.template(), cut, i, a, j, k):
+    """Weight of node (a, j, k) in the process zone of slice i, which is centred half a zone below the edge."""
+    z = s.par[cut, ZONE]
+    at = to_scene_axes(s, cut, node_position(s, cut, a, j, k))
+    w = bspline(at[1] / z) * bspline((at[2] - s.crack_front[cut, i]) / z + 0.5)
+    if ti.static(s.turned):
+        w *= ti.max(0.0, 1.0 - ti.abs(at[0] - s.par[cut, FIRST_STATION] - i * s.par[cut, DX]) * s.par[cut, INV_DX])
+    return w
+
+
+@ti.func
+def node_momentum(s: ti.template(), cut, a, j, k):
+    """Momentum and mass of both fields of a node."""
+    q = s.u[node_index(s, cut, a, j, k)]
+    out = q[3] * ti.Vector([q[0], q[1], q[2], 1.0])
+    if ti.static(s.second_fields):
+        if has_second_field(s, cut, j):
+            other = s.u[node_index(s, cut, a, s.size[cut, SECOND_OFFSET] + j, k)]
+            out += other[3] * ti.Vector([other[0], other[1], other[2], 1.0])
+    return out
+
+
+@ti.func
 def add_velocity(s: ti.template(), cut, a, j, k, dv):
     """Change the velocity of both fields of a node."""
     for d in ti.static(range(3)):
@@ -231,47 +186,3 @@ def add_velocity(s: ti.template(), cut, a, j, k, dv):
         if has_second_field(s, cut, j):
             for d in ti.static(range(3)):
                 s.u[node_index(s, cut, a, s.size[cut, SECOND_OFFSET] + j, k)][d] += dv[d]
-
-
-@ti.func
-def count_started_beside(s: ti.template(), cut, i):
-    """Count the neighbours of a slice in which the cut has started."""
-    s.started_beside[cut, i] = 0
-    for d in ti.static((-1, 1)):
-        if 0 <= i + d < s.size[cut, STATIONS]:
-            s.started_beside[cut, i] += ti.cast(s.start_force[cut, i + d] > 0, ti.i32)
-
-
-@ti.func
-def advance_crack_fronts(s: ti.template(), cut: ti.template()):
-    """Move the crack front of every slice."""
-    ti.loop_config(serialize=s.serial)
-    for q in range(repetitions(s, cut, SLICES)):
-        c, i, mine = locate_active(s, cut, q, SLICES)
-        if mine:
-            advance_front(s, c, i)
-
-
-@ti.func
-def apply_edge_law(s: ti.template(), cut: ti.template()):
-    """Find the edge's reaction on every slice, give it to the grid, and see how the material moves then."""
-    ti.loop_config(serialize=s.serial)
-    for q in range(repetitions(s, cut, SLICES)):
-        c, i, mine = locate_active(s, cut, q, SLICES)
-        if mine:
-            count_started_beside(s, c, i)
-    ti.loop_config(serialize=s.serial)
-    for q in range(repetitions(s, cut, SLICES)):
-        c, i, mine = locate_active(s, cut, q, SLICES)
-        if mine and i >= s.plane_x:
-            find_reaction(s, c, i, step_size(s, c))
-    ti.loop_config(serialize=s.serial)
-    for q in range(repetitions(s, cut, SLICES)):
-        c, i, mine = locate_active(s, cut, q, SLICES)
-        if mine and i >= s.plane_x:
-            apply_reaction(s, c, i)
-    ti.loop_config(serialize=s.serial)
-    for q in range(repetitions(s, cut, SLICES)):
-        c, i, mine = locate_active(s, cut, q, SLICES)
-        if mine and i >= s.plane_x:
-            follow_material(s, c, i)

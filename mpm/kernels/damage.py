@@ -1,4 +1,4 @@
-"""Bulk damage, and the smoothed strain that drives it."""
+"""Bulk damage of the particles, and the smoothed strain that drives it."""
 
 import taichi as ti
 
@@ -20,10 +20,20 @@ from mpm.state.tables import COUNT, EPS0, EPSF
 
 @ti.func
 def update_damage(s: ti.template(), cut, p, v, j, mu, lam):
-    """Damage of a particle from the smoothed strain of the last step; returns it and the energy that is lost.
+    """Damage of a particle from the smoothed strain of the last step.
 
-    Also finds the box of the particles whose strain could damage something. No principal strain exceeds the norm
-    of the strain, so the others never pay for an eigenvalue.
+    Also finds the box of the particles whose strain could damage something. No principal strain exceeds the norm of the
+    strain, so the others never pay for an eigenvalue.
+
+    Args:
+        p: The particle.
+        v: Its left stretch.
+        j: Its determinant.
+        mu: Shear modulus [Pa].
+        lam: First Lame constant [Pa].
+
+    Returns:
+        Its damage, and the energy per volume that this step has taken [J/m^3].
     """
     d, lost = 0.0, 0.0
     eps0, eps_f = s.par[cut, EPS0], s.par[cut, EPSF]
@@ -45,20 +55,36 @@ def update_damage(s: ti.template(), cut, p, v, j, mu, lam):
 
 
 @ti.func
-def clear_damage_box(s: ti.template(), cut):
-    """Begin to look for the particles whose strain could damage something."""
-    for d in ti.static(range(3)):
-        s.damage_box[cut, d], s.damage_box[cut, d + 3] = BEYOND_GRID, -BEYOND_GRID
+def smooth_driving_strain(s: ti.template(), cut):
+    """Replace each particle's driving strain by its mean over the grid's weights (one pass).
 
-
-@ti.func
-def near_damage(s: ti.template(), cut, base, cells):
-    """Whether a particle is at most so many cells from the box of those whose strain could damage something."""
-    out = True
-    for d in ti.static(range(3)):
-        if base[d] < s.damage_box[cut, d] - cells or base[d] > s.damage_box[cut, d + 3] + cells:
-            out = False
-    return out
+    Only where it can matter: two particles meet at a node when they are at most two cells apart, so that those within
+    two cells of a strain above the threshold may be damaged, and those within four contribute to that. It uses the
+    grids of the threads, which are cleared at the start of a step.
+    """
+    # threads that would find nothing are not woken
+    some = 1 if ti.static(s.atomic) else ti.cast(s.damage_box[cut, 3] >= 0, ti.i32)
+    for q in range(repetitions(s, cut, DAMAGE_ROWS)):
+        c, r, mine = locate_active(s, cut, q, DAMAGE_ROWS)
+        if mine:
+            i, j, low, high = node_row(s, c, r, DAMAGE_ROWS)
+            for k in range(low, high):
+                for thread in ti.static(range(s.threads)):
+                    s.g[thread_node_index(s, c, thread, i, j, k)] = ti.Vector.zero(float, 4)
+    for q in range(repetitions(s, cut, PARTS) * some):
+        c, part, mine = locate_active(s, cut, q, PARTS)
+        first, last, thread = block_range(s, c, part)
+        if mine and first < last and s.damage_box[c, 3] >= 0:
+            window = node_box(s, c, NODE_ROWS)
+            for p in range(first * s.lanes, ti.min(last * s.lanes, s.size[c, COUNT])):
+                strain_to_grid(s, c, p, thread, window)
+    for q in range(repetitions(s, cut, PARTS) * some):
+        c, part, mine = locate_active(s, cut, q, PARTS)
+        first, last, _ = block_range(s, c, part)
+        if mine and first < last and s.damage_box[c, 3] >= 0:
+            window = node_box(s, c, NODE_ROWS)
+            for p in range(first * s.lanes, ti.min(last * s.lanes, s.size[c, COUNT])):
+                strain_from_grid(s, c, p, window)
 
 
 @ti.func
@@ -75,39 +101,6 @@ def strain_to_grid(s: ti.template(), cut, p, thread, window):
 
 
 @ti.func
-def smooth_driving_strain(s: ti.template(), cut: ti.template()):
-    """Replace each particle's driving strain by its mean over the grid's weights (one pass).
-
-    Only where it can matter: two particles meet at a node when they are at most two cells apart, so that those
-    within two cells of a strain above the threshold may be damaged, and those within four contribute to that. It
-    uses the grids of the threads, which are cleared at the start of a step.
-    """
-    # threads that would find nothing are not woken
-    hot = 1 if ti.static(s.atomic) else ti.cast(s.damage_box[cut, 3] >= 0, ti.i32)
-    for q in range(repetitions(s, cut, DAMAGE_ROWS)):
-        c, r, mine = locate_active(s, cut, q, DAMAGE_ROWS)
-        if mine:
-            i, j, low, high = node_row(s, c, r, DAMAGE_ROWS)
-            for k in range(low, high):
-                for thread in ti.static(range(s.threads)):
-                    s.g[thread_node_index(s, c, thread, i, j, k)] = ti.Vector.zero(float, 4)
-    for q in range(repetitions(s, cut, PARTS) * hot):
-        c, part, mine = locate_active(s, cut, q, PARTS)
-        first, last, thread = block_range(s, c, part)
-        if mine and first < last and s.damage_box[c, 3] >= 0:
-            window = node_box(s, c, NODE_ROWS)
-            for p in range(first * s.lanes, ti.min(last * s.lanes, s.size[c, COUNT])):
-                strain_to_grid(s, c, p, thread, window)
-    for q in range(repetitions(s, cut, PARTS) * hot):
-        c, part, mine = locate_active(s, cut, q, PARTS)
-        first, last, _ = block_range(s, c, part)
-        if mine and first < last and s.damage_box[c, 3] >= 0:
-            window = node_box(s, c, NODE_ROWS)
-            for p in range(first * s.lanes, ti.min(last * s.lanes, s.size[c, COUNT])):
-                strain_from_grid(s, c, p, window)
-
-
-@ti.func
 def strain_from_grid(s: ti.template(), cut, p, window):
     """Mean of the driving strain that the particles about one have spread over the grid."""
     base, fx = base_node(s, cut, s.x[cut, p])
@@ -121,3 +114,20 @@ def strain_from_grid(s: ti.template(), cut, p, window):
                 total += ti.Vector([q[0], q[1]])
             e += w[i][0] * w[j][1] * w[k][2] * total[0] / ti.max(total[1], 1e-30)
         s.driving_strain[cut, p] = e
+
+
+@ti.func
+def near_damage(s: ti.template(), cut, base, cells):
+    """Whether a particle is at most so many cells from the box of those whose strain could damage something."""
+    out = True
+    for d in ti.static(range(3)):
+        if base[d] < s.damage_box[cut, d] - cells or base[d] > s.damage_box[cut, d + 3] + cells:
+            out = False
+    return out
+
+
+@ti.func
+def clear_damage_box(s: ti.template(), cut: ti.template()):
+    """Begin to look for the particles whose strain could damage something."""
+    for d in ti.static(range(3)):
+        s.damage_box[cut, d], s.damage_box[cut, d + 3] = BEYOND_GRID, -BEYOND_GRID

@@ -1,4 +1,4 @@
-"""Grid to particles (G2P)."""
+"""Grid to particles (G2P): velocity and gradient are gathered from the nodes; particles move and touch the tools."""
 
 import taichi as ti
 
@@ -12,63 +12,31 @@ from mpm.state.tables import COUNT, INV_DX
 
 
 @ti.func
+def grid_to_particles(s: ti.template(), cut: ti.template()):
+    """Gather velocity and gradient of every particle, move it, and let it touch the tools."""
+    for q in range(repetitions(s, cut, PARTS)):
+        c, part, mine = locate_active(s, cut, q, PARTS)
+        first, last, thread = block_range(s, c, part)
+        if mine and first < last:
+            dt, w = step_size(s, c), node_box(s, c, NODE_ROWS)
+            for p in range(first * s.lanes, ti.min(last * s.lanes, s.size[c, COUNT])):
+                g2p_particle(s, c, p, thread, dt, w)
+
+
+@ti.func
 def g2p_particle(s: ti.template(), cut, p, thread, dt, window):
-    """Grid to particle, then contact."""
+    """One particle from the grid; one that has left it stays where it is, and the run ends at the next output."""
     base, fx = base_node(s, cut, s.x[cut, p])
-    if in_window(base, window) > 0:  # one that has left the grid stays where it is; the run ends at the next output
+    if in_window(base, window) > 0:
         update_particle(s, cut, p, thread, base, fx, dt)
-
-
-@ti.func
-def gather_plane(s: ti.template(), at, w):
-    """Velocity of the nine nodes of a particle in one plane across x times their weights, and its moments about the
-    lowest node along y and z in cells.
-
-    Args:
-        at: Their indices (j, k).
-        w: Weights of the nodes.
-    """
-    whole, py, pz = ti.Vector.zero(float, 4), ti.Vector.zero(float, 4), ti.Vector.zero(float, 4)
-    for j in ti.static(range(3)):
-        b, c = w[1][2] * s.u[at[j, 1]], w[2][2] * s.u[at[j, 2]]
-        row = w[j][1] * (w[0][2] * s.u[at[j, 0]] + b + c)
-        whole += row
-        py += j * row
-        pz += w[j][1] * (b + 2 * c)
-    return whole, py, pz
-
-
-@ti.func
-def whole_plane(s: ti.template(), lowest):
-    """Indices of the nine nodes above the lowest one in a plane across x; masked as in :meth:`shared`."""
-    at = ti.Matrix.zero(ti.i32, 3, 3)
-    for j, k in ti.static(ti.ndrange(3, 3)):
-        at[j, k] = (lowest & s.index_mask) + (j * s.stride_y + k)
-    return at
-
-
-@ti.func
-def split_plane(s: ti.template(), cut, lowest, i, code):
-    """The same where some have the field of the other side."""
-    at = field_offsets(s, cut, i, code)
-    for j, k in ti.static(ti.ndrange(3, 3)):
-        at[j, k] = lowest + at[j, k] * s.stride_y + k
-    return at
-
-
-@ti.func
-def store_plane(s: ti.template(), cut, thread, i, plane):
-    """Keep what :meth:`plane` gave for plane ``i``."""
-    for r in ti.static(range(3)):
-        s.planes[cut, thread, 3 * r + i] = plane[r]
 
 
 @ti.func
 def update_particle(s: ti.template(), cut, p, thread, base, fx, dt):
     """Velocity, gradient and position of a particle from the 27 nodes above ``base``.
 
-    Contact corrects the velocity that the next transfer hands on, not the position: moving the particle as well
-    would let the surface slip through the material without straining it.
+    Contact corrects the velocity that the next transfer hands on, not the position: moving the particle as well would
+    let the surface slip through the material without straining it.
     """
     w = bspline_weights(fx)
     code, lowest = s.visibility[cut, p], node_index(s, cut, base[0], base[1], base[2])
@@ -80,8 +48,8 @@ def update_particle(s: ti.template(), cut, p, thread, base, fx, dt):
             u4, cx = u4 + w[i][0] * whole, cx + i * w[i][0] * whole
             cy, cz = cy + w[i][0] * py, cz + w[i][0] * pz
     else:
-        # Where the loops are unrolled LLVM does not find the vectors of four, and the whole step takes 8 % longer. So their end
-        # is one that LLVM cannot know, and what they find goes through memory.
+        # Where the loops are unrolled LLVM does not find the vectors of four, which costs time (docs/theory.md,
+        # "Measured choices"). So their end is one that LLVM cannot know, and what they find goes through memory.
         end = ti.min(s.size[cut, COUNT], 3)
         if code == ALL_VISIBLE:
             for i in range(end):
@@ -109,12 +77,47 @@ def update_particle(s: ti.template(), cut, p, thread, base, fx, dt):
 
 
 @ti.func
-def grid_to_particles(s: ti.template(), cut: ti.template()):
-    """Gather velocity and gradient of every particle, move it, and let it touch the tools."""
-    for q in range(repetitions(s, cut, PARTS)):
-        c, part, mine = locate_active(s, cut, q, PARTS)
-        first, last, thread = block_range(s, c, part)
-        if mine and first < last:
-            dt, w = step_size(s, c), node_box(s, c, NODE_ROWS)
-            for p in range(first * s.lanes, ti.min(last * s.lanes, s.size[c, COUNT])):
-                g2p_particle(s, c, p, thread, dt, w)
+def gather_plane(s: ti.template(), at, w):
+    """Sum of the velocities of the nine nodes of a particle in one plane across x, and its moments.
+
+    Args:
+        at: Indices (j, k) of the nodes.
+        w: Weights of the nodes.
+
+    Returns:
+        Sum of weight times velocity [m/s], and its moments about the lowest node along y and z in cells.
+    """
+    whole, py, pz = ti.Vector.zero(float, 4), ti.Vector.zero(float, 4), ti.Vector.zero(float, 4)
+    for j in ti.static(range(3)):
+        b, c = w[1][2] * s.u[at[j, 1]], w[2][2] * s.u[at[j, 2]]
+        row = w[j][1] * (w[0][2] * s.u[at[j, 0]] + b + c)
+        whole += row
+        py += j * row
+        pz += w[j][1] * (b + 2 * c)
+    return whole, py, pz
+
+
+@ti.func
+def whole_plane(s: ti.template(), lowest):
+    """Indices of the nine nodes above the lowest one in a plane across x; masked as in
+    :func:`mpm.state.stencil.node_index`."""
+    at = ti.Matrix.zero(ti.i32, 3, 3)
+    for j, k in ti.static(ti.ndrange(3, 3)):
+        at[j, k] = (lowest & s.index_mask) + (j * s.stride_y + k)
+    return at
+
+
+@ti.func
+def split_plane(s: ti.template(), cut, lowest, i, code):
+    """As :func:`whole_plane` where some have the field of the other half."""
+    at = field_offsets(s, cut, i, code)
+    for j, k in ti.static(ti.ndrange(3, 3)):
+        at[j, k] = lowest + at[j, k] * s.stride_y + k
+    return at
+
+
+@ti.func
+def store_plane(s: ti.template(), cut, thread, i, plane):
+    """Keep what :func:`gather_plane` gave for plane ``i``."""
+    for r in ti.static(range(3)):
+        s.planes[cut, thread, 3 * r + i] = plane[r]

@@ -1,4 +1,4 @@
-"""What happens at the grid's nodes: mirrors, the two halves, the plain nodal contact."""
+"""Grid update: momentum to velocity at the nodes, mirror images, contact of the two halves, the plain nodal contact."""
 
 import taichi as ti
 
@@ -28,6 +28,15 @@ from mpm.state.tables import (
 
 
 @ti.func
+def clear_grid(s: ti.template(), cut: ti.template()):
+    """Empty the grids of all threads."""
+    for q in range(repetitions(s, cut, NODE_ROWS)):
+        c, r, mine = locate_active(s, cut, q, NODE_ROWS)
+        if mine:
+            clear_row(s, c, r)
+
+
+@ti.func
 def clear_row(s: ti.template(), cut, r):
     """Empty the grids of all threads at a row of nodes."""
     i, j, low, high = node_row(s, cut, r, NODE_ROWS)
@@ -41,6 +50,45 @@ def clear_row(s: ti.template(), cut, r):
                     s.g[thread_node_index(s, cut, thread, i, s.size[cut, SECOND_OFFSET] + j, k)] = ti.Vector.zero(
                         float, 4
                     )
+
+
+@ti.func
+def fold_mirror_images(s: ti.template(), cut: ti.template()):
+    """Add the mirror images across x = 0 to the nodes."""
+    if ti.static(s.threads > 1):
+        for q in range(repetitions(s, cut, NODE_ROWS)):
+            sum_row(s, cut, q)
+    for q in range(repetitions(s, cut, NODE_LINES)):
+        c, r, mine = locate_active(s, cut, q, NODE_LINES)
+        if mine:
+            deep = s.window[c, 5] - s.window[c, 2]
+            j, k = s.window[c, 1] + r // deep, s.window[c, 2] + r % deep
+            fold_mirror_x(s, c, j, k)
+            if ti.static(s.second_fields):
+                if has_second_field(s, c, j):
+                    fold_mirror_x(s, c, s.size[c, SECOND_OFFSET] + j, k)
+
+
+@ti.func
+def fold_mirror_x(s: ti.template(), cut, j, k):
+    """Add the mirror images across x = 0 to one line of nodes."""
+    for m in ti.static(range(s.plane_x)):
+        add_mirror_image(s, cut, s.size[cut, MIRROR_SUM] - m, m, j, k)
+    if s.size[cut, MIRROR_SUM] == 2 * s.plane_x:
+        c = 2.0 * s.g[thread_node_index(s, cut, 0, s.plane_x, j, k)]
+        c[0] = 0.0
+        s.g[thread_node_index(s, cut, 0, s.plane_x, j, k)] = c
+
+
+@ti.func
+def add_mirror_image(s: ti.template(), cut, i, m, j, k):
+    """Make node i and its image m across x carry the sum of both."""
+    a, b = s.g[thread_node_index(s, cut, 0, i, j, k)], s.g[thread_node_index(s, cut, 0, m, j, k)]
+    b[0] = -b[0]
+    a += b
+    s.g[thread_node_index(s, cut, 0, i, j, k)] = a
+    a[0] = -a[0]
+    s.g[thread_node_index(s, cut, 0, m, j, k)] = a
 
 
 @ti.func
@@ -65,30 +113,113 @@ def sum_threads(s: ti.template(), cut, i, j, k):
 
 
 @ti.func
-def add_mirror_image(s: ti.template(), cut, i, m, j, k):
-    """Make node i and its image m across x carry the sum of both."""
-    a, b = s.g[thread_node_index(s, cut, 0, i, j, k)], s.g[thread_node_index(s, cut, 0, m, j, k)]
-    b[0] = -b[0]
-    a += b
-    s.g[thread_node_index(s, cut, 0, i, j, k)] = a
-    a[0] = -a[0]
-    s.g[thread_node_index(s, cut, 0, m, j, k)] = a
+def update_grid(s: ti.template(), cut: ti.template()):
+    """Momentum to velocity at every node in reach."""
+    for q in range(repetitions(s, cut, NODE_ROWS)):
+        c, r, mine = locate_active(s, cut, q, NODE_ROWS)
+        if mine:
+            dt = step_size(s, c)
+            i, j, low, high = node_row(s, c, r, NODE_ROWS)
+            for k in range(low, high):
+                update_node(s, c, i, j, k, dt)
 
 
 @ti.func
-def fold_mirror_x(s: ti.template(), cut, j, k):
-    """Add the mirror images across x = 0 to one line of nodes."""
-    for m in ti.static(range(s.plane_x)):
-        add_mirror_image(s, cut, s.size[cut, MIRROR_SUM] - m, m, j, k)
-    if s.size[cut, MIRROR_SUM] == 2 * s.plane_x:
-        c = 2.0 * s.g[thread_node_index(s, cut, 0, s.plane_x, j, k)]
-        c[0] = 0.0
-        s.g[thread_node_index(s, cut, 0, s.plane_x, j, k)] = c
+def update_node(s: ti.template(), cut, i, j, k, dt):
+    """Momentum to velocity at a node, for the food on its own side and for the severed food of the other side."""
+    a, b, masses = both_fields(s, cut, i, j, k)
+    fall = ti.Vector([0.0, 0.0, -s.par[cut, GRAVITY] * dt])
+    va, vb = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
+    if a[3] > 0:
+        va = ti.Vector([a[0], a[1], a[2]]) / a[3] + fall
+        if ti.static(s.nodal):
+            va = nodal_contact(s, cut, i, j, k, a, va)
+    if ti.static(s.second_fields):
+        if b[3] > 0:
+            vb = ti.Vector([b[0], b[1], b[2]]) / b[3] + fall
+            va, vb = crack_face_contact(s, cut, i, j, k, a, b, va, vb)
+        if has_second_field(s, cut, j):
+            # velocity of all that shares the field, mass of what was scattered here
+            at = s.size[cut, SECOND_OFFSET] + j
+            s.u[node_index(s, cut, i, at, k)] = ti.Vector([vb[0], vb[1], vb[2], masses[1]])
+    s.u[node_index(s, cut, i, j, k)] = ti.Vector([va[0], va[1], va[2], masses[0]])
+
+
+@ti.func
+def both_fields(s: ti.template(), cut, i, j, k):
+    """Momentum and mass of both fields at a node, with mirror images across y, and their masses without."""
+    a, b = scattered(s, cut, i, j, k), ti.Vector.zero(float, 4)
+    masses = ti.Vector([a[3], 0.0])
+    if ti.static(s.second_fields):
+        if has_second_field(s, cut, j):
+            second = s.size[cut, SECOND_OFFSET]
+            b = scattered(s, cut, i, second + j, k)
+            masses[1] = b[3]
+            if ti.static(s.mirror_y):
+                m = 2 * s.size[cut, PLANE_Y] - j
+                if has_second_field(s, cut, m):
+                    flip = ti.Vector([1.0, -1.0, 1.0, 1.0])
+                    a += flip * scattered(s, cut, i, m, k)
+                    if j != s.size[cut, PLANE_Y]:
+                        b += flip * scattered(s, cut, i, second + m, k)
+    return a, b, masses
+
+
+@ti.func
+def scattered(s: ti.template(), cut, i, j, k):
+    """Momentum and mass that all threads have scattered to a node; beside a mirror across x they are summed before."""
+    q = s.g[thread_node_index(s, cut, 0, i, j, k)]
+    if ti.static(not s.mirror_x):
+        for thread in ti.static(range(1, s.threads)):
+            q += s.g[thread_node_index(s, cut, thread, i, j, k)]
+    return q
+
+
+@ti.func
+def crack_face_contact(s: ti.template(), cut, i, j, k, a, b, va, vb):
+    """Where no blade is between them, the severed halves may close on each other but not pass through.
+
+    Args:
+        i, j, k: The node.
+        a: Momentum and mass of its first field.
+        b: Momentum and mass of its second field.
+        va: Velocity of the first field [m/s].
+        vb: Velocity of the second field [m/s].
+
+    Returns:
+        Both velocities after contact [m/s].
+    """
+    at = to_scene_axes(s, cut, node_position(s, cut, i, j, k))
+    above = at[2] - edge_height(s, cut, at[0])
+    if not (-0.5 * s.par[cut, DX] < above < s.par[cut, BLADE_HEIGHT] and under_blade(s, cut, at[0])):
+        n = to_grid_axes(s, cut, ti.Vector([0.0, 1.0, 0.0]))
+        sign = 1.0 if node_half(s, cut, at[1]) == 1 else -1.0
+        na, nb = va.dot(n), vb.dot(n)
+        on_mirror = False
+        if ti.static(s.mirror_y):
+            on_mirror = j == s.size[cut, PLANE_Y]
+        if on_mirror:  # the other half is the image of the second field
+            if nb > 0:
+                vb -= nb * n
+        elif sign * (nb - na) > 0 and a[3] > 0:
+            mean = (a[3] * na + b[3] * nb) / (a[3] + b[3])
+            va += (mean - na) * n
+            vb += (mean - nb) * n
+    return va, vb
 
 
 @ti.func
 def nodal_contact(s: ti.template(), cut, i, j, k, q, u):
-    """The plain rule: velocities at nodes inside a tool are projected, with Coulomb friction."""
+    """The plain rule: velocities at nodes inside a tool are projected, with Coulomb friction.
+
+    Args:
+        i, j, k: The node.
+        q: Its momentum and mass.
+        u: Its velocity [m/s].
+
+    Returns:
+        Its velocity outside of blade and board [m/s].
+    """
     at = to_scene_axes(s, cut, node_position(s, cut, i, j, k))
     u = to_scene_axes(s, cut, u)
     mult = multiplicity(s, cut, i, j)
@@ -123,115 +254,3 @@ def nodal_contact(s: ti.template(), cut, i, j, k, q, u):
                 book_impulse(s, cut, BOARD, mult * q[3] * (u - new))
             u = new
     return to_grid_axes(s, cut, u)
-
-
-@ti.func
-def scattered(s: ti.template(), cut, i, j, k):
-    """Momentum and mass that all threads have scattered to a node; where x has a mirror they are added up before it."""
-    q = s.g[thread_node_index(s, cut, 0, i, j, k)]
-    if ti.static(not s.mirror_x):
-        for thread in ti.static(range(1, s.threads)):
-            q += s.g[thread_node_index(s, cut, thread, i, j, k)]
-    return q
-
-
-@ti.func
-def both_fields(s: ti.template(), cut, i, j, k):
-    """Momentum and mass of the first and the second field at a node, mirror images across y included, and the masses
-    without them."""
-    a, b = scattered(s, cut, i, j, k), ti.Vector.zero(float, 4)
-    masses = ti.Vector([a[3], 0.0])
-    if ti.static(s.second_fields):
-        if has_second_field(s, cut, j):
-            second = s.size[cut, SECOND_OFFSET]
-            b = scattered(s, cut, i, second + j, k)
-            masses[1] = b[3]
-            if ti.static(s.mirror_y):
-                m = 2 * s.size[cut, PLANE_Y] - j
-                if has_second_field(s, cut, m):
-                    flip = ti.Vector([1.0, -1.0, 1.0, 1.0])
-                    a += flip * scattered(s, cut, i, m, k)
-                    if j != s.size[cut, PLANE_Y]:
-                        b += flip * scattered(s, cut, i, second + m, k)
-    return a, b, masses
-
-
-@ti.func
-def update_node(s: ti.template(), cut, i, j, k, dt):
-    """Momentum to velocity at a node, for the food on its own side and for the severed food of the other side."""
-    a, b, masses = both_fields(s, cut, i, j, k)
-    fall = ti.Vector([0.0, 0.0, -s.par[cut, GRAVITY] * dt])
-    va, vb = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
-    if a[3] > 0:
-        va = ti.Vector([a[0], a[1], a[2]]) / a[3] + fall
-        if ti.static(s.nodal):
-            va = nodal_contact(s, cut, i, j, k, a, va)
-    if ti.static(s.second_fields):
-        if b[3] > 0:
-            vb = ti.Vector([b[0], b[1], b[2]]) / b[3] + fall
-            va, vb = crack_face_contact(s, cut, i, j, k, a, b, va, vb)
-        if has_second_field(s, cut, j):
-            # velocity of all that shares the field, mass of what was scattered here
-            at = s.size[cut, SECOND_OFFSET] + j
-            s.u[node_index(s, cut, i, at, k)] = ti.Vector([vb[0], vb[1], vb[2], masses[1]])
-    s.u[node_index(s, cut, i, j, k)] = ti.Vector([va[0], va[1], va[2], masses[0]])
-
-
-@ti.func
-def crack_face_contact(s: ti.template(), cut, i, j, k, a, b, va, vb):
-    """Where no blade is between them, the severed halves may close on each other but not pass through."""
-    at = to_scene_axes(s, cut, node_position(s, cut, i, j, k))
-    above = at[2] - edge_height(s, cut, at[0])
-    if not (-0.5 * s.par[cut, DX] < above < s.par[cut, BLADE_HEIGHT] and under_blade(s, cut, at[0])):
-        n = to_grid_axes(s, cut, ti.Vector([0.0, 1.0, 0.0]))
-        sign = 1.0 if node_half(s, cut, at[1]) == 1 else -1.0
-        na, nb = va.dot(n), vb.dot(n)
-        on_mirror = False
-        if ti.static(s.mirror_y):
-            on_mirror = j == s.size[cut, PLANE_Y]
-        if on_mirror:  # the other half is the image of the second field
-            if nb > 0:
-                vb -= nb * n
-        elif sign * (nb - na) > 0 and a[3] > 0:
-            mean = (a[3] * na + b[3] * nb) / (a[3] + b[3])
-            va += (mean - na) * n
-            vb += (mean - nb) * n
-    return va, vb
-
-
-@ti.func
-def clear_grid(s: ti.template(), cut: ti.template()):
-    """Empty the grids of all threads."""
-    for q in range(repetitions(s, cut, NODE_ROWS)):
-        c, r, mine = locate_active(s, cut, q, NODE_ROWS)
-        if mine:
-            clear_row(s, c, r)
-
-
-@ti.func
-def fold_mirror_images(s: ti.template(), cut: ti.template()):
-    """Add the mirror images across x = 0 to the nodes."""
-    if ti.static(s.threads > 1):
-        for q in range(repetitions(s, cut, NODE_ROWS)):
-            sum_row(s, cut, q)
-    for q in range(repetitions(s, cut, NODE_LINES)):
-        c, r, mine = locate_active(s, cut, q, NODE_LINES)
-        if mine:
-            deep = s.window[c, 5] - s.window[c, 2]
-            j, k = s.window[c, 1] + r // deep, s.window[c, 2] + r % deep
-            fold_mirror_x(s, c, j, k)
-            if ti.static(s.second_fields):
-                if has_second_field(s, c, j):
-                    fold_mirror_x(s, c, s.size[c, SECOND_OFFSET] + j, k)
-
-
-@ti.func
-def update_grid(s: ti.template(), cut: ti.template()):
-    """Momentum to velocity at every node in reach."""
-    for q in range(repetitions(s, cut, NODE_ROWS)):
-        c, r, mine = locate_active(s, cut, q, NODE_ROWS)
-        if mine:
-            dt = step_size(s, c)
-            i, j, low, high = node_row(s, c, r, NODE_ROWS)
-            for k in range(low, high):
-                update_node(s, c, i, j, k, dt)

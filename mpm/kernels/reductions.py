@@ -1,4 +1,4 @@
-"""What is read out of a run: the nodes in reach of the particles, their momentum and energy, what the tools were booked."""
+"""Reductions: the nodes in reach of the particles, their momentum and energy, and what the tools were booked."""
 
 import taichi as ti
 
@@ -31,36 +31,41 @@ MARGIN = 3  # cells by which the window exceeds the particles; it is renewed at 
 
 
 @ti.func
-def momentum_and_energy(s: ti.template(), cut, p):
-    """Momentum (3), kinetic and elastic energy of a particle [N s, J].
-
-    The kinetic energy is that of the motion, without what contact has just given, as the stress that will balance it has
-    not acted yet: food at rest on a board would else have the energy of the fall that the board stops in every step.
-    """
-    m, u = s.par[cut, MASS] * s.volume_ratio[cut, p], s.v[cut, p]
-    spin = velocity_gradient(s, cut, p).norm_sqr()
-    f = deformation_gradient(s, cut, p)
-    j = f.determinant()
-    v = unit()
-    if j > 0:
-        v = left_stretch(left_cauchy_green(f), j)
-    d = 0.0
-    if ti.static(s.damage):
-        d = damage_of(s.kappa[cut, p], s.par[cut, EPS0], s.par[cut, EPSF])
-    vol = 0.5 * s.par[cut, LAM] * (j - 1) ** 2
-    dev = deviatoric_energy(v, s.par[cut, MU])
-    if ti.static(s.branches > 0):
-        held = 1.0
-        stored = 0.0
-        for b in ti.static(range(s.branches)):
-            held -= s.prony_share[cut, b]
-            stored += s.prony_stress[cut, b, p].norm_sqr() / (4 * s.par[cut, MU] * s.prony_share[cut, b])
-        dev = held * dev + stored
-    keep = 1.0 - d
-    gift = s.contact_moment[cut, p, 0][3] if s.visibility[cut, p] & IN_CONTACT else 0.0
-    kinetic = m * (0.5 * u.norm_sqr() - gift + 0.125 * s.par[cut, DX] * s.par[cut, DX] * spin)
-    energy = s.par[cut, VOLUME] * s.volume_ratio[cut, p] * (keep * dev + (keep if j > 1 else 1.0) * vol)
-    return ti.Vector([m * u[0], m * u[1], m * u[2], kinetic, energy])
+def find_window(s: ti.template(), cut):
+    """Find the window: the nodes that any particle touches, some more, and those that mirrors fold back."""
+    for q in range(repetitions(s, cut, CUTS)):
+        c, _, _ = locate(s, cut, q, CUTS)
+        for d in ti.static(range(3)):
+            s.window[c, d], s.window[c, d + 3] = BEYOND_GRID, -BEYOND_GRID
+        if ti.static(s.atomic):
+            for what in ti.static((NODE_ROWS, NODE_LINES, DAMAGE_ROWS)):
+                s.extents[what] = 0
+    for q in range(repetitions(s, cut, PARTS)):
+        c, part, there = locate(s, cut, q, PARTS)
+        first, last, _ = block_range(s, c, part)
+        if there and first < last:
+            low, high = ti.Vector([BEYOND_GRID] * 3), ti.Vector([-BEYOND_GRID] * 3)
+            for p in range(first * s.lanes, ti.min(last * s.lanes, s.size[c, COUNT])):
+                base, fx = base_node(s, c, s.x[c, p])
+                for d in ti.static(range(3)):
+                    node = ti.min(ti.max(base[d], -BEYOND_GRID // 2), BEYOND_GRID // 2)
+                    low[d], high[d] = ti.min(low[d], node), ti.max(high[d], node)
+            for d in ti.static(range(3)):
+                ti.atomic_min(s.window[c, d], low[d])
+                ti.atomic_max(s.window[c, d + 3], high[d])
+    for q in range(repetitions(s, cut, CUTS)):
+        c, _, _ = locate(s, cut, q, CUTS)
+        for d in ti.static(range(3)):
+            low, high = s.window[c, d] - MARGIN, s.window[c, d + 3] + MARGIN + 3
+            if ti.static((s.mirror_x, s.mirror_y, False)[d]):
+                plane = s.plane_x if ti.static(d == 0) else s.size[c, PLANE_Y]
+                low, high = ti.min(low, plane - 2), ti.max(high, plane + 3)
+            s.window[c, d] = ti.max(low, 0)
+            s.window[c, d + 3] = ti.max(ti.min(high, s.size[c, NODES + d]), s.window[c, d])
+        if ti.static(s.atomic):
+            for what in ti.static((NODE_ROWS, NODE_LINES)):
+                ti.atomic_max(s.extents[what], extent(s, c, what))
+            ti.atomic_max(s.extents[DAMAGE_ROWS], extent(s, c, NODE_ROWS))
 
 
 @ti.func
@@ -95,41 +100,33 @@ def report(s: ti.template(), cut, row, out: ti.template()):
 
 
 @ti.func
-def find_window(s: ti.template(), cut):
-    """Find the window: the nodes that any particle touches, some more, and those that mirrors fold back."""
-    for q in range(repetitions(s, cut, CUTS)):
-        c, _, _ = locate(s, cut, q, CUTS)
-        for d in ti.static(range(3)):
-            s.window[c, d], s.window[c, d + 3] = BEYOND_GRID, -BEYOND_GRID
-        if ti.static(s.atomic):
-            for what in ti.static((NODE_ROWS, NODE_LINES, DAMAGE_ROWS)):
-                s.extents[what] = 0
-    for q in range(repetitions(s, cut, PARTS)):
-        c, part, there = locate(s, cut, q, PARTS)
-        first, last, _ = block_range(s, c, part)
-        if there and first < last:
-            low, high = (
-                ti.Vector([BEYOND_GRID, BEYOND_GRID, BEYOND_GRID]),
-                ti.Vector([-BEYOND_GRID, -BEYOND_GRID, -BEYOND_GRID]),
-            )
-            for p in range(first * s.lanes, ti.min(last * s.lanes, s.size[c, COUNT])):
-                base, fx = base_node(s, c, s.x[c, p])
-                for d in ti.static(range(3)):
-                    place = ti.min(ti.max(base[d], -BEYOND_GRID // 2), BEYOND_GRID // 2)
-                    low[d], high[d] = ti.min(low[d], place), ti.max(high[d], place)
-            for d in ti.static(range(3)):
-                ti.atomic_min(s.window[c, d], low[d])
-                ti.atomic_max(s.window[c, d + 3], high[d])
-    for q in range(repetitions(s, cut, CUTS)):
-        c, _, _ = locate(s, cut, q, CUTS)
-        for d in ti.static(range(3)):
-            low, high = s.window[c, d] - MARGIN, s.window[c, d + 3] + MARGIN + 3
-            if ti.static((s.mirror_x, s.mirror_y, False)[d]):
-                plane = s.plane_x if ti.static(d == 0) else s.size[c, PLANE_Y]
-                low, high = ti.min(low, plane - 2), ti.max(high, plane + 3)
-            s.window[c, d] = ti.max(low, 0)
-            s.window[c, d + 3] = ti.max(ti.min(high, s.size[c, NODES + d]), s.window[c, d])
-        if ti.static(s.atomic):
-            for what in ti.static((NODE_ROWS, NODE_LINES)):
-                ti.atomic_max(s.extents[what], extent(s, c, what))
-            ti.atomic_max(s.extents[DAMAGE_ROWS], extent(s, c, NODE_ROWS))
+def momentum_and_energy(s: ti.template(), cut, p):
+    """Momentum (3), kinetic and elastic energy of a particle [N s, J].
+
+    The kinetic energy is that of the motion, without what contact has just given: the stress that will balance it has
+    not acted yet. Food at rest on a board would else have the energy of the fall that the board stops in every step.
+    """
+    m, u = s.par[cut, MASS] * s.volume_ratio[cut, p], s.v[cut, p]
+    spin = velocity_gradient(s, cut, p).norm_sqr()
+    f = deformation_gradient(s, cut, p)
+    j = f.determinant()
+    v = unit()
+    if j > 0:
+        v = left_stretch(left_cauchy_green(f), j)
+    d = 0.0
+    if ti.static(s.damage):
+        d = damage_of(s.kappa[cut, p], s.par[cut, EPS0], s.par[cut, EPSF])
+    vol = 0.5 * s.par[cut, LAM] * (j - 1) ** 2
+    dev = deviatoric_energy(v, s.par[cut, MU])
+    if ti.static(s.branches > 0):
+        held = 1.0
+        stored = 0.0
+        for b in ti.static(range(s.branches)):
+            held -= s.prony_share[cut, b]
+            stored += s.prony_stress[cut, b, p].norm_sqr() / (4 * s.par[cut, MU] * s.prony_share[cut, b])
+        dev = held * dev + stored
+    keep = 1.0 - d
+    given = s.contact_moment[cut, p, 0][3] if s.visibility[cut, p] & IN_CONTACT else 0.0
+    kinetic = m * (0.5 * u.norm_sqr() - given + 0.125 * s.par[cut, DX] * s.par[cut, DX] * spin)
+    energy = s.par[cut, VOLUME] * s.volume_ratio[cut, p] * (keep * dev + (keep if j > 1 else 1.0) * vol)
+    return ti.Vector([m * u[0], m * u[1], m * u[2], kinetic, energy])

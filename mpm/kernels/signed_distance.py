@@ -1,4 +1,4 @@
-"""Knife and board as signed distance fields, Coulomb contact at a particle, and the cutting edge's law."""
+"""The blade as a signed distance field, and the laws of friction and adhesion of what touches it."""
 
 import taichi as ti
 

@@ -1,4 +1,8 @@
-"""Stress of the particles: many elastic ones at once, the others one by one."""
+"""Constitutive update: deformation gradient and Kirchhoff stress of the particles.
+
+Those that are elastic or flow are done for a block of particles at once (:func:`elastic_block`), the others one by one
+(:func:`particle_stress`). The laws themselves are in :mod:`mpm.kernels.constitutive`.
+"""
 
 import taichi as ti
 
@@ -44,11 +48,51 @@ from mpm.state.tables import (
 
 
 @ti.func
+def constitutive_update(
+    s: ti.template(),
+    cut: ti.template(),
+    p: ti.template(),
+    block: ti.template(),
+    lane: ti.template(),
+    dt: ti.template(),
+    loss: ti.template(),
+    tau: ti.template(),
+):
+    """Advance F of one particle and find its Kirchhoff stress, as far as :func:`elastic_block` has not done so.
+
+    Args:
+        loss: Set to its (plastic, damage, viscous loss per volume [J/m^3], inverted); 0 before.
+        tau: Set to the stress [Pa], xx, yy, zz, yz, xz, xy.
+    """
+    one_by_one = True
+    if ti.static(s.branches == 0):
+        one_by_one = s.tau[cut, block, STRETCH][lane] < 0
+    if one_by_one:
+        loss, tau = particle_stress(s, cut, p, block, lane, dt)
+        for r in ti.static(range(6)):
+            s.tau[cut, block, r][lane] = tau[r]
+    else:
+        for r in ti.static(range(6)):
+            tau[r] = s.tau[cut, block, r][lane]
+        loss[2], loss[0] = s.tau[cut, block, VISCOUS_LOSS][lane], s.tau[cut, block, PLASTIC_LOSS][lane]
+
+
+@ti.func
 def prony_stress(s: ti.template(), cut, p, f, v, j, mu):
-    """Prony series on the deviator in the unrotated frame (Simo 1987): stress to add, and loss per volume."""
+    """Prony series on the deviator in the unrotated frame (Simo 1987).
+
+    Args:
+        f: Deformation gradient.
+        v: Its left stretch.
+        j: Its determinant.
+        mu: Shear modulus [Pa].
+
+    Returns:
+        Stress to add [Pa], and loss per volume [J/m^3].
+    """
     r = full(cofactor(v)) @ f / j
-    place = r.transpose() @ f
-    now = 2 * mu * (place @ place - place)
+    u = r.transpose() @ f
+    now = 2 * mu * (u @ u - u)
     now -= now.trace() / 3 * ti.Matrix.identity(float, 3)
     add, lost = ti.Matrix.zero(float, 3, 3), 0.0
     for b in ti.static(range(s.branches)):
@@ -69,30 +113,28 @@ def gradient_entry(s: ti.template(), cut, block, row, column):
 
 
 @ti.func
+def gradient_row(s: ti.template(), cut: ti.template(), block: ti.template(), row: ti.template()):
+    """One row of the velocity gradient for all particles of a block [1/s]."""
+    return (
+        gradient_entry(s, cut, block, row, 0),
+        gradient_entry(s, cut, block, row, 1),
+        gradient_entry(s, cut, block, row, 2),
+    )
+
+
+@ti.func
 def elastic_block(s: ti.template(), cut, block, dt):
     """Advance F of a block of particles and find their Kirchhoff stress and viscous loss, all at once.
 
     Those that are damaged or inverted, or whose stretch has not converged, are left as they are and marked;
-    :meth:`stress` does them one by one.
+    :func:`particle_stress` does them one by one.
     """
     a0, a1, a2 = s.F[cut, block, 0], s.F[cut, block, 1], s.F[cut, block, 2]
     b0, b1, b2 = s.F[cut, block, 3], s.F[cut, block, 4], s.F[cut, block, 5]
     c0, c1, c2 = s.F[cut, block, 6], s.F[cut, block, 7], s.F[cut, block, 8]
-    lxx, lxy, lxz = (
-        gradient_entry(s, cut, block, 0, 0),
-        gradient_entry(s, cut, block, 0, 1),
-        gradient_entry(s, cut, block, 0, 2),
-    )
-    lyx, lyy, lyz = (
-        gradient_entry(s, cut, block, 1, 0),
-        gradient_entry(s, cut, block, 1, 1),
-        gradient_entry(s, cut, block, 1, 2),
-    )
-    lzx, lzy, lzz = (
-        gradient_entry(s, cut, block, 2, 0),
-        gradient_entry(s, cut, block, 2, 1),
-        gradient_entry(s, cut, block, 2, 2),
-    )
+    lxx, lxy, lxz = gradient_row(s, cut, block, 0)
+    lyx, lyy, lyz = gradient_row(s, cut, block, 1)
+    lzx, lzy, lzz = gradient_row(s, cut, block, 2)
     d0 = a0 + dt * (lxx * a0 + lxy * b0 + lxz * c0)
     d1 = a1 + dt * (lxx * a1 + lxy * b1 + lxz * c1)
     d2 = a2 + dt * (lxx * a2 + lxy * b2 + lxz * c2)
@@ -184,7 +226,7 @@ def elastic_block(s: ti.template(), cut, block, dt):
 
 @ti.func
 def particle_stress(s: ti.template(), cut, p, block, lane, dt):
-    """Advance F of one particle; returns its (plastic, damage, viscous loss, inverted) and Kirchhoff stress."""
+    """Advance F of one particle by all its laws; returns loss and stress as :func:`constitutive_update` gives them."""
     c, old = velocity_gradient(s, cut, p), deformation_gradient(s, cut, p)
     f = old + dt * (c @ old)
     j = f.determinant()

@@ -30,10 +30,10 @@ from mpm.state.tables import (
     YIELD,
 )
 
-# Stiffness of the contact over mass / dt^2 of a particle. The stiffest sound one is 4 for a lone particle on a hard surface,
-# over 1 + 4 arm^2 / dx^2 when the impulse has an arm, which is half a cell at most.
+# Stiffness of the contact over mass / dt^2 of a particle. The stiffest sound one is 4 for a lone particle on a hard
+# surface, over 1 + 4 arm^2 / dx^2 when the impulse has an arm, which is half a cell at most.
 CONTACT_STIFFNESS = 2.0
-FLAT = 0.02  # least distance between a particle's centre and the surface that squeezing leaves, over the cell
+LEAST_GAP = 0.02  # least distance between a particle's centre and the surface that squeezing leaves, over the cell
 
 
 @ti.func
@@ -51,20 +51,27 @@ def near_tool(s: ti.template(), cut, p, at):
 def surface_contact(s: ti.template(), cut, p, dt, u, at):
     """Contact of one particle with board and tool; returns its corrected velocity.
 
-    What touches is the food's surface, not the particle's centre. Its distance from the centre stretches with the
-    food, it moves with the food's velocity there, and the impulse has the moment that belongs to it, so that the work
-    of the contact is that of the surface. At the centre a food of n cells would be 1 / n stiffer.
+    What touches is the food's surface, not the particle's centre. Its distance from the centre stretches with the food,
+    it moves with the food's velocity there, and the impulse has the moment that belongs to it, so that the work of the
+    contact is that of the surface. At the centre a food of n cells would be 1 / n stiffer.
 
     The force is the food's own traction on the surface and, for what is missing, a stiff spring (Nitsche's method:
-    Chouly and Hild 2013, SIAM J. Numer. Anal. 51:1295). The spring alone, as stiff as the time step allows, would
-    give way as much as a fifth of a cell of food does.
+    Chouly and Hild 2013, SIAM J. Numer. Anal. 51:1295). The spring alone, as stiff as the time step allows, would give
+    way as much as a fifth of a cell of food does.
+
+    Args:
+        p: The particle.
+        dt: Time step [s].
+        u: Its velocity in the grid's axes [m/s].
+        at: Its position in the grid's axes [m].
     """
     m = s.par[cut, MASS] * s.volume_ratio[cut, p] * ti.static((2 if s.mirror_x else 1) * (2 if s.mirror_y else 1))
     c = velocity_gradient(s, cut, p)
-    up = to_scene_axes(s, cut, c @ ti.Vector([0.0, 0.0, 1.0]))  # gradient of the velocity, upwards and across the blade
+    # gradient of the velocity, upwards and across the blade
+    up = to_scene_axes(s, cut, c @ ti.Vector([0.0, 0.0, 1.0]))
     across = to_scene_axes(s, cut, c @ to_grid_axes(s, cut, ti.Vector([0.0, 1.0, 0.0])))
     there, v = to_scene_axes(s, cut, at), to_scene_axes(s, cut, u)
-    least, most = FLAT * s.par[cut, DX], 0.5 * s.par[cut, DX]
+    least, most = LEAST_GAP * s.par[cut, DX], 0.5 * s.par[cut, DX]
     kick, high, wide = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
     if 0 < s.board_gap[cut, p] and there[2] < 2 * s.par[cut, DX]:  # a free body has none
         s.board_gap[cut, p] = ti.math.clamp(s.board_gap[cut, p] * (1 + dt * up[2]), least, most)
@@ -85,17 +92,22 @@ def surface_contact(s: ti.template(), cut, p, dt, u, at):
     scale = 4 * s.par[cut, INV_DX] * s.par[cut, INV_DX]
     high, wide = to_grid_axes(s, cut, high), to_grid_axes(s, cut, wide)
     new = v + kick + push
-    gift = 0.5 * (new.norm_sqr() - v.norm_sqr())
-    s.contact_moment[cut, p, 0] = ti.Vector([scale * high[0], scale * high[1], scale * high[2], gift])
+    given = 0.5 * (new.norm_sqr() - v.norm_sqr())
+    s.contact_moment[cut, p, 0] = ti.Vector([scale * high[0], scale * high[1], scale * high[2], given])
     s.contact_moment[cut, p, 1] = scale * ti.Vector([wide[0], wide[1], wide[2], 0.0])
     return to_grid_axes(s, cut, new)
 
 
 @ti.func
 def surface_traction(s: ti.template(), cut, p, shell, depth, n, dt):
-    """Force that the food's own stress asks of a board or tool with outward normal n, over the contact's stiffness [m].
+    """Force that the food's own stress asks of a board or tool, over the contact's stiffness [m].
 
-    Of the first layer only: ``shell`` is the reference volume between centre and surface, ``depth`` their distance.
+    Args:
+        p: The particle.
+        shell: Reference volume between its centre and the surface [m^3], 0 behind the first layer.
+        depth: Distance of centre and surface [m].
+        n: Outward normal of the tool, in the scene's axes.
+        dt: Time step [s].
     """
     out = ti.Vector.zero(float, 3)
     if shell > 0:
@@ -109,8 +121,9 @@ def surface_traction(s: ti.template(), cut, p, shell, depth, n, dt):
 
 @ti.func
 def friction_limit(s: ti.template(), cut, p, press, dt):
-    """Largest friction on the tool at a normal force, both over the contact's stiffness [m]: Coulomb's, and on the food's face no
-    more than its yield stress in shear (Orowan 1943; Zorev 1963).
+    """Largest friction on the tool at a normal force, both over the contact's stiffness [m].
+
+    It is Coulomb's, and on the food's face no more than its yield stress in shear (Orowan 1943; Zorev 1963).
 
     Beyond that the food shears in a band of no thickness along the face. A grid without this limit shears a whole layer
     of cells, drags it down with the blade and is pressed for it the more, the finer the cells.
@@ -124,11 +137,19 @@ def friction_limit(s: ti.template(), cut, p, press, dt):
 
 @ti.func
 def board_contact(s: ti.template(), cut, p, m, dt, u, at):
-    """Contact of one particle with the board; returns the change of its velocity. ``u`` is that of its surface.
+    """Contact of one particle with the board; returns the change of its velocity [m/s].
 
-    Friction is Coulomb's alone. The limit of :meth:`friction` would bind where the pressure exceeds the yield stress over
-    sqrt(3) mu, which under a food that lies on a board is at the points of a round one, whose contact is narrower than a
-    particle's face: the area to multiply is not known there. Nor is food drawn along the board by a tool.
+    Friction is Coulomb's alone. The limit of :func:`friction_limit` would bind where the pressure exceeds the yield
+    stress over sqrt(3) mu, which under a food that lies on a board is at the points of a round one. Its contact is
+    narrower than a particle's face there, and the area to multiply is not known. Nor is food drawn along the board by a
+    tool.
+
+    Args:
+        p: The particle.
+        m: Its mass, mirror images included [kg].
+        dt: Time step [s].
+        u: Velocity of its surface [m/s].
+        at: Position of its centre [m].
     """
     dv = ti.Vector.zero(float, 3)
     own = surface_traction(s, cut, p, s.surface_volume[cut, p][0], s.board_gap[cut, p], ti.Vector([0.0, 0.0, 1.0]), dt)
@@ -148,10 +169,19 @@ def board_contact(s: ti.template(), cut, p, m, dt, u, at):
 
 @ti.func
 def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
-    """Contact of one severed particle with the blade's faces; returns the change of its velocity, and its lever arm.
+    """Contact of one severed particle with the blade's faces; returns the change of velocity [m/s] and lever arm [m].
 
-    A particle meets the blade as far from its centre as it was from the cut plane when the food was whole, so
-    that the faces displace the food by the true half thickness of the blade.
+    A particle meets the blade as far from its centre as it was from the cut plane when the food was whole, so that the
+    faces displace the food by the true half thickness of the blade.
+
+    Args:
+        p: The particle.
+        m: Its mass, mirror images included [kg].
+        dt: Time step [s].
+        u: Velocity of its centre [m/s].
+        up: Gradient of the velocity upwards [1/s].
+        across: Gradient of the velocity across the blade [1/s].
+        at: Position of its centre [m].
     """
     cos_t, sin_t = ti.cast(s.pose[cut, TILT_COS], float), ti.cast(s.pose[cut, TILT_SIN], float)
     above = (at[2] - edge_height(s, cut, at[0])) * cos_t
@@ -201,9 +231,14 @@ def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
 
 @ti.func
 def press_contact(s: ti.template(), cut, p, m, dt, u, at):
-    """Contact of one particle with a plate or wedge that presses from above; returns the change of its velocity.
+    """Contact of one particle with a plate or wedge that presses from above; returns the change of its velocity [m/s].
 
-    ``at`` and ``u`` are place and velocity of the food's surface above the particle.
+    Args:
+        p: The particle.
+        m: Its mass, mirror images included [kg].
+        dt: Time step [s].
+        u: Velocity of the food's surface above it [m/s].
+        at: Position of that surface [m].
     """
     sign = 1.0 if at[1] >= 0 else -1.0
     above = at[2] - ti.cast(s.pose[cut, EDGE_Z], float)

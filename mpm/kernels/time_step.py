@@ -5,22 +5,24 @@ from collections.abc import Sequence
 import numpy as np
 import taichi as ti
 
-from mpm.kernels.cutting_edge import advance_crack_fronts, apply_edge_law
-from mpm.kernels.damage import smooth_driving_strain
+from mpm.kernels.crack import advance_crack_fronts
+from mpm.kernels.cutting_edge import apply_edge_law
+from mpm.kernels.damage import clear_damage_box, smooth_driving_strain
 from mpm.kernels.g2p import grid_to_particles
 from mpm.kernels.grid_update import clear_grid, fold_mirror_images, update_grid
 from mpm.kernels.p2g import particles_to_grid
 from mpm.kernels.reductions import find_window, report
-from mpm.kernels.tool import move_tools, set_tool_velocities
+from mpm.kernels.tool import move_tools, set_tool_velocity
 from mpm.state.host_transfer import ROWS, TABLES
-from mpm.state.state import CPU_BLOCK, State
+from mpm.state.loops import locate, repetitions, takes_part
+from mpm.state.state import CPU_BLOCK, CUTS, State
 from mpm.state.tables import N_ORDER, N_REPORT, STEPS, STEPS_PER_ROW
 
 
 @ti.func
 def time_step(s: ti.template(), cut):
     """One time step of a cut, on a GPU of all cuts that have steps left."""
-    set_tool_velocities(s, cut)
+    begin_step(s, cut)
     if ti.static(s.cuts):
         advance_crack_fronts(s, cut)
     clear_grid(s, cut)
@@ -34,6 +36,26 @@ def time_step(s: ti.template(), cut):
     grid_to_particles(s, cut)  # with the contact of the particles
     if ti.static(s.damage):
         smooth_driving_strain(s, cut)
+
+
+@ti.func
+def begin_step(s: ti.template(), cut: ti.template()):
+    """Count the step, and find the velocities of the tools in it."""
+    ti.loop_config(serialize=s.serial)
+    for q in range(repetitions(s, cut, CUTS)):
+        c, _, _ = locate(s, cut, q, CUTS)
+        if ti.static(s.atomic):
+            s.steps_left[c] -= 1
+        if takes_part(s, c):
+            begin_step_of(s, c)
+
+
+@ti.func
+def begin_step_of(s: ti.template(), cut):
+    """Begin the step of one cut."""
+    set_tool_velocity(s, cut)
+    if ti.static(s.damage):
+        clear_damage_box(s, cut)
 
 
 @ti.func
@@ -65,7 +87,7 @@ def read_orders(s: ti.template(), orders: ti.template()):
 
 @ti.kernel
 def _steps(s: ti.template(), orders: ROWS, out: TABLES):
-    """All time steps that are ordered without leaving the kernel, one thread a cut, with a row of the report after every so many."""
+    """All time steps that are ordered without leaving the kernel, one thread a cut, with the rows of the report."""
     read_orders(s, orders)
     if ti.static(s.batch == 1):
         follow_orders(s, 0, out)
@@ -101,11 +123,12 @@ def advance(state: State, orders: Sequence[Sequence[float]]) -> np.ndarray:
     """Make the time steps that are ordered.
 
     Args:
-        orders: Of each cut steps, after how many each a row of the report, time step [s], velocity upwards and along the blade [m/s]
-            and rate of its turn [rad/s]; no steps for one that rests.
+        state: The cuts.
+        orders: Of each cut steps, after how many each a row of the report, time step [s], velocity upwards and along
+            the blade [m/s] and rate of its tilt [rad/s] (:class:`mpm.run.Order`); no steps for one that rests.
 
     Returns:
-        Rows of the report of each cut, (cuts, most rows, N_REPORT); a cut with fewer has the first of them.
+        Rows of the report of each cut, shape (cuts, most rows, N_REPORT); a cut with fewer has the first of them.
     """
     table = np.zeros((state.batch, N_ORDER))
     table[:, STEPS_PER_ROW] = 1

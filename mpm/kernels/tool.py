@@ -1,10 +1,9 @@
-"""The tool: its motion, and the impulses that it is booked."""
+"""The tool: how it moves, where it is, and the impulses that it is booked."""
 
 import taichi as ti
 
-from mpm.kernels.damage import clear_damage_box
 from mpm.state.accessors import step_size
-from mpm.state.loops import locate, locate_active, repetitions, takes_part
+from mpm.state.loops import locate_active, repetitions
 from mpm.state.state import CUTS
 from mpm.state.tables import (
     ARM_C,
@@ -20,6 +19,7 @@ from mpm.state.tables import (
     EDGE_Z,
     FACE,
     HALF_LENGTH,
+    INV_DX,
     MOMENT,
     SPEED_ALONG,
     SPEED_TILT,
@@ -32,8 +32,50 @@ from mpm.state.tables import (
 
 
 @ti.func
+def set_tool_velocity(s: ti.template(), cut: ti.template()):
+    """Velocity of the tool in this step: as commanded, or that of the arm behind its spring."""
+    dt, vz = step_size(s, cut), ti.cast(s.order[cut, SPEED_UP], float)
+    s.pose[cut, EDGE_VS], s.pose[cut, TILT_RATE] = s.order[cut, SPEED_ALONG], s.order[cut, SPEED_TILT]
+    s.pose[cut, COMMAND] += vz * dt
+    if s.par[cut, ARM_MASS] > 0:
+        booked = s.sums[cut, EDGE + 2] + s.sums[cut, FACE + 2]
+        limit = ti.cast(s.par[cut, ARM_LIMIT], ti.f64)
+        spring = s.par[cut, ARM_K] * (s.pose[cut, COMMAND] - s.pose[cut, EDGE_Z])
+        pull = ti.math.clamp(spring + s.par[cut, ARM_C] * (vz - s.pose[cut, EDGE_VZ]), -limit, limit)
+        if ti.abs(spring) > 2 * limit:  # stalled: it pulls as hard as it can and only stops rattling
+            pull = ti.math.clamp(spring, -limit, limit) - s.par[cut, ARM_C] * s.pose[cut, EDGE_VZ]
+        s.pose[cut, EDGE_VZ] += (pull * dt + booked - s.pose[cut, BOOKED_IMPULSE]) / s.par[cut, ARM_MASS]
+        s.pose[cut, BOOKED_IMPULSE] = booked
+        s.pose[cut, EDGE_VZ] = ti.max(s.pose[cut, EDGE_VZ], -s.pose[cut, EDGE_Z] / dt)  # the board stops the edge
+    else:
+        s.pose[cut, EDGE_VZ] = vz
+
+
+@ti.func
+def move_tools(s: ti.template(), cut: ti.template()):
+    """Move the tools on, after the grid has felt them."""
+    ti.loop_config(serialize=s.serial)
+    for q in range(repetitions(s, cut, CUTS)):
+        c, _, mine = locate_active(s, cut, q, CUTS)
+        if mine:
+            move_tool(s, c)
+
+
+@ti.func
+def move_tool(s: ti.template(), cut):
+    """Move the tool."""
+    dt = step_size(s, cut)
+    s.pose[cut, EDGE_Z] += s.pose[cut, EDGE_VZ] * dt
+    s.pose[cut, EDGE_S] += s.pose[cut, EDGE_VS] * dt
+    if s.order[cut, SPEED_TILT] != 0:
+        s.pose[cut, TILT] += s.pose[cut, TILT_RATE] * dt
+        tilt = ti.cast(s.pose[cut, TILT], float)
+        s.pose[cut, TILT_COS], s.pose[cut, TILT_SIN] = ti.cos(tilt), ti.sin(tilt)
+
+
+@ti.func
 def edge_height(s: ti.template(), cut, place):
-    """Height of the edge at a place along the blade [m]."""
+    """Height of the edge at a place along the cut [m]."""
     z = ti.cast(s.pose[cut, EDGE_Z], float)
     c, t = ti.cast(s.pose[cut, TILT_COS], float), ti.cast(s.pose[cut, TILT_SIN], float)
     return z + (place - ti.cast(s.pose[cut, EDGE_S], float)) * t / c
@@ -57,6 +99,15 @@ def under_blade(s: ti.template(), cut, place):
 
 
 @ti.func
+def covered_part(s: ti.template(), cut, place):
+    """Part of a slice that is under the blade [-]."""
+    reach = s.par[cut, HALF_LENGTH] * ti.cast(s.pose[cut, TILT_COS], float) - ti.abs(
+        place - ti.cast(s.pose[cut, EDGE_S], float)
+    )
+    return ti.math.clamp(reach * s.par[cut, INV_DX] + 0.5, 0.0, 1.0)
+
+
+@ti.func
 def book_impulse(s: ti.template(), cut, row, impulse):
     """Book an impulse of the food on a tool, in the scene's axes; mirror images cancel across their plane."""
     if ti.static(not s.mirror_x):
@@ -68,65 +119,11 @@ def book_impulse(s: ti.template(), cut, row, impulse):
 
 @ti.func
 def book_knife_impulse(s: ti.template(), cut, row, impulse, place, z):
-    """Book an impulse of the food on the knife at a place along the cut and a height, and its moment about the middle of the edge,
-    which raises the end at +x."""
+    """Book an impulse of the food on the knife at a place along the cut and a height.
+
+    Its moment is about the middle of the edge, and raises the end at +x.
+    """
     book_impulse(s, cut, row, impulse)
     if ti.static(not s.mirror_x):
         wide, high = place - ti.cast(s.pose[cut, EDGE_S], float), z - ti.cast(s.pose[cut, EDGE_Z], float)
         s.sums[cut, MOMENT] += wide * impulse[2] - high * impulse[0]
-
-
-@ti.func
-def set_tool_velocity(s: ti.template(), cut):
-    """Velocity of the tool in this step: as commanded, or that of the arm behind its spring."""
-    dt, vz = step_size(s, cut), ti.cast(s.order[cut, SPEED_UP], float)
-    s.pose[cut, EDGE_VS], s.pose[cut, TILT_RATE] = s.order[cut, SPEED_ALONG], s.order[cut, SPEED_TILT]
-    s.pose[cut, COMMAND] += vz * dt
-    if s.par[cut, ARM_MASS] > 0:
-        booked = s.sums[cut, EDGE + 2] + s.sums[cut, FACE + 2]
-        limit = ti.cast(s.par[cut, ARM_LIMIT], ti.f64)
-        spring = s.par[cut, ARM_K] * (s.pose[cut, COMMAND] - s.pose[cut, EDGE_Z])
-        pull = ti.math.clamp(spring + s.par[cut, ARM_C] * (vz - s.pose[cut, EDGE_VZ]), -limit, limit)
-        if ti.abs(spring) > 2 * limit:  # stalled: it pulls as hard as it can and only stops rattling
-            pull = ti.math.clamp(spring, -limit, limit) - s.par[cut, ARM_C] * s.pose[cut, EDGE_VZ]
-        s.pose[cut, EDGE_VZ] += (pull * dt + booked - s.pose[cut, BOOKED_IMPULSE]) / s.par[cut, ARM_MASS]
-        s.pose[cut, BOOKED_IMPULSE] = booked
-        s.pose[cut, EDGE_VZ] = ti.max(s.pose[cut, EDGE_VZ], -s.pose[cut, EDGE_Z] / dt)  # the board stops the edge
-    else:
-        s.pose[cut, EDGE_VZ] = vz
-
-
-@ti.func
-def move_tool(s: ti.template(), cut):
-    """Move the tool."""
-    dt = step_size(s, cut)
-    s.pose[cut, EDGE_Z] += s.pose[cut, EDGE_VZ] * dt
-    s.pose[cut, EDGE_S] += s.pose[cut, EDGE_VS] * dt
-    if s.order[cut, SPEED_TILT] != 0:
-        s.pose[cut, TILT] += s.pose[cut, TILT_RATE] * dt
-        tilt = ti.cast(s.pose[cut, TILT], float)
-        s.pose[cut, TILT_COS], s.pose[cut, TILT_SIN] = ti.cos(tilt), ti.sin(tilt)
-
-
-@ti.func
-def set_tool_velocities(s: ti.template(), cut: ti.template()):
-    """Velocities of the tools of all cuts in this step."""
-    ti.loop_config(serialize=s.serial)
-    for q in range(repetitions(s, cut, CUTS)):
-        c, _, _ = locate(s, cut, q, CUTS)
-        if ti.static(s.atomic):
-            s.steps_left[c] -= 1
-        if takes_part(s, c):
-            set_tool_velocity(s, c)
-            if ti.static(s.damage):
-                clear_damage_box(s, c)
-
-
-@ti.func
-def move_tools(s: ti.template(), cut: ti.template()):
-    """Move the tools."""
-    ti.loop_config(serialize=s.serial)
-    for q in range(repetitions(s, cut, CUTS)):
-        c, _, mine = locate_active(s, cut, q, CUTS)
-        if mine:
-            move_tool(s, c)

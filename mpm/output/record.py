@@ -14,7 +14,7 @@ from mpm.output.topology import Topology
 ENERGIES = ("kinetic", "elastic", "plastic", "damage", "viscous", "friction", "parting", "unbooked")
 """Where the work of knife and gravity has gone, each a column of a record; together they are that work."""
 LEAST_CUT = 5
-"""Stroke [cells] from which on it is asked what parting has cost: the new area is known to a row of cells, here a fifth of it."""
+"""Stroke [cells] from which the cost of parting is asked for: the new area is known to a row of cells, its fifth."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,11 @@ class ForceRecord:
         plastic: Energy dissipated by J2 flow so far [J], shape (n,).
         damage: Energy dissipated by bulk damage so far [J], shape (n,).
         viscous: Energy dissipated by the loss factor so far [J], shape (n,).
-        friction: Energy that friction, and faces that stick, have taken so far [J], shape (n,); of particles that touch, so
-            that of the ``nodal`` contact is not in it.
-        parting: Energy that the cutting edge has taken so far [J], shape (n,): the new surface, and the start of the cut.
-        moment: Moment of the food on the knife about the middle of the edge, which raises the end at +x [N m], shape (n,); 0 where
-            x = 0 is a mirror.
+        friction: Energy that friction, and faces that stick, have taken so far [J], shape (n,); of particles that
+            touch, so that of the ``nodal`` contact is not in it.
+        parting: Energy that the cutting edge has taken so far [J], shape (n,): new surface, and the start of the cut.
+        moment: Moment of the food on the knife about the middle of the edge, which raises the end at +x [N m], shape
+            (n,); 0 where x = 0 is a mirror.
         tilt: Angle of the edge to the board at the end of each interval [rad], shape (n,).
         mass: Mass of the food, mirror images included [kg].
         lagging: Whether contact acts on particles after they were moved: all but ``nodal`` contact.
@@ -111,8 +111,8 @@ class ForceRecord:
         """Upward force on the blade's faces, averaged over one cell of stroke [N], shape (n,).
 
         The crack front behind the edge advances by whole node layers, so the force on the faces carries a ripple with
-        the period of one cell. A moving mean over exactly one cell removes it and nothing longer; on the last half cell,
-        which has no such window, the curve is carried on along the last two whole ones.
+        the period of one cell. A moving mean over exactly one cell removes it and nothing longer; on the last half
+        cell, which has no such window, the curve is carried on along the last two whole ones.
         """
         return _moving_mean(self.time * self.speed, self.face[:, 2], self.cell)
 
@@ -153,11 +153,11 @@ class ForceRecord:
     def unbooked(self) -> np.ndarray:
         """Energy that no law has taken [J], shape (n,): work of the knife and of gravity less all that is booked.
 
-        Most of it is released at the front of the crack, which leads the edge by half a process zone: there the halves, bent apart
-        by the blade, part without resistance, and what they release goes on in waves that viscosity and the transfers between
-        particles and grid damp. It is the energy release rate of that crack, the same on any grid (a stiff apple: 37, 36 and 36 J/m^2
-        on 3, 2 and 1.5 mm) and that of finite elements (studies/verification/cutting.py). The rest is lost by the discretisation: the
-        transfers smooth the velocities, and the contact stops what approaches it.
+        Most of it is released at the front of the crack, which leads the edge by half a process zone: there the halves,
+        bent apart by the blade, part without resistance, and what they release goes on in waves that viscosity and the
+        transfers between particles and grid damp. It is the energy release rate of that crack, the same on any grid
+        (docs/theory.md, "Measured choices") and that of finite elements (studies/verification/cutting.py). The rest is
+        lost by the discretisation: the transfers smooth the velocities, and the contact stops what approaches it.
         """
         booked = self.kinetic + self.elastic + self.plastic + self.damage + self.viscous + self.friction + self.parting
         return self.work_done + self.weighing - booked
@@ -169,8 +169,11 @@ class ForceRecord:
 
     @property
     def fracture(self) -> dict[str, float] | None:
-        """Energy of new surface over its area [J/m^2]: ``edge``, by the edge's law, and ``released``, :attr:`unbooked`; None where
-        there is none. Their sum is the work of fracture that an energy balance of the whole cut would find."""
+        """Energy of new surface over its area [J/m^2]; None where there is none.
+
+        ``edge_J_m2`` is that of the edge's law, ``released_J_m2`` is :attr:`unbooked`. Their sum is the work of
+        fracture that an energy balance of the whole cut would find.
+        """
         if not self.severed_area > 0:
             return None
         return {
@@ -180,10 +183,10 @@ class ForceRecord:
 
     @property
     def parted(self) -> float:
-        """Energy that the edge has taken over R times the new area [-]; NaN where nothing is to be parted, or too little for the grid.
+        """Energy that the edge has taken over R times the new area [-]; NaN where nothing or too little is parted.
 
-        One, and more with a skin, where the food is cut. Where the edge presses it away, as one that flows, the force is that of
-        the flow within the process zone, which is a width of the method, and R only bounds it.
+        One, and more with a skin, where the food is cut. Where the edge presses it away, as one that flows, the force
+        is that of the flow within the process zone, which is a width of the method, and R only bounds it.
         """
         sound = self.status == "done" and self.resistance > 0 and len(self.stroke) > 0
         if not sound or self.stroke.max() < LEAST_CUT * self.cell:
@@ -194,8 +197,8 @@ class ForceRecord:
     def weighing(self) -> np.ndarray:
         """Work of gravity so far [J], shape (n,).
 
-        The momentum of a record is that which the next transfer gets; with contact of particles it is ahead of the motion
-        by the impulse of one step.
+        The momentum of a record is that which the next transfer gets; with contact of particles it is ahead of the
+        motion by the impulse of one step.
         """
         span = np.diff(self.time, prepend=0.0)
         p = self.momentum[:, 2]
@@ -262,9 +265,9 @@ class ForceRecord:
 def _moving_mean(way: np.ndarray, values: np.ndarray, width: float) -> np.ndarray:
     """Mean of interval values over a centred window of the way, exact for piecewise constant values.
 
-    Where the window would reach beyond the end, the means over the last two whole windows are carried on along their line: a
-    window that shrinks would let through what it is there to remove. At the beginning it shrinks, where there is nothing
-    to remove yet.
+    Where the window would reach beyond the end, the means over the last two whole windows are carried on along their
+    line: a window that shrinks would let through what it is there to remove. At the beginning it shrinks, where there
+    is nothing to remove yet.
     """
     if len(way) == 0:
         return values

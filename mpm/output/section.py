@@ -19,7 +19,8 @@ class Section:
         y: Places across the blade [m], shape (k, m).
         z: Heights above the board [m], shape (k, m).
         mises: Von Mises stress [Pa], shape (k, m).
-        size: Width across the blade and height of the piece of food that each particle stands for, undeformed [m], shape (2, m).
+        size: Width across the blade and height of the piece of food that each particle stands for, undeformed [m],
+            shape (2, m).
         mirrored: Whether there is a mirror image of it on the other side of the blade.
     """
 

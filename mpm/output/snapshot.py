@@ -40,6 +40,9 @@ def snapshot(time: float, stroke: float, slide: float, now: Particles, x: np.nda
         slide: Way of the blade along its edge [m].
         now: The particles.
         x: Their places in the scene's axes [m], shape (n, 3).
+
+    Returns:
+        Their von Mises stress and which of them the cut has passed.
     """
     cauchy = now.tau / np.linalg.det(now.F)[:, None]
     xx, yy, zz, yz, xz, xy = cauchy.T

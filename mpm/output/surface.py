@@ -1,8 +1,9 @@
 """The food's surface, which a picture shows: triangles of either half that move with the particles.
 
-The outline is a stack of rings around sections of the shape, closed by the face of the cut and by the far end. A vertex goes with
-the particles of its own half that are nearest to it at rest: by a moving least-squares fit that is exact for any affine motion
-(Lancaster and Salkauskas 1981, Math. Comp. 37:141), while a stress, which must not overshoot, is their weighted mean.
+The outline is a stack of rings around sections of the shape, closed by the face of the cut and by the far end. A vertex
+goes with the particles of its own half that are nearest to it at rest: by a moving least-squares fit that is exact for
+any affine motion (Lancaster and Salkauskas 1981, Math. Comp. 37:141), while a stress, which must not overshoot, is
+their weighted mean.
 """
 
 from __future__ import annotations

@@ -67,10 +67,13 @@ def topology(
     Args:
         seeds: The particles at rest, n of them.
         mirrors: Whether x = 0 and y = 0 are mirrors.
-        half: Half of each particle, 0 left, 1 right, shape (n,).
-        severed: Whether the edge has passed it, shape (n,).
-        swell: Volume over volume at rest, shape (n,).
-        damage: Bulk damage, shape (n,).
+        half: Half of each particle [-], 0 left, 1 right, shape (n,).
+        severed: Whether the edge has passed it [-], shape (n,).
+        swell: Volume over volume at rest [-], shape (n,).
+        damage: Bulk damage [-], shape (n,).
+
+    Returns:
+        What the cut has left.
     """
     cells, image, half = seeds.cells, seeds.owner, half[seeds.owner]
     if mirrors[1]:

@@ -16,12 +16,12 @@ from typing import Any
 Lines = tuple[list[str], int]
 
 
-def hasten() -> None:
+def cache_parsing() -> None:
     """Let Taichi find, wrap and parse the source of a function once, and name a statement by its line.
 
-    For each call and each copy of an unrolled loop Taichi 1.7 reads the function's source again, wraps its lines, parses
-    them and draws a caret under each expression, for messages that nobody sees. Where Taichi is not as it was in 1.7
-    nothing is done.
+    For each call and each copy of an unrolled loop Taichi 1.7 reads the function's source again, wraps its lines,
+    parses them and draws a caret under each expression, for messages that nobody sees. Where Taichi is not as it was in
+    1.7 nothing is done.
     """
     try:
         import taichi as ti

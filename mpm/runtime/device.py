@@ -8,14 +8,14 @@ import os
 from dataclasses import dataclass, replace
 from typing import Any
 
-from mpm.runtime.compiler import hasten
+from mpm.runtime.compiler import cache_parsing
 from mpm.scene.errors import SceneError
 
 ARCHES = ("cpu", "cuda", "vulkan", "gpu")
 """Devices; not Metal, which has no doubles: the way of the blade needs them."""
 SINGLE = ("vulkan",)
-"""Devices whose kernels are in single precision, whatever a scene asks for: Taichi has no exponential of doubles for them, and its
-additions to a double are no atomic ones there, so that impulses are lost (a third of a blade's)."""
+"""Devices whose kernels are in single precision, whatever a scene asks for: Taichi has no exponential of doubles for
+them, and its additions to a double are no atomic ones there, so that impulses are lost."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def start(runtime: Runtime, precision: str) -> int:
     """
     import taichi as ti
 
-    hasten()
+    cache_parsing()
     key = (runtime, precision)
     if _state["key"] == key:
         return _state["serial"]
@@ -63,7 +63,7 @@ def start(runtime: Runtime, precision: str) -> int:
                 default_fp=real,
                 cpu_max_num_threads=runtime.cpu_threads,
                 offline_cache=True,
-                # LLVM does the same work again: a cut's kernel compiles in 5 instead of 38 s and runs as fast
+                # LLVM does the same work again (docs/theory.md, "Measured choices")
                 advanced_optimization=runtime.arch != "cpu",
                 log_level=ti.ERROR,
                 random_seed=0,
@@ -88,7 +88,7 @@ def start(runtime: Runtime, precision: str) -> int:
 
 
 def stop() -> None:
-    """End the runtime, if one was started. Only then Taichi puts what it has compiled into the cache of all processes."""
+    """End the runtime, if there is one. Only then Taichi puts what it has compiled into the cache of all processes."""
     if _state["key"] is not None:
         import taichi as ti
 

@@ -29,7 +29,19 @@ class SimulationError(CutcalError):
 
 
 def check_number(where: str, name: str, value: float, low: float, high: float, unit: str) -> None:
-    """Raise SceneError unless ``low < value < high`` (both open) and ``value`` is a finite number."""
+    """Insist on a finite number between two limits, which it must not reach.
+
+    Args:
+        where: What the number belongs to, for the message.
+        name: Its name.
+        value: The number, in the unit.
+        low: Lower limit.
+        high: Upper limit.
+        unit: Its unit, for the message.
+
+    Raises:
+        SceneError: It is no finite number, or not between the limits.
+    """
     ok = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
     if not ok or not low < value < high:
         raise SceneError(f"{where}: {name} = {value!r} {unit} must be a number between {low:g} and {high:g} {unit}")

@@ -85,7 +85,8 @@ class Board:
 
 
 STEEPEST = 1.2
-"""Largest angle of the edge to the board [rad]: at 69 degrees the ends of what lies over the food are 2.6 of its widths apart in height."""
+"""Largest angle of the edge to the board [rad]: at 69 degrees the ends of what lies over the food are 2.6 of its widths
+apart in height."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ class Motion:
     Attributes:
         stroke: Way of the edge's middle below the food's top [m].
         mach: Blade speed over the P-wave speed [-]. All laws are rate-independent by default, so the real speed is
-            replaced by this one; the force changes by less than 1 % up to 0.01 and by 9 % at 0.035.
+            replaced by this one (docs/theory.md, "Measured choices").
         slice_ratio: Speed along the edge over the speed down (slice/push ratio xi) [-].
         tilt: Angle of the edge to the board, positive when the end at +x is higher [rad].
         dwell: Pause at the end of the stroke [s], in real time; needs ``speed``.
@@ -174,14 +175,14 @@ class Numerics:
     Attributes:
         dx: Cell size [m].
         ppc: Particles per cell and direction, at least 2.
-        far: Distance from the cut plane beyond which there is one particle a cell across the blade, and within the food one a cell
-            altogether [m]; None: nowhere. Only the outline needs as many there as elsewhere.
+        far: Distance from the cut plane beyond which there is one particle a cell across the blade, and within the food
+            one a cell altogether [m]; None: nowhere. Only the outline needs as many there as elsewhere.
         contact: ``cohesive`` (edge law and particle contact) or ``nodal`` (the plain projection of grid velocities).
         grid_shift: Position of the grid against the scene along x, y, z [cells].
         grid_turn: Angle of food and blade against the grid [rad].
         mirror: Use the mirror planes x = 0 and y = 0 where they are mirrors of the grid.
-        room: Empty grid on either side of the food, for it to widen in while it is pressed, part of half its size, and above it
-            for the ends of halves that tip, part of half its length across the blade.
+        room: Empty grid on either side of the food, for it to widen in while it is pressed, part of half its size, and
+            above it for the ends of halves that tip, part of half its length across the blade.
         seed: Seed of the particle positions.
         safety: dt over the stability limit of a lone particle [-].
         gravity: Acceleration of gravity [m/s^2].
@@ -209,8 +210,8 @@ class Numerics:
         check_number(w, "ppc", self.ppc, 0.5, 8.5, "")
         if self.ppc < 2:
             raise SceneError(
-                "numerics: ppc 1: one particle a cell does not integrate the grid's functions, and where a cut starts energy "
-                "comes from nothing; use 2 (8 particles a cell) or 3"
+                "numerics: ppc 1: one particle a cell does not integrate the grid's functions, and where a cut starts "
+                "energy comes from nothing; use 2 (8 particles a cell) or 3"
             )
         if self.far is not None:
             check_number(w, "far", self.far, 0.0, 1.0, "m")
@@ -239,8 +240,8 @@ class Scene:
         dx, shape = self.numerics.dx, self.food.shape
         if self.cuts and self.numerics.contact == "cohesive" and self.edge.zone < dx * (1 - 1e-9):
             raise SceneError(
-                f"edge: process zone {self.edge.zone * 1e3:g} mm is narrower than the cell {dx * 1e3:g} mm, so the edge "
-                f"would fall between nodes; use dx <= {self.edge.zone * 1e3:g} mm"
+                f"edge: process zone {self.edge.zone * 1e3:g} mm is narrower than the cell {dx * 1e3:g} mm, so the "
+                f"edge would fall between nodes; use dx <= {self.edge.zone * 1e3:g} mm"
             )
         thin = min(shape.length, shape.width, shape.height)
         if thin < 4 * dx:
@@ -248,8 +249,8 @@ class Scene:
         least = shape.length / 2 - abs(shape.cut)
         if shape.cut != 0 and least < 2 * dx:
             raise SceneError(
-                f"shape: the blade at {shape.cut * 1e3:g} mm from the middle leaves a slice of {least * 1e3:.3g} mm, under 2 cells of "
-                f"{dx * 1e3:g} mm; cut nearer to the middle or use a smaller dx"
+                f"shape: the blade at {shape.cut * 1e3:g} mm from the middle leaves a slice of {least * 1e3:.3g} mm, "
+                f"under 2 cells of {dx * 1e3:g} mm; cut nearer to the middle or use a smaller dx"
             )
         self._check_motion()
         self._check_band()
@@ -265,7 +266,12 @@ class Scene:
         return self.lowered(self.motion.tilt)
 
     def lowered(self, tilt: float, aside: float = 0.0) -> float:
-        """The same of an edge at another angle to the board [rad], whose middle is so far along the blade from the food's [m]."""
+        """How much lower than its middle an edge gets over the food [m].
+
+        Args:
+            tilt: Its angle to the board [rad].
+            aside: Distance of its middle from the food's along the blade [m].
+        """
         if not isinstance(self.knife, Knife):
             return 0.0
         reach = min(self.food.shape.width / 2 + abs(aside), self.knife.length / 2 * math.cos(tilt))
@@ -302,13 +308,13 @@ class Scene:
         limit = 2 * m.E * m.fracture_energy / m.tensile_strength**2
         if band >= limit:
             raise SceneError(
-                f"bulk damage would snap back (Bazant and Oh 1983): the crack band of {band * 1e3:g} mm must stay below "
-                f"2 E Gf / sigma_t^2 = {limit * 1e3:.3g} mm; use dx < {limit / BAND_CELLS * 1e3:.3g} mm"
+                f"bulk damage would snap back (Bazant and Oh 1983): the crack band of {band * 1e3:g} mm must stay "
+                f"below 2 E Gf / sigma_t^2 = {limit * 1e3:.3g} mm; use dx < {limit / BAND_CELLS * 1e3:.3g} mm"
             )
 
     @property
     def mirrors(self) -> tuple[bool, bool]:
-        """Whether the planes x = 0 and y = 0 are used as mirrors: only where the motion allows and they mirror the grid.
+        """Whether x = 0 and y = 0 are used as mirrors: only where the motion allows and they mirror the grid.
 
         They do with nodes on them, and x = 0 also half-way between nodes.
         """
@@ -333,6 +339,5 @@ class Scene:
         return asdict(self)
 
 
-BAND_CELLS = (
-    2.5  # width of a crack band of grid-smoothed damage, in cells (measured: dissipation within 15 % over dx x 4)
-)
+# Width of a crack band of grid-smoothed damage, in cells (docs/theory.md, "Measured choices").
+BAND_CELLS = 2.5

@@ -29,7 +29,12 @@ class Shape:
 
     A cylinder lies along y, an upright one stands on its end.
 
-    Attributes: kind; length along y, width along x, height along z [m]; cut, place of the blade along y from the food's middle [m].
+    Attributes:
+        kind: One of :data:`SHAPE_KINDS`.
+        length: Along y [m].
+        width: Along x [m].
+        height: Along z [m].
+        cut: Place of the blade along y from the food's middle [m].
     """
 
     kind: str
@@ -55,7 +60,7 @@ class Shape:
 
 
 def _radius2(shape: Shape, x: np.ndarray, y: np.ndarray, thinner: float = 0.0) -> np.ndarray:
-    """Squared distance from the vertical axis (or plane) in units of the outline, or of one ``thinner`` [m] on all sides: 1 on the rim [-]."""
+    """Squared distance from the axis or plane over that of the rim [-], of an outline ``thinner`` [m] on all sides."""
     a, b = (max(size / 2 - thinner, 5e-10) for size in (shape.width, shape.length))
     y = y + shape.cut
     if shape.kind in ("cylinder", "half_cylinder"):
@@ -158,8 +163,8 @@ def skin_path(shape: Shape, x: np.ndarray, thickness: float) -> np.ndarray:
 
 
 SLICE_SAMPLES = 64
-"""Points at which a slice's outline is looked up: an even number, so that none lies where the rim of a food of whole or half cells does.
-There the last bit would decide whether it counts, and with it 1.8 % of a strawberry's peak."""
+"""Points at which a slice's outline is looked up: an even number, so that none lies where the rim of a food of whole or
+half cells does. There the last bit would decide whether it counts (docs/theory.md, "Measured choices")."""
 
 
 def slices(shape: Shape, x: np.ndarray, dx: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

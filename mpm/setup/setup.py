@@ -51,7 +51,8 @@ class Setup:
         return min(self.runtime.cpu_threads, 1 + len(self.seeds.x) // PARTICLES_PER_THREAD)
 
     def configuration(self, threads: int, batch: int = 1) -> Configuration:
-        """What the fields must be for so many CPU threads, 0 for a GPU, and cuts side by side: alike for scenes of about this size."""
+        """What the fields must be for so many CPU threads, 0 for a GPU, and cuts side by side: alike for scenes of
+        about this size."""
         scene = self.scene
         return Configuration(
             room=particle_capacity(len(self.seeds.x)),

@@ -1,7 +1,7 @@
 """What the host writes into the fields before a run, and what it reads from them.
 
-Each by one kernel for all fields: to make a cached kernel ready takes some 25 ms however small it is, and one for each
-field would be a third of what a process needs before its first step.
+Each by one kernel for all fields: to make a cached kernel ready takes time however small it is (docs/theory.md,
+"Measured choices").
 """
 
 from collections.abc import Sequence
@@ -31,8 +31,8 @@ from mpm.state.contents import (
 from mpm.state.state import CUTS, N_LOOPS, PARTS, SECOND_FIELD_CELLS, SLICES, State
 from mpm.state.tables import BLOCKS, COUNT, N_PARAMETERS, N_POSE, N_SIZES, STATIONS, STRETCH, STRETCH_AT_REST
 
-# Columns of the table of particles that is read after some steps: position, half, deformation gradient, Kirchhoff stress
-# and the largest strain of bulk damage.
+# Columns of the table of particles that is read after some steps: position, half, deformation gradient, Kirchhoff
+# stress and the largest strain of bulk damage.
 HALF, DEFORMATION, STRESS, STRAIN = 3, 4, 13, 19
 N_PARTICLE_NOW = 20
 

@@ -3,8 +3,9 @@
 On CPUs a loop goes over the places of one cut, on a GPU over those of all cuts in one launch. The kinds of loops are
 :data:`mpm.state.state.CUTS` and those beside it.
 
-A function that has such loops takes ``cut`` by reference (``ti.template()``): a copy outside the loops would be a launch of
-its own.
+A function that has such loops takes ``cut`` by reference (``ti.template()``): a copy outside the loops would be a
+launch of its own. Short loops are run where the kernel was launched (``serialize``): to wake the threads costs more
+(docs/theory.md, "Measured choices").
 """
 
 import taichi as ti
@@ -48,7 +49,7 @@ def locate(s: ti.template(), cut, q, what: ti.template()):
 
 @ti.func
 def takes_part(s: ti.template(), cut):
-    """Whether a cut takes part in this step of a launch; its count of steps that are left is already that after the step."""
+    """Whether a cut takes part in this step of a launch; its steps that are left are already those after the step."""
     return s.steps_left[cut] >= 0 if ti.static(s.atomic) else True
 
 

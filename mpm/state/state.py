@@ -16,8 +16,8 @@ BEYOND_GRID = 1 << 20  # a node that no grid has
 SECOND_FIELD_CELLS = 3  # cells on either side of the cut plane whose nodes may carry both halves
 REGISTER = 32  # bytes of a register of a CPU: as many particles as fill it have their elastic stress found at once
 CPU_BLOCK = 512  # Taichi runs CPU loops shorter than this on one thread, so one iteration in 512 works for a thread
-# What a loop goes over: each cut, rows of nodes in reach, lines of nodes across the mirror, parts of the particles, slices
-# along the edge, rows of nodes about what could be damaged.
+# What a loop goes over: each cut, rows of nodes in reach, lines of nodes across the mirror, parts of the particles,
+# slices along the edge, rows of nodes about what could be damaged.
 CUTS, NODE_ROWS, NODE_LINES, PARTS, SLICES, DAMAGE_ROWS = range(6)
 N_LOOPS = 6
 
@@ -55,20 +55,69 @@ class Configuration:
 
 @ti.data_oriented
 class State:
-    """Particles, grid, edge and tables, with room for a class of scenes; :func:`mpm.state.host_transfer.begin` fits them to some.
+    """Particles, grid, edge and tables with room for a class of scenes.
 
-    They hold one cut or a batch of them side by side, each with scene, material, time step and blade of its own; the
-    first index of every field says which. On a GPU one launch does a loop of all cuts, on CPUs a thread does all loops
-    of a cut (:func:`mpm.state.loops.locate`).
+    :mod:`mpm.state.host_transfer` fits them to some. They hold one cut or a batch of them side by side, each with
+    scene, material, time step and blade of its own; the first index of every field says which. On a GPU one launch does
+    a loop of all cuts, on CPUs a thread does all loops of a cut (:func:`mpm.state.loops.locate`).
 
-    Deformation gradients are stored entry by entry for ``lanes`` particles, [block, 3 row + column, lane], so that the
-    same operation on all of them is one instruction; velocity gradients column by column, each filled up to four.
+    Matrices of the particles are stored entry by entry for ``lanes`` particles, [block, entry, lane], so that the same
+    operation on all of them is one instruction; velocity gradients column by column, each filled up to four.
 
     The grid stores two velocity fields: the first at ``[i, j, k]``, the second, which only nodes beside the cut plane
     have, at ``[i, second + j, k]`` of each cut.
 
     Args:
         configuration: What is compiled into the kernels.
+
+    Attributes:
+        x: Positions of the particles in the grid's axes [m], (cut, particle).
+        v: Velocities [m/s], (cut, particle).
+        C: Velocity gradients [1/s], (cut, particle, column).
+        F: Deformation gradients [-], (cut, block, 3 row + column) of lanes.
+        tau: Kirchhoff stress [Pa], losses and stretch (:mod:`mpm.state.tables`), (cut, block, entry) of lanes.
+        side: 0 where the cut has not passed a particle, else 1 or 2 for its half, (cut, particle).
+        tool_gap: Distance at which a particle meets the tool [m], (cut, particle).
+        board_gap: Distance at which it meets the board [m], (cut, particle).
+        volume_ratio: Its volume over that of a particle beside the cut [-], (cut, particle).
+        surface_volume: Reference volume between a particle of the first layer and board and tool [m^3], 0 behind the
+            first layer, (cut, particle) of two.
+        contact_moment: Moment of the contact's last impulse as a gradient of the velocity, upwards and across the blade
+            [1/s]; the fourth entry upwards is the kinetic energy per mass that this impulse gave [J/kg],
+            (cut, particle, 2).
+        stick: Stretch of the friction's spring on board and tool [m], (cut, 2, particle).
+        adhering: 1 where a particle sticks to the blade, 0 where it may, -1 where not, (cut, particle).
+        visibility: What :func:`mpm.kernels.crack.visible_layers` found in the last step, with ``IN_CONTACT`` where
+            ``contact_moment`` is of this step; elsewhere it means nothing, (cut, particle).
+        kappa: Largest strain that has acted on bulk damage [-], (cut, particle).
+        driving_strain: Smoothed strain of the last step [-], (cut, particle).
+        prony_stress: Stress of the Prony branches [Pa], (cut, branch, particle).
+        prony_before: Deviator of the last step [Pa], (cut, particle).
+        prony_share: Share of a branch [-], (cut, branch).
+        prony_rate: Time step over its time [-], (cut, branch).
+        g: Momentum [N s] and mass [kg] of the nodes, a grid for each thread.
+        u: Velocity [m/s] and mass [kg] of the nodes.
+        planes: Sums over the planes of nodes of the particle that a thread moves, (cut, thread, 16).
+        damage_box: Lowest and highest lowest node of particles whose strain could damage something, (cut, 6).
+        slip: Elastic slip of the edge in a slice, along the edge and forward [m], (cut, slice).
+        reaction: Change of velocity that the edge gives in this step, along the cut and upwards [m/s], (cut, slice).
+        zone_velocity: Mean velocity of the material at the edge, in the scene's axes [m/s], (cut, slice).
+        crack_front: Height of the crack front [m], far up where nothing is cut, (cut, slice).
+        front_drift: Way of the front with the material in this step [m], (cut, slice).
+        cut_depth: Way that has been cut since the start [m], (cut, slice).
+        softening: Slip over which the resistance falls after the start [m], (cut, slice).
+        start_force: Force at which the cut has started [N/m], 0 before, (cut, slice).
+        contact_part: Part of the slice that the edge was in before [-], (cut, slice).
+        started_beside: Neighbours in which the cut has started, (cut, slice).
+        top_high: Highest height of the upper surface over a slice [m], (cut, slice); ``top_low`` the lowest.
+        width: Part of the slice that has food [-], (cut, slice).
+        floor_high: Highest height of the lower surface over a slice [m], (cut, slice); ``floor_low`` the lowest.
+        sums, particle_sums, pose, order, par, size: Tables whose rows are in :mod:`mpm.state.tables`, (cut, row).
+        window: Nodes that particles can reach before it is renewed: first, last + 1, (cut, 6).
+        steps_left: Steps that a cut has yet to do before the next row of the report, on a GPU, (cut,).
+        extents: Most places that a loop goes over in any cut, (kind of loop,).
+        n: Particles of each cut, shape (cuts,).
+        owner: Whose cuts the fields hold.
     """
 
     def __init__(self, configuration: Configuration) -> None:
@@ -82,15 +131,14 @@ class State:
         self.serial = not self.atomic  # short loops run where the kernel was launched
         self.parts = 1 if self.threads == 1 else self.threads * CPU_BLOCK
         self.branches, self.second_fields = own.branches, not own.nodal
-        self.owner: Any = None  # whose cuts the fields hold
-        self.n = np.zeros(own.batch, np.int32)  # particles of each cut
+        self.owner: Any = None
+        self.n = np.zeros(own.batch, np.int32)
         real = ti.lang.impl.get_runtime().default_fp
-        self.real = np.float64 if real == ti.f64 else np.float32  # of the entries of fields, to fill them from the host
         self.lanes = 1 if self.atomic else REGISTER // (8 if real == ti.f64 else 4)
         self.blocks = -(-own.room // self.lanes)
         self.batch, self.room, self.slices = own.batch, self.blocks * self.lanes, own.stations
-        # What is double on every device is laid out by itself: beside fields of four bytes Taichi's Vulkan puts it where
-        # it may not begin at a multiple of eight, and then writes the end of its neighbour.
+        # What is double on every device is laid out by itself: beside fields of four bytes Taichi's Vulkan puts it
+        # where it may not begin at a multiple of eight, and then writes the end of its neighbour.
         self.pose, self.order = ti.field(ti.f64, (own.batch, N_POSE)), ti.field(ti.f64, (own.batch, N_ORDER))
         ti.sync()
         booked = ti.f64 if adds_doubles() else ti.f32
@@ -109,19 +157,13 @@ class State:
         self.x, self.v = (vec3.field(shape=(batch, room)) for _ in range(2))
         self.C, self.F = vec4.field(shape=(batch, room, 3)), ti.Vector.field(self.lanes, real, (batch, self.blocks, 9))
         self.tau = ti.Vector.field(self.lanes, real, (batch, self.blocks, N_STRESS))
-        # 0 where the cut has not passed, else 1 or 2 for the half; distances at which tool and board are met
         self.side, self.tool_gap = ti.field(ti.i32, (batch, room)), ti.field(real, (batch, room))
         self.board_gap = ti.field(real, (batch, room))
-        self.volume_ratio = ti.field(real, (batch, room))  # volume over that of a particle beside the cut
-        # reference volume between a particle of the first layer and the board, and the tool; 0 behind the first layer
+        self.volume_ratio = ti.field(real, (batch, room))
         self.surface_volume = ti.Vector.field(2, real, (batch, room))
-        # moment of the contact's last impulse as a gradient of the velocity: upwards, and across the blade; the fourth
-        # entry upwards is the kinetic energy per mass that this impulse gave
         self.contact_moment = vec4.field(shape=(batch, room, 2))
         self.kappa, self.driving_strain = (ti.field(real, (batch, worn)) for _ in range(2))
-        self.stick = vec3.field(shape=(batch, 2, room))  # stretch of the friction's spring on board and tool
-        # visibility: what mpm.kernels.crack.visible_layers found in the last step, with IN_CONTACT where `contact_moment` is of this
-        # step; elsewhere it means nothing
+        self.stick = vec3.field(shape=(batch, 2, room))
         self.adhering, self.visibility = (ti.field(ti.i32, (batch, room)) for _ in range(2))
         self.prony_stress = mat3.field(shape=(batch, branches, aged))
         self.prony_before = mat3.field(shape=(batch, aged))
@@ -135,17 +177,16 @@ class State:
         self.nodes_per_grid = nodes[0] * self.stride_x
         grids = batch * self.threads
         self.index_mask = (1 << (grids * self.nodes_per_grid).bit_length()) - 1
-        self.g = vec4.field(shape=grids * self.nodes_per_grid)  # momentum and mass
-        self.u = vec4.field(shape=batch * self.nodes_per_grid)  # velocity and mass
-        self.planes = vec4.field(shape=(batch, self.threads, 16))  # of the nodes of the particle that a thread moves
-        # box of the lowest nodes of particles whose strain could damage something
+        self.g = vec4.field(shape=grids * self.nodes_per_grid)
+        self.u = vec4.field(shape=batch * self.nodes_per_grid)
+        self.planes = vec4.field(shape=(batch, self.threads, 16))
         self.damage_box = ti.field(ti.i32, (batch, 6))
 
     def _add_edge(self, real: Any) -> None:
         """Fields of the slices along the cutting edge."""
         vec2, vec3, shape = ti.types.vector(2, real), ti.types.vector(3, real), (self.batch, self.slices)
         self.slip, self.reaction = (vec2.field(shape=shape) for _ in range(2))
-        self.zone_velocity = vec3.field(shape=shape)  # mean velocity of the material at the edge
+        self.zone_velocity = vec3.field(shape=shape)
         self.crack_front, self.front_drift, self.cut_depth = (ti.field(real, shape) for _ in range(3))
         self.softening, self.start_force, self.contact_part = (ti.field(real, shape) for _ in range(3))
         self.started_beside = ti.field(ti.i32, shape)
@@ -156,8 +197,6 @@ class State:
         """Tables of numbers that the host sets, and of what the loops go over."""
         self.par = ti.field(real, (self.batch, N_PARAMETERS))
         self.size = ti.field(ti.i32, (self.batch, N_SIZES))
-        # nodes that particles can reach before it is renewed: first, last + 1
         self.window = ti.field(ti.i32, (self.batch, 6))
-        # steps that a cut has yet to do before the next row of the report, on a GPU
         self.steps_left = ti.field(ti.i32, self.batch)
-        self.extents = ti.field(ti.i32, N_LOOPS)  # most places that a loop goes over in any cut
+        self.extents = ti.field(ti.i32, N_LOOPS)

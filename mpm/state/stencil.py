@@ -78,7 +78,7 @@ def thread_node_index(s: ti.template(), cut, thread, i, j, k):
 
 @ti.func
 def add_to_node(s: ti.template(), at, value):
-    """Add to a node of a thread's own grid, given by its :func:`thread_node_index`; atomically where all threads share one."""
+    """Add to a node of a thread's grid, by its :func:`thread_node_index`; atomically where all threads share one."""
     if ti.static(s.atomic):
         s.g[at] += value
     else:

@@ -15,9 +15,9 @@ ARM_K, ARM_C, ARM_MASS, ARM_LIMIT = range(28, 32)
 DX, INV_DX, ORIGIN_X, ORIGIN_Y, ORIGIN_Z, FIRST_STATION = range(32, 38)
 N_PARAMETERS = 38
 
-# Rows of the table of sizes: particles, blocks of them, nodes along x, y, z, slices along the edge, the node plane along
-# y that is nearest to y = 0, the first and last + 1 node plane along y whose nodes have a second field, how far behind
-# the first that is stored, and the sum of the indices of two nodes that are mirror images across x.
+# Rows of the table of sizes: particles, blocks of them, nodes along x, y, z, slices along the edge, the node plane
+# along y that is nearest to y = 0, the first and last + 1 node plane along y whose nodes have a second field, how far
+# behind the first that is stored, and the sum of the indices of two nodes that are mirror images across x.
 COUNT, BLOCKS, NODES, STATIONS, PLANE_Y, SECOND_BEGIN, SECOND_END, SECOND_OFFSET, MIRROR_SUM = (
     0,
     1,
@@ -52,8 +52,8 @@ N_POSE = 10
 STEPS, STEPS_PER_ROW, DT, SPEED_UP, SPEED_ALONG, SPEED_TILT = range(6)
 N_ORDER = 6
 
-# Entries of a particle's stress: Kirchhoff stress (xx, yy, zz, yz, xz, xy), viscous and plastic loss per volume, and the
-# trace of the left stretch, negative where the particle must be done by itself.
+# Entries of a particle's stress: Kirchhoff stress (xx, yy, zz, yz, xz, xy), viscous and plastic loss per volume, and
+# the trace of the left stretch, negative where the particle must be done by itself.
 VISCOUS_LOSS, PLASTIC_LOSS, STRETCH = 6, 7, 8
 N_STRESS = 9
 STRETCH_AT_REST = 3.0  # trace of the stretch of food that is not strained

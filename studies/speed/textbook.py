@@ -1,9 +1,9 @@
 """MLS-MPM as tutorials write it, with the solver's physics: the yardstick of the benchmarks, not meant for use.
 
 Quadratic B-splines, APIC, scatter with atomic additions, ``ti.svd`` for everything, a fixed box of nodes that is swept
-whole, unsorted particles (Hu et al. 2018, ACM TOG 37:150), contact by projecting grid velocities out of blade and board,
-and the force from the momentum that this takes away. The contact laws are the solver's; J2 flow returns the logarithmic
-strain, as is usual.
+whole, unsorted particles (Hu et al. 2018, ACM TOG 37:150), contact by projecting grid velocities out of blade and
+board, and the force from the momentum that this takes away. The contact laws are the solver's; J2 flow returns the
+logarithmic strain, as is usual.
 """
 
 import math

@@ -23,7 +23,8 @@ SCENES = (
     replace(CUT.with_material(E=3e6, loss_factor=0.3, R=80.0), motion=replace(CUT.motion, stroke=6e-3, retract=1e-3)),
     replace(CUT, food=replace(CUT.food, shape=replace(SHAPE, width=1.2 * SHAPE.width, height=1.1 * SHAPE.height))),
 )
-"""A wedge that cuts, rubs and lets the food flow; stiff food with a step of its own, cut deeper and left again; a larger piece."""
+"""A wedge that cuts, rubs and lets the food flow; stiff food with a step of its own, cut deeper and left again; a
+larger piece."""
 BRITTLE = tuple(scene.with_material(tensile_strength=1e4, fracture_energy=20.0) for scene in SCENES)
 
 
@@ -34,8 +35,8 @@ def alone(scenes: tuple[Scene, ...]) -> list[ForceRecord]:
 
 @pytest.mark.slow
 def test_a_thread_for_each_cut_changes_no_bit() -> None:
-    """Three cuts that differ in food, size, time step and way, on two threads: bit for bit those of one run each; so are two of them in
-    the fields of three, after the third has gone.
+    """Three cuts that differ in food, size, time step and way, on two threads: bit for bit those of one run each; so
+    are two of them in the fields of three, after the third has gone.
     """
     one = alone(SCENES)
     assert len({r.dt for r in one}) == 2 and len({r.steps for r in one}) == 2 and len({r.particles for r in one}) == 2
@@ -51,8 +52,8 @@ def test_a_thread_for_each_cut_changes_no_bit() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("scenes", [SCENES, BRITTLE], ids=["flows", "breaks"])
 def test_one_launch_for_all_cuts(scenes: tuple[Scene, ...], monkeypatch: pytest.MonkeyPatch) -> None:
-    """As on a GPU, where a launch does a step of all cuts and those that are through rest: the forces of each alone, to 1e-9, and the
-    momentum closes.
+    """As on a GPU, where a launch does a step of all cuts and those that are through rest: the forces of each alone, to
+    1e-9, and the momentum closes.
     """
     one = alone(scenes)
     monkeypatch.setattr(Setup, "threads", lambda self: 0)
@@ -67,8 +68,8 @@ def test_one_launch_for_all_cuts(scenes: tuple[Scene, ...], monkeypatch: pytest.
 @pytest.mark.slow
 @pytest.mark.parametrize("threads", [1, 0])
 def test_a_cut_that_breaks_down_stops_alone(threads: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Food that leaves the grid ends its own run with its reason; the one beside it goes on to its end. Scenes of another kind, or in
-    another precision, may be among them.
+    """Food that leaves the grid ends its own run with its reason; the one beside it goes on to its end. Scenes of
+    another kind, or in another precision, may be among them.
     """
     monkeypatch.setattr(Setup, "threads", lambda self: threads)
     tight = replace(

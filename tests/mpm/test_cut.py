@@ -53,7 +53,8 @@ def whole() -> ForceRecord:
 
 
 def test_a_prism_is_cut_alike_wherever_the_blade_is():
-    """A block 72 mm long cut at a third needs the force of one that is cut in the middle, and parts into a third and two."""
+    """A block 72 mm long cut at a third needs the force of one that is cut in the middle, and parts into a third and
+    two."""
     long = replace(
         PRISM, food=replace(PRISM.food, shape=Shape("block", 0.072, 0.024, 0.024)), motion=Motion(0.024, 0.01)
     )
@@ -67,7 +68,8 @@ def test_a_prism_is_cut_alike_wherever_the_blade_is():
 
 
 def test_halves_that_tip_stay_on_the_grid():
-    """The skin under the edge drags the cut faces of a long soft food down and tips its halves; their ends rise by 11 mm."""
+    """The skin under the edge drags the cut faces of a long soft food down and tips its halves; their ends rise by 11
+    mm."""
     fruit = Material(
         E=2.6e5, nu=0.35, rho=960, yield_stress=1.7e4, R=370, R_initiation=525, R_skin=434, skin_thickness=2.5e-3,
         initiation_depth=1.6e-3, mu=0.18,
@@ -93,8 +95,9 @@ def test_thin_blade_needs_resistance_times_width(prism, modulus, R):
 
 
 def test_food_that_flows_is_pressed_away_not_parted(prism):
-    """The edge takes R from each new area of a food that is cut (5 %), and far less of one whose yield stress over the process
-    zone is a tenth of R: that one flows along with the edge. Where nothing is to be parted there is no such number."""
+    """The edge takes R from each new area of a food that is cut (5 %), and far less of one whose yield stress over the
+    process zone is a tenth of R: that one flows along with the edge. Where nothing is to be parted there is no such
+    number."""
     cut, flown = (prism.run(replace(FLESH, yield_stress=y)) for y in (2e5, 1e4))
     assert cut.parted == pytest.approx(1.0, abs=0.06)
     assert flown.status == "done" and flown.parted < 0.5
@@ -147,8 +150,8 @@ def test_mirrored_quarter_equals_the_whole(whole, quarter):
 
 
 def test_mirror_between_the_nodes_is_the_whole_on_the_same_grid(quarter):
-    """With x = 0 half-way between nodes a quarter gives the force of the whole made of its particles and their images, to rounding,
-    also while the blade goes up again and the crack stays in the food."""
+    """With x = 0 half-way between nodes a quarter gives the force of the whole made of its particles and their images,
+    to rounding, also while the blade goes up again and the crack stays in the food."""
     motion = replace(PRISM.motion, retract=6e-3)
     scene = replace(PRISM, knife=WEDGE, motion=motion, numerics=replace(PRISM.numerics, grid_shift=(0.5, 0.0, 0.0)))
     part = Simulation(scene, Runtime(threads=1))
@@ -162,7 +165,8 @@ def test_mirror_between_the_nodes_is_the_whole_on_the_same_grid(quarter):
 
 
 def test_front_beside_the_mirror_is_that_of_the_first_slice():
-    """Slices that are mirror images take no part: between the mirror and the first slice the front is the first slice's."""
+    """Slices that are mirror images take no part: between the mirror and the first slice the front is the first
+    slice's."""
     scene = replace(PRISM, numerics=replace(PRISM.numerics, grid_shift=(0.5, 0.0, 0.0)))
     simulation = Simulation(scene, Runtime(threads=1))
     simulation.load(FLESH)
@@ -199,9 +203,11 @@ def with_images(seeds: Seeds) -> Seeds:
 
 
 def test_the_work_is_accounted_for(whole, quarter):
-    """All but 4 % of the work has a law that took it: parting R times the new area, friction, what is stored. Whole as quarter.
+    """All but 4 % of the work has a law that took it: parting R times the new area, friction, what is stored. Whole as
+    quarter.
 
-    Without the lag of the contact in the work of gravity, or with the wrong number of mirror images, it would not close.
+    Without the lag of the contact in the work of gravity, or with the wrong number of mirror images, it would not
+    close.
     """
     for record in (whole, quarter):
         total = record.work_done[-1] + record.weighing[-1]
@@ -241,7 +247,8 @@ def test_friction_is_coulomb_and_free_of_rate(prism):
 
 
 def test_a_weaker_food_rubs_less():
-    """Rubbing food that yields in shear on the blade takes less work the weaker it is, on cells of 3 mm and of 2 mm alike.
+    """Rubbing food that yields in shear on the blade takes less work the weaker it is, on cells of 3 mm and of 2 mm
+    alike.
 
     Without the limit of friction the weak one takes 12 % more than the strong one, and on cells of 2 mm 32 % more.
     """
@@ -256,7 +263,8 @@ def test_a_weaker_food_rubs_less():
 
 
 def test_work_is_never_below_resistance_times_area(prism):
-    """The edge's work is at least R times the area it has swept, less the slip it needs to develop (one slip length)."""
+    """The edge's work is at least R times the area it has swept, less the slip it needs to develop (one slip
+    length)."""
     record = prism.run(FLESH)
     swept = 0.024 * (record.stroke[-1] - 2 * PRISM.edge.slip)
     assert record.work > 300 * swept * 0.97
@@ -306,7 +314,8 @@ def test_scenes_that_cannot_be_right_are_refused(change, says):
 
 @pytest.mark.slow
 def test_bulk_damage_dissipates_and_weakens():
-    """With a tensile strength that the wedge exceeds, bulk damage dissipates energy, the force drops, balance closes."""
+    """With a tensile strength that the wedge exceeds, bulk damage dissipates energy, the force drops, balance
+    closes."""
     brittle = replace(FLESH, tensile_strength=2e4, fracture_energy=20.0)
     scene = replace(PRISM, knife=WEDGE, food=replace(PRISM.food, material=brittle))
     tough, weak = run(replace(PRISM, knife=WEDGE)), run(scene)
@@ -315,8 +324,8 @@ def test_bulk_damage_dissipates_and_weakens():
     assert (np.diff(weak.damage) >= 0).all()
     assert weak.face[:, 2].mean() < tough.face[:, 2].mean()
     assert weak.momentum_residual < 1e-10 and weak.status == "done"
-    # what is damaged flows under the stress that is left, and damage under pressure costs the deviator: 10 % are released in waves, where
-    # booking the flow of whole food made the rest -240 %, and damage in tension alone 13 %
+    # what is damaged flows under the stress that is left, and damage under pressure costs the deviator: 10 % are
+    # released in waves, where booking the flow of whole food made the rest -240 %, and damage in tension alone 13 %
     assert 0.0 < weak.unbooked[-1] < 0.12 * weak.work
 
 
@@ -353,7 +362,8 @@ def test_slip_on_a_round_top_counts_from_where_each_width_is_touched():
 def test_a_cut_starts_at_the_same_depth_at_any_speed_of_the_blade():
     """The depth at which a soft food begins to be cut is the same at Mach 0.002 and 0.02 (5 %).
 
-    Slip that is counted before the edge's own reaction runs ahead by force x dt / mass a step, so that slow cuts start early.
+    Slip that is counted before the edge's own reaction runs ahead by force x dt / mass a step, so that slow cuts start
+    early.
     """
     depths = []
     for mach in (0.002, 0.02):
@@ -365,7 +375,8 @@ def test_a_cut_starts_at_the_same_depth_at_any_speed_of_the_blade():
 
 
 def test_edge_leaves_the_food_at_its_lower_outline():
-    """Below the middle of a lying cylinder the edge carries R times the chord that is left, not the chord it began with."""
+    """Below the middle of a lying cylinder the edge carries R times the chord that is left, not the chord it began
+    with."""
     round_food = Food(Shape("cylinder", 0.03, 0.03, 0.03), replace(FLESH, E=5e6, yield_stress=1e6))
     record = run(replace(PRISM, food=round_food, motion=Motion(0.03, 0.01)))
     chord = 2 * np.sqrt(np.maximum(0.015**2 - (0.015 - record.stroke) ** 2, 0))
@@ -378,7 +389,8 @@ def test_edge_leaves_the_food_at_its_lower_outline():
 @pytest.mark.slow
 @pytest.mark.parametrize("mirror", [True, False])
 def test_section_has_all_food_across_the_blade(mirror):
-    """Pieces of the section fill length times height, near the cut and far from it; looks are even and the last is the end."""
+    """Pieces of the section fill length times height, near the cut and far from it; looks are even and the last is the
+    end."""
     numerics = replace(PRISM.numerics, mirror=mirror, far=4.5e-3)
     simulation = Simulation(replace(PRISM, numerics=numerics), Runtime(threads=1))
     record = simulation.run(sections=4)

@@ -36,8 +36,8 @@ def apart(one: ForceRecord, two: ForceRecord) -> float:
 def test_the_layout_of_a_gpu_gives_the_same_cut(
     scene: Scene, precision: str, close: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One grid for all threads, atomic additions, a node for a row and a particle for a block: the same forces, but for the order of
-    sums, and the momentum closes.
+    """One grid for all threads, atomic additions, a node for a row and a particle for a block: the same forces, but for
+    the order of sums, and the momentum closes.
     """
     scene = replace(scene, numerics=replace(scene.numerics, precision=precision))
     one = Simulation(scene, Runtime(threads=1)).run()
@@ -51,7 +51,8 @@ def test_the_layout_of_a_gpu_gives_the_same_cut(
 
 
 def test_a_gpu_that_is_vulkans_is_started_once_and_in_single_precision(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Asked for as ``gpu`` it is started again without doubles, and not a third time for the next run, which would lose all kernels."""
+    """Asked for as ``gpu`` it is started again without doubles, and not a third time for the next run, which would lose
+    all kernels."""
     begun = []
     monkeypatch.setitem(runtime._state, "key", None)
     monkeypatch.setitem(runtime._state, "serial", runtime._state["serial"])
@@ -65,7 +66,8 @@ def test_a_gpu_that_is_vulkans_is_started_once_and_in_single_precision(monkeypat
 @pytest.mark.gpu
 @pytest.mark.parametrize("arch", ["cuda", "vulkan"])
 def test_a_device_gives_the_curve_of_the_cpu(arch: str) -> None:
-    """To 1e-4 of the peak, in the precision that the device has, and the momentum closes as well; skipped where it is not there."""
+    """To 1e-4 of the peak, in the precision that the device has, and the momentum closes as well; skipped where it is
+    not there."""
     one = Simulation(SCENE, Runtime(threads=1)).run()
     try:
         record = Simulation(SCENE, Runtime(arch)).run()

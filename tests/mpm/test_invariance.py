@@ -101,8 +101,9 @@ def test_force_of_the_faces_belongs_to_the_food(stiff, change):
 
 @pytest.mark.slow
 def test_longer_halves_are_bent_apart_with_more_force():
-    """Like arms of a double cantilever beam: four heights of a stiff food need half as much again on the faces of the blade, and
-    it does not matter that few particles are far from the cut. The force itself is compared with finite elements by ``verify``."""
+    """Like arms of a double cantilever beam: four heights of a stiff food need half as much again on the faces of the
+    blade, and it does not matter that few particles are far from the cut. The force itself is compared with finite
+    elements by ``verify``."""
     flesh = Material(E=1e6, nu=0.35, rho=1000, loss_factor=0.05, R=1.0, R_initiation=1.0)
 
     def opened(length: float, far: float | None = None) -> ForceRecord:

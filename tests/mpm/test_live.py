@@ -1,4 +1,5 @@
-"""A cut whose blade is moved from outside: the same as one whose motion is prescribed, however the motion is chopped up."""
+"""A cut whose blade is moved from outside: the same as one whose motion is prescribed, however the motion is chopped
+up."""
 
 from __future__ import annotations
 
@@ -40,8 +41,8 @@ def down(live: LiveCut, span: float, to: float = 0.0) -> None:
 
 
 def test_it_is_the_cut_whose_motion_is_prescribed(scene):
-    """In steps of 2 and of 10 ms: peak and work to 1 %, the same new area, momentum balanced to rounding, and the impulse is that of the force
-    over real time.
+    """In steps of 2 and of 10 ms: peak and work to 1 %, the same new area, momentum balanced to rounding, and the
+    impulse is that of the force over real time.
     """
     whole = Simulation(scene, Runtime(threads=1)).run()
     for span in (0.002, 0.01):
@@ -59,7 +60,8 @@ def test_it_is_the_cut_whose_motion_is_prescribed(scene):
 
 
 def test_a_faster_or_paused_motion_takes_the_same_force(scene):
-    """The laws do not know time: four times as fast takes as many steps, so that the Mach number stays; a pause takes nothing away."""
+    """The laws do not know time: four times as fast takes as many steps, so that the Mach number stays; a pause takes
+    nothing away."""
     plain, fast, paused = LiveCut(scene), None, None
     down(plain, 0.01)
     steps, work = plain.record().steps, plain.record().work
@@ -78,8 +80,8 @@ def test_a_faster_or_paused_motion_takes_the_same_force(scene):
 
 
 def test_sawing_costs_the_same_at_half_the_simulated_speed(scene):
-    """A blade that goes to and fro is as fast along its edge as it may be downwards, and no faster: peak to 8 %, work to 3 %. Twice as fast the
-    peak of a banana is off by 12 %, that of a tomato by 45 %.
+    """A blade that goes to and fro is as fast along its edge as it may be downwards, and no faster: peak to 8 %, work
+    to 3 %. Twice as fast the peak of a banana is off by 12 %, that of a tomato by 45 %.
     """
     found = []
     for mach in (scene.motion.mach, scene.motion.mach / 2):
@@ -106,9 +108,9 @@ def block() -> Scene:
 
 
 def test_a_tilted_edge_needs_what_it_has_cut_into(block):
-    """Straight down at 15 degrees from the corner on: the force grows by R / tan(tilt) a metre, to 3 %, until all of the edge is in the food, and acts
-    on the middle of the part that is in it, to 2 mm (it lags by the indentation at which a cut starts). It is the cut that the solver
-    makes whose tilt is prescribed.
+    """Straight down at 15 degrees from the corner on: the force grows by R / tan(tilt) a metre, to 3 %, until all of
+    the edge is in the food, and acts on the middle of the part that is in it, to 2 mm (it lags by the indentation at
+    which a cut starts). It is the cut that the solver makes whose tilt is prescribed.
     """
     live, half = LiveCut(block), 0.024
     way = np.arange(0.024 + half * np.tan(ROCK) + 1e-3, half * np.tan(ROCK) + 1e-3, -4e-4)
@@ -129,8 +131,8 @@ def test_a_tilted_edge_needs_what_it_has_cut_into(block):
 
 
 def test_a_rock_costs_what_a_press_does(block):
-    """One end to the board and then turned level about it: the same work to 2 %, of which the moment does a part, the same energy of parting to 1 %,
-    and momentum and energy balance as they do in a press.
+    """One end to the board and then turned level about it: the same work to 2 %, of which the moment does a part, the
+    same energy of parting to 1 %, and momentum and energy balance as they do in a press.
     """
     press, half = LiveCut(block), 0.024
     down(press, 0.01)
@@ -152,7 +154,8 @@ def test_a_rock_costs_what_a_press_does(block):
 
 
 def test_behind_an_arm_that_yields_it_ends_where_the_solvers_own_arm_does(scene):
-    """An arm outside that gives way by force over stiffness, with a lag, leaves the edge as high above the board as the solver's own."""
+    """An arm outside that gives way by force over stiffness, with a lag, leaves the edge as high above the board as the
+    solver's own."""
     own = replace(scene, arm=Arm(STIFF), motion=replace(scene.motion, dwell=1.0))
     whole = Simulation(own, Runtime(threads=1)).run()
     short = scene.food.shape.height - float(whole.stroke[-1])

@@ -118,7 +118,8 @@ def test_arm_that_is_too_weak_does_not_sever_and_says_so():
 
 
 def test_an_edge_that_is_commanded_into_the_board_stops_on_it():
-    """Two centimetres below: the run ends there. Without the board the blade took the halves along, and went on as they flew off the grid."""
+    """Two centimetres below: the run ends there. Without the board the blade took the halves along, and went on as they
+    flew off the grid."""
     over = cut(replace(PRISM, motion=Motion(0.044, 0.01), arm=Arm(3000.0)))
     assert over.severed and over.pieces is not None and len(over.pieces.volumes) == 2
     assert over.fraction == 1.0 and 0.024 < over.command.max() < 0.03

@@ -37,8 +37,8 @@ def pressed(scene: Scene) -> ForceRecord:
 @pytest.mark.parametrize("half_angle", [math.pi / 2, math.radians(60)])
 @pytest.mark.parametrize("mirror", [True, False])
 def test_what_the_press_gives_the_board_takes(half_angle, mirror):
-    """Press + board + weight = change of momentum to rounding in every interval, also with friction and a wedge; at the end
-    the board carries the press's force and the weight within 2 %."""
+    """Press + board + weight = change of momentum to rounding in every interval, also with friction and a wedge; at the
+    end the board carries the press's force and the weight within 2 %."""
     numerics = replace(SCENE.numerics, mirror=mirror)
     record = pressed(replace(SCENE, knife=Press("tool", half_angle, 0.4), numerics=numerics))
     assert record.momentum_residual < 1e-10
@@ -66,8 +66,8 @@ def test_a_press_cuts_nothing():
 @pytest.mark.slow
 @pytest.mark.parametrize("changed", [{}, {"dx": 1e-3}, {"safety": 0.35}])
 def test_a_sliding_block_has_the_force_of_uniaxial_compression(changed):
-    """Between slippery plates a block is in uniaxial compression: the law's force within 1 % on 8 cells, on 16, and with half
-    the time step. The contact gives way by nothing that the grid or the time step decides."""
+    """Between slippery plates a block is in uniaxial compression: the law's force within 1 % on 8 cells, on 16, and
+    with half the time step. The contact gives way by nothing that the grid or the time step decides."""
     numerics = Numerics(**{"dx": 2e-3, "gravity": 0.0, "output": 1e-5, **changed})
     record = pressed(replace(SCENE, knife=Press(), board=Board(0.0), motion=Motion(1.8e-3, 3e-3), numerics=numerics))
     middle = 0.5 * (record.stroke[1:] + record.stroke[:-1])
@@ -87,7 +87,8 @@ def test_the_contact_keeps_no_energy():
 
 
 def uniaxial(stretch: float, material: Material) -> float:
-    """Nominal stress of the corotated law under uniaxial compression, by its least energy over the lateral stretch [Pa]."""
+    """Nominal stress of the corotated law under uniaxial compression, by its least energy over the lateral stretch
+    [Pa]."""
 
     def energy(lateral: float, axial: float) -> float:
         size = (axial - 1) ** 2 + 2 * (lateral - 1) ** 2
@@ -118,7 +119,8 @@ def test_what_a_press_cannot_do():
 
 
 def test_section_stands_under_the_stress_of_uniaxial_compression():
-    """Between slippery plates the von Mises stress of a section is that of the law, over the area as it is then (1 %)."""
+    """Between slippery plates the von Mises stress of a section is that of the law, over the area as it is then (1
+    %)."""
     numerics = replace(SCENE.numerics, gravity=0.0)
     scene = replace(SCENE, knife=Press(mu=0.0), board=Board(0.0), motion=Motion(2e-3, 2e-3), numerics=numerics)
     section = Simulation(scene, Runtime(threads=1)).run(sections=2).section

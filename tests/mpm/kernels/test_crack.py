@@ -74,7 +74,8 @@ def length() -> CubicSpline:
 @pytest.mark.parametrize("offset", [0.0, 0.25, 0.5])
 @pytest.mark.parametrize("dx", [1.5, 1.0])
 def test_crack_is_as_long_as_its_front_with_a_lead_of_half_a_cell(length, dx, offset):
-    """Held half a cell above the front the rule makes the crack as long as meant, 0.2 cells at most off, at any offset."""
+    """Held half a cell above the front the rule makes the crack as long as meant, 0.2 cells at most off, at any
+    offset."""
     found = [
         float(length(compliance(dx, CRACK, (offset, z), s, lead=0.5))) for s in (0, 1) for z in (0, 0.25, 0.5, 0.75)
     ]

@@ -7,7 +7,7 @@ import pytest
 import taichi as ti
 from scipy.linalg import polar
 
-from mpm.discretisation.capacity import OFF, node_capacity, particle_capacity
+from mpm.discretisation.capacity import EXTRA_PARTICLES, node_capacity, particle_capacity
 from mpm.kernels.crack import ALL_VISIBLE
 from mpm.kernels.stress import elastic_block
 from mpm.kernels.surface_contact import CONTACT_STIFFNESS, friction_limit
@@ -91,8 +91,8 @@ def strained(request):
 
 
 def test_stress_of_four_particles_at_once(strained):
-    """Deformation gradient, Kirchhoff stress with the viscous part, and the losses are those of the formulas, also where
-    some of the four flow: to 1e-9, flowing ones to 1e-6."""
+    """Deformation gradient, Kirchhoff stress with the viscous part, and the losses are those of the formulas, also
+    where some of the four flow: to 1e-9, flowing ones to 1e-6."""
     sim, dt, f, slope, tau, new = strained
     par, m = sim.state.par.to_numpy()[0], sim.scene.food.material
     flowing = 0
@@ -128,7 +128,8 @@ def test_inverted_particles_are_left_to_be_done_one_by_one(strained):
 
 @pytest.mark.slow
 def test_strain_is_smoothed_wherever_it_can_matter():
-    """About a few strongly strained particles the smoothed strain is the one over all particles, and most are spared."""
+    """About a few strongly strained particles the smoothed strain is the one over all particles, and most are
+    spared."""
     tough = replace(BRITTLE.food.material, yield_stress=np.inf)
     sim = Simulation(replace(BRITTLE, food=Food(BRITTLE.food.shape, tough)), Runtime(threads=1))
     sim.load(tough)
@@ -169,8 +170,8 @@ def alone():
 @pytest.mark.slow
 @pytest.mark.parametrize("threads", [2, 0])
 def test_many_threads_repeat_one(alone, threads):
-    """Split among two threads, or as on a GPU (here on the CPU), a cut with flow, friction, damage and both halves gives
-    the same force to 1e-9."""
+    """Split among two threads, or as on a GPU (here on the CPU), a cut with flow, friction, damage and both halves
+    gives the same force to 1e-9."""
     sim = Simulation(BRITTLE, Runtime(threads=2))
     sim.state = state_of(sim.setup.configuration(threads), sim.serial)
     record = sim.run()
@@ -232,13 +233,13 @@ def test_fields_have_room_for_what_they_hold_and_come_in_few_sizes():
     ):
         assert all(of(n) >= n for n in sizes)
         assert len({of(n) for n in sizes if n <= whole}) == 3
-        assert all(of(n) <= n + step + OFF for n in sizes if n > whole)
+        assert all(of(n) <= n + step + EXTRA_PARTICLES for n in sizes if n > whole)
 
 
 @pytest.mark.slow
 def test_scenes_of_a_class_share_kernels_and_keep_their_force():
-    """Two sizes of food run with what was compiled once; the force of the first is the same before and after the second, and to
-    1e-9 that of fields without room to spare."""
+    """Two sizes of food run with what was compiled once; the force of the first is the same before and after the
+    second, and to 1e-9 that of fields without room to spare."""
     small = replace(PRISM, motion=replace(PRISM.motion, stroke=2e-3))
     shape = replace(PRISM.food.shape, width=1.3 * PRISM.food.shape.width, height=1.2 * PRISM.food.shape.height)
     one = Simulation(small, Runtime(threads=1))
@@ -276,7 +277,8 @@ def test_food_without_resistance_is_cut():
 
 @pytest.mark.parametrize(("where", "value", "same"), [(0, np.nan, True), (1, 0.0, False)], ids=["elsewhere", "there"])
 def test_a_moment_of_contact_is_read_where_there_is_one(where, value, same, monkeypatch):
-    """Nonsense in the moments of particles that touch nothing changes no digit of forces and energies; those that there are count."""
+    """Nonsense in the moments of particles that touch nothing changes no digit of forces and energies; those that there
+    are count."""
     sim = Simulation(replace(PRISM, knife=WEDGE, motion=replace(PRISM.motion, stroke=3e-3)), Runtime(threads=1))
     plain, advance, touched = sim.run(), sim.advance, []
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import taichi as ti
 
-from mpm.kernels import cutting_edge, signed_distance
+from mpm.kernels import cohesive_law, signed_distance
 from mpm.runtime import Runtime, start
 from mpm.state import stencil
 from tests.mpm import twins
@@ -35,7 +35,7 @@ def evaluate():
 
     @ti.kernel
     def level():
-        out[0] = cutting_edge.softening_law(inp[0], inp[1], inp[2], inp[3])
+        out[0] = cohesive_law.softening_law(inp[0], inp[1], inp[2], inp[3])
 
     @ti.kernel
     def spline():

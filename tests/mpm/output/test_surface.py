@@ -34,7 +34,8 @@ def moved(scene: Scene, f: np.ndarray, shift: np.ndarray) -> tuple[Surface, np.n
 
 @pytest.mark.parametrize("kind", SHAPE_KINDS)
 def test_a_half_is_closed_and_has_half_the_volume(kind: str) -> None:
-    """Each edge belongs to two triangles that pass it in opposite directions; the rings inscribed into the outline hold 0.3 % less."""
+    """Each edge belongs to two triangles that pass it in opposite directions; the rings inscribed into the outline hold
+    0.3 % less."""
     shape = Shape(kind, 0.06, 0.03, 0.024)
     half = half_of(shape, 1.5e-3)
     edges = np.concatenate([half.triangles[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
@@ -56,7 +57,8 @@ def test_parts_of_different_length_make_the_whole_food(kind: str) -> None:
 
 @pytest.mark.parametrize("mirror", [True, False])
 def test_vertices_follow_an_affine_motion_exactly(mirror: bool) -> None:
-    """Stretched, and of the whole food sheared and shifted too, every vertex is where the motion takes it, with thinned particles too."""
+    """Stretched, and of the whole food sheared and shifted too, every vertex is where the motion takes it, with thinned
+    particles too."""
     scene = replace(PRISM, numerics=Numerics(dx=3e-3, mirror=mirror, far=4.5e-3))
     f, shift = np.diag([1.1, 0.9, 0.8]), np.array([0.0, 0.0, 2e-3])
     if not mirror:
@@ -92,7 +94,8 @@ def test_stress_of_the_surface_lies_within_that_of_the_particles() -> None:
 
 
 def test_a_watch_looks_at_even_parts_of_a_run_and_sees_the_cut() -> None:
-    """Time and stroke rise evenly up to the end, particles are severed behind the edge, and the surface stays above the board."""
+    """Time and stroke rise evenly up to the end, particles are severed behind the edge, and the surface stays above the
+    board."""
     simulation, watch = Simulation(PRISM, Runtime(threads=1)), SnapshotRecorder(5)
     record = simulation.run(snapshots=watch)
     looks = watch.taken

@@ -1,4 +1,5 @@
-"""What Taichi's front end does once: it finds the same source, and a function read twice means what it meant the first time."""
+"""What Taichi's front end does once: it finds the same source, and a function read twice means what it meant the first
+time."""
 
 import inspect
 

@@ -30,7 +30,8 @@ def scene(kind: str, **numerics: object) -> Scene:
 @pytest.mark.parametrize("cut", [0.0, 0.016, -0.022])
 @pytest.mark.parametrize("kind", SHAPE_KINDS)
 def test_volume_and_section_agree_with_counting(kind, cut):
-    """The closed forms agree with a count of random points within 3 standard deviations, and the surface with inside."""
+    """The closed forms agree with a count of random points within 3 standard deviations, and the surface with
+    inside."""
     shape = Shape(kind, 0.06, 0.04, 0.03, cut)
     rng = np.random.default_rng(0)
     n, box = 200_000, 0.06 * 0.04 * 0.03
@@ -47,7 +48,8 @@ def test_volume_and_section_agree_with_counting(kind, cut):
 def test_particles_add_up_to_the_food(kind, mirror, cut):
     """All images of the particles have the volume of the shape, lie in it, and fill the modelled part evenly.
 
-    A blade that is not in the middle leaves the mirror along it, and has two layers of particles on either side all the same.
+    A blade that is not in the middle leaves the mirror along it, and has two layers of particles on either side all the
+    same.
     """
     sc = scene(kind, mirror=mirror)
     sc = replace(sc, food=replace(sc.food, shape=replace(sc.food.shape, cut=cut)))
@@ -84,7 +86,8 @@ def test_a_blade_beside_the_food_or_at_its_very_end_is_refused():
 @pytest.mark.parametrize("kind", SHAPE_KINDS)
 @pytest.mark.parametrize("mirror", [True, False])
 def test_far_from_the_cut_a_particle_stands_for_a_cell_across_the_blade(kind, mirror):
-    """Half as many, within the food an eighth; those beside the cut, the mass and its middle are the same, and so is the outline."""
+    """Half as many, within the food an eighth; those beside the cut, the mass and its middle are the same, and so is
+    the outline."""
     far, sc = 6e-3, scene(kind, mirror=mirror)
     all_, some = seed(sc), seed(replace(sc, numerics=replace(sc.numerics, far=far)))
     assert some.total == pytest.approx(all_.total, rel=1e-12) and set(some.volume_ratio) <= {1.0, 2.0, 8.0}
@@ -118,7 +121,8 @@ def test_particles_are_no_lattice_aligned_with_the_blade():
 
 
 def test_first_layer_meets_a_surface_at_its_own_distance():
-    """Between flat ends the first layer touches at its own distance, so all of it at once; the layers behind at half a cell."""
+    """Between flat ends the first layer touches at its own distance, so all of it at once; the layers behind at half a
+    cell."""
     seeds = seed(scene("block", mirror=False))
     first = seeds.x[:, 2] < seeds.spacing
     np.testing.assert_allclose(seeds.board_gap[first], seeds.x[first, 2])
@@ -129,7 +133,8 @@ def test_first_layer_meets_a_surface_at_its_own_distance():
 
 
 def test_mirrors_follow_the_grid():
-    """Mirrors are used where they mirror the grid, along the blade also between nodes; not by the nodal rule across the blade."""
+    """Mirrors are used where they mirror the grid, along the blade also between nodes; not by the nodal rule across the
+    blade."""
     assert scene("block").mirrors == (True, True)
     assert scene("block", grid_shift=(0.0, 0.5, 0.3)).mirrors == (True, False)
     assert scene("block", grid_shift=(0.25, 0.0, 0.0)).mirrors == (False, True)
@@ -140,7 +145,8 @@ def test_mirrors_follow_the_grid():
 
 
 def test_skin_path_is_the_thickness_on_top_and_longer_on_the_flanks():
-    """In the middle the edge crosses the skin's thickness; at the flank of a circle the chord of the ring; outside none."""
+    """In the middle the edge crosses the skin's thickness; at the flank of a circle the chord of the ring; outside
+    none."""
     circle, t = Shape("cylinder", 0.06, 0.04, 0.04), 1e-3
     x = np.array([0.0, 0.015, 0.0195, 0.03])
     outer, inner = np.sqrt(0.02**2 - np.minimum(x, 0.02) ** 2), np.sqrt(np.maximum(0.019**2 - x**2, 0))
@@ -150,7 +156,8 @@ def test_skin_path_is_the_thickness_on_top_and_longer_on_the_flanks():
 
 
 def test_moving_mean_removes_a_ripple_of_its_width():
-    """A ripple of exactly one cell vanishes, a constant and a straight line stay, also at the end of a cut under load."""
+    """A ripple of exactly one cell vanishes, a constant and a straight line stay, also at the end of a cut under
+    load."""
     s = np.arange(1, 401) * 1e-4
     ripple = np.sin(2 * np.pi * s / 3e-3)
     inner = slice(40, None)
@@ -196,7 +203,8 @@ def test_one_particle_a_cell_is_refused():
 @pytest.mark.parametrize("kind", ["block", "cylinder", "sphere"])
 @pytest.mark.parametrize("cells", [8, 9])
 def test_the_last_bit_of_a_cell_does_not_change_the_outline(kind: str, cells: int) -> None:
-    """A food as wide as whole cells, rim on a node or half-way between two: cells longer or shorter by 1e-12 see the same slices."""
+    """A food as wide as whole cells, rim on a node or half-way between two: cells longer or shorter by 1e-12 see the
+    same slices."""
     shape = Shape(kind, 0.04, 0.024, 0.024)
     found = []
     for error in (-1e-12, 0.0, 1e-12):

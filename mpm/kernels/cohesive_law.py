@@ -1,0 +1,72 @@
+"""Cohesive law of the cutting edge: the force that a slice of it needs to part the food."""
+
+import taichi as ti
+
+from mpm.state.tables import INITIATION_DEPTH, R_FLESH, R_START, SLIP, STATIONS
+
+
+@ti.func
+def line_force(s: ti.template(), cut, i, tangential, forward, part):
+    """Force per length of the edge in one slice after it moved against the material [N/m]: along the edge, forward.
+
+    The slip is elastic up to a limit and points where the edge goes. A cut starts where the force reaches the
+    threshold, at the indentation that belongs to it, and from there runs along the blade to every slice that already
+    carries the propagation resistance: growing a crack takes less than starting one. Then the force falls to that
+    resistance. Until the start the slip is the mean over the part of the slice that the edge has reached: on a round
+    top more of it comes into contact, unslipped, as the edge goes down. The force acts against the motion and only the
+    way forward makes new surface, so that with a slice/push ratio xi the forward force is R / (1 + xi^2) (Atkins, Xu
+    and Jeronimidis 2004).
+
+    Args:
+        i: The slice.
+        tangential: Way of the edge against the material along itself in this step [m].
+        forward: The same forward [m].
+        part: Part of the slice that the edge is in [-].
+    """
+    limit, flesh = s.par[cut, SLIP], s.par[cut, R_FLESH]
+    held = 1.0
+    if s.start_force[cut, i] <= 0:  # what has come into contact since has not slipped yet
+        held = ti.min(1.0, s.contact_part[cut, i] / part)
+    s.contact_part[cut, i] = part
+    e = held * s.slip[cut, i] + ti.Vector([tangential, forward])
+    e[1] = ti.max(e[1], 0.0)
+    size = e.norm()
+    steep = e[1] / size if size > 0 else 0.0
+    level = 0.0
+    if s.start_force[cut, i] <= 0:
+        level = s.par[cut, R_START] * size / s.par[cut, INITIATION_DEPTH]
+        if level >= s.par[cut, R_START] or (s.started_beside[cut, i] > 0 and level >= flesh):
+            s.start_force[cut, i] = ti.max(level, 1e-9)
+            e *= limit / ti.max(size, 1e-30)  # without resistance a cut starts before the edge has slipped
+    else:
+        if size > limit:
+            s.cut_depth[cut, i] += (size - limit) * steep
+            e *= limit / size
+            size = limit
+        level = softening_law(s.cut_depth[cut, i], s.softening[cut, i], s.start_force[cut, i], flesh) * size / limit
+    s.slip[cut, i] = e
+    return level * steep * e / ti.max(e.norm(), 1e-30)
+
+
+@ti.func
+def softening_law(depth, softening, start, resistance):
+    """Line force that the edge can carry [N/m].
+
+    It falls from the force at which the cut started to the propagation resistance.
+
+    Args:
+        depth: Way that has been cut since the start [m].
+        softening: Length over which the force falls [m].
+        start: Force at which the cut started [N/m].
+        resistance: Propagation resistance [N/m].
+    """
+    return resistance + (start - resistance) * ti.exp(-depth / softening)
+
+
+@ti.func
+def count_started_beside(s: ti.template(), cut, i):
+    """Count the neighbours of a slice in which the cut has started."""
+    s.started_beside[cut, i] = 0
+    for d in ti.static((-1, 1)):
+        if 0 <= i + d < s.size[cut, STATIONS]:
+            s.started_beside[cut, i] += ti.cast(s.start_force[cut, i + d] > 0, ti.i32)
