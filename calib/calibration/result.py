@@ -312,20 +312,3 @@ def _rated(result: CalibrationResult) -> NullRating | None:
         return NullRating.of(compare(stroke, real, start))
     except CurveError:  # a simulation without any positive force cannot be rated
         return NullRating(None, None, None, None, None)
-
-
-def write_report(folder: Path) -> Path:
-    """Write ``report.pdf`` of the finished calibration in a folder.
-
-    Args:
-        folder: The output folder of ``calibrate``.
-
-    Returns:
-        Path of the report.
-
-    Raises:
-        OutputError: A file is missing, damaged or incomplete, or the report cannot be written.
-    """
-    from reports.calibration import report
-
-    return report.write_report(read_result(Path(folder)))

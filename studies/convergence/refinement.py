@@ -14,7 +14,8 @@ from calib.simulation.evaluation_store import EvaluationStore, Header, content_k
 from calib.simulation.workers import Workers
 from studies.convergence.analysis import analyse
 from studies.convergence.plan import CutDescription, PlannedRun, RefinementPlan, planned_runs
-from studies.convergence.result import ConvergenceResult, write_figure, write_report, write_result
+from studies.convergence.report import write_figure, write_report
+from studies.convergence.result import ConvergenceResult, write_result
 
 
 def refine(

@@ -242,29 +242,3 @@ def read_result(folder: Path) -> tuple[ConvergenceResult, ForceCurves]:
     except (OSError, ValueError) as e:
         raise DocumentError(f"{path}: cannot be read ({e}); {REMEDY}") from None
     return result, curves
-
-
-def write_report(folder: Path) -> Path:
-    """Typeset ``report.pdf`` of a folder from its files.
-
-    Returns:
-        Path of the report.
-
-    Raises:
-        DocumentError: A file is missing, damaged or incomplete.
-        ReportError: The report cannot be written.
-    """
-    from reports.studies import convergence
-
-    return convergence.write_report(*read_result(folder), folder)
-
-
-def write_figure(folder: Path) -> None:
-    """Draw ``converge.svg`` of a folder from its files.
-
-    Raises:
-        DocumentError: A file is missing, damaged or incomplete.
-    """
-    from reports.studies import convergence
-
-    convergence.write_figure(*read_result(folder), folder)

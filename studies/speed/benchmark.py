@@ -19,7 +19,8 @@ from mpm.runtime import Runtime
 from mpm.scene import Scene
 from studies.speed.cut_times import ablation, default_cut, size_exponent, variants
 from studies.speed.kernel_rates import peers, published_configuration, throughput
-from studies.speed.result import RESULT_FILE, BenchmarkResult, write_report
+from studies.speed.report import write_report
+from studies.speed.result import RESULT_FILE, BenchmarkResult
 from studies.speed.side_by_side import batch_times, process_scaling
 from studies.speed.timing import Say, Session
 

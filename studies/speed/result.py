@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import ClassVar
 
-from calib.io.typed_document import FLAT, read_document
+from calib.io.typed_document import FLAT
 
 RESULT_FILE = "bench.json"
 
@@ -223,18 +222,3 @@ class BenchmarkResult:
     ratio_to_paper: float | None = None
     ablations: tuple[Ablation, ...] | None = None
     exponent: float | None = None
-
-
-def write_report(folder: Path) -> Path:
-    """Typeset ``report.pdf`` of a folder from its ``bench.json``.
-
-    Returns:
-        Path of the report.
-
-    Raises:
-        DocumentError: The file is missing or damaged.
-        ReportError: Too little was measured, or the report cannot be written.
-    """
-    from reports.studies import benchmark
-
-    return benchmark.write_report(read_document(folder / RESULT_FILE, BenchmarkResult), folder)

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import ClassVar
 
-from calib.io.typed_document import FLAT, read_document
+from calib.io.typed_document import FLAT
 from calib.simulation.workers import DIED
 
 RESULT_FILE = "stress.json"
@@ -157,18 +156,3 @@ class StabilityMap:
     def passed(self) -> bool:
         """Whether every end is explained and every physical cell is stable."""
         return not self.unexplained_cells and not self.physical.not_stable
-
-
-def write_report(folder: Path) -> Path:
-    """Typeset ``report.pdf`` of a folder from its ``stress.json``.
-
-    Returns:
-        Path of the report.
-
-    Raises:
-        DocumentError: The file is missing, damaged or incomplete.
-        ReportError: The report cannot be written.
-    """
-    from reports.studies import stability
-
-    return stability.write_report(read_document(folder / RESULT_FILE, StabilityMap), folder)

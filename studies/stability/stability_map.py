@@ -19,7 +19,8 @@ from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_store import EvaluationStore, Header
 from calib.simulation.workers import DIED, Workers
 from studies.stability.map_cell import SOUND_STEP, MapCell
-from studies.stability.result import REASONS, RESULT_FILE, CellResult, MapLimits, StabilityMap, write_report
+from studies.stability.report import write_report
+from studies.stability.result import REASONS, RESULT_FILE, CellResult, MapLimits, StabilityMap
 
 MOST_STEPS = 3e8  # particle steps that a cell may take; about three minutes
 LONGEST_RUN = 300.0  # time that a run may take [s]

@@ -5,10 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar
-
-from calib.io.typed_document import read_document
 
 RESULT_FILE = "verify.json"
 
@@ -102,18 +99,3 @@ class Verification:
     def passed(self) -> bool:
         """Whether all cases are done, none broke down and every comparison passed."""
         return self.complete and not self.broken and all(row.passed for row in self.rows)
-
-
-def write_report(folder: Path) -> Path:
-    """Typeset ``report.pdf`` of a folder from its ``verify.json``.
-
-    Returns:
-        Path of the report.
-
-    Raises:
-        DocumentError: The file is missing, damaged or incomplete.
-        ReportError: The report cannot be written.
-    """
-    from reports.studies import verification
-
-    return verification.write_report(read_document(folder / RESULT_FILE, Verification), folder)

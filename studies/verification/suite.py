@@ -15,7 +15,8 @@ from calib.io.typed_document import read_document, to_document
 from calib.simulation.workers import Workers
 from mpm.scene.errors import CutcalError
 from studies.verification.case import SuiteOptions, VerificationCase, cases
-from studies.verification.result import RESULT_FILE, Comparison, Verification, write_report
+from studies.verification.report import write_report
+from studies.verification.result import RESULT_FILE, Comparison, Verification
 
 Say = Callable[[str], None]
 

@@ -39,13 +39,13 @@ def writer(folder: Path) -> Callable[[Path], Path]:
     Raises:
         ReportError: The folder is missing, or holds no finished run.
     """
-    from calib.calibration import result as calibration
+    from calib.calibration import report as calibration
     from calib.material.properties import MEANINGS
     from reports import multi_specimen
-    from studies.convergence import result as convergence
-    from studies.speed import result as bench
-    from studies.stability import result as stability
-    from studies.verification import result as verification
+    from studies.convergence import report as convergence
+    from studies.speed import report as bench
+    from studies.stability import report as stability
+    from studies.verification import report as verification
 
     found: dict[str, Callable[[Path], Path]] = {
         "converge.json": convergence.write_report,

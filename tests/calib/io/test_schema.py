@@ -213,7 +213,7 @@ def test_lists_and_single_foods_and_knives(printed):
 
 def test_a_written_report_is_a_document(printed, tmp_path, monkeypatch):
     """``report --json`` names the file."""
-    monkeypatch.setattr("studies.stability.result.write_report", lambda folder: folder / "report.pdf")
+    monkeypatch.setattr("studies.stability.report.write_report", lambda folder: folder / "report.pdf")
     (tmp_path / "stress.json").touch()
     assert valid(printed("report", str(tmp_path)))["report"] == str(tmp_path / "report.pdf")
 

@@ -16,10 +16,10 @@ import pytest
 from calib.errors import DocumentError
 from cutcal.main import main
 from reports.base import brief
-from studies.convergence import result as convergence
-from studies.speed import result as bench
-from studies.stability import result as stability
-from studies.verification import result as verification
+from studies.convergence import report as convergence
+from studies.speed import report as bench
+from studies.stability import report as stability
+from studies.verification import report as verification
 from tests.reports.sample import pages, spaced
 
 VERSIONS = {"cutcal": "0.1.0", "python": "3.11.7"}

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from calib.calibration.result import from_document, write_report
+from calib.calibration.report import write_report
+from calib.calibration.result import from_document
 from mpm.output.section import Section
 from mpm.scene import Knife
 from reports.base import figures

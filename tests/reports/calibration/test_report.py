@@ -16,7 +16,7 @@ import h5py
 import numpy as np
 import pytest
 
-from calib.calibration.result import write_report
+from calib.calibration.report import write_report
 from calib.errors import OutputError
 from reports import ReportError
 from reports.base.format import DASH
@@ -68,7 +68,7 @@ def test_same_files_give_same_bytes_in_another_process(tmp_path: Path) -> None:
     """Neither the clock, the hash seed, the time zone, the folder nor an existing report changes a byte."""
     first = write_report(sample.write_run(tmp_path / "a")).read_bytes()
     second = sample.write_run(tmp_path / "a folder with another name")
-    code = "import sys; from pathlib import Path; from calib.calibration.result import write_report; " + (
+    code = "import sys; from pathlib import Path; from calib.calibration.report import write_report; " + (
         "[write_report(Path(sys.argv[1])) for _ in range(2)]"
     )
     env = {**os.environ, "PYTHONHASHSEED": "12345", "TZ": "Asia/Tokyo", "PYTHONPATH": str(ROOT)}
