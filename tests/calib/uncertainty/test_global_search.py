@@ -101,7 +101,7 @@ def test_what_no_other_food_refutes_is_claimed_still(seed):
     assert {p.budget for p in told} == {100}
 
 
-def test_what_is_claimed_is_deflated():
+def test_what_is_claimed_is_barred():
     """A point within all claimed intervals has a residual more, the deeper the larger; one outside of any of them has none."""
     _, analysis, _ = inferred(onefold, 0)
     both = analysis.uncertainty.intervals

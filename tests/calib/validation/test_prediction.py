@@ -9,7 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calib.io.folder import finite
 from calib.material.food import dump_material, load_food
+from calib.validation.prediction import read_prediction, to_document
 from cutcal.main import main
 from mpm.solver import Simulation
 from tests.calib.documents import valid
@@ -42,6 +44,8 @@ def test_prediction_takes_one_number_from_the_trace(material, tmp_path, capsys):
     for name, s in (("bare", bare), ("scaled", scaled)):
         assert s["passed"] == (s["metrics"]["nrmse"] <= 0.10 and s["metrics"]["iso18571"]["R"] >= 0.80)
         assert code[name] == (0 if s["passed"] else 2)
+        result = read_prediction(tmp_path / name)
+        assert finite(to_document(result)) == s and result.metrics.nrmse == s["metrics"]["nrmse"]
     assert "one factor" in capsys.readouterr().out
 
 
