@@ -146,6 +146,9 @@ class Calibration:
             progress: Called after each simulation.
             say: Called with each warning and stage, as one sentence.
 
+        Returns:
+            What the folder holds.
+
         Raises:
             CutcalError: Anything wrong with the input; nothing that was computed is lost.
         """
