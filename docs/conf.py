@@ -27,7 +27,8 @@ napoleon_use_ivar = True  # attributes of data classes are listed once, with wha
 html_theme = "furo"
 html_title = f"cutcal {release}"
 
-# Files outside this folder that are pages of the site: a link to one works in the repository, and on the site to its page.
+# Files outside this folder that are pages of the site: a link to one works in the repository, and on the site to its
+# page.
 PAGES = {
     "../CHANGELOG.md": "changes.md",
     "../CONTRIBUTING.md": "contributing.md",

@@ -190,7 +190,8 @@ def content(done: FinishedStudy) -> Data:
         "names": [breakable(name) for name in done.curves],
         "shown": list(done.curves).index(first(done)),
         "captions": [_caption(s, name) for name in done.curves],
-        "left_open": [[breakable(name), *measurement.left_open(n, SimpleNamespace(**row))] for name, t in s["traces"].items()
+        "left_open": [[breakable(name), *measurement.left_open(n, SimpleNamespace(**row))]
+                      for name, t in s["traces"].items()
                       for n, row in (t.get("nuisances") or {}).items()],
         "parameters": [_parameter(name, p, done.meanings) for name, p in s["parameters"].items()],
         "checks": [[breakable(name), in_words(c["name"]), *_change(c)] for name, t in s["traces"].items()

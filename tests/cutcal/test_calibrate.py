@@ -62,7 +62,8 @@ def finished(killed: tuple[Path, list[bytes]]) -> tuple[Path, int]:
 
 
 def test_numerical_choices_are_checked(finished):
-    """The best values run again at half the speed, elsewhere on the grid and on a finer one, in lines of the verdict; resuming runs none."""
+    """The best values run again at half the speed, elsewhere on the grid and on a finer one, in lines of the verdict;
+    resuming runs none."""
     out, _ = finished
     summary = json.loads((out / "summary.json").read_text())
     assert [c["name"] for c in summary["numerical_checks"]] == [
@@ -99,7 +100,8 @@ def test_kill_loses_nothing_and_resume_repeats_nothing(killed, finished):
 
 
 def test_second_run_costs_no_simulation(finished, capsys, monkeypatch):
-    """Resuming a finished run simulates nothing, the record of the best values included, and prints one JSON document."""
+    """Resuming a finished run simulates nothing, the record of the best values included, and prints one JSON
+    document."""
     monkeypatch.setattr(Pool, "_submit", lambda self, work, *job: pytest.fail(f"{work.__name__} was asked for"))
     with h5py.File(finished[0] / "evaluations.h5") as f:
         before = f["key"][()].tolist()

@@ -1,4 +1,5 @@
-"""The command line for whoever types it: help of one screen, examples that parse, one line for each slip, nothing beside JSON."""
+"""The command line for whoever types it: help of one screen, examples that parse, one line for each slip, nothing
+beside JSON."""
 
 from __future__ import annotations
 

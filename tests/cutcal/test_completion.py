@@ -23,7 +23,8 @@ printf '%s\\n' "${COMPREPLY[@]}"
 
 
 def program(shell: str) -> str:
-    """Path of a shell; the test is skipped where this machine has none, and on Windows, where one sees another file system."""
+    """Path of a shell; the test is skipped where this machine has none, and on Windows, where one sees another file
+    system."""
     found = None if sys.platform == "win32" else shutil.which(shell)
     if found is None:
         pytest.skip(f"there is no {shell} on this machine")

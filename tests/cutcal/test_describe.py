@@ -11,7 +11,8 @@ TRACE = ROOT / "force_data" / "banana_reconstructed.csv"
 
 
 def test_check_says_what_a_fit_would_start_from(tmp_path: Path, capsys, monkeypatch) -> None:
-    """Columns, tare, contact, stroke and peak of the bundled trace (its header), the specimen, what is fitted; no folder is made."""
+    """Columns, tare, contact, stroke and peak of the bundled trace (its header), the specimen, what is fitted; no
+    folder is made."""
     monkeypatch.chdir(tmp_path)
     assert (
         main(["calibrate", "--check", "--food", "banana", "--trace", str(TRACE), "--height", "0.03", "--fit", "E,R"])

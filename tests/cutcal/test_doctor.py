@@ -103,7 +103,8 @@ def test_failures_count(monkeypatch, capsys):
 
 
 def test_a_device_that_is_missing_is_one_line(monkeypatch, capsys, tmp_path: Path):
-    """An error that names the device, in the solver and on the command line. Metal, which has no doubles, cannot be asked for."""
+    """An error that names the device, in the solver and on the command line. Metal, which has no doubles, cannot be
+    asked for."""
 
     def init(**options):
         raise RuntimeError("Arch=cuda is not supported")
@@ -130,7 +131,8 @@ ATTEMPTS = pytest.mark.parametrize(
 
 @ATTEMPTS
 def test_the_robot_simulator_may_be_missing_or_blind(monkeypatch, code, stdout, stderr, state, said):
-    """Not installed: what to install. Installed without a renderer: which feature of Vulkan it asks for. Neither is a failure."""
+    """Not installed: what to install. Installed without a renderer: which feature of Vulkan it asks for. Neither is a
+    failure."""
     monkeypatch.setattr(doctor, "_installed", lambda name: False)
     assert doctor.robot().state == "absent" and "cutcal[robot]" in doctor.robot().words
     monkeypatch.setattr(doctor, "_installed", lambda name: True)

@@ -1,4 +1,5 @@
-"""The interface in Python: what docs/python.md says runs as it stands there, and errors are those of the command line."""
+"""The interface in Python: what docs/python.md says runs as it stands there, and errors are those of the command
+line."""
 
 from __future__ import annotations
 
@@ -171,7 +172,8 @@ def test_foods_by_name_and_by_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["cutcal", "calib"])
 def test_names_are_loaded_when_they_are_used(name: str) -> None:
-    """``import cutcal`` loads no pandas, no Taichi and no plotting; Trace needs no pandas either; other names are errors."""
+    """``import cutcal`` loads no pandas, no Taichi and no plotting; Trace needs no pandas either; other names are
+    errors."""
     code = (
         f"import sys, {name}\n"
         "heavy = {'taichi', 'matplotlib', 'pandas', 'numpy', 'yaml', 'scipy', 'h5py'} & set(sys.modules)\n"

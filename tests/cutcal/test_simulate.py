@@ -35,7 +35,8 @@ def test_simulate_writes_a_force_record_that_reads_back(tmp_path: Path, capsys):
 
 
 def test_simulate_cuts_where_it_is_told(tmp_path: Path, capsys):
-    """A strawberry at a quarter of its length parts into caps of a quarter's height and the rest (5/32 of an ellipsoid)."""
+    """A strawberry at a quarter of its length parts into caps of a quarter's height and the rest (5/32 of an
+    ellipsoid)."""
     argv = ["simulate", "--food", "strawberry", "--knife", "edc", "--at", "0.25", "--threads", "1", "--json"]
     assert main([*argv, "--out", str(tmp_path / "cut")]) == 0
     summary = valid(json.loads(capsys.readouterr().out))
@@ -46,7 +47,8 @@ def test_simulate_cuts_where_it_is_told(tmp_path: Path, capsys):
 
 
 def test_simulate_says_what_was_not_cut(tmp_path: Path, capsys):
-    """A cherry that parts has nothing said of it; one that yields first is pressed away, which is said and in the document."""
+    """A cherry that parts has nothing said of it; one that yields first is pressed away, which is said and in the
+    document."""
     argv = ["simulate", "--food", "cherry", "--knife", "edc", "--dx", "2e-3", "--threads", "1", "--json"]
     for name, more, pressed in (("cut", [], False), ("pressed", ["--set", "yield_stress=2e3"], True)):
         assert main([*argv, *more, "--out", str(tmp_path / name)]) == 0

@@ -57,7 +57,8 @@ def offset(said: str) -> None:
 
 
 def converge(said: str) -> None:
-    """The published example (Celik et al. 2008): order 1.53, 6.1685, 2.2 %; noise makes a trend that no longer counts."""
+    """The published example (Celik et al. 2008): order 1.53, 6.1685, 2.2 %; noise makes a trend that no longer
+    counts."""
     assert number(said, r"order {}, extrapolated") == pytest.approx(1.53, abs=0.01)
     assert number(said, r"extrapolated {}") == pytest.approx(6.1685, abs=1e-3)
     assert "0.0: monotone" in said and "0.0012: noise-limited" in said
@@ -95,7 +96,8 @@ PROVED: dict[str, Callable[[str], None]] = {
 
 
 def test_every_example_is_proved_and_shown() -> None:
-    """No example without a number that is checked, none longer than it may be, none that the page of examples leaves out."""
+    """No example without a number that is checked, none longer than it may be, none that the page of examples leaves
+    out."""
     there = sorted(path.name for path in EXAMPLES.glob("*.py"))
     assert there == sorted(PROVED)
     page = (ROOT / "docs" / "examples.md").read_text(encoding="utf-8")

@@ -1,4 +1,5 @@
-"""Docstrings of public functions with three arguments and more say what goes in, in which shape and unit, what comes out, and what fails."""
+"""Docstrings of public functions with three arguments and more say what goes in, in which shape and unit, what comes
+out, and what fails."""
 
 from __future__ import annotations
 

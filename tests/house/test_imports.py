@@ -79,7 +79,8 @@ def test_loading_a_package_loads_only_what_is_below_it(name):
 
 
 def test_a_function_imports_upwards_only_to_write_its_report():
-    """``calib`` and ``studies`` load ``reports`` when there is something to report, and ``reports`` names ``calib`` in annotations alone."""
+    """``calib`` and ``studies`` load ``reports`` when there is something to report, and ``reports`` names ``calib`` in
+    annotations alone."""
     up = {
         (package(one), package(other))
         for one in modules()
@@ -95,7 +96,8 @@ def test_no_circle_of_modules():
 
 
 def test_no_circle_of_rooms():
-    """Within a package the folders are in an order too; what lies beside them is below all, as errors, or above all, as the face."""
+    """Within a package the folders are in an order too; what lies beside them is below all, as errors, or above all, as
+    the face."""
     arrows: dict[str, set[str]] = {}
     for name in modules():
         inside = {room(other) for other in imports(name) if package(other) == package(name)}
@@ -119,7 +121,8 @@ def test_folders_and_modules_can_be_overlooked():
 
 
 def test_the_face_loads_nothing_heavy():
-    """``from cutcal import ...`` knows the four names, and has loaded neither Taichi nor pandas nor matplotlib before they are used."""
+    """``from cutcal import ...`` knows the four names, and has loaded neither Taichi nor pandas nor matplotlib before
+    they are used."""
     code = (
         "import sys, cutcal; assert not {'taichi', 'pandas', 'matplotlib', 'scipy'} & set(sys.modules); "
         "from cutcal import Calibration, Food, Study, Trace; assert not {'taichi', 'matplotlib'} & set(sys.modules); "

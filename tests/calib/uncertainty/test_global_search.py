@@ -70,8 +70,9 @@ def verdicts(analysis: UncertaintyAnalysis) -> dict[str, str]:
 
 
 def test_another_food_that_explains_the_curve_takes_a_claim_back():
-    """Which food the first search ends at is chance; the second is sent away from it and ends at the other, the interval reaches to it and
-    nothing is claimed. Of 24 seeds it does so in 21 or 22, and which ones hangs on the processor's last bits; none claims the wrong food."""
+    """Which food the first search ends at is chance; the second is sent away from it and ends at the other, the
+    interval reaches to it and nothing is claimed. Of 24 seeds it does so in 21 or 22, and which ones hangs on the
+    processor's last bits; none claims the wrong food."""
     reached = 0
     for seed in range(1, 9):
         _, analysis, _ = inferred(twofold, seed)
@@ -87,7 +88,8 @@ def test_another_food_that_explains_the_curve_takes_a_claim_back():
 
 @pytest.mark.parametrize("seed", range(3))
 def test_what_no_other_food_refutes_is_claimed_still(seed):
-    """The second search finds nothing as good; all its runs are in the history, with the chi-square of the objective itself."""
+    """The second search finds nothing as good; all its runs are in the history, with the chi-square of the objective
+    itself."""
     told: list[Progress] = []
     result, analysis, first = inferred(onefold, seed, told=told)
     r = analysis.uncertainty.intervals[1]
@@ -102,7 +104,8 @@ def test_what_no_other_food_refutes_is_claimed_still(seed):
 
 
 def test_what_is_claimed_is_barred():
-    """A point within all claimed intervals has a residual more, the deeper the larger; one outside of any of them has none."""
+    """A point within all claimed intervals has a residual more, the deeper the larger; one outside of any of them has
+    none."""
     _, analysis, _ = inferred(onefold, 0)
     both = analysis.uncertainty.intervals
     barred = global_search._deflated(TWO, both)
@@ -134,8 +137,8 @@ def stuck(goal: Objective, fake: Fake, shift: float) -> FitResult:
 
 
 def test_a_better_food_becomes_the_answer():
-    """Where the first search has ended in a basin that explains the curve less well, values and intervals are about the second's, and
-    only what holds the first's value as well is claimed."""
+    """Where the first search has ended in a basin that explains the curve less well, values and intervals are about the
+    second's, and only what holds the first's value as well is claimed."""
     goal, fake = objective(onefold), Fake(onefold, noisy=0.002)
     first = stuck(goal, fake, 1.1)
     narrow = replace(search_uncertainty(goal, first).intervals[1], verdict="identified")  # type: ignore[union-attr]
@@ -179,7 +182,8 @@ def test_what_is_not_proven_is_not_claimed():
 
 
 def test_what_numerics_decide_is_not_claimed():
-    """An answer that does not explain the curve at half the speed and with other particles is none; no second search is made for it."""
+    """An answer that does not explain the curve at half the speed and with other particles is none; no second search is
+    made for it."""
     goal, fake = objective(onefold), Fake(onefold, noisy=0.002)
     other = Fake(lambda p: onefold(p) + 0.9 * np.sin(STROKE / 0.003), noisy=0.002)
     result, analysis = fit_with_uncertainty(goal, Evaluators(fake, fake, other), FitOptions(seed=0))

@@ -153,7 +153,8 @@ def test_correlation_length_is_found_in_what_a_fit_leaves(length: float) -> None
 
 
 def test_a_residual_of_one_sign_is_no_independent_noise() -> None:
-    """A constant residual is drawn from the assumed length far towards its own, half the stroke; a vanishing one says nothing."""
+    """A constant residual is drawn from the assumed length far towards its own, half the stroke; a vanishing one says
+    nothing."""
     assert correlation_length(np.ones(240), 0.0, 0.05) == pytest.approx(0.05 * 10.0 ** (0.25 / 0.41))
     assert correlation_length(np.zeros(240), 3.0, 0.05) == 0.05
 

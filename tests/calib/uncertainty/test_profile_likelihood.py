@@ -1,4 +1,5 @@
-"""Profiles: the normal approximation where chi-square is a parabola, and what the trace alone bounds where it is not."""
+"""Profiles: the normal approximation where chi-square is a parabola, and what the trace alone bounds where it is
+not."""
 
 from __future__ import annotations
 
@@ -89,8 +90,8 @@ def test_verdicts_say_what_the_trace_bounds(one_sided: tuple[Objective, FitResul
 def test_what_would_have_an_interval_was_tried_at_both_ends(
     one_sided: tuple[Objective, FitResult, UncertaintyAnalysis],
 ) -> None:
-    """Runs that count are made where R would end, and again where that turns out to lie elsewhere, and for nothing that is open;
-    coarse ones at the ends of all."""
+    """Runs that count are made where R would end, and again where that turns out to lie elsewhere, and for nothing that
+    is open; coarse ones at the ends of all."""
     objective, result, analysis = one_sided
     runs = analysis.result.history[len(result.history) :]
     judged = [t.z - result.best.z for t in runs if not t.coarse]
@@ -106,7 +107,8 @@ def test_what_would_have_an_interval_was_tried_at_both_ends(
 def test_a_better_run_at_the_end_of_an_interval_becomes_the_best(
     one_sided: tuple[Objective, FitResult, UncertaintyAnalysis],
 ) -> None:
-    """Where the process was wrong and a run at an end is better than the answer of the search, values and intervals are about it."""
+    """Where the process was wrong and a run at an end is better than the answer of the search, values and intervals are
+    about it."""
     objective, result, _ = one_sided
     values = dict(result.best.evaluation.parameters)
     poor = objective.score(next(iter(Fake(elastic).evaluate([values | {"R": 1.15 * values["R"]}]))), stage="round")
@@ -136,8 +138,8 @@ def test_an_interval_holds_the_best_value(one_sided: tuple[Objective, FitResult,
 def test_an_interval_is_about_the_value_that_is_reported(
     one_sided: tuple[Objective, FitResult, UncertaintyAnalysis],
 ) -> None:
-    """A value where the profile has risen by 1 belongs to the interval of what has risen by 3.84 more: it ends at 2.2 standard
-    deviations from the optimum on both sides, not at 1.96."""
+    """A value where the profile has risen by 1 belongs to the interval of what has risen by 3.84 more: it ends at 2.2
+    standard deviations from the optimum on both sides, not at 1.96."""
     uncertainty = one_sided[2].uncertainty
     found = uncertainty.intervals[0]
     p = found.parameter
@@ -163,7 +165,8 @@ def test_nothing_is_identified_where_the_curve_is_not_explained(
 def test_a_curve_that_is_off_for_long_stretches_is_not_explained(
     one_sided: tuple[Objective, FitResult, UncertaintyAnalysis],
 ) -> None:
-    """Its residuals look like few independent rows, so that their chi-square is nothing odd; the search's own is, and R is weak."""
+    """Its residuals look like few independent rows, so that their chi-square is nothing odd; the search's own is, and R
+    is weak."""
     objective, result, analysis = one_sided
     assert result.jacobian is not None and linearised_likelihood(objective, result.best, result.jacobian).met
     rows = objective.effective_rows

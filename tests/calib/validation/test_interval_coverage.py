@@ -74,7 +74,8 @@ def test_it_does_not_pass_by_chance(rows: list[dict[str, Any]]) -> None:
 
 @pytest.mark.slow
 def test_the_study_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Three traces on the analytic simulator; a torn last line is done again from the store, the others are not touched."""
+    """Three traces on the analytic simulator; a torn last line is done again from the store, the others are not
+    touched."""
     monkeypatch.setattr(cutcal.commands.calibration.coverage, "workers_of", lambda args, say: FakePool())
     out = tmp_path / "out"
     command = ["coverage", "--food", "banana", "--traces", "3", "--out", str(out)]

@@ -187,7 +187,8 @@ def test_iso_slope_by_hand() -> None:
 
 
 def test_iso_phase_of_a_ramp_says_that_it_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A slower exponential rise is matched by shifting to the bound; the rating flags it, and gives that of the other parts unshifted."""
+    """A slower exponential rise is matched by shifting to the bound; the rating flags it, and gives that of the other
+    parts unshifted."""
     x = np.linspace(0.0, 1.0, ISO_SAMPLES)
     rating = iso18571(x, 1.0 - np.exp(-4.0 * x), 0.8 * x**1.2)
     assert rating.at_bound

@@ -50,7 +50,8 @@ def test_prediction_takes_one_number_from_the_trace(material, tmp_path, capsys):
 
 
 def test_a_void_phase_is_said_beside_the_rating(material, tmp_path, capsys, monkeypatch):
-    """Where the phase search ends at its bound, R is printed with what it is without its phase, which decides nothing."""
+    """Where the phase search ends at its bound, R is printed with what it is without its phase, which decides
+    nothing."""
     monkeypatch.setattr("calib.validation.metrics._best_shift", lambda r, m, most: most)
     main(["predict", "--food", "banana", "--material", material, *TRACE, "--out", str(tmp_path / "x")])
     summary = valid(json.loads((tmp_path / "x" / "summary.json").read_text()))
@@ -67,8 +68,8 @@ def test_prediction_needs_a_calibrated_food(capsys, tmp_path):
 
 
 def test_run_that_breaks_down_is_an_error_and_not_a_prediction(material, tmp_path, capsys, monkeypatch):
-    """A run that ends early is one error with its reason and the part that was done; nothing is compared. Of a food that is higher than
-    the stroke half a cell more is cut."""
+    """A run that ends early is one error with its reason and the part that was done; nothing is compared. Of a food
+    that is higher than the stroke half a cell more is cut."""
     whole, strokes = Simulation.run, []
 
     def broken(simulation):

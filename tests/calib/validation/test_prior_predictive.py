@@ -31,8 +31,9 @@ FOODS = tuple(load_foods())
 RECORDED = ROOT / "force_data" / "prior_predictive"
 CHEAP = ("grape", "shine_muscat", "strawberry")  # some tenths of a second each, besides their kernels
 PATIENCE_S = 120.0
-# Part of the peak. Rounding, compilers and processors move a curve by up to 0.1 % (tests/mpm/test_regression.py); E, R, R_skin or the
-# initiation depth changed by a fifth moves it by 2 % and more, which nobody would see in a band that spans a decade.
+# Part of the peak. Rounding, compilers and processors move a curve by up to 0.1 % (tests/mpm/test_regression.py); E, R,
+# R_skin or the initiation depth changed by a fifth moves it by 2 % and more, which nobody would see in a band that
+# spans a decade.
 TOLERANCE = 0.01
 
 
@@ -101,9 +102,8 @@ def result(level, stroke, reason="", ke=0.0, parted=1.0):
 
 
 def test_quantiles_are_those_of_the_runs_that_finished():
-    """Eleven levels of force have their quantiles; a run that broke down counts as such and is left out, at any force. Those that are
-    not quasi-static, or not cut but pressed away, are in them and are counted.
-    """
+    """Eleven levels of force have their quantiles; a run that broke down counts as such and is left out, at any force.
+    Those that are not quasi-static, or not cut but pressed away, are in them and are counted."""
     one = plan(load_food("grape"), load_knife("kitchen"), draws=12)
     levels = [result(float(k), 0.02, ke=0.02 * k, parted=0.105 * k) for k in range(11)]
     columns, row = conclude(one, [result(100.0, 0.02), *levels, result(1e6, 0.02, "inverted")])
@@ -135,7 +135,8 @@ def known(journal):
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    """The default cut and a draw of some cheap foods, killed after two runs and resumed: folder, exit code, stored runs."""
+    """The default cut and a draw of some cheap foods, killed after two runs and resumed: folder, exit code, stored
+    runs."""
     out = tmp_path_factory.mktemp("prior") / "out"
     words = ["prior", *CHEAP, "--draws", "1", "--workers", "1", "--out", str(out)]
     process = subprocess.Popen(
@@ -154,7 +155,8 @@ def study(tmp_path_factory):
 
 @pytest.mark.slow
 def test_kill_and_resume_run_nothing_twice(study, capsys):
-    """What was stored before the kill is known; a second call knows all, shows warnings and table, and changes no file."""
+    """What was stored before the kill is known; a second call knows all, shows warnings and table, and changes no
+    file."""
     out, code, stored = study
     assert stored >= 2 and code == 0
     before = {p.name: p.read_bytes() for p in out.glob("*.csv")}

@@ -77,7 +77,8 @@ def test_the_predictive_band_is_drawn_where_there_is_one() -> None:
 
 
 def test_profiles_are_in_the_units_that_people_use() -> None:
-    """Pascals become kilopascals, the literature too; a friction has a linear axis; a profile of one point is left out."""
+    """Pascals become kilopascals, the literature too; a friction has a linear axis; a profile of one point is left
+    out."""
     s = sample.summary()
     s["profiles"]["E"] = {key: value[:1] for key, value in s["profiles"]["E"].items()}
     result = from_document(s, Path())
@@ -141,7 +142,8 @@ def test_three_moments_of_the_cut_are_shown() -> None:
 
 @pytest.mark.slow
 def test_the_picture_of_the_cut_is_stable_and_fits_its_page(tmp_path: Path) -> None:
-    """The same section gives the same bytes, flat foods and tall ones; the report has one page more with it, and none without."""
+    """The same section gives the same bytes, flat foods and tall ones; the report has one page more with it, and none
+    without."""
     stroke = np.linspace(0, 0.02, 50)
     for section in (looked_at(), looked_at(0.03, 0.09)):
         made = [pictures.cut(section, KNIFE, 0.03, stroke, np.sin(np.pi * stroke / 0.024)) for _ in range(2)]
@@ -160,7 +162,8 @@ def test_the_picture_of_the_cut_is_stable_and_fits_its_page(tmp_path: Path) -> N
 def test_the_glance_on_the_first_page_is_the_food_about_the_blade_at_the_largest_force(
     height: float, length: float
 ) -> None:
-    """A long food is shown to 0.8 heights from the blade, a short one whole; the blade stands at the stroke of the largest force."""
+    """A long food is shown to 0.8 heights from the blade, a short one whole; the blade stands at the stroke of the
+    largest force."""
     stroke = np.linspace(0.0, 0.02, 50)
     section = looked_at(length, height)
     axes = Figure().subplots()

@@ -50,7 +50,8 @@ def test_moments_are_contact_largest_force_and_end(film: Film) -> None:
 
 
 def test_the_blade_has_its_size_and_is_where_it_was(film: Film) -> None:
-    """Volume of a wedge of the included angle up to the spine and a plate above it; edge lowered, slid, and higher at +x when tilted."""
+    """Volume of a wedge of the included angle up to the spine and a plate above it; edge lowered, slid, and higher at
+    +x when tilted."""
     knife = Knife("wedge", 2e-3, math.radians(20), 0.03, 0.2)
     points, triangles = blade(knife, 0.1)
     a, b, c = (points[triangles[:, k]] for k in range(3))
@@ -65,7 +66,8 @@ def test_the_blade_has_its_size_and_is_where_it_was(film: Film) -> None:
 
 
 def test_stills_show_food_blade_and_board(film: Film, tmp_path: Path) -> None:
-    """Three files of the size that is said, each with pixels of steel, of the board and of food under stress; the blade goes down."""
+    """Three files of the size that is said, each with pixels of steel, of the board and of food under stress; the blade
+    goes down."""
     paths = stills(film, tmp_path)
     assert [p.name for p in paths] == ["contact.png", "peak.png", "end.png"]
     rows = []
@@ -94,7 +96,8 @@ def test_a_video_has_a_picture_for_each_look(film: Film, tmp_path: Path) -> None
 
 
 def test_a_page_needs_no_network_and_has_all_looks(film: Film, tmp_path: Path) -> None:
-    """Nothing is loaded from elsewhere; each frame has the vertices of its look, to a hundredth of a millimetre, and its force."""
+    """Nothing is loaded from elsewhere; each frame has the vertices of its look, to a hundredth of a millimetre, and
+    its force."""
     path = tmp_path / "cut.html"
     page(film, path, "prism, thin knife")
     text = path.read_text(encoding="utf-8")

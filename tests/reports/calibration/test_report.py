@@ -140,7 +140,8 @@ def test_an_older_folder_still_gives_a_report(tmp_path: Path) -> None:
 
 
 def test_a_long_table_keeps_the_figure_on_the_first_page(tmp_path: Path) -> None:
-    """Eighteen lines, some with names or notes of two lines, leave the main figure its least height, not a page of its own."""
+    """Eighteen lines, some with names or notes of two lines, leave the main figure its least height, not a page of its
+    own."""
     verdicts = sample.summary()["verdicts"]
     verdicts += [{**verdicts[0], "name": f"{i} a name that is longer than its own column"} for i in range(3)]
     verdicts += [{**verdicts[0], "note": "lag +0.00018 ± 0.0001 m, expected 0 ± 0.0003 m"} for _ in range(4)]
@@ -163,7 +164,8 @@ def test_what_the_measurement_leaves_open_is_said_in_units_and_marked(content: C
 
 
 def test_errors_are_counted_and_sized_in_words(content: Content) -> None:
-    """33 mm over a correlation length of 2.1 mm are 16 readings; chi-square 14.2 is 3.8 times; below one nothing widens."""
+    """33 mm over a correlation length of 2.1 mm are 16 readings; chi-square 14.2 is 3.8 times; below one nothing
+    widens."""
     length, size = (spaced(text) for text in content("failed")["errors"])
     assert "over 2.1 mm of stroke" in length and "240 points" in length and "about 16 independent" in length
     assert "14.2" in size and "3.8 times" in size and "were widened" in size
