@@ -190,7 +190,8 @@ def content(done: FinishedStudy) -> Data:
         "names": [breakable(name) for name in done.curves],
         "shown": list(done.curves).index(first(done)),
         "captions": [_caption(s, name) for name in done.curves],
-        "left_open": [[breakable(name), *measurement.left_open(n, SimpleNamespace(**row))] for name, t in s["traces"].items()
+        "left_open": [[breakable(name), *measurement.left_open(n, SimpleNamespace(**row))]
+                      for name, t in s["traces"].items()
                       for n, row in (t.get("nuisances") or {}).items()],
         "parameters": [_parameter(name, p, done.meanings) for name, p in s["parameters"].items()],
         "checks": [[breakable(name), in_words(c["name"]), *_change(c)] for name, t in s["traces"].items()
@@ -291,8 +292,8 @@ def _parameter(name: str, p: Data, meanings: Mapping[str, str]) -> list[str]:
     shared = "all cuts" if p.get("shared", True) else "one cut"
     return [
         breakable(name), meanings.get(_property_of(name), ""), quantity(p["value"], unit),
-        interval(p["low95"], p["high95"], unit), interval(p["prior_low"], p["prior_high"], unit), in_words(p["verdict"]),
-        shared,
+        interval(p["low95"], p["high95"], unit), interval(p["prior_low"], p["prior_high"], unit),
+        in_words(p["verdict"]), shared,
     ]  # fmt: skip
 
 

@@ -12,9 +12,9 @@ A class may say more about its document in two class variables:
 * ``DOCUMENT`` is the name of the document. It becomes the first key, ``schema``.
 * ``KEYS`` lists the keys in their order, where these are not just the fields: properties may be among them.
 
-A field with the metadata :data:`FLAT` is a mapping or another dataclass. Its keys stand beside those of the result; where
-it may be None, they may all be missing. :func:`renamed` gives a field another name in the document; a field with the metadata
-:data:`ANY` may be of any kind in older documents. The JSON Schema of a document is made from the same type
+A field with the metadata :data:`FLAT` is a mapping or another dataclass. Its keys stand beside those of the result;
+where it may be None, they may all be missing. :func:`renamed` gives a field another name in the document; a field with
+the metadata :data:`ANY` may be of any kind in older documents. The JSON Schema of a document is made from the same type
 (:mod:`calib.io.type_schema`).
 """
 
@@ -43,7 +43,7 @@ REMEDY = "run the same command again"
 
 Result = TypeVar("Result")
 FORMER: Mapping[str, Any] = {"former": True}
-"""Metadata of a field whose default is None and that only documents of other versions have: it is read and not written."""
+"""Metadata of a field whose default is None and that only documents of other versions have: it is read, not written."""
 
 
 def renamed(name: str) -> Mapping[str, Any]:
