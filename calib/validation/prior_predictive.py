@@ -168,7 +168,7 @@ def run(
         "foods": rows,
     }
     write_json(out / "prior.json", document)
-    from reports.prior import write_figure
+    from reports.calibration.prior import write_figure
 
     write_figure(out)
     return document

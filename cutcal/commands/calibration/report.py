@@ -41,7 +41,7 @@ def writer(folder: Path) -> Callable[[Path], Path]:
     """
     from calib.calibration import result as calibration
     from calib.material.properties import MEANINGS
-    from reports import multi_specimen
+    from reports.calibration import multi_specimen
     from studies.convergence import result as convergence
     from studies.speed import result as bench
     from studies.stability import result as stability
