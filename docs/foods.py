@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from calib.io.yaml_checks import data_path
 from reports.base.figures import MM, STYLE, WIDTH
-from reports.prior import draw, foods, height
+from reports.calibration.prior import draw, foods, height
 
 
 def main(picture: Path) -> None:

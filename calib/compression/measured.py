@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from calib.errors import CurveError, TraceError
+from calib.io.type_schema import Shared
 from calib.trace.columns import candidates, choose, numbers
 from calib.trace.reader import read_table
 from calib.trace.table import Table
@@ -26,10 +28,17 @@ REPEAT_COLUMN = "replicate"
 
 @dataclass(frozen=True)
 class MeasuredFile:
-    """A file of a compression test: its name and SHA-256, and the columns of the compression and of the load."""
+    """A file of a compression test: its name and SHA-256, and the columns of the compression and of the load.
+
+    Attributes:
+        name: Its name.
+        sha256: SHA-256 of a file's content.
+        compression: Column of the compression.
+        force: Column of the load.
+    """
 
     name: str
-    sha256: str
+    sha256: Annotated[str, Shared("sha256")]
     compression: str
     force: str
 

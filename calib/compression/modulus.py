@@ -10,6 +10,7 @@ from scipy.stats import t as student
 
 from calib.compression.measured import MeasuredCompression, slope
 from calib.compression.press import homogeneous, largest_error
+from calib.io.type_schema import Positive
 from mpm.arrays import FloatArray
 
 NU_STEP = 0.05
@@ -88,10 +89,15 @@ def fit_modulus(measured: MeasuredCompression, unit: FloatArray) -> ModulusFit:
 
 @dataclass(frozen=True)
 class ModulusAtNu:
-    """Young's modulus [Pa] that the same curve gives at another Poisson's ratio [-]."""
+    """Young's modulus [Pa] that the same curve gives at another Poisson's ratio [-].
+
+    Attributes:
+        nu: Poisson's ratio.
+        E_Pa: Modulus [Pa].
+    """
 
     nu: float
-    E_Pa: float
+    E_Pa: Positive
 
 
 def modulus_at_other_nu(measured: MeasuredCompression, nu: float, modulus: float) -> tuple[ModulusAtNu, ModulusAtNu]:

@@ -204,7 +204,7 @@ def calibrate_modulus(
         git=git_commit(),
     )
     write_result(result, _curves(measured, found), out)
-    from reports.compression import write_figure
+    from reports.calibration.compression import write_figure
 
     write_figure(result, read_curves(out), out)
     return result

@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from calib.compression.measured import area, strain_grid
 from calib.errors import CurveError
 from calib.io.progress import clock
+from calib.io.type_schema import Count, NotNegative, Positive
 from mpm.arrays import FloatArray
 from mpm.runtime import Runtime
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
@@ -49,19 +50,19 @@ class PressRun:
 
     Attributes:
         cells: Cells over the height.
-        dx_m: Cell size [m].
-        mach: Speed of the plate over that of the P-wave [-].
+        dx_m: Cell [m].
+        mach: Speed of the plate over the P-wave speed.
         particles: Particles.
         steps: Time steps.
         wall_s: Run time [s].
     """
 
-    cells: int
-    dx_m: float
-    mach: float
-    particles: int
-    steps: int
-    wall_s: float
+    cells: Count
+    dx_m: Positive
+    mach: Positive
+    particles: Count
+    steps: Count
+    wall_s: NotNegative
 
 
 @dataclass(frozen=True)

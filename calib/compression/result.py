@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import pandas as pd
 
@@ -13,23 +13,36 @@ from calib.compression.measured import MeasuredFile
 from calib.compression.modulus import ModulusAtNu
 from calib.compression.press import PressRun
 from calib.io.folder import write_csv, write_json
+from calib.io.provenance import CommandLine, Commit, DeviceName, Seed, Versions
+from calib.io.type_schema import Count, NotNegative, NumberOrNull, Positive, Shared, keywords, one_of
 from calib.io.typed_document import FLAT, to_document
 from calib.validation.acceptance import Verdict
 from mpm.arrays import FloatArray
 from mpm.scene.shapes import Shape
 
 RESULT_FILE, CURVES_FILE = "compress.json", "curves.csv"
+ONE = keywords(description="One of them")
+Plates = Annotated[str, one_of("frictionless", "bonded")]
+Window = Annotated[tuple[float, float], keywords(prefixItems=None, items={"type": "number"})]
 
 
 @dataclass(frozen=True)
 class SpecimenSizes:
-    """The specimen: kind of shape, sizes [m], area under the plate [m^2]."""
+    """The specimen: kind of shape, sizes [m], area under the plate [m^2].
 
-    kind: str
-    length: float
-    width: float
-    height: float
-    area_m2: float
+    Attributes:
+        kind: Outline.
+        length: Length, or diameter [m].
+        width: Width, or diameter [m].
+        height: Height [m].
+        area_m2: Area under the plate [m^2].
+    """
+
+    kind: Annotated[str, one_of("block", "upright_cylinder")]
+    length: Positive
+    width: Positive
+    height: Positive
+    area_m2: Positive
 
     @classmethod
     def of(cls, shape: Shape, area: float) -> SpecimenSizes:
@@ -39,10 +52,15 @@ class SpecimenSizes:
 
 @dataclass(frozen=True)
 class Assumptions:
-    """What the test does not tell: Poisson's ratio [-], and whether the plates are ``frictionless`` or ``bonded``."""
+    """What the test does not tell: Poisson's ratio [-], and whether the plates are ``frictionless`` or ``bonded``.
+
+    Attributes:
+        nu: Poisson's ratio.
+        plates: What the food does at the plates: slides without friction, or sticks.
+    """
 
     nu: float
-    plates: str
+    plates: Plates
 
 
 @dataclass(frozen=True)
@@ -50,20 +68,20 @@ class FittedModulus:
     """Young's modulus.
 
     Attributes:
-        window: First and last strain of the fit [-].
+        window: Strains between which it is fitted.
         mean_Pa: Mean of the repeats [Pa].
-        sd_Pa: Standard deviation between the repeats [Pa], NaN for one.
-        low_Pa: Lower end of the 95 % interval of the mean [Pa], NaN for one repeat.
-        high_Pa: Its upper end [Pa].
+        sd_Pa: Their standard deviation [Pa]; null for one repeat.
+        low_Pa: Lower end of the 95 % interval of the mean [Pa]; null for one repeat.
+        high_Pa: Upper end [Pa]; null for one repeat.
         repeats: Number of repeats.
     """
 
-    window: tuple[float, float]
-    mean_Pa: float
-    sd_Pa: float
-    low_Pa: float
-    high_Pa: float
-    repeats: int
+    window: Window
+    mean_Pa: Positive
+    sd_Pa: NumberOrNull
+    low_Pa: NumberOrNull
+    high_Pa: NumberOrNull
+    repeats: Count
 
 
 @dataclass(frozen=True)
@@ -71,17 +89,17 @@ class SmallStrainModulus:
     """Slope of the stress over a small strain, measured and fitted.
 
     Attributes:
-        window: First and last strain [-].
+        window: Strains between which it is taken.
         measured_Pa: Mean of the repeats [Pa].
-        measured_sd_Pa: Standard deviation between them [Pa], None for one.
-        fitted_Pa: Slope of the fitted curve [Pa].
-        error: Fitted over measured, less 1 [-].
+        measured_sd_Pa: Their standard deviation [Pa]; null for one repeat.
+        fitted_Pa: Of the fitted curve [Pa].
+        error: Fitted over measured less 1.
     """
 
-    window: tuple[float, float]
+    window: Window
     measured_Pa: float
     measured_sd_Pa: float | None
-    fitted_Pa: float
+    fitted_Pa: Positive
     error: float
 
 
@@ -90,65 +108,85 @@ class ForceError:
     """Largest relative error of the fitted force.
 
     Attributes:
-        from_strain: Strain from which it is taken [-].
-        value: The error, with its sign [-].
-        strain: Strain where it is [-].
+        from_strain: Strain from which it is taken.
+        value: The error, a fraction.
+        strain: Strain where it is.
     """
 
-    from_strain: float
+    from_strain: Positive
     value: float
     strain: float
 
 
 @dataclass(frozen=True)
 class OtherPlates:
-    """Young's modulus [Pa] if the plates were ``frictionless`` in place of ``bonded``, or the other way."""
+    """Young's modulus [Pa] if the plates were ``frictionless`` in place of ``bonded``, or the other way.
 
-    plates: str
-    E_Pa: float
+    Attributes:
+        plates: What the food does at the plates: slides without friction, or sticks.
+        E_Pa: Modulus [Pa].
+    """
+
+    plates: Plates
+    E_Pa: Positive
 
 
 @dataclass(frozen=True)
 class RepeatModulus:
-    """One repeat: its name, Young's modulus [Pa] and slope over a small strain [Pa]."""
+    """One repeat: its name, Young's modulus [Pa] and slope over a small strain [Pa].
+
+    Attributes:
+        name: Its name.
+        E_Pa: Modulus [Pa].
+        slope_Pa: Slope over a small strain [Pa].
+    """
 
     name: str
-    E_Pa: float
+    E_Pa: Positive
     slope_Pa: float
 
 
 @dataclass(frozen=True)
 class PressSimulation:
-    """The press that was simulated, with the seed of its particles and its device."""
+    """The press that was simulated, with the seed of its particles and its device.
+
+    Attributes:
+        run: The simulation.
+        seed: Seed of the particles, and of the search or the draws where there are any.
+        arch: Device of the simulations.
+    """
 
     run: PressRun = field(metadata=FLAT)
-    seed: int
-    arch: str
+    seed: Seed
+    arch: DeviceName
 
 
 @dataclass(frozen=True, kw_only=True)
 class CompressionResult:
-    """A calibrated modulus.
+    """Young's modulus from a compression test.
+
+    ``compress.json`` of ``cutcal compress``, and what ``cutcal compress --json`` prints.
 
     Attributes:
-        command: Words of the command line.
+        command: Command line, or the call from Python, that made the document.
         specimen: The specimen.
         assumed: What the test does not tell.
         E: Young's modulus.
-        slope: Modulus over a small strain.
-        nrmse: Root mean square difference of the curves over the largest measured stress [-].
-        force_error: Largest relative error of the force.
-        solver_error: Largest error of the solver against the closed form [-]; None between bonded plates.
-        grid_change: Change from a coarser grid [-]; None between frictionless plates.
-        sensitivity: The modulus at other Poisson's ratios; None between bonded plates.
-        bracket: The modulus if the plates were the other way; None where that was not simulated.
-        repeats: The repeats.
+        slope: Slope of stress over a small strain.
+        nrmse: Root mean square difference of fitted and mean measured stress over the largest, a fraction.
+        force_error: Largest error of the force.
+        solver_error: Largest error of the solver against the closed form; null between bonded plates.
+        grid_change: Change from a coarser grid; null between frictionless plates.
+        sensitivity: Modulus at other Poisson's ratios; null between bonded plates.
+        bracket: The modulus if the plates were the other way, with --bracket; null without.
+        repeats: Repeats.
         verdicts: Lines of the verdict.
-        not_shown: What the result does not show, in words.
+        not_shown: What the result does not show, one sentence each.
         simulation: The press that was simulated.
         files: Files of the test.
-        versions: Versions of cutcal, Python and packages.
-        git: Commit of the checkout.
+        versions: Versions of cutcal, of Python and of the packages that a result depends on.
+        git: Commit of the checkout that ran, with +changes where it was edited; null where cutcal was installed without
+            one.
     """
 
     DOCUMENT: ClassVar[str] = "compress"
@@ -158,28 +196,28 @@ class CompressionResult:
         "git",
     )  # fmt: skip
 
-    command: tuple[str, ...]
+    command: CommandLine
     specimen: SpecimenSizes
     assumed: Assumptions
     E: FittedModulus
     slope: SmallStrainModulus
-    nrmse: float
+    nrmse: NotNegative
     force_error: ForceError
     solver_error: float | None
     grid_change: float | None
-    sensitivity: tuple[ModulusAtNu, ...] | None
-    bracket: OtherPlates | None
-    repeats: tuple[RepeatModulus, ...]
-    verdicts: tuple[Verdict, ...]
-    not_shown: tuple[str, ...]
+    sensitivity: Annotated[tuple[Annotated[ModulusAtNu, ONE], ...], keywords(type=("array", "null"))] | None
+    bracket: Annotated[OtherPlates, keywords(description=None)] | None
+    repeats: Annotated[tuple[Annotated[RepeatModulus, ONE], ...], keywords(minItems=1)]
+    verdicts: Annotated[tuple[Annotated[Verdict, Shared("verdict")], ...], keywords(minItems=1)]
+    not_shown: Annotated[tuple[str, ...], Shared("limits")]
     simulation: PressSimulation
-    files: tuple[MeasuredFile, ...]
-    versions: Mapping[str, str]
-    git: str | None
+    files: Annotated[tuple[Annotated[MeasuredFile, keywords(description="One file")], ...], keywords(minItems=1)]
+    versions: Versions
+    git: Commit
 
     @property
     def passed(self) -> bool:
-        """Whether every line of the verdict passed."""
+        """Whether every line passed."""
         return all(line.passed for line in self.verdicts)
 
 

@@ -68,6 +68,13 @@ def key_of(content: Any) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()
 
 
+Versions = Annotated[Mapping[str, str], Shared("versions")]
+Commit = Annotated[str | None, Shared("commit")]
+Seed = Annotated[int, Shared("seed")]
+DeviceName = Annotated[str, Shared("device")]
+CommandLine = Annotated[tuple[str, ...], Shared("command")]
+
+
 @dataclass(frozen=True)
 class Software:
     """What was run.

@@ -11,6 +11,8 @@ import inspect
 import re
 from collections.abc import Mapping
 from dataclasses import Field, dataclass, fields, is_dataclass
+from functools import reduce
+from operator import or_
 from types import NoneType, UnionType
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
@@ -33,7 +35,7 @@ class Keywords:
 
 
 def keywords(**items: Any) -> Keywords:
-    """Keywords of JSON Schema, such as ``minimum=0``."""
+    """Keywords of JSON Schema, such as ``minimum=0``; None takes away what the type would say."""
     return Keywords(tuple(items.items()))
 
 
@@ -48,6 +50,8 @@ Positive = Annotated[float, keywords(exclusiveMinimum=0)]
 NotNegative = Annotated[float, keywords(minimum=0)]
 Fraction = Annotated[float, keywords(minimum=0, maximum=1)]
 Count = Annotated[int, keywords(minimum=0)]
+NumberOrNull = Annotated[float, keywords(type=("number", "null"))]
+"""A number that is NaN in Python, and null in the document, where there is none."""
 
 
 def document_schema(kind: Any) -> dict[str, Any]:
@@ -79,7 +83,12 @@ def document_schema(kind: Any) -> dict[str, Any]:
 def _object(kind: Any) -> dict[str, Any]:
     """Schema of a dataclass, without a description."""
     properties, required = _properties(kind)
-    return {"type": "object", "properties": properties, "required": required, "additionalProperties": False}
+    others = [f for f in fields(kind) if f.metadata.get("flat") and get_origin(get_type_hints(kind)[f.name]) is Mapping]
+    other: Any = False
+    if others:
+        (_, each) = get_args(get_type_hints(kind, include_extras=True)[others[0].name])
+        other = {"description": _attributes(kind)[others[0].name]} | _item(each)
+    return {"type": "object", "properties": properties, "required": required, "additionalProperties": other}
 
 
 def _properties(kind: Any) -> tuple[dict[str, Any], list[str]]:
@@ -95,13 +104,22 @@ def _properties(kind: Any) -> tuple[dict[str, Any], list[str]]:
             properties[name] = _key(None, get_type_hints(own.fget, include_extras=True)["return"], _first(own))
             required.append(name)
         elif field.metadata.get("flat"):
-            inner = _properties(_unwrapped(hints[name])[0])
-            properties |= inner[0]
-            required += inner[1]
+            inner, needed = _flat_properties(hints[name])
+            properties |= inner
+            required += needed
         elif not field.metadata.get("former"):
             properties[document_key(field)] = _key(field, hints[name], texts[name])
             required += [] if left_out(field) else [document_key(field)]
     return properties, required
+
+
+def _flat_properties(hint: Any) -> tuple[dict[str, Any], list[str]]:
+    """Schemas of the keys of a field that stand beside the others, and those that are always there."""
+    kind, nullable, _ = _unwrapped(hint)
+    if not is_dataclass(kind):
+        return {}, []  # a mapping: its keys may have any name
+    properties, required = _properties(kind)
+    return properties, [] if nullable else required
 
 
 def _key(field: Field[Any] | None, hint: Any, text: str) -> dict[str, Any]:
@@ -131,12 +149,18 @@ def _value(kind: Any, said: tuple[Any, ...], nullable: bool) -> dict[str, Any]:
         return {"$ref": f"urn:cutcal:schema:{COMMON}:{VERSION}#/$defs/{shared}"}
     own = {name: value for one in said if isinstance(one, Keywords) for name, value in one.items}
     own = {name: list(value) if isinstance(value, tuple) else value for name, value in own.items()}
-    return own if {"enum", "const"} & set(own) else _plain(kind, nullable) | own
+    whole = own if {"enum", "const"} & set(own) else _plain(kind, nullable) | own
+    return {name: value for name, value in whole.items() if value is not None}
 
 
 def _plain(kind: Any, nullable: bool) -> dict[str, Any]:
     """Schema of a kind of value."""
     container, inner = get_origin(kind), get_args(kind)
+    if container in (Union, UnionType):
+        parts = [_plain(one, False) for one in inner]
+        if any(is_dataclass(one) for one in inner):
+            return {"anyOf": parts}
+        return {"type": [part["type"] for part in parts] + (["null"] if nullable else [])}
     if is_dataclass(kind):
         return {"description": _first(kind), **_object(kind)}
     if container is Mapping:
@@ -158,8 +182,11 @@ def _unwrapped(hint: Any) -> tuple[Any, bool, tuple[Any, ...]]:
             said += hint.__metadata__
             hint = hint.__origin__
         elif get_origin(hint) in (Union, UnionType):
-            nullable = True
-            (hint,) = (one for one in get_args(hint) if one is not NoneType)
+            kinds = [one for one in get_args(hint) if one is not NoneType]
+            nullable = nullable or NoneType in get_args(hint)
+            hint = reduce(or_, kinds)
+            if len(kinds) > 1:
+                return hint, nullable, tuple(said)
         else:
             return hint, nullable, tuple(said)
 

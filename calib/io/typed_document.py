@@ -43,8 +43,7 @@ REMEDY = "run the same command again"
 
 Result = TypeVar("Result")
 FORMER: Mapping[str, Any] = {"former": True}
-"""Metadata of a field whose default is None and that only documents of other versions have: it is read and not
-written."""
+"""Metadata of a field whose default is None and that only documents of other versions have: it is read, not written."""
 
 
 def renamed(name: str) -> Mapping[str, Any]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
+from calib.io.provenance import Commit, DeviceName, Seed
+from calib.io.type_schema import Count, NumberOrNull, Positive, keywords, one_of
 from calib.io.typed_document import FLAT
 
 RESULT_FILE = "scalars.json"
@@ -18,20 +20,20 @@ class PropertyResult:
     """A property of the food.
 
     Attributes:
-        role: ``fitted``, or ``drawn`` for the band.
-        value: Best value, or that of the food [unit].
-        unit: SI unit, ``-`` where there is none.
-        low95: Lower end of 95 % of the draws that met the given numbers [unit], NaN without draws.
-        high95: Upper end [unit].
-        prior_low: Lower end of the prior's 95 % range [unit].
+        role: Whether it is fitted, or drawn for the band.
+        value: Best value, or that of materials.yaml [unit].
+        unit: SI unit, - where there is none.
+        low95: Lower end of 95 % of the draws that met the given numbers [unit]; null without draws.
+        high95: Upper end [unit]; null without draws.
+        prior_low: Lower end of the literature's 95 % range [unit].
         prior_high: Upper end [unit].
     """
 
-    role: str
+    role: Annotated[str, one_of("fitted", "drawn")]
     value: float
     unit: str
-    low95: float
-    high95: float
+    low95: NumberOrNull
+    high95: NumberOrNull
     prior_low: float
     prior_high: float
 
@@ -41,29 +43,29 @@ class NumberResult:
     """A published number and what is simulated of it.
 
     Attributes:
-        specimen: Name of its cut.
-        quantity: What it is, with its unit.
-        role: ``given`` to the fit, or ``predicted``.
-        published: Its value [unit of the quantity].
-        relative_sd: Its standard deviation, a fraction of the value [-].
-        simulated: What the fitted properties give [unit of the quantity].
-        error: Simulated over published, less 1 [-].
-        misfit_sd: Logarithm of simulated over published, in standard deviations [-].
-        low95: Lower end of 95 % of the draws [unit of the quantity], NaN without draws.
-        high95: Upper end [unit of the quantity].
-        inside: Whether the published value is between them, None without draws.
+        specimen: Cut it is of.
+        quantity: What it is, with its unit: peak_N or energy_J_m2.
+        role: Whether the fit was given it.
+        published: Published value [unit of the quantity].
+        relative_sd: Its relative standard deviation.
+        simulated: Simulated value [unit of the quantity].
+        error: Simulated over published less 1.
+        misfit_sd: Logarithm of simulated over published, in standard deviations.
+        low95: Lower end of 95 % of the draws; null without draws.
+        high95: Upper end; null without draws.
+        inside: Whether the published value is between them; null without draws.
     """
 
     specimen: str
     quantity: str
-    role: str
-    published: float
-    relative_sd: float
-    simulated: float
+    role: Annotated[str, one_of("given", "predicted")]
+    published: Positive
+    relative_sd: Positive
+    simulated: Positive
     error: float
     misfit_sd: float
-    low95: float
-    high95: float
+    low95: NumberOrNull
+    high95: NumberOrNull
     inside: bool | None
 
 
@@ -72,25 +74,31 @@ class FullnessResult:
     """Largest over mean force of a cut [-].
 
     Attributes:
-        specimen: Name of the cut.
-        published: As published, None where one of both numbers is missing.
+        specimen: The cut.
+        published: As published; null where it is not.
         simulated: As simulated.
         uniform: Where the force goes with the width that is cut.
     """
 
     specimen: str
     published: float | None
-    simulated: float
-    uniform: float
+    simulated: Positive
+    uniform: Positive
 
 
 @dataclass(frozen=True)
 class DrawCounts:
-    """How many draws met the given numbers, could not, and broke down."""
+    """How many draws met the given numbers, could not, and broke down.
 
-    met: int
-    unmet: int
-    broke_down: int
+    Attributes:
+        met: Met the given numbers.
+        unmet: Could not.
+        broke_down: Broke down.
+    """
+
+    met: Count
+    unmet: Count
+    broke_down: Count
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,14 +106,14 @@ class FittedNumbers:
     """Published numbers, given to the fit or predicted by it.
 
     Attributes:
-        source: Where they were published.
-        food: Name of the food.
-        knife: Name of the knife.
-        limit: Largest error of a predicted number that passes [-].
-        fit: Properties that were fitted.
-        vary: Properties that were drawn.
-        parameters: The properties, by name.
-        numbers: The numbers.
+        source: Publication.
+        food: Food of materials.yaml, or of the file given.
+        knife: Knife of knives.yaml, or of the file given.
+        limit: Largest error of a predicted number, a fraction.
+        fit: Properties that are fitted.
+        vary: Properties that are drawn.
+        parameters: Properties, by name.
+        numbers: Published numbers.
         fullness: Largest over mean force of each cut.
         draws: What the draws came to.
     """
@@ -118,12 +126,12 @@ class FittedNumbers:
     source: str
     food: str
     knife: str
-    limit: float
+    limit: Positive
     fit: tuple[str, ...]
     vary: tuple[str, ...]
-    parameters: Mapping[str, PropertyResult]
-    numbers: tuple[NumberResult, ...]
-    fullness: tuple[FullnessResult, ...]
+    parameters: Mapping[str, Annotated[PropertyResult, keywords(description="One of them")]]
+    numbers: tuple[Annotated[NumberResult, keywords(description="One of them")], ...]
+    fullness: tuple[Annotated[FullnessResult, keywords(description="One cut")], ...]
     draws: DrawCounts
 
     @property
@@ -138,34 +146,37 @@ class FittedNumbers:
 
     @property
     def passed(self) -> bool:
-        """Whether both are so."""
+        """Whether the given numbers are met and the predicted ones within the limit."""
         return self.consistent and self.predicted
 
 
 @dataclass(frozen=True, kw_only=True)
 class ScalarFitResult:
-    """A finished fit to published numbers.
+    """Properties from published numbers.
+
+    ``scalars.json`` of ``cutcal scalars``, and what ``cutcal scalars --json`` prints.
 
     Attributes:
         fitted: The numbers and the properties.
-        draws_asked: Draws that were asked for.
-        seed: Seed of draws and particles.
-        evaluations: Simulations that were asked for, known ones included.
-        failed_evaluations: Those of them that broke down.
-        dx_m: Cell size of the default grid [m], by cut.
+        draws_asked: Draws asked for.
+        seed: Seed of the particles, and of the search or the draws where there are any.
+        evaluations: Simulations asked for, known ones included.
+        failed_evaluations: Those that broke down.
+        dx_m: Cell of the default grid [m], by cut.
         device: Device of the simulations.
         cutcal: Version of cutcal.
-        commit: Commit of the checkout.
+        commit: Commit of the checkout that ran, with +changes where it was edited; null where cutcal was installed
+            without one.
     """
 
     DOCUMENT: ClassVar[str] = "scalars"
 
     fitted: FittedNumbers = field(metadata=FLAT)
-    draws_asked: int
-    seed: int
-    evaluations: int
-    failed_evaluations: int
-    dx_m: Mapping[str, float]
-    device: str
+    draws_asked: Count
+    seed: Seed
+    evaluations: Count
+    failed_evaluations: Count
+    dx_m: Mapping[str, Positive]
+    device: DeviceName
     cutcal: str
-    commit: str | None
+    commit: Commit

@@ -196,7 +196,7 @@ def run(study: PriorStudy, out: Path, pool: Workers, *, resume: bool, say: Calla
         "foods": rows,
     }
     write_json(out / "prior.json", document)
-    from reports.prior import write_figure
+    from reports.calibration.prior import write_figure
 
     write_figure(out)
     return document

@@ -1,1 +1,1 @@
-"""The report of a calibration."""
+"""Reports of calibrations: on one trace and of a study; figures of a compression test and of prior predictives."""

@@ -214,11 +214,11 @@ def _peers(peers: Sequence[PeerResult]) -> ReportTable:
     """Rates of other codes; one that could not be measured says why."""
     rows = []
     for peer in peers:
-        if peer.error is not None:
+        if hasattr(peer, "error"):
             rows.append([peer.name, f"not measured: {breakable(peer.error)}", "", ""])
         else:
             rates = [quantity(rate, "-") for rate in (peer.Mps, peer.ours_Mps, peer.ratio)]
-            rows.append([f"{peer.name} {peer.version or ''}", *rates])
+            rows.append([f"{peer.name} {peer.version}", *rates])
     return ReportTable(("Code", "Its rate", "Ours", "Ours over its"), ("1fr", "auto", "auto", "auto"), rows)
 
 

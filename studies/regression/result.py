@@ -6,11 +6,14 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ClassVar
+from typing import Annotated, Any, ClassVar
 
 from calib.io.folder import write_csv, write_json
+from calib.io.provenance import Commit, DeviceName, Versions
+from calib.io.type_schema import NotNegative, NumberOrNull, keywords, one_of
 from calib.io.typed_document import to_document
 from mpm.arrays import FloatArray
+from mpm.scene import CONTACTS
 from studies.regression.reference_curves import DIGITS
 
 RESULT_FILE = "regress.json"
@@ -21,6 +24,13 @@ VERDICT_MEANINGS = {
     "broke down": "the cut did not reach its end",
     "new": "nothing was recorded that could be read",
 }
+VERDICT: Mapping[str, Any] = {
+    "description": "same: the recorded curve but for rounding; within: no further away than another seed's; "
+    "outside: further; broke down: no end; new: nothing recorded",
+    "enum": [*VERDICT_MEANINGS],
+}
+"""JSON Schema of a verdict."""
+VerdictWord = Annotated[str, one_of(*VERDICT_MEANINGS)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,12 +47,18 @@ class NumberChange:
     before: float | None = None
     now: float
     change: float | None = None
-    over_limit: float | None = None
+    over_limit: NotNegative | None = None
 
 
 @dataclass(frozen=True)
 class NumberChanges:
-    """Peak [N], stroke at which it is [m], and work [J] of a cut."""
+    """Peak [N], stroke at which it is [m], and work [J] of a cut.
+
+    Attributes:
+        peak_N: One number of a cut.
+        peak_stroke_m: One number of a cut.
+        work_J: One number of a cut.
+    """
 
     peak_N: NumberChange
     peak_stroke_m: NumberChange
@@ -55,17 +71,17 @@ class LargestDeviation:
 
     Attributes:
         column: Column of the reference.
-        stroke_m: Where it is [m].
-        difference: How much it is [unit of the column].
+        stroke_m: Where [m].
+        difference: How much, in the unit of the column.
         over_tolerance: The same over the tolerance [-].
         part: Largest deviation of any column over the largest force or work [-].
     """
 
     column: str
     stroke_m: float
-    difference: float
-    over_tolerance: float
-    part: float
+    difference: NotNegative
+    over_tolerance: NotNegative
+    part: NotNegative
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,17 +89,17 @@ class CutComparison:
     """What became of a recorded cut.
 
     Attributes:
-        food: Name of the food.
+        food: Food of materials.yaml.
         contact: Kind of contact.
-        reason: Why the cut broke down, empty where it did not.
+        reason: Why a cut broke down; empty where it did not.
         recorded: Whether a new reference was written.
         because: What is another than when the reference was recorded.
-        results: Peak and work; None where the cut broke down.
-        shape_error: Difference of the curves, each over its own peak [-]; NaN where one has no force, None without
-            curves.
-        nrmse: Root mean square difference of the curves over the recorded peak [-]; the same.
-        verdict: One of :data:`VERDICT_MEANINGS`.
-        largest: The largest deviation; None where there is nothing to compare.
+        results: Largest force [N], stroke at which it is [m], and work [J].
+        shape_error: Difference of the curves, each over its own peak [-]; null where one has no force.
+        nrmse: Root mean square difference of the curves over the recorded peak [-].
+        verdict: same: the recorded curve but for rounding; within: no further away than another seed's; outside:
+            further; broke down: no end; new: nothing recorded.
+        largest: The deviation that is largest over its tolerance.
         columns: The new curves by the names of the reference's columns, (60,) each; None where the cut broke down.
     """
 
@@ -92,47 +108,50 @@ class CutComparison:
     )  # fmt: skip
 
     food: str
-    contact: str
+    contact: Annotated[str, one_of(*CONTACTS)]
     reason: str = ""
     recorded: bool = False
     because: tuple[str, ...] = ()
     results: NumberChanges | None = None
-    shape_error: float | None = None
-    nrmse: float | None = None
-    verdict: str
+    shape_error: NumberOrNull | None = None
+    nrmse: NumberOrNull | None = None
+    verdict: VerdictWord
     largest: LargestDeviation | None = None
     columns: Mapping[str, FloatArray] | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, kw_only=True)
 class RegressionResult:
-    """Cuts compared with those that were recorded.
+    """Cuts against those that were recorded.
+
+    ``regress.json`` of ``cutcal regress``, and what ``cutcal regress --json`` prints.
 
     Attributes:
-        update: Whether references were recorded.
-        cases: The cuts.
+        update: Whether references were recorded (--update).
+        cases: The cuts, in the order of the foods.
         device: Device of the simulations.
-        versions: Versions of cutcal, Python and packages.
-        git: Commit of the checkout.
+        versions: Versions of cutcal, of Python and of the packages that a result depends on.
+        git: Commit of the checkout that ran, with +changes where it was edited; null where cutcal was installed without
+            one.
     """
 
     DOCUMENT: ClassVar[str] = "regress"
     KEYS: ClassVar[tuple[str, ...]] = ("passed", "update", "counts", "cases", "device", "versions", "git")
 
     update: bool
-    cases: tuple[CutComparison, ...]
-    device: str
-    versions: Mapping[str, str]
-    git: str | None
+    cases: tuple[Annotated[CutComparison, keywords(description=None)], ...]
+    device: DeviceName
+    versions: Versions
+    git: Commit
 
     @property
     def passed(self) -> bool:
-        """Whether no cut broke down, and none is outside its tolerances where nothing was recorded."""
+        """Whether no cut is outside its tolerances or broke down (with --update: whether none broke down)."""
         bad = {"broke down"} if self.update else {"broke down", "outside"}
         return not any(one.verdict in bad for one in self.cases)
 
     @property
-    def counts(self) -> dict[str, int]:
+    def counts(self) -> Annotated[Mapping[str, Annotated[int, keywords(minimum=1)]], keywords(propertyNames=VERDICT)]:
         """Number of cuts of each verdict."""
         return dict(Counter(one.verdict for one in self.cases))
 

@@ -17,7 +17,7 @@ from mpm.scene import EdgeLaw, Food, Knife, Motion, Numerics, Scene
 from mpm.scene.material import Material
 from mpm.scene.shapes import Shape
 from studies.speed.peers import PEERS, measure
-from studies.speed.result import PeerResult, PublishedConfiguration, Throughput
+from studies.speed.result import MeasuredPeer, PeerResult, PublishedConfiguration, Throughput, UnmeasuredPeer
 from studies.speed.timing import RateMeter, Session
 
 # The published configuration: nodes along each axis, time step [s] (CulinaryCut, section 4.1). Its cell is the one with
@@ -168,14 +168,14 @@ def peers(session: Session, python: str) -> tuple[PeerResult, ...]:
 def _peer_result(answer: Mapping[str, Any], ours: float) -> PeerResult:
     """What a peer answered, beside our particle steps a second [1/s]."""
     if "seconds" not in answer:
-        return PeerResult(answer["name"], error=answer["error"])
+        return UnmeasuredPeer(answer["name"], answer["error"])
     theirs = answer["particles"] / answer["seconds"]
     rates = {"Mps": theirs / 1e6, "ours_Mps": ours / 1e6, "ratio": ours / theirs}
-    return PeerResult(answer["name"], answer["seconds"], answer["version"], answer["particles"], **rates)
+    return MeasuredPeer(answer["name"], answer["seconds"], answer["version"], answer["particles"], **rates)
 
 
 def _peer_words(peer: PeerResult) -> str:
-    if peer.error is not None:
+    if isinstance(peer, UnmeasuredPeer):
         return f"{peer.name}: not measured, {peer.error}"
     return f"{peer.name} {peer.version}: {peer.Mps:.2f} million particle steps a second, {peer.ratio:.1f}"
 

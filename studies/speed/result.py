@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
+from calib.io.provenance import CommandLine, Commit, DeviceName, Versions
+from calib.io.type_schema import Count, NotNegative, Positive, Shared, keywords
 from calib.io.typed_document import FLAT
 
 RESULT_FILE = "bench.json"
@@ -16,14 +17,14 @@ class CutErrors:
     """Errors of a cut against the same on finer cells.
 
     Attributes:
-        peak_error: Peak over that of the reference, less 1 [-].
-        work_error: Work over that of the reference, less 1 [-].
-        nrmse: Root mean square difference from the reference over its peak [-].
+        peak_error: Peak over that of the reference less 1.
+        work_error: Work over that of the reference less 1.
+        nrmse: Root mean square difference from the reference over its peak.
     """
 
     peak_error: float
     work_error: float
-    nrmse: float
+    nrmse: NotNegative
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,22 +36,22 @@ class Throughput:
         bandwidth_GBps: Bytes that the memory reads and writes a second [1e9/s].
         bytes_per_particle_step: Bytes that a particle step has to move.
         memory_bound_Mps: Particle steps a second that the memory would bear [1e6/s].
-        full_physics_Mps: Ours [1e6/s].
-        single_Mps: Ours in single precision [1e6/s]; older documents have none.
-        textbook_Mps: Those of the textbook's kernel with the same physics [1e6/s].
-        ratio: Ours over the textbook's [-].
+        full_physics_Mps: Particle steps a second [1e6/s].
+        single_Mps: Ours in single precision [1e6/s].
+        textbook_Mps: Those of a textbook kernel with the same physics [1e6/s].
+        ratio: Ours over the textbook's.
         cut_Mps: Ours inside the default cut [1e6/s].
     """
 
-    particles: int
-    bandwidth_GBps: float
-    bytes_per_particle_step: int
-    memory_bound_Mps: float
-    full_physics_Mps: float
-    single_Mps: float | None = None
-    textbook_Mps: float
-    ratio: float
-    cut_Mps: float
+    particles: Count
+    bandwidth_GBps: Positive
+    bytes_per_particle_step: Count
+    memory_bound_Mps: Positive
+    full_physics_Mps: Positive
+    single_Mps: Positive | None = None
+    textbook_Mps: Positive
+    ratio: Positive
+    cut_Mps: Positive
 
 
 @dataclass(frozen=True)
@@ -59,21 +60,21 @@ class PublishedConfiguration:
 
     Attributes:
         nodes: Nodes along each axis.
-        dx_m: Cell size [m].
+        dx_m: Cell [m].
         dt_s: Time step [s].
         particles: Particles.
         steps: Steps of the whole cut.
-        step_s: Run time of a step [s].
-        wall_s_extrapolated: Run time of the whole cut, from a few of its steps [s].
+        step_s: Time of a step [s].
+        wall_s_extrapolated: Time of the whole cut, from a few of its steps [s].
     """
 
-    nodes: int
-    dx_m: float
-    dt_s: float
-    particles: int
-    steps: int
-    step_s: float
-    wall_s_extrapolated: float
+    nodes: Count
+    dx_m: Positive
+    dt_s: Positive
+    particles: Count
+    steps: Count
+    step_s: Positive
+    wall_s_extrapolated: Positive
 
 
 @dataclass(frozen=True)
@@ -86,18 +87,18 @@ class DefaultCut:
         particles: Particles.
         steps: Time steps.
         nodes: Nodes of the grid.
-        reference_dx_m: Cell size of the reference [m].
+        reference_dx_m: Cell of the reference [m].
         reference_wall_s: Run time of the reference [s].
         errors: Its errors.
     """
 
-    wall_s: float
-    first_run_s: float
-    particles: int
-    steps: int
-    nodes: int
-    reference_dx_m: float
-    reference_wall_s: float
+    wall_s: Positive
+    first_run_s: Positive
+    particles: Count
+    steps: Count
+    nodes: Count
+    reference_dx_m: Positive
+    reference_wall_s: Positive
     errors: CutErrors = field(metadata=FLAT)
 
 
@@ -107,24 +108,30 @@ class ProcessScaling:
 
     Attributes:
         processes: Processes.
-        speed_up: Cuts in the time of one [-].
-        cut_Mps: Particle steps a second of all together [1e6/s]; older documents have none.
-        start_up_s: What the first cut of a further process takes longer than its next [s]; older documents have none.
+        speed_up: Cuts in the time of one.
+        cut_Mps: Particle steps a second of all together [1e6/s].
+        start_up_s: What the first cut of a further process takes longer than its next, the kernels compiled before [s].
     """
 
-    processes: int
-    speed_up: float
-    cut_Mps: float | None = None
+    processes: Count
+    speed_up: Positive
+    cut_Mps: Positive | None = None
     start_up_s: float | None = None
 
 
 @dataclass(frozen=True)
 class BatchTime:
-    """Cuts side by side: how many, least run time of them all [s], time of each over that of one alone [-]."""
+    """Cuts side by side: how many, least run time of them all [s], time of each over that of one alone [-].
 
-    cuts: int
-    wall_s: float
-    per_cut: float
+    Attributes:
+        cuts: How many.
+        wall_s: Least run time of them all [s].
+        per_cut: Time of each over that of one alone.
+    """
+
+    cuts: Annotated[int, keywords(minimum=1)]
+    wall_s: Positive
+    per_cut: Positive
 
 
 @dataclass(frozen=True)
@@ -133,10 +140,11 @@ class Ablation:
 
     Attributes:
         name: What was changed.
-        status: How the run ended.
+        status: How a simulation ended: done, or why it broke down: a force or position is no number, food left the
+            grid, a particle was turned inside out.
         wall_s: Least run time [s].
         first_run_s: Time of the first run, with compilation [s].
-        time_ratio: Run time over that of the default cut, in turns [-].
+        time_ratio: Run time over that of the default cut, in turns.
         particles: Particles.
         steps: Time steps.
         nodes: Nodes of the grid.
@@ -144,81 +152,98 @@ class Ablation:
     """
 
     name: str
-    status: str
-    wall_s: float
-    first_run_s: float
-    time_ratio: float
-    particles: int
-    steps: int
-    nodes: int
+    status: Annotated[str, Shared("runState")]
+    wall_s: Positive
+    first_run_s: Positive
+    time_ratio: Positive
+    particles: Count
+    steps: Count
+    nodes: Count
     errors: CutErrors | None = field(default=None, metadata=FLAT)
 
 
 @dataclass(frozen=True)
-class PeerResult:
-    """The elastic block in another simulator.
+class MeasuredPeer:
+    """A peer that was measured.
 
     Attributes:
         name: Its name.
-        seconds: Run time of a step [s]; this and the next are None where it could not be measured.
+        seconds: Time of a step [s].
         version: Its version.
         particles: Particles.
-        Mps: Its particle steps a second [1e6/s].
+        Mps: Particle steps a second [1e6/s].
         ours_Mps: Those of cutcal [1e6/s].
-        ratio: Ours over its [-].
-        error: Why it could not be measured, None where it was.
+        ratio: Ours over theirs.
     """
 
     name: str
-    seconds: float | None = None
-    version: str | None = None
-    particles: int | None = None
-    Mps: float | None = None
-    ours_Mps: float | None = None
-    ratio: float | None = None
-    error: str | None = None
+    seconds: Positive
+    version: str
+    particles: Count
+    Mps: Positive
+    ours_Mps: Positive
+    ratio: Positive
+
+
+@dataclass(frozen=True)
+class UnmeasuredPeer:
+    """A peer that could not be measured.
+
+    Attributes:
+        name: Its name.
+        error: Why not.
+    """
+
+    name: str
+    error: str
+
+
+PeerResult = MeasuredPeer | UnmeasuredPeer
 
 
 @dataclass(frozen=True, kw_only=True)
 class BenchmarkResult:
-    """A benchmark, finished or not: what was not measured is None.
+    """Run time against error.
+
+    ``bench.json`` of ``cutcal bench``, and what ``cutcal bench --json`` prints.
 
     Attributes:
-        food: Name of the food.
-        knife: Name of the knife.
-        command: Words of the command line.
-        complete: Whether everything was measured.
-        device: Device of the default cut.
-        threads: CPU threads.
-        versions: Versions of cutcal, Python and packages.
-        git: Commit of the checkout.
-        peers: The elastic block in other simulators.
-        throughput: Rates of the kernels.
-        paper_config: The published configuration.
-        default_cut: The default cut.
+        food: Food of materials.yaml, or of the file given.
+        knife: Knife of knives.yaml, or of the file given.
+        command: Command line, or the call from Python, that made the document.
+        complete: Whether everything was measured; the later keys are missing before.
+        device: Device of the simulations.
+        threads: Threads of the CPU.
+        versions: Versions of cutcal, of Python and of the packages that a result depends on.
+        git: Commit of the checkout that ran, with +changes where it was edited; null where cutcal was installed without
+            one.
+        peers: The elastic block in other simulators, with --peers.
+        throughput: Rate of the kernels on a block.
+        paper_config: The published configuration on this machine.
+        default_cut: The default cut against finer cells.
         processes: Several processes against one.
-        batches: Several cuts side by side in one process.
-        ratio_to_paper: Run time of the published configuration over that of the default cut [-].
+        batches: Several cuts side by side in one process, on a GPU in one launch.
+        ratio_to_paper: Run time of the published configuration over that of the default cut.
         ablations: The default cut with one thing changed.
-        exponent: Power with which the time grows with particles times steps [-].
+        exponent: Power with which the time grows with particles times steps.
     """
 
     DOCUMENT: ClassVar[str] = "bench"
 
     food: str
     knife: str
-    command: tuple[str, ...]
+    command: CommandLine
     complete: bool
-    device: str
-    threads: int
-    versions: Mapping[str, str]
-    git: str | None
-    peers: tuple[PeerResult, ...] = ()
+    device: DeviceName
+    threads: Annotated[int, keywords(minimum=1)]
+    versions: Versions
+    git: Commit
+    peers: tuple[MeasuredPeer | UnmeasuredPeer, ...] = ()
     throughput: Throughput | None = None
     paper_config: PublishedConfiguration | None = None
     default_cut: DefaultCut | None = None
     processes: ProcessScaling | None = None
-    batches: tuple[BatchTime, ...] | None = None
-    ratio_to_paper: float | None = None
-    ablations: tuple[Ablation, ...] | None = None
+    batches: tuple[Annotated[BatchTime, keywords(description="Cuts at a time")], ...] | None = None
+    ratio_to_paper: Positive | None = None
+    ablations: tuple[Annotated[Ablation, keywords(description="One of them")], ...] | None = None
     exponent: float | None = None

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
+from calib.io.provenance import CommandLine, Commit, DeviceName, Seed, Versions
+from calib.io.type_schema import Count, Fraction, NotNegative, Positive, keywords, one_of
 from calib.io.typed_document import FLAT
 from calib.simulation.workers import DIED
 
@@ -27,25 +29,25 @@ REASONS = {
 
 @dataclass(frozen=True, kw_only=True)
 class CellResult:
-    """One cell of the map.
+    """One cell. Beside the keys that are listed it has the values that are varied, names with units where they have
+    one.
 
     Attributes:
         name: The cell in words.
         family: Which values are varied together.
-        values: Names with units and values of what is varied.
-        physical: Whether a cut like this one exists, so that it must be stable.
+        values: A value that is varied.
+        physical: Whether a user could ask for it and it must be stable.
         forced: Whether checks that would refuse it were passed by.
-        status: ``stable``, ``refused``, ``stopped`` or ``unexplained``.
-        reason: Why it is not stable: of :data:`REASONS`, another word where it is unexplained, empty where it is
-            stable.
+        status: How it ended.
+        reason: Why it is not stable, a key of reasons; empty where it is, another word where it is unexplained.
         message: The reason in words.
-        fraction: Part of the stroke that was reached [-]; this and all that follows is None where nothing was run.
-        particle_steps: Particles times steps; the rest but the time is None where the run was too long.
+        fraction: Part of the stroke that was reached.
+        particle_steps: Particles times steps.
         particles: Particles.
         peak_N: Largest force [N].
         work_J: Work [J].
-        energy_gain: Largest energy from nothing over what was put in [-].
-        momentum_residual: Part of the momentum balance that does not close, over the largest force [-].
+        energy_gain: Energy beyond what was put in, a fraction.
+        momentum_residual: Part of the momentum balance that does not close.
         steps: Time steps.
         dt_s: Time step [s].
         wall_s: Run time [s].
@@ -56,19 +58,19 @@ class CellResult:
     values: Mapping[str, float | str | None] = field(metadata=FLAT)
     physical: bool
     forced: bool
-    status: str
+    status: Annotated[str, one_of("stable", "refused", "stopped", "unexplained")]
     reason: str
     message: str
-    fraction: float | None = None
-    particle_steps: float | None = None
-    particles: float | None = None
+    fraction: Fraction | None = None
+    particle_steps: NotNegative | None = None
+    particles: NotNegative | None = None
     peak_N: float | None = None
     work_J: float | None = None
     energy_gain: float | None = None
     momentum_residual: float | None = None
-    steps: float | None = None
-    dt_s: float | None = None
-    wall_s: float | None = None
+    steps: NotNegative | None = None
+    dt_s: Positive | None = None
+    wall_s: NotNegative | None = None
 
     @property
     def stable(self) -> bool:
@@ -78,10 +80,16 @@ class CellResult:
 
 @dataclass(frozen=True)
 class PhysicalCells:
-    """Cells that must be stable: how many, how many are, and the names of the others."""
+    """Cells that must be stable: how many, how many are, and the names of the others.
 
-    cells: int
-    stable: int
+    Attributes:
+        cells: How many.
+        stable: How many of them are.
+        not_stable: Names of the others.
+    """
+
+    cells: Count
+    stable: Count
     not_stable: tuple[str, ...]
 
 
@@ -90,29 +98,32 @@ class MapLimits:
     """Limits of the map.
 
     Attributes:
-        dt_over_limit: Time step over its limit below which a physical cell must be stable [-].
+        dt_over_limit: Time step over its limit below which a physical cell must be stable.
         particle_steps: Particle steps that a cell may take.
         time_s: Time that a cell may take [s].
     """
 
-    dt_over_limit: float
-    particle_steps: float
-    time_s: float
+    dt_over_limit: Positive
+    particle_steps: Positive
+    time_s: Positive
 
 
 @dataclass(frozen=True, kw_only=True)
 class StabilityMap:
-    """A finished stability map.
+    """Stability map.
+
+    ``stress.json`` of ``cutcal stress``, and what ``cutcal stress --json`` prints.
 
     Attributes:
-        command: Words of the command line.
-        seed: Seed of the particles.
-        cells: The cells.
+        command: Command line, or the call from Python, that made the document.
+        seed: Seed of the particles, and of the search or the draws where there are any.
+        cells: The map.
         reasons: What each reason means.
-        limits: What was allowed.
-        device: Device of the runs.
-        versions: Versions of cutcal, Python and packages.
-        git: Commit of the checkout.
+        limits: Limits.
+        device: Device of the simulations.
+        versions: Versions of cutcal, of Python and of the packages that a result depends on.
+        git: Commit of the checkout that ran, with +changes where it was edited; null where cutcal was installed without
+            one.
     """
 
     DOCUMENT: ClassVar[str] = "stress"
@@ -121,38 +132,38 @@ class StabilityMap:
         "passed", "device", "versions", "git",
     )  # fmt: skip
 
-    command: tuple[str, ...]
-    seed: int
+    command: CommandLine
+    seed: Seed
     cells: tuple[CellResult, ...]
     reasons: Mapping[str, str] = field(default_factory=lambda: dict(REASONS))
     limits: MapLimits
-    device: str
-    versions: Mapping[str, str]
-    git: str | None
+    device: DeviceName
+    versions: Versions
+    git: Commit
 
     @property
     def unexplained_cells(self) -> tuple[str, ...]:
-        """Names of the cells that ended for no known reason."""
+        """Their names."""
         return tuple(cell.name for cell in self.cells if cell.status == "unexplained")
 
     @property
-    def unexplained(self) -> int:
-        """How many they are."""
+    def unexplained(self) -> Count:
+        """Cells that ended for no reason of the list."""
         return len(self.unexplained_cells)
 
     @property
     def physical(self) -> PhysicalCells:
-        """The cells that must be stable."""
+        """Cells that must be stable."""
         bound = [cell for cell in self.cells if cell.physical]
         unstable = tuple(cell.name for cell in bound if not cell.stable)
         return PhysicalCells(len(bound), len(bound) - len(unstable), unstable)
 
     @property
-    def counts(self) -> dict[str, int]:
-        """Number of cells by reason; ``stable`` for those that are."""
+    def counts(self) -> Mapping[str, Annotated[int, keywords(minimum=1)]]:
+        """Number of cells by reason; stable for those that are."""
         return dict(Counter(cell.reason or "stable" for cell in self.cells))
 
     @property
     def passed(self) -> bool:
-        """Whether every end is explained and every physical cell is stable."""
+        """Whether no cell is unexplained and every physical one is stable."""
         return not self.unexplained_cells and not self.physical.not_stable

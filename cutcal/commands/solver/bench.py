@@ -122,6 +122,8 @@ def _line(name: str, time_ratio: float, errors: CutErrors | None) -> str:
 
 
 def _peer_line(peer: PeerResult) -> str:
-    if peer.error is not None:
+    from studies.speed.result import UnmeasuredPeer
+
+    if isinstance(peer, UnmeasuredPeer):
         return f"  elastic block in {peer.name}: not measured, {peer.error}"
     return f"  elastic block: {peer.ratio:.1f} times {peer.name} {peer.version} ({peer.Mps:.2f} million a second)"

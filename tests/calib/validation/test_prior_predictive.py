@@ -23,7 +23,7 @@ from calib.problem.parameters import Z95
 from calib.simulation.evaluation import Evaluation
 from calib.validation.prior_predictive import QUANTILES, conclude, draw, plan
 from cutcal.main import main
-from reports.prior import write_figure
+from reports.calibration.prior import write_figure
 from tests.calib.documents import valid
 from tests.data_dir import ROOT
 

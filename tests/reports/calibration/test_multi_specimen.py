@@ -8,7 +8,7 @@ import h5py
 import pytest
 
 from reports import ReportError
-from reports.multi_specimen import content, picture, read_study, write_report
+from reports.calibration.multi_specimen import content, picture, read_study, write_report
 from tests.reports import study_sample as sample
 from tests.reports.base.test_figures import looked_at
 from tests.reports.sample import pages, spaced
