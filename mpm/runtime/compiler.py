@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import functools
 import linecache
+import sys
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -16,12 +17,13 @@ from typing import Any
 Lines = tuple[list[str], int]
 
 
-def cache_parsing() -> None:
-    """Let Taichi find, wrap and parse the source of a function once, and name a statement by its line.
+def quicken_front_end() -> None:
+    """Let Taichi declare functions without a look at the source, read each once, and name a statement by its line.
 
     For each call and each copy of an unrolled loop Taichi 1.7 reads the function's source again, wraps its lines,
-    parses them and draws a caret under each expression, for messages that nobody sees. Where Taichi is not as it was in
-    1.7 nothing is done.
+    parses them and draws a caret under each expression, for messages that nobody sees. For each function that is
+    declared it looks for the source of the line from which the declaration was called, to see whether that begins a
+    class; here the frame tells. Where Taichi is not as it was in 1.7 nothing is done.
     """
     try:
         import taichi as ti
@@ -33,7 +35,7 @@ def cache_parsing() -> None:
             return
         lines, file = kernel_impl.getsourcelines, kernel_impl.getsourcefile
         transform, parse, build = kernel_impl.transform_tree, kernel_impl.ast.parse, Builder.__call__
-        fill, dedent = kernel_impl.textwrap.fill, kernel_impl.textwrap.dedent
+        fill, dedent, _ = kernel_impl.textwrap.fill, kernel_impl.textwrap.dedent, kernel_impl._inside_class
     except (ImportError, AttributeError):
         return
     spare: dict[str, list[ast.Module]] = {}  # trees that are not being transformed, by their source
@@ -62,6 +64,10 @@ def cache_parsing() -> None:
         where = f'File "{self.file}", line {node.lineno + self.lineno_offset}, in {self.func.func.__name__}:'
         return f"{where}\n{self.src[node.lineno - 1].rstrip()}\n"
 
+    def inside_class(level_of_class_stackframe: int) -> bool:
+        return "__qualname__" in sys._getframe(level_of_class_stackframe - 1).f_locals  # set in the body of a class
+
+    kernel_impl._inside_class = inside_class
     kernel_impl.getsourcelines = functools.cache(lambda function: _lines(function, lines))
     kernel_impl.getsourcefile = functools.cache(file)
     kernel_impl.textwrap = SimpleNamespace(fill=functools.cache(fill), dedent=dedent)

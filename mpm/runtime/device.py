@@ -8,7 +8,7 @@ import os
 from dataclasses import dataclass, replace
 from typing import Any
 
-from mpm.runtime.compiler import cache_parsing
+from mpm.runtime.compiler import quicken_front_end
 from mpm.scene.errors import SceneError
 
 ARCHES = ("cpu", "cuda", "vulkan", "gpu")
@@ -49,7 +49,7 @@ def start(runtime: Runtime, precision: str) -> int:
     """
     import taichi as ti
 
-    cache_parsing()
+    quicken_front_end()
     key = (runtime, precision)
     if _state["key"] == key:
         return _state["serial"]

@@ -46,6 +46,24 @@ def product(a, n: ti.template()):
     return out
 
 
+@ti.data_oriented
+class Scaled:
+    """Numbers times a factor."""
+
+    def __init__(self, factor: float) -> None:
+        self.factor = factor
+
+    @ti.func
+    def times(self, a):
+        """A number times the factor."""
+        return self.factor * a
+
+    @ti.kernel
+    def square(self) -> ti.f64:
+        """The factor times itself."""
+        return self.times(self.factor)
+
+
 @ti.kernel
 def totals() -> ti.types.vector(3, ti.f64):
     """Of a vector, of something of Python, and of a matrix."""
@@ -73,6 +91,11 @@ def test_a_function_that_is_read_again_means_the_same():
     for _ in range(2):
         np.testing.assert_array_equal(totals().to_numpy(), [6.0, 10.0, 18.0])
         np.testing.assert_array_equal(products(3.0).to_numpy(), [360.0, 18.0])
+
+
+def test_what_is_declared_in_a_class_takes_its_object():
+    """Functions and kernels of a class are told from those of a module, and each object has its own."""
+    assert (Scaled(3.0).square(), Scaled(5.0).square()) == (9.0, 25.0)
 
 
 def test_a_tree_is_read_anew_only_while_it_is_in_use():
