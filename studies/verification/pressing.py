@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.press import press
+from fem_reference.press import Elements, press
 from mpm.material import Material
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
 from mpm.shapes import Shape
@@ -158,8 +158,8 @@ def compare(how: How, test: Test, sizes: Sequence[float]) -> Iterator[Row]:
     material = replace(FOOD, yield_stress=test.yield_stress)
     # a law with a memory wants small steps; a wedge's first contact is one row of nodes
     strokes = sorted({*test.strokes, *(np.arange(1, 9) / 8 * test.strokes[-1])})
-    options = dict(test.reference)
-    curve = press(test.shape, material, strokes, half_angle=test.half_angle, bonded=test.bonded, **options)
+    elements = Elements(**dict(test.reference))
+    curve = press(test.shape, material, strokes, half_angle=test.half_angle, bonded=test.bonded, elements=elements)
     want = np.interp(test.strokes, curve.stroke, curve.force)
     misses = []
     for dx in sizes:
