@@ -33,17 +33,25 @@ class Plane:
 class Wedge:
     """A symmetric wedge along x that points down: both faces at ``half`` to the vertical, blunt up to half ``spine``.
 
-    Attributes: height of its edge [m]; half angle [rad]; spine, thickness above the shoulder [m], ``inf`` for none.
+    Attributes:
+        height: Of its edge [m].
+        half: Angle between a face and the vertical [rad].
+        spine: Thickness above the shoulder [m], ``inf`` for none.
+        fillet: Radius that rounds the shoulder [m], at most half the thickness; the faces stay tangents of it.
+        single: Whether only the face at y > 0 is there, for half a body, whose points at y = 0 may be a little beyond
+        it.
     """
 
     height: float
     half: float
     spine: float = np.inf
+    fillet: float = 0.0
+    single: bool = False
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See :class:`Obstacle`; below the edge it is the distance to the edge."""
-        side = np.where(points[:, 1] < 0, -1.0, 1.0)
-        y, above = np.abs(points[:, 1]), points[:, 2] - self.height
+        side = np.where((points[:, 1] < 0) & (not self.single), -1.0, 1.0)
+        y, above = side * points[:, 1], points[:, 2] - self.height
         c, s = np.cos(self.half), np.sin(self.half)
         d = y * c - above * s
         n = np.stack([np.zeros_like(y), side * c, np.full_like(y, -s)], axis=1)
@@ -54,7 +62,14 @@ class Wedge:
         flat = y - self.spine / 2
         shoulder = flat > d
         n = np.where(shoulder[:, None], np.stack([np.zeros_like(y), side, np.zeros_like(y)], axis=1), n)
-        return np.where(shoulder, flat, d), n
+        d = np.where(shoulder, flat, d)
+        if self.fillet == 0:
+            return d, n
+        out = flat + self.fillet  # from the middle of the fillet's circle, outwards and upwards
+        up = above - (self.spine / 2 - self.fillet + self.fillet / c) * c / s
+        arc, size = (up < 0) & (out * s + up * c > 0), np.maximum(np.hypot(out, up), 1e-300)
+        round_ = np.stack([np.zeros_like(y), side * out, up], axis=1) / size[:, None]
+        return np.where(arc, size - self.fillet, d), np.where(arc[:, None], round_, n)
 
 
 @dataclass

@@ -25,8 +25,17 @@ class Law(Protocol):
         """Whether the tangent has the major symmetry."""
         ...
 
+    @property
+    def linear(self) -> bool:
+        """Whether the tangent is a constant."""
+        ...
+
     def start(self, shape: tuple[int, ...]) -> np.ndarray | None:
         """State of undeformed points of this shape."""
+        ...
+
+    def energy(self, f: np.ndarray, state: np.ndarray | None = None) -> np.ndarray:
+        """Elastic energy per reference volume [J/m^3], of a state that is in equilibrium."""
         ...
 
     def stress(self, f: np.ndarray, state: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
@@ -79,8 +88,8 @@ def mises(tau: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Corotated:
-    """Fixed-corotated energy ``mu |F - R|^2 + lambda/2 (J - 1)^2`` (Stomakhin et al. 2012), that of the particle solver.
+class Linear:
+    """Hooke's law of small strains, eps = sym(F - 1): energy ``mu |eps|^2 + lambda/2 (tr eps)^2``.
 
     Attributes: mu [Pa]; lam, first Lame constant [Pa].
     """
@@ -88,11 +97,53 @@ class Corotated:
     mu: float
     lam: float
     symmetric = True
+    linear = True
 
     def start(self, shape: tuple[int, ...]) -> None:
         """No memory."""
 
-    def energy(self, f: np.ndarray) -> np.ndarray:
+    def energy(self, f: np.ndarray, state: np.ndarray | None = None) -> np.ndarray:
+        """Energy per volume [J/m^3]."""
+        e = self._strain(f)
+        trace = e[0, 0] + e[1, 1] + e[2, 2]
+        return self.mu * np.einsum("ij...,ij...->...", e, e) + self.lam / 2 * trace**2
+
+    def stress(self, f: np.ndarray, state: np.ndarray | None = None) -> tuple[np.ndarray, None]:
+        """sigma = 2 mu eps + lambda tr eps 1 [Pa]."""
+        e = self._strain(f)
+        return 2 * self.mu * e + self.lam * (e[0, 0] + e[1, 1] + e[2, 2]) * identity(e.shape[2:]), None
+
+    def tangent(self, f: np.ndarray, state: np.ndarray | None = None) -> np.ndarray:
+        """dsigma/dF."""
+        out = np.zeros((3, 3, *f.shape))
+        for i in range(3):
+            for k in range(3):
+                out[i, i, k, k] += self.lam
+                out[i, k, i, k] += self.mu
+                out[i, k, k, i] += self.mu
+        return out
+
+    @staticmethod
+    def _strain(f: np.ndarray) -> np.ndarray:
+        return 0.5 * (f + np.swapaxes(f, 0, 1)) - identity(f.shape[2:])
+
+
+@dataclass(frozen=True)
+class Corotated:
+    """Fixed-corotated energy ``mu |F - R|^2 + lambda/2 (J - 1)^2`` (Stomakhin et al. 2012), the particle solver's.
+
+    Attributes: mu [Pa]; lam, first Lame constant [Pa].
+    """
+
+    mu: float
+    lam: float
+    symmetric = True
+    linear = False
+
+    def start(self, shape: tuple[int, ...]) -> None:
+        """No memory."""
+
+    def energy(self, f: np.ndarray, state: np.ndarray | None = None) -> np.ndarray:
         """Energy per reference volume [J/m^3]."""
         e = f - rotation(f)
         return self.mu * np.einsum("ij...,ij...->...", e, e) + self.lam / 2 * (determinant(f) - 1) ** 2
@@ -133,11 +184,12 @@ class NeoHookean:
     mu: float
     lam: float
     symmetric = True
+    linear = False
 
     def start(self, shape: tuple[int, ...]) -> None:
         """No memory."""
 
-    def energy(self, f: np.ndarray) -> np.ndarray:
+    def energy(self, f: np.ndarray, state: np.ndarray | None = None) -> np.ndarray:
         """Energy per reference volume [J/m^3]."""
         log = np.log(determinant(f))
         return self.mu / 2 * (np.einsum("ij...,ij...->...", f, f) - 3 - 2 * log) + self.lam / 2 * log**2
@@ -175,10 +227,15 @@ class Plastic:
     lam: float
     yield_stress: float
     symmetric = False
+    linear = False
 
     def start(self, shape: tuple[int, ...]) -> np.ndarray:
         """No plastic deformation."""
         return identity(shape)
+
+    def energy(self, f: np.ndarray, state: np.ndarray | None = None) -> np.ndarray:
+        """Energy of the elastic part per reference volume [J/m^3], the state being that after the step."""
+        return Corotated(self.mu, self.lam).energy(f if state is None else product(f, state))
 
     def stress(self, f: np.ndarray, state: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         """First Piola-Kirchhoff stress [Pa], and the inverse of the plastic deformation after it."""

@@ -1,4 +1,4 @@
-"""A food pressed quasi-statically on its board by a plate or wedge: force over stroke, the reference of the particles."""
+"""A food pressed quasi-statically on its board by a plate or wedge: force over stroke."""
 
 from __future__ import annotations
 
@@ -21,6 +21,24 @@ STEP = 0.25  # way of the tool in a load step, over the size of the elements
 HALVINGS = 4  # how often a load step that fails is halved
 
 
+@dataclass(frozen=True)
+class Elements:
+    """Hexahedra of a quarter of a food.
+
+    Attributes:
+        cells: Elements along half the height.
+        order: Order of the elements, 1 or 2.
+        grade: Power by which they shrink towards the axis, 1 for none.
+        mixed: Whether the change of volume is taken from its linear projection in each element, which needs order 2.
+            Without it foods with a Poisson's ratio near 0.5, and foods that flow, are too stiff where they are bonded.
+    """
+
+    cells: int = 6
+    order: int = 1
+    grade: float = 1.0
+    mixed: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class Curve:
     """Force over stroke.
@@ -40,6 +58,9 @@ class Curve:
     unknowns: int
 
 
+DEFAULT = Elements()
+
+
 def law_of(material: Material) -> Law:
     """The material's law: the particles' elasticity, with their yield stress where there is one."""
     if math.isinf(material.yield_stress):
@@ -54,9 +75,7 @@ def press(
     *,
     half_angle: float = math.pi / 2,
     bonded: bool = False,
-    cells: int = 6,
-    order: int = 1,
-    grade: float = 1.0,
+    elements: Elements = DEFAULT,
     law: Law | None = None,
 ) -> Curve:
     """Press a food down.
@@ -67,21 +86,22 @@ def press(
         strokes: Ways of the tool below the food's top at which the force is wanted [m], rising, the first above 0.
         half_angle: Angle between the faces of the wedge and the vertical [rad]; a plate at pi / 2.
         bonded: Whether flat ends stick to plate and board; without that there is no friction.
-        cells: Elements along half the height.
-        order: Order of the elements, 1 or 2.
-        grade: Power by which the elements shrink towards the axis.
+        elements: Mesh and elements.
         law: Another law than the particles'.
+
+    Returns:
+        Force over stroke.
 
     Raises:
         MeshError: A shape without a mesh, or a bonded shape without flat ends.
         EquilibriumError: No equilibrium even in small steps; the message says where.
     """
-    mesh = quarter(shape, cells, grade, order)
+    mesh = quarter(shape, elements.cells, elements.grade, elements.order)
     flat = shape.kind in ("block", "upright_cylinder")
     if bonded and (not flat or half_angle < math.pi / 2):
         raise MeshError(f"press: a {shape.kind} under this tool has no flat ends to bond; leave out bonded")
-    solid = Solid(mesh, law or law_of(material), order)
-    h, size = shape.height, shape.height / (2 * cells)
+    solid = Solid(mesh, law or law_of(material), elements.order, elements.mixed)
+    h, size = shape.height, shape.height / (2 * elements.cells)
     x, y, z = solid.nodes.T
     near = 1e-6 * h
     for axis, place in ((0, x), (1, y)):
@@ -114,7 +134,7 @@ def press(
         done = rows[-1][0] if rows else 0.0
         parts = math.ceil((way - done) / (STEP * size))
         for k in range(parts):
-            _advance(to, done + (way - done) * k / parts, done + (way - done) * (k + 1) / parts)
+            advance(to, done + (way - done) * k / parts, done + (way - done) * (k + 1) / parts)
         at = solid.nodes + solid.u
         if bonded:
             force, board = -solid.reaction(ends[1])[2], solid.reaction(ends[0])[2]
@@ -126,16 +146,26 @@ def press(
     return Curve(stroke, forces, boards, deepest, solid.u.size)
 
 
-def _advance(to: Callable[[float], None], done: float, way: float, halvings: int = HALVINGS) -> None:
-    """Move the tool; a step that finds no equilibrium is done in two halves."""
+def advance(to: Callable[[float], None], done: float, way: float, halvings: int = HALVINGS) -> None:
+    """Move a tool; a step that finds no equilibrium is done in two halves.
+
+    Args:
+        to: Moves the tool to a way and finds equilibrium.
+        done: Way of the last equilibrium [m].
+        way: Way to go to [m].
+        halvings: How often a step may be halved.
+
+    Raises:
+        EquilibriumError: No equilibrium even in small steps; the message says where.
+    """
     try:
         to(way)
     except EquilibriumError as e:
         if halvings == 0:
             raise EquilibriumError(f"{e} (tool at {way * 1e3:.3g} mm)") from e
         middle = 0.5 * (done + way)
-        _advance(to, done, middle, halvings - 1)
-        _advance(to, middle, way, halvings - 1)
+        advance(to, done, middle, halvings - 1)
+        advance(to, middle, way, halvings - 1)
 
 
 def _skin(solid: Solid, where: Callable[[np.ndarray], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

@@ -43,7 +43,8 @@ class Opening:
 
     @property
     def released(self) -> np.ndarray:
-        """Energy that the parting of the halves at the end of the slit has released so far [J], shape (n,): work less what is stored."""
+        """Energy that the parting of the halves at the end of the slit has released so far [J], shape (n,): work less
+        what is stored."""
         steps = np.diff(self.stroke, prepend=0.0)
         return np.cumsum(steps * (self.force + np.append(0.0, self.force[:-1])) / 2) - self.stored
 
@@ -52,7 +53,8 @@ def cleave(block: Shape, material: Material, knife: Knife, lead: float, stroke: 
     """Push a blade into a block whose halves part at a fixed way ahead of the edge, without friction.
 
     The halves are held together below the slit and free above; nothing is spent on parting them. The block stands on a
-    smooth floor. Its halves turn outwards, so the lower outer edges carry it and its middle rises from the floor; the way
+    smooth floor. Its halves turn outwards, so the lower outer edges carry it and its middle rises from the floor; the
+    way
     between the slit's end and the edge is that of the deformed block.
 
     Args:
@@ -62,6 +64,9 @@ def cleave(block: Shape, material: Material, knife: Knife, lead: float, stroke: 
         lead: Way of the slit's end ahead of the edge [m].
         stroke: Way of the edge into the block [m]; the last that ends the slit at a node is less.
         cells: Elements over the lead; all elements are as high, and the slit ends at their nodes.
+
+    Returns:
+        Forces and energies as the slit grows.
 
     Raises:
         EquilibriumError: No equilibrium.

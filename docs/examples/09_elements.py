@@ -2,7 +2,7 @@
 
 from scipy.optimize import brentq
 
-from fem_reference.press import press
+from fem_reference.press import Elements, press
 from mpm import Material, Shape
 
 block = Material(E=1e5, nu=0.35, rho=1000)
@@ -21,6 +21,6 @@ j = stretch * s * s
 nominal = (2 * mu * (stretch - 1) * stretch + lam * (j - 1) * j) / stretch
 exact = -nominal * 0.02 * 0.02
 
-curve = press(Shape("block", 0.02, 0.02, 0.02), block, [0.002, 0.02 * (1 - stretch)], cells=3)
+curve = press(Shape("block", 0.02, 0.02, 0.02), block, [0.002, 0.02 * (1 - stretch)], elements=Elements(cells=3))
 print(f"finite elements {curve.force[-1]:.4f} N, closed form {exact:.4f} N")
 print(f"relative error {abs(curve.force[-1] / exact - 1):.1e}")

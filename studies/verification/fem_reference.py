@@ -10,7 +10,7 @@ import numpy as np
 
 from fem_reference.laws import Corotated, Law, Plastic
 from fem_reference.meshes import bent, box, surface
-from fem_reference.press import press
+from fem_reference.press import Elements, press
 from fem_reference.solid import Solid
 from mpm.arrays import FloatArray
 from mpm.scene.material import Material
@@ -196,7 +196,7 @@ def hertz(options: SuiteOptions) -> Iterator[Comparison]:
     """A ball and a cylinder between two plates."""
     ball, food = Shape("sphere", 0.04, 0.04, 0.04), Material(E=1e5, nu=0.35, rho=1000.0)
     way = 0.3e-3  # contact radius over radius 0.09: Hertz holds where that is small
-    curve = press(ball, food, [way / 2, way], cells=9, grade=2.0)
+    curve = press(ball, food, [way / 2, way], elements=Elements(cells=9, grade=2.0))
     modulus = food.E / (1 - food.nu**2)
     want = 4 / 3 * modulus * math.sqrt(0.02) * (way / 2) ** 1.5
     yield Comparison(
@@ -217,7 +217,8 @@ def hertz(options: SuiteOptions) -> Iterator[Comparison]:
     way = 2 * line / (math.pi * food.E) * (2 * math.log(4 * radius / half) - 1)
     round_ = Shape("cylinder", 0.002, 2 * radius, 2 * radius)
     soft = replace(food, nu=0.0)
-    curve = press(round_, soft, [way / 4, way / 2, 3 * way / 4, way], cells=6, order=2, grade=2.0)
+    elements = Elements(cells=6, order=2, grade=2.0)
+    curve = press(round_, soft, [way / 4, way / 2, 3 * way / 4, way], elements=elements)
     yield Comparison(
         "cylinder between plates",
         f"force on its length at {way * 1e3:.2g} mm [N/m]",

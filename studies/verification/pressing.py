@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.press import press
+from fem_reference.press import Elements, press
 from mpm.arrays import FloatArray
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
 from mpm.scene.material import Material
@@ -191,8 +191,8 @@ def compare(options: SuiteOptions, test: PressTest, sizes: Sequence[float]) -> I
     material = replace(PRESSED_MATERIAL, yield_stress=test.yield_stress)
     # a law with a memory wants small steps; a wedge's first contact is one row of nodes
     strokes = sorted({*test.strokes, *(np.arange(1, 9) / 8 * test.strokes[-1])})
-    of_elements = dict(test.reference)
-    curve = press(test.shape, material, strokes, half_angle=test.half_angle, bonded=test.bonded, **of_elements)
+    elements = Elements(**dict(test.reference))
+    curve = press(test.shape, material, strokes, half_angle=test.half_angle, bonded=test.bonded, elements=elements)
     want = np.interp(test.strokes, curve.stroke, curve.force)
     misses = []
     for dx in sizes:

@@ -11,7 +11,7 @@ import skfem as sk
 from fem_reference import meshes
 from fem_reference.contact import Contact, Plane, Wedge
 from fem_reference.laws import Corotated, NeoHookean
-from fem_reference.press import press
+from fem_reference.press import Elements, press
 from fem_reference.slit import Opening, cleave
 from fem_reference.solid import EquilibriumError, Solid
 from mpm.scene import Knife
@@ -42,7 +42,7 @@ def test_a_homogeneous_deformation_is_exact(kind, order):
 @pytest.mark.parametrize(("stretch", "nominal"), [(0.95, -0.05119), (0.9, -0.10507), (0.8, -0.22310), (0.7, -0.35968)])
 def test_a_sliding_press_has_the_closed_form(stretch, nominal):
     """Force = nominal stress times area, on plate and board, to 0.1 %; penetration below 1e-4 of an element."""
-    curve = press(CUBE, FOOD, [(1 - stretch) * CUBE.height], cells=2)
+    curve = press(CUBE, FOOD, [(1 - stretch) * CUBE.height], elements=Elements(cells=2))
     want = -nominal * FOOD.E * CUBE.width * CUBE.length
     assert curve.force[0] == pytest.approx(want, rel=1e-3)
     assert curve.board[0] == pytest.approx(want, rel=1e-3)
@@ -52,23 +52,23 @@ def test_a_sliding_press_has_the_closed_form(stretch, nominal):
 def test_a_flowing_press_has_the_closed_form():
     """Beyond the yield stress the Kirchhoff stress stays there: force = yield stress times area over stretch."""
     soft = Material(E=1e5, nu=0.35, rho=1000.0, yield_stress=5e3)
-    curve = press(CUBE, soft, [0.002, 0.004], cells=2)
+    curve = press(CUBE, soft, [0.002, 0.004], elements=Elements(cells=2))
     area = CUBE.width * CUBE.length
     np.testing.assert_allclose(curve.force, [5e3 * area / 0.9, 5e3 * area / 0.8], rtol=2e-3)
 
 
 def test_bonded_ends_stiffen_and_finer_elements_approach_quadratic_ones():
     """Bonded ends carry more than sliding ones; linear elements come down to the quadratic result with their size."""
-    fine = press(CUBE, FOOD, [0.002], bonded=True, cells=3, order=2).force[0]
-    coarse, finer = (press(CUBE, FOOD, [0.002], bonded=True, cells=n).force[0] for n in (2, 4))
+    fine = press(CUBE, FOOD, [0.002], bonded=True, elements=Elements(cells=3, order=2)).force[0]
+    coarse, finer = (press(CUBE, FOOD, [0.002], bonded=True, elements=Elements(cells=n)).force[0] for n in (2, 4))
     assert 1.05 * 4.203 < fine < finer < coarse < 1.15 * 4.203
     assert coarse / fine - 1 > 2 * (finer / fine - 1)
 
 
 def test_a_wedge_pushes_along_its_faces():
     """A wedge of 140 degrees indents a block with less force than a plate, and the board carries all of it."""
-    curve = press(CUBE, FOOD, [0.001, 0.002], half_angle=math.radians(70), cells=4)
-    assert 0 < curve.force[0] < curve.force[1] < 0.8 * press(CUBE, FOOD, [0.002], cells=2).force[0]
+    curve = press(CUBE, FOOD, [0.001, 0.002], half_angle=math.radians(70), elements=Elements(cells=4))
+    assert 0 < curve.force[0] < curve.force[1] < 0.8 * press(CUBE, FOOD, [0.002], elements=Elements(cells=2)).force[0]
     np.testing.assert_allclose(curve.board, curve.force, rtol=1e-5)
 
 
@@ -157,8 +157,11 @@ def test_a_bonded_block_flows_in_steps():
     """J2 flow between bonded ends: more force than with sliding ones and less than without flow."""
     soft = Material(E=1e5, nu=0.35, rho=1000.0, yield_stress=5e3)
     strokes = [0.0005, 0.001, 0.0015]
-    flowing = press(CUBE, soft, strokes, bonded=True, cells=2).force
-    sliding, elastic = press(CUBE, soft, strokes, cells=2).force, press(CUBE, FOOD, strokes, bonded=True, cells=2).force
+    flowing = press(CUBE, soft, strokes, bonded=True, elements=Elements(cells=2)).force
+    sliding, elastic = (
+        press(CUBE, soft, strokes, elements=Elements(cells=2)).force,
+        press(CUBE, FOOD, strokes, bonded=True, elements=Elements(cells=2)).force,
+    )
     assert flowing[0] == pytest.approx(elastic[0], rel=0.03)
     assert (flowing[1:] > 1.01 * sliding[1:]).all()
     assert flowing[2] < 0.8 * elastic[2]
@@ -166,7 +169,8 @@ def test_a_bonded_block_flows_in_steps():
 
 @pytest.mark.slow
 def test_a_blade_in_a_slit():
-    """The force on its faces is proportional to the stiffness, grows with its thickness, and comes near on finer elements."""
+    """The force on its faces is proportional to the stiffness, grows with its thickness, and comes near on finer
+    elements."""
     block, lead, stroke = Shape("block", 0.024, 0.016, 0.018), 3e-3, 6e-3
 
     def opening(E: float = 1e6, spine: float = 2e-3, cells: int = 2) -> Opening:
@@ -179,14 +183,16 @@ def test_a_blade_in_a_slit():
     np.testing.assert_allclose(opening(E=2e6).force, 2 * once.force, rtol=1e-4)
     assert opening(spine=1e-3).force[-1] < 0.9 * once.force[-1]
     assert opening(cells=3).force[-1] == pytest.approx(once.force[-1], rel=0.1)
-    # the halves turn outwards about the lower edges, so the middle rises, and the edge is where the slit's end leaves it
+    # the halves turn outwards about the lower edges, so the middle rises, and the edge is where the slit's end leaves
+    # it
     assert (np.diff(once.rise) > 0).all() and once.rise[0] > 0
     np.testing.assert_allclose(once.stroke + once.rise, lead / 2 * np.arange(1, 5), rtol=1e-2)
 
 
 @pytest.mark.slow
 def test_energy_that_the_end_of_a_slit_releases_is_its_virtual_extension():
-    """Work less stored energy, over the area, is how much less a block stores whose slit is one element longer (12 %)."""
+    """Work less stored energy, over the area, is how much less a block stores whose slit is one element longer (12
+    %)."""
     block, knife, size = Shape("block", 0.024, 0.016, 0.018), Knife("blade", 2e-3, math.radians(11.0), 0.02, 0.2), 1e-3
     short, long = (cleave(block, FOOD, knife, cells * size, 9e-3, cells=cells) for cells in (3, 4))
     at = short.stroke[4:]
