@@ -19,7 +19,7 @@ from calib.io.provenance import code_key
 from calib.simulation.evaluation_store import content_key
 from calib.simulation.workers import Errand
 from mpm.files import replacing
-from mpm.output.record import ForceRecord
+from mpm.output.record import COHESION, ForceRecord
 from mpm.output.section import Section
 from mpm.output.topology import Topology
 from mpm.scene import Scene
@@ -65,7 +65,7 @@ def _write(path: Path, key: str, record: ForceRecord) -> None:
                 elif name == SECTION_GROUP:
                     for part, content in (value or {}).items():
                         file[f"{SECTION_GROUP}/{part}"] = content
-                else:
+                elif value is not None or name in JSON_FIELDS:
                     file.attrs[name] = json.dumps(value) if name in JSON_FIELDS else value
     except OSError as e:
         raise OutputError(f"{path}: cannot be written ({e}); check the disk") from None
@@ -81,6 +81,7 @@ def _read(path: Path, key: str) -> ForceRecord | None:
             found = {name: values[()] for name, values in file.items() if name != SECTION_GROUP}
             found |= {name: v.item() if isinstance(v, np.generic) else v for name, v in file.attrs.items()}
             found[SECTION_GROUP] = Section(**section) if section else None
+            found.setdefault(COHESION, None)
             values = {f.name: found[f.name] for f in fields(ForceRecord)}
             values |= {name: json.loads(values[name]) for name in JSON_FIELDS}
     except (OSError, KeyError, ValueError):

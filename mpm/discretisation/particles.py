@@ -62,6 +62,25 @@ class Seeds:
         """Distance at which each particle meets the blade [m], shape (n,): as ``board_gap``, from the cut plane."""
         return _depth(np.abs(self.x[:, 1]), self.spacing)
 
+    def ties(self, mirrored: bool) -> np.ndarray:
+        """Particles that face each other across the cut plane.
+
+        At the rim of a food whose outline is not the same on both sides some may face none.
+
+        Args:
+            mirrored: Whether the cut plane is a mirror, where each faces its own image.
+
+        Returns:
+            Left and right particle, shape (k, 2), -1 for an image.
+        """
+        left, right = (np.flatnonzero(self.cells[:, 1] == layer) for layer in (-1, 0))
+        if mirrored:
+            return np.stack([self.owner[left], np.full(len(left), -1)], axis=1)
+        low, width = self.cells.min(axis=0), np.ptp(self.cells[:, 0]) + 1
+        place = (self.cells[:, 2] - low[2]) * width + self.cells[:, 0] - low[0]
+        _, a, b = np.intersect1d(place[left], place[right], return_indices=True)
+        return np.stack([self.owner[left[a]], self.owner[right[b]]], axis=1)
+
     @property
     def beside(self) -> np.ndarray:
         """Whether a particle is in the first layer beside the cut plane, shape (n,)."""
@@ -112,7 +131,11 @@ def seed(scene: Scene) -> Seeds:
     origin = np.array([low[0], (right - counts[1]) * h, 0.0])
     cells = np.stack(np.meshgrid(*[np.arange(n) for n in counts], indexing="ij"), -1).reshape(-1, 3)
     rng = np.random.default_rng(num.seed)
-    points = origin + (cells + 0.5 + JITTER * rng.uniform(-0.5, 0.5, cells.shape)) * h
+    offsets = JITTER * rng.uniform(-0.5, 0.5, cells.shape)
+    if scene.tied and not mirror_y:  # across the cut plane each faces one of the other half
+        first = counts[1] - right
+        offsets[cells[:, 1] == first] = offsets[cells[:, 1] == first - 1] * [1, -1, 1]
+    points = origin + (cells + 0.5 + offsets) * h
     there = inside(shape, points)
     points, cells = points[there], cells[there] - [0, counts[1] - right, 0]
     lattice = volume(shape) / (2 if mirror_x else 1) / (2 if mirror_y else 1) / len(points)

@@ -1,6 +1,7 @@
 """The crack as the transfers see it: on which side of it a particle is, and which nodes it sees across it.
 
-The crack lies in the cut plane. Its front is a height in each slice along the edge.
+The crack lies in the cut plane. Its front is a height in each slice along the edge. Where ties hold the food together
+(:mod:`mpm.kernels.ties`) the plane is parted from the beginning, and only the edge's law asks for the front.
 """
 
 import taichi as ti
@@ -84,7 +85,9 @@ def visible_layers(s: ti.template(), cut, p, base, q, mine):
         Layers, two bits a column, read by :func:`hidden_from`; 3 where a column is seen as a whole.
     """
     code = ALL_VISIBLE
-    if ti.static(s.cuts):
+    if ti.static(s.tied):
+        code = visible_columns(s, cut, base, q, mine)
+    elif ti.static(s.cuts):
         reach = ti.static(2.2 if s.turned else 1.6) * s.par[cut, DX]
         if ti.abs(q[1]) < reach:
             front = front_height(s, cut, q[0]) - LEAD_ZONES * s.par[cut, ZONE]
@@ -107,6 +110,25 @@ def visible_layers(s: ti.template(), cut, p, base, q, mine):
 
 
 @ti.func
+def visible_columns(s: ti.template(), cut, base, q, mine):
+    """As :func:`visible_layers` where the plane is parted from the beginning: all nodes of the other half are hidden.
+
+    Args:
+        base: Lowest node of the particle.
+        q: Its position in the scene's axes [m].
+        mine: Half that it belongs to.
+    """
+    code = ALL_VISIBLE
+    reach = ti.static(2.2 if s.turned else 1.6) * s.par[cut, DX]
+    if ti.abs(q[1]) < reach:
+        code = 0
+        for column in range(ti.static(9 if s.turned else 3)):
+            n = to_scene_axes(s, cut, node_position(s, cut, base[0] + column // 3, base[1] + column % 3, base[2]))[1]
+            code |= (3 if node_half(s, cut, n) == mine else 0) << (2 * column)
+    return code
+
+
+@ti.func
 def hidden_from(s: ti.template(), code, i, j):
     """Layer from which node column (i, j) of a particle is hidden; the same for all i where the grid is not turned."""
     return (code >> (2 * (3 * i + j if ti.static(s.turned) else j))) & 3
@@ -114,9 +136,14 @@ def hidden_from(s: ti.template(), code, i, j):
 
 @ti.func
 def particle_half(s: ti.template(), cut, p, n):
-    """Half of the food that a particle belongs to, 0 left, 1 right: fixed when it is severed, by its side before."""
+    """Half of the food that a particle belongs to, 0 left, 1 right: fixed when it is severed, by its side before.
+
+    With ties across the cut plane it is fixed from the beginning.
+    """
     out = 0  # the modelled half of a mirror is the left
-    if ti.static(not s.mirror_y):
+    if ti.static(s.tied and not s.mirror_y):
+        out = s.half[cut, p]
+    elif ti.static(not s.mirror_y):
         out = s.side[cut, p] - 1 if s.side[cut, p] > 0 else ti.cast(n >= 0, ti.i32)
     return out
 

@@ -137,7 +137,8 @@ def update_node(s: ti.template(), cut, i, j, k, dt):
     if ti.static(s.second_fields):
         if b[3] > 0:
             vb = ti.Vector([b[0], b[1], b[2]]) / b[3] + fall
-            va, vb = crack_face_contact(s, cut, i, j, k, a, b, va, vb)
+            if ti.static(not s.tied):
+                va, vb = crack_face_contact(s, cut, i, j, k, a, b, va, vb)
         if has_second_field(s, cut, j):
             # velocity of all that shares the field, mass of what was scattered here
             at = s.size[cut, SECOND_OFFSET] + j

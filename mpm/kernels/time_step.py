@@ -12,6 +12,7 @@ from mpm.kernels.g2p import grid_to_particles
 from mpm.kernels.grid_update import clear_grid, fold_mirror_images, update_grid
 from mpm.kernels.p2g import particles_to_grid
 from mpm.kernels.reductions import find_window, report
+from mpm.kernels.ties import hold_together
 from mpm.kernels.tool import move_tools, set_tool_velocity
 from mpm.state.host_transfer import ROWS, TABLES
 from mpm.state.loops import locate, repetitions, takes_part
@@ -34,6 +35,8 @@ def time_step(s: ti.template(), cut):
         apply_edge_law(s, cut)
     move_tools(s, cut)
     grid_to_particles(s, cut)  # with the contact of the particles
+    if ti.static(s.tied):
+        hold_together(s, cut)
     if ti.static(s.damage):
         smooth_driving_strain(s, cut)
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 SPENT = {
     "parting": "parting the food",
+    "cohesion": "opening ahead of the edge",
     "friction": "friction",
     "plastic": "flow",
     "damage": "damage",
@@ -28,7 +29,7 @@ def spent(energy: Mapping[str, float]) -> str:
         The text; empty where no work was done.
     """
     total = sum(energy.values())
-    parts = {words: energy[name] / total for name, words in SPENT.items()} if total > 0 else {}
+    parts = {words: energy.get(name, 0.0) / total for name, words in SPENT.items()} if total > 0 else {}
     large = sorted((part, words) for words, part in parts.items() if part >= LEAST)
     return ", ".join(f"{words} {part:.0%}" for part, words in reversed(large))
 

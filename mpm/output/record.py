@@ -12,7 +12,11 @@ from mpm.output.section import Section
 from mpm.output.topology import Topology
 
 ENERGIES = ("kinetic", "elastic", "plastic", "damage", "viscous", "friction", "parting", "unbooked")
-"""Where the work of knife and gravity has gone, each a column of a record; together they are that work."""
+"""Where the work of knife and gravity has gone, each a column of a record; together they are that work.
+
+A cut with a cohesive crack has one more, :data:`COHESION`."""
+COHESION = "cohesion"
+"""What the food has taken where it opened across the cut plane by itself, ahead of the edge."""
 LEAST_CUT = 5
 """Stroke [cells] from which the cost of parting is asked for: the new area is known to a row of cells, its fifth."""
 
@@ -62,6 +66,8 @@ class ForceRecord:
         fraction: Part of the stroke completed [-].
         section: The food across the blade's middle, where it was asked for.
         resistance: Cutting resistance R of the flesh [J/m^2]; NaN where no edge parts the food.
+        cohesion: Energy that the ties of a cohesive crack have taken so far, where the food opened ahead of the edge
+            [J], shape (n,); None without one.
     """
 
     stroke: np.ndarray
@@ -100,6 +106,7 @@ class ForceRecord:
     fraction: float = 1.0
     section: Section | None = None
     resistance: float = math.nan
+    cohesion: np.ndarray | None = None
 
     @property
     def knife(self) -> np.ndarray:
@@ -157,33 +164,49 @@ class ForceRecord:
         bent apart by the blade, part without resistance, and what they release goes on in waves that viscosity and the
         transfers between particles and grid damp. It is the energy release rate of that crack, the same on any grid
         (docs/theory.md, "Measured choices") and that of finite elements (studies/verification/cutting.py). The rest is
-        lost by the discretisation: the transfers smooth the velocities, and the contact stops what approaches it.
+        lost by the discretisation: the transfers smooth the velocities, and the contact stops what approaches it. With
+        ties across the cut plane only that rest is left.
         """
         booked = self.kinetic + self.elastic + self.plastic + self.damage + self.viscous + self.friction + self.parting
+        if self.cohesion is not None:
+            booked = booked + self.cohesion
         return self.work_done + self.weighing - booked
 
     @property
+    def surface(self) -> np.ndarray:
+        """Energy of new surface so far, taken by the edge and by ties that open ahead of it [J], shape (n,)."""
+        return self.parting if self.cohesion is None else self.parting + self.cohesion
+
+    @property
+    def energies(self) -> tuple[str, ...]:
+        """Names of the energies of this record: :data:`ENERGIES`, and :data:`COHESION` where there are ties."""
+        return ENERGIES if self.cohesion is None else (*ENERGIES[:-1], COHESION, ENERGIES[-1])
+
+    @property
     def budget(self) -> dict[str, float]:
-        """Where the work has gone by the end [J], by the names of :data:`ENERGIES`."""
-        return {name: float(getattr(self, name)[-1]) if len(self.stroke) else 0.0 for name in ENERGIES}
+        """Where the work has gone by the end [J], by the names of :attr:`energies`."""
+        return {name: float(getattr(self, name)[-1]) if len(self.stroke) else 0.0 for name in self.energies}
 
     @property
     def fracture(self) -> dict[str, float] | None:
         """Energy of new surface over its area [J/m^2]; None where there is none.
 
         ``edge_J_m2`` is that of the edge's law, ``released_J_m2`` is :attr:`unbooked`. Their sum is the work of
-        fracture that an energy balance of the whole cut would find.
+        fracture that an energy balance of the whole cut would find. With ties across the cut plane ``opening_J_m2`` is
+        theirs; that of edge and opening add up to R, and what is unbooked is lost.
         """
         if not self.severed_area > 0:
             return None
+        opening = {} if self.cohesion is None else {"opening_J_m2": float(self.cohesion[-1]) / self.severed_area}
         return {
             "edge_J_m2": float(self.parting[-1]) / self.severed_area,
+            **opening,
             "released_J_m2": float(self.unbooked[-1]) / self.severed_area,
         }
 
     @property
     def parted(self) -> float:
-        """Energy that the edge has taken over R times the new area [-]; NaN where nothing or too little is parted.
+        """Energy of new surface over R times the new area [-]; NaN where nothing or too little is parted.
 
         One, and more with a skin, where the food is cut. Where the edge presses it away, as one that flows, the force
         is that of the flow within the process zone, which is a width of the method, and R only bounds it.
@@ -191,7 +214,7 @@ class ForceRecord:
         sound = self.status == "done" and self.resistance > 0 and len(self.stroke) > 0
         if not sound or self.stroke.max() < LEAST_CUT * self.cell:
             return math.nan
-        return float(self.parting[-1]) / (self.resistance * self.severed_area) if self.severed_area > 0 else 0.0
+        return float(self.surface[-1]) / (self.resistance * self.severed_area) if self.severed_area > 0 else 0.0
 
     @property
     def weighing(self) -> np.ndarray:
@@ -229,7 +252,7 @@ class ForceRecord:
             out |= {f"{name}_f{axis}_N": values[:, k] for k, axis in enumerate("xyz")}
         out |= {"moment_Nm": self.moment, "tilt_rad": self.tilt}
         out |= {f"balance_{axis}_N": self.residual[:, k] for k, axis in enumerate("xyz")}
-        for name in ENERGIES:
+        for name in self.energies:
             out[f"{name}_J"] = getattr(self, name)
         return out
 

@@ -39,6 +39,7 @@ class Interval:
         viscous: Energy that the loss factor has taken in it [J].
         friction: Energy that friction has taken in it [J].
         parting: Energy that the cutting edge has taken in it [J].
+        cohesion: Energy that ties across the cut plane have taken in it [J].
         moment: Of the food on the knife about the middle of the edge [N m].
         tilt: Angle of the edge to the board at its end [rad].
     """
@@ -60,6 +61,7 @@ class Interval:
     viscous: float
     friction: float
     parting: float
+    cohesion: float
     moment: float
     tilt: float
 
@@ -137,6 +139,7 @@ class Recorder:
             viscous=volume * sums[row.VISCOUS],
             friction=sums[row.FRICTION_WORK],
             parting=sums[row.CUTTING_WORK],
+            cohesion=sums[row.TIE_WORK],
             moment=sums[row.MOMENT] / span,
             tilt=pose[row.TILT],
         )
@@ -195,4 +198,5 @@ class Recorder:
             status=self.status,
             fraction=fraction,
             resistance=material.R if cohesive else math.nan,
+            cohesion=np.cumsum(self._column("cohesion")) if scene.tied else None,
         )

@@ -3,6 +3,7 @@
 from mpm.scene.scene import (
     BAND_CELLS,
     CONTACTS,
+    CRACKS,
     PRECISIONS,
     STEEPEST,
     Arm,
@@ -19,6 +20,7 @@ from mpm.scene.scene import (
 __all__ = [
     "BAND_CELLS",
     "CONTACTS",
+    "CRACKS",
     "PRECISIONS",
     "STEEPEST",
     "Arm",

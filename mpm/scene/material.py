@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from mpm.scene.errors import SceneError, check_number
 
 MAX_POISSON = 0.49  # above it a single-field quadratic MPM locks volumetrically and dt falls as sqrt(1 - 2 nu)
+# Length E R / strength^2 of the process zone of a food whose cohesive strength is not known, at least [m].
+COHESIVE_ZONE = 10e-3
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,9 @@ class Material:
         skin_thickness: Thickness of the skin [m]; 0 = no skin.
         initiation_depth: Indentation under the edge at which a cut starts [m]; soft solids go deep before a cut
             nucleates (Reyssat et al. 2012, Phys. Rev. Lett. 109:244301).
+        cohesive_strength: Tension at which the food parts across the plane of a cohesive crack [Pa]; it falls from
+            there to nothing while the food opens, and the work is R. None: see :attr:`cohesion`. Other cracks do not
+            use it.
         mu: Coulomb friction of food on the blade's faces [-].
         tensile_strength: Stress at which bulk damage starts [Pa], or None.
         fracture_energy: Energy per crack area of bulk damage [J/m^2], or None. Both or none.
@@ -52,6 +57,7 @@ class Material:
     prony: tuple[tuple[float, float], ...] = ()
     adhesion: float = 0.0
     adhesion_energy: float = 0.0
+    cohesive_strength: float | None = None
 
     def __post_init__(self) -> None:
         w = "material"
@@ -77,6 +83,8 @@ class Material:
         for name in ("R_initiation", "R_skin"):
             if getattr(self, name) is not None:
                 check_number(w, name, getattr(self, name), -1e-300, 1e6, "N/m")
+        if self.cohesive_strength is not None:
+            check_number(w, "cohesive_strength", self.cohesive_strength, 0.0, 1e12, "Pa")
         if (self.tensile_strength is None) != (self.fracture_energy is None):
             raise SceneError(
                 "material: tensile_strength and fracture_energy make bulk damage together; give both or none"
@@ -113,6 +121,14 @@ class Material:
         """Force per width at which a cut starts: that of the skin where there is one, never below R [N/m]."""
         threshold = self.R_skin if self.skin_thickness > 0 else self.R_initiation
         return max(self.R, threshold or 0.0)
+
+    @property
+    def cohesion(self) -> float:
+        """Cohesive strength [Pa]: as given, else twice the yield stress, and no more than makes a process zone
+        E R / strength^2 of :data:`COHESIVE_ZONE`."""
+        if self.cohesive_strength is not None:
+            return self.cohesive_strength
+        return min(2 * self.yield_stress, math.sqrt(self.E * self.R / COHESIVE_ZONE))
 
     @property
     def rate_dependent(self) -> bool:

@@ -15,6 +15,7 @@ from mpm.scene.material import Material
 from mpm.scene.shapes import Shape
 
 CONTACTS = ("cohesive", "nodal")
+CRACKS = ("lead", "cohesive")
 PRECISIONS = ("f64", "f32")
 
 
@@ -158,14 +159,20 @@ class EdgeLaw:
     Attributes:
         zone: Width of the B-spline over which the edge's line force is spread [m]; at least one cell.
         slip: Slip of the edge in the material at which the line force is fully developed [m].
+        crack: How the food parts ahead of the edge: ``lead``, without resistance over half a zone, or ``cohesive``,
+            against ties of the food's cohesive strength, and the edge pays what is left of R (docs/theory.md, "A crack
+            with a law").
     """
 
     zone: float = 3e-3
     slip: float = 1e-3
+    crack: str = "lead"
 
     def __post_init__(self) -> None:
         check_number("edge", "zone", self.zone, 1e-5, 0.05, "m")
         check_number("edge", "slip", self.slip, 1e-5, 0.05, "m")
+        if self.crack not in CRACKS:
+            raise SceneError(f"edge: crack {self.crack!r} is not one of {', '.join(CRACKS)}")
 
 
 @dataclass(frozen=True)
@@ -254,11 +261,17 @@ class Scene:
             )
         self._check_motion()
         self._check_band()
+        self._check_ties()
 
     @property
     def cuts(self) -> bool:
         """Whether the tool is a knife."""
         return isinstance(self.knife, Knife)
+
+    @property
+    def tied(self) -> bool:
+        """Whether ties hold the food together across the cut plane, which the edge and the opening cut."""
+        return self.cuts and self.edge.crack == "cohesive"
 
     @property
     def drop(self) -> float:
@@ -312,6 +325,22 @@ class Scene:
                 f"below 2 E Gf / sigma_t^2 = {limit * 1e3:.3g} mm; use dx < {limit / BAND_CELLS * 1e3:.3g} mm"
             )
 
+    def _check_ties(self) -> None:
+        if not self.tied:
+            return
+        m, num = self.food.material, self.numerics
+        if num.contact != "cohesive":
+            raise SceneError("edge: a cohesive crack needs the contact of particles; leave out numerics.contact")
+        if not m.R > 0:
+            raise SceneError("edge: a cohesive crack needs R above 0, or the food falls apart before it is cut")
+        zone, least = m.E * m.R / m.cohesion**2, num.dx / num.ppc / 2
+        if zone < least:
+            raise SceneError(
+                f"material: cohesive strength {m.cohesion / 1e3:.3g} kPa makes a process zone E R / strength^2 of "
+                f"{zone * 1e3:.3g} mm, and the ties would snap back; use at most "
+                f"{math.sqrt(m.E * m.R / least) / 1e3:.3g} kPa or a smaller dx"
+            )
+
     @property
     def mirrors(self) -> tuple[bool, bool]:
         """Whether x = 0 and y = 0 are used as mirrors: only where the motion allows and they mirror the grid.
@@ -335,8 +364,14 @@ class Scene:
         return replace(self, food=replace(self.food, material=replace(self.food.material, **values)))
 
     def as_dict(self) -> dict[str, Any]:
-        """All numbers of the scene as plain data, for provenance and for the key of a stored run."""
-        return asdict(self)
+        """All numbers of the scene as plain data, for provenance and for the key of a stored run.
+
+        What belongs to a cohesive crack is left out of scenes without one, whose data are those of before it was there.
+        """
+        out = asdict(self)
+        if not self.tied:
+            del out["edge"]["crack"], out["food"]["material"]["cohesive_strength"]
+        return out
 
 
 # Width of a crack band of grid-smoothed damage, in cells (docs/theory.md, "Measured choices").

@@ -48,7 +48,7 @@ def _put_grid(table: np.ndarray, scene: Scene, grid: Grid) -> None:
 
 
 def _put_material(table: np.ndarray, scene: Scene, material: Material, seeds: Seeds) -> None:
-    """Constants of the bulk, its damage and its sticky faces."""
+    """Constants of the bulk, its damage, its ties across the cut plane and its sticky faces."""
     table[row.MU], table[row.LAM] = material.shear, material.lame
     table[row.YIELD] = min(material.yield_stress, UNBOUNDED)
     table[row.MASS], table[row.VOLUME] = material.rho * seeds.volume, seeds.volume
@@ -59,6 +59,8 @@ def _put_material(table: np.ndarray, scene: Scene, material: Material, seeds: Se
         table[row.EPSF] = eps0 / 2 + material.fracture_energy / (material.tensile_strength * band)
     beta = retardation_time(scene, material)
     table[row.ETA_S], table[row.ETA_B] = beta * material.shear, beta * (material.lame + 2 / 3 * material.shear)
+    if scene.tied:
+        table[row.SPACING], table[row.TIE_OPENING] = seeds.spacing, material.R / material.cohesion
     table[row.ADHESION], table[row.ADHESION_GAP] = material.adhesion / (material.rho * seeds.spacing), 1.0
     if material.adhesion > 0:
         table[row.ADHESION_GAP] = 2 * material.adhesion_energy / material.adhesion

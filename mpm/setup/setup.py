@@ -66,7 +66,12 @@ class Setup:
             turned=scene.numerics.grid_turn != 0,
             branches=len(scene.food.material.prony),
             batch=batch_capacity(batch),
+            ties=particle_capacity(len(self.ties())) if scene.tied else 0,
         )
+
+    def ties(self) -> np.ndarray:
+        """Particles that hold the food together across the plane of a cohesive crack, left and right, shape (k, 2)."""
+        return self.seeds.ties(self.scene.mirrors[1]) if self.scene.tied else np.zeros((0, 2), int)
 
     @property
     def gap(self) -> float:
@@ -103,7 +108,14 @@ class Setup:
             parameters=parameters(scene, material, self.seeds, self.grid),
             pose=pose(scene.food.shape.height + self.gap, 0.0, scene.motion.tilt),
             relaxation=self._relaxation(material),
+            ties=self._ties(material),
+            half=self.seeds.x[:, 1] >= 0 if scene.tied else np.zeros(0),
         )
+
+    def _ties(self, material: Material) -> np.ndarray:
+        """The table of ties (k, N_TIE)."""
+        pairs = self.ties()
+        return np.column_stack([pairs, np.full(len(pairs), material.R)])
 
     def _particles(self, material: Material) -> np.ndarray:
         """The table of particles (n, N_PARTICLE)."""

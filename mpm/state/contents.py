@@ -12,6 +12,9 @@ POSITION, BOARD_GAP, TOOL_GAP, VOLUME_RATIO, SURFACE_VOLUME, ADHERING = 0, 3, 4,
 N_PARTICLE = 9
 TOP_HIGH, TOP_LOW, WIDTH, FLOOR_HIGH, FLOOR_LOW, SOFTENING = range(6)
 N_SLICE = 6
+# Columns of the table of ties: left and right particle, toughness.
+LEFT, RIGHT, TOUGHNESS = range(3)
+N_TIE = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +34,9 @@ class Contents:
         parameters: Shape (N_PARAMETERS,), rows as in :mod:`mpm.state.tables`.
         pose: Of the tool, shape (N_POSE,), rows as in :mod:`mpm.state.tables`.
         relaxation: Share of each Prony branch [-], and time step over its time [-], shape (2, branches).
+        ties: Table of the ties across the cut plane, shape (k, N_TIE): left and right particle, -1 for a mirror image,
+            and toughness [J/m^2]; none without a cohesive crack.
+        half: Half of the food that each particle belongs to, 0 left, 1 right, shape (n,); empty without ties.
     """
 
     nodes: Sequence[int]
@@ -41,3 +47,5 @@ class Contents:
     parameters: np.ndarray
     pose: np.ndarray
     relaxation: np.ndarray
+    ties: np.ndarray
+    half: np.ndarray

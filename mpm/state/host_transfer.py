@@ -16,20 +16,35 @@ from mpm.state.contents import (
     BOARD_GAP,
     FLOOR_HIGH,
     FLOOR_LOW,
+    LEFT,
     N_PARTICLE,
     N_SLICE,
+    N_TIE,
     POSITION,
+    RIGHT,
     SOFTENING,
     SURFACE_VOLUME,
     TOOL_GAP,
     TOP_HIGH,
     TOP_LOW,
+    TOUGHNESS,
     VOLUME_RATIO,
     WIDTH,
     Contents,
 )
-from mpm.state.state import CUTS, N_LOOPS, PARTS, SECOND_FIELD_CELLS, SLICES, State
-from mpm.state.tables import BLOCKS, COUNT, N_PARAMETERS, N_POSE, N_SIZES, STATIONS, STRETCH, STRETCH_AT_REST
+from mpm.state.state import CUTS, N_LOOPS, PARTS, SECOND_FIELD_CELLS, SLICES, TIES, State
+from mpm.state.tables import (
+    BLOCKS,
+    COUNT,
+    N_PARAMETERS,
+    N_POSE,
+    N_SIZES,
+    R_FLESH,
+    STATIONS,
+    STRETCH,
+    STRETCH_AT_REST,
+    TIE_COUNT,
+)
 
 # Columns of the table of particles that is read after some steps: position, half, deformation gradient, Kirchhoff
 # stress and the largest strain of bulk damage.
@@ -53,6 +68,7 @@ def begin(state: State, cuts: Sequence[Contents]) -> None:
     state.n = sizes[:, COUNT]
     most = np.zeros((1, N_LOOPS), np.int32)
     most[0, [CUTS, PARTS, SLICES]] = 1, sizes[:, BLOCKS].max(), sizes[:, STATIONS].max()
+    most[0, TIES] = sizes[:, TIE_COUNT].max()
     _write(
         state,
         sizes,
@@ -63,6 +79,12 @@ def begin(state: State, cuts: Sequence[Contents]) -> None:
         _table(state, (N_POSE,), [cut.pose for cut in cuts]),
         _table(state, (2, max(state.branches, 1)), [cut.relaxation for cut in cuts]),
     )
+    if state.tied:
+        _write_ties(
+            state,
+            _table(state, (max(sizes[:, TIE_COUNT].max(), 1), N_TIE), [cut.ties for cut in cuts]),
+            _table(state, (state.n.max(),), [cut.half for cut in cuts]),
+        )
 
 
 def _sizes(state: State, cut: Contents) -> list[int]:
@@ -71,7 +93,7 @@ def _sizes(state: State, cut: Contents) -> list[int]:
     first = 0 if state.turned else max(cut.plane - SECOND_FIELD_CELLS, 0)
     end = nodes[1] if state.turned else min(cut.plane + SECOND_FIELD_CELLS + 1, nodes[1])
     blocks, mirror_sum = -(-n // state.lanes), 2 * state.plane_x - cut.between
-    return [n, blocks, *nodes, len(cut.slices), cut.plane, first, end, nodes[1] - first, mirror_sum]
+    return [n, blocks, *nodes, len(cut.slices), cut.plane, first, end, nodes[1] - first, mirror_sum, len(cut.ties)]
 
 
 def _table(state: State, shape: tuple[int, ...], parts: Sequence[np.ndarray]) -> np.ndarray:
@@ -152,6 +174,25 @@ def _write(
         s.crack_front[c, i] = 1e3
     for c, k in s.sums:
         s.sums[c, k] = 0.0
+
+
+@ti.kernel
+def _write_ties(s: ti.template(), ties: TABLES, half: ROWS):
+    """Write the ties across the cut plane, whole, and what they leave to the edge."""
+    for c, p in s.half:
+        s.half[c, p] = ti.cast(half[c, p], ti.i32) if p < s.size[c, COUNT] else 0
+    for c, n in s.tie_toughness:
+        row = ti.Vector.zero(float, N_TIE)
+        if n < s.size[c, TIE_COUNT]:
+            for k in ti.static(range(N_TIE)):
+                row[k] = ti.cast(ties[c, n, k], float)
+        s.tie_ends[c, n] = ti.Vector([ti.cast(row[LEFT], ti.i32), ti.cast(row[RIGHT], ti.i32)])
+        s.tie_toughness[c, n], s.largest_opening[c, n], s.cut_part[c, n] = row[TOUGHNESS], 0.0, 0.0
+        s.face_shear[c, n] = ti.Vector.zero(float, 2)
+    for c, i in s.passing:
+        s.passing[c, i] = ti.Vector.zero(float, 3)
+        s.passed_mean[c, i] = ti.Vector([s.par[c, R_FLESH], s.par[c, R_FLESH]])
+        s.start_excess[c, i] = 0.0
 
 
 def particles(state: State, cut: int = 0) -> Particles:

@@ -17,9 +17,9 @@ SECOND_FIELD_CELLS = 3  # cells on either side of the cut plane whose nodes may 
 REGISTER = 32  # bytes of a register of a CPU: as many particles as fill it have their elastic stress found at once
 CPU_BLOCK = 512  # Taichi runs CPU loops shorter than this on one thread, so one iteration in 512 works for a thread
 # What a loop goes over: each cut, rows of nodes in reach, lines of nodes across the mirror, parts of the particles,
-# slices along the edge, rows of nodes about what could be damaged.
-CUTS, NODE_ROWS, NODE_LINES, PARTS, SLICES, DAMAGE_ROWS = range(6)
-N_LOOPS = 6
+# slices along the edge, rows of nodes about what could be damaged, ties across the cut plane.
+CUTS, NODE_ROWS, NODE_LINES, PARTS, SLICES, DAMAGE_ROWS, TIES = range(7)
+N_LOOPS = 7
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,7 @@ class Configuration:
         turned: The grid is turned against the blade.
         branches: Number of Prony branches.
         batch: Most cuts side by side; more than one on a GPU or with one thread a cut.
+        ties: Most ties across the cut plane, 0 without a cohesive crack.
     """
 
     room: int
@@ -51,6 +52,7 @@ class Configuration:
     turned: bool = False
     branches: int = 0
     batch: int = 1
+    ties: int = 0
 
 
 @ti.data_oriented
@@ -112,6 +114,17 @@ class State:
         top_high: Highest height of the upper surface over a slice [m], (cut, slice); ``top_low`` the lowest.
         width: Part of the slice that has food [-], (cut, slice).
         floor_high: Highest height of the lower surface over a slice [m], (cut, slice); ``floor_low`` the lowest.
+        half: Half of the food that a particle belongs to, 0 left, 1 right, (cut, particle). This and what follows down
+            to ``start_excess`` is there only where ``tied``: with ties across the cut plane.
+        tie_ends: Left and right particle of a tie, (cut, tie).
+        tie_toughness: Its work of fracture over its area [J/m^2], (cut, tie).
+        largest_opening: Largest half opening of its two faces so far [m], (cut, tie).
+        cut_part: Part of it that the edge has cut [-], (cut, tie).
+        face_shear: Half of the shear of the two faces against their centres, along the cut and upwards [m], (cut, tie).
+        passing: Sums over the ties that the edge passes, with their weights: what is left of their toughness, toughness
+            [J/m^2], and the weights [-], (cut, slice).
+        passed_mean: Their last means: what is left, and toughness [J/m^2], (cut, slice).
+        start_excess: Line force beyond the toughness at which a cut has started [N/m], (cut, slice).
         sums, particle_sums, pose, order, par, size: Tables whose rows are in :mod:`mpm.state.tables`, (cut, row).
         window: Nodes that particles can reach before it is renewed: first, last + 1, (cut, 6).
         steps_left: Steps that a cut has yet to do before the next row of the report, on a GPU, (cut,).
@@ -131,6 +144,7 @@ class State:
         self.serial = not self.atomic  # short loops run where the kernel was launched
         self.parts = 1 if self.threads == 1 else self.threads * CPU_BLOCK
         self.branches, self.second_fields = own.branches, not own.nodal
+        self.tied = own.ties > 0
         self.owner: Any = None
         self.n = np.zeros(own.batch, np.int32)
         real = ti.lang.impl.get_runtime().default_fp
@@ -147,6 +161,8 @@ class State:
         self._add_grid(real, own.nodes)
         self._add_edge(real)
         self._add_tables(real)
+        if self.tied:
+            self._add_ties(real, own.ties)
         ti.sync()  # lays these fields out by themselves; Taichi does not manage those of eight scenes at once
 
     def _add_particles(self, real: Any, damage: bool) -> None:
@@ -192,6 +208,16 @@ class State:
         self.started_beside = ti.field(ti.i32, shape)
         self.top_high, self.top_low, self.width = (ti.field(real, shape) for _ in range(3))
         self.floor_high, self.floor_low = (ti.field(real, shape) for _ in range(2))
+
+    def _add_ties(self, real: Any, ties: int) -> None:
+        """Fields of the ties across the cut plane, and of what they leave to the edge."""
+        vec2, batch, slices = ti.types.vector(2, real), self.batch, (self.batch, self.slices)
+        self.half = ti.field(ti.i32, (batch, self.room))
+        self.tie_ends = ti.Vector.field(2, ti.i32, (batch, ties))
+        self.tie_toughness, self.largest_opening, self.cut_part = (ti.field(real, (batch, ties)) for _ in range(3))
+        self.face_shear = vec2.field(shape=(batch, ties))
+        self.passing, self.passed_mean = ti.types.vector(3, real).field(shape=slices), vec2.field(shape=slices)
+        self.start_excess = ti.field(real, slices)
 
     def _add_tables(self, real: Any) -> None:
         """Tables of numbers that the host sets, and of what the loops go over."""

@@ -13,12 +13,14 @@ SPINE, WEDGE_COS, WEDGE_SIN, HALF_LENGTH, BLADE_HEIGHT, GRAVITY, TIP_RADIUS, ETA
 YAW_COS, YAW_SIN, ADHESION, ADHESION_GAP = range(24, 28)
 ARM_K, ARM_C, ARM_MASS, ARM_LIMIT = range(28, 32)
 DX, INV_DX, ORIGIN_X, ORIGIN_Y, ORIGIN_Z, FIRST_STATION = range(32, 38)
-N_PARAMETERS = 38
+SPACING, TIE_OPENING = range(38, 40)
+N_PARAMETERS = 40
 
 # Rows of the table of sizes: particles, blocks of them, nodes along x, y, z, slices along the edge, the node plane
 # along y that is nearest to y = 0, the first and last + 1 node plane along y whose nodes have a second field, how far
-# behind the first that is stored, and the sum of the indices of two nodes that are mirror images across x.
-COUNT, BLOCKS, NODES, STATIONS, PLANE_Y, SECOND_BEGIN, SECOND_END, SECOND_OFFSET, MIRROR_SUM = (
+# behind the first that is stored, the sum of the indices of two nodes that are mirror images across x, and ties across
+# the cut plane.
+COUNT, BLOCKS, NODES, STATIONS, PLANE_Y, SECOND_BEGIN, SECOND_END, SECOND_OFFSET, MIRROR_SUM, TIE_COUNT = (
     0,
     1,
     2,
@@ -28,14 +30,16 @@ COUNT, BLOCKS, NODES, STATIONS, PLANE_Y, SECOND_BEGIN, SECOND_END, SECOND_OFFSET
     8,
     9,
     10,
+    11,
 )
-N_SIZES = 11
+N_SIZES = 12
 
 # Rows of the table of sums over an output interval: impulses on edge, faces and board (three each), losses of the
-# particles, how many were inverted or left the grid, work of friction and of the edge, moment on the knife.
+# particles, how many were inverted or left the grid, work of friction and of the edge, moment on the knife, work of
+# ties.
 EDGE, FACE, BOARD = 0, 3, 6
-PLASTIC, DAMAGE, VISCOUS, INVERTED, OUTSIDE, FRICTION_WORK, CUTTING_WORK, MOMENT = range(9, 17)
-N_SUMS = 17
+PLASTIC, DAMAGE, VISCOUS, INVERTED, OUTSIDE, FRICTION_WORK, CUTTING_WORK, MOMENT, TIE_WORK = range(9, 18)
+N_SUMS = 18
 
 # Rows of the sums over all particles at an output: momentum (three), kinetic and elastic energy.
 MOMENTUM, KINETIC, ELASTIC = 0, 3, 4

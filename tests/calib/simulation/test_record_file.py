@@ -15,7 +15,7 @@ from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import Motion, Scene
 from mpm.solver import Simulation
-from tests.mpm.scenes import PRISM
+from tests.mpm.scenes import PRISM, WEDGE
 
 
 def whole(scene: Scene, path: Path) -> tuple[ForceRecord, int]:
@@ -44,3 +44,13 @@ def test_a_record_is_read_back_with_its_section(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="--resume"):
         read_record(scene, path)
     assert whole(scene, path)[1] == 1
+
+
+def test_energy_of_ties_is_read_back(tmp_path: Path) -> None:
+    """Of a cohesive crack; a record without one has none when it is read back."""
+    scene = replace(PRISM, knife=WEDGE, motion=Motion(4e-3, 0.02)).with_material(E=1e7, R=30.0, R_initiation=30.0)
+    tied = replace(scene, edge=replace(scene.edge, crack="cohesive"))
+    (first, one), (again, none) = (whole(tied, tmp_path / "tied.h5") for _ in range(2))
+    assert (one, none) == (1, 0) and first.cohesion is not None and again.cohesion is not None
+    assert np.array_equal(first.cohesion, again.cohesion) and first.cohesion[-1] > 0
+    assert whole(scene, tmp_path / "lead.h5")[0].cohesion is None

@@ -1,0 +1,198 @@
+"""Ties across the cut plane: what holds the two halves of the food together, and what of it the edge has to pay.
+
+The law of a cohesive crack. The cut plane is parted from the beginning. Each pair of particles that face each other
+across it is held by a tie, as stiff as the contact of surfaces, whose tension is capped by a softening envelope: the
+food's own law of fracture, whoever loads it (docs/theory.md, "A crack with a law").
+"""
+
+import taichi as ti
+
+from mpm.kernels.constitutive import full
+from mpm.kernels.crack import IN_CONTACT
+from mpm.kernels.surface_contact import CONTACT_STIFFNESS
+from mpm.kernels.tool import edge_height, under_blade
+from mpm.state.accessors import step_size, to_grid_axes, to_scene_axes, velocity_gradient
+from mpm.state.loops import locate_active, repetitions
+from mpm.state.state import SLICES, TIES
+from mpm.state.tables import (
+    BLADE_HEIGHT,
+    DX,
+    FIRST_STATION,
+    INV_DX,
+    MASS,
+    MIRROR_SUM,
+    SPACING,
+    STATIONS,
+    TIE_OPENING,
+    TIE_WORK,
+)
+
+# Cells by which the middle of what the edge is cutting lies below it, so that it has cut all that is above it. Ties
+# that were left there would press the halves on the faces of a thin blade, and the more friction would they make, the
+# larger the cells.
+AHEAD_CELLS = 0.5
+
+
+@ti.func
+def softened_tension(opening, end):
+    """Tension of a tie over its strength [-]: it falls in a line to nothing.
+
+    Args:
+        opening: Largest half opening so far [m].
+        end: Half opening at which nothing holds any more [m].
+    """
+    return ti.max(0.0, 1.0 - opening / end)
+
+
+@ti.func
+def work_spent(opening, end):
+    """Part of its toughness that a tie has taken [-]: the area under :func:`softened_tension`.
+
+    Args:
+        opening: Largest half opening so far [m].
+        end: Half opening at which nothing holds any more [m].
+    """
+    r = ti.min(opening / end, 1.0)
+    return r * (2.0 - r)
+
+
+@ti.func
+def passing_weight(height):
+    """Weight with which the edge pays for a tie [-], a hat; ``height``: of the tie over the hat's middle [hats]."""
+    return ti.max(0.0, 1.0 - ti.abs(height))
+
+
+@ti.func
+def passed_part(height):
+    """Part of a tie that the edge has cut [-]: the integral of :func:`passing_weight`."""
+    q = ti.math.clamp(height, -1.0, 1.0)
+    return 0.5 + q - 0.5 * q * ti.abs(q)
+
+
+@ti.func
+def hold_together(s: ti.template(), cut: ti.template()):
+    """Let all ties across the cut plane pull, and see what they leave to the edge in the next step."""
+    ti.loop_config(serialize=s.serial)
+    for q in range(repetitions(s, cut, SLICES)):
+        c, i, mine = locate_active(s, cut, q, SLICES)
+        if mine:
+            s.passing[c, i] = ti.Vector.zero(float, 3)
+    for q in range(repetitions(s, cut, TIES)):
+        c, n, mine = locate_active(s, cut, q, TIES)
+        if mine:
+            pull_tie(s, c, n, step_size(s, c))
+
+
+@ti.func
+def pull_tie(s: ti.template(), cut, n, dt):
+    """One tie after the particles have moved: what the edge has cut of it, its pull, and what is left of it to cut.
+
+    The pull is the food's own traction and, for what is missing, a stiff spring on the half opening, as of the contact
+    (Nitsche). Its tension, and the shear where there are two halves, is capped together by the envelope of the largest
+    half opening so far. It is unloaded along the tie's own stiffness; pressed it is a contact.
+    """
+    p, other = s.tie_ends[cut, n][0], s.tie_ends[cut, n][1]
+    at = to_scene_axes(s, cut, s.x[cut, p])
+    own = plane_traction(s, cut, p)
+    jump = ti.Vector([0.0, -at[1] - s.tool_gap[cut, p], 0.0])  # half of it
+    if ti.static(s.mirror_y):
+        own[0], own[2] = 0.0, 0.0
+    else:
+        there = to_scene_axes(s, cut, s.x[cut, other])
+        own = 0.5 * (own + plane_traction(s, cut, other))
+        y = to_grid_axes(s, cut, ti.Vector([0.0, 1.0, 0.0]))
+        shear = s.tool_gap[cut, p] * to_scene_axes(s, cut, velocity_gradient(s, cut, p) @ y)
+        shear += s.tool_gap[cut, other] * to_scene_axes(s, cut, velocity_gradient(s, cut, other) @ y)
+        s.face_shear[cut, n] -= 0.5 * dt * ti.Vector([shear[0], shear[2]])
+        jump = 0.5 * (there - at)
+        jump[1] -= 0.5 * (s.tool_gap[cut, p] + s.tool_gap[cut, other])
+        jump[0] += s.face_shear[cut, n][0]
+        jump[2] += s.face_shear[cut, n][1]
+        at = 0.5 * (at + there)
+    tip, end = edge_height(s, cut, at[0]), s.par[cut, TIE_OPENING]
+    above = (at[2] - tip) * s.par[cut, INV_DX]
+    between = False  # the blade
+    if under_blade(s, cut, at[0]) and above * s.par[cut, DX] < s.par[cut, BLADE_HEIGHT]:
+        if cut_has_started(s, cut, at[0]):
+            s.cut_part[cut, n] = ti.max(s.cut_part[cut, n], passed_part((above + AHEAD_CELLS) / AHEAD_CELLS))
+        between = above > 0
+    left = 1.0 - s.cut_part[cut, n]
+    m = s.par[cut, MASS] * s.volume_ratio[cut, p]
+    stiff = CONTACT_STIFFNESS * m / (dt * dt)
+    force = own + stiff * jump
+    pressed = ti.min(force[1], 0.0)
+    if left > 0 or (pressed < 0 and not between):
+        opening = ti.sqrt(ti.max(jump[1], 0.0) ** 2 + jump[0] ** 2 + jump[2] ** 2)
+        tough, largest = s.tie_toughness[cut, n], s.largest_opening[cut, n]
+        area = s.par[cut, SPACING] ** 2
+        most = tough / end * area * softened_tension(largest, end) - 0.5 * stiff * ti.max(0.0, largest - opening)
+        force[1] -= pressed
+        size = force.norm()
+        if size > ti.max(most, 0.0):
+            force *= ti.max(most, 0.0) / size
+            if opening > largest:
+                s.largest_opening[cut, n] = opening
+                work = left * area * tough * (work_spent(opening, end) - work_spent(largest, end))
+                s.sums[cut, TIE_WORK] += ti.static(2.0 if s.mirror_x else 1.0) * work
+        dv = left * dt / m * force
+        if not between:
+            dv[1] += dt / m * pressed
+        push_face(s, cut, p, s.tool_gap[cut, p], dv)
+        if ti.static(not s.mirror_y):
+            push_face(s, cut, other, -s.tool_gap[cut, other], -dv)
+    weight = passing_weight((above + AHEAD_CELLS) / AHEAD_CELLS)
+    if weight > 0:
+        tough = s.tie_toughness[cut, n]
+        rest = tough * (1.0 - work_spent(s.largest_opening[cut, n], end)) if left > 0 else 0.0
+        charge_edge(s, cut, at[0], weight * ti.Vector([rest, tough, 1.0]))
+
+
+@ti.func
+def plane_traction(s: ti.template(), cut, p):
+    """Force of the food's own stress on the face of a particle beside the cut plane, whose normal is +y, in the scene's
+    axes [N]."""
+    block = p // s.lanes
+    lane = p - block * s.lanes
+    t = ti.Vector([s.tau[cut, block, r][lane] for r in range(6)])
+    out = to_scene_axes(s, cut, full(t) @ to_grid_axes(s, cut, ti.Vector([0.0, 1.0, 0.0])))
+    return out * (s.surface_volume[cut, p][1] / s.tool_gap[cut, p])
+
+
+@ti.func
+def push_face(s: ti.template(), cut, p, arm, dv):
+    """Change the velocity of a particle by an impulse that acts on its face.
+
+    Args:
+        p: The particle.
+        arm: Place of the face across the blade from its centre [m].
+        dv: Change of its velocity, in the scene's axes [m/s].
+    """
+    kick, before = to_grid_axes(s, cut, dv), s.v[cut, p]
+    if not s.visibility[cut, p] & IN_CONTACT:
+        s.visibility[cut, p] |= IN_CONTACT
+        s.contact_moment[cut, p, 0] = ti.Vector.zero(float, 4)
+        s.contact_moment[cut, p, 1] = ti.Vector.zero(float, 4)
+    turn = 4 * s.par[cut, INV_DX] * s.par[cut, INV_DX] * arm * kick
+    s.contact_moment[cut, p, 0][3] += 0.5 * ((before + kick).norm_sqr() - before.norm_sqr())
+    s.contact_moment[cut, p, 1] += ti.Vector([turn[0], turn[1], turn[2], 0.0])
+    s.v[cut, p] = before + kick
+
+
+@ti.func
+def cut_has_started(s: ti.template(), cut, place):
+    """Whether the cut has started at a place along the edge: before that the edge only dents the food."""
+    i = ti.floor((place - s.par[cut, FIRST_STATION]) * s.par[cut, INV_DX] + 0.5, ti.i32)
+    return s.start_force[cut, ti.math.clamp(i, s.first_slice, s.size[cut, STATIONS] - 1)] > 0
+
+
+@ti.func
+def charge_edge(s: ti.template(), cut, place, sums):
+    """Share what the edge passes at a place along the cut among the two slices beside it, or their mirror images."""
+    r = (place - s.par[cut, FIRST_STATION]) * s.par[cut, INV_DX]
+    low = ti.math.clamp(ti.floor(r, ti.i32), 0, s.size[cut, STATIONS] - 2)
+    t = ti.math.clamp(r - low, 0.0, 1.0)
+    for d in ti.static(range(2)):
+        i = low + d
+        if ti.static(s.mirror_x):
+            i = ti.max(i, s.size[cut, MIRROR_SUM] - i)
+        s.passing[cut, i] += (t if ti.static(d == 1) else 1.0 - t) * sums
