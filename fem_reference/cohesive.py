@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fem_reference.contact import Wedge
+from fem_reference.solid import EquilibriumError
 from fem_reference.surface import SurfacePoints
 
 
@@ -22,13 +23,17 @@ class Cohesion:
 
     Attributes:
         toughness: Work of new surface R [J/m^2], per area of the plane.
-        strength: Largest traction [Pa]; ``inf`` is not possible, a plane without opening law has ``toughness`` 0.
+        strength: Largest traction [Pa].
         stiffness: Traction per half opening before the strength is reached [Pa/m].
     """
 
     toughness: float
     strength: float
     stiffness: float
+
+    def __post_init__(self) -> None:
+        if not self.first < self.last:
+            raise EquilibriumError("cohesive law: the tie gives way before it is stretched; make it stiffer")
 
     @property
     def first(self) -> float:
@@ -133,7 +138,7 @@ class CutPlane:
             return self.cut, zero, zero
         t = np.clip((z - self.edge.height) / self.band + 0.5, 0.0, 1.0)
         c, slope, bend = t**2 * (3 - 2 * t), 6 * t * (1 - t) / self.band, (6 - 12 * t) / self.band**2
-        on = c >= self.cut
+        on = (c >= self.cut) & (t > 0) & (t < 1)
         return np.maximum(c, self.cut), np.where(on, slope, 0.0), np.where(on, bend, 0.0)
 
     def force(self, x: np.ndarray) -> np.ndarray:

@@ -73,8 +73,6 @@ def energy_release(beam: Block, blade: Blade, depth: float, tips: Sequence[float
     Raises:
         EquilibriumError: No equilibrium, or the blade's faces rub.
     """
-    if blade.friction:
-        raise EquilibriumError("energy release: a blade with friction takes energy from the crack; give it none")
     model = _Cracked(beam, blade, depth, grid)
     rows = [round(tip / model.size) for tip in tips]
     energies = {row: model.energy(row) for row in sorted({r + k for r in rows for k in (-1, 1)}, reverse=True)}
@@ -95,7 +93,7 @@ def crack_length(beam: Block, blade: Blade, depth: float, toughness: float, grid
         Way from the blade's shoulder to the crack's tip [m], and the tip's height in the undeformed block [m].
 
     Raises:
-        EquilibriumError: No equilibrium, or no such crack between the edge and the lowest element.
+        EquilibriumError: No equilibrium, the blade's faces rub, or no such crack ends in the block below the edge.
     """
     model = _Cracked(beam, blade, depth, grid)
     edge = beam.height - depth
@@ -118,6 +116,8 @@ class _Cracked(Halves):
     """Halves under a blade at rest, tied below a row of elements."""
 
     def __init__(self, beam: Block, blade: Blade, depth: float, grid: Grid) -> None:
+        if blade.friction:
+            raise EquilibriumError("energy release: a blade with friction takes energy from the crack; give it none")
         super().__init__(beam, blade, grid)
         self.size = beam.height / round(beam.height / grid.size)
         self.wedge.height = beam.height - depth

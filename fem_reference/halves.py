@@ -7,12 +7,12 @@ import skfem as sk
 
 from fem_reference.contact import Plane, Wedge
 from fem_reference.cut_case import Blade, Block, Grid
+from fem_reference.meshes import graded
 from fem_reference.solid import Solid
 from fem_reference.surface import SlidingContact, SurfacePoints, nodal, sampled
 
 PENALTY = 10.0  # stiffness of contact over the P-wave modulus and the elements' size: with more the force ripples
 SAMPLES = 8  # points of contact along the edge of an element
-COARSEST = 4.0  # width of the elements far from the plane over that at the plane
 BALANCE = 1e-6  # forces out of balance that are small enough, over those in the solid
 
 
@@ -29,7 +29,8 @@ class Halves:
 
     def __init__(self, block: Block, blade: Blade, grid: Grid) -> None:
         h, rows = block.height, round(block.height / grid.size)
-        mesh = sk.MeshQuad.init_tensor(_columns(block.length / 2, grid), np.linspace(0, h, rows + 1))
+        across = graded(block.length / 2, grid.size, grid.growth)
+        mesh = sk.MeshQuad.init_tensor(across, np.linspace(0, h, rows + 1))
         self.solid = Solid(mesh, block.law, 2, grid.mixed, BALANCE)
         near = 1e-6 * h
         plane = mesh.facets_satisfying(lambda p: p[0] < near, boundaries_only=True)
@@ -70,12 +71,3 @@ class Halves:
         """Where a point of the plane is that was at a height [m] of the undeformed block [m]."""
         order = np.argsort(self.height)
         return float(np.interp(height, self.height[order], self.points.at(self.x)[order, 2]))
-
-
-def _columns(half: float, grid: Grid) -> np.ndarray:
-    """Places of the nodes across one half [m]: widths grow away from the plane."""
-    widths = [grid.size]
-    while sum(widths) < half:
-        widths.append(min(widths[-1] * grid.growth, COARSEST * grid.size))
-    places = np.concatenate([[0.0], np.cumsum(widths)])
-    return places * half / places[-1]

@@ -130,7 +130,7 @@ class Linear:
 
 @dataclass(frozen=True)
 class Corotated:
-    """Fixed-corotated energy ``mu |F - R|^2 + lambda/2 (J - 1)^2`` (Stomakhin et al. 2012), that of the particle solver.
+    """Fixed-corotated energy ``mu |F - R|^2 + lambda/2 (J - 1)^2`` (Stomakhin et al. 2012), the particle solver's.
 
     Attributes: mu [Pa]; lam, first Lame constant [Pa].
     """

@@ -17,6 +17,7 @@ from mpm.shapes import Shape
 CORE = 0.55  # part of the radius that the middle block of a disc or ball reaches along the axes
 BULGE = 0.5  # how round that block is: 0 a cube, 1 a ball
 ON_OUTLINE = 1e-9  # a vertex this near to 1 in units of the outline lies on it
+COARSEST = 4.0  # size of a graded row's largest elements over its smallest
 MERGE = 1e-9  # nodes nearer than this part of the size are one
 
 Map = Callable[[np.ndarray], np.ndarray]
@@ -26,8 +27,35 @@ class MeshError(CutcalError):
     """A mesh that cannot be made or read."""
 
 
+def graded(length: float, size: float, growth: float) -> np.ndarray:
+    """Nodes of a row of elements from 0 to a length, each wider than the one before, up to four times the first.
+
+    Args:
+        length: Of the row [m].
+        size: Size of the first element [m], about: all are scaled to fill the row.
+        growth: Size of each over that of the one before.
+
+    Returns:
+        Places of the nodes [m], shape (n,).
+    """
+    widths = [size]
+    while sum(widths) < length * (1 - MERGE):
+        widths.append(min(widths[-1] * growth, COARSEST * size))
+    places = np.concatenate([[0.0], np.cumsum(widths)])
+    return places * length / places[-1]
+
+
 def box(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> sk.MeshHex:
-    """Block with nodes at these places along each axis [m]."""
+    """Block of hexahedra.
+
+    Args:
+        x: Places of the nodes along the first axis [m], shape (n,).
+        y: Along the second [m], shape (m,).
+        z: Along the third [m], shape (k,).
+
+    Returns:
+        The mesh.
+    """
     return sk.MeshHex.init_tensor(x, y, z)
 
 
@@ -39,6 +67,9 @@ def quarter(shape: Shape, cells: int, grade: float = 1.0, order: int = 1) -> sk.
         cells: Elements along half the height; along a quarter of a round outline they are twice as many.
         grade: Power by which the elements shrink towards the axes, 1 for none.
         order: 1 for straight edges; 2 for elements whose outer faces follow a round outline.
+
+    Returns:
+        The mesh.
 
     Raises:
         MeshError: A shape without such a mesh, or one that is not cut in the middle.
@@ -70,7 +101,17 @@ def _straight(shape: Shape, cells: int, grade: float) -> sk.MeshHex:
 
 
 def bent(x: np.ndarray, y: np.ndarray, z: np.ndarray, to: Map) -> sk.MeshHex2:
-    """A block with nodes at these places along each axis, mapped (3, n) to (3, n) into elements with curved edges."""
+    """A block of elements with curved edges: a straight one whose nodes, also those in the middle, are mapped.
+
+    Args:
+        x: Places of the straight block's nodes along the first axis [m], shape (n,).
+        y: Along the second [m], shape (m,).
+        z: Along the third [m], shape (k,).
+        to: Map of places, (3, n) to (3, n).
+
+    Returns:
+        The mesh.
+    """
     mesh = sk.MeshHex2.from_mesh(box(x, y, z))
     return replace(mesh, doflocs=to(mesh.doflocs))
 
@@ -93,7 +134,13 @@ def read(path: Path | str) -> sk.Mesh:
 
 
 def write(mesh: sk.Mesh, path: Path | str, u: np.ndarray | None = None) -> None:
-    """Mesh to a file, with the displacements of its vertices [m], shape (n, 3), where given."""
+    """Write a mesh to a file.
+
+    Args:
+        mesh: The mesh.
+        path: File; its suffix decides the format.
+        u: Displacements of the nodes [m], shape (n, 3), or None; those of the vertices are written.
+    """
     data = None if u is None else {"displacement": u[: mesh.p.shape[1]]}
     mesh.save(str(path), point_data=data)
 

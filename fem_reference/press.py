@@ -134,7 +134,7 @@ def press(
         done = rows[-1][0] if rows else 0.0
         parts = math.ceil((way - done) / (STEP * size))
         for k in range(parts):
-            _advance(to, done + (way - done) * k / parts, done + (way - done) * (k + 1) / parts)
+            advance(to, done + (way - done) * k / parts, done + (way - done) * (k + 1) / parts)
         at = solid.nodes + solid.u
         if bonded:
             force, board = -solid.reaction(ends[1])[2], solid.reaction(ends[0])[2]
@@ -146,16 +146,26 @@ def press(
     return Curve(stroke, forces, boards, deepest, solid.u.size)
 
 
-def _advance(to: Callable[[float], None], done: float, way: float, halvings: int = HALVINGS) -> None:
-    """Move the tool; a step that finds no equilibrium is done in two halves."""
+def advance(to: Callable[[float], None], done: float, way: float, halvings: int = HALVINGS) -> None:
+    """Move a tool; a step that finds no equilibrium is done in two halves.
+
+    Args:
+        to: Moves the tool to a way and finds equilibrium.
+        done: Way of the last equilibrium [m].
+        way: Way to go to [m].
+        halvings: How often a step may be halved.
+
+    Raises:
+        EquilibriumError: No equilibrium even in small steps; the message says where.
+    """
     try:
         to(way)
     except EquilibriumError as e:
         if halvings == 0:
             raise EquilibriumError(f"{e} (tool at {way * 1e3:.3g} mm)") from e
         middle = 0.5 * (done + way)
-        _advance(to, done, middle, halvings - 1)
-        _advance(to, middle, way, halvings - 1)
+        advance(to, done, middle, halvings - 1)
+        advance(to, middle, way, halvings - 1)
 
 
 def _skin(solid: Solid, where: Callable[[np.ndarray], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

@@ -132,7 +132,13 @@ class Solid:
         self._columns = np.broadcast_to(unknowns[None], (count, count, unknowns.shape[1])).ravel()
 
     def hold(self, nodes: np.ndarray, axes: Sequence[int], value: float = 0.0) -> None:
-        """Prescribe the displacement of some nodes along some axes [m]."""
+        """Prescribe a displacement.
+
+        Args:
+            nodes: Indices of the nodes, shape (n,).
+            axes: Axes, 0 to 2.
+            value: Displacement along them [m].
+        """
         for axis in axes:
             self.fixed |= dict.fromkeys((3 * np.asarray(nodes) + axis).tolist(), value)
 
@@ -331,7 +337,7 @@ class Solid:
     def _linear(self, k: sp.csr_matrix, b: np.ndarray, free: np.ndarray) -> np.ndarray:
         """Solution of K x = b: factorised when small, else by multigrid with the rigid-body modes."""
         symmetric = self.law.symmetric and all(s.symmetric for s in self.surfaces)
-        if len(b) <= DIRECT or self.plane:
+        if len(b) <= DIRECT or self.plane or self.surfaces:
             return _factorised(k, b, symmetric)
         x, y, z = (self.nodes + self.u).T
         modes = np.zeros((len(self.nodes), 3, 6))
