@@ -39,7 +39,7 @@ class Wedge:
         spine: Thickness above the shoulder [m], ``inf`` for none.
         fillet: Radius that rounds the shoulder [m], at most half the thickness; the faces stay tangents of it.
         single: Whether only the face at y > 0 is there, for half a body, whose points at y = 0 may be a little beyond
-        it.
+            it.
     """
 
     height: float

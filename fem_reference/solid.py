@@ -73,8 +73,7 @@ class Solid:
     """A meshed body with a material law.
 
     A mesh of quadrilaterals is a section of the plane x = 0 in plane strain: its two coordinates are y and z, every
-    node
-    is held along x, and forces, energies and weights are per metre of width along x.
+    node is held along x, and forces, energies and weights are per metre of width along x.
 
     Args:
         mesh: Hexahedra, tetrahedra, or quadrilaterals in plane strain [m].

@@ -65,10 +65,10 @@ def nodal(solid: Solid, facets: np.ndarray) -> SurfacePoints:
 
 
 def sampled(solid: Solid, facets: np.ndarray, count: int) -> SurfacePoints:
-    """Points within some facets at equal distances: a rigid corner finds one everywhere.
+    """Points within some facets, at equal distances, so that a rigid corner finds one everywhere.
 
     Args:
-        solid: The elements.
+        solid: The solid.
         facets: Indices of the facets [-], shape (n,).
         count: Points along each edge of a facet.
 
@@ -98,8 +98,7 @@ class SlidingContact:
     """Points in contact with a rigid obstacle by a penalty, on which they always slide upwards.
 
     The traction on the food is ``penalty depth (n + mu t)``: n the obstacle's outward normal and t the direction along
-    its
-    face, in the plane across the blade, that points down: the blade goes down and drags the food with it.
+    its face, in the plane across the blade, that points down: the blade goes down and drags the food with it.
 
     Attributes:
         points: Points that may touch.

@@ -1,4 +1,4 @@
-"""What is cut, with what and how finely, and what comes of it: input and result of :mod:`fem_reference.wedge`."""
+"""What is cut, with what and how finely, and what comes of it: input and result of :mod:`fem_reference.crack.wedge`."""
 
 from __future__ import annotations
 
@@ -8,10 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem_reference.laws import Corotated, Linear, NeoHookean, Plastic
+from mpm.scene.errors import CutcalError
 
 TIE = 100.0  # stiffness of the tie over the food's P-wave modulus and the size of the elements
 
 Flesh = Linear | Corotated | NeoHookean | Plastic
+
+
+class CutCaseError(CutcalError):
+    """A cut that is impossible as it is described."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +52,12 @@ class Blade:
     friction: float = 0.0
     rounding: float = 1e-3
 
+    def __post_init__(self) -> None:
+        if not 0 < self.angle < math.pi:
+            raise CutCaseError(f"blade: an angle of {math.degrees(self.angle):g} degrees is none of a wedge; 0 to 180")
+        if not 0 < 2 * self.rounding <= self.thickness:
+            raise CutCaseError("blade: round the shoulder with a radius above 0 and up to half the thickness")
+
     @property
     def shoulder(self) -> float:
         """Height of the shoulder above the edge [m]."""
@@ -68,6 +79,10 @@ class Interface:
     strength: float
     band: float | None = None
     tie: float = TIE
+
+    def __post_init__(self) -> None:
+        if not min(self.toughness, self.strength, self.tie) > 0:
+            raise CutCaseError("interface: toughness, strength and stiffness of the tie must be above 0")
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fem_reference.cut_case import Blade, Block, Grid
-from fem_reference.halves import Halves
+from fem_reference.crack.cut_case import Blade, Block, Grid
+from fem_reference.crack.halves import Halves
 from fem_reference.solid import EquilibriumError
 from fem_reference.surface import Tie
 
@@ -21,8 +21,7 @@ def beam_release_rate(
     """Energy release rate of a beam that is split along its middle and held open by a wedge.
 
     Each arm is a cantilever of height h and unit width, whose end a force P bends by half the opening D: with I =
-    h^3/12,
-    ``P = 3 E I (D/2) / a^3``, both arms store ``U = P D/2 = E h^3 D^2 / (16 a^3)``, and at a fixed opening
+    h^3/12, ``P = 3 E I (D/2) / a^3``, both arms store ``U = P D/2 = E h^3 D^2 / (16 a^3)``, and at a fixed opening
     ``G = -dU/da = 3 E h^3 D^2 / (16 a^4)`` (Gurney and Hunt 1967, whose wedge is this one). The arms are clamped by
     what is not split yet, which gives way: a is longer by a part of h (Kanninen 1973; Williams 1989).
 
@@ -58,9 +57,9 @@ def beam_crack_length(modulus: float, arm: float, opening: float, toughness: flo
 def energy_release(beam: Block, blade: Blade, depth: float, tips: Sequence[float], grid: Grid) -> np.ndarray:
     """Energy release rates of cracks of given tips under a blade at rest, by elements: G = -dU/da.
 
-    The same model as :func:`fem_reference.wedge.split`, but for the plane: it is rigidly tied below the tip and free
-    above,
-    so that no cohesive law has a part in it. U is that of two cracks, one element longer and shorter.
+    The same model as :func:`fem_reference.crack.wedge.split`, but for the plane: it is rigidly tied below the tip and
+    free
+    above, so that no cohesive law has a part in it. U is that of two cracks, one element longer and shorter.
 
     Args:
         beam: The split block; elastic.
@@ -75,8 +74,6 @@ def energy_release(beam: Block, blade: Blade, depth: float, tips: Sequence[float
     Raises:
         EquilibriumError: No equilibrium, or the blade's faces rub.
     """
-    if blade.friction:
-        raise EquilibriumError("energy release: a blade with friction takes energy from the crack; give it none")
     model = _Cracked(beam, blade, depth, grid)
     rows = [round(tip / model.size) for tip in tips]
     energies = {row: model.energy(row) for row in sorted({r + k for r in rows for k in (-1, 1)}, reverse=True)}
@@ -97,7 +94,7 @@ def crack_length(beam: Block, blade: Blade, depth: float, toughness: float, grid
         Way from the blade's shoulder to the crack's tip [m], and the tip's height in the undeformed block [m].
 
     Raises:
-        EquilibriumError: No equilibrium, or no such crack between the edge and the lowest element.
+        EquilibriumError: No equilibrium, the blade's faces rub, or no such crack ends in the block below the edge.
     """
     model = _Cracked(beam, blade, depth, grid)
     edge = beam.height - depth
@@ -120,6 +117,8 @@ class _Cracked(Halves):
     """Halves under a blade at rest, tied below a row of elements."""
 
     def __init__(self, beam: Block, blade: Blade, depth: float, grid: Grid) -> None:
+        if blade.friction:
+            raise EquilibriumError("energy release: a blade with friction takes energy from the crack; give it none")
         super().__init__(beam, blade, grid)
         self.size = beam.height / round(beam.height / grid.size)
         self.wedge.height = beam.height - depth

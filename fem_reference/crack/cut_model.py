@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fem_reference.cohesive import Cohesion, CutPlane
-from fem_reference.cut_case import Blade, Block, Cut, Grid, Interface
-from fem_reference.halves import Halves
+from fem_reference.crack.cohesive import Cohesion, CutPlane
+from fem_reference.crack.cut_case import Blade, Block, Cut, Grid, Interface
+from fem_reference.crack.halves import Halves
 from fem_reference.laws import Plastic
 from fem_reference.solid import EquilibriumError
 
@@ -20,6 +20,7 @@ DRAGGED = 400  # proximal steps after which a plane that tears by itself must ha
 LOOSEN, TIGHTEN = 0.5, 8.0  # change of the drag after a proximal step that has found equilibrium, and after another
 LOOSE = 1e-3  # drag below which none is tried, over the one that makes the plane's energy convex
 HALF = 0.5  # part of R that the tie has taken, or the edge cut, at the crack's tip
+FREE = 0.01  # part of R that a tie may have left above the edge of a wedge in a split
 NEAR = 1e-6  # places nearer than this part of the height are the same
 
 
@@ -32,7 +33,7 @@ class CutModel(Halves):
         interface: What holds the halves together.
         grid: Elements.
         notch: Depth of a split that is there at the beginning [m], whose end the edge must not reach; None: the edge
-        cuts.
+            cuts.
 
     Attributes:
         plane: The tie, and the edge's work on it.
@@ -63,12 +64,17 @@ class CutModel(Halves):
                 self._advance(done, height)
             except EquilibriumError as e:
                 raise EquilibriumError(f"{e} (edge {(self.block.height - height) * 1e3:.3g} mm deep)") from e
-            moment = book.note()
-            if self.notched and height < moment.tip:
+            book.note()
+            if self.notched and self._reached():
                 raise EquilibriumError(
                     "finite elements: the edge has come to the end of the split; make a deeper notch"
                 )
         return book.cut()
+
+    def _reached(self) -> bool:
+        """Whether something above the edge is still tied."""
+        left = (1 - self.plane.cut) * (1 - self.plane.spent(self.x) / self.toughness)
+        return bool((left[self.points.at(self.x)[:, 2] > self.wedge.height] > FREE).any())
 
     def _advance(self, done: float, height: float, halvings: int = HALVINGS) -> None:
         try:
@@ -140,7 +146,7 @@ class Books:
         spent, faces = model.plane.spent(x), model.faces
         return _Instant(x, model.wedge.height, spent, model.plane.cut, faces.rubbing(x), inner)
 
-    def note(self) -> Moment:
+    def note(self) -> None:
         """Add what has happened since the last equilibrium."""
         now, last, model = self._now(), self.last, self.model
         areas, whole = model.points.areas, 1 - 0.5 * (now.cut + last.cut)
@@ -153,7 +159,6 @@ class Books:
         self.absorbed += float((now.inner + last.inner).ravel() @ (now.x - last.x).ravel())
         self.last = now
         self.moments.append(self._moment())
-        return self.moments[-1]
 
     def _moment(self) -> Moment:
         model, now = self.model, self.last

@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fem_reference.contact import Wedge
+from fem_reference.solid import EquilibriumError
 from fem_reference.surface import SurfacePoints
 
 
@@ -17,19 +18,22 @@ class Cohesion:
 
     ``sigma(v) = stiffness v`` up to the strength and from there ``strength (1 - (v - v0) / (vf - v0))``, with
     ``v0 = strength / stiffness`` and ``vf = toughness / strength`` where nothing is carried any more. The stiffness
-    stands
-    for a rigid tie and does not change the area. Below the largest v so far the traction runs straight to the origin
-    (damage: Camacho and Ortiz 1996). Closed halves press on each other with the same stiffness.
+    stands for a rigid tie and does not change the area. Below the largest v so far the traction runs straight to the
+    origin (damage: Camacho and Ortiz 1996). Closed halves press on each other with the same stiffness.
 
     Attributes:
         toughness: Work of new surface R [J/m^2], per area of the plane.
-        strength: Largest traction [Pa]; ``inf`` is not possible, a plane without opening law has ``toughness`` 0.
+        strength: Largest traction [Pa].
         stiffness: Traction per half opening before the strength is reached [Pa/m].
     """
 
     toughness: float
     strength: float
     stiffness: float
+
+    def __post_init__(self) -> None:
+        if not self.first < self.last:
+            raise EquilibriumError("cohesive law: the tie gives way before it is stretched; make it stiffer")
 
     @property
     def first(self) -> float:
@@ -93,10 +97,9 @@ class CutPlane:
     """The plane of symmetry y = 0 of a food under a blade: a cohesive tie, and the edge that cuts it.
 
     The energy of the plane is ``D = integral of R - (1 - c) (R - phi)`` over its area: phi is what the tie has taken
-    and c,
-    from 0 to 1, how far the edge has cut the point, a smooth step over ``band`` about the edge's height. All forces are
-    derivatives of D: the tie pulls with (1 - c) sigma, and the edge presses a point down with (R - phi) dc/dz. So each
-    point costs R in all, whoever pays it.
+    and c, from 0 to 1, how far the edge has cut the point, a smooth step over ``band`` about the edge's height. All
+    forces are derivatives of D: the tie pulls with (1 - c) sigma, and the edge presses a point down with (R - phi)
+    dc/dz. So each point costs R in all, whoever pays it.
 
     Attributes:
         points: Points of the plane.
