@@ -94,7 +94,7 @@ def report(s: ti.template(), cut, row, out: ti.template()):
         for r in range(N_POSE):
             out[c, row, N_SUMS + N_PARTICLE_SUMS + r] = s.pose[c, r]
         s.pose[c, BOOKED_IMPULSE] -= s.sums[c, EDGE + 2] + s.sums[c, FACE + 2]  # the arm has felt that
-        for r in range(N_SUMS):
+        for r in range(s.booked_sums):
             out[c, row, r] = s.sums[c, r]
             s.sums[c, r] = 0.0
 

@@ -10,7 +10,7 @@ import taichi as ti
 
 from mpm.discretisation.grid import MIRROR
 from mpm.runtime import adds_doubles
-from mpm.state.tables import N_ORDER, N_PARAMETERS, N_PARTICLE_SUMS, N_POSE, N_SIZES, N_STRESS, N_SUMS
+from mpm.state.tables import N_ORDER, N_PARAMETERS, N_PARTICLE_SUMS, N_POSE, N_SIZES, N_STRESS, N_SUMS, TIE_WORK
 
 BEYOND_GRID = 1 << 20  # a node that no grid has
 SECOND_FIELD_CELLS = 3  # cells on either side of the cut plane whose nodes may carry both halves
@@ -156,7 +156,10 @@ class State:
         self.pose, self.order = ti.field(ti.f64, (own.batch, N_POSE)), ti.field(ti.f64, (own.batch, N_ORDER))
         ti.sync()
         booked = ti.f64 if adds_doubles() else ti.f32
-        self.sums, self.particle_sums = (ti.field(booked, (own.batch, n)) for n in (N_SUMS, N_PARTICLE_SUMS))
+        # the last sum is of the ties: without them it would only shift the fields behind it
+        self.booked_sums = N_SUMS if self.tied else TIE_WORK
+        self.sums = ti.field(booked, (own.batch, self.booked_sums))
+        self.particle_sums = ti.field(booked, (own.batch, N_PARTICLE_SUMS))
         self._add_particles(real, own.damage)
         self._add_grid(real, own.nodes)
         self._add_edge(real)
