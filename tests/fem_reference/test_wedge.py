@@ -117,11 +117,12 @@ def test_a_block_that_flows_books_its_flow():
 
 @pytest.mark.slow
 def test_a_stronger_tie_comes_to_griffiths_crack():
-    """The crack's length tends to that without a cohesive zone."""
+    """The crack's length tends to that without a cohesive zone. The edge of this wedge reaches the zone of ties of less
+    than 0.2 MPa, which is refused: there the edge would have to pay a part."""
     want, _ = crack_length(BEAM, THICK, 0.016, R, Grid(0.5e-3))
     off = [
         1 - split(BEAM, THICK, replace(TIE, strength=strength), 0.016, GRID).crack_length[-1] / want
-        for strength in (0.15e6, 0.3e6, 0.45e6)
+        for strength in (0.22e6, 0.3e6, 0.45e6)
     ]
     assert off[0] > 2 * off[1] > 0
     assert off[1] > off[2] and abs(off[2]) < 0.02
