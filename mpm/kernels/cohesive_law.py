@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from mpm.state.tables import INITIATION_DEPTH, R_FLESH, R_START, SLIP, STATIONS
+from mpm.state.tables import INITIATION_DEPTH, R_START, SLIP, STATIONS
 
 
 @ti.func
@@ -23,9 +23,7 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
         forward: The same forward [m].
         part: Part of the slice that the edge is in [-].
     """
-    limit, flesh = s.par[cut, SLIP], s.par[cut, R_FLESH]
-    if ti.static(s.tied):
-        flesh = resistance_left(s, cut, i)
+    limit, flesh = s.par[cut, SLIP], resistance_left(s, cut, i)
     held = 1.0
     if s.start_force[cut, i] <= 0:  # what has come into contact since has not slipped yet
         held = ti.min(1.0, s.contact_part[cut, i] / part)
@@ -39,17 +37,14 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
         level = s.par[cut, R_START] * size / s.par[cut, INITIATION_DEPTH]
         if level >= s.par[cut, R_START] or (s.started_beside[cut, i] > 0 and level >= flesh):
             s.start_force[cut, i] = ti.max(level, 1e-9)
-            if ti.static(s.tied):
-                s.start_excess[cut, i] = ti.max(level - s.passed_mean[cut, i][1], 0.0)
+            s.start_excess[cut, i] = ti.max(level - s.passed_mean[cut, i][1], 0.0)
             e *= limit / ti.max(size, 1e-30)  # without resistance a cut starts before the edge has slipped
     else:
         if size > limit:
             s.cut_depth[cut, i] += (size - limit) * steep
             e *= limit / size
             size = limit
-        start = s.start_force[cut, i]
-        if ti.static(s.tied):
-            start = flesh + s.start_excess[cut, i]
+        start = flesh + s.start_excess[cut, i]
         level = softening_law(s.cut_depth[cut, i], s.softening[cut, i], start, flesh) * size / limit
     s.slip[cut, i] = e
     return level * steep * e / ti.max(e.norm(), 1e-30)

@@ -110,9 +110,9 @@ def whole_plane(s: ti.template(), lowest):
 @ti.func
 def split_plane(s: ti.template(), cut, lowest, i, code):
     """As :func:`whole_plane` where some have the field of the other half."""
-    at = field_offsets(s, cut, i, code)
+    offsets, at = field_offsets(s, cut, i, code), ti.Matrix.zero(ti.i32, 3, 3)
     for j, k in ti.static(ti.ndrange(3, 3)):
-        at[j, k] = lowest + at[j, k] * s.stride_y + k
+        at[j, k] = lowest + offsets[j] * s.stride_y + k
     return at
 
 

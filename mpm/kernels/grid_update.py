@@ -2,7 +2,6 @@
 
 import taichi as ti
 
-from mpm.kernels.crack import node_half
 from mpm.kernels.signed_distance import blade_distance, coulomb
 from mpm.kernels.tool import blade_velocity, book_impulse, book_knife_impulse, edge_height, under_blade
 from mpm.state.accessors import multiplicity, step_size, to_grid_axes, to_scene_axes
@@ -137,8 +136,6 @@ def update_node(s: ti.template(), cut, i, j, k, dt):
     if ti.static(s.second_fields):
         if b[3] > 0:
             vb = ti.Vector([b[0], b[1], b[2]]) / b[3] + fall
-            if ti.static(not s.tied):
-                va, vb = crack_face_contact(s, cut, i, j, k, a, b, va, vb)
         if has_second_field(s, cut, j):
             # velocity of all that shares the field, mass of what was scattered here
             at = s.size[cut, SECOND_OFFSET] + j
@@ -174,39 +171,6 @@ def scattered(s: ti.template(), cut, i, j, k):
         for thread in ti.static(range(1, s.threads)):
             q += s.g[thread_node_index(s, cut, thread, i, j, k)]
     return q
-
-
-@ti.func
-def crack_face_contact(s: ti.template(), cut, i, j, k, a, b, va, vb):
-    """Where no blade is between them, the severed halves may close on each other but not pass through.
-
-    Args:
-        i, j, k: The node.
-        a: Momentum and mass of its first field.
-        b: Momentum and mass of its second field.
-        va: Velocity of the first field [m/s].
-        vb: Velocity of the second field [m/s].
-
-    Returns:
-        Both velocities after contact [m/s].
-    """
-    at = to_scene_axes(s, cut, node_position(s, cut, i, j, k))
-    above = at[2] - edge_height(s, cut, at[0])
-    if not (-0.5 * s.par[cut, DX] < above < s.par[cut, BLADE_HEIGHT] and under_blade(s, cut, at[0])):
-        n = to_grid_axes(s, cut, ti.Vector([0.0, 1.0, 0.0]))
-        sign = 1.0 if node_half(s, cut, at[1]) == 1 else -1.0
-        na, nb = va.dot(n), vb.dot(n)
-        on_mirror = False
-        if ti.static(s.mirror_y):
-            on_mirror = j == s.size[cut, PLANE_Y]
-        if on_mirror:  # the other half is the image of the second field
-            if nb > 0:
-                vb -= nb * n
-        elif sign * (nb - na) > 0 and a[3] > 0:
-            mean = (a[3] * na + b[3] * nb) / (a[3] + b[3])
-            va += (mean - na) * n
-            vb += (mean - nb) * n
-    return va, vb
 
 
 @ti.func

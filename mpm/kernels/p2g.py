@@ -3,7 +3,7 @@
 import taichi as ti
 
 from mpm.kernels.constitutive import unit
-from mpm.kernels.crack import ALL_VISIBLE, IN_CONTACT, field_offsets, particle_half, sever, visible_layers
+from mpm.kernels.crack import ALL_VISIBLE, IN_CONTACT, field_offsets, particle_half, sever, visible_columns
 from mpm.kernels.stress import constitutive_update, elastic_block
 from mpm.state.accessors import step_size, to_grid_axes, to_scene_axes
 from mpm.state.loops import block_range, locate_active, node_box, repetitions
@@ -71,7 +71,7 @@ def p2g_particle(s: ti.template(), cut, p, block, lane, thread, dt, window):
             add_contact_moment(s, cut, p, carry, ax, ay, az)
         v = s.v[cut, p]
         corner = m * ti.Vector([v[0], v[1], v[2], 1.0]) - fx[0] * ax - fx[1] * ay - fx[2] * az
-        code = visible_layers(s, cut, p, base, q, particle_half(s, cut, p, q[1]))
+        code = visible_columns(s, cut, base, q, particle_half(s, cut, p))
         s.visibility[cut, p] = code
         lowest = thread_node_index(s, cut, thread, base[0], base[1], base[2])
         if ti.static(s.atomic):
@@ -139,5 +139,5 @@ def scatter_split(s: ti.template(), cut, lowest, code, w, corner, ax, ay, az):
             wij = w[i][0] * w[j][1]
             low, rise = wij * (corner + i * ax + j * ay), wij * az
             for k in ti.static(range(3)):
-                node = lowest + (i * s.stride_x + k) + at[j, k] * s.stride_y
+                node = lowest + (i * s.stride_x + k) + at[j] * s.stride_y
                 add_to_node(s, node, w[k][2] * (low + k * rise))

@@ -187,18 +187,15 @@ def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
     above = (at[2] - edge_height(s, cut, at[0])) * cos_t
     touching = False
     dv, arm = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
-    tall = s.par[cut, BLADE_HEIGHT]
-    if ti.static(s.tied):
-        tall += half_thickness(s, cut)
+    tall = s.par[cut, BLADE_HEIGHT] + half_thickness(s, cut)
     if s.side[cut, p] != 0 and 0 < above < tall and under_blade(s, cut, at[0]):
         sign = 1.0 if s.side[cut, p] == 2 else -1.0
         d, n = blade_distance(
             sign * at[1], above, s.par[cut, SPINE], s.par[cut, WEDGE_COS], s.par[cut, WEDGE_SIN], s.par[cut, TIP_RADIUS]
         )
-        if ti.static(s.tied):
-            back = (sign * at[1] - half_thickness(s, cut) + above - s.par[cut, BLADE_HEIGHT]) * ti.sqrt(0.5)
-            if back > d:
-                d, n = back, ti.Vector([0.0, ti.sqrt(0.5), ti.sqrt(0.5)])
+        back = (sign * at[1] - half_thickness(s, cut) + above - s.par[cut, BLADE_HEIGHT]) * ti.sqrt(0.5)
+        if back > d:
+            d, n = back, ti.Vector([0.0, ti.sqrt(0.5), ti.sqrt(0.5)])
         n = ti.Vector([-sin_t * n[2], sign * n[1], cos_t * n[2]])
         own = surface_traction(s, cut, p, s.surface_volume[cut, p][1], s.tool_gap[cut, p], n, dt)
         opening = d - s.tool_gap[cut, p]

@@ -35,7 +35,7 @@ def time_step(s: ti.template(), cut):
         apply_edge_law(s, cut)
     move_tools(s, cut)
     grid_to_particles(s, cut)  # with the contact of the particles
-    if ti.static(s.tied):
+    if ti.static(s.cuts):
         hold_together(s, cut)
     if ti.static(s.damage):
         smooth_driving_strain(s, cut)

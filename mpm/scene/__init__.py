@@ -3,7 +3,6 @@
 from mpm.scene.scene import (
     BAND_CELLS,
     CONTACTS,
-    CRACKS,
     PRECISIONS,
     STEEPEST,
     Arm,
@@ -20,7 +19,6 @@ from mpm.scene.scene import (
 __all__ = [
     "BAND_CELLS",
     "CONTACTS",
-    "CRACKS",
     "PRECISIONS",
     "STEEPEST",
     "Arm",

@@ -10,6 +10,7 @@ from mpm.scene.errors import SceneError, check_number
 MAX_POISSON = 0.49  # above it a single-field quadratic MPM locks volumetrically and dt falls as sqrt(1 - 2 nu)
 # Length E R / strength^2 of the process zone of a food whose cohesive strength is not known, at least [m].
 COHESIVE_ZONE = 10e-3
+LEAST_OPENING = 1e-9  # half opening at which a food without resistance has parted [m]; it divides by it
 
 
 @dataclass(frozen=True)
@@ -28,8 +29,7 @@ class Material:
         initiation_depth: Indentation under the edge at which a cut starts [m]; soft solids go deep before a cut
             nucleates (Reyssat et al. 2012, Phys. Rev. Lett. 109:244301).
         cohesive_strength: Tension at which the food parts across the plane of a cohesive crack [Pa]; it falls from
-            there to nothing while the food opens, and the work is R. None: see :attr:`cohesion`. Other cracks do not
-            use it.
+            there to nothing while the food opens, and the work is R. None: see :attr:`cohesion`.
         mu: Coulomb friction of food on the blade's faces [-].
         tensile_strength: Stress at which bulk damage starts [Pa], or None.
         fracture_energy: Energy per crack area of bulk damage [J/m^2], or None. Both or none.
@@ -129,6 +129,11 @@ class Material:
         if self.cohesive_strength is not None:
             return self.cohesive_strength
         return min(2 * self.yield_stress, math.sqrt(self.E * self.R / COHESIVE_ZONE))
+
+    @property
+    def opening(self) -> float:
+        """Half opening at which nothing holds the two faces of the cohesive crack any more [m]."""
+        return self.R / self.cohesion if self.R > 0 else LEAST_OPENING
 
     @property
     def rate_dependent(self) -> bool:

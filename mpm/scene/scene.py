@@ -15,7 +15,6 @@ from mpm.scene.material import Material
 from mpm.scene.shapes import Shape
 
 CONTACTS = ("cohesive", "nodal")
-CRACKS = ("lead", "cohesive")
 PRECISIONS = ("f64", "f32")
 
 
@@ -159,20 +158,14 @@ class EdgeLaw:
     Attributes:
         zone: Width of the B-spline over which the edge's line force is spread [m]; at least one cell.
         slip: Slip of the edge in the material at which the line force is fully developed [m].
-        crack: How the food parts ahead of the edge: ``lead``, without resistance over half a zone, or ``cohesive``,
-            against ties of the food's cohesive strength, and the edge pays what is left of R (docs/theory.md, "A crack
-            with a law").
     """
 
     zone: float = 3e-3
     slip: float = 1e-3
-    crack: str = "lead"
 
     def __post_init__(self) -> None:
         check_number("edge", "zone", self.zone, 1e-5, 0.05, "m")
         check_number("edge", "slip", self.slip, 1e-5, 0.05, "m")
-        if self.crack not in CRACKS:
-            raise SceneError(f"edge: crack {self.crack!r} is not one of {', '.join(CRACKS)}")
 
 
 @dataclass(frozen=True)
@@ -271,7 +264,7 @@ class Scene:
     @property
     def tied(self) -> bool:
         """Whether ties hold the food together across the cut plane, which the edge and the opening cut."""
-        return self.cuts and self.edge.crack == "cohesive"
+        return self.cuts and self.numerics.contact == "cohesive"
 
     @property
     def drop(self) -> float:
@@ -329,10 +322,8 @@ class Scene:
         if not self.tied:
             return
         m, num = self.food.material, self.numerics
-        if num.contact != "cohesive":
-            raise SceneError("edge: a cohesive crack needs the contact of particles; leave out numerics.contact")
-        if not m.R > 0:
-            raise SceneError("edge: a cohesive crack needs R above 0, or the food falls apart before it is cut")
+        if m.R == 0:
+            return
         zone, least = m.E * m.R / m.cohesion**2, num.dx / num.ppc / 2
         if zone < least:
             raise SceneError(
@@ -364,14 +355,8 @@ class Scene:
         return replace(self, food=replace(self.food, material=replace(self.food.material, **values)))
 
     def as_dict(self) -> dict[str, Any]:
-        """All numbers of the scene as plain data, for provenance and for the key of a stored run.
-
-        What belongs to a cohesive crack is left out of scenes without one, whose data are those of before it was there.
-        """
-        out = asdict(self)
-        if not self.tied:
-            del out["edge"]["crack"], out["food"]["material"]["cohesive_strength"]
-        return out
+        """All numbers of the scene as plain data, for provenance and for the key of a stored run."""
+        return asdict(self)
 
 
 # Width of a crack band of grid-smoothed damage, in cells (docs/theory.md, "Measured choices").

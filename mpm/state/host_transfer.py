@@ -79,7 +79,7 @@ def begin(state: State, cuts: Sequence[Contents]) -> None:
         _table(state, (N_POSE,), [cut.pose for cut in cuts]),
         _table(state, (2, max(state.branches, 1)), [cut.relaxation for cut in cuts]),
     )
-    if state.tied:
+    if state.cuts:
         _write_ties(
             state,
             _table(state, (max(sizes[:, TIE_COUNT].max(), 1), N_TIE), [cut.ties for cut in cuts]),

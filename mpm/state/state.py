@@ -89,7 +89,7 @@ class State:
             (cut, particle, 2).
         stick: Stretch of the friction's spring on board and tool [m], (cut, 2, particle).
         adhering: 1 where a particle sticks to the blade, 0 where it may, -1 where not, (cut, particle).
-        visibility: What :func:`mpm.kernels.crack.visible_layers` found in the last step, with ``IN_CONTACT`` where
+        visibility: What :func:`mpm.kernels.crack.visible_columns` found in the last step, with ``IN_CONTACT`` where
             ``contact_moment`` is of this step; elsewhere it means nothing, (cut, particle).
         kappa: Largest strain that has acted on bulk damage [-], (cut, particle).
         driving_strain: Smoothed strain of the last step [-], (cut, particle).
@@ -115,7 +115,7 @@ class State:
         width: Part of the slice that has food [-], (cut, slice).
         floor_high: Highest height of the lower surface over a slice [m], (cut, slice); ``floor_low`` the lowest.
         half: Half of the food that a particle belongs to, 0 left, 1 right, (cut, particle). This and what follows down
-            to ``start_excess`` is there only where ``tied``: with ties across the cut plane.
+            to ``start_excess`` is there only where ``cuts``.
         tie_ends: Left and right particle of a tie, (cut, tie).
         tie_toughness: Its work of fracture over its area [J/m^2], (cut, tie).
         largest_opening: Largest half opening of its two faces so far [m], (cut, tie).
@@ -144,7 +144,6 @@ class State:
         self.serial = not self.atomic  # short loops run where the kernel was launched
         self.parts = 1 if self.threads == 1 else self.threads * CPU_BLOCK
         self.branches, self.second_fields = own.branches, not own.nodal
-        self.tied = own.ties > 0
         self.owner: Any = None
         self.n = np.zeros(own.batch, np.int32)
         real = ti.lang.impl.get_runtime().default_fp
@@ -156,15 +155,14 @@ class State:
         self.pose, self.order = ti.field(ti.f64, (own.batch, N_POSE)), ti.field(ti.f64, (own.batch, N_ORDER))
         ti.sync()
         booked = ti.f64 if adds_doubles() else ti.f32
-        # the last sum is of the ties: without them it would only shift the fields behind it
-        self.booked_sums = N_SUMS if self.tied else TIE_WORK
+        self.booked_sums = N_SUMS if self.cuts else TIE_WORK  # the last is of the ties
         self.sums = ti.field(booked, (own.batch, self.booked_sums))
         self.particle_sums = ti.field(booked, (own.batch, N_PARTICLE_SUMS))
         self._add_particles(real, own.damage)
         self._add_grid(real, own.nodes)
         self._add_edge(real)
         self._add_tables(real)
-        if self.tied:
+        if self.cuts:
             self._add_ties(real, own.ties)
         ti.sync()  # lays these fields out by themselves; Taichi does not manage those of eight scenes at once
 

@@ -60,17 +60,14 @@ def test_simulate_says_what_was_not_cut(tmp_path: Path, capsys):
 
 
 def test_simulate_parts_a_food_by_a_law_of_its_crack(tmp_path: Path, capsys):
-    """The document and the columns have what the opening took, which default cuts do not have; nodes are refused."""
+    """The document and the columns have what the opening took, which cuts by plain nodal projection do not have."""
     argv = ["simulate", "--food", "strawberry", "--knife", "edc", "--stroke", "0.01", "--threads", "1", "--json"]
-    for name, more in (("lead", []), ("law", ["--crack", "cohesive"])):
+    for name, more in (("nodal", ["--contact", "nodal"]), ("law", [])):
         assert main([*argv, *more, "--out", str(tmp_path / name)]) == 0
         summary = valid(json.loads(capsys.readouterr().out))
         columns = pd.read_csv(tmp_path / name / "force.csv").columns
-        assert summary.get("crack") == (None if name == "lead" else "cohesive")
         assert ("cohesion" in summary["energy_J"]) is ("cohesion_J" in columns) is (name == "law")
     assert summary["energy_J"]["cohesion"] > 0
-    assert main([*argv, "--crack", "cohesive", "--contact", "nodal", "--out", str(tmp_path / "nodal")]) != 0
-    assert "a cohesive crack needs the contact of particles" in capsys.readouterr().err
 
 
 def test_simulate_draws_what_is_asked_for(tmp_path: Path, capsys, monkeypatch):

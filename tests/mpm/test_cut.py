@@ -6,10 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import taichi as ti
 
 from mpm.discretisation.particles import Seeds
-from mpm.kernels.crack import front_height
 from mpm.output.record import ForceRecord
 from mpm.output.snapshot import SnapshotRecorder
 from mpm.runtime import Runtime
@@ -162,30 +160,6 @@ def test_mirror_between_the_nodes_is_the_whole_on_the_same_grid(quarter):
     np.testing.assert_allclose(a.knife[:, 2], b.knife[:, 2], atol=1e-8 * b.peak)
     assert a.momentum_residual < 1e-10
     assert a.peak == pytest.approx(quarter.peak, rel=0.02)
-
-
-def test_front_beside_the_mirror_is_that_of_the_first_slice():
-    """Slices that are mirror images take no part: between the mirror and the first slice the front is the first
-    slice's."""
-    scene = replace(PRISM, numerics=replace(PRISM.numerics, grid_shift=(0.5, 0.0, 0.0)))
-    simulation = Simulation(scene, Runtime(threads=1))
-    simulation.load(FLESH)
-    k = simulation.state
-    fronts = np.full(k.crack_front.shape, 0.02)
-    fronts[:, : k.plane_x] = 0.01
-    k.crack_front.from_numpy(fronts)
-
-    assert simulation.setup.grid.stations[k.plane_x] == pytest.approx(0.5 * scene.numerics.dx)
-    places = ti.field(ti.f64, 4)
-    places.from_numpy(scene.numerics.dx * np.array([0.0, 0.2, 0.49, 0.7]))
-
-    @ti.kernel
-    def look():
-        for n in range(4):
-            places[n] = front_height(k, 0, places[n])
-
-    look()
-    np.testing.assert_allclose(places.to_numpy(), 0.02, rtol=1e-12)
 
 
 def with_images(seeds: Seeds) -> Seeds:

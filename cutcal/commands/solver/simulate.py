@@ -30,7 +30,7 @@ from cutcal.options import (
 from mpm.output.energy import spent, unbooked
 from mpm.output.record import ForceRecord
 from mpm.output.snapshot import SnapshotRecorder
-from mpm.scene import CONTACTS, CRACKS, Arm
+from mpm.scene import CONTACTS, Arm
 
 HELP = "simulate one cut"
 DESCRIPTION = "Simulate one cut and write force.csv and summary.json."
@@ -60,13 +60,6 @@ def add_args(p: argparse.ArgumentParser) -> None:
         default="cohesive",
         metavar="KIND",
         help="cohesive (default), or nodal for comparison",
-    )
-    p.add_argument(
-        "--crack",
-        choices=CRACKS,
-        default="lead",
-        metavar="KIND",
-        help="ahead of the edge: lead (default), or cohesive, against ties",
     )
     p.add_argument(
         "--mach",
@@ -134,7 +127,6 @@ def run(args: argparse.Namespace) -> int:
             grid_shift=(0.0, args.offset, 0.0),
             grid_turn=math.radians(args.turn),
         ),
-        edge=replace(scene.edge, crack=args.crack),
         arm=Arm(args.arm_stiffness, args.force_limit),
     )
     prepare(out, resume=False)
@@ -166,7 +158,6 @@ def run(args: argparse.Namespace) -> int:
         "dx_m": scene.numerics.dx,
         "mach": scene.motion.mach,
         "contact": scene.numerics.contact,
-        **({"crack": scene.edge.crack} if scene.tied else {}),
         "shape": vars(shape),
         "speed_real_m_s": args.speed,
         "seed": args.seed,
@@ -188,8 +179,7 @@ def run(args: argparse.Namespace) -> int:
         part, fracture = unbooked(record.budget), record.fracture
         if part is not None:
             rate = "" if fracture is None else f" ({fracture['released_J_m2']:.3g} J/m^2)"
-            released = "" if scene.tied else "released at the front of the crack or "
-            print(f"where the work went: {spent(record.budget)}; {released}lost by the discretisation {part:.1%}{rate}")
+            print(f"where the work went: {spent(record.budget)}; lost by the discretisation {part:.1%}{rate}")
         if record.pieces is not None:
             print(record.pieces.words())
     return 0 if record.status == "done" else 1
