@@ -66,7 +66,7 @@ def test_a_prism_is_cut_alike_wherever_the_blade_is():
 
 
 def test_halves_that_tip_stay_on_the_grid():
-    """The skin under the edge drags the cut faces of a long soft food down and tips its halves; their ends rise by 11
+    """The skin under the edge drags the cut faces of a long soft food down and tips its halves; their ends rise by 9
     mm."""
     fruit = Material(
         E=2.6e5, nu=0.35, rho=960, yield_stress=1.7e4, R=370, R_initiation=525, R_skin=434, skin_thickness=2.5e-3,
@@ -82,7 +82,7 @@ def test_halves_that_tip_stay_on_the_grid():
     watch = SnapshotRecorder(10)
     record = simulation.run(snapshots=watch)
     assert record.status == "done" and record.counters["outside"] == 0
-    assert max(now.x[:, 2].max() for now in watch.taken) > 0.033 + 10e-3
+    assert max(now.x[:, 2].max() for now in watch.taken) > 0.033 + 8e-3
 
 
 @pytest.mark.parametrize(("modulus", "R"), [(1e5, 100.0), (1e6, 100.0), (1e7, 100.0), (1e6, 300.0), (1e7, 300.0)])
@@ -100,11 +100,13 @@ def test_food_that_flows_is_pressed_away_not_parted(prism):
     assert cut.parted == pytest.approx(1.0, abs=0.06)
     assert flown.status == "done" and flown.parted < 0.5
     assert flown.plastic[-1] > flown.parting[-1]
-    short = replace(cut, stroke=cut.stroke[:5], parting=cut.parting[:5])
+    assert cut.cohesion is not None
+    short = replace(cut, stroke=cut.stroke[:5], parting=cut.parting[:5], cohesion=cut.cohesion[:5])
     assert np.isnan(short.parted) and np.isnan(replace(cut, resistance=np.nan).parted)
     assert replace(cut, severed_area=0.0).parted == 0.0
     assert np.isnan(replace(cut, status="left_grid").parted)
-    back = replace(cut, stroke=np.append(cut.stroke, 0.0), parting=np.append(cut.parting, cut.parting[-1]))
+    longer = {name: np.append(getattr(cut, name), getattr(cut, name)[-1]) for name in ("parting", "cohesion")}
+    back = replace(cut, stroke=np.append(cut.stroke, 0.0), **longer)
     assert back.parted == cut.parted  # after the blade has been drawn out
 
 
@@ -191,10 +193,12 @@ def test_the_work_is_accounted_for(whole, quarter):
         assert record.fracture["edge_J_m2"] == pytest.approx(FLESH.R, rel=0.1)  # the first millimetres need a start
         assert 0 < record.fracture["released_J_m2"] < 0.1 * FLESH.R
         inside = [int(np.searchsorted(record.stroke, at)) for at in (8e-3, 15e-3)]
-        parted, way = np.diff(record.parting[inside])[0], np.diff(record.stroke[inside])[0]
-        assert parted == pytest.approx(FLESH.R * 0.024 * way, rel=0.03)  # the food rises towards the wedge
+        new, way = np.diff(record.surface[inside])[0], np.diff(record.stroke[inside])[0]
+        assert new == pytest.approx(FLESH.R * 0.024 * way, rel=0.03)  # the food rises towards the wedge
+        # the wedge opens some of it ahead of the edge
+        assert 0.01 * FLESH.R < record.fracture["opening_J_m2"] < 0.1 * FLESH.R
         assert record.budget["friction"] > 0.1 * total
-    for name in ("friction", "parting"):
+    for name in ("friction", "parting", "cohesion"):
         assert whole.budget[name] == pytest.approx(quarter.budget[name], rel=0.03)
     frictionless = run(replace(PRISM, knife=WEDGE, board=Board(0.0)))
     assert abs(frictionless.budget["friction"]) < 1e-3 * frictionless.work
@@ -341,9 +345,17 @@ def test_a_cut_starts_at_the_same_depth_at_any_speed_of_the_blade():
     """
     depths = []
     for mach in (0.002, 0.02):
-        scene = replace(PRISM, motion=Motion(0.006, mach), numerics=replace(PRISM.numerics, output=1e-4))
-        record = run(scene, E=1e5, yield_stress=2e4, R=100.0, R_initiation=100.0)
-        depths.append(record.stroke[np.argmax(record.edge[:, 2] > 0.98 * 100.0 * 0.024)])
+        numerics = replace(PRISM.numerics, dx=2.25e-3, output=1e-4)  # three quarters of the zone, as default cells are
+        record = run(
+            replace(PRISM, motion=Motion(0.006, mach), numerics=numerics),
+            E=1e5,
+            yield_stress=2e4,
+            R=100.0,
+            R_initiation=100.0,
+        )
+        force = record.edge[:, 2] / (100.0 * 0.024)
+        first = int(np.argmax(force > 0.98))
+        depths.append(np.interp(0.98, force[first - 1 : first + 1], record.stroke[first - 1 : first + 1]))
     assert depths[0] > 1e-3
     assert depths[0] == pytest.approx(depths[1], rel=0.05)
 

