@@ -8,6 +8,7 @@ from typing import Any
 
 from calib.errors import MaterialError
 from calib.io.yaml_checks import Place, check_unit, choice, finite_number, suggest, text
+from calib.trace.units import metres
 from mpm.scene.material import MAX_POISSON
 
 #: Where a literature value comes from: measured on this food; Table 2 of the CulinaryCut paper; another food,
@@ -188,7 +189,7 @@ def check_override(name: str, value: float | str) -> float:
 
     Args:
         name: Property name.
-        value: A number, or text that is one, in the property's SI unit.
+        value: A number, or text that is one, in the property's SI unit; a length may also have its own, as in ``3mm``.
 
     Raises:
         MaterialError: An unknown property, text that is no number, or a value out of its limits.
@@ -197,7 +198,7 @@ def check_override(name: str, value: float | str) -> float:
     place = Place("", (name,))
     if isinstance(value, str):
         try:
-            value = float(value)
+            value = metres(value) if rule.unit == "m" else float(value)
         except ValueError:
             raise place.error(
                 f"{value!r} is not a number; give the {rule.meaning} as a plain number in {rule.unit}"

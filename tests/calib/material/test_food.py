@@ -257,9 +257,12 @@ def test_sizes_by_hand(foods: dict[str, FoodSpec]) -> None:
     assert (shape.kind, shape.length, shape.width, shape.height) == ("block", 0.06, 0.05, 0.047)
 
 
-@pytest.mark.parametrize(("name", "value", "expected"), [("E", "3e5", 3e5), ("nu", 0.3, 0.3), ("mu", "0", 0.0)])
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [("E", "3e5", 3e5), ("nu", 0.3, 0.3), ("mu", "0", 0.0), ("skin_thickness", "0.3mm", 3e-4)],
+)
 def test_check_override(name: str, value: Any, expected: float) -> None:
-    """Numbers, and text that is one, become numbers."""
+    """Numbers, and text that is one, become numbers; a length may have its unit."""
     assert check_override(name, value) == expected
 
 
@@ -270,6 +273,8 @@ def test_check_override(name: str, value: Any, expected: float) -> None:
         ("Yield_Stress", 1e5, ("did you mean 'yield_stress'",)),
         ("xyzzy", 1, ("known: rho, E, nu",)),
         ("E", "300 kPa", ("'300 kPa'", "plain number in Pa")),
+        ("E", "3e5m", ("'3e5m'", "plain number in Pa")),
+        ("skin_thickness", "3in", ("'3in'", "plain number in m")),
         ("E", -1.0, ("E: -1 Pa", "between 100 and 1e+10 Pa")),
         ("E", float("nan"), ("E: is nan", "finite")),
         ("E", "inf", ("finite",)),
