@@ -336,7 +336,7 @@ class Scene:
         zone, least = m.E * m.R / m.cohesion**2, num.dx / num.ppc / 2
         if zone < least:
             raise SceneError(
-                f"material: cohesive strength {m.cohesion / 1e3:.3g} kPa makes a process zone E R / strength^2 of "
+                f"material: tensile_strength {m.cohesion / 1e3:.3g} kPa makes a process zone E R / strength^2 of "
                 f"{zone * 1e3:.3g} mm, and the ties would snap back; use at most "
                 f"{math.sqrt(m.E * m.R / least) / 1e3:.3g} kPa or a smaller dx"
             )
@@ -366,11 +366,14 @@ class Scene:
     def as_dict(self) -> dict[str, Any]:
         """All numbers of the scene as plain data, for provenance and for the key of a stored run.
 
-        What belongs to a cohesive crack is left out of scenes without one, whose data are those of before it was there.
+        What belongs to a cohesive crack is left out of scenes without one, whose data are those of before it was there:
+        so is a tensile strength that neither a cohesive crack nor bulk damage uses.
         """
         out = asdict(self)
         if not self.tied:
-            del out["edge"]["crack"], out["food"]["material"]["cohesive_strength"]
+            del out["edge"]["crack"]
+            if not self.food.material.damaged:
+                out["food"]["material"]["tensile_strength"] = None
         return out
 
 

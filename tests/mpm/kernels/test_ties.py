@@ -89,12 +89,14 @@ def test_scenes_without_ties_are_what_they_were():
     """No field, no particle, no datum and no energy of the default knows of ties."""
     whole = replace(PRISM, numerics=replace(PRISM.numerics, mirror=False))
     simulation, data = Simulation(whole, Runtime(threads=1)), whole.as_dict()
+    strong = whole.with_material(tensile_strength=2e5)
     assert not simulation.state.tied and not hasattr(simulation.state, "tie_ends")
     assert len(simulation.setup.ties()) == 0
     left, right = (simulation.setup.seeds.x[simulation.setup.seeds.cells[:, 1] == layer] for layer in (-1, 0))
     assert np.abs(left * [1, -1, 1] - right).max() > 1e-5
-    assert "crack" not in data["edge"] and "cohesive_strength" not in data["food"]["material"]
-    assert replace(whole, edge=TIED.edge).as_dict()["edge"]["crack"] == "cohesive"
+    assert "crack" not in data["edge"] and strong.as_dict() == data
+    tied = replace(strong, edge=TIED.edge).as_dict()
+    assert (tied["edge"]["crack"], tied["food"]["material"]["tensile_strength"]) == ("cohesive", 2e5)
     record = cut(replace(PRISM, motion=Motion(0.002, 0.02)))
     assert record.cohesion is None and record.energies == ENERGIES and "cohesion_J" not in record.columns()
     assert record.surface is record.parting
@@ -104,22 +106,22 @@ def test_impossible_cracks_are_refused():
     """In one line: an unknown law, no toughness, ties that would snap back, nodes that touch in place of particles."""
     with pytest.raises(SceneError, match="crack 'stitch' is not one of lead, cohesive"):
         EdgeLaw(crack="stitch")
-    with pytest.raises(SceneError, match="cohesive_strength"):
-        replace(TUBER, cohesive_strength=0.0)
+    with pytest.raises(SceneError, match="tensile_strength"):
+        replace(TUBER, tensile_strength=0.0)
     with pytest.raises(SceneError, match="needs R above 0"):
         SPLIT.with_material(R=0.0)
     with pytest.raises(SceneError, match="snap back; use at most"):
-        SPLIT.with_material(cohesive_strength=3e6)
+        SPLIT.with_material(tensile_strength=3e6)
     with pytest.raises(SceneError, match="leave out numerics.contact"):
         replace(TIED, numerics=replace(TIED.numerics, contact="nodal"))
-    assert replace(SPLIT, edge=EdgeLaw(zone=4e-3)).with_material(cohesive_strength=3e6).tied is False
+    assert replace(SPLIT, edge=EdgeLaw(zone=4e-3)).with_material(tensile_strength=3e6).tied is False
 
 
 def test_the_strength_of_a_food_that_has_none_is_derived():
     """Twice the yield stress, or what makes a process zone of ten millimetres if that is less."""
     assert FLOWS.cohesion == 2 * FLOWS.yield_stress
     assert TUBER.E * TUBER.R / TUBER.cohesion**2 == pytest.approx(COHESIVE_ZONE)
-    assert replace(TUBER, cohesive_strength=1.5e5).cohesion == 1.5e5
+    assert replace(TUBER, tensile_strength=1.5e5).cohesion == 1.5e5
 
 
 def surface(record: ForceRecord) -> float:
@@ -189,7 +191,7 @@ def test_ties_of_a_whole_food_pull_as_those_of_its_quarter():
 def test_a_food_that_is_not_cut_hangs_together():
     """Pulled apart at less than its strength a block stays whole and takes no energy; beyond it the plane parts and
     takes R."""
-    soft = replace(FLESH, E=1e5, R=20.0, R_initiation=20.0, yield_stress=np.inf, cohesive_strength=5e3, loss_factor=0.1)
+    soft = replace(FLESH, E=1e5, R=20.0, R_initiation=20.0, yield_stress=np.inf, tensile_strength=5e3, loss_factor=0.1)
     numerics = replace(PRISM.numerics, mirror=False, gravity=0.0, room=1.5)
     scene = replace(TIED, numerics=numerics, board=Board(0.0), knife=WEDGE, food=replace(PRISM.food, material=soft))
     sim = Simulation(scene, Runtime(threads=1))
