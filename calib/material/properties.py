@@ -34,7 +34,8 @@ SYNONYMS = {
     "toughness": "R", "fracture_toughness": "R", "cutting_resistance": "R", "resistance": "R",
     "initiation": "R_initiation", "depth": "initiation_depth", "damping": "loss_factor",
     "skin": "skin_thickness", "skin_resistance": "R_skin",
-    "gf": "fracture_energy", "strength": "tensile_strength", "diameter": "width",
+    "gf": "fracture_energy", "strength": "tensile_strength", "cohesive_strength": "tensile_strength",
+    "sigma_c": "tensile_strength", "sigma_t": "tensile_strength", "diameter": "width",
 }  # fmt: skip
 
 
@@ -72,7 +73,7 @@ PROPERTIES: dict[str, Rule] = {
     "initiation_depth": Rule("m", 1e-4, 0.05, "indentation under the edge at which a cut starts"),
     "mu": Rule("-", 0.0, 2.0, "Coulomb friction of food on blade"),
     "loss_factor": Rule("-", 0.0, 1.0, "mechanical loss factor tan(delta) at the first axial mode"),
-    "tensile_strength": Rule("Pa", 10.0, 1e9, "stress at which bulk damage starts"),
+    "tensile_strength": Rule("Pa", 10.0, 1e9, "tension at which the flesh parts"),
     "fracture_energy": Rule("J/m^2", 0.1, 1e6, "energy per crack area of bulk damage"),
 }  # fmt: skip
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
+from calib.errors import MaterialError
 from calib.io.provenance import code_key, key_of
 from calib.material.knife import load_knife
 from calib.material.scene import at_fitted_height, cut_scene, height_range, specimen, windowed, with_other_particles
@@ -168,6 +169,7 @@ def _objective(
     u_num = 0.0 if request.u_num is None else numerical_uncertainty(request.u_num, food.name, scene, curve)
     target = Target(curve.stroke, curve.curve, curve.curve_noise_sd_N, curve.peak_sd_N, filter_simulated, u_num)
     names = request.fit or (food.default_fit if heights is None else (*food.default_fit, "height"))
+    _check_strength(names, scene)
     return Objective(
         target,
         fit_parameters(food, names, heights),
@@ -175,6 +177,15 @@ def _objective(
         nuisances(curve, sensor, width_sd=width_sd, scaled=request.scaled),
         scale_sd=math.hypot(width_sd, sensor.gain_sd) if request.scaled else 0.0,
     )
+
+
+def _check_strength(names: Collection[str], scene: Scene) -> None:
+    """Refuses to fit a tensile strength that the cut does not feel."""
+    if "tensile_strength" in names and not (scene.tied or scene.food.material.damaged):
+        raise MaterialError(
+            "--fit tensile_strength: nothing in this cut uses it, for there is neither a cohesive crack nor bulk "
+            "damage; leave it out"
+        )
 
 
 def slower(scene: Scene) -> Scene:
