@@ -15,6 +15,7 @@ from calib.material.scene import MID_LENGTH, Sizing
 from calib.simulation.dask_cluster import Cluster
 from calib.simulation.process_pool import Pool
 from calib.simulation.workers import Workers
+from calib.trace.units import metres
 from mpm.runtime import ARCHES
 from mpm.scene.errors import CutcalError
 from mpm.scene.shapes import SHAPE_KINDS
@@ -43,7 +44,7 @@ def number(low: float, high: float, unit: str) -> Callable[[str], float]:
     Args:
         low: Lower limit, in the option's unit.
         high: Upper limit, in the option's unit.
-        unit: The unit, for the error.
+        unit: The unit, for the error; a length [m] may also be written with its own, as in ``45mm``.
 
     Returns:
         What argparse calls with the text of the option.
@@ -54,9 +55,10 @@ def number(low: float, high: float, unit: str) -> Callable[[str], float]:
 
     def convert(text: str) -> float:
         try:
-            value = float(text)
+            value = metres(text) if unit == "m" else float(text)
         except ValueError:
-            raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+            what = "a length such as 0.045 or 45mm" if unit == "m" else "a number"
+            raise argparse.ArgumentTypeError(f"{text!r} is not {what}") from None
         if not (math.isfinite(value) and low < value < high):
             raise argparse.ArgumentTypeError(f"{text} must lie between {low:g} and {high:g} {unit}".rstrip())
         return value
@@ -122,7 +124,7 @@ def add_food(p: Group, *, cell: bool = True, required: bool = True) -> None:
     p.add_argument(
         "--shape", choices=SHAPE_KINDS, metavar="KIND", help="outline of the specimen, such as half_cylinder"
     )
-    for name, what in (("height", ""), ("width", ", along the blade"), ("length", ", across the blade")):
+    for name, what in (("height", ", 0.045 or 45mm"), ("width", ", along the blade"), ("length", ", across the blade")):
         p.add_argument(f"--{name}", type=number(1e-3, 1.0, "m"), metavar="M", help=f"{name} of the specimen{what} [m]")
     p.add_argument(
         "--at",

@@ -48,8 +48,7 @@ __all__ = [
 GIVEN_SPREAD = 10.0
 """Range of a property that has no literature and is given by the user: the value over and times this."""
 
-_DAMAGE = ("tensile_strength", "fracture_energy")
-_NULLABLE = ("R_skin", *_DAMAGE)
+_NULLABLE = ("R_skin", "tensile_strength", "fracture_energy")
 
 
 @dataclass(frozen=True)
@@ -176,11 +175,16 @@ class FoodSpec:
             for name, item in items.items()
             for w in item.warnings()
         ]
-        have = [n for n in _DAMAGE if n in self.properties]
-        if len(have) == 1:
-            other = next(n for n in _DAMAGE if n not in have)
-            said.append(f"{self.name}.properties.{have[0]}: not used, because bulk damage also needs {other}")
+        if self._lacks_strength:
+            said.append(
+                f"{self.name}.properties.fracture_energy: not used, because bulk damage also needs tensile_strength"
+            )
         return said
+
+    @property
+    def _lacks_strength(self) -> bool:
+        """Whether bulk damage has its energy, but not the stress at which it starts."""
+        return "fracture_energy" in self.properties and "tensile_strength" not in self.properties
 
     def to_scene_food(
         self,
@@ -199,7 +203,7 @@ class FoodSpec:
             shape: Another outline.
 
         Returns:
-            The food; bulk damage is left out where it has only one of the two properties of it.
+            The food; bulk damage is left out where there is no tensile strength at which it starts.
 
         Raises:
             SceneError: A shape or size that the solver cannot take.
@@ -211,8 +215,8 @@ class FoodSpec:
         sizes = {"length": length, "width": width, "height": height}
         size = {n: self.dims[n].value if given is None else given for n, given in sizes.items()}
         values: dict[str, Any] = {n: p.value for n, p in self.properties.items()}
-        if not all(n in values for n in _DAMAGE):
-            values = {n: v for n, v in values.items() if n not in _DAMAGE}
+        if self._lacks_strength:
+            del values["fracture_energy"]
         return Food(Shape(shape or self.shape_kind, **size), Material(**values))
 
     def as_dict(self) -> dict[str, Any]:

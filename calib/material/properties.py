@@ -8,6 +8,7 @@ from typing import Any
 
 from calib.errors import MaterialError
 from calib.io.yaml_checks import Place, check_unit, choice, finite_number, suggest, text
+from calib.trace.units import metres
 from mpm.scene.material import MAX_POISSON
 
 #: Where a literature value comes from: measured on this food; Table 2 of the CulinaryCut paper; another food,
@@ -33,7 +34,8 @@ SYNONYMS = {
     "toughness": "R", "fracture_toughness": "R", "cutting_resistance": "R", "resistance": "R",
     "initiation": "R_initiation", "depth": "initiation_depth", "damping": "loss_factor",
     "skin": "skin_thickness", "skin_resistance": "R_skin",
-    "gf": "fracture_energy", "strength": "tensile_strength", "diameter": "width",
+    "gf": "fracture_energy", "strength": "tensile_strength", "cohesive_strength": "tensile_strength",
+    "sigma_c": "tensile_strength", "sigma_t": "tensile_strength", "diameter": "width",
 }  # fmt: skip
 
 
@@ -71,7 +73,7 @@ PROPERTIES: dict[str, Rule] = {
     "initiation_depth": Rule("m", 1e-4, 0.05, "indentation under the edge at which a cut starts"),
     "mu": Rule("-", 0.0, 2.0, "Coulomb friction of food on blade"),
     "loss_factor": Rule("-", 0.0, 1.0, "mechanical loss factor tan(delta) at the first axial mode"),
-    "tensile_strength": Rule("Pa", 10.0, 1e9, "stress at which bulk damage starts"),
+    "tensile_strength": Rule("Pa", 10.0, 1e9, "tension at which the flesh parts"),
     "fracture_energy": Rule("J/m^2", 0.1, 1e6, "energy per crack area of bulk damage"),
 }  # fmt: skip
 
@@ -188,7 +190,7 @@ def check_override(name: str, value: float | str) -> float:
 
     Args:
         name: Property name.
-        value: A number, or text that is one, in the property's SI unit.
+        value: A number, or text that is one, in the property's SI unit; a length may also have its own, as in ``3mm``.
 
     Raises:
         MaterialError: An unknown property, text that is no number, or a value out of its limits.
@@ -197,7 +199,7 @@ def check_override(name: str, value: float | str) -> float:
     place = Place("", (name,))
     if isinstance(value, str):
         try:
-            value = float(value)
+            value = metres(value) if rule.unit == "m" else float(value)
         except ValueError:
             raise place.error(
                 f"{value!r} is not a number; give the {rule.meaning} as a plain number in {rule.unit}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 SECONDS = {
@@ -17,6 +18,8 @@ METRES = {
     "mm": 1e-3, "millimetre": 1e-3, "millimetres": 1e-3, "millimeter": 1e-3, "millimeters": 1e-3,
     "um": 1e-6,
 }  # fmt: skip
+LENGTH_DECIMALS = 12
+"""Decimals of a length that is converted [m]: 0.3 mm is 0.0003 m, and not 0.00029999999999999997."""
 UNITS_OF_ROLE: Mapping[str, Mapping[str, float]] = {
     "time": SECONDS,
     "force": NEWTONS,
@@ -24,6 +27,27 @@ UNITS_OF_ROLE: Mapping[str, Mapping[str, float]] = {
     "compression": METRES,
 }
 """Units that a column of each role may have: what a number in them is multiplied by."""
+
+
+def metres(text: str) -> float:
+    """Length of a text: a number of metres, or a number and its unit, with a blank between them or not.
+
+    >>> metres("0.045"), metres("45mm"), metres("4.5 cm")
+    (0.045, 0.045, 0.045)
+
+    Args:
+        text: Such as ``0.045`` or ``45mm``.
+
+    Returns:
+        The length [m].
+
+    Raises:
+        ValueError: It is neither.
+    """
+    found = re.fullmatch(r"\s*(.*?)\s*([a-zA-Z]*)\s*", text)
+    if found is None or found[2] not in METRES:
+        return float(text)
+    return round(float(found[1]) * METRES[found[2]], LENGTH_DECIMALS)
 
 
 def is_unit(text: str) -> bool:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from mpm.scene.errors import SceneError, check_number
 
 MAX_POISSON = 0.49  # above it a single-field quadratic MPM locks volumetrically and dt falls as sqrt(1 - 2 nu)
-# Length E R / strength^2 of the process zone of a food whose cohesive strength is not known, at least [m].
+# Length E R / strength^2 of the process zone of a food whose tensile strength is not known, at least [m].
 COHESIVE_ZONE = 10e-3
-LEAST_OPENING = 1e-9  # half opening at which a food without resistance has parted [m]; it divides by it
+LEAST_OPENING = 1e-9  # half opening at which a food without resistance has parted [m]; the ties divide by it
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,12 @@ class Material:
         skin_thickness: Thickness of the skin [m]; 0 = no skin.
         initiation_depth: Indentation under the edge at which a cut starts [m]; soft solids go deep before a cut
             nucleates (Reyssat et al. 2012, Phys. Rev. Lett. 109:244301).
-        cohesive_strength: Tension at which the food parts across the plane of a cohesive crack [Pa]; it falls from
-            there to nothing while the food opens, and the work is R. None: see :attr:`cohesion`.
         mu: Coulomb friction of food on the blade's faces [-].
-        tensile_strength: Stress at which bulk damage starts [Pa], or None.
-        fracture_energy: Energy per crack area of bulk damage [J/m^2], or None. Both or none.
+        tensile_strength: Tension at which the food parts [Pa], or None. Across the plane of a cohesive crack the
+            tension falls from there to nothing while the food opens, and the work is R; None: see :attr:`cohesion`.
+            Bulk damage, where there is any, starts at it. Nothing else uses it.
+        fracture_energy: Energy per crack area of bulk damage [J/m^2], or None for a food without bulk damage. It needs
+            ``tensile_strength``.
         loss_factor: Mechanical loss factor tan(delta) [-] at the first axial mode of the specimen, Kelvin-Voigt. Apple
             tissue loses 0.13-0.4 of the energy of a cycle (J. Texture Stud. 14:155, 1983), i.e. about 0.04-0.13.
         prony: Relaxation of the shear stiffness as pairs (share [-], time [s]); E is then the instantaneous modulus and
@@ -57,7 +58,6 @@ class Material:
     prony: tuple[tuple[float, float], ...] = ()
     adhesion: float = 0.0
     adhesion_energy: float = 0.0
-    cohesive_strength: float | None = None
 
     def __post_init__(self) -> None:
         w = "material"
@@ -83,15 +83,15 @@ class Material:
         for name in ("R_initiation", "R_skin"):
             if getattr(self, name) is not None:
                 check_number(w, name, getattr(self, name), -1e-300, 1e6, "N/m")
-        if self.cohesive_strength is not None:
-            check_number(w, "cohesive_strength", self.cohesive_strength, 0.0, 1e12, "Pa")
-        if (self.tensile_strength is None) != (self.fracture_energy is None):
-            raise SceneError(
-                "material: tensile_strength and fracture_energy make bulk damage together; give both or none"
-            )
-        if self.tensile_strength is not None and self.fracture_energy is not None:
+        if self.tensile_strength is not None:
             check_number(w, "tensile_strength", self.tensile_strength, 0.0, 1e12, "Pa")
+        if self.fracture_energy is not None:
             check_number(w, "fracture_energy", self.fracture_energy, 0.0, 1e9, "J/m^2")
+            if self.tensile_strength is None:
+                raise SceneError(
+                    "material: fracture_energy makes bulk damage, which starts at tensile_strength; give both, or "
+                    "leave out fracture_energy"
+                )
         if self.skin_thickness > 0 and self.R_skin is None:
             raise SceneError(
                 "material: skin_thickness > 0 needs R_skin, the force per width that goes through the skin"
@@ -124,16 +124,31 @@ class Material:
 
     @property
     def cohesion(self) -> float:
-        """Cohesive strength [Pa]: as given, else twice the yield stress, and no more than makes a process zone
-        E R / strength^2 of :data:`COHESIVE_ZONE`."""
-        if self.cohesive_strength is not None:
-            return self.cohesive_strength
+        """Strength of a cohesive crack [Pa]: the tensile strength; where that is None twice the yield stress, and no
+        more than makes a process zone E R / strength^2 of :data:`COHESIVE_ZONE`."""
+        if self.tensile_strength is not None:
+            return self.tensile_strength
         return min(2 * self.yield_stress, math.sqrt(self.E * self.R / COHESIVE_ZONE))
 
+    def tie_strength(self, spacing: float) -> float:
+        """Strength of ties across the cut plane [Pa]: the cohesive strength, and no more than their grid resolves.
+
+        A tie softens over E R / strength^2. Where that is shorter than half a spacing it would snap back, so it is
+        made weaker until it is not. The work R is the same (Turon et al. 2007, Eng. Fract. Mech. 74:1665).
+
+        Args:
+            spacing: Distance of the ties [m].
+        """
+        return min(self.cohesion, math.sqrt(self.E * self.R / (spacing / 2)))
+
+    def tie_opening(self, spacing: float) -> float:
+        """Half opening at which ties across the cut plane hold nothing any more [m]; ``spacing``: their distance."""
+        return self.R / self.tie_strength(spacing) if self.R > 0 else LEAST_OPENING
+
     @property
-    def opening(self) -> float:
-        """Half opening at which nothing holds the two faces of the cohesive crack any more [m]."""
-        return self.R / self.cohesion if self.R > 0 else LEAST_OPENING
+    def damaged(self) -> bool:
+        """Whether the food has bulk damage."""
+        return self.fracture_energy is not None
 
     @property
     def rate_dependent(self) -> bool:

@@ -60,7 +60,7 @@ def _put_material(table: np.ndarray, scene: Scene, material: Material, seeds: Se
     beta = retardation_time(scene, material)
     table[row.ETA_S], table[row.ETA_B] = beta * material.shear, beta * (material.lame + 2 / 3 * material.shear)
     if scene.tied:
-        table[row.SPACING], table[row.TIE_OPENING] = seeds.spacing, material.opening
+        table[row.SPACING], table[row.TIE_OPENING] = seeds.spacing, material.tie_opening(seeds.spacing)
     table[row.ADHESION], table[row.ADHESION_GAP] = material.adhesion / (material.rho * seeds.spacing), 1.0
     if material.adhesion > 0:
         table[row.ADHESION_GAP] = 2 * material.adhesion_energy / material.adhesion

@@ -62,7 +62,7 @@ class Setup:
             threads=threads,
             nodal=scene.numerics.contact == "nodal",
             press=not scene.cuts,
-            damage=scene.food.material.tensile_strength is not None,
+            damage=scene.food.material.damaged,
             turned=scene.numerics.grid_turn != 0,
             branches=len(scene.food.material.prony),
             batch=batch_capacity(batch),

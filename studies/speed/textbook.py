@@ -79,7 +79,7 @@ class Textbook:
         self.n, self.nodes, self.dx, self.inv, self.dt = len(x), nodes, dx, 1 / dx, dt
         self.mu, self.lam, self.limit = m.shear, m.lame, min(math.sqrt(2 / 3) * m.yield_stress, THRESHOLD)
         self.mass, self.vol = m.rho * seeds.volume, seeds.volume
-        self.eps0 = THRESHOLD if m.tensile_strength is None else m.tensile_strength / m.E
+        self.eps0 = m.tensile_strength / m.E if m.damaged and m.tensile_strength else THRESHOLD
         self.friction, self.speed = m.mu, speed
         self.top, self.middle = BOTTOM * dx + shape.height, nodes * dx / 2
         if not isinstance(knife, Knife):

@@ -191,7 +191,7 @@ def _order(cell: MapCell) -> tuple[Any, ...]:
     assert cell.scene is not None
     n, m = cell.scene.numerics, cell.scene.food.material
     mirrors = cell.scene.mirrors
-    kind = (n.precision, n.contact, mirrors, n.grid_turn, n.ppc, len(m.prony), m.tensile_strength is not None)
+    kind = (n.precision, n.contact, mirrors, n.grid_turn, n.ppc, len(m.prony), m.damaged)
     return n.dx, kind, -cell.cost
 
 

@@ -62,6 +62,14 @@ def test_every_option_is_explained_with_what_it_takes():
                 assert action.metavar, (name, action.dest)
 
 
+@pytest.mark.parametrize("text", ["0.045", "45mm", "4.5 cm", "45000um", " 4.5e1mm "])
+def test_a_length_may_have_its_unit(text):
+    """Metres, or a number and its unit, on every option that takes a length, and in a list of them."""
+    args = parse(parser(), ["simulate", "--food", "banana", "--height", text])
+    assert args.height == 0.045
+    assert parse(parser(), ["converge", "--food", "banana", "--dx", "3mm,0.002"]).dx == (0.003, 0.002)
+
+
 SLIPS = {
     "": ["name a command", "cutcal --help"],
     "calibrat": ["no command 'calibrat'", "did you mean 'calibrate'?"],
@@ -72,7 +80,8 @@ SLIPS = {
     "simulate --food": ["--food", "expected one argument"],
     "simulate --food Bananna": ["did you mean 'banana'?"],
     "simulate --food banana --knife kichen": ["did you mean 'kitchen'?"],
-    "simulate --food banana --height 30mm": ["--height", "'30mm' is not a number"],
+    "simulate --food banana --height 30in": ["--height", "'30in' is not a length such as 0.045 or 45mm"],
+    "simulate --food banana --height 3000mm": ["--height", "3000mm must lie between 0.001 and 1 m"],
     "simulate --food banana --height 30": ["--height", "30", "0.001 and 1 m"],
     "simulate --food banana --shape sylinder": ["--shape", "did you mean 'cylinder'?"],
     "simulate --food banana --trace x.csv": ["--trace", "calibrate", "predict", "have it"],
@@ -94,7 +103,7 @@ SLIPS = {
     "calibrate --food banana --trace {banana} --force-col Force": ["'Force'", "did you mean 'force_N'?"],
     "calibrate --food banana --trace {banana} --material {folder}": ["cannot be read", "readable YAML file"],
     "calibrate --config {folder}": ["cannot be read", "readable YAML file"],
-    "converge --food banana --dx 3e-3,x": ["--dx", "'x' is not a number"],
+    "converge --food banana --dx 3e-3,x": ["--dx", "'x' is not a length"],
     "converge --food banana --repeats -1": ["--repeats", "at least 0"],
     "prior --draws 0": ["--draws", "at least 1"],
     "report nowhere": ["nowhere", "no such folder", "output folder of a calibration"],

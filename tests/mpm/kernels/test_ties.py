@@ -101,18 +101,25 @@ def test_a_food_without_resistance_parts_for_nothing():
 
 
 def test_impossible_cracks_are_refused():
-    """In one line: no strength, and ties that would snap back."""
-    with pytest.raises(SceneError, match="cohesive_strength"):
-        replace(TUBER, cohesive_strength=0.0)
-    with pytest.raises(SceneError, match="snap back; use at most"):
-        SPLIT.with_material(cohesive_strength=3e6)
+    """In one line: a food without strength."""
+    with pytest.raises(SceneError, match="tensile_strength"):
+        replace(TUBER, tensile_strength=0.0)
+
+
+def test_ties_are_no_stronger_than_the_grid_resolves():
+    """Ties that would snap back are weakened until their process zone is as long as they are stiff; R stays."""
+    strong = SPLIT.with_material(tensile_strength=3e6)
+    food = strong.food.material
+    assert strong.weakened and not SPLIT.weakened and TUBER.tie_strength(1.5e-3) == TUBER.cohesion
+    assert food.E * food.R / food.tie_strength(1.5e-3) ** 2 == pytest.approx(0.75e-3)
+    assert food.tie_opening(1.5e-3) * food.tie_strength(1.5e-3) == pytest.approx(food.R)
 
 
 def test_the_strength_of_a_food_that_has_none_is_derived():
     """Twice the yield stress, or what makes a process zone of ten millimetres if that is less."""
     assert FLOWS.cohesion == 2 * FLOWS.yield_stress
     assert TUBER.E * TUBER.R / TUBER.cohesion**2 == pytest.approx(COHESIVE_ZONE)
-    assert replace(TUBER, cohesive_strength=1.5e5).cohesion == 1.5e5
+    assert replace(TUBER, tensile_strength=1.5e5).cohesion == 1.5e5
 
 
 def surface(record: ForceRecord) -> float:
@@ -178,7 +185,7 @@ def test_ties_of_a_whole_food_pull_as_those_of_its_quarter():
 def test_a_food_that_is_not_cut_hangs_together():
     """Pulled apart at less than its strength a block stays whole and takes no energy; beyond it the plane parts and
     takes R."""
-    soft = replace(FLESH, E=1e5, R=20.0, R_initiation=20.0, yield_stress=np.inf, cohesive_strength=5e3, loss_factor=0.1)
+    soft = replace(FLESH, E=1e5, R=20.0, R_initiation=20.0, yield_stress=np.inf, tensile_strength=5e3, loss_factor=0.1)
     numerics = replace(PRISM.numerics, mirror=False, gravity=0.0, room=1.5)
     scene = replace(PRISM, numerics=numerics, board=Board(0.0), knife=WEDGE, food=replace(PRISM.food, material=soft))
     sim = Simulation(scene, Runtime(threads=1))

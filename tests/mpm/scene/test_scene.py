@@ -173,7 +173,8 @@ def test_moving_mean_removes_a_ripple_of_its_width():
         ({"nu": 0.5}, "nu"),
         ({"E": -1.0}, "E = -1.0"),
         ({"rho": math.nan}, "rho"),
-        ({"tensile_strength": 1e5}, "both or none"),
+        ({"fracture_energy": 20.0}, "give both"),
+        ({"tensile_strength": 0.0}, "tensile_strength"),
         ({"skin_thickness": 1e-3}, "R_skin"),
     ],
 )

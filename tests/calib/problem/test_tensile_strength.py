@@ -1,0 +1,62 @@
+"""The tensile strength as a parameter: its prior and a fit to a made-up cut."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calib.fit.multistart import multistart_search
+from calib.fit.options import FitOptions
+from calib.material.food import load_food
+from calib.problem.food_parameters import fit_parameters
+from calib.problem.objective import Objective
+from calib.problem.target import Target
+from calib.simulation.evaluation import Evaluation
+from calib.simulation.workers import evaluation_of
+from mpm.runtime import Runtime
+from mpm.scene import Scene
+from mpm.solver import Simulation
+from tests.mpm.kernels.test_ties import SHORT
+
+APPLE = load_food("apple")
+STRENGTH = "tensile_strength"
+PEELED = replace(APPLE.to_scene_food().material, skin_thickness=0.0)
+SPLIT = replace(SHORT, food=replace(SHORT.food, material=PEELED), motion=replace(SHORT.motion, mach=0.04))
+"""A short cut of peeled apple that parts by a cohesive crack, under a thick blade."""
+
+
+class Cuts:
+    """Simulates the cut in this process, in order."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.simulation = scene, Simulation(scene, Runtime(threads=1))
+
+    def evaluate(self, batch: Sequence[Mapping[str, float]]) -> Iterator[Evaluation]:
+        """Each set of the batch."""
+        for index, values in enumerate(batch):
+            run = evaluation_of(self.simulation.run(replace(self.scene.food.material, **values)))
+            yield replace(run, index=index, parameters=dict(values))
+
+
+def test_prior_is_that_of_the_literature() -> None:
+    """On a log scale, and with the stress-like: it scales with stiffness and toughness."""
+    only = fit_parameters(APPLE, (STRENGTH,))
+    parameter = only[STRENGTH]
+    assert (parameter.value, parameter.prior_low, parameter.prior_high) == (2.5e5, 5e4, 5e5)
+    assert parameter.log and only.stress_like() == pytest.approx([1.0])
+
+
+@pytest.mark.parametrize("truth", [1.2e5, 4e5])
+def test_strength_of_a_made_up_cut_is_found(truth: float) -> None:
+    """Under a thick blade the force tells a weak food from a strong one of the same stiffness and toughness."""
+    cuts = Cuts(SPLIT)
+    real = next(cuts.evaluate([{STRENGTH: truth}]))
+    grid = np.linspace(0.0, 0.006, 60)
+    curve = np.interp(grid, real.stroke, real.force)
+    noise = 0.005 * float(curve.max())
+    objective = Objective(Target(grid, curve, noise, noise, np.interp), fit_parameters(APPLE, (STRENGTH,)))
+    found = multistart_search(objective, cuts, options=FitOptions(budget=25, design=3))
+    assert found.parameters[STRENGTH].value == pytest.approx(truth, rel=0.1)
