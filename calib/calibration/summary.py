@@ -65,7 +65,7 @@ def summarise(done: Calibrated, folder: Path, began: float) -> CalibrationResult
     verdicts = judge(
         done.metrics,
         {name: model.metrics for name, model in done.nulls.items()},
-        conservation=Conservation(record.momentum_residual, record.ke_over_ie, record.parted),
+        conservation=Conservation(record.momentum_residual, record.ke_over_ie, record.parted, record.lost),
         fitted=fitted,
         checks=done.checks,
         nuisances=nuisances,

@@ -98,7 +98,8 @@ class FoodSpec:
     def default_fit(self) -> tuple[str, ...]:
         """Names of the properties that a calibration fits unless told otherwise."""
         start = ("R_skin", "skin_thickness") if self.properties["skin_thickness"].value > 0.0 else ("R_initiation",)
-        return ("E", "yield_stress", "R", *start, "initiation_depth", "mu")
+        strength = ("tensile_strength",) if "tensile_strength" in self.properties else ()
+        return ("E", "yield_stress", *strength, "R", *start, "initiation_depth", "mu")
 
     def value(self, name: str) -> float | None:
         """Value of a property [SI], None where the food has none.

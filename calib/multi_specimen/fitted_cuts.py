@@ -12,7 +12,7 @@ from calib.problem.scored_run import ScoredRun
 from calib.problem.setup import Setup
 from calib.simulation.record_file import record_errands
 from calib.uncertainty.predictive import Band
-from calib.validation.acceptance import Verdict, agreement, balances, changes
+from calib.validation.acceptance import Conservation, Verdict, agreement, balances, changes
 from calib.validation.metrics import Metrics, compare
 from calib.validation.null_models import null_models
 from calib.validation.numerical_checks import VARIED, Check, check, check_errands
@@ -68,9 +68,7 @@ class FittedCut:
     @cached_property
     def verdicts(self) -> tuple[Verdict, ...]:
         """Lines of its verdict: agreement with the trace, balances, numerical choices."""
-        evaluation = self.run.evaluation
-        scalars = evaluation.scalars
-        kept = balances(scalars["momentum_residual"], scalars["ke_over_ie"], evaluation.parted)
+        kept = balances(Conservation.of(self.run.evaluation))
         return (*agreement(self.metrics), *kept, *changes(self.checks))
 
     @property

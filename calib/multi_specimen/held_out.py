@@ -25,7 +25,7 @@ from calib.simulation.evaluation import Evaluation
 from calib.trace.filters import filter_simulated
 from calib.uncertainty.intervals import linearised_likelihood, uncertainty
 from calib.uncertainty.predictive import Band, error_draws, pointwise_band, posterior_draws
-from calib.validation.acceptance import Verdict, balances
+from calib.validation.acceptance import Conservation, Verdict, balances
 from calib.validation.metrics import Metrics, compare
 from calib.validation.null_models import null_models
 from calib.validation.prediction import PREDICTION_NRMSE_LIMIT, PREDICTION_RATING_LIMIT
@@ -113,7 +113,7 @@ def predict(specimens: Specimens, fit: JointFit, name: str) -> HeldOutPrediction
     drawn = [{**x, **y} for x, y in zip(others, _adapted(specimens, own, shared, others, name), strict=True)]
     runs = _simulated(specimens, name, [{**shared, **best}, *drawn])
     curve, *others_curves = (filter_simulated(objective.target.stroke, e.stroke, e.force) for e in runs if e.ok)
-    factor, scalars = objective.factor(curve), runs[0].scalars
+    factor = objective.factor(curve)
     stroke, real = objective.target.stroke, objective.target.curve
     nulls = {n: m.metrics for n, m in null_models(stroke, real).items()}
     return HeldOutPrediction(
@@ -126,7 +126,7 @@ def predict(specimens: Specimens, fit: JointFit, name: str) -> HeldOutPrediction
         nulls=nulls | {MEAN_CURVE: compare(stroke, real, _mean_curve(specimens, fit.names, name))},
         band=_band(objective, [curve, *others_curves], fit, seed),
         simulations=len(runs) + (0 if own is None else len(own.result.history) + 1 + len(others)),
-        balances=tuple(balances(scalars["momentum_residual"], scalars["ke_over_ie"], runs[0].parted)),
+        balances=tuple(balances(Conservation.of(runs[0]))),
     )
 
 

@@ -89,8 +89,14 @@ class Evaluation:
 
     @property
     def parted(self) -> float:
-        """Energy that the edge has taken over R times the new area [-]; NaN where there is nothing to judge."""
+        """Energy of new surface over R times its area [-]; NaN where there is nothing to judge."""
         return self.scalars.get("parted", math.nan)
+
+    @property
+    def unbooked(self) -> float:
+        """Part of the work that no law has taken [-]; NaN where there is nothing to judge."""
+        lost, work = self.scalars.get("unbooked_J", math.nan), self.scalars.get("work_J", 0.0)
+        return lost / work if work > 0 else math.nan
 
     @property
     def ok(self) -> bool:

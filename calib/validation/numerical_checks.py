@@ -77,11 +77,6 @@ class Check:
         return to_document(self)
 
 
-def _unbooked(run: Evaluation) -> float:
-    """Part of the work that no law has taken [-]."""
-    return run.scalars["unbooked_J"] / run.scalars["work_J"]
-
-
 def check(scene: Scene, own: Evaluation, store: EvaluationStore, stroke: float) -> list[Check]:
     """The variants of a scene against it.
 
@@ -102,8 +97,7 @@ def check(scene: Scene, own: Evaluation, store: EvaluationStore, stroke: float) 
         run = store.last(_key(vary(scene)))
         if run.ok and min(own.until(stroke)) > 0:
             peak, work = (new / old - 1 for new, old in zip(run.until(stroke), own.until(stroke), strict=True))
-            unbooked = _unbooked(run) - _unbooked(own)
-            out.append(Check(name, None, peak, work, unbooked))
+            out.append(Check(name, None, peak, work, run.unbooked - own.unbooked))
         else:
             out.append(Check(name, run.reason or "no force", None, None))
     return out

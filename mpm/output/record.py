@@ -160,17 +160,18 @@ class ForceRecord:
     def unbooked(self) -> np.ndarray:
         """Energy that no law has taken [J], shape (n,): work of the knife and of gravity less all that is booked.
 
-        Most of it is released at the front of the crack, which leads the edge by half a process zone: there the halves,
-        bent apart by the blade, part without resistance, and what they release goes on in waves that viscosity and the
-        transfers between particles and grid damp. It is the energy release rate of that crack, the same on any grid
-        (docs/theory.md, "Measured choices") and that of finite elements (studies/verification/cutting.py). The rest is
-        lost by the discretisation: the transfers smooth the velocities, and the contact stops what approaches it. With
-        ties across the cut plane only that rest is left.
+        It is lost by the discretisation: the transfers smooth the velocities, and the contact stops what approaches it.
+        Without ties across the cut plane (the ``nodal`` contact) it holds all that new surface costs as well.
         """
         booked = self.kinetic + self.elastic + self.plastic + self.damage + self.viscous + self.friction + self.parting
         if self.cohesion is not None:
             booked = booked + self.cohesion
         return self.work_done + self.weighing - booked
+
+    @property
+    def lost(self) -> float:
+        """Part of the work that no law has taken [-]; NaN where no work was done."""
+        return float(self.unbooked[-1]) / self.work if len(self.stroke) and self.work > 0 else math.nan
 
     @property
     def surface(self) -> np.ndarray:
@@ -191,9 +192,8 @@ class ForceRecord:
     def fracture(self) -> dict[str, float] | None:
         """Energy of new surface over its area [J/m^2]; None where there is none.
 
-        ``edge_J_m2`` is that of the edge's law, ``released_J_m2`` is :attr:`unbooked`. Their sum is the work of
-        fracture that an energy balance of the whole cut would find. With ties across the cut plane ``opening_J_m2`` is
-        theirs; that of edge and opening add up to R, and what is unbooked is lost.
+        ``edge_J_m2`` is that of the edge's law, ``opening_J_m2`` that of the ties that open ahead of the edge. They add
+        up to R. ``released_J_m2`` is :attr:`unbooked`: what no law has taken.
         """
         if not self.severed_area > 0:
             return None

@@ -45,11 +45,11 @@ def _far(scene: Mapping[str, Any]) -> str | None:
 def _energy(energy: Mapping[str, float], fracture: Mapping[str, float] | None) -> Data:
     """Part of the work that no law has taken, where the rest has gone, and both parts of the work of fracture; None
     where it was not recorded."""
-    part = unbooked(energy)
+    part, opening = unbooked(energy), None if fracture is None else fracture.get("opening_J_m2")
     return {
         "unbooked": None if part is None else quantity(part, "fraction", digits=2),
         "spent": spent(energy),
-        "released": None if fracture is None else quantity(fracture["released_J_m2"], "J/m^2", digits=3),
+        "opened": None if opening is None else quantity(opening, "J/m^2", digits=3),
         "parted": None if fracture is None else quantity(fracture["edge_J_m2"], "J/m^2", digits=3),
     }
 

@@ -129,7 +129,7 @@ def lines_of_a_report() -> list[Verdict]:
     return judge(
         compare(s, real, real),
         nulls,
-        conservation=Conservation(0.0, 0.0),
+        conservation=Conservation(0.0, 0.0, 1.0, 0.0),
         fitted={},
         checks=[Check(name, None, 0.0, 0.0, 0.0) for name in VARIANTS],
         nuisances=dict.fromkeys(NUISANCE_LINES, nuisance),
