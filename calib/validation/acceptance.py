@@ -274,8 +274,8 @@ def _limits_of_simulation(fracture: Mapping[str, float] | None) -> list[str]:
         edge, opening = fracture["edge_J_m2"], fracture["opening_J_m2"]
         if opening > OPENING_REMARKED * (edge + opening):
             said.append(
-                f"The blade opens the food ahead of its edge: of R {opening / (edge + opening):.0%} went there, against "
-                "the tensile strength, which then trades with R and the yield stress."
+                f"The blade opens the food ahead of its edge: of R {opening / (edge + opening):.0%} went there, "
+                "against the tensile strength, which then trades with R and the yield stress."
             )
     return [
         *said,

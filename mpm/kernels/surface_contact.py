@@ -13,6 +13,7 @@ from mpm.state.tables import (
     BLADE_MU,
     BOARD,
     BOARD_MU,
+    CONTACT,
     DX,
     EDGE_VS,
     EDGE_VZ,
@@ -30,9 +31,6 @@ from mpm.state.tables import (
     YIELD,
 )
 
-# Stiffness of the contact over mass / dt^2 of a particle. The stiffest sound one is 4 for a lone particle on a hard
-# surface, over 1 + 4 arm^2 / dx^2 when the impulse has an arm, which is half a cell at most.
-CONTACT_STIFFNESS = 2.0
 LEAST_GAP = 0.02  # least distance between a particle's centre and the surface that squeezing leaves, over the cell
 
 
@@ -56,8 +54,8 @@ def surface_contact(s: ti.template(), cut, p, dt, u, at):
     contact is that of the surface. At the centre a food of n cells would be 1 / n stiffer.
 
     The force is the food's own traction on the surface and, for what is missing, a stiff spring (Nitsche's method:
-    Chouly and Hild 2013, SIAM J. Numer. Anal. 51:1295). The spring alone, as stiff as the time step allows, would give
-    way as much as a fifth of a cell of food does.
+    Chouly and Hild 2013, SIAM J. Numer. Anal. 51:1295). The spring alone, as stiff as two layers of particles, would
+    give way as much as a fifth of a cell of food does.
 
     Args:
         p: The particle.
@@ -99,7 +97,7 @@ def surface_contact(s: ti.template(), cut, p, dt, u, at):
 
 
 @ti.func
-def surface_traction(s: ti.template(), cut, p, shell, depth, n, dt):
+def surface_traction(s: ti.template(), cut, p, shell, depth, n):
     """Force that the food's own stress asks of a board or tool, over the contact's stiffness [m].
 
     Args:
@@ -107,7 +105,6 @@ def surface_traction(s: ti.template(), cut, p, shell, depth, n, dt):
         shell: Reference volume between its centre and the surface [m^3], 0 behind the first layer.
         depth: Distance of centre and surface [m].
         n: Outward normal of the tool, in the scene's axes.
-        dt: Time step [s].
     """
     out = ti.Vector.zero(float, 3)
     if shell > 0:
@@ -115,12 +112,12 @@ def surface_traction(s: ti.template(), cut, p, shell, depth, n, dt):
         lane = p - block * s.lanes
         t = ti.Vector([s.tau[cut, block, r][lane] for r in range(6)])
         out = to_scene_axes(s, cut, full(t) @ to_grid_axes(s, cut, n))
-        out *= -shell / depth * dt * dt / (CONTACT_STIFFNESS * s.par[cut, MASS] * s.volume_ratio[cut, p])
+        out *= -shell / depth / (s.par[cut, CONTACT] * s.par[cut, MASS] * s.volume_ratio[cut, p])
     return out
 
 
 @ti.func
-def friction_limit(s: ti.template(), cut, p, press, dt):
+def friction_limit(s: ti.template(), cut, p, press):
     """Largest friction on the tool at a normal force, both over the contact's stiffness [m].
 
     It is Coulomb's, and on the food's face no more than its yield stress in shear (Orowan 1943; Zorev 1963).
@@ -131,7 +128,7 @@ def friction_limit(s: ti.template(), cut, p, press, dt):
     most, shell = s.par[cut, BLADE_MU] * press, s.surface_volume[cut, p][1]
     if shell > 0:
         yields = s.par[cut, YIELD] / ti.sqrt(3.0) * shell / s.tool_gap[cut, p]
-        most = ti.min(most, yields * dt * dt / (CONTACT_STIFFNESS * s.par[cut, MASS] * s.volume_ratio[cut, p]))
+        most = ti.min(most, yields / (s.par[cut, CONTACT] * s.par[cut, MASS] * s.volume_ratio[cut, p]))
     return most
 
 
@@ -152,14 +149,14 @@ def board_contact(s: ti.template(), cut, p, m, dt, u, at):
         at: Position of its centre [m].
     """
     dv = ti.Vector.zero(float, 3)
-    own = surface_traction(s, cut, p, s.surface_volume[cut, p][0], s.board_gap[cut, p], ti.Vector([0.0, 0.0, 1.0]), dt)
+    own = surface_traction(s, cut, p, s.surface_volume[cut, p][0], s.board_gap[cut, p], ti.Vector([0.0, 0.0, 1.0]))
     force = s.board_gap[cut, p] - at[2] + own[2]
     own[2] = 0.0
     if force > 0:
         slide = dt * ti.Vector([u[0], u[1], 0.0])
         hold = stick_slip(s.stick[cut, 0, p], slide, own, s.par[cut, BOARD_MU] * force)
         s.stick[cut, 0, p] = own - hold
-        dv = CONTACT_STIFFNESS / dt * ti.Vector([hold[0], hold[1], force])
+        dv = s.par[cut, CONTACT] * dt * ti.Vector([hold[0], hold[1], force])
         book_impulse(s, cut, BOARD, -m * dv)
         s.sums[cut, FRICTION_WORK] -= m / dt * dv.dot(slide)
     else:
@@ -197,7 +194,7 @@ def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
         if back > d:
             d, n = back, ti.Vector([0.0, ti.sqrt(0.5), ti.sqrt(0.5)])
         n = ti.Vector([-sin_t * n[2], sign * n[1], cos_t * n[2]])
-        own = surface_traction(s, cut, p, s.surface_volume[cut, p][1], s.tool_gap[cut, p], n, dt)
+        own = surface_traction(s, cut, p, s.surface_volume[cut, p][1], s.tool_gap[cut, p], n)
         opening = d - s.tool_gap[cut, p]
         force = own.dot(n) - opening
         press = ti.max(force, 0.0)
@@ -208,11 +205,7 @@ def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
             if opening < s.par[cut, ADHESION_GAP]:
                 opening = ti.max(opening, 0.0)
                 force = (
-                    -s.par[cut, ADHESION]
-                    * adhesive_traction(opening, s.par[cut, ADHESION_GAP])
-                    * dt
-                    * dt
-                    / CONTACT_STIFFNESS
+                    -s.par[cut, ADHESION] * adhesive_traction(opening, s.par[cut, ADHESION_GAP]) / s.par[cut, CONTACT]
                 )
                 press = -force
             else:
@@ -223,9 +216,9 @@ def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
             rel = u + arm[2] * up + arm[1] * across - blade_velocity(s, cut, at[0] + arm[0], at[2] + arm[2])
             slide = rel - rel.dot(n) * n
             stick = s.stick[cut, 1, p] - s.stick[cut, 1, p].dot(n) * n
-            hold = stick_slip(stick, dt * slide, own, friction_limit(s, cut, p, press, dt))
+            hold = stick_slip(stick, dt * slide, own, friction_limit(s, cut, p, press))
             s.stick[cut, 1, p] = own - hold
-            dv = CONTACT_STIFFNESS / dt * (force * n + hold)
+            dv = s.par[cut, CONTACT] * dt * (force * n + hold)
             book_knife_impulse(s, cut, FACE, -m * dv, at[0] + arm[0], at[2] + arm[2])
             s.sums[cut, FRICTION_WORK] -= m * dv.dot(slide if force > 0 else rel)
     if not touching:
@@ -260,7 +253,7 @@ def press_contact(s: ti.template(), cut, p, m, dt, u, at):
         sign * at[1], above, s.par[cut, SPINE], s.par[cut, WEDGE_COS], s.par[cut, WEDGE_SIN], s.par[cut, TIP_RADIUS]
     )
     n = ti.Vector([0.0, sign * n[1], n[2]])
-    own = surface_traction(s, cut, p, s.surface_volume[cut, p][1], s.tool_gap[cut, p], n, dt)
+    own = surface_traction(s, cut, p, s.surface_volume[cut, p][1], s.tool_gap[cut, p], n)
     force = own.dot(n) - d
     own -= own.dot(n) * n
     dv = ti.Vector.zero(float, 3)
@@ -269,9 +262,9 @@ def press_contact(s: ti.template(), cut, p, m, dt, u, at):
         stick = s.stick[cut, 1, p] - s.stick[cut, 1, p].dot(n) * n
         slide = u - tool
         slide -= slide.dot(n) * n
-        hold = stick_slip(stick, dt * slide, own, friction_limit(s, cut, p, force, dt))
+        hold = stick_slip(stick, dt * slide, own, friction_limit(s, cut, p, force))
         s.stick[cut, 1, p] = own - hold
-        dv = CONTACT_STIFFNESS / dt * (force * n + hold)
+        dv = s.par[cut, CONTACT] * dt * (force * n + hold)
         book_impulse(s, cut, FACE, -m * dv)
         s.sums[cut, FRICTION_WORK] -= m * dv.dot(slide)
     else:

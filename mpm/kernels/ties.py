@@ -9,13 +9,13 @@ import taichi as ti
 
 from mpm.kernels.constitutive import full
 from mpm.kernels.crack import IN_CONTACT
-from mpm.kernels.surface_contact import CONTACT_STIFFNESS
 from mpm.kernels.tool import edge_height, under_blade
 from mpm.state.accessors import step_size, to_grid_axes, to_scene_axes, velocity_gradient
 from mpm.state.loops import locate_active, repetitions
 from mpm.state.state import SLICES, TIES
 from mpm.state.tables import (
     BLADE_HEIGHT,
+    CONTACT,
     DX,
     FIRST_STATION,
     INV_DX,
@@ -118,7 +118,7 @@ def pull_tie(s: ti.template(), cut, n, dt):
         between = above > 0
     left = 1.0 - s.cut_part[cut, n]
     m = s.par[cut, MASS] * s.volume_ratio[cut, p]
-    stiff = CONTACT_STIFFNESS * m / (dt * dt)
+    stiff = s.par[cut, CONTACT] * m
     force = own + stiff * jump
     pressed = ti.min(force[1], 0.0)
     if left > 0 or (pressed < 0 and not between):

@@ -177,6 +177,8 @@ class Numerics:
         ppc: Particles per cell and direction, at least 2.
         far: Distance from the cut plane beyond which there is one particle a cell across the blade, and within the food
             one a cell altogether [m]; None: nowhere. Only the outline needs as many there as elsewhere.
+        contact_stiffness: Stiffness of the contact's spring over that of a layer of particles [-]. Below 1.5 Nitsche's
+            method is not stable in every food (docs/theory.md, "Measured choices"); stiffer asks for shorter steps.
         contact: ``cohesive`` (edge law and particle contact) or ``nodal`` (the plain projection of grid velocities).
         grid_shift: Position of the grid against the scene along x, y, z [cells].
         grid_turn: Angle of food and blade against the grid [rad].
@@ -194,6 +196,7 @@ class Numerics:
     ppc: int = 2
     far: float | None = None
     contact: str = "cohesive"
+    contact_stiffness: float = 2.0
     grid_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
     grid_turn: float = 0.0
     mirror: bool = True
@@ -216,6 +219,7 @@ class Numerics:
         if self.far is not None:
             check_number(w, "far", self.far, 0.0, 1.0, "m")
         check_number(w, "room", self.room, 0.0, 100.0, "of half the food's size")
+        check_number(w, "contact_stiffness", self.contact_stiffness, 0.1, 100.0, "of a layer's")
         check_number(w, "safety", self.safety, 0.0, 0.9001, "of the stability limit")
         check_number(w, "output", self.output, 0.0, 0.1, "m")
         if self.contact not in CONTACTS:

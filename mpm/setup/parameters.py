@@ -11,7 +11,7 @@ from mpm.discretisation.particles import Seeds
 from mpm.scene import BAND_CELLS, Press, Scene
 from mpm.scene.material import Material
 from mpm.scene.shapes import section_area
-from mpm.setup.stable_step import retardation_time
+from mpm.setup.stable_step import contact_stiffness, retardation_time
 from mpm.state import tables as row
 
 ENDLESS = 1e3  # thickness of a wedge that never becomes a plate with parallel faces [m]
@@ -59,6 +59,7 @@ def _put_material(table: np.ndarray, scene: Scene, material: Material, seeds: Se
         table[row.EPSF] = eps0 / 2 + material.fracture_energy / (material.tensile_strength * band)
     beta = retardation_time(scene, material)
     table[row.ETA_S], table[row.ETA_B] = beta * material.shear, beta * (material.lame + 2 / 3 * material.shear)
+    table[row.CONTACT] = contact_stiffness(scene, material, seeds.spacing)
     if scene.tied:
         table[row.SPACING], table[row.TIE_OPENING] = seeds.spacing, material.tie_opening(seeds.spacing)
     table[row.ADHESION], table[row.ADHESION_GAP] = material.adhesion / (material.rho * seeds.spacing), 1.0

@@ -4,20 +4,34 @@ from __future__ import annotations
 
 import math
 
-from mpm.kernels.surface_contact import CONTACT_STIFFNESS
 from mpm.scene import Scene
 from mpm.scene.material import Material
 
 EDGE_STABILITY = 0.5  # dt times the frequency of the edge's cohesive spring, 2 is unstable
 ADHESION_STABILITY = 0.5  # the same for the rising part of the adhesive traction
-# Least stiffness of the contact's spring over that of the layer of particles it holds, for which Nitsche's method is
-# stable (docs/theory.md, "Measured choices"). Only foods of nu < 0.2 ask for a shorter step than waves do.
-COERCIVITY = 1.5
+# Largest stiffness of the contact's spring over mass / dt^2 of a particle: 4 for a lone particle on a hard surface, over
+# 1 + 4 arm^2 / dx^2 when the impulse has an arm, which is half a cell at most.
+CONTACT_LIMIT = 2.0
 
 
 def retardation_time(scene: Scene, material: Material) -> float:
     """Kelvin-Voigt retardation time that gives the loss factor at the first axial mode c/(4 height) [s]."""
     return material.loss_factor * 4 * scene.food.shape.height / (2 * math.pi * material.p_wave)
+
+
+def contact_stiffness(scene: Scene, material: Material, spacing: float) -> float:
+    """Stiffness of the contact over the mass of a particle [1/s^2]: ``numerics.contact_stiffness`` layers of particles.
+
+    Args:
+        scene: What is simulated.
+        material: Its constants.
+        spacing: Lattice spacing of the particles [m].
+
+    Returns:
+        Stiffness of the contact of board, blade and halves, over mass.
+    """
+    layer = min(spacing, scene.numerics.dx / 2)
+    return scene.numerics.contact_stiffness * (material.p_wave / layer) ** 2
 
 
 def stable_step(scene: Scene, material: Material, spacing: float) -> float:
@@ -37,8 +51,7 @@ def stable_step(scene: Scene, material: Material, spacing: float) -> float:
     zeta = retardation_time(scene, material) * omega / 2
     dt = num.safety * 2 / omega * (math.sqrt(1 + zeta * zeta) - zeta)
     if num.contact == "cohesive":
-        layer = min(spacing, num.dx / 2)
-        dt = min(dt, math.sqrt(CONTACT_STIFFNESS / COERCIVITY) * layer / material.p_wave)
+        dt = min(dt, math.sqrt(CONTACT_LIMIT / contact_stiffness(scene, material, spacing)))
     if num.contact == "cohesive" and scene.cuts:
         spring = math.sqrt(max(material.start, 1e-12) / (edge.slip * material.rho * edge.zone**2))
         dt = min(dt, EDGE_STABILITY / spring)
