@@ -9,7 +9,7 @@ from mpm.scene.material import Material
 
 EDGE_STABILITY = 0.5  # dt times the frequency of the edge's cohesive spring, 2 is unstable
 ADHESION_STABILITY = 0.5  # the same for the rising part of the adhesive traction
-# Largest stiffness of the contact's spring over mass / dt^2 of a particle: 4 for a lone particle on a hard surface, over
+# Largest stiffness of the contact over mass / dt^2 of a particle: 4 for a lone particle on a hard surface, over
 # 1 + 4 arm^2 / dx^2 when the impulse has an arm, which is half a cell at most.
 CONTACT_LIMIT = 2.0
 
