@@ -1,4 +1,5 @@
-"""What numerical choices do to a calibrated force: the best values once more, slower and elsewhere on the grid."""
+"""What numerical choices do to a calibrated force: the best values once more, slower, elsewhere on the grid, and with
+each constant of the method halved and doubled."""
 
 from __future__ import annotations
 
@@ -13,6 +14,7 @@ from calib.problem.setup import slower
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_store import EvaluationStore, content_key
 from calib.simulation.workers import Errand
+from calib.validation.method_constants import varied
 from mpm.scene import Scene
 
 FINER = 2 / 3
@@ -23,20 +25,29 @@ def _finer(scene: Scene) -> Scene:
     return replace(scene, numerics=replace(scene.numerics, dx=FINER * scene.numerics.dx))
 
 
-FINER_GRID = "cells of two thirds"
+FINER_GRID, HALF_SPEED = "cells of two thirds", "half the simulated speed"
 VARIANTS: Mapping[str, Callable[[Scene], Scene]] = {
-    "half the simulated speed": slower,
+    HALF_SPEED: slower,
     "grid and particles elsewhere": lambda scene: with_other_particles(scene, 1),
     FINER_GRID: _finer,
 }
-"""What should not matter, by name. Order of convergence and uncertainty are the business of a convergence study."""
-VARIED = "at half the speed, with the grid and the particles elsewhere, and on cells of two thirds"
+"""What should not matter and has a line of its own, by name. Order of convergence and uncertainty are the business of
+a convergence study."""
+VARIED = (
+    "at half the speed, with the grid and the particles elsewhere, on cells of two thirds, and with the constants of "
+    "the method halved and doubled"
+)
+
+
+def variants(scene: Scene) -> dict[str, Scene]:
+    """The scenes that are compared with a scene, by what was changed."""
+    return {name: vary(scene) for name, vary in VARIANTS.items()} | dict(varied(scene))
 
 
 def check_errands(scene: Scene, store: EvaluationStore) -> list[Errand]:
     """The simulations that :func:`check` compares: those of the variants that the store does not know."""
-    varied = {_key(other): other for other in (vary(scene) for vary in VARIANTS.values())}
-    return [Errand(other, _keeper(store, key)) for key, other in varied.items() if store.get(key) is None]
+    others = {_key(other): other for other in variants(scene).values()}
+    return [Errand(other, _keeper(store, key)) for key, other in others.items() if store.get(key) is None]
 
 
 def _keeper(store: EvaluationStore, key: str) -> Callable[[Evaluation], None]:
@@ -93,8 +104,8 @@ def check(scene: Scene, own: Evaluation, store: EvaluationStore, stroke: float) 
         KeyError: They were not made.
     """
     out = []
-    for name, vary in VARIANTS.items():
-        run = store.last(_key(vary(scene)))
+    for name, other in variants(scene).items():
+        run = store.last(_key(other))
         if run.ok and min(own.until(stroke)) > 0:
             peak, work = (new / old - 1 for new, old in zip(run.until(stroke), own.until(stroke), strict=True))
             out.append(Check(name, None, peak, work, run.unbooked - own.unbooked))

@@ -43,6 +43,7 @@ from calib.trace.conditioning import condition
 from calib.trace.trace import Trace
 from calib.uncertainty.estimates import FittedParameter
 from calib.validation.acceptance import Conservation, balances, changes, judge, limits, remedied
+from calib.validation.method_constants import varied
 from calib.validation.metrics import compare
 from calib.validation.null_models import null_models
 from calib.validation.numerical_checks import Check, check, check_errands
@@ -176,12 +177,12 @@ def test_a_repeated_run_is_compared_over_the_stroke_of_the_trace(tmp_path):
             (
                 replace(own, force=np.where(stroke < 0.0155, 10.5, 0.0), scalars={"work_J": 2.0, "unbooked_J": 0.4}),
                 replace(own, status="failed", reason="not_finite", fraction=0.5),
-                own,
             )
         )
         for errand in check_errands(PRISM, store):
-            errand.keep(next(again))
-        half, elsewhere_, finer = check(PRISM, own, store, 0.015)
+            errand.keep(next(again, own))
+        half, elsewhere_, finer, *others = check(PRISM, own, store, 0.015)
+        assert [c.name for c in others] == list(varied(PRISM)) and {c.change for c in others} == {0.0}
         assert (half.peak_change, half.work_change) == pytest.approx((0.05, 0.05))
         assert half.unbooked_change == pytest.approx(0.1) and finer.change == 0.0
         assert (elsewhere_.reason, elsewhere_.change) == ("not_finite", None)
@@ -274,10 +275,11 @@ def test_verdicts_fail_what_fails():
         "R": fitted("identified", 300.0),
     }
     checks = [
-        Check("slower", None, 0.01, -0.06),
-        Check("aside", None, 0.02, -0.02),
-        Check("broken", "inverted", None, None),
+        Check("half the simulated speed", None, 0.01, -0.03),
+        Check("grid and particles elsewhere", "inverted", None, None),
         Check("cells of two thirds", None, 0.01, 0.01, -0.03),
+        Check("half the slip of the edge", None, 0.02, -0.02),
+        Check("twice the process zone", None, 0.02, -0.07),
     ]
     kept = Conservation(momentum_residual=0.02, ke_over_ie=0.2, parted=0.7, unbooked=0.09)
     judged = partial(judge, compare(s, real, 1.2 * real), nulls, conservation=kept, checks=checks)
@@ -291,8 +293,9 @@ def test_verdicts_fail_what_fails():
         "food pressed away, not parted",
         "energy lost by the discretisation",
         "parameters at a bound",
-        "slower",
-        "broken",
+        "half the simulated speed",
+        "grid and particles elsewhere",
+        "constants of the method halved and doubled",
     }
     notes = {v.name: (v.value, v.note) for v in lines}
     assert notes["food pressed away, not parted"] == (
@@ -304,9 +307,13 @@ def test_verdicts_fail_what_fails():
         True,
     )
     assert len(balances(Conservation(0.0, 0.0))) == 2  # nothing was to be parted
-    assert notes["slower"] == (0.06, "peak +1.0%, work -6.0%")
+    assert notes["half the simulated speed"] == (0.06, "peak +2.0%, work -6.0%, extrapolated to rest")
+    assert notes["constants of the method halved and doubled"] == (
+        0.07,
+        "most by twice the process zone: peak +2.0%, work -7.0%",
+    )
     assert notes["energy lost by the discretisation"] == (0.09, "of the work")
-    assert notes["broken"] == (None, "broke down: inverted")
+    assert notes["grid and particles elsewhere"] == (None, "broke down: inverted")
     assert sum(v.passed is None for v in lines) == 3
     bounds = next(v for v in lines if v.name == "parameters at a bound")
     assert bounds.value == 1 and "mu at its natural limit" in bounds.note
@@ -334,7 +341,9 @@ def test_verdicts_fail_what_fails():
 @pytest.mark.parametrize("change", [0.01, -0.08])
 def test_a_force_that_hangs_on_the_cells_says_what_to_do(change):
     """The remedy is among the limits of a calibration whose finer grid fails, and of no other."""
-    lines = changes([Check("slower", None, 0.01, -0.06), Check("cells of two thirds", None, 0.01, change, 0.0)])
+    lines = changes(
+        [Check("half the simulated speed", None, 0.01, -0.03), Check("cells of two thirds", None, 0.01, change)]
+    )
     said = limits("measured", "position", "air", lines, {}, [])
     assert [remedied(line) != "" for line in lines] == [False, change < -0.05]
     assert any("Values and intervals answer for these cells alone" in text for text in said) == (change < -0.05)

@@ -62,20 +62,33 @@ def finished(killed: tuple[Path, list[bytes]]) -> tuple[Path, int]:
 
 
 def test_numerical_choices_are_checked(finished):
-    """The best values run again at half the speed, elsewhere on the grid and on a finer one, in lines of the verdict;
-    resuming runs none."""
+    """The best values run again at half the speed, elsewhere on the grid, on a finer one, and with the constants of the
+    method halved and doubled, in lines of the verdict; resuming runs none."""
     out, _ = finished
     summary = json.loads((out / "summary.json").read_text())
     assert [c["name"] for c in summary["numerical_checks"]] == [
         "half the simulated speed",
         "grid and particles elsewhere",
         "cells of two thirds",
+        "twice the process zone",
+        "half the slip of the edge",
+        "twice the slip of the edge",
+        "twice the contact stiffness",
+        "half the time step",
+        "half the loss factor",
+        "twice the loss factor",
+        "blade half a cell aside",
     ]
+    lines = {v["name"]: v["value"] for v in summary["verdicts"]}
+    found = {}
     for one in summary["numerical_checks"]:
-        line = next(v for v in summary["verdicts"] if v["name"] == one["name"])
         assert one["reason"] is None
-        assert line["value"] == max(abs(one["peak_change"]), abs(one["work_change"]))
-        assert 0 < line["value"] < 0.2
+        found[one["name"]] = max(abs(one["peak_change"]), abs(one["work_change"]))
+    speed, elsewhere, finer, *constants = found.items()
+    assert lines[speed[0]] == 2 * speed[1]
+    assert all(lines[name] == size for name, size in (elsewhere, finer))
+    assert lines["constants of the method halved and doubled"] == max(size for _, size in constants)
+    assert all(0 < size < 0.2 for size in found.values())
 
 
 def test_a_grid_that_counts_is_said_with_a_remedy(finished):

@@ -1,0 +1,94 @@
+"""The constants of the method: numbers that nobody measured on the food, and what halving or doubling each does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from mpm.scene import Scene
+
+
+@dataclass(frozen=True)
+class MethodConstant:
+    """A number of the method that could move a force.
+
+    Attributes:
+        name: What it is.
+        part: Part of a scene that holds it: ``edge``, ``numerics`` or ``material``.
+        key: Its name there.
+        factors: By how much it is varied; a factor that cannot be simulated is left out, and ``why`` says so.
+        source: Where its value is from.
+        why: Why not both half and twice; empty where it is both.
+    """
+
+    name: str
+    part: str
+    key: str
+    factors: tuple[float, ...]
+    source: str
+    why: str = ""
+
+    def value(self, scene: Scene) -> float:
+        """Its value in a scene [SI]."""
+        part = scene.food.material if self.part == "material" else getattr(scene, self.part)
+        return float(getattr(part, self.key))
+
+    def varied(self, scene: Scene, factor: float) -> Scene:
+        """The scene with another value of it; the same scene where it is nothing.
+
+        Args:
+            scene: A scene.
+            factor: Of its value.
+        """
+        new = {self.key: factor * self.value(scene)}
+        if self.part == "material":
+            return scene.with_material(**new)
+        return replace(scene, **{self.part: replace(getattr(scene, self.part), **new)})
+
+
+CONSTANTS = (
+    MethodConstant(
+        "process zone", "edge", "zone", (2.0,), "numerical: as wide as the cells allow",
+        "half of it is narrower than a cell",
+    ),
+    MethodConstant("slip of the edge", "edge", "slip", (0.5, 2.0), "numerical: elastic way of the edge's law"),
+    MethodConstant(
+        "contact stiffness", "numerics", "contact_stiffness", (2.0,),
+        "numerical: above the bound of Nitsche's method, 1.5 layers of particles", "half of it is below that bound",
+    ),
+    MethodConstant(
+        "time step", "numerics", "safety", (0.5,), "numerical: part of the stability limit",
+        "twice of it is beyond that limit",
+    ),
+    MethodConstant(
+        "loss factor", "material", "loss_factor", (0.5, 2.0),
+        "of the food, where literature has it (materials.yaml); assumed elsewhere",
+    ),
+)  # fmt: skip
+"""Those of a cut. Cell, particles and speed have checks of their own. The friction of a face is at most the yield
+stress in shear (Orowan 1943), which is a law and no constant."""
+
+
+def aside(scene: Scene) -> Scene:
+    """The scene with the blade half-way between two planes of nodes."""
+    x, y, z = scene.numerics.grid_shift
+    return replace(scene, numerics=replace(scene.numerics, grid_shift=(x, y + 0.5, z)))
+
+
+def varied(scene: Scene) -> Mapping[str, Scene]:
+    """A scene with each constant of the method halved and doubled where that can be, by what was changed.
+
+    Args:
+        scene: A scene.
+
+    Returns:
+        Other scenes; what is nothing in the scene (a loss factor of 0) is not varied.
+    """
+    words = {0.5: "half", 2.0: "twice"}
+    out = {
+        f"{words[factor]} the {constant.name}": constant.varied(scene, factor)
+        for constant in CONSTANTS
+        if constant.value(scene) != 0
+        for factor in constant.factors
+    }
+    return out | {"blade half a cell aside": aside(scene)}

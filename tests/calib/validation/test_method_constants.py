@@ -1,0 +1,36 @@
+"""The constants of the method: each is varied alone, and what is nothing is not."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from calib.validation.method_constants import CONSTANTS, varied
+from tests.mpm.scenes import PRISM
+
+
+def flat(data: dict[str, Any], at: str = "") -> dict[str, Any]:
+    """Leaves of nested dictionaries by their path."""
+    out: dict[str, Any] = {}
+    for key, value in data.items():
+        out |= flat(value, f"{at}{key}.") if isinstance(value, dict) else {at + key: value}
+    return out
+
+
+def test_each_constant_is_varied_alone():
+    """One number changes in each scene, to half or twice; the blade moves by half a cell across the grid."""
+    scene = PRISM.with_material(loss_factor=0.02)
+    own = flat(asdict(scene))
+    for name, other in varied(scene).items():
+        changed = {key: (own[key], value) for key, value in flat(asdict(other)).items() if value != own[key]}
+        ((key, (old, new)),) = changed.items()
+        if name == "blade half a cell aside":
+            assert (key, new) == ("numerics.grid_shift", (0.0, 0.5, 0.0))
+        else:
+            assert new == {"half": 0.5, "twice": 2.0}[name.split()[0]] * old
+
+
+def test_what_cannot_be_varied_says_why():
+    """Both half and twice, or a reason; a loss factor of nothing is not varied."""
+    assert all(bool(c.why) is (c.factors != (0.5, 2.0)) and c.source for c in CONSTANTS)
+    assert not any("loss factor" in name for name in varied(PRISM))
