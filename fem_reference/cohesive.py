@@ -17,9 +17,9 @@ class Cohesion:
     """Traction over half the opening v of a plane of symmetry: linear softening of area ``toughness`` for both halves.
 
     ``sigma(v) = stiffness v`` up to the strength and from there ``strength (1 - (v - v0) / (vf - v0))``, with
-    ``v0 = strength / stiffness`` and ``vf = toughness / strength`` where nothing is carried any more. The stiffness stands
-    for a rigid tie and does not change the area. Below the largest v so far the traction runs straight to the origin
-    (damage: Camacho and Ortiz 1996). Closed halves press on each other with the same stiffness.
+    ``v0 = strength / stiffness`` and ``vf = toughness / strength`` where nothing is carried any more. The stiffness
+    stands for a rigid tie and does not change the area. Below the largest v so far the traction runs straight to the
+    origin (damage: Camacho and Ortiz 1996). Closed halves press on each other with the same stiffness.
 
     Attributes:
         toughness: Work of new surface R [J/m^2], per area of the plane.
@@ -96,10 +96,10 @@ class Cohesion:
 class CutPlane:
     """The plane of symmetry y = 0 of a food under a blade: a cohesive tie, and the edge that cuts it.
 
-    The energy of the plane is ``D = integral of R - (1 - c) (R - phi)`` over its area: phi is what the tie has taken and c,
-    from 0 to 1, how far the edge has cut the point, a smooth step over ``band`` about the edge's height. All forces are
-    derivatives of D: the tie pulls with (1 - c) sigma, and the edge presses a point down with (R - phi) dc/dz. So each
-    point costs R in all, whoever pays it.
+    The energy of the plane is ``D = integral of R - (1 - c) (R - phi)`` over its area: phi is what the tie has taken
+    and c, from 0 to 1, how far the edge has cut the point, a smooth step over ``band`` about the edge's height. All
+    forces are derivatives of D: the tie pulls with (1 - c) sigma, and the edge presses a point down with (R - phi)
+    dc/dz. So each point costs R in all, whoever pays it.
 
     Attributes:
         points: Points of the plane.

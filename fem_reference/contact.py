@@ -38,7 +38,8 @@ class Wedge:
         half: Angle between a face and the vertical [rad].
         spine: Thickness above the shoulder [m], ``inf`` for none.
         fillet: Radius that rounds the shoulder [m], at most half the thickness; the faces stay tangents of it.
-        single: Whether only the face at y > 0 is there, for half a body, whose points at y = 0 may be a little beyond it.
+        single: Whether only the face at y > 0 is there, for half a body, whose points at y = 0 may be a little beyond
+            it.
     """
 
     height: float

@@ -32,7 +32,8 @@ class CutModel(Halves):
         blade: The blade.
         interface: What holds the halves together.
         grid: Elements.
-        notch: Depth of a split that is there at the beginning [m], whose end the edge must not reach; None: the edge cuts.
+        notch: Depth of a split that is there at the beginning [m], whose end the edge must not reach; None: the edge
+            cuts.
 
     Attributes:
         plane: The tie, and the edge's work on it.

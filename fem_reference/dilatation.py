@@ -12,11 +12,11 @@ CHUNK = 64  # elements whose tangents are computed at a time: bounds the memory
 class Dilatation:
     """Mixed elements with linear discontinuous pressure and volume (Simo, Taylor and Pister 1985).
 
-    Displacement, pressure p and volume ratio J' are independent fields. p and J' are linear in each element and may jump
-    between elements, so that both are eliminated element by element: J' is the projection of J = det F, and the law sees
-    ``F' = (J' / J)^(1/3) F``. With quadratic displacements the pair satisfies the inf-sup condition (Q2/P1: Boffi, Brezzi
-    and Fortin 2013, section 8.6), so that neither nearly incompressible solids nor plastic flow, which keeps the volume,
-    lock. Any law can be used, since the law itself does not change.
+    Displacement, pressure p and volume ratio J' are independent fields. p and J' are linear in each element and may
+    jump between elements, so that both are eliminated element by element: J' is the projection of J = det F, and the
+    law sees ``F' = (J' / J)^(1/3) F``. With quadratic displacements the pair satisfies the inf-sup condition (Q2/P1:
+    Boffi, Brezzi and Fortin 2013, section 8.6), so that neither nearly incompressible solids nor plastic flow, which
+    keeps the volume, lock. Any law can be used, since the law itself does not change.
 
     Args:
         points: Places of the quadrature points [m], shape (3, elements, points).
@@ -38,7 +38,8 @@ class Dilatation:
         return np.einsum("keq,ekm,...em->...eq", self._monomials, self._inverse, moments, optimize=True)
 
     def deformation(self, f: np.ndarray) -> np.ndarray:
-        """Deformation gradients that the law sees [-], shape (3, 3, elements, points), from those of the displacements."""
+        """Deformation gradients that the law sees [-], shape (3, 3, elements, points), from those of the
+        displacements."""
         j = determinant(f)
         return np.cbrt(self.project(j) / j) * f
 
@@ -51,8 +52,8 @@ class Dilatation:
             state: The law's memory [-], shape (3, 3, elements, points), or None.
 
         Returns:
-            ``P = (dev tau + J pi 1) F^-T`` [Pa], shape (3, 3, elements, points), tau the law's Kirchhoff stress and pi the
-            projection of its mean over J'; and the state.
+            ``P = (dev tau + J pi 1) F^-T`` [Pa], shape (3, 3, elements, points), tau the law's Kirchhoff stress and pi
+            the projection of its mean over J'; and the state.
         """
         j = determinant(f)
         mean = self.project(j)

@@ -20,8 +20,8 @@ def beam_release_rate(
 ) -> float | np.ndarray:
     """Energy release rate of a beam that is split along its middle and held open by a wedge.
 
-    Each arm is a cantilever of height h and unit width, whose end a force P bends by half the opening D: with I = h^3/12,
-    ``P = 3 E I (D/2) / a^3``, both arms store ``U = P D/2 = E h^3 D^2 / (16 a^3)``, and at a fixed opening
+    Each arm is a cantilever of height h and unit width, whose end a force P bends by half the opening D: with I =
+    h^3/12, ``P = 3 E I (D/2) / a^3``, both arms store ``U = P D/2 = E h^3 D^2 / (16 a^3)``, and at a fixed opening
     ``G = -dU/da = 3 E h^3 D^2 / (16 a^4)`` (Gurney and Hunt 1967, whose wedge is this one). The arms are clamped by
     what is not split yet, which gives way: a is longer by a part of h (Kanninen 1973; Williams 1989).
 
@@ -57,8 +57,8 @@ def beam_crack_length(modulus: float, arm: float, opening: float, toughness: flo
 def energy_release(beam: Block, blade: Blade, depth: float, tips: Sequence[float], grid: Grid) -> np.ndarray:
     """Energy release rates of cracks of given tips under a blade at rest, by elements: G = -dU/da.
 
-    The same model as :func:`fem_reference.wedge.split`, but for the plane: it is rigidly tied below the tip and free above,
-    so that no cohesive law has a part in it. U is that of two cracks, one element longer and shorter.
+    The same model as :func:`fem_reference.wedge.split`, but for the plane: it is rigidly tied below the tip and free
+    above, so that no cohesive law has a part in it. U is that of two cracks, one element longer and shorter.
 
     Args:
         beam: The split block; elastic.

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import skfem as sk
 
 from fem_reference.contact import Wedge
 from fem_reference.meshes import MeshError, box, graded, surface
@@ -28,7 +29,7 @@ class Mesh:
     Attributes:
         size: Their size under the wedge's edge [m].
         growth: Size of each over that of its neighbour nearer to the edge.
-        layers: Elements along half the wedge.
+        layers: Elements along half the wedge; 0 for a section in plane strain, whose forces are per metre of width.
     """
 
     size: float
@@ -39,8 +40,8 @@ class Mesh:
 def indent(block: Shape, material: Material, half_angle: float, strokes: Sequence[float], mesh: Mesh) -> Curve:
     """Press a wedge without friction into the top of a block that stands on a smooth board.
 
-    Unlike :func:`fem_reference.press.press`, which touches nodes, the wedge touches points within the elements, so that the
-    force does not jump as it reaches the next row of nodes.
+    Unlike :func:`fem_reference.press.press`, which touches nodes, the wedge touches points within the elements, so that
+    the force does not jump as it reaches the next row of nodes.
 
     Args:
         block: Outline, a block.
@@ -50,7 +51,7 @@ def indent(block: Shape, material: Material, half_angle: float, strokes: Sequenc
         mesh: Elements.
 
     Returns:
-        Force over stroke, of the whole block.
+        Force over stroke, of the whole block, or of a section per metre of width [N/m].
 
     Raises:
         MeshError: The shape is no block.
@@ -59,18 +60,21 @@ def indent(block: Shape, material: Material, half_angle: float, strokes: Sequenc
     if block.kind != "block" or block.cut != 0:
         raise MeshError(f"indent: a wedge indents a block, not a {block.kind}; use press")
     h = block.height
-    down = h - graded(h, mesh.size, mesh.growth)[::-1]
+    up = h - graded(h, mesh.size, mesh.growth)[::-1]
     across = graded(block.length / 2, mesh.size, mesh.growth)
-    hexahedra = box(np.linspace(0, block.width / 2, mesh.layers + 1), across, down)
-    solid = Solid(hexahedra, law_of(material), 2, True, BALANCE)
+    cells: sk.Mesh = sk.MeshQuad.init_tensor(across, up)
+    if mesh.layers:
+        cells = box(np.linspace(0, block.width / 2, mesh.layers + 1), across, up)
+    solid = Solid(cells, law_of(material), 2, True, BALANCE)
     x, y, z = solid.nodes.T
+    parts = 4 if mesh.layers else 2
     near = 1e-6 * h
     solid.hold(np.flatnonzero(x < near), [0])
     solid.hold(np.flatnonzero(y < near), [1])
     base = np.flatnonzero(z < near)
     solid.hold(base, [2])
     wedge = Wedge(h, half_angle, single=True)
-    top = sampled(solid, surface(hexahedra, lambda p: p[2] > h - near), SAMPLES)
+    top = sampled(solid, surface(cells, lambda p: p[-1] > h - near), SAMPLES)
     contact = SlidingContact(top, wedge, PENALTY * (material.lame + 2 * material.shear) / mesh.size)
     solid.surfaces.append(contact)
 
@@ -84,7 +88,7 @@ def indent(block: Shape, material: Material, half_angle: float, strokes: Sequenc
             advance(to, done, part)
             done = float(part)
         at = solid.nodes + solid.u
-        force = -4 * float(contact.tractions(at)[:, 2].sum())
-        rows.append((way, force, 4 * float(solid.reaction(base)[2]), contact.penetration(at)))
+        force = -parts * float(contact.tractions(at)[:, 2].sum())
+        rows.append((way, force, parts * float(solid.reaction(base)[2]), contact.penetration(at)))
     stroke, forces, boards, deepest = np.array(rows).T
     return Curve(stroke, forces, boards, deepest, solid.u.size)

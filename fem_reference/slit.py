@@ -1,4 +1,9 @@
-"""A blade that is pushed into a block along a slit which opens ahead of its edge: the force on its faces."""
+"""A blade in a block whose halves part at a prescribed way ahead of its edge: bookkeeping of the faces' force.
+
+The lead is an input. It is that of the particle solver's own edge law, so that this reference repeats the assumption
+and can't judge it: it checks contact, elasticity and the energy that a given opening releases, no more. What a crack
+does by itself, :mod:`fem_reference.wedge` says.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +48,8 @@ class Opening:
 
     @property
     def released(self) -> np.ndarray:
-        """Energy that the parting of the halves at the end of the slit has released so far [J], shape (n,): work less what is stored."""
+        """Energy that the parting at the end of the slit has released so far [J], shape (n,): work less what is
+        stored."""
         steps = np.diff(self.stroke, prepend=0.0)
         return np.cumsum(steps * (self.force + np.append(0.0, self.force[:-1])) / 2) - self.stored
 
@@ -51,9 +57,10 @@ class Opening:
 def cleave(block: Shape, material: Material, knife: Knife, lead: float, stroke: float, *, cells: int = 2) -> Opening:
     """Push a blade into a block whose halves part at a fixed way ahead of the edge, without friction.
 
-    The halves are held together below the slit and free above; nothing is spent on parting them. The block stands on a
-    smooth floor. Its halves turn outwards, so the lower outer edges carry it and its middle rises from the floor; the way
-    between the slit's end and the edge is that of the deformed block.
+    The halves are held together below the slit and free above; nothing is spent on parting them, and the slit's end is
+    where the caller puts it, not where a crack would stop. The block stands on a smooth floor. Its halves turn
+    outwards, so the lower outer edges carry it and its middle rises from the floor; the way between the slit's end and
+    the edge is that of the deformed block.
 
     Args:
         block: Outline, a block.
@@ -62,6 +69,9 @@ def cleave(block: Shape, material: Material, knife: Knife, lead: float, stroke: 
         lead: Way of the slit's end ahead of the edge [m].
         stroke: Way of the edge into the block [m]; the last that ends the slit at a node is less.
         cells: Elements over the lead; all elements are as high, and the slit ends at their nodes.
+
+    Returns:
+        Force and energy over stroke.
 
     Raises:
         EquilibriumError: No equilibrium.

@@ -72,8 +72,8 @@ class Surface(Protocol):
 class Solid:
     """A meshed body with a material law.
 
-    A mesh of quadrilaterals is a section of the plane x = 0 in plane strain: its two coordinates are y and z, every node
-    is held along x, and forces, energies and weights are per metre of width along x.
+    A mesh of quadrilaterals is a section of the plane x = 0 in plane strain: its two coordinates are y and z, every
+    node is held along x, and forces, energies and weights are per metre of width along x.
 
     Args:
         mesh: Hexahedra, tetrahedra, or quadrilaterals in plane strain [m].
@@ -135,7 +135,7 @@ class Solid:
         """Prescribe a displacement.
 
         Args:
-            nodes: Indices of the nodes, shape (n,).
+            nodes: Indices of the nodes [-], shape (n,).
             axes: Axes, 0 to 2.
             value: Displacement along them [m].
         """

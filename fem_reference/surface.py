@@ -65,7 +65,16 @@ def nodal(solid: Solid, facets: np.ndarray) -> SurfacePoints:
 
 
 def sampled(solid: Solid, facets: np.ndarray, count: int) -> SurfacePoints:
-    """Points within some facets, ``count`` along each edge at equal distances: a rigid corner finds one everywhere."""
+    """Points within some facets, at equal distances, so that a rigid corner finds one everywhere.
+
+    Args:
+        solid: The solid.
+        facets: Indices of the facets [-], shape (n,).
+        count: Points along each edge of a facet.
+
+    Returns:
+        The points.
+    """
     line = (np.arange(count) + 0.5) / count
     grid = line[None] if solid.plane else np.stack(np.meshgrid(line, line, indexing="ij")).reshape(2, -1)
     weights = np.full(grid.shape[1], 1.0 / grid.shape[1])
@@ -88,8 +97,8 @@ def sampled(solid: Solid, facets: np.ndarray, count: int) -> SurfacePoints:
 class SlidingContact:
     """Points in contact with a rigid obstacle by a penalty, on which they always slide upwards.
 
-    The traction on the food is ``penalty depth (n + mu t)``: n the obstacle's outward normal and t the direction along its
-    face, in the plane across the blade, that points down: the blade goes down and drags the food with it.
+    The traction on the food is ``penalty depth (n + mu t)``: n the obstacle's outward normal and t the direction along
+    its face, in the plane across the blade, that points down: the blade goes down and drags the food with it.
 
     Attributes:
         points: Points that may touch.

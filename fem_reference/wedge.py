@@ -14,10 +14,10 @@ __all__ = ["Blade", "Block", "Cut", "Grid", "Interface", "cut", "split"]
 def cut(block: Block, blade: Blade, interface: Interface, depth: float, grid: Grid) -> Cut:
     """Cut a block in its middle: the edge pays what the opening has not.
 
-    The plane of the cut is a cohesive tie from the beginning (:class:`fem_reference.cohesive.CutPlane`). Each point of it
-    costs R in all: the tie takes what the opening ahead of the edge takes, and the edge the rest as it passes. Where the
-    crack's tip is, is a result. Newton's method with halved steps; where the crack runs by itself, proximal steps find the
-    next equilibrium at rest.
+    The plane of the cut is a cohesive tie from the beginning (:class:`fem_reference.cohesive.CutPlane`). Each point of
+    it costs R in all: the tie takes what the opening ahead of the edge takes, and the edge the rest as it passes. Where
+    the crack's tip is, is a result. Newton's method with halved steps; where the crack runs by itself, proximal steps
+    find the next equilibrium at rest.
 
     Args:
         block: The food.

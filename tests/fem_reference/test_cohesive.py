@@ -89,7 +89,7 @@ def test_points_carry_the_surface_and_follow_it():
 
 
 def test_a_rounded_shoulder_against_its_outline():
-    """Distance to the outline of face, arc and flank, drawn densely; outside it is exact, and its gradient has length 1."""
+    """Distance to the densely drawn outline of face, arc and flank; outside it is exact, its gradient of length 1."""
     half, spine, radius = 0.4, 2e-3, 6e-4
     wedge = Wedge(0.0, half, spine, fillet=radius, single=True)
     y, up = spine / 2 - radius, (spine / 2 - radius + radius / np.cos(half)) / np.tan(half)
@@ -144,8 +144,10 @@ def test_every_point_costs_the_toughness_whoever_pays():
 
 @pytest.mark.parametrize("stiffness", [1e9, 1e11])
 def test_a_strip_under_tension_follows_the_closed_form(stiffness: float):
-    """Stress over displacement u of a strip of length l: u = v + l sigma / M, through softening and an unloading; the work
-    is R times the area."""
+    """Stress over displacement u of a strip of length l: u = v + l sigma / M, through softening and an unloading.
+
+    The work is R times the area.
+    """
     law = Cohesion(80.0, 0.2e6, stiffness)
     length, height, mu, lam = 0.002, 0.02, 2e6, 3e6
     mesh = sk.MeshQuad.init_tensor(np.linspace(0, length, 3), np.linspace(0, height, 5))

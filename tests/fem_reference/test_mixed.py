@@ -76,7 +76,7 @@ def test_a_section_is_a_slab_that_is_held_along_x(mixed: bool):
 
 
 def test_formulas_of_a_bonded_disc_in_their_regimes():
-    """A slender bar has Young's modulus, a thin disc that of confined compression; in between the formulas bracket it."""
+    """A slender bar has Young's modulus, a thin disc that of confined compression; formulas bracket what is between."""
     for nu in (0.3, 0.49):
         confined = (1 - nu) / ((1 + nu) * (1 - 2 * nu))
         assert apparent_modulus(0.02, nu) == pytest.approx(1.0, rel=0.01)
@@ -93,7 +93,7 @@ def test_formulas_of_a_bonded_disc_in_their_regimes():
 
 @pytest.mark.parametrize("nu", [0.3, 0.45, 0.49])
 def test_a_bonded_disc_of_mixed_elements_does_not_lock(nu: float):
-    """Within 0.7 % of the limit on two elements over half the height, nearer on finer ones, whatever Poisson's ratio is."""
+    """Within 0.7 % of the limit on two elements over half the height, nearer on finer ones, at any Poisson's ratio."""
     strain = 1e-4
     want = apparent_modulus(25 / 30, nu) * FOOD.E * math.pi * 0.025**2 * strain
     food = replace(FOOD, nu=nu)

@@ -169,7 +169,7 @@ def test_a_bonded_block_flows_in_steps():
 
 @pytest.mark.slow
 def test_a_blade_in_a_slit():
-    """The force on its faces is proportional to the stiffness, grows with its thickness, and comes near on finer elements."""
+    """The force on its faces is proportional to stiffness, grows with thickness, and comes near on finer elements."""
     block, lead, stroke = Shape("block", 0.024, 0.016, 0.018), 3e-3, 6e-3
 
     def opening(E: float = 1e6, spine: float = 2e-3, cells: int = 2) -> Opening:
@@ -182,14 +182,14 @@ def test_a_blade_in_a_slit():
     np.testing.assert_allclose(opening(E=2e6).force, 2 * once.force, rtol=1e-4)
     assert opening(spine=1e-3).force[-1] < 0.9 * once.force[-1]
     assert opening(cells=3).force[-1] == pytest.approx(once.force[-1], rel=0.1)
-    # the halves turn outwards about the lower edges, so the middle rises, and the edge is where the slit's end leaves it
+    # the halves turn outwards about the lower edges, so the middle rises; the edge is where the slit's end leaves it
     assert (np.diff(once.rise) > 0).all() and once.rise[0] > 0
     np.testing.assert_allclose(once.stroke + once.rise, lead / 2 * np.arange(1, 5), rtol=1e-2)
 
 
 @pytest.mark.slow
 def test_energy_that_the_end_of_a_slit_releases_is_its_virtual_extension():
-    """Work less stored energy, over the area, is how much less a block stores whose slit is one element longer (12 %)."""
+    """Work less stored energy, over the area, is what a block stores less whose slit is one element longer (12 %)."""
     block, knife, size = Shape("block", 0.024, 0.016, 0.018), Knife("blade", 2e-3, math.radians(11.0), 0.02, 0.2), 1e-3
     short, long = (cleave(block, FOOD, knife, cells * size, 9e-3, cells=cells) for cells in (3, 4))
     at = short.stroke[4:]

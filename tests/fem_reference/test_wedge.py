@@ -43,7 +43,7 @@ def test_long_arms_have_the_release_rate_of_beams(slenderness: int):
 
 
 def test_a_wedge_in_a_split_beam():
-    """The crack runs ahead at constant length, near Griffith's; the force is R, and the tie takes R of each new area."""
+    """The crack runs ahead at constant length, near Griffith's; the force is R, and the tie takes R per new area."""
     found = split(BEAM, THICK, TIE, 0.02, GRID)
     low, high = 0.013, 0.02
     length = found.crack_length[(found.stroke > low)]
