@@ -128,4 +128,4 @@ class _Cracked(Halves):
         """Energy of both halves with the crack's tip at the lower end of a row of elements [J/m]."""
         self._tie.on = self.height < (row + 0.25) * self.size
         self.solid.solve()
-        return 2 * (self.solid.energy(self.solid.u) + self._tie.energy(self.x)) + self.springs
+        return self.scale * (self.solid.energy(self.solid.u) + self._tie.energy(self.x)) + self.springs

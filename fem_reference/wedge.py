@@ -1,6 +1,7 @@
 """A blade driven into a block along a plane that parts by a cohesive law: no prescribed lead of the crack.
 
-In plane strain, quasi-static, force over stroke: the independent reference of the particles' crack.
+Quasi-static, in plane strain or, for a block of a given width, in space; force over stroke. The independent reference
+of the particles' crack.
 """
 
 from __future__ import annotations

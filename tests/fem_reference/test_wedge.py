@@ -102,6 +102,24 @@ def test_small_strains_are_enough_for_a_stiff_block():
     assert large.work[-1] != linear.work[-1]
 
 
+def test_a_block_of_finite_width_lies_between_plane_stress_and_plane_strain():
+    """Without lateral contraction it is its section; with it, narrow is plane stress and wide near plane strain."""
+    blade, grid = Blade(math.radians(11), 2e-3), Grid(2.5e-3)
+
+    def work(law: Linear, width: float | None = None) -> float:
+        found = cut(replace(BLOCK, law=law, width=width), blade, TIE, 5e-3, grid)
+        np.testing.assert_allclose(found.board, found.force, rtol=1e-4, atol=0.01)
+        return float(found.work[-1])
+
+    straight = Linear(E / 2, 0.0)
+    assert work(straight, 0.03) == pytest.approx(work(straight), rel=1e-4)
+    stress, strain = work(Linear(MU, 2 * LAM * MU / (LAM + 2 * MU))), work(FLESH)
+    narrow, wide = work(FLESH, 0.004), work(FLESH, 0.1)
+    assert narrow == pytest.approx(stress, rel=3e-3)
+    assert wide == pytest.approx(strain, rel=8e-3)
+    assert strain / stress > 1.02
+
+
 @pytest.mark.slow
 def test_a_block_that_flows_books_its_flow():
     """With a yield stress below the tie's strength the work of the cut has one more part; new surface still costs R."""
