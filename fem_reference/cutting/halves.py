@@ -6,7 +6,7 @@ import numpy as np
 import skfem as sk
 
 from fem_reference.contact import Plane, Wedge
-from fem_reference.cut_case import Blade, Block, Grid
+from fem_reference.cutting.case import Blade, Block, Grid
 from fem_reference.meshes import box, graded
 from fem_reference.solid import Solid
 from fem_reference.surface import SlidingContact, SurfacePoints, nodal, sampled

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fem_reference.cohesive import Cohesion, CutPlane
-from fem_reference.cut_case import Blade, Block, Cut, Grid, Interface
-from fem_reference.halves import Halves
+from fem_reference.cutting.case import Blade, Block, Cut, Grid, Interface
+from fem_reference.cutting.cohesive import Cohesion, CutPlane
+from fem_reference.cutting.halves import Halves
 from fem_reference.laws import Plastic
 from fem_reference.solid import EquilibriumError
 

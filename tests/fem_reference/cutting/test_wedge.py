@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fem_reference.cut_case import CutCaseError
-from fem_reference.griffith import beam_crack_length, beam_release_rate, crack_length, energy_release
+from fem_reference.cutting.case import CutCaseError
+from fem_reference.cutting.griffith import beam_crack_length, beam_release_rate, crack_length, energy_release
+from fem_reference.cutting.wedge import Blade, Block, Cut, Grid, Interface, cut, split
 from fem_reference.laws import Corotated, Linear, Plastic
 from fem_reference.solid import EquilibriumError
-from fem_reference.wedge import Blade, Block, Cut, Grid, Interface, cut, split
 
 E, NU, R = 9.5e6, 0.3, 87.0
 MU, LAM = E / (2 * (1 + NU)), E * NU / ((1 + NU) * (1 - 2 * NU))

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fem_reference.cut_case import Blade, Block, Grid
-from fem_reference.halves import Halves
+from fem_reference.cutting.case import Blade, Block, Grid
+from fem_reference.cutting.halves import Halves
 from fem_reference.solid import EquilibriumError
 from fem_reference.surface import Tie
 
@@ -57,8 +57,8 @@ def beam_crack_length(modulus: float, arm: float, opening: float, toughness: flo
 def energy_release(beam: Block, blade: Blade, depth: float, tips: Sequence[float], grid: Grid) -> np.ndarray:
     """Energy release rates of cracks of given tips under a blade at rest, by elements: G = -dU/da.
 
-    The same model as :func:`fem_reference.wedge.split`, but for the plane: it is rigidly tied below the tip and free
-    above, so that no cohesive law has a part in it. U is that of two cracks, one element longer and shorter.
+    The same model as :func:`fem_reference.cutting.wedge.split`, but for the plane: it is rigidly tied below the tip and
+    free above, so that no cohesive law has a part in it. U is that of two cracks, one element longer and shorter.
 
     Args:
         beam: The split block; elastic.

@@ -1,4 +1,5 @@
-"""What is cut, with what and how finely, and what comes of it: input and result of :mod:`fem_reference.wedge`."""
+"""What is cut, with what and how finely, and what comes of it: input and result of
+:mod:`fem_reference.cutting.wedge`."""
 
 from __future__ import annotations
 

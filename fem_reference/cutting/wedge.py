@@ -6,8 +6,8 @@ of the particles' crack.
 
 from __future__ import annotations
 
-from fem_reference.cut_case import Blade, Block, Cut, Grid, Interface
-from fem_reference.cut_model import CutModel
+from fem_reference.cutting.case import Blade, Block, Cut, Grid, Interface
+from fem_reference.cutting.model import CutModel
 
 __all__ = ["Blade", "Block", "Cut", "Grid", "Interface", "cut", "split"]
 
@@ -15,10 +15,10 @@ __all__ = ["Blade", "Block", "Cut", "Grid", "Interface", "cut", "split"]
 def cut(block: Block, blade: Blade, interface: Interface, depth: float, grid: Grid) -> Cut:
     """Cut a block in its middle: the edge pays what the opening has not.
 
-    The plane of the cut is a cohesive tie from the beginning (:class:`fem_reference.cohesive.CutPlane`). Each point of
-    it costs R in all: the tie takes what the opening ahead of the edge takes, and the edge the rest as it passes. Where
-    the crack's tip is, is a result. Newton's method with halved steps; where the crack runs by itself, proximal steps
-    find the next equilibrium at rest.
+    The plane of the cut is a cohesive tie from the beginning (:class:`fem_reference.cutting.cohesive.CutPlane`). Each
+    point of it costs R in all: the tie takes what the opening ahead of the edge takes, and the edge the rest as it
+    passes. Where the crack's tip is, is a result. Newton's method with halved steps; where the crack runs by itself,
+    proximal steps find the next equilibrium at rest.
 
     Args:
         block: The food.
