@@ -2,7 +2,7 @@
 
 The lead is an input. It is that of the particle solver's own edge law, so that this reference repeats the assumption
 and can't judge it: it checks contact, elasticity and the energy that a given opening releases, no more. What a crack
-does by itself, :mod:`fem_reference.crack.wedge` says.
+does by itself, :mod:`fem_reference.cutting.wedge` says.
 """
 
 from __future__ import annotations
