@@ -23,6 +23,9 @@ THIN = Knife("thin", 0.2e-3, math.radians(1.0), 0.05, 0.4)
 WEDGE = Knife("wedge", 2e-3, math.radians(11.0), 0.0104, 0.2)
 FLESH = Material(E=1e6, nu=0.35, rho=1000, yield_stress=2e5, R=300.0, R_initiation=300.0)
 PRISM = Shape("block", 0.03, 0.024, 0.024)
+READ_BACK = "bookkeeping: "
+"""Begins the name of a row that reads back what the edge's law prescribes: it finds errors in how the law is applied
+and booked, but cannot tell whether the law is right."""
 
 
 def cut(
@@ -67,13 +70,15 @@ def _unbooked(record: ForceRecord) -> float:
 
 
 def resistance(options: SuiteOptions) -> Iterator[Comparison]:
-    """A thin blade without friction needs R times the width, and nothing of the stiffness."""
+    """A thin blade without friction needs R times the width, and nothing of the stiffness, as its law says."""
     base = cut(options)
     source = "F = R w (Atkins 2009)"
-    yield Comparison("thin blade", "force on the plateau [N]", FLESH.R * PRISM.width, _plateau(base), 0.03, source)
+    yield Comparison(
+        f"{READ_BACK}thin blade", "force on the plateau [N]", FLESH.R * PRISM.width, _plateau(base), 0.03, source
+    )
     wide = cut(options, shape=replace(PRISM, width=0.048))
     yield Comparison(
-        "thin blade, twice the width",
+        f"{READ_BACK}thin blade, twice the width",
         "force over that of the single width [-]",
         2.0,
         _plateau(wide) / _plateau(base),
@@ -82,7 +87,7 @@ def resistance(options: SuiteOptions) -> Iterator[Comparison]:
     )
     stiff = cut(options, material=replace(FLESH, E=4e6, yield_stress=8e5))
     yield Comparison(
-        "thin blade, four times the stiffness",
+        f"{READ_BACK}thin blade, four times the stiffness",
         "force over that of the soft food [-]",
         1.0,
         _plateau(stiff) / _plateau(base),
@@ -91,7 +96,9 @@ def resistance(options: SuiteOptions) -> Iterator[Comparison]:
     )
     deep = [int(np.searchsorted(base.stroke, at)) for at in (8e-3, 16e-3)]
     parted, area = float(np.diff(base.parting[deep])[0]), PRISM.width * float(np.diff(base.stroke[deep])[0])
-    yield Comparison("thin blade", "energy of parting over the new area [J/m^2]", FLESH.R, parted / area, 0.01, "R")
+    yield Comparison(
+        f"{READ_BACK}thin blade", "energy of parting over the new area [J/m^2]", FLESH.R, parted / area, 0.01, "R"
+    )
     yield Comparison(
         "thin blade",
         "energy that no law took, of the work [-]",
@@ -112,15 +119,17 @@ def resistance(options: SuiteOptions) -> Iterator[Comparison]:
 
 
 def slicing(options: SuiteOptions) -> Iterator[Comparison]:
-    """A slice/push ratio lowers the force down and brings one along the blade."""
+    """A slice/push ratio lowers the force down and brings one along the blade, as its law says."""
     xi = 1.0
     held = Shape("block", 0.03, 0.072, 0.024)
     record = cut(options, shape=held, motion=Motion(0.018, 0.01, slice_ratio=xi), board=9.0)
     on = (record.stroke > 11e-3) & (record.stroke < 16e-3)  # a glued block shears until then
     down, along = float(record.edge[on, 2].mean()), abs(float(record.edge[on, 0].mean()))
     line, source = FLESH.R * held.width, "Atkins, Xu and Jeronimidis 2004"
-    yield Comparison("slice/push ratio 1", "force down [N]", line / (1 + xi**2), down, 0.05, source)
-    yield Comparison("slice/push ratio 1", "force along the blade [N]", line * xi / (1 + xi**2), along, 0.05, source)
+    yield Comparison(f"{READ_BACK}slice/push ratio 1", "force down [N]", line / (1 + xi**2), down, 0.05, source)
+    yield Comparison(
+        f"{READ_BACK}slice/push ratio 1", "force along the blade [N]", line * xi / (1 + xi**2), along, 0.05, source
+    )
 
 
 def invariance(options: SuiteOptions) -> Iterator[Comparison]:
