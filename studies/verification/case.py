@@ -25,6 +25,7 @@ PARTS = (
     "fracture.splitting",
     "fracture.surface_work",
     "fracture.wedge_cuts",
+    "fracture.friction",
     "fem_reference",
 )
 """Modules with cases, in the order of the table."""
