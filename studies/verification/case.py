@@ -15,7 +15,19 @@ from mpm.solver import Simulation
 from studies.verification.free_body import AT_REST, FreeBody, InitialState
 from studies.verification.result import Comparison
 
-PARTS = ("constitutive_point", "motion", "contact", "bending", "pressing", "cutting", "fem_reference")
+PARTS = (
+    "constitutive_point",
+    "motion",
+    "contact",
+    "bending",
+    "pressing",
+    "cutting",
+    "fracture.splitting",
+    "fracture.surface_work",
+    "fracture.wedge_cuts",
+    "fracture.friction",
+    "fem_reference",
+)
 """Modules with cases, in the order of the table."""
 
 

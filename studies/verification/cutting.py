@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.slit import cleave
-from mpm.arrays import FloatArray
 from mpm.output.energy import unbooked
 from mpm.output.record import ForceRecord
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
@@ -23,6 +21,9 @@ THIN = Knife("thin", 0.2e-3, math.radians(1.0), 0.05, 0.4)
 WEDGE = Knife("wedge", 2e-3, math.radians(11.0), 0.0104, 0.2)
 FLESH = Material(E=1e6, nu=0.35, rho=1000, yield_stress=2e5, R=300.0, R_initiation=300.0)
 PRISM = Shape("block", 0.03, 0.024, 0.024)
+READ_BACK = "bookkeeping: "
+"""Begins the name of a row that reads back what the edge's law prescribes: it finds errors in how the law is applied
+and booked, but cannot tell whether the law is right."""
 
 
 def cut(
@@ -67,13 +68,15 @@ def _unbooked(record: ForceRecord) -> float:
 
 
 def resistance(options: SuiteOptions) -> Iterator[Comparison]:
-    """A thin blade without friction needs R times the width, and nothing of the stiffness."""
+    """A thin blade without friction needs R times the width, and nothing of the stiffness, as its law says."""
     base = cut(options)
     source = "F = R w (Atkins 2009)"
-    yield Comparison("thin blade", "force on the plateau [N]", FLESH.R * PRISM.width, _plateau(base), 0.03, source)
+    yield Comparison(
+        f"{READ_BACK}thin blade", "force on the plateau [N]", FLESH.R * PRISM.width, _plateau(base), 0.03, source
+    )
     wide = cut(options, shape=replace(PRISM, width=0.048))
     yield Comparison(
-        "thin blade, twice the width",
+        f"{READ_BACK}thin blade, twice the width",
         "force over that of the single width [-]",
         2.0,
         _plateau(wide) / _plateau(base),
@@ -82,7 +85,7 @@ def resistance(options: SuiteOptions) -> Iterator[Comparison]:
     )
     stiff = cut(options, material=replace(FLESH, E=4e6, yield_stress=8e5))
     yield Comparison(
-        "thin blade, four times the stiffness",
+        f"{READ_BACK}thin blade, four times the stiffness",
         "force over that of the soft food [-]",
         1.0,
         _plateau(stiff) / _plateau(base),
@@ -91,7 +94,9 @@ def resistance(options: SuiteOptions) -> Iterator[Comparison]:
     )
     deep = [int(np.searchsorted(base.stroke, at)) for at in (8e-3, 16e-3)]
     parted, area = float(np.diff(base.parting[deep])[0]), PRISM.width * float(np.diff(base.stroke[deep])[0])
-    yield Comparison("thin blade", "energy of parting over the new area [J/m^2]", FLESH.R, parted / area, 0.01, "R")
+    yield Comparison(
+        f"{READ_BACK}thin blade", "energy of parting over the new area [J/m^2]", FLESH.R, parted / area, 0.01, "R"
+    )
     yield Comparison(
         "thin blade",
         "energy that no law took, of the work [-]",
@@ -112,15 +117,17 @@ def resistance(options: SuiteOptions) -> Iterator[Comparison]:
 
 
 def slicing(options: SuiteOptions) -> Iterator[Comparison]:
-    """A slice/push ratio lowers the force down and brings one along the blade."""
+    """A slice/push ratio lowers the force down and brings one along the blade, as its law says."""
     xi = 1.0
     held = Shape("block", 0.03, 0.072, 0.024)
     record = cut(options, shape=held, motion=Motion(0.018, 0.01, slice_ratio=xi), board=9.0)
     on = (record.stroke > 11e-3) & (record.stroke < 16e-3)  # a glued block shears until then
     down, along = float(record.edge[on, 2].mean()), abs(float(record.edge[on, 0].mean()))
     line, source = FLESH.R * held.width, "Atkins, Xu and Jeronimidis 2004"
-    yield Comparison("slice/push ratio 1", "force down [N]", line / (1 + xi**2), down, 0.05, source)
-    yield Comparison("slice/push ratio 1", "force along the blade [N]", line * xi / (1 + xi**2), along, 0.05, source)
+    yield Comparison(f"{READ_BACK}slice/push ratio 1", "force down [N]", line / (1 + xi**2), down, 0.05, source)
+    yield Comparison(
+        f"{READ_BACK}slice/push ratio 1", "force along the blade [N]", line * xi / (1 + xi**2), along, 0.05, source
+    )
 
 
 def invariance(options: SuiteOptions) -> Iterator[Comparison]:
@@ -132,14 +139,13 @@ def invariance(options: SuiteOptions) -> Iterator[Comparison]:
         ("other particles", replace(options, seed=options.seed + 1), {}),
     )
     base = cut(options, knife=WEDGE, material=food)
-    finer = cut(options, knife=WEDGE, material=food, dx=2e-3)
     yield Comparison(
         "wedge with friction",
         "energy lost by the discretisation, of the work [-]",
         0.0,
-        3 * abs(_unbooked(finer) - _unbooked(base)),
+        abs(_unbooked(base)),
         0.02,
-        "first-order error of what no law took, from cells of 3 and 2 mm",
+        "all work is taken by a law",
     )
     for name, so, change in changes[:1] if options.quick else changes:
         other = cut(so, knife=WEDGE, material=food, **change)
@@ -151,72 +157,8 @@ def invariance(options: SuiteOptions) -> Iterator[Comparison]:
         )
 
 
-def slit(options: SuiteOptions) -> Iterator[Comparison]:
-    """A wedge without friction in a slit that leads its edge: the force on the faces, and the energy that the halves
-    release where they part, against finite elements.
-
-    A block of three heights, with few particles far from the blade as in a food, needs more force than one of one: its
-    halves bend less. The blade lies on a plane of nodes, as in every scene whose grid is not turned, or half-way
-    between two planes.
-
-    No law of the solver knows the energy that is released: it is what its books leave open, with what viscosity takes
-    of the waves. It is compared on cells that are finer than the process zone. See docs/theory.md, "Measured choices".
-    """
-    lead, stroke = 1.5e-3, 9e-3
-    food = Material(E=1e6, nu=0.35, rho=1000, loss_factor=0.05, R=1.0, R_initiation=1.0)
-    blocks = {length: Shape("block", length, 0.016, 0.024) for length in (0.024, 0.072)}
-    wanted = {
-        length: cleave(block, food, WEDGE, lead, stroke + lead) for length, block in blocks.items()
-    }  # their middle rises
-
-    def mean(stroke: FloatArray, force: FloatArray) -> float:
-        at = np.linspace(5e-3, 8.5e-3, 50)
-        return float(np.interp(at, stroke, force).mean())
-
-    def rate(stroke: FloatArray, energy: FloatArray) -> float:
-        low, high = np.interp([4e-3, 8.5e-3], stroke, energy)
-        return float(high - low) / (0.016 * 4.5e-3)
-
-    shapes = (
-        (0.024, 3e-3, 0.0, None),
-        (0.024, 1.5e-3, 0.0, None),
-        (0.024, 1.5e-3, 0.5, None),
-        (0.072, 3e-3, 0.0, 6e-3),
-        (0.072, 1.5e-3, 0.0, 6e-3),
-    )
-    for length, dx, shift, far in shapes:
-        scene = Scene(
-            Food(blocks[length], food),
-            WEDGE,
-            Motion(stroke + lead, 0.005),
-            Board(0.0),
-            EdgeLaw(zone=2 * lead),
-            Numerics(dx=dx, far=far, gravity=0.0, grid_shift=(0.0, shift, 0.0)),
-        )
-        record, want = options.simulate(scene), wanted[length]
-        where = ", blade between planes of nodes" if shift else ""
-        yield Comparison(
-            f"wedge in a slit, {1e3 * length:g} mm long, dx {1e3 * dx:g} mm{where}",
-            "mean force on the faces, 5 to 8.5 mm deep [N]",
-            mean(want.stroke, want.force),
-            mean(record.stroke, record.resolved_face),
-            0.05,
-            f"finite elements of the same law, {want.unknowns} unknowns",
-        )
-        if dx < 2 * lead and not shift:
-            yield Comparison(
-                f"wedge in a slit, {1e3 * length:g} mm long, dx {1e3 * dx:g} mm",
-                "energy released where the halves part, over the area, 4 to 8.5 mm deep [J/m^2]",
-                rate(want.stroke, want.released),
-                rate(record.stroke, record.unbooked + record.viscous),
-                0.10,
-                "finite elements: work less stored energy",
-            )
-
-
 CASES = [
     VerificationCase("cutting resistance", resistance, cost=50),
     VerificationCase("slicing", slicing, fast=False, cost=22),
-    VerificationCase("wedge in a slit", slit, fast=False, cost=140),
     VerificationCase("invariance of the cut", invariance, fast=False, cost=25),
 ]

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from fem_reference.press import Elements, press
+from fem_reference.indentation import Mesh, indent
+from fem_reference.press import Curve, Elements, press
 from mpm.arrays import FloatArray
 from mpm.scene import Board, Food, Motion, Numerics, Press, Scene
 from mpm.scene.material import Material
@@ -36,8 +37,10 @@ class PressTest:
         half_angle: Half the angle of the tool [rad]; a right angle is a plate.
         bonded: Whether tool and board stick to the food.
         yield_stress: Yield stress of the food [Pa].
+        poisson: Its Poisson's ratio [-].
         tolerance: Largest error of a force that passes [-].
         reference: Options of the finite elements.
+        mesh: Elements of a wedge on a block that flows, which touches points between the nodes; None: ``reference``.
         sizes: Cell sizes of the particles [m].
         slow: Whether it is left out of the quick part.
         cost: About the time that it takes [s].
@@ -49,11 +52,27 @@ class PressTest:
     half_angle: float = math.pi / 2
     bonded: bool = False
     yield_stress: float = math.inf
+    poisson: float = PRESSED_MATERIAL.nu
     tolerance: float = 0.02
     reference: tuple[tuple[str, Any], ...] = ()
+    mesh: Mesh | None = None
     sizes: tuple[float, ...] = PRESS_CELLS
     slow: bool = True
     cost: float = 90.0
+
+    @property
+    def food(self) -> Material:
+        """Constants of the food."""
+        return replace(PRESSED_MATERIAL, nu=self.poisson, yield_stress=self.yield_stress)
+
+    def by_elements(self) -> Curve:
+        """Force over stroke by finite elements of the particles' law."""
+        # a law with a memory wants small steps; a wedge's first contact is one row of nodes
+        strokes = sorted({*self.strokes, *(np.arange(1, 9) / 8 * self.strokes[-1])})
+        if self.mesh is not None:
+            return indent(self.shape, self.food, self.half_angle, strokes, self.mesh)
+        elements = Elements(**dict(self.reference))
+        return press(self.shape, self.food, strokes, half_angle=self.half_angle, bonded=self.bonded, elements=elements)
 
 
 PRESS_TESTS = (
@@ -134,21 +153,52 @@ PRESS_TESTS = (
         bonded=True,
         yield_stress=8e3,
         tolerance=0.03,
-        reference=(("cells", 4), ("order", 2)),
+        reference=(("cells", 4), ("order", 2), ("mixed", True)),  # without it they lock: 2.6 % more at 4 mm
+    ),
+    *(
+        PressTest(
+            f"cylinder of 50 x 30 mm to 30 %, bonded, nu {poisson:g}",
+            Shape("upright_cylinder", 0.05, 0.05, 0.03),
+            (0.003, 0.006, 0.009),
+            bonded=True,
+            poisson=poisson,
+            reference=(("cells", 4), ("order", 2), ("mixed", True)),
+            sizes=(3e-3, 2e-3),
+            cost=250.0,
+        )
+        for poisson in (0.45, 0.49)
+    ),
+    PressTest(
+        "wedge of 90 degrees on a block, J2",
+        Shape("block", 0.03, 0.016, 0.02),
+        (0.002, 0.003),
+        half_angle=math.radians(45),
+        yield_stress=8e3,
+        tolerance=0.03,
+        mesh=Mesh(1.5e-3, layers=2),
+        sizes=PRESS_CELLS[1:],  # on the coarser ones it touches one cell at 2 mm
+        cost=150.0,
+    ),
+    PressTest(
+        "wedge of 140 degrees on a block, J2",
+        Shape("block", 0.03, 0.016, 0.02),
+        (0.002, 0.003),
+        half_angle=math.radians(70),
+        yield_stress=8e3,
+        tolerance=0.03,
+        mesh=Mesh(1.5e-3, layers=2),
+        cost=200.0,
     ),
 )
 
 
-def particles(
-    options: SuiteOptions, test: PressTest, dx: float, *, material: Material = PRESSED_MATERIAL, mach: float = MACH
-) -> FloatArray:
+def particles(options: SuiteOptions, test: PressTest, dx: float, *, mach: float = MACH) -> FloatArray:
     """Force of the particles at the strokes of a press.
 
     Args:
         options: Seed and device.
         test: The press.
         dx: Cell size [m].
-        material: Constants of the food; its yield stress is that of the press.
         mach: Speed of the plate over that of the P-wave [-].
 
     Returns:
@@ -157,7 +207,7 @@ def particles(
     friction = STICKS if test.bonded else 0.0
     end = test.strokes[-1] * (1 + WINDOW)
     scene = Scene(
-        Food(test.shape, replace(material, yield_stress=test.yield_stress)),
+        Food(test.shape, test.food),
         Press(half_angle=test.half_angle, mu=friction),
         Motion(end, mach),
         Board(friction),
@@ -188,11 +238,7 @@ def compare(options: SuiteOptions, test: PressTest, sizes: Sequence[float]) -> I
     Yields:
         A comparison for each grid.
     """
-    material = replace(PRESSED_MATERIAL, yield_stress=test.yield_stress)
-    # a law with a memory wants small steps; a wedge's first contact is one row of nodes
-    strokes = sorted({*test.strokes, *(np.arange(1, 9) / 8 * test.strokes[-1])})
-    elements = Elements(**dict(test.reference))
-    curve = press(test.shape, material, strokes, half_angle=test.half_angle, bonded=test.bonded, elements=elements)
+    curve = test.by_elements()
     want = np.interp(test.strokes, curve.stroke, curve.force)
     misses = []
     for dx in sizes:

@@ -107,3 +107,21 @@ def test_a_bonded_disc_of_mixed_elements_does_not_lock(nu: float):
     assert fine < 7e-3
     if nu == 0.49:
         assert error(2, mixed=False) > 0.05
+
+
+@pytest.mark.slow
+def test_a_punch_on_mixed_elements_sinks_at_prandtls_load():
+    """Flat punch of half width 1 on a block of 3 by 3 in plane strain: mean pressure (2 + pi) k within 3 %."""
+    n, wide, depth, steps = 3, 3.0, 0.02, 4
+    shrink = np.linspace(0, 1, 2 * n + 1) ** 2  # elements become small at the punch's edge
+    across = np.concatenate([1 - np.linspace(1, 0, n + 1) ** 2, 1 + (wide - 1) * shrink[1:]])
+    mesh = sk.MeshQuad.init_tensor(across, -wide * shrink[::-1])
+    solid = Solid(mesh, Plastic(385.0, 577.0, 1.0), 2, mixed=True)
+    _, y, z = solid.nodes.T
+    solid.hold(np.flatnonzero((y < 1e-9) | (y > wide - 1e-9)), [1])
+    solid.hold(np.flatnonzero(z < 1e-9 - wide), [2])
+    under = np.flatnonzero((z > -1e-9) & (y < 1 + 1e-9))
+    for k in range(1, steps + 1):
+        solid.hold(under, [2], -depth * k / steps)
+        solid.solve()
+    assert -solid.reaction(under)[2] == pytest.approx((2 + math.pi) / math.sqrt(3), rel=0.03)

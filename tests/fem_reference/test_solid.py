@@ -12,9 +12,7 @@ from fem_reference import meshes
 from fem_reference.contact import Contact, Plane, Wedge
 from fem_reference.laws import Corotated, NeoHookean
 from fem_reference.press import Elements, press
-from fem_reference.slit import Opening, cleave
 from fem_reference.solid import EquilibriumError, Solid
-from mpm.scene import Knife
 from mpm.scene.material import Material
 from mpm.scene.shapes import Shape, volume
 from tests.mpm import twins
@@ -165,51 +163,3 @@ def test_a_bonded_block_flows_in_steps():
     assert flowing[0] == pytest.approx(elastic[0], rel=0.03)
     assert (flowing[1:] > 1.01 * sliding[1:]).all()
     assert flowing[2] < 0.8 * elastic[2]
-
-
-@pytest.mark.slow
-def test_a_blade_in_a_slit():
-    """The force on its faces is proportional to stiffness, grows with thickness, and comes near on finer elements."""
-    block, lead, stroke = Shape("block", 0.024, 0.016, 0.018), 3e-3, 6e-3
-
-    def opening(E: float = 1e6, spine: float = 2e-3, cells: int = 2) -> Opening:
-        knife = Knife("blade", spine, math.radians(11.0), 0.02, 0.2)
-        return cleave(block, Material(E=E, nu=0.35, rho=1000.0), knife, lead, stroke, cells=cells)
-
-    once = opening()
-    np.testing.assert_allclose(opening(E=2e6).released, 2 * once.released, rtol=1e-3)
-    assert len(once.force) == 4 and (once.force > 0).all()
-    np.testing.assert_allclose(opening(E=2e6).force, 2 * once.force, rtol=1e-4)
-    assert opening(spine=1e-3).force[-1] < 0.9 * once.force[-1]
-    assert opening(cells=3).force[-1] == pytest.approx(once.force[-1], rel=0.1)
-    # the halves turn outwards about the lower edges, so the middle rises; the edge is where the slit's end leaves it
-    assert (np.diff(once.rise) > 0).all() and once.rise[0] > 0
-    np.testing.assert_allclose(once.stroke + once.rise, lead / 2 * np.arange(1, 5), rtol=1e-2)
-
-
-@pytest.mark.slow
-def test_energy_that_the_end_of_a_slit_releases_is_its_virtual_extension():
-    """Work less stored energy, over the area, is what a block stores less whose slit is one element longer (12 %)."""
-    block, knife, size = Shape("block", 0.024, 0.016, 0.018), Knife("blade", 2e-3, math.radians(11.0), 0.02, 0.2), 1e-3
-    short, long = (cleave(block, FOOD, knife, cells * size, 9e-3, cells=cells) for cells in (3, 4))
-    at = short.stroke[4:]
-    rates = [np.gradient(one.released, one.stroke) for one in (short, long)]
-    mean = np.mean([np.interp(at, one.stroke, rate) for one, rate in zip((short, long), rates, strict=True)], axis=0)
-    released = np.interp(at, short.stroke, short.stored) - np.interp(at, long.stroke, long.stored)
-    np.testing.assert_allclose(mean[:-1], released[:-1] / size, rtol=0.12)
-
-
-def test_a_block_in_a_slit_is_held_by_nothing_but_blade_and_floor(monkeypatch):
-    """Blade and floor are in balance, and the floor only pushes."""
-    solids = []
-    monkeypatch.setattr("fem_reference.slit.Solid", lambda *a: solids.append(Solid(*a)) or solids[0])
-    block = Shape("block", 0.024, 0.016, 0.018)
-    found = cleave(block, FOOD, Knife("blade", 2e-3, math.radians(11.0), 0.02, 0.2), 3e-3, 6e-3)
-    (solid,) = solids
-    _, floor = solid.contacts
-    outer = np.flatnonzero((solid.nodes[:, 1] > 0.008 - 1e-9) & (solid.nodes[:, 2] < 1e-9))
-    corner = solid.reaction(outer)[2]  # of what holds the outer edge and of the floor under it
-    inner = ~np.isin(floor.nodes, outer)
-    rest = floor.force(solid.nodes + solid.u)[inner, 2].sum()
-    assert 4 * (corner + rest) == pytest.approx(found.force[-1], rel=1e-3)
-    assert corner > 0 and rest >= 0

@@ -17,7 +17,10 @@ from tests.calib.documents import valid
 
 FAST = [case for case in cases() if case.fast]
 # The fast cases that take five seconds and more.
-SECONDS = ("tilted board", "rest and friction", "vortex", "cutting resistance", "press: block, sliding", "ball")
+SECONDS = (
+    *("tilted board", "rest and friction", "vortex", "cutting resistance", "press: block, sliding", "ball"),
+    *("splitting: short arms", "work of new surface: 2.5 degrees", "work of new surface: 20 degrees"),
+)
 
 
 def row(expected: float = 2.0, got: float = 2.0, tolerance: float = 0.01, least: bool = False) -> Comparison:

@@ -1,4 +1,4 @@
-"""Half a block in plane strain with a blade on its plane of symmetry and a board under it."""
+"""Half a block with a blade on its plane of symmetry and a board under it, in plane strain or in space."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import numpy as np
 import skfem as sk
 
 from fem_reference.contact import Plane, Wedge
-from fem_reference.crack.cut_case import Blade, Block, Grid
-from fem_reference.meshes import graded
+from fem_reference.cutting.case import Blade, Block, Grid
+from fem_reference.meshes import box, graded
 from fem_reference.solid import Solid
 from fem_reference.surface import SlidingContact, SurfacePoints, nodal, sampled
 
@@ -24,26 +24,36 @@ class Halves:
         wedge: The blade.
         points: Nodes on the plane of symmetry.
         height: Their heights in the undeformed block [m], shape (n,).
+        levels: The heights of its rows of nodes, rising [m], shape (m,).
+        scale: Whole block per metre of width over what is meshed: two halves, of half the width in space [1/m].
         faces: Contact of the plane with the blade.
     """
 
     def __init__(self, block: Block, blade: Blade, grid: Grid) -> None:
         h, rows = block.height, round(block.height / grid.size)
-        across = graded(block.length / 2, grid.size, grid.growth)
-        mesh = sk.MeshQuad.init_tensor(across, np.linspace(0, h, rows + 1))
+        across, up = graded(block.length / 2, grid.size, grid.growth), np.linspace(0, h, rows + 1)
+        mesh: sk.Mesh = sk.MeshQuad.init_tensor(across, up)
+        self.scale = 2.0
+        if block.width is not None:
+            mesh = box(np.linspace(0, block.width / 2, grid.layers + 1), across, up)
+            self.scale = 4.0 / block.width
         self.solid = Solid(mesh, block.law, 2, grid.mixed, BALANCE)
         near = 1e-6 * h
-        plane = mesh.facets_satisfying(lambda p: p[0] < near, boundaries_only=True)
-        under = mesh.facets_satisfying(lambda p: p[1] < near, boundaries_only=True)
+        plane = mesh.facets_satisfying(lambda p: p[-2] < near, boundaries_only=True)
+        under = mesh.facets_satisfying(lambda p: p[-1] < near, boundaries_only=True)
         self.modulus = (block.law.lam + 2 * block.law.mu) / grid.size  # that all penalties are measured by [Pa/m]
         self.wedge = Wedge(h, blade.angle / 2, blade.thickness, blade.rounding, single=True)
         self.points: SurfacePoints = nodal(self.solid, plane)
         self.height = self.points.at(self.solid.nodes)[:, 2]
+        row = np.round(2 * rows * self.height / h).astype(int)
+        self.levels, self._row = h * np.arange(2 * rows + 1) / (2 * rows), row
         penalty = PENALTY * self.modulus
         self.faces = SlidingContact(sampled(self.solid, plane, SAMPLES), self.wedge, penalty, blade.friction)
         self._floor = SlidingContact(nodal(self.solid, under), Plane((0, 0, 0), (0, 0, 1)), penalty)
         self._base = np.flatnonzero(self.solid.nodes[:, 2] < near)
         self._held = block.held
+        if block.width is not None:
+            self.solid.hold(np.flatnonzero(self.solid.nodes[:, 0] < near), [0])
         self.solid.surfaces.append(self.faces)
         if block.held:
             self.solid.hold(self._base, [2])
@@ -57,17 +67,21 @@ class Halves:
 
     @property
     def springs(self) -> float:
-        """Energy in the penalty of the contacts of both halves [J/m]."""
-        return 2 * (self.faces.energy(self.x) + (0.0 if self._held else self._floor.energy(self.x)))
+        """Energy in the penalty of the contacts [J/m]."""
+        return self.scale * (self.faces.energy(self.x) + (0.0 if self._held else self._floor.energy(self.x)))
 
     @property
     def board(self) -> float:
-        """Force of both halves down on the board [N/m]."""
+        """Force down on the board [N/m]."""
         if self._held:
-            return 2 * float(self.solid.reaction(self._base)[2])
-        return 2 * float(self._floor.tractions(self.x)[:, 2].sum())
+            return self.scale * float(self.solid.reaction(self._base)[2])
+        return self.scale * float(self._floor.tractions(self.x)[:, 2].sum())
+
+    def rows(self, values: np.ndarray) -> np.ndarray:
+        """Values at the nodes of the plane, shape (n,), as means along its rows, shape (m,)."""
+        weights = self.points.areas
+        return np.bincount(self._row, weights * values) / np.bincount(self._row, weights)
 
     def now(self, height: float) -> float:
-        """Where a point of the plane is that was at a height [m] of the undeformed block [m]."""
-        order = np.argsort(self.height)
-        return float(np.interp(height, self.height[order], self.points.at(self.x)[order, 2]))
+        """Where a row of the plane is that was at a height [m] of the undeformed block [m]."""
+        return float(np.interp(height, self.levels, self.rows(self.points.at(self.x)[:, 2])))

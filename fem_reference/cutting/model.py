@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fem_reference.crack.cohesive import Cohesion, CutPlane
-from fem_reference.crack.cut_case import Blade, Block, Cut, Grid, Interface
-from fem_reference.crack.halves import Halves
+from fem_reference.cutting.case import Blade, Block, Cut, Grid, Interface
+from fem_reference.cutting.cohesive import Cohesion, CutPlane
+from fem_reference.cutting.halves import Halves
 from fem_reference.laws import Plastic
 from fem_reference.solid import EquilibriumError
 
@@ -149,25 +149,26 @@ class Books:
     def note(self) -> None:
         """Add what has happened since the last equilibrium."""
         now, last, model = self._now(), self.last, self.model
+        each = model.scale / 2  # of what is said of both halves already, or is twice its mean
         areas, whole = model.points.areas, 1 - 0.5 * (now.cut + last.cut)
-        self.tied += float((areas * whole * (now.spent - last.spent)).sum())
+        self.tied += each * float((areas * whole * (now.spent - last.spent)).sum())
         left = model.toughness - 0.5 * (now.spent + last.spent)
-        self.parted += float((areas * left * (now.cut - last.cut)).sum())
+        self.parted += each * float((areas * left * (now.cut - last.cut)).sum())
         slip = model.faces.points.at(now.x - last.x)
         slip[:, 2] -= now.height - last.height
-        self.rubbed -= float((now.rubbing + last.rubbing).ravel() @ slip.ravel())
-        self.absorbed += float((now.inner + last.inner).ravel() @ (now.x - last.x).ravel())
+        self.rubbed -= each * float((now.rubbing + last.rubbing).ravel() @ slip.ravel())
+        self.absorbed += each * float((now.inner + last.inner).ravel() @ (now.x - last.x).ravel())
         self.last = now
         self.moments.append(self._moment())
 
     def _moment(self) -> Moment:
         model, now = self.model, self.last
-        edge = -2 * float(model.plane.tractions(now.x)[:, 2].sum())
-        elastic = 2 * model.solid.energy(model.solid.u)
+        edge = -model.scale * float(model.plane.tractions(now.x)[:, 2].sum())
+        elastic = model.scale * model.solid.energy(model.solid.u)
         reference = self._tip()
         return Moment(
             stroke=model.block.height - now.height,
-            force=edge - 2 * float(model.faces.tractions(now.x)[:, 2].sum()),
+            force=edge - model.scale * float(model.faces.tractions(now.x)[:, 2].sum()),
             edge=edge,
             tip=model.now(reference),
             reference_tip=reference,
@@ -183,9 +184,7 @@ class Books:
     def _tip(self) -> float:
         """Height of the crack's tip in the undeformed block [m]: above it, more than half of R is taken."""
         model, now = self.model, self.last
-        order = np.argsort(model.height)
-        taken = 1 - (1 - now.cut[order]) * (1 - now.spent[order] / model.toughness)
-        z = model.height[order]
+        taken, z = 1 - model.rows((1 - now.cut) * (1 - now.spent / model.toughness)), model.levels
         if not (taken > HALF).any():
             return float(z[-1])
         at = max(int(np.argmax(taken > HALF)), 1)

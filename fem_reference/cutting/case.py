@@ -1,4 +1,5 @@
-"""What is cut, with what and how finely, and what comes of it: input and result of :mod:`fem_reference.crack.wedge`."""
+"""What is cut, with what and how finely, and what comes of it: input and result of
+:mod:`fem_reference.cutting.wedge`."""
 
 from __future__ import annotations
 
@@ -21,19 +22,21 @@ class CutCaseError(CutcalError):
 
 @dataclass(frozen=True)
 class Block:
-    """A food that is parted in its middle, of unit width along the blade.
+    """A food that is parted in its middle.
 
     Attributes:
         length: Across the blade, both halves [m].
         height: [m].
         law: Material law of the flesh.
         held: Whether the base stays on the board; else it may lift, and the board only pushes. It slides either way.
+        width: Along the blade, with free ends [m]; None for plane strain. Results are per metre of width either way.
     """
 
     length: float
     height: float
     law: Flesh
     held: bool = False
+    width: float | None = None
 
 
 @dataclass(frozen=True)
@@ -93,11 +96,13 @@ class Grid:
         size: Their height, and their width at the plane [m].
         growth: Width of each over that of its neighbour nearer to the plane, until four times ``size``.
         mixed: Elements that do not lock, for plastic flow or little compressibility.
+        layers: Elements along half the width, where the block has one.
     """
 
     size: float
     growth: float = 1.3
     mixed: bool = False
+    layers: int = 2
 
 
 @dataclass(frozen=True, eq=False)

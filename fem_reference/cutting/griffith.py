@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fem_reference.crack.cut_case import Blade, Block, Grid
-from fem_reference.crack.halves import Halves
+from fem_reference.cutting.case import Blade, Block, Grid
+from fem_reference.cutting.halves import Halves
 from fem_reference.solid import EquilibriumError
 from fem_reference.surface import Tie
 
@@ -57,9 +57,8 @@ def beam_crack_length(modulus: float, arm: float, opening: float, toughness: flo
 def energy_release(beam: Block, blade: Blade, depth: float, tips: Sequence[float], grid: Grid) -> np.ndarray:
     """Energy release rates of cracks of given tips under a blade at rest, by elements: G = -dU/da.
 
-    The same model as :func:`fem_reference.crack.wedge.split`, but for the plane: it is rigidly tied below the tip and
-    free
-    above, so that no cohesive law has a part in it. U is that of two cracks, one element longer and shorter.
+    The same model as :func:`fem_reference.cutting.wedge.split`, but for the plane: it is rigidly tied below the tip and
+    free above, so that no cohesive law has a part in it. U is that of two cracks, one element longer and shorter.
 
     Args:
         beam: The split block; elastic.
@@ -129,4 +128,4 @@ class _Cracked(Halves):
         """Energy of both halves with the crack's tip at the lower end of a row of elements [J/m]."""
         self._tie.on = self.height < (row + 0.25) * self.size
         self.solid.solve()
-        return 2 * (self.solid.energy(self.solid.u) + self._tie.energy(self.x)) + self.springs
+        return self.scale * (self.solid.energy(self.solid.u) + self._tie.energy(self.x)) + self.springs

@@ -9,7 +9,7 @@ import skfem as sk
 
 from fem_reference.condensation import Condensation
 from fem_reference.contact import Plane, Wedge
-from fem_reference.crack.cohesive import Cohesion, CutPlane
+from fem_reference.cutting.cohesive import Cohesion, CutPlane
 from fem_reference.laws import Linear
 from fem_reference.solid import Solid
 from fem_reference.surface import SlidingContact, SurfacePoints, Tie, nodal, sampled

@@ -1,12 +1,13 @@
 """A blade driven into a block along a plane that parts by a cohesive law: no prescribed lead of the crack.
 
-In plane strain, quasi-static, force over stroke: the independent reference of the particles' crack.
+Quasi-static, in plane strain or, for a block of a given width, in space; force over stroke. The independent reference
+of the particles' crack.
 """
 
 from __future__ import annotations
 
-from fem_reference.crack.cut_case import Blade, Block, Cut, Grid, Interface
-from fem_reference.crack.cut_model import CutModel
+from fem_reference.cutting.case import Blade, Block, Cut, Grid, Interface
+from fem_reference.cutting.model import CutModel
 
 __all__ = ["Blade", "Block", "Cut", "Grid", "Interface", "cut", "split"]
 
@@ -14,11 +15,10 @@ __all__ = ["Blade", "Block", "Cut", "Grid", "Interface", "cut", "split"]
 def cut(block: Block, blade: Blade, interface: Interface, depth: float, grid: Grid) -> Cut:
     """Cut a block in its middle: the edge pays what the opening has not.
 
-    The plane of the cut is a cohesive tie from the beginning (:class:`fem_reference.crack.cohesive.CutPlane`). Each
-    point of
-    it costs R in all: the tie takes what the opening ahead of the edge takes, and the edge the rest as it passes. Where
-    the crack's tip is, is a result. Newton's method with halved steps; where the crack runs by itself, proximal steps
-    find the next equilibrium at rest.
+    The plane of the cut is a cohesive tie from the beginning (:class:`fem_reference.cutting.cohesive.CutPlane`). Each
+    point of it costs R in all: the tie takes what the opening ahead of the edge takes, and the edge the rest as it
+    passes. Where the crack's tip is, is a result. Newton's method with halved steps; where the crack runs by itself,
+    proximal steps find the next equilibrium at rest.
 
     Args:
         block: The food.
