@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 import h5py
@@ -236,7 +237,7 @@ def test_foreign_files_and_missing_folders_are_refused(tmp_path: Path) -> None:
         EvaluationStore(text, HEADER, resume=True)
     other = tmp_path / "other.h5"
     with h5py.File(other, "w") as file:
-        file.attrs.update({"schema": 1, "trace_sha256": HEADER.trace_sha256, "scene_key": HEADER.scene_key})
+        file.attrs.update(asdict(HEADER))
     with pytest.raises(OutputError, match="no store of evaluations"):
         EvaluationStore(other, HEADER, resume=True)
     with pytest.raises(OutputError, match="cannot be written"):
