@@ -18,6 +18,7 @@ import yaml
 
 from calib.errors import MaterialError
 from calib.io.wording import brief, quoted
+from mpm.files import read_regular
 from mpm.scene.errors import CutcalError
 
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -39,6 +40,8 @@ _FLOAT = re.compile(r"^[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+$")
 _FLOAT_START = list("-+.0123456789")
 # What PyYAML lets through from Python where a date, a number or a tagged value is none: 2024-13-01 or "!!int x".
 _UNCONSTRUCTED = (ValueError, KeyError, IndexError, AttributeError, TypeError, OverflowError)
+MOST_BYTES = 1_000_000
+"""Bytes of a YAML file from which on it is no list of foods: the largest that comes with cutcal has a tenth of that."""
 LONGEST_KEY = 60
 """Letters of a key from which on it is the name of nothing."""
 
@@ -143,7 +146,7 @@ def read_yaml(path: Path | str, *, kind: type[CutcalError] = MaterialError) -> t
     path = Path(path)
     top = Place(path.name, (), kind)
     try:
-        content = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
+        content = yaml.load(read_regular(path, MOST_BYTES).decode("utf-8"), Loader=_Loader)
     except FileNotFoundError:
         raise kind(f"{path}: no such file; check the path") from None
     except OSError as e:

@@ -236,7 +236,9 @@ class EvaluationStore:
                 self._stream = None
             self.journal.unlink(missing_ok=True)
         except OSError as error:
-            raise OutputError(f"{self.path} cannot be written: {error}; its journal holds all runs.") from error
+            raise OutputError(
+                f"{self.path} cannot be written: {error}; free space, then --resume goes on from its journal."
+            ) from error
 
 
 class CachedEvaluator:

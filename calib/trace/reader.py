@@ -11,6 +11,7 @@ from calib.errors import TraceError
 from calib.trace.csv_table import table_of_csv
 from calib.trace.json_table import table_of_json
 from calib.trace.table import Table
+from mpm.files import read_regular
 
 _JSON_SUFFIXES = (".json", ".jsonl", ".ndjson")
 _JSON_START = re.compile(rb"(\xef\xbb\xbf)?\s*(\{|\[\s*[\[{])")
@@ -60,11 +61,11 @@ def _content(path: Path) -> bytes:
     try:
         if path.is_dir():
             raise TraceError(f"{path} is a directory; name a CSV, JSON or HDF5 file")
-        if not path.is_file():
+        if not path.exists():
             near = difflib.get_close_matches(path.name, _names_beside(path), n=3)
             hint = f"did you mean {' or '.join(near)}?" if near else "check the path"
             raise TraceError(f"{path}: no such file; {hint}")
-        raw = path.read_bytes()
+        raw = read_regular(path)
     except OSError as error:
         raise TraceError(f"{path}: cannot be read ({error.strerror})") from None
     if not raw.strip():

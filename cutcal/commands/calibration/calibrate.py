@@ -28,6 +28,7 @@ from cutcal.options import (
     titled,
     workers_of,
 )
+from cutcal.surroundings import interrupted
 from mpm.scene.errors import CutcalError
 
 if TYPE_CHECKING:
@@ -40,7 +41,8 @@ EPILOG = """examples:
   calibrate --food potato --trace cut.csv --air air.csv --check
   calibrate --config potatoes.yaml --out runs/potatoes
 
-Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass."""
+Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass,
+130 interrupted."""
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
@@ -161,6 +163,8 @@ def run(args: argparse.Namespace) -> int:
         print_json(to_document(result))
     else:
         print(verdict_text(result))
+    if result.status == "interrupted":
+        return interrupted(resumable=True)
     return 0 if result.passed else 2
 
 
