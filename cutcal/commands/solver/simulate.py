@@ -29,7 +29,7 @@ from cutcal.options import (
     sizing_of,
     whole,
 )
-from mpm.output.energy import spent, unbooked
+from mpm.output.energy import doubts, spent, unbooked
 from mpm.output.record import ForceRecord
 from mpm.output.snapshot import SnapshotRecorder
 from mpm.scene import CONTACTS, CRACKS, Arm, Scene
@@ -43,7 +43,12 @@ DESCRIPTION = "Simulate one cut and write force.csv and summary.json."
 VIDEO_FRAMES = 72  # of a video: five seconds
 FRAMES_PER_PAGE_FRAME = 2  # frames of a video of which a page has one
 FRAMES_PER_LINE = 12  # pictures of a video after which a line says how many there are
-EPILOG = "example:\n  cutcal simulate --food cucumber --knife edc --out runs/cucumber"
+EPILOG = """example:
+  cutcal simulate --food cucumber --knife edc --out runs/cucumber
+
+Exit codes: 0 done, 1 error in input or run, 2 done, but the energies say that
+the force is not to be trusted: more than 10 % of the work is taken by no law,
+or kinetic energy is more than 10 % of the internal one."""
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
@@ -123,6 +128,10 @@ def run(args: argparse.Namespace) -> int:
         if record.parted < FULLY_PARTED:
             assumed.append(pressed_away(record.parted))
             note(assumed[-1])
+        doubted = doubts(record.budget, record.ke_over_ie) if record.status == "done" else []
+        for text in doubted:
+            say(f"not passed: {text}")
+        assumed += doubted
         summary = _summary(args, food, scene, record, assumed)
         write_json(out / "summary.json", summary)
         if watch is not None:
@@ -131,7 +140,9 @@ def run(args: argparse.Namespace) -> int:
         print_json(summary)
     else:
         print(_words(food.name, scene, record, out))
-    return 0 if record.status == "done" else 1
+    if record.status != "done":
+        return 1
+    return 2 if doubted else 0
 
 
 def _scene(args: argparse.Namespace, food: FoodSpec, shape: Shape) -> Scene:
