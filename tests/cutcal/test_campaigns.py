@@ -62,12 +62,12 @@ class Calibration:
         )
 
     def finish(self, *more: str) -> dict[str, object]:
-        """Let it end; what its summary says, less when and how long."""
+        """Let it end; what its summary says, less when, how long and of which commit."""
         process = self.start(*more)
         _, said = process.communicate()
         assert process.returncode in DONE, said
         found = json.loads((self.out / "summary.json").read_text())
-        return {k: v for k, v in found.items() if k not in ("created", "wall_s", "command")}
+        return {k: v for k, v in found.items() if k not in ("created", "wall_s", "command", "git")}
 
 
 def test_forty_kills_and_signals(tmp_path):
