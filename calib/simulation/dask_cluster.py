@@ -103,8 +103,8 @@ class Cluster(Workers):
         super().__init__(workers or len(ready), arch, threads)
         if not _is_trusted(address):
             say(
-                f"{address} neither encrypts nor asks who is there: whoever reaches it can run code on its workers, and "
-                "it can run code here; use tls:// outside a network that you trust"
+                f"{address} neither encrypts nor asks who is there: whoever reaches it can run code on its workers, "
+                "and it can run code here; use tls:// outside a network that you trust"
             )
         say(
             f"{len(ready)} workers at {address}, {self.workers} simulations at a time; --workers {self.workers} asks "
