@@ -306,3 +306,26 @@ def test_only_repeatable_failures_are_remembered(tmp_path: Path, status: str, re
         answer = list(CachedEvaluator(second, store, scene=SCENE, code="1").evaluate([{"E": 1.0}]))
         assert (second.runs == 1) is again and len(store) == 1
         assert answer[0].ok is again
+
+
+def test_the_journal_is_forced_to_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each run is given to the disk, whole and by fsync of the journal, before append returns: what only the system
+    has taken is lost when the power fails. So is the HDF5 file before it takes the place of the journal."""
+    forced: list[tuple[str, bytes]] = []
+
+    def fsync(number: int) -> None:
+        path = Path(os.readlink(f"/proc/self/fd/{number}")) if Path("/proc/self/fd").exists() else None
+        if path is None:
+            pytest.skip("this system does not say which file a number is")
+        forced.append((path.name, path.read_bytes()))
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    store = EvaluationStore(tmp_path / "evaluations.h5", HEADER)
+    for k in range(3):
+        store.append(f"k{k}", evaluation(1.0 + k), "fine")
+        name, content = forced[-1]
+        assert name == "evaluations.h5.journal" and f'"k{k}"'.encode() in content and content.endswith(b"}\n")
+        assert content == store.journal.read_bytes()
+    forced.clear()
+    store.close()
+    assert forced == [("evaluations.h5.draft", store.path.read_bytes())]

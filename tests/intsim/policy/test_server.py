@@ -135,6 +135,15 @@ def test_pixels_and_bytes_are_limited(monkeypatch):
         assert asked(made, content=body + b" " * 3_000_000)[0] == 413, "the answer arrives though much is not read"
 
 
+def test_a_question_has_100_megabytes_at_most():
+    """One that says that it is longer is refused before a byte of it is read."""
+    with serving() as made:
+        for size, code in ((100_000_001, b" 413 "), (10**30, b" 411 ")):
+            with socket.create_connection(("127.0.0.1", made.server_port), timeout=10) as asking:
+                asking.sendall(b"POST /act HTTP/1.0\r\nContent-Length: %d\r\n\r\n" % size)
+                assert code in asking.makefile("rb").readline()
+
+
 @pytest.mark.parametrize(
     ("content", "word"),
     [
