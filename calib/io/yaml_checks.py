@@ -66,7 +66,10 @@ class _Loader(yaml.SafeLoader):
         node = super().compose_node(parent, index)
         if isinstance(event, yaml.AliasEvent) and not isinstance(node, yaml.ScalarNode):
             raise yaml.composer.ComposerError(
-                None, None, f"*{event.anchor} stands for a list or mapping; write it out", event.start_mark  # type: ignore[arg-type]
+                None,
+                None,
+                f"*{event.anchor} stands for a list or mapping; write it out",
+                event.start_mark,  # type: ignore[arg-type]
             )
         return node
 
