@@ -20,7 +20,7 @@ def pins(name):
 
 
 def test_pins_with_hashes_are_those_without():
-    """No package has another version in the file with hashes, none is without hashes, and all that is needed is there."""
+    """No package has another version in the file with hashes, none is without, and all that is needed is there."""
     plain, hashed = pins("constraints.txt"), pins("constraints-hashes.txt")
     assert len(hashed) > 80
     for package, versions in hashed.items():
