@@ -41,8 +41,7 @@ EPILOG = """examples:
   calibrate --food potato --trace cut.csv --air air.csv --check
   calibrate --config potatoes.yaml --out runs/potatoes
 
-Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass,
-130 interrupted."""
+Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass."""
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
