@@ -6,20 +6,17 @@ needed.
 
 from __future__ import annotations
 
-import io
-import os
 import sys
 from collections.abc import Iterable, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from calib._version import __version__
+from cutcal.surroundings import INTERRUPTED as INTERRUPTED
+from cutcal.surroundings import check_limits, fit_process, interrupted, silence
 
 if TYPE_CHECKING:
     from cutcal.parsing import Parser
-
-# The fit's matrices are small and the simulations have the cores: more threads for linear algebra get in their way.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 DESCRIPTION = "Calibrate cutting simulations of food against measured knife forces."
 EPILOG = """example:
@@ -51,7 +48,7 @@ COMMANDS = {
 }
 """The folder of each command, in the order of the help."""
 CLOSED = 141  # what a shell reports for a program whose reader has gone
-INTERRUPTED = 130  # what a shell reports for a program ended by Ctrl-C
+FAILED = 1  # an error in input or run
 
 
 def command(name: str) -> Any:
@@ -86,30 +83,48 @@ def calibrate() -> int:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; returns its exit code."""
+    with fit_process():
+        try:
+            return _run(sys.argv[1:] if argv is None else argv)
+        except KeyboardInterrupt:  # before there was a command
+            return interrupted(resumable=False)
+        except BrokenPipeError:  # the reader, such as head, has enough
+            silence(sys.stdout)
+            return CLOSED
+
+
+def _run(words: Sequence[str]) -> int:
+    """Run the command that the words name, and say in one line why it fails.
+
+    Raises:
+        BrokenPipeError: Nobody reads the results.
+    """
     from cutcal.parsing import Misused, parse
     from mpm.scene.errors import CutcalError
 
-    words = sys.argv[1:] if argv is None else argv
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a terminal or pipe that has no degree sign gets a question mark
+    resumable = False
     try:
+        check_limits()
         try:
             args = parse(parser([word for word in words[:1] if word in COMMANDS] or COMMANDS), words)
         except Misused:
             args = parse(parser(), words)  # says of an option that another command has it
+        resumable = hasattr(args, "resume")
         code: int = command(args.command).run(args)
         sys.stdout.flush()
         return code
-    except BrokenPipeError:  # the reader, such as head, has enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return CLOSED
-    except CutcalError as e:
-        print(f"cutcal: {e}", file=sys.stderr)
-        return 1
     except KeyboardInterrupt:
-        print("cutcal: interrupted", file=sys.stderr)
-        return INTERRUPTED
+        return interrupted(resumable=resumable)
+    except BrokenPipeError:
+        raise
+    except CutcalError as e:
+        why = str(e)
+    except MemoryError:
+        why = "out of memory; end other programs, or use fewer --workers or coarser cells"
+    except OSError as e:  # a full disk, a name that is too long, a file that has gone: nothing wrong with cutcal
+        why = f"{e.filename}: {e.strerror}; check path and disk" if e.filename else f"{e}; check the disk"
+    print(f"cutcal: {why}", file=sys.stderr)
+    return FAILED
 
 
 if __name__ == "__main__":

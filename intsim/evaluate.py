@@ -154,26 +154,26 @@ def evaluate(
     if evaluation.world is not None and pool is None:
         raise CutcalError("evaluate: episodes in IntSim run in worker processes; give a pool")
     load_knife(evaluation.knife)
-    prepare(out, resume=resume)
-    settings = evaluation.settings
-    rows = _read_rows(out / ROWS_FILE, settings)
-    done = {(row.suite, row.seed) for row in rows}
-    todo = [test for test in evaluation.tests if test not in done]
-    often = evaluation.severing or evaluation.world is not None
-    with (out / ROWS_FILE).open("a", encoding="utf-8") as file:
-        if not rows and file.tell() == 0:
-            file.write(_line(settings))
-        rest = Countdown(max(len(todo), 1))
-        for k, row in enumerate(_outcomes(evaluation, todo, pool), 1):
-            rows.append(row)
-            file.write(_line(row))
-            file.flush()
-            left = rest.left(1)
-            if often or k % 100 == 0:
-                say(f"{k} of {len(todo)} episodes: {row.suite}, {row.food}, {row.words()}; {left}")
-    result = EvaluationResult(settings, _by_suite(evaluation, rows), tuple(command), versions(), git_commit())
-    write_json(out / RESULT_FILE, to_document(result))
-    return result
+    with prepare(out, "evaluate", resume=resume):
+        settings = evaluation.settings
+        rows = _read_rows(out / ROWS_FILE, settings)
+        done = {(row.suite, row.seed) for row in rows}
+        todo = [test for test in evaluation.tests if test not in done]
+        often = evaluation.severing or evaluation.world is not None
+        with (out / ROWS_FILE).open("a", encoding="utf-8") as file:
+            if not rows and file.tell() == 0:
+                file.write(_line(settings))
+            rest = Countdown(max(len(todo), 1))
+            for k, row in enumerate(_outcomes(evaluation, todo, pool), 1):
+                rows.append(row)
+                file.write(_line(row))
+                file.flush()
+                left = rest.left(1)
+                if often or k % 100 == 0:
+                    say(f"{k} of {len(todo)} episodes: {row.suite}, {row.food}, {row.words()}; {left}")
+        result = EvaluationResult(settings, _by_suite(evaluation, rows), tuple(command), versions(), git_commit())
+        write_json(out / RESULT_FILE, to_document(result))
+        return result
 
 
 def _by_suite(evaluation: PolicyEvaluation, rows: Sequence[EpisodeOutcome]) -> dict[str, SuiteResult]:

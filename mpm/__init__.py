@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
-
 from mpm.output.record import ForceRecord
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
 from mpm.scene.errors import CutcalError, SceneError, SimulationError
 from mpm.scene.material import Material
 from mpm.scene.shapes import Shape
+from mpm.taichi_environment import prepare_taichi
 
-os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")  # stdout belongs to the caller
-os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")  # Taichi would tell its makers once a day that it was started
+prepare_taichi()
 
 __all__ = [
     "Board",

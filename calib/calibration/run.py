@@ -72,13 +72,13 @@ def run(
         say(text)
     options = FitOptions(budget=request.budget, batch=pool.batch, seed=request.seed)
     options.check(len(setup.objective.parameters))
-    prepare(out, resume=resume)
-    with EvaluationStore(out / STORE, setup.header, resume=resume) as store:
-        work = _Calibration(setup, pool, store, out, say)
-        fit, analysis = work.fitted(options, progress)
-        calibrated = work.repeated(fit, analysis)
-    add_conditioning(out / STORE, setup.curve)
-    return _write(calibrated, out, began)
+    with prepare(out, "calibrate", resume=resume):
+        with EvaluationStore(out / STORE, setup.header, resume=resume, say=say) as store:
+            work = _Calibration(setup, pool, store, out, say)
+            fit, analysis = work.fitted(options, progress)
+            calibrated = work.repeated(fit, analysis)
+        add_conditioning(out / STORE, setup.curve)
+        return _write(calibrated, out, began)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import io
 import math
-import shutil
 import time
 from collections.abc import Mapping
 from dataclasses import replace
@@ -39,7 +39,7 @@ from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.uncertainty.intervals import Uncertainty
 from calib.validation.acceptance import Conservation, judge, limits
-from mpm.files import replacing
+from mpm.files import write_atomic
 from mpm.output.record import ForceRecord
 from mpm.scene import Knife
 
@@ -233,13 +233,13 @@ def add_conditioning(path: Path, curve: Conditioned) -> None:
     """
     columns = {"time_s": curve.time, "raw_N": curve.trace.force, "tared_N": curve.force}
     try:
-        with replacing(path) as draft:
-            shutil.copyfile(path, draft)
-            with h5py.File(draft, "a") as file:
-                if "conditioning" in file:
-                    del file["conditioning"]
-                group = file.create_group("conditioning")
-                for name, values in columns.items():
-                    group[name] = values
+        stream = io.BytesIO(path.read_bytes())
+        with h5py.File(stream, "r+") as file:
+            if "conditioning" in file:
+                del file["conditioning"]
+            group = file.create_group("conditioning")
+            for name, values in columns.items():
+                group[name] = values
+        write_atomic(path, stream.getvalue(), sync=True)
     except OSError as e:
         raise OutputError(f"{path}: cannot be written ({e}); check the disk") from None

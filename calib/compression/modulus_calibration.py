@@ -174,40 +174,40 @@ def calibrate_modulus(
     scene = _scene(test, options)
     columns = {"compression_col": test.compression_col, "force_col": test.force_col}
     measured = read_repeats(test.paths, test.shape, test.strain, **columns)
-    prepare(out, resume=False)
-    plates = _plates(test.bonded)
-    say(f"pressing to a strain of {test.strain:g} on {options.cells} cells over the height, plates {plates}")
-    unit = unit_curve(scene, test.strain, arch=options.arch, say=say)
-    found = fit_modulus(measured, unit.stress)
-    error, change = _numerical_errors(test, options, unit, say)
-    result = CompressionResult(
-        command=tuple(command),
-        specimen=SpecimenSizes.of(test.shape, area(test.shape)),
-        assumed=Assumptions(test.nu, plates),
-        E=FittedModulus((0.0, test.strain), found.mean, found.sd, found.low, found.high, len(found.E)),
-        slope=_small_strain_modulus(measured, found),
-        nrmse=found.nrmse,
-        force_error=ForceError(CONTACT_STRAIN, found.force_error, found.force_error_at),
-        solver_error=error,
-        grid_change=change,
-        sensitivity=None if test.bonded else modulus_at_other_nu(measured, test.nu, found.mean),
-        bracket=_other_plates(test, options, measured, say) if options.bracket else None,
-        repeats=tuple(
-            RepeatModulus(name, float(modulus), float(small))
-            for name, modulus, small in zip(measured.names, found.E, measured.slope, strict=True)
-        ),
-        verdicts=tuple(acceptance_lines(found, error, change)),
-        not_shown=tuple(unshown(test, options.bracket, len(found.E))),
-        simulation=PressSimulation(unit.run, options.seed, options.arch),
-        files=measured.files,
-        versions=versions(),
-        git=git_commit(),
-    )
-    write_result(result, _curves(measured, found), out)
-    from reports.calibration.compression import write_figure
+    with prepare(out, "compress", resume=False):
+        plates = _plates(test.bonded)
+        say(f"pressing to a strain of {test.strain:g} on {options.cells} cells over the height, plates {plates}")
+        unit = unit_curve(scene, test.strain, arch=options.arch, say=say)
+        found = fit_modulus(measured, unit.stress)
+        error, change = _numerical_errors(test, options, unit, say)
+        result = CompressionResult(
+            command=tuple(command),
+            specimen=SpecimenSizes.of(test.shape, area(test.shape)),
+            assumed=Assumptions(test.nu, plates),
+            E=FittedModulus((0.0, test.strain), found.mean, found.sd, found.low, found.high, len(found.E)),
+            slope=_small_strain_modulus(measured, found),
+            nrmse=found.nrmse,
+            force_error=ForceError(CONTACT_STRAIN, found.force_error, found.force_error_at),
+            solver_error=error,
+            grid_change=change,
+            sensitivity=None if test.bonded else modulus_at_other_nu(measured, test.nu, found.mean),
+            bracket=_other_plates(test, options, measured, say) if options.bracket else None,
+            repeats=tuple(
+                RepeatModulus(name, float(modulus), float(small))
+                for name, modulus, small in zip(measured.names, found.E, measured.slope, strict=True)
+            ),
+            verdicts=tuple(acceptance_lines(found, error, change)),
+            not_shown=tuple(unshown(test, options.bracket, len(found.E))),
+            simulation=PressSimulation(unit.run, options.seed, options.arch),
+            files=measured.files,
+            versions=versions(),
+            git=git_commit(),
+        )
+        write_result(result, _curves(measured, found), out)
+        from reports.calibration.compression import write_figure
 
-    write_figure(result, read_curves(out), out)
-    return result
+        write_figure(result, read_curves(out), out)
+        return result
 
 
 def _scene(test: CompressionTest, options: PressOptions, *, bonded: bool | None = None, cells: int = 0) -> Scene:

@@ -1,7 +1,8 @@
 """Validators shared by the loaders of YAML files: each error says file, place in it, and what to write.
 
-YAML numbers are read as YAML 1.2 reads them (``3e5`` is a number) and a key given twice is an error; PyYAML
-alone reads ``3e5`` as text and keeps the last of two keys without a word.
+YAML numbers are decimal as in YAML 1.2 (``3e5`` is a number, ``1:30`` text), and a key given twice is an error; PyYAML
+alone reads ``3e5`` as text and ``1:30`` as 90, and keeps the last of two keys without a word. What makes a small file
+large, merge keys and aliases of lists and mappings, is refused.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import yaml
 
 from calib.errors import MaterialError
 from calib.io.wording import brief, quoted
+from mpm.files import read_regular
 from mpm.scene.errors import CutcalError
 
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -34,17 +36,66 @@ MULTIPLES: dict[str, dict[str, float]] = {
 }
 """Units that a value may have been meant in, by SI unit, and what one of them is in the SI unit."""
 
-_FLOAT_TAG = "tag:yaml.org,2002:float"
-_FLOAT = re.compile(r"^[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+$")
+_FLOAT_TAG, _INT_TAG, _MERGE_TAG = (f"tag:yaml.org,2002:{name}" for name in ("float", "int", "merge"))
+_EXPONENT = re.compile(r"^[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)[eE][-+]?[0-9]+$")
+_FLOAT = re.compile(
+    r"^(?:[-+]?(?:[0-9]+\.[0-9]*|\.[0-9]+|[0-9]+(?=[eE]))(?:[eE][-+]?[0-9]+)?"
+    r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))$"
+)
+_INT = re.compile(r"^[-+]?[0-9]{1,30}$")
 _FLOAT_START = list("-+.0123456789")
 # What PyYAML lets through from Python where a date, a number or a tagged value is none: 2024-13-01 or "!!int x".
 _UNCONSTRUCTED = (ValueError, KeyError, IndexError, AttributeError, TypeError, OverflowError)
+MOST_BYTES = 1_000_000
+"""Bytes of a YAML file from which on it is no list of foods: the largest that comes with cutcal has a tenth of that."""
 LONGEST_KEY = 60
 """Letters of a key from which on it is the name of nothing."""
 
 
 class _Loader(yaml.SafeLoader):
-    """SafeLoader that refuses a key given twice."""
+    """SafeLoader of decimal numbers that refuses a key given twice, and what unpacks to more than is there."""
+
+    yaml_implicit_resolvers = {
+        first: [(tag, pattern) for tag, pattern in known if tag not in (_FLOAT_TAG, _INT_TAG)]
+        for first, known in yaml.SafeLoader.yaml_implicit_resolvers.items()
+    }
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """The next node; an alias of a list or mapping is refused."""
+        event = self.peek_event()
+        node = super().compose_node(parent, index)
+        if isinstance(event, yaml.AliasEvent) and not isinstance(node, yaml.ScalarNode):
+            raise yaml.composer.ComposerError(
+                None,
+                None,
+                f"*{event.anchor} stands for a list or mapping; write it out",
+                event.start_mark,  # type: ignore[arg-type]
+            )
+        return node
+
+    def flatten_mapping(self, node: yaml.MappingNode) -> None:
+        """Refuse a merge key."""
+        for key, _ in node.value:
+            if key.tag == _MERGE_TAG:
+                raise yaml.constructor.ConstructorError(
+                    None, None, "<< takes keys from elsewhere; write them out", key.start_mark
+                )
+
+    def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
+        """A whole number, in decimal."""
+        if not _INT.match(node.value):
+            raise yaml.constructor.ConstructorError(
+                None, None, f"{quoted(node.value)} is no whole number in decimal", node.start_mark
+            )
+        return int(node.value)
+
+    def construct_yaml_float(self, node: yaml.ScalarNode) -> float:
+        """A number."""
+        if not (_FLOAT.match(node.value) or _INT.match(node.value)):
+            raise yaml.constructor.ConstructorError(
+                None, None, f"{quoted(node.value)} is no number such as 3.0e5", node.start_mark
+            )
+        return float(re.sub(r"\.(?=[in])", "", node.value.lower()))
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         seen: set[str] = set()
@@ -67,7 +118,10 @@ class Dumper(yaml.SafeDumper):
 
 
 _Loader.add_implicit_resolver(_FLOAT_TAG, _FLOAT, _FLOAT_START)
-Dumper.add_implicit_resolver(_FLOAT_TAG, _FLOAT, _FLOAT_START)
+_Loader.add_implicit_resolver(_INT_TAG, _INT, list("-+0123456789"))
+_Loader.add_constructor(_INT_TAG, _Loader.construct_yaml_int)
+_Loader.add_constructor(_FLOAT_TAG, _Loader.construct_yaml_float)
+Dumper.add_implicit_resolver(_FLOAT_TAG, _EXPONENT, _FLOAT_START)
 
 
 def data_path(name: str) -> Path:
@@ -143,7 +197,7 @@ def read_yaml(path: Path | str, *, kind: type[CutcalError] = MaterialError) -> t
     path = Path(path)
     top = Place(path.name, (), kind)
     try:
-        content = yaml.load(path.read_text(encoding="utf-8"), Loader=_Loader)
+        content = yaml.load(read_regular(path, MOST_BYTES).decode("utf-8"), Loader=_Loader)
     except FileNotFoundError:
         raise kind(f"{path}: no such file; check the path") from None
     except OSError as e:

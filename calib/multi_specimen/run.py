@@ -64,14 +64,14 @@ def run(
     moduli = tuple(compression_modulus(spec) for spec in study.compressions)
     for text in _warnings(study, setups):
         say(text)
-    prepare(out, resume=resume)
-    with EvaluationStore(out / "evaluations.h5", _header(setups), resume=resume) as store:
-        specimens = Specimens(study, setups, moduli, pool, store, progress, say)
-        held_out = {name: _held_out(specimens, name) for name in study.hold_out}
-        say(f"fitting {', '.join(study.fitted)} together")
-        fit = specimens.fit(study.fitted)
-        done = Finished(study, setups, moduli, fit, fitted_cuts(specimens, fit, out), held_out, len(store))
-    return _write(done, out, began)
+    with prepare(out, "study", resume=resume):
+        with EvaluationStore(out / "evaluations.h5", _header(setups), resume=resume, say=say) as store:
+            specimens = Specimens(study, setups, moduli, pool, store, progress, say)
+            held_out = {name: _held_out(specimens, name) for name in study.hold_out}
+            say(f"fitting {', '.join(study.fitted)} together")
+            fit = specimens.fit(study.fitted)
+            done = Finished(study, setups, moduli, fit, fitted_cuts(specimens, fit, out), held_out, len(store))
+        return _write(done, out, began)
 
 
 @dataclass(frozen=True, eq=False)

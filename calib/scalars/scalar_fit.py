@@ -62,27 +62,27 @@ def fit_scalars(
         }
         for fidelity in (COARSE, FINE)
     }
-    prepare(out, resume=resume)
-    with EvaluationStore(out / "evaluations.h5", Header("", "published scalars"), resume=resume) as store:
-        evaluators = {fidelity: _evaluators(named, pool, store, fidelity) for fidelity, named in scenes.items()}
-        simulator = CutSimulator(published, evaluators, say)
-        best = fit_given_numbers(simulator)
-        values = [published.fitted.to_dict(best.z)]
-        found = {cut.name: simulator.simulate(cut, values, FINE)[0] or {} for cut in published.cuts}
-        drawn = randomised_fits(simulator, best, draws, seed)
-    result = ScalarFitResult(
-        fitted=fitted_numbers(published, best, found, drawn),
-        draws_asked=draws,
-        seed=seed,
-        evaluations=simulator.runs,
-        failed_evaluations=simulator.broken,
-        dx_m={name: scene.numerics.dx for name, scene in scenes[FINE].items()},
-        device=pool.arch,
-        cutcal=__version__,
-        commit=git_commit(),
-    )
-    write_json(out / RESULT_FILE, to_document(result))
-    return result
+    with prepare(out, "scalars", resume=resume):
+        with EvaluationStore(out / "evaluations.h5", Header("", "published scalars"), resume=resume, say=say) as store:
+            evaluators = {fidelity: _evaluators(named, pool, store, fidelity) for fidelity, named in scenes.items()}
+            simulator = CutSimulator(published, evaluators, say)
+            best = fit_given_numbers(simulator)
+            values = [published.fitted.to_dict(best.z)]
+            found = {cut.name: simulator.simulate(cut, values, FINE)[0] or {} for cut in published.cuts}
+            drawn = randomised_fits(simulator, best, draws, seed)
+        result = ScalarFitResult(
+            fitted=fitted_numbers(published, best, found, drawn),
+            draws_asked=draws,
+            seed=seed,
+            evaluations=simulator.runs,
+            failed_evaluations=simulator.broken,
+            dx_m={name: scene.numerics.dx for name, scene in scenes[FINE].items()},
+            device=pool.arch,
+            cutcal=__version__,
+            commit=git_commit(),
+        )
+        write_json(out / RESULT_FILE, to_document(result))
+        return result
 
 
 def _evaluators(

@@ -101,6 +101,11 @@ class Cluster(Workers):
             self.close()
             raise
         super().__init__(workers or len(ready), arch, threads)
+        if not _is_trusted(address):
+            say(
+                f"{address} neither encrypts nor asks who is there: whoever reaches it can run code on its workers, "
+                "and it can run code here; use tls:// outside a network that you trust"
+            )
         say(
             f"{len(ready)} workers at {address}, {self.workers} simulations at a time; --workers {self.workers} asks "
             "for the same ones again when there are other workers"
@@ -184,6 +189,13 @@ class Cluster(Workers):
                 "stored: start workers and add --resume"
             )
         return seen
+
+
+def _is_trusted(address: str) -> bool:
+    """Whether an address is this machine's own, or its both sides show certificates."""
+    protocol, _, rest = address.rpartition("://")
+    host = rest.rpartition(":")[0].strip("[]")
+    return protocol in ("tls", "inproc") or host in ("localhost", "::1") or host.startswith("127.")
 
 
 def _connect(address: str) -> Client:

@@ -4,6 +4,7 @@
 runs):
 
     attributes      schema, trace_sha256, scene_key
+    sha256          (n,) checksum of each run, see :mod:`calib.simulation.evaluation_file`
     key             (n,) SHA-256 of scene, parameters and code version, see :func:`content_key`
     status, reason, fidelity             (n,) text
     fraction [-], seconds [s]            (n,)
@@ -19,31 +20,29 @@ HDF5 does not survive a process that is killed while it writes. Runs therefore g
 it, ``evaluations.h5.journal``: one line of checksum and JSON per run, forced to disk before :meth:`append`
 returns; a kill can tear the last line only.  Closing and reopening the store write the HDF5 file as a whole
 under another name and rename it, which is atomic, before the journal is removed.  One process at a time may
-write.
+write: :func:`calib.io.folder.prepare` locks the folder.
+
+A run whose checksum is wrong is left out and made again; the damaged file is kept as ``evaluations.h5.damaged``.
 """
 
 from __future__ import annotations
 
-import base64
 import hashlib
 import json
 import os
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO
 
-import h5py
-import numpy as np
-
 from calib.errors import OutputError
 from calib.simulation.evaluation import Evaluation, Evaluator
-from mpm.files import replacing
+from calib.simulation.evaluation_file import Header as Header
+from calib.simulation.evaluation_file import StoredEvaluation, from_json, hdf5_of, read_hdf5, to_json
+from mpm.files import write_atomic
 
-LAYOUT_VERSION = 1
-"""Version of both layouts; a file with another one is refused."""
 KEY_DIGITS = 12
 """Significant digits of a parameter in a key: what survives any arithmetic on its logarithm."""
 REPEATABLE_STATUS = ("ok", "failed")
@@ -73,36 +72,6 @@ def content_key(scene: Mapping[str, Any], parameters: Mapping[str, float], code:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-@dataclass(frozen=True)
-class Header:
-    """What a store belongs to; a store with another header is refused.
-
-    Attributes:
-        trace_sha256: SHA-256 of the trace file.
-        scene_key: Hash or name of the scene without the fitted parameters.
-        schema: Version of the layout.
-    """
-
-    trace_sha256: str
-    scene_key: str
-    schema: int = LAYOUT_VERSION
-
-
-@dataclass(frozen=True)
-class StoredEvaluation:
-    """One stored run.
-
-    Attributes:
-        key: Its content key.
-        fidelity: Label of the resolution it was run at.
-        evaluation: The run; ``index`` is its place in the store.
-    """
-
-    key: str
-    fidelity: str
-    evaluation: Evaluation
-
-
 class EvaluationStore:
     """Runs by content key, on disk as soon as they are appended; a context manager that closes itself.
 
@@ -110,13 +79,21 @@ class EvaluationStore:
         path: The HDF5 file; its journal lies beside it.
         header: What the store belongs to.
         resume: Whether to go on with a store that exists.
+        say: Called with a sentence where runs were damaged.
 
     Raises:
         OutputError: The store exists and ``resume`` is False, belongs to something else, or cannot be read or
             written.
     """
 
-    def __init__(self, path: Path | str, header: Header, *, resume: bool = False) -> None:
+    def __init__(
+        self,
+        path: Path | str,
+        header: Header,
+        *,
+        resume: bool = False,
+        say: Callable[[str], None] = lambda text: None,
+    ) -> None:
         self.path = Path(path)
         self.journal = self.path.with_name(self.path.name + ".journal")
         self.header = header
@@ -124,6 +101,8 @@ class EvaluationStore:
         self._stream: BinaryIO | None = None
         self.torn = 0
         """Damaged lines found in the journal: runs that were being written when the process was killed."""
+        self.damaged = 0
+        """Damaged runs found in the HDF5 file."""
         present = [p for p in (self.path, self.journal) if p.exists()]
         if present and not resume:
             raise OutputError(
@@ -133,7 +112,13 @@ class EvaluationStore:
             self._read_file()
         if self.journal.exists():
             self._read_journal()
+        if self.journal.exists() or self.damaged:
             self._compact()
+        if self.damaged:
+            say(
+                f"{self.damaged} runs of {self.path} were damaged, are left out and simulated again; the file is kept "
+                f"as {self.path.name}.damaged: check the disk"
+            )
 
     def __len__(self) -> int:
         return len(self._entries)
@@ -182,7 +167,7 @@ class EvaluationStore:
         try:
             if self._stream is None:
                 self._stream = self._begin()
-            _write_line(self._stream, _to_json(entry))
+            _write_line(self._stream, to_json(entry))
         except OSError as error:
             raise OutputError(
                 f"{self.journal} cannot be written: {error}; free space or choose another --out."
@@ -208,15 +193,6 @@ class EvaluationStore:
             raise
         return stream
 
-    def _check(self, found: Mapping[str, Any], where: Path) -> None:
-        """Refuse a header other than this store's."""
-        for name, expected in asdict(self.header).items():
-            if found.get(name) != expected:
-                raise OutputError(
-                    f"{where} belongs to another calibration: its {name} is {found.get(name)!r}, not "
-                    f"{expected!r}; choose another --out folder."
-                )
-
     def _read_journal(self) -> None:
         """Take over the runs of the journal, leaving out damaged lines."""
         documents = []
@@ -230,33 +206,39 @@ class EvaluationStore:
                     self.torn += 1
         for document in documents:
             if "schema" in document:
-                self._check(document, self.journal)
+                self.header.check(document, self.journal)
             else:
-                entry = _from_json(document)
+                entry = from_json(document)
                 self._entries[entry.key] = entry
 
     def _read_file(self) -> None:
-        """Take over the runs of the HDF5 file."""
+        """Take over the sound runs of the HDF5 file, and keep a copy of it where there are others."""
+        entries, self.damaged = read_hdf5(self.path, self.header)
+        for place, entry in enumerate(entries):
+            self._entries[entry.key] = replace(entry, evaluation=replace(entry.evaluation, index=place))
+        if self.damaged:
+            self._set_aside()
+
+    def _set_aside(self) -> None:
+        """Keep a copy of the damaged HDF5 file."""
+        aside = self.path.with_name(f"{self.path.name}.damaged")
         try:
-            with h5py.File(self.path, "r") as file:
-                self._check({name: _plain(value) for name, value in file.attrs.items()}, self.path)
-                for entry in _read_entries(file):
-                    self._entries[entry.key] = entry
-        except (OSError, KeyError) as error:
-            raise OutputError(f"{self.path} is no store of evaluations: {error}; move it away.") from error
+            write_atomic(aside, self.path.read_bytes())
+        except OSError as error:
+            raise OutputError(f"{aside} cannot be written: {error}; free space, or move {self.path} away.") from error
 
     def _compact(self) -> None:
         """Write everything into the HDF5 file under another name, rename it, and remove the journal."""
         try:
-            with replacing(self.path, sync=True) as draft, h5py.File(draft, "w") as file:
-                file.attrs.update(asdict(self.header))
-                _write_entries(file, list(self))
+            write_atomic(self.path, hdf5_of(self.header, list(self)), sync=True)
             if self._stream is not None:
                 self._stream.close()
                 self._stream = None
             self.journal.unlink(missing_ok=True)
         except OSError as error:
-            raise OutputError(f"{self.path} cannot be written: {error}; its journal holds all runs.") from error
+            raise OutputError(
+                f"{self.path} cannot be written: {error}; free space, then --resume goes on from its journal."
+            ) from error
 
 
 class CachedEvaluator:
@@ -316,75 +298,3 @@ def _write_line(stream: BinaryIO, document: Mapping[str, Any]) -> None:
     stream.write(b"\n%08x %s\n" % (zlib.crc32(text), text))
     stream.flush()
     os.fsync(stream.fileno())
-
-
-def _to_json(entry: StoredEvaluation) -> dict[str, Any]:
-    """An entry as plain JSON; curves as base64 of little-endian 64-bit floats."""
-    document = {"key": entry.key, "fidelity": entry.fidelity, **vars(entry.evaluation)}
-    for name in ("parameters", "scalars"):
-        document[name] = {n: float(x) for n, x in document[name].items()}
-    for name in ("stroke", "force"):
-        document[name] = base64.b64encode(np.asarray(document[name], "<f8").tobytes()).decode()
-    return document
-
-
-def _from_json(document: dict[str, Any]) -> StoredEvaluation:
-    """Inverse of :func:`_to_json`."""
-    key, fidelity = document.pop("key"), document.pop("fidelity")
-    for name in ("stroke", "force"):
-        document[name] = np.frombuffer(base64.b64decode(document[name]), "<f8").astype(np.float64)
-    return StoredEvaluation(key, fidelity, Evaluation(**document))
-
-
-def _plain(value: Any) -> Any:
-    """An HDF5 attribute as int or str."""
-    return value.item() if isinstance(value, np.generic) else value
-
-
-def _write_entries(file: h5py.File, entries: Sequence[StoredEvaluation]) -> None:
-    """Write all runs in the layout of the module."""
-    runs = [r.evaluation for r in entries]
-    text = h5py.string_dtype()
-    file.create_dataset("key", data=[r.key for r in entries], dtype=text)
-    file.create_dataset("fidelity", data=[r.fidelity for r in entries], dtype=text)
-    file.create_dataset("status", data=[e.status for e in runs], dtype=text)
-    file.create_dataset("reason", data=[e.reason for e in runs], dtype=text)
-    file.create_dataset("fraction", data=[e.fraction for e in runs], dtype="f8")
-    file.create_dataset("seconds", data=[e.seconds for e in runs], dtype="f8")
-    for group, columns in (
-        ("parameters", [e.parameters for e in runs]),
-        ("scalars", [e.scalars for e in runs]),
-    ):
-        file.create_group(group)
-        for name in sorted({name for column in columns for name in column}):
-            file[group].create_dataset(name, data=[column.get(name, np.nan) for column in columns], dtype="f8")
-    start = np.cumsum([0] + [e.stroke.size for e in runs])
-    file.create_dataset("curves/start", data=start, dtype="i8")
-    for name, curves in (("stroke", [e.stroke for e in runs]), ("force", [e.force for e in runs])):
-        file.create_dataset(f"curves/{name}", data=np.concatenate([*curves, np.empty(0)]), dtype="f8")
-
-
-def _read_entries(file: h5py.File) -> Iterator[StoredEvaluation]:
-    """Inverse of :func:`_write_entries`."""
-    text = {name: file[name].asstr()[()] for name in ("key", "fidelity", "status", "reason")}
-    number = {name: file[name][()] for name in ("fraction", "seconds")}
-    named = {group: {n: c[()] for n, c in file[group].items()} for group in ("parameters", "scalars")}
-    start, stroke, force = (file[f"curves/{name}"][()] for name in ("start", "stroke", "force"))
-    for k, key in enumerate(text["key"]):
-        own = {
-            group: {n: float(c[k]) for n, c in columns.items() if not np.isnan(c[k])}
-            for group, columns in named.items()
-        }
-        part = slice(start[k], start[k + 1])
-        evaluation = Evaluation(
-            index=k,
-            parameters=own["parameters"],
-            status=text["status"][k],
-            reason=text["reason"][k],
-            fraction=float(number["fraction"][k]),
-            stroke=stroke[part],
-            force=force[part],
-            scalars=own["scalars"],
-            seconds=float(number["seconds"][k]),
-        )
-        yield StoredEvaluation(key, text["fidelity"][k], evaluation)

@@ -1,11 +1,14 @@
 """The whole record of one cut in a file, so that it is simulated once.
 
 An HDF5 file: what a :class:`mpm.output.record.ForceRecord` has over the stroke as datasets of its names and units, all
-else as attributes, ``counters`` and ``pieces`` as JSON, and ``key``, the SHA-256 of scene and code.
+else as attributes, ``counters`` and ``pieces`` as JSON, ``key``, the SHA-256 of scene and code, and ``sha256``, that of
+all the rest: a file in which a bit has flipped is no record.
 """
 
 from __future__ import annotations
 
+import hashlib
+import io
 import json
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -16,15 +19,17 @@ import numpy as np
 
 from calib.errors import OutputError
 from calib.io.provenance import code_key
+from calib.simulation.evaluation_file import UNREADABLE
 from calib.simulation.evaluation_store import content_key
 from calib.simulation.workers import Errand
-from mpm.files import replacing
+from mpm.files import write_atomic
 from mpm.output.record import COHESION, ForceRecord
 from mpm.output.section import Section
 from mpm.output.topology import Topology
 from mpm.scene import Scene
 
 SECTION_GROUP = "section"
+CHECKSUM = "sha256"  # attribute
 JSON_FIELDS = ("counters", "pieces")  # parts of a record that are neither arrays nor numbers
 
 
@@ -56,26 +61,48 @@ def _key(scene: Scene) -> str:
 
 def _write(path: Path, key: str, record: ForceRecord) -> None:
     """Write the file of a record; a kill leaves the old one or none."""
+    stream = io.BytesIO()  # HDF5 itself may end the process on a full disk
+    with h5py.File(stream, "w") as file:
+        file.attrs["key"] = key
+        for name, value in asdict(record).items():
+            if isinstance(value, np.ndarray):
+                file[name] = value
+            elif name == SECTION_GROUP:
+                for part, content in (value or {}).items():
+                    file[f"{SECTION_GROUP}/{part}"] = content
+            elif value is not None or name in JSON_FIELDS:
+                file.attrs[name] = json.dumps(value) if name in JSON_FIELDS else value
+        file.attrs[CHECKSUM] = _digest(file)
     try:
-        with replacing(path) as draft, h5py.File(draft, "w") as file:
-            file.attrs["key"] = key
-            for name, value in asdict(record).items():
-                if isinstance(value, np.ndarray):
-                    file[name] = value
-                elif name == SECTION_GROUP:
-                    for part, content in (value or {}).items():
-                        file[f"{SECTION_GROUP}/{part}"] = content
-                elif value is not None or name in JSON_FIELDS:
-                    file.attrs[name] = json.dumps(value) if name in JSON_FIELDS else value
+        write_atomic(path, stream.getvalue())
     except OSError as e:
         raise OutputError(f"{path}: cannot be written ({e}); check the disk") from None
+
+
+def _digest(file: h5py.File) -> str:
+    """SHA-256 of all data sets and attributes by name, but of its own."""
+    found = hashlib.sha256()
+
+    def take(name: str, value: Any) -> None:
+        content = np.asarray(value)
+        text = content.item() if content.dtype.kind in "OSU" else content.tobytes()
+        found.update(repr((name, content.shape, text)).encode())
+
+    for name in sorted(file.attrs):
+        if name != CHECKSUM:
+            take(name, file.attrs[name])
+    sets: dict[str, h5py.Dataset] = {}
+    file.visititems(lambda name, node: sets.update({name: node}) if isinstance(node, h5py.Dataset) else None)
+    for name in sorted(sets):
+        take(name, sets[name][()])
+    return found.hexdigest()
 
 
 def _read(path: Path, key: str) -> ForceRecord | None:
     """The record of this key; None where the file is missing, damaged, or holds another one."""
     try:
-        with h5py.File(path) as file:
-            if file.attrs["key"] != key:
+        with h5py.File(io.BytesIO(path.read_bytes())) as file:
+            if file.attrs["key"] != key or file.attrs[CHECKSUM] != _digest(file):
                 return None
             section = {name: part[()] for name, part in file.get(SECTION_GROUP, {}).items()}
             found = {name: values[()] for name, values in file.items() if name != SECTION_GROUP}
@@ -84,7 +111,7 @@ def _read(path: Path, key: str) -> ForceRecord | None:
             found.setdefault(COHESION, None)
             values = {f.name: found[f.name] for f in fields(ForceRecord)}
             values |= {name: json.loads(values[name]) for name in JSON_FIELDS}
-    except (OSError, KeyError, ValueError):
+    except UNREADABLE:
         return None
     if values["pieces"] is not None:
         pieces: dict[str, Any] = {n: tuple(v) if isinstance(v, list) else v for n, v in values["pieces"].items()}

@@ -35,6 +35,7 @@ as it sinks in, a cone (Sneddon 1965, Int. J. Eng. Sci. 3:47) or an edge across 
 and what the 2 is for: docs/theory.md, "Measured choices"."""
 HINGE_GRID = 200
 """Trial positions of the kink in each of the two passes of its search."""
+MOST_HINGE_VALUES = 10**7  # numbers of trial rises at a time: a record of millions of samples has more
 MAD_TO_SD = 1.4826
 """Standard deviation of a normal variable over its median absolute deviation."""
 MEDIAN_VARIANCE = np.pi / 2.0
@@ -287,18 +288,29 @@ def _fit_hinge(time: np.ndarray, force: np.ndarray, power: float) -> tuple[float
     """Kink of ``b + a max(0, t - t0)^power``, its variance for independent noise, and what is left."""
     low, high = time[0], time[-3]
     centred = force - force.mean()
+    parts = 1 + HINGE_GRID * len(time) // MOST_HINGE_VALUES
     for _ in range(2):
         trial = np.linspace(low, high, HINGE_GRID)
-        rise = np.maximum(0.0, time - trial[:, None]) ** power
-        rise -= rise.mean(axis=1, keepdims=True)
-        gain = np.maximum(rise @ centred, 0.0) ** 2 / np.sum(rise**2, axis=1)
+        gains = []
+        for some in np.array_split(trial, parts):
+            rise = _rises(time, some, power)
+            gains.append(np.maximum(rise @ centred, 0.0) ** 2 / np.sum(rise**2, axis=1))
+        gain = np.concatenate(gains)
         best = int(np.argmax(gain))
         low, high = trial[max(best - 1, 0)], trial[min(best + 1, HINGE_GRID - 1)]
     t0 = float(trial[best])
     after = np.maximum(0.0, time - t0)
-    slope = float(rise[best] @ centred / (rise[best] @ rise[best]))
+    (own,) = _rises(time, trial[best : best + 1], power)
+    slope = float(own @ centred / (own @ own))
     bend = np.where(after > 0.0, -slope * power * np.maximum(after, 1e-300) ** (power - 1.0), 0.0)
     jacobian = np.column_stack([np.ones_like(time), after**power, bend])
     total = max(float(centred @ centred - gain[best]), 0.0)
     covariance = np.linalg.pinv(jacobian.T @ jacobian) * total / max(len(time) - 3, 1)
     return t0, float(covariance[2, 2]), total
+
+
+def _rises(time: np.ndarray, kinks: np.ndarray, power: float) -> np.ndarray:
+    """``max(0, t - t0)^power`` less its mean for each kink t0, shape (kinks, n)."""
+    rise = np.maximum(0.0, time - kinks[:, None]) ** power
+    rise -= rise.mean(axis=1, keepdims=True)
+    return rise

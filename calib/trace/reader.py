@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import difflib
+import hashlib
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 
 from calib.errors import TraceError
 from calib.trace.csv_table import table_of_csv
 from calib.trace.json_table import table_of_json
 from calib.trace.table import Table
+from mpm.files import read_regular
 
 _JSON_SUFFIXES = (".json", ".jsonl", ".ndjson")
 _JSON_START = re.compile(rb"(\xef\xbb\xbf)?\s*(\{|\[\s*[\[{])")
 _HDF5_ADDRESS = re.compile(r"(.+\.(?:h5|hdf5|hdf|he5)):(.*)", re.IGNORECASE | re.DOTALL)
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5")
+LONG_BYTES = 32_000_000
+"""Bytes of a CSV file from which on its numbers alone are read, a piece at a time: as text it takes 30 times that."""
+HEAD_BYTES = 200_000  # of a long file, by which it is told what it is like
 
 
 def read_table(path: str | Path) -> Table:
@@ -40,7 +46,30 @@ def read_table(path: str | Path) -> Table:
         return table_of_hdf5(file, raw, address)
     if file.suffix.lower() in _JSON_SUFFIXES or _JSON_START.match(raw):
         return table_of_json(file.name, raw)
-    return table_of_csv(file.name, raw)
+    return table_of_csv(file.name, raw) if len(raw) < LONG_BYTES else _table_of_long_csv(file.name, raw)
+
+
+def _table_of_long_csv(source: str, raw: bytes) -> Table:
+    """The columns of numbers of a long CSV file; what it is like is found in its first lines.
+
+    Raises:
+        TraceError: It is no CSV file with a header, or its rows are of several widths.
+    """
+    from calib.io.number_columns import number_columns
+
+    head = table_of_csv(source, raw[: raw.rfind(b"\n", 0, HEAD_BYTES) + 1])
+    first = int(head.rows[0])
+    try:
+        found = number_columns(raw, first, list(head.columns))
+    except ValueError as e:
+        raise TraceError(f"{source}: {e}") from None
+    return replace(
+        head,
+        columns=found.columns,
+        rows=range(first, first + found.rows),
+        sha256=hashlib.sha256(raw).hexdigest(),
+        left_out={**head.left_out, **found.left_out},
+    )
 
 
 def split_address(path: str | Path) -> tuple[Path, str]:
@@ -60,11 +89,11 @@ def _content(path: Path) -> bytes:
     try:
         if path.is_dir():
             raise TraceError(f"{path} is a directory; name a CSV, JSON or HDF5 file")
-        if not path.is_file():
+        if not path.exists():
             near = difflib.get_close_matches(path.name, _names_beside(path), n=3)
             hint = f"did you mean {' or '.join(near)}?" if near else "check the path"
             raise TraceError(f"{path}: no such file; {hint}")
-        raw = path.read_bytes()
+        raw = read_regular(path)
     except OSError as error:
         raise TraceError(f"{path}: cannot be read ({error.strerror})") from None
     if not raw.strip():

@@ -190,31 +190,31 @@ def run(plan: CoveragePlan, out: Path, pool: Workers, *, resume: bool, say: Call
     Raises:
         CutcalError: Anything wrong with the input; nothing that was computed is lost.
     """
-    prepare(out, resume=resume)
-    began = time.monotonic()
-    lines = out / "coverage.jsonl"
-    header, done = plan.header, _known(lines)
-    todo = [k for k in range(plan.traces) if k not in done]
-    rest = Countdown(len(todo))
-    with EvaluationStore(out / "evaluations.h5", header, resume=resume) as store:
-        for k in todo:
-            done[k] = _one(plan, k, out / f"trace-{k:03d}.csv", store, pool)
-            _append(lines, done[k])
-            say(f"trace {k + 1} of {plan.traces}: {_words(done[k])}; {rest.left(1.0)}")
-    document = {"schema": tag("coverage"), **coverage_of([done[k] for k in range(plan.traces)])}
-    document |= {
-        "food": plan.food.name,
-        "knife": plan.knife,
-        "dx_m": plan.scene.numerics.dx,
-        "sensor": vars(plan.sensor),
-        "seed": plan.seed,
-        "wall_s": time.monotonic() - began,
-        "command": list(plan.command),
-        "versions": versions(),
-        "git": git_commit(),
-    }
-    write_json(out / "coverage.json", document)
-    return document
+    with prepare(out, "coverage", resume=resume):
+        began = time.monotonic()
+        lines = out / "coverage.jsonl"
+        header, done = plan.header, _known(lines)
+        todo = [k for k in range(plan.traces) if k not in done]
+        rest = Countdown(len(todo))
+        with EvaluationStore(out / "evaluations.h5", header, resume=resume, say=say) as store:
+            for k in todo:
+                done[k] = _one(plan, k, out / f"trace-{k:03d}.csv", store, pool)
+                _append(lines, done[k])
+                say(f"trace {k + 1} of {plan.traces}: {_words(done[k])}; {rest.left(1.0)}")
+        document = {"schema": tag("coverage"), **coverage_of([done[k] for k in range(plan.traces)])}
+        document |= {
+            "food": plan.food.name,
+            "knife": plan.knife,
+            "dx_m": plan.scene.numerics.dx,
+            "sensor": vars(plan.sensor),
+            "seed": plan.seed,
+            "wall_s": time.monotonic() - began,
+            "command": list(plan.command),
+            "versions": versions(),
+            "git": git_commit(),
+        }
+        write_json(out / "coverage.json", document)
+        return document
 
 
 def _one(plan: CoveragePlan, k: int, path: Path, store: EvaluationStore, pool: Workers) -> dict[str, Any]:

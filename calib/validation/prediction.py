@@ -140,42 +140,42 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
     warnings = (*request.food.warnings(), *curve.warnings, *assumed)
     for text in warnings:
         say(text)
-    prepare(out, resume=False)
-    record = _simulated(scene, request.arch)
-    whole = filter_simulated(curve.stroke, record.stroke, record.resolved)
-    unscaled = compare(curve.stroke, curve.curve, whole)
-    factor = unscaled.best_scale if scale_width else 1.0
-    metrics = compare(curve.stroke, curve.curve, factor * whole)
-    write_csv(
-        out / "curves.csv",
-        {
-            "stroke_m": curve.stroke,
-            "real_N": curve.curve,
-            "sim_N": factor * whole,
-            "edge_N": factor * filter_simulated(curve.stroke, record.stroke, record.edge[:, 2]),
-            "face_N": factor * filter_simulated(curve.stroke, record.stroke, record.resolved_face),
-        },
-    )
-    result = PredictionResult(
-        food=request.food.name,
-        trace=curve.trace.label,
-        trace_sha256=curve.trace.sha256,
-        passed=PredictionLimits().hold(metrics),
-        width_scale=factor if scale_width else None,
-        width_m=factor * shape.width,
-        metrics=metrics,
-        unscaled=unscaled,
-        status=record.status,
-        momentum_residual=record.momentum_residual,
-        dx_m=scene.numerics.dx,
-        shape=replace(shape, width=factor * shape.width),
-        knife=knife.name,
-        invocation=Invocation(request.seed, request.arch, tuple(request.command)),
-        software=Software.here(),
-        warnings=warnings,
-    )
-    write_json(out / "summary.json", to_document(result))
-    return result
+    with prepare(out, "predict", resume=False):
+        record = _simulated(scene, request.arch)
+        whole = filter_simulated(curve.stroke, record.stroke, record.resolved)
+        unscaled = compare(curve.stroke, curve.curve, whole)
+        factor = unscaled.best_scale if scale_width else 1.0
+        metrics = compare(curve.stroke, curve.curve, factor * whole)
+        write_csv(
+            out / "curves.csv",
+            {
+                "stroke_m": curve.stroke,
+                "real_N": curve.curve,
+                "sim_N": factor * whole,
+                "edge_N": factor * filter_simulated(curve.stroke, record.stroke, record.edge[:, 2]),
+                "face_N": factor * filter_simulated(curve.stroke, record.stroke, record.resolved_face),
+            },
+        )
+        result = PredictionResult(
+            food=request.food.name,
+            trace=curve.trace.label,
+            trace_sha256=curve.trace.sha256,
+            passed=PredictionLimits().hold(metrics),
+            width_scale=factor if scale_width else None,
+            width_m=factor * shape.width,
+            metrics=metrics,
+            unscaled=unscaled,
+            status=record.status,
+            momentum_residual=record.momentum_residual,
+            dx_m=scene.numerics.dx,
+            shape=replace(shape, width=factor * shape.width),
+            knife=knife.name,
+            invocation=Invocation(request.seed, request.arch, tuple(request.command)),
+            software=Software.here(),
+            warnings=warnings,
+        )
+        write_json(out / "summary.json", to_document(result))
+        return result
 
 
 def _simulated(scene: Scene, arch: str) -> ForceRecord:

@@ -179,27 +179,27 @@ def run(study: PriorStudy, out: Path, pool: Workers, *, resume: bool, say: Calla
         CutcalError: Anything wrong with the input; nothing that was computed is lost.
     """
     plans = study.plans()
-    prepare(out, resume=resume)
-    with EvaluationStore(out / "evaluations.h5", Header("", "prior predictive"), resume=resume) as store:
-        results = evaluate(plans, store, pool, say)
-    about = {"knife": study.knife.name, "draws": study.draws, "seed": study.seed, "device": pool.arch}
-    about |= {"cutcal": __version__, "commit": git_commit(), "solver": code_key()[:KEY_LENGTH]}
-    rows = _before(out)
-    for one, runs in zip(plans, results, strict=True):
-        columns, row = conclude(one, runs)
-        name = one.food.name
-        rows[name] = about | row
-        write_csv(out / f"{name}.csv", columns, head=_head(name, rows[name]), digits=DIGITS)
-    document = {
-        "schema": tag("prior"),
-        "passed": all(rows[one.food.name]["default_status"] == "ok" for one in plans),
-        "foods": rows,
-    }
-    write_json(out / "prior.json", document)
-    from reports.calibration.prior import write_figure
+    with prepare(out, "prior", resume=resume):
+        with EvaluationStore(out / "evaluations.h5", Header("", "prior predictive"), resume=resume, say=say) as store:
+            results = evaluate(plans, store, pool, say)
+        about = {"knife": study.knife.name, "draws": study.draws, "seed": study.seed, "device": pool.arch}
+        about |= {"cutcal": __version__, "commit": git_commit(), "solver": code_key()[:KEY_LENGTH]}
+        rows = _before(out)
+        for one, runs in zip(plans, results, strict=True):
+            columns, row = conclude(one, runs)
+            name = one.food.name
+            rows[name] = about | row
+            write_csv(out / f"{name}.csv", columns, head=_head(name, rows[name]), digits=DIGITS)
+        document = {
+            "schema": tag("prior"),
+            "passed": all(rows[one.food.name]["default_status"] == "ok" for one in plans),
+            "foods": rows,
+        }
+        write_json(out / "prior.json", document)
+        from reports.calibration.prior import write_figure
 
-    write_figure(out)
-    return document
+        write_figure(out)
+        return document
 
 
 def _before(out: Path) -> dict[str, Any]:

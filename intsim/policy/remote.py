@@ -11,29 +11,40 @@ HTTP, a JSON document each way:
 ``joints`` actions have 8: joint targets [rad] and the gripper. The gripper stays closed, whatever is sent: the knife is
 fixed to the hand. All actions of an answer are carried out, one in each control step, before the next question. Foods
 are not sent: what a policy may know of them is in the pictures.
+
+What a server cannot answer has a code of HTTP and ``{"error": ...}``. A server that other machines reach wants a token,
+``Authorization: Bearer TOKEN``, which both sides take from the variable ``CUTCAL_POLICY_TOKEN``. HTTP is not encrypted:
+between machines that do not trust their network, forward the port through SSH. :mod:`intsim.policy.server` is a server.
 """
 
 from __future__ import annotations
 
 import base64
+import binascii
 import io
 import json
-import math
+import os
+import time
 import urllib.error
 import urllib.request
 from collections.abc import Sequence
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from http.client import HTTPException
 from typing import Any, Protocol
 
 import numpy as np
 
+from calib.io.wording import brief
 from mpm.scene.errors import CutcalError
 
 PROTOCOL = 1
 ACTION_SIZES = {"pose": 7, "joints": 8}
 """Kinds of action, and how many numbers each has."""
 ANSWER_TIMEOUT_S = 600.0  # until an answer; the first one may load a network
-MAX_REQUEST_BYTES = 100_000_000  # bytes of a question
+MAX_ANSWER_BYTES = 10_000_000  # bytes of an answer
+MOST_ACTIONS = 10_000  # actions of an answer: minutes of control steps
+MOST_PIXELS = 4096 * 4096  # pixels of a picture
+TOKEN = "CUTCAL_POLICY_TOKEN"
+"""Variable of the environment that holds what a server asks for; words of the command line are kept with results."""
 
 
 class Model(Protocol):
@@ -70,19 +81,24 @@ class Remote:
 
     Args:
         address: Such as ``http://host:8000``.
-        patience: Time until an answer [s].
+        patience: Time until a whole answer [s].
+        token: What the server asks for; that of the environment when None.
 
     Raises:
         CutcalError: Nothing answers there, or something else.
     """
 
-    def __init__(self, address: str, patience: float = ANSWER_TIMEOUT_S) -> None:
+    def __init__(self, address: str, patience: float = ANSWER_TIMEOUT_S, token: str | None = None) -> None:
         self.address, self.patience = address.rstrip("/"), patience
+        self._token = os.environ.get(TOKEN, "") if token is None else token
+        if not self.address.startswith(("http://", "https://")):
+            raise CutcalError(f"--server {brief(address)}: is no address such as http://127.0.0.1:8000")
         about = self._ask("about", None)
-        kind = about.get("action")
-        if about.get("protocol") != PROTOCOL or kind not in ACTION_SIZES:
-            raise CutcalError(f"--server {address}: is no policy server of protocol {PROTOCOL} ({str(about)[:80]})")
-        self.name, self.action, self.cameras = str(about.get("name")), str(kind), list(about.get("cameras", []))
+        kind, cameras = about.get("action"), about.get("cameras", [])
+        known = isinstance(kind, str) and kind in ACTION_SIZES
+        if about.get("protocol") != PROTOCOL or not known or not _are_names(cameras):
+            raise CutcalError(f"--server {address}: is no policy server of protocol {PROTOCOL} ({brief(about)})")
+        self.name, self.action, self.cameras = brief(about.get("name")), str(kind), list(cameras)
         self._todo: list[np.ndarray] = []
         self._seed, self._begun, self._done = 0, False, False
 
@@ -110,7 +126,10 @@ class Remote:
                     "images": {name: encode_png(self._image(obs, name)) for name in self.cameras},
                 },
             )
-            self._done = bool(answer.get("done"))
+            done = answer.get("done", False)
+            if not isinstance(done, bool):
+                raise CutcalError(f"--server {self.address}: {self.name} says done: {brief(done)}, not true or false")
+            self._done = done
             self._todo = [] if self._done and answer.get("actions") == [] else self._actions(answer.get("actions"))
         return self._todo.pop(0) if self._todo else None
 
@@ -126,33 +145,83 @@ class Remote:
 
     def _actions(self, given: Any) -> list[np.ndarray]:
         """Checked actions of an answer."""
-        try:
-            actions = np.array(given, float)
-        except (TypeError, ValueError):
-            actions = np.empty(0)
-        if actions.ndim != 2 or actions.shape[1] != ACTION_SIZES[self.action] or not np.isfinite(actions).all():
+        actions = finite_rows(given, ACTION_SIZES[self.action])
+        if actions is None or not 0 < len(actions) <= MOST_ACTIONS:
             raise CutcalError(
-                f"--server {self.address}: {self.name} answers with actions {str(given)[:80]}; "
-                f"{self.action} actions are rows of {ACTION_SIZES[self.action]} finite numbers"
+                f"--server {self.address}: {self.name} answers with actions {brief(given)}; {self.action} actions are "
+                f"1 to {MOST_ACTIONS} rows of {ACTION_SIZES[self.action]} finite numbers"
             )
         return list(actions)
 
     def _ask(self, what: str, document: dict[str, Any] | None) -> dict[str, Any]:
-        data = None if document is None else json.dumps(document).encode()
-        request = urllib.request.Request(
-            f"{self.address}/{what}", data=data, headers={"Content-Type": "application/json"}
+        """The answer to a question.
+
+        Raises:
+            CutcalError: There is none, or it is none of a policy server.
+        """
+        where = f"--server {self.address}/{what}"
+        head = {"Content-Type": "application/json"} | (
+            {"Authorization": f"Bearer {self._token}"} if self._token else {}
         )
+        data = None if document is None else json.dumps(document).encode()
         try:
+            request = urllib.request.Request(f"{self.address}/{what}", data=data, headers=head)
             with urllib.request.urlopen(request, timeout=self.patience) as answer:
-                found = json.loads(answer.read())
+                found = json.loads(_whole(answer, self.patience))
         except urllib.error.HTTPError as e:
-            said = e.read(400).decode("utf-8", "replace").strip()
-            raise CutcalError(f"--server {self.address}/{what}: {e.code} {said}") from None
-        except (OSError, ValueError) as e:
-            raise CutcalError(f"--server {self.address}/{what}: no answer of a policy server ({e})") from None
+            raise CutcalError(f"{where}: {e.code} {_said(e)}") from None
+        except (OSError, ValueError, HTTPException, RecursionError) as e:
+            raise CutcalError(
+                f"{where}: no answer of a policy server ({brief(str(e) or type(e).__name__, 200)})"
+            ) from None
         if not isinstance(found, dict):
-            raise CutcalError(f"--server {self.address}/{what}: answers {str(found)[:80]}, not a JSON object")
+            raise CutcalError(f"{where}: answers {brief(found)}, not a JSON object")
         return found
+
+
+def _are_names(cameras: Any) -> bool:
+    return isinstance(cameras, list) and all(isinstance(name, str) and name.isprintable() for name in cameras)
+
+
+def _whole(answer: Any, patience: float) -> bytes:
+    """All bytes of an answer.
+
+    Raises:
+        ValueError: There are too many, or they take too long.
+    """
+    end, content = time.monotonic() + patience, b""
+    while part := answer.read1(65536):
+        content += part
+        if len(content) > MAX_ANSWER_BYTES:
+            raise ValueError(f"it is longer than {MAX_ANSWER_BYTES} bytes")
+        if time.monotonic() > end:
+            raise ValueError(f"it is not whole after {patience:g} s")
+    if answer.length:  # what was promised and has not come
+        raise ValueError("it ends too early")
+    return content
+
+
+def _said(error: urllib.error.HTTPError) -> str:
+    """The words of an answer that says what is wrong, on one line."""
+    try:
+        return brief(error.read(400).decode("utf-8", "replace").strip(), 400)
+    except (OSError, HTTPException):
+        return ""
+
+
+def finite_rows(given: Any, size: int) -> np.ndarray | None:
+    """Rows of finite numbers, shape (n, size); None where something else was given.
+
+    Args:
+        given: What was given.
+        size: Numbers of a row.
+    """
+    try:
+        rows = np.array(given)
+        rows = rows.astype(float) if rows.dtype.kind in "iuf" else np.empty(0)
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return rows if rows.ndim == 2 and rows.shape[1] == size and np.isfinite(rows).all() else None
 
 
 def encode_png(image: np.ndarray) -> str:
@@ -165,80 +234,18 @@ def encode_png(image: np.ndarray) -> str:
 
 
 def decode_png(text: str) -> np.ndarray:
-    """A picture (h, w, 3) from :func:`encode_png`."""
+    """A picture (h, w, 3) from :func:`encode_png`.
+
+    Raises:
+        ValueError: It is no PNG, damaged, or has more pixels than :data:`MOST_PIXELS`.
+    """
     from PIL import Image
 
-    return np.array(Image.open(io.BytesIO(base64.b64decode(text))).convert("RGB"))
-
-
-class Server(ThreadingHTTPServer):
-    """Answers for a model, one question at a time; ``serve_forever`` begins, ``shutdown`` ends it.
-
-    Args:
-        model: Who is asked.
-        host, port: Where; port 0 takes a free one, ``server_port``.
-    """
-
-    daemon_threads = True
-
-    def __init__(self, model: Model, host: str = "127.0.0.1", port: int = 8000) -> None:
-        super().__init__((host, port), _Handler)
-        self.model = model
-
-
-class _Handler(BaseHTTPRequestHandler):
-    server: Server
-
-    def do_GET(self) -> None:
-        """Who this is."""
-        model = self.server.model
-        if self.path != "/about":
-            self._say(404, {"error": f"{self.path}: ask for /about, /reset or /act"})
-            return
-        about = {
-            "protocol": PROTOCOL,
-            "name": model.name,
-            "action": model.action,
-            "cameras": list(model.cameras),
-        }
-        self._say(200, about)
-
-    def do_POST(self) -> None:
-        """Reset, or act."""
-        try:
-            size = int(self.headers.get("Content-Length", 0))
-            if not 0 < size <= MAX_REQUEST_BYTES:
-                raise ValueError(f"a question of {size} bytes")
-            asked = json.loads(self.rfile.read(size))
-            answer = self._answer(asked)
-        except (KeyError, TypeError, ValueError, OSError) as e:
-            self._say(400, {"error": f"{type(e).__name__}: {e}"})
-            return
-        self._say(200 if answer is not None else 404, answer or {"error": f"{self.path}: ask for /reset or /act"})
-
-    def _answer(self, asked: dict[str, Any]) -> dict[str, Any] | None:
-        model = self.server.model
-        if self.path == "/reset":
-            model.reset(int(asked["seed"]), str(asked["instruction"]))
-            return {"reset": True}
-        if self.path == "/act":
-            pose = np.array(asked["pose"], float)
-            if pose.shape != (5,) or not all(math.isfinite(v) for v in pose):
-                raise ValueError(f"pose {asked['pose']}; five finite numbers")
-            joints = None if asked.get("joints") is None else np.array(asked["joints"], float)
-            images = {name: decode_png(text) for name, text in asked["images"].items()}
-            actions = np.atleast_2d(model.act(str(asked["instruction"]), pose, joints, images))
-            return {"actions": actions.tolist() if actions.size else [], "done": actions.size == 0}
-        return None
-
-    def _say(self, code: int, document: dict[str, Any]) -> None:
-        content = json.dumps(document).encode()
-        self.send_response(code)
-        self.send_header("Content-Type", "application/json")
-        self.send_header("Content-Length", str(len(content)))
-        self.end_headers()
-        self.wfile.write(content)
-
-    def log_message(self, format: str, *args: Any) -> None:  # noqa: A002 - the name is http.server's
-        """Silence."""
-        del format, args
+    try:
+        content = base64.b64decode(text, validate=True)
+        with Image.open(io.BytesIO(content), formats=["PNG"]) as image:
+            if image.width * image.height > MOST_PIXELS:
+                raise ValueError(f"a picture of {image.width} x {image.height} pixels; at most {MOST_PIXELS}")
+            return np.array(image.convert("RGB"))
+    except (OSError, SyntaxError, TypeError, binascii.Error, Image.DecompressionBombError) as e:
+        raise ValueError(f"a picture is no PNG in base64 ({brief(str(e))})") from None

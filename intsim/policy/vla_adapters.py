@@ -20,7 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from intsim.policy.remote import Model, Server
+from intsim.policy.remote import TOKEN, Model
+from intsim.policy.server import Server
 from mpm.scene.errors import CutcalError
 
 FRONT_CAMERA = "front"  # the picture that all three are given
@@ -248,7 +249,9 @@ def main(words: Sequence[str] | None = None) -> int:
     p.add_argument("--root", help="repository of rdt")
     p.add_argument("--statistics", help="statistics.json of the export that rdt was fine-tuned on")
     p.add_argument("--device", default="cuda:0", help="of openvla (default cuda:0)")
-    p.add_argument("--host", default="127.0.0.1", help="(default 127.0.0.1)")
+    p.add_argument(
+        "--host", default="127.0.0.1", help=f"(default 127.0.0.1; another one needs a token in the variable {TOKEN})"
+    )
     p.add_argument("--port", type=int, default=8000, help="(default 8000)")
     args = p.parse_args(words)
     try:

@@ -44,16 +44,18 @@ def refine(
         CutcalError: Impossible values, or results of something else in ``out``; nothing that was computed is lost.
     """
     runs = planned_runs(plan)
-    prepare(out, resume=resume)
-    with EvaluationStore(out / "evaluations.h5", Header("", key_of(plan.scene.as_dict())), resume=resume) as store:
-        evaluations = _evaluated(runs, store, pool, say)
-    result, curves = analyse(runs, evaluations, cut, pool.arch)
-    for text in result.warnings[len(cut.warnings) :]:
-        say(f"note: {text}")
-    write_result(result, curves, out)
-    write_figure(out)
-    write_report(out)
-    return result
+    with prepare(out, "converge", resume=resume):
+        with EvaluationStore(
+            out / "evaluations.h5", Header("", key_of(plan.scene.as_dict())), resume=resume, say=say
+        ) as store:
+            evaluations = _evaluated(runs, store, pool, say)
+        result, curves = analyse(runs, evaluations, cut, pool.arch)
+        for text in result.warnings[len(cut.warnings) :]:
+            say(f"note: {text}")
+        write_result(result, curves, out)
+        write_figure(out)
+        write_report(out)
+        return result
 
 
 def _evaluated(

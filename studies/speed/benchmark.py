@@ -101,32 +101,32 @@ def run_benchmark(settings: BenchmarkSettings, out: Path, say: Say) -> Benchmark
         CutcalError: A food or knife that cannot be used, or a folder that is not empty or cannot be written.
     """
     scene, session = settings.scene(), Session(settings.runtime, settings.repeats, say)
-    prepare(out, resume=False)
-    file = ResultFile(out / RESULT_FILE, _nothing_measured(settings))
-    file.keep(throughput=throughput(session, scene))
-    paper = published_configuration(session, settings.whole_food(), scene.motion.stroke)
-    file.keep(paper_config=paper)
-    cut, reference = default_cut(session, scene, settings.finest)
-    file.keep(default_cut=cut)
-    file.keep(processes=process_scaling(session, scene, cut))
-    file.keep(batches=batch_times(session, scene))
-    if settings.peers:
-        file.keep(peers=peers(session, settings.peers))
-    file.keep(ratio_to_paper=paper.wall_s_extrapolated / cut.wall_s, ablations=())
-    todo = variants(scene, settings.scene(coarse=True), settings.runtime)
-    ablations = []
-    began = time.monotonic()
-    for done, variant in enumerate(todo, 1):
-        ablations.append(ablation(session, scene, variant, reference))
-        file.keep(ablations=tuple(ablations))
-        left = (time.monotonic() - began) / done * (len(todo) - done)
-        say(f"{variant.name}: {ablations[-1].time_ratio:.2f} times the time; about {clock(left)} left")
-    file.keep(exponent=size_exponent(cut, ablations), complete=True)
-    from reports.studies.benchmark import write_figure
+    with prepare(out, "bench", resume=False):
+        file = ResultFile(out / RESULT_FILE, _nothing_measured(settings))
+        file.keep(throughput=throughput(session, scene))
+        paper = published_configuration(session, settings.whole_food(), scene.motion.stroke)
+        file.keep(paper_config=paper)
+        cut, reference = default_cut(session, scene, settings.finest)
+        file.keep(default_cut=cut)
+        file.keep(processes=process_scaling(session, scene, cut))
+        file.keep(batches=batch_times(session, scene))
+        if settings.peers:
+            file.keep(peers=peers(session, settings.peers))
+        file.keep(ratio_to_paper=paper.wall_s_extrapolated / cut.wall_s, ablations=())
+        todo = variants(scene, settings.scene(coarse=True), settings.runtime)
+        ablations = []
+        began = time.monotonic()
+        for done, variant in enumerate(todo, 1):
+            ablations.append(ablation(session, scene, variant, reference))
+            file.keep(ablations=tuple(ablations))
+            left = (time.monotonic() - began) / done * (len(todo) - done)
+            say(f"{variant.name}: {ablations[-1].time_ratio:.2f} times the time; about {clock(left)} left")
+        file.keep(exponent=size_exponent(cut, ablations), complete=True)
+        from reports.studies.benchmark import write_figure
 
-    write_figure(file.result, out)
-    write_report(out)
-    return file.result
+        write_figure(file.result, out)
+        write_report(out)
+        return file.result
 
 
 def _nothing_measured(settings: BenchmarkSettings) -> BenchmarkResult:

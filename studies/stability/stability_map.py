@@ -59,16 +59,16 @@ def run_map(
         CutcalError: A device that is missing, or results of something else in ``out``; nothing that was computed is
             lost.
     """
-    prepare(out, resume=resume)
-    with EvaluationStore(out / "evaluations.h5", Header("", "stability map"), resume=resume) as store:
-        evaluations = run_cells(cells, store, pool, say)
-    result = map_result(cells, evaluations, command=command, seed=seed, device=pool.arch)
-    write_json(out / RESULT_FILE, to_document(result))
-    from reports.studies.stability import write_figure
+    with prepare(out, "stress", resume=resume):
+        with EvaluationStore(out / "evaluations.h5", Header("", "stability map"), resume=resume, say=say) as store:
+            evaluations = run_cells(cells, store, pool, say)
+        result = map_result(cells, evaluations, command=command, seed=seed, device=pool.arch)
+        write_json(out / RESULT_FILE, to_document(result))
+        from reports.studies.stability import write_figure
 
-    write_figure(result.cells, out)
-    write_report(out)
-    return result
+        write_figure(result.cells, out)
+        write_report(out)
+        return result
 
 
 def run_cells(

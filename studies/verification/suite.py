@@ -67,28 +67,28 @@ def run_suite(
         CurveError: No case has such a name, or ``out`` holds cases of another seed, device, extent or version.
     """
     todo = _chosen(options, only)
-    prepare(out, resume=resume)
-    none = _nothing_run(options, command)
-    found = _known(out, none) if resume else {}
-    new = sorted((c for c in todo if c.name not in found), key=lambda c: -c.cost)
-    if len(new) < len(todo):
-        say(f"{len(todo) - len(new)} of {len(todo)} cases are known already")
-    rest = Countdown(sum(c.cost for c in new))
-    for k, done in pool.each(_case_outcome, [(c.name, options) for c in new]):
-        name, outcome = new[k].name, done or KILLED
-        found[name] = outcome
-        write_json(out / RESULT_FILE, to_document(_with_cases(none, todo, found)))
-        failed = sum(not row.passed for row in outcome.rows)
-        state = "broke down" if outcome.broken else f"{failed} failed" if failed else "passed"
-        done_now = f"{len(found)} of {len(todo)} cases, {rest.left(new[k].cost)}"
-        say(f"{name}: {len(outcome.rows)} rows, {state}; {done_now}")
-    result = _with_cases(none, todo, found)
-    write_json(out / RESULT_FILE, to_document(result))
-    from reports.studies.verification import write_figure
+    with prepare(out, "verify", resume=resume):
+        none = _nothing_run(options, command)
+        found = _known(out, none) if resume else {}
+        new = sorted((c for c in todo if c.name not in found), key=lambda c: -c.cost)
+        if len(new) < len(todo):
+            say(f"{len(todo) - len(new)} of {len(todo)} cases are known already")
+        rest = Countdown(sum(c.cost for c in new))
+        for k, done in pool.each(_case_outcome, [(c.name, options) for c in new]):
+            name, outcome = new[k].name, done or KILLED
+            found[name] = outcome
+            write_json(out / RESULT_FILE, to_document(_with_cases(none, todo, found)))
+            failed = sum(not row.passed for row in outcome.rows)
+            state = "broke down" if outcome.broken else f"{failed} failed" if failed else "passed"
+            done_now = f"{len(found)} of {len(todo)} cases, {rest.left(new[k].cost)}"
+            say(f"{name}: {len(outcome.rows)} rows, {state}; {done_now}")
+        result = _with_cases(none, todo, found)
+        write_json(out / RESULT_FILE, to_document(result))
+        from reports.studies.verification import write_figure
 
-    write_figure(result, out)
-    write_report(out)
-    return result
+        write_figure(result, out)
+        write_report(out)
+        return result
 
 
 def _chosen(options: SuiteOptions, only: str | None) -> list[VerificationCase]:

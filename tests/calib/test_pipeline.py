@@ -387,9 +387,11 @@ def test_json_is_written_whole_and_finite(tmp_path):
 
 
 def test_prepare_makes_folders_once(tmp_path):
-    """A new folder is made with its parents and left empty."""
-    prepare(tmp_path / "a" / "b", resume=False)
-    assert list((tmp_path / "a" / "b").iterdir()) == []
+    """A new folder is made with its parents and left empty, and may be used again."""
+    for _ in range(2):
+        with prepare(tmp_path / "a" / "b", "calibrate", resume=False):
+            pass
+        assert list((tmp_path / "a" / "b").iterdir()) == []
 
 
 class FlakyPool(Pool):

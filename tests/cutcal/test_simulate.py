@@ -12,6 +12,7 @@ import pytest
 
 from calib.trace.trace import read_trace
 from cutcal.main import main
+from mpm.output.energy import doubts
 from tests.calib.documents import valid
 
 
@@ -81,3 +82,35 @@ def test_simulate_draws_what_is_asked_for(tmp_path: Path, capsys, monkeypatch):
     assert main([*argv, "--video", "--out", str(tmp_path / "film")]) == 1
     assert "pip install 'cutcal[view]'" in capsys.readouterr().err
     assert {p.name for p in (tmp_path / "film").iterdir()} == {"force.csv", "summary.json"}
+
+
+BALANCED = {"parting": 0.6, "friction": 0.3, "kinetic": 0.02, "unbooked": 0.08}
+
+
+@pytest.mark.parametrize(
+    ("energy", "ke_over_ie", "words"),
+    [
+        (BALANCED, 0.02, []),
+        (BALANCED | {"unbooked": 0.2}, 0.02, ["18% of the work is taken by no law (limit 10%)"]),
+        (BALANCED | {"unbooked": -0.2}, 0.02, ["28% of the work is made by no law"]),
+        (BALANCED, 5.32, ["kinetic energy is 532% of the internal one (limit 10%)"]),
+        (BALANCED | {"unbooked": 0.2}, 0.11, ["taken by no law", "kinetic energy is 11%"]),
+        ({}, 0.0, []),
+    ],
+)
+def test_energies_are_judged(energy, ke_over_ie, words):
+    """A balance that does not close, either way, and a cut that is mostly motion: a sentence each."""
+    found = doubts(energy, ke_over_ie)
+    assert len(found) == len(words) and all(word in text for word, text in zip(words, found, strict=True))
+
+
+def test_simulate_judges_itself(tmp_path: Path, capsys):
+    """A blade that is much too fast makes waves: exit code 2, a line, and the sentence in the document."""
+    argv = ["simulate", "--food", "cherry", "--knife", "edc", "--dx", "3e-3", "--threads", "1", "--json"]
+    argv += ["--set", "E=2e4", "--set", "R=2", "--mach", "0.049"]
+    assert main([*argv, "--out", str(tmp_path / "cut")]) == 2
+    out, err = capsys.readouterr()
+    summary = valid(json.loads(out))
+    assert summary["status"] == "done" and "not passed: " in err
+    lines = [text for text in summary["warnings"] if "(limit 10%)" in text]
+    assert lines and all(f"not passed: {line}\n" in err for line in lines)

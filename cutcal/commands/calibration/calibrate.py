@@ -28,6 +28,7 @@ from cutcal.options import (
     titled,
     workers_of,
 )
+from cutcal.surroundings import interrupted
 from mpm.scene.errors import CutcalError
 
 if TYPE_CHECKING:
@@ -161,6 +162,8 @@ def run(args: argparse.Namespace) -> int:
         print_json(to_document(result))
     else:
         print(verdict_text(result))
+    if result.status == "interrupted":
+        return interrupted(resumable=True)
     return 0 if result.passed else 2
 
 

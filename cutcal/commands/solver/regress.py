@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -65,17 +66,16 @@ def run(args: argparse.Namespace) -> int:
     )
     todo = baseline_cuts(foods, knife, CONTACTS if args.contact is None else (args.contact,))
     references = References()
-    if args.out is not None:
-        prepare(Path(args.out), resume=False)
-    with workers_of(args, say) as pool:
-        if args.update:
-            order = [cut.name for food in known.values() for cut in baseline_cuts([food], knife)]
-            found = record_changes(todo, references, pool, say, order)
-        else:
-            found = compare_with_references(todo, references, pool, say)
-    result = regression_result(found, args.arch, update=args.update)
-    if args.out is not None:
-        write_result(result, Path(args.out))
+    with nullcontext() if args.out is None else prepare(Path(args.out), "regress", resume=False):
+        with workers_of(args, say) as pool:
+            if args.update:
+                order = [cut.name for food in known.values() for cut in baseline_cuts([food], knife)]
+                found = record_changes(todo, references, pool, say, order)
+            else:
+                found = compare_with_references(todo, references, pool, say)
+        result = regression_result(found, args.arch, update=args.update)
+        if args.out is not None:
+            write_result(result, Path(args.out))
     if args.json:
         print_json(to_document(result))
     else:

@@ -5,17 +5,20 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from calib.io.folder import prepare, write_csv, write_json
 from calib.io.progress import Countdown, clock
 from calib.io.provenance import git_commit, versions
 from calib.io.schema import tag
+from calib.material.food import FoodSpec
 from calib.material.knife import load_knife
 from calib.material.scene import cut_scene, specimen
 from calib.simulation.evaluation import FULLY_PARTED, pressed_away
+from calib.validation.method_constants import CONSTANTS
 from cutcal.options import (
     add_food,
     add_run,
@@ -27,17 +30,26 @@ from cutcal.options import (
     sizing_of,
     whole,
 )
-from mpm.output.energy import spent, unbooked
+from mpm.output.energy import doubts, spent, unbooked
 from mpm.output.record import ForceRecord
 from mpm.output.snapshot import SnapshotRecorder
-from mpm.scene import CONTACTS, Arm
+from mpm.scene import CONTACTS, Arm, Scene
+from mpm.scene.shapes import Shape
+
+if TYPE_CHECKING:
+    from mpm.solver import Simulation
 
 HELP = "simulate one cut"
 DESCRIPTION = "Simulate one cut and write force.csv and summary.json."
 VIDEO_FRAMES = 72  # of a video: five seconds
 FRAMES_PER_PAGE_FRAME = 2  # frames of a video of which a page has one
 FRAMES_PER_LINE = 12  # pictures of a video after which a line says how many there are
-EPILOG = "example:\n  cutcal simulate --food cucumber --knife edc --out runs/cucumber"
+EPILOG = """example:
+  cutcal simulate --food cucumber --knife edc --out runs/cucumber
+
+Exit codes: 0 done, 1 error in input or run, 2 done, but the energies say that
+the force is not to be trusted: more than 10 % of the work is taken by no law,
+or kinetic energy is more than 10 % of the internal one."""
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
@@ -60,6 +72,24 @@ def add_args(p: argparse.ArgumentParser) -> None:
         default="cohesive",
         metavar="KIND",
         help="cohesive (default), or nodal for comparison",
+    )
+    p.add_argument(
+        "--zone",
+        type=number(1e-5, 0.05, "m"),
+        metavar="M",
+        help="width of the edge's process zone (default: the food's)",
+    )
+    p.add_argument(
+        "--slip", type=number(1e-5, 0.05, "m"), metavar="M", help="elastic way of the edge's law (default 1mm)"
+    )
+    p.add_argument(
+        "--contact-stiffness",
+        type=number(0.1, 100, "of a layer's"),
+        metavar="K",
+        help="contact over a layer of particles (default 2)",
+    )
+    p.add_argument(
+        "--safety", type=number(0, 0.9, "of the stability limit"), metavar="F", help="time step (default 0.7)"
     )
     p.add_argument(
         "--mach",
@@ -100,38 +130,60 @@ def add_args(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Simulate and write."""
-    food, knife = food_of(args), load_knife(args.knife)
+    food = food_of(args)
     out = Path(args.out or f"cutcal-simulate-{food.name}")
     shape, assumed = specimen(food, None, sizing_of(args))
-    scene = cut_scene(
-        food,
-        shape,
-        knife,
-        stroke=args.stroke,
-        dx=args.dx,
-        seed=args.seed,
-    )
-    scene = replace(
-        scene,
-        motion=replace(
-            scene.motion,
-            mach=args.mach,
-            slice_ratio=args.slice_ratio,
-            tilt=math.radians(args.tilt),
-            retract=args.retract,
-            speed=args.speed,
-        ),
-        numerics=replace(
-            scene.numerics,
-            contact=args.contact,
-            grid_shift=(0.0, args.offset, 0.0),
-            grid_turn=math.radians(args.turn),
-        ),
-        arm=Arm(args.arm_stiffness, args.force_limit),
-    )
-    prepare(out, resume=False)
-    import time
+    scene = _scene(args, food, shape)
+    with prepare(out, "simulate", resume=False):
+        simulation, watch, record = _simulated(args, scene)
+        write_csv(out / "force.csv", record.columns())
+        if record.parted < FULLY_PARTED:
+            assumed.append(pressed_away(record.parted))
+            note(assumed[-1])
+        doubted = doubts(record.budget, record.ke_over_ie) if record.status == "done" else []
+        for text in doubted:
+            say(f"not passed: {text}")
+        assumed += doubted
+        summary = _summary(args, food, scene, record, assumed)
+        write_json(out / "summary.json", summary)
+        if watch is not None:
+            _draw(args, out, simulation, record, watch, f"{food.name}, {scene.knife.name} knife")
+    if args.json:
+        print_json(summary)
+    else:
+        print(_words(food.name, scene, record, out))
+    if record.status != "done":
+        return 1
+    return 2 if doubted else 0
 
+
+def _scene(args: argparse.Namespace, food: FoodSpec, shape: Shape) -> Scene:
+    """The cut that the options ask for."""
+    scene = cut_scene(food, shape, load_knife(args.knife), stroke=args.stroke, dx=args.dx, seed=args.seed)
+    motion = replace(
+        scene.motion,
+        mach=args.mach,
+        slice_ratio=args.slice_ratio,
+        tilt=math.radians(args.tilt),
+        retract=args.retract,
+        speed=args.speed,
+    )
+    numerics = replace(
+        scene.numerics,
+        contact=args.contact,
+        grid_shift=(0.0, args.offset, 0.0),
+        grid_turn=math.radians(args.turn),
+    )
+    given = {"contact_stiffness": args.contact_stiffness, "safety": args.safety}
+    numerics = replace(numerics, **{name: value for name, value in given.items() if value is not None})
+    sizes = {"zone": args.zone, "slip": args.slip}
+    edge = replace(scene.edge, **{name: value for name, value in sizes.items() if value is not None})
+    arm = Arm(args.arm_stiffness, args.force_limit)
+    return replace(scene, motion=motion, numerics=numerics, edge=edge, arm=arm)
+
+
+def _simulated(args: argparse.Namespace, scene: Scene) -> tuple[Simulation, SnapshotRecorder | None, ForceRecord]:
+    """The cut: what simulated it, the looks at it that pictures need, and its record."""
     from mpm.runtime import Runtime
     from mpm.solver import Simulation
 
@@ -143,22 +195,27 @@ def run(args: argparse.Namespace) -> int:
 
     simulation = Simulation(scene, Runtime(args.arch, args.threads))
     watch = SnapshotRecorder(VIDEO_FRAMES) if args.pictures or args.video or args.page else None
-    record = simulation.run(progress=show if sys.stderr.isatty() else None, snapshots=watch)
-    if sys.stderr.isatty():
+    terminal = sys.stderr.isatty()
+    record = simulation.run(progress=show if terminal else None, snapshots=watch)
+    if terminal:
         print(file=sys.stderr)
-    write_csv(out / "force.csv", record.columns())
-    if record.parted < FULLY_PARTED:
-        assumed.append(pressed_away(record.parted))
-        note(assumed[-1])
-    summary = {
+    return simulation, watch, record
+
+
+def _summary(
+    args: argparse.Namespace, food: FoodSpec, scene: Scene, record: ForceRecord, assumed: list[str]
+) -> dict[str, Any]:
+    """The content of summary.json."""
+    return {
         "schema": tag("simulate"),
         "food": food.name,
-        "knife": knife.name,
+        "knife": scene.knife.name,
         **record.summary(),
         "dx_m": scene.numerics.dx,
         "mach": scene.motion.mach,
         "contact": scene.numerics.contact,
-        "shape": vars(shape),
+        "constants": {constant.key: constant.value(scene) for constant in CONSTANTS},
+        "shape": vars(scene.food.shape),
         "speed_real_m_s": args.speed,
         "seed": args.seed,
         "device": args.arch,
@@ -166,23 +223,21 @@ def run(args: argparse.Namespace) -> int:
         "git": git_commit(),
         "warnings": [*food.warnings(), *assumed],
     }
-    write_json(out / "summary.json", summary)
-    if watch is not None:
-        _draw(args, out, simulation, record, watch, f"{food.name}, {knife.name} knife")
-    if args.json:
-        print_json(summary)
-    else:
-        print(
-            f"{food.name}: peak {record.peak:.2f} N, work {record.work:.3f} J, {record.status}; "
-            f"momentum balance closes to {record.momentum_residual:.1e} of the peak; wrote {out}"
-        )
-        part, fracture = unbooked(record.budget), record.fracture
-        if part is not None:
-            rate = "" if fracture is None else f" ({fracture['released_J_m2']:.3g} J/m^2)"
-            print(f"where the work went: {spent(record.budget)}; lost by the discretisation {part:.1%}{rate}")
-        if record.pieces is not None:
-            print(record.pieces.words())
-    return 0 if record.status == "done" else 1
+
+
+def _words(name: str, scene: Scene, record: ForceRecord, out: Path) -> str:
+    """What the terminal shows at the end."""
+    lines = [
+        f"{name}: peak {record.peak:.2f} N, work {record.work:.3f} J, {record.status}; "
+        f"momentum balance closes to {record.momentum_residual:.1e} of the peak; wrote {out}"
+    ]
+    part, fracture = unbooked(record.budget), record.fracture
+    if part is not None:
+        rate = "" if fracture is None else f" ({fracture['released_J_m2']:.3g} J/m^2)"
+        lines.append(f"where the work went: {spent(record.budget)}; lost by the discretisation {part:.1%}{rate}")
+    if record.pieces is not None:
+        lines.append(record.pieces.words())
+    return "\n".join(lines)
 
 
 def _draw(

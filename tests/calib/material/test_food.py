@@ -490,16 +490,17 @@ def test_not_a_materials_file(content: str, words: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("line", "words"),
     [
-        ("a: !!int x", "holds a value that YAML does not have"),
+        ("a: !!int x", "'x' is no whole number in decimal"),
         ("a: !!bool perhaps", "holds a value that YAML does not have"),
         ("a: !!timestamp now", "holds a value that YAML does not have"),
         ("a: 2001-99-99", "holds a value that YAML does not have (month must be in 1..12); put it in quotes"),
-        ("a: &a {b: *a}", "a.b: unknown key"),
+        ("a: &a {b: *a}", "*a stands for a list or mapping; write it out"),
         ("a: " + "[" * 2000, "is nested too deeply"),
         ("a: \0", "not YAML: unacceptable character #x0000"),
         ('"a\\nb": {}', "the key 'a\\nb' is no name"),
         ("x" * 500 + ": {}", "xxx...' is no name: use one line"),
-        ("1" * 300 + ": {}", "the key 1111"),
+        ("1" * 300 + ": {}", "the key '1111"),
+        ("1" * 20 + ": {}", "the key 1111"),
     ],
 )
 def test_what_yaml_lets_through(line: str, words: str, tmp_path: Path) -> None:
@@ -512,18 +513,15 @@ def test_values_without_end(tmp_path: Path, document: dict[str, Any]) -> None:
     """A whole number too large for a float, and anchors that stand for 10^11 words, where a unit or a kind should
     be."""
     document["banana"]["properties"]["E"]["value"] = 10**400
-    assert "E.value: is 1000" in message(write(tmp_path, document))
+    assert "E.value: is text '1000" in message(write(tmp_path, document))
     document["banana"]["properties"]["E"]["value"] = 1e5
     laughs = "calibration:\n  - &l0 [ha]\n" + "".join(
         f"  - &l{i} [{', '.join([f'*l{i - 1}'] * 10)}]\n" for i in range(1, 12)
     )
     text = yaml.safe_dump(document)
-    for old, new, words in (
-        ("unit: Pa", "unit: *l11", "has unit [[[[[[["),
-        ("kind: cylinder", "kind: *l11", "unknown value [[[[[[["),
-    ):
+    for old, new in (("unit: Pa", "unit: *l11"), ("kind: cylinder", "kind: *l11")):
         said = message(write(tmp_path, laughs + text.replace(old, new)))
-        assert words in said and len(said) < 300
+        assert "*l0 stands for a list or mapping; write it out" in said and len(said) < 300
 
 
 def test_unreadable_files(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 import h5py
@@ -236,7 +237,7 @@ def test_foreign_files_and_missing_folders_are_refused(tmp_path: Path) -> None:
         EvaluationStore(text, HEADER, resume=True)
     other = tmp_path / "other.h5"
     with h5py.File(other, "w") as file:
-        file.attrs.update({"schema": 1, "trace_sha256": HEADER.trace_sha256, "scene_key": HEADER.scene_key})
+        file.attrs.update(asdict(HEADER))
     with pytest.raises(OutputError, match="no store of evaluations"):
         EvaluationStore(other, HEADER, resume=True)
     with pytest.raises(OutputError, match="cannot be written"):
@@ -305,3 +306,26 @@ def test_only_repeatable_failures_are_remembered(tmp_path: Path, status: str, re
         answer = list(CachedEvaluator(second, store, scene=SCENE, code="1").evaluate([{"E": 1.0}]))
         assert (second.runs == 1) is again and len(store) == 1
         assert answer[0].ok is again
+
+
+def test_the_journal_is_forced_to_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each run is given to the disk, whole and by fsync of the journal, before append returns: what only the system
+    has taken is lost when the power fails. So is the HDF5 file before it takes the place of the journal."""
+    forced: list[tuple[str, bytes]] = []
+
+    def fsync(number: int) -> None:
+        path = Path(os.readlink(f"/proc/self/fd/{number}")) if Path("/proc/self/fd").exists() else None
+        if path is None:
+            pytest.skip("this system does not say which file a number is")
+        forced.append((path.name, path.read_bytes()))
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    store = EvaluationStore(tmp_path / "evaluations.h5", HEADER)
+    for k in range(3):
+        store.append(f"k{k}", evaluation(1.0 + k), "fine")
+        name, content = forced[-1]
+        assert name == "evaluations.h5.journal" and f'"k{k}"'.encode() in content and content.endswith(b"}\n")
+        assert content == store.journal.read_bytes()
+    forced.clear()
+    store.close()
+    assert forced == [("evaluations.h5.draft", store.path.read_bytes())]

@@ -15,7 +15,8 @@ import pytest
 from cutcal.main import main
 from intsim.policy import vla_adapters
 from intsim.policy.oracles import Oracle
-from intsim.policy.remote import Remote, Server, decode_png, encode_png
+from intsim.policy.remote import Remote, decode_png, encode_png
+from intsim.policy.server import Server
 from intsim.policy.vla_adapters import RDT, Octo, OpenVLA
 from mpm.scene.errors import CutcalError
 
@@ -113,7 +114,7 @@ def test_what_is_wrong_is_said(served):
     failing = Counting()
     failing.act = lambda *asked: (_ for _ in ()).throw(ValueError("out of memory"))  # type: ignore[method-assign]
     policy = Remote(served(failing))
-    with pytest.raises(CutcalError, match="400 .*out of memory"):
+    with pytest.raises(CutcalError, match="500 .*fails with ValueError: out of memory"):
         policy.act(OBS, "cut")
 
 

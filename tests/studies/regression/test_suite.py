@@ -351,11 +351,15 @@ def test_value_without_effect_is_recorded(play, capsys, monkeypatch):
 
 
 def test_value_beside_the_scene_is_recorded(play, capsys, monkeypatch):
-    """So does one that no scene has, such as a strength without a fracture energy:
+    """So does one that no scene has, such as a fracture energy without a strength:
     it is in the hash of the inputs alone.
     """
     known = load_foods()
-    torn = known["grape"].with_values({"tensile_strength": 1e4})
+    properties = {name: p for name, p in known["grape"].properties.items() if name != "tensile_strength"}
+    weak = replace(known["grape"], properties=properties)
+    torn = weak.with_values({"fracture_energy": 1.0})
+    monkeypatch.setattr("cutcal.commands.solver.regress.load_foods", lambda: known | {"grape": weak})
+    assert main(["regress", "grape", "--contact", "nodal", "--update"]) == 0
     monkeypatch.setattr("cutcal.commands.solver.regress.load_foods", lambda: known | {"grape": torn})
     case, reference = replace(ALL["grape-nodal"], food=torn), References(play[0]).read("grape-nodal")
     assert differences(case, reference) == ["values of the food or the knife that its scene does not show"]
