@@ -77,7 +77,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
         "--zone",
         type=number(1e-5, 0.05, "m"),
         metavar="M",
-        help="width of the edge's process zone (default: the food's)",
+        help="process zone of the edge (default: the food's)",
     )
     p.add_argument(
         "--slip", type=number(1e-5, 0.05, "m"), metavar="M", help="elastic way of the edge's law (default 1mm)"
