@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from calib.formats.reader import split_address
 from calib.material.food import FoodSpec
 from calib.material.scene import Sizing
 from calib.problem.target import ErrorModel
-from calib.trace.reader import split_address
 from calib.trace.trace import Trace, read_trace
 
 
@@ -22,7 +22,7 @@ class Request:
         food: The food with its literature ranges.
         trace: The cut, or its file.
         air: The same motion without food, or its file, or None.
-        columns: ``time_col``, ``force_col``, ``position_col``, ``depth_col``, ``sign`` for reading files.
+        columns: How files are read: attributes of :class:`calib.trace.recorded.Reading`.
         knife: Name or YAML file.
         speed: Knife speed [m/s], or None.
         t_end: End of the record [s], or None.

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.errors import TraceError
+from calib.table.table import RECONSTRUCTED
 from calib.trace.contact_onset import FLOOR_FRACTION, SUSTAIN, ContactOnset, find_contact_onset
 from calib.trace.filters import FILTER_SD_M, N_STROKE, leading_grid, resample, smooth
 from calib.trace.stroke import DWELL_M, end_of_descent, ending_at_board, stroke_axis
-from calib.trace.table import RECONSTRUCTED
 from calib.trace.trace import MIN_SAMPLES, Trace
 
 AIR_SLACK_SAMPLES = 3

@@ -71,11 +71,13 @@ def add_trace(p: argparse.ArgumentParser, *, required: bool = True) -> None:
     g = p.add_argument_group("measurement")
     g.add_argument("--trace", required=required, metavar="FILE", help="record of the cut")
     g.add_argument("--air", metavar="FILE", help="the same motion without food, to be subtracted")
-    g.add_argument("--time-col", metavar="NAME", help="column of the time")
+    g.add_argument("--time-col", metavar="NAME", help="column of the time; NAME=UNIT says its unit")
     g.add_argument("--force-col", metavar="NAME", help="column of the force on the knife")
     g.add_argument("--position-col", metavar="NAME", help="column of the knife's height ('none': none)")
     g.add_argument("--depth-col", metavar="NAME", help="the same where it grows as the knife descends")
     g.add_argument("--sign", choices=("+", "-"), metavar="+|-", help="sign that makes resistance positive")
+    g.add_argument("--rate", type=number(0, 1e6, "/s"), metavar="HZ", help="rows a second, where there is no clock")
+    g.add_argument("--decimal", choices=(".", ","), metavar=".|,", help="mark before decimals, where nothing tells it")
     g.add_argument("--speed", type=number(0, 10, "m/s"), metavar="M/S", help="of the knife, where there is no position")
     g.add_argument("--gain-sd", type=number(0, 1, ""), metavar="PART", help="doubt of the sensor's gain (default 0.02)")
     g.add_argument("--lag-sd", type=number(0, 1, "s"), metavar="S", help="doubt of force against position in time [s]")
@@ -113,13 +115,8 @@ def measured(args: argparse.Namespace, command: Sequence[str]) -> Request:
     Raises:
         CutcalError: An impossible value, an unknown name, a missing file.
     """
-    columns: dict[str, Any] = {
-        "time_col": args.time_col,
-        "force_col": args.force_col,
-        "position_col": args.position_col,
-        "depth_col": args.depth_col,
-        "sign": args.sign,
-    }
+    how = ("time_col", "force_col", "position_col", "depth_col", "sign", "rate", "decimal")
+    columns: dict[str, Any] = {name: getattr(args, name) for name in how}
     return Request(
         food=food_of(args),
         trace=Path(args.trace),

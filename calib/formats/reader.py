@@ -8,9 +8,10 @@ import re
 from pathlib import Path
 
 from calib.errors import TraceError
-from calib.trace.csv_table import table_of_csv
-from calib.trace.json_table import table_of_json
-from calib.trace.table import Table
+from calib.formats.csv_table import table_of_csv
+from calib.formats.json_table import table_of_json
+from calib.table.clock_cells import with_clocks
+from calib.table.table import Table
 
 _JSON_SUFFIXES = (".json", ".jsonl", ".ndjson")
 _JSON_START = re.compile(rb"(\xef\xbb\xbf)?\s*(\{|\[\s*[\[{])")
@@ -19,12 +20,13 @@ _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5")
 
 
-def read_table(path: str | Path) -> Table:
+def read_table(path: str | Path, decimal: str | None = None) -> Table:
     """Read a table from a file; its content and suffix tell of what kind it is.
 
     Args:
         path: A CSV file with a header line, a JSON file of lists or records, or an HDF5 file (``file.h5``, or
             ``file.h5:/group`` for a group or data set in it).
+        decimal: The mark before decimals in a text file, a point or a comma; None to tell it from the numbers.
 
     Returns:
         The table, its cells as the file holds them.
@@ -32,15 +34,20 @@ def read_table(path: str | Path) -> Table:
     Raises:
         TraceError: There is no such file, or it holds no table.
     """
+    return with_clocks(_table(path, decimal))
+
+
+def _table(path: str | Path, decimal: str | None) -> Table:
+    """The table as the file holds it."""
     file, address = split_address(path)
     raw = _content(file)
     if raw.startswith(_HDF5_SIGNATURE) or file.suffix.lower() in _HDF5_SUFFIXES:
-        from calib.trace.hdf5_table import table_of_hdf5  # brings h5py, which is slow to import
+        from calib.formats.hdf5_table import table_of_hdf5  # brings h5py, which is slow to import
 
         return table_of_hdf5(file, raw, address)
     if file.suffix.lower() in _JSON_SUFFIXES or _JSON_START.match(raw):
         return table_of_json(file.name, raw)
-    return table_of_csv(file.name, raw)
+    return table_of_csv(file.name, raw, decimal)
 
 
 def split_address(path: str | Path) -> tuple[Path, str]:

@@ -11,10 +11,10 @@ import numpy as np
 
 from calib.errors import TraceError
 from calib.io.wording import brief, listed
-from calib.trace.table import MEASURED, Cells, Table
-from calib.trace.vector_fields import LONGEST_VECTOR, table_of_fields
+from calib.table.table import MEASURED, Cells, Table
+from calib.table.vector_fields import LONGEST_VECTOR, table_of_fields
 
-UNIT_ATTRIBUTES = ("unit", "units")
+UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "UNITS", "unit_string", "NX_units")
 MOST_VALUES = 10**8
 """Values of a data set from which on it is no record of a cut: days at a kilohertz."""
 # What h5py raises on a damaged file, a type that NumPy does not have, or a filter that is not installed.
