@@ -22,7 +22,7 @@ from mpm.scene.shapes import SHAPE_KINDS
 Group: TypeAlias = argparse._ActionsContainer
 """A parser, or a group of its options."""
 RUN = "run"  # title of the group of options that say where and how
-RESUME_HELP = "go on with the run in --out; nothing is simulated twice"
+RESUME_HELP = "go on with the run in --out; nothing is run twice"
 KNIFE_HELP = "knife of knives.yaml, or a YAML file (default kitchen)"
 LOCAL_WORKERS = 2  # simulations at a time on this machine: a process each
 

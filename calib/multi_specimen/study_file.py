@@ -33,8 +33,8 @@ LARGEST_SCATTER = 1.0
 EACH = "each"
 """What ``hold_out`` says where each cut is held out in turn."""
 TOP = ("material", "knife", "fit", "own", "hold_out", "scatter", "budget", "seed", "dx", "set")
-NUMBERS = ("speed", "t_end", "height", "width", "length", "at", "gain_sd", "lag_sd", "rate")
-TEXTS = ("time_col", "force_col", "position_col", "depth_col", "sign", "decimal", "shape", "knife")
+NUMBERS = ("speed", "t_end", "height", "width", "length", "at", "gain_sd", "lag_sd", "rate", "cut")
+TEXTS = ("time_col", "force_col", "position_col", "depth_col", "sign", "decimal", "baseline", "shape", "knife")
 COMPRESSION_SIZES = ("height", "diameter", "width", "length")
 
 
@@ -134,6 +134,8 @@ def _request(place: Place, given: Mapping[str, Any], folder: Path, base: Request
         ),
         speed=numbers["speed"],
         t_end=numbers["t_end"],
+        baseline=words["baseline"] or base.baseline,
+        cut=None if numbers["cut"] is None else int(numbers["cut"]),
         gain_sd=numbers["gain_sd"],
         lag_sd=numbers["lag_sd"],
     )

@@ -167,7 +167,9 @@ def _restarted(table: Table, time: Column, clock: Clock) -> Clock:
     steps = np.diff(t)
     step = float(np.median(steps))
     begin = np.flatnonzero(steps < 0.0) + 1
-    restarts = [int(i) for i in begin if abs(t[i] - t[0]) <= max(JUMP * step, 0.02 * np.ptp(t))]
+    near = max(JUMP * step, 0.02 * np.ptp(t))
+    goes_on = [int(i) for i in begin if np.all(np.abs(steps[i : i + 3]) <= JUMP * step)]
+    restarts = [i for i in goes_on if abs(t[i] - t[0]) <= near]
     parts = [int(np.searchsorted(clock.kept, start)) for start in table.parts[1:]]
     ends = sorted({*restarts, *parts})
     if not ends or min(np.diff([0, *ends, len(t)])) < FEWEST_ROWS:

@@ -41,6 +41,7 @@ class Trace:
         row: What such a name is: ``row`` or ``index``.
         time_sd: Standard uncertainty of a time that a repair of the clock leaves [s].
         breaks: Indices of the samples with which another record of the file begins.
+        whole: Whether it is one cut, also where its force is released in it.
 
     Raises:
         TraceError: Too few samples, unequal lengths, a number that is not finite, a clock that does not run.
@@ -59,6 +60,7 @@ class Trace:
     row: str = "row"
     time_sd: float = 0.0
     breaks: tuple[int, ...] = ()
+    whole: bool = False
 
     def __post_init__(self) -> None:
         for name in ("time", "force", "position"):

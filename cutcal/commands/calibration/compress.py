@@ -33,8 +33,8 @@ EPILOG = """examples:
       --nu 0.4 --strain 0.2 --bracket
 
 A trace has a column of compression (compression_mm, displacement_mm, ...), one
-of load (load_N, force_kN, ...) and may have one of repeats (replicate, specimen).
-A machine that counts both negative is read with --sign -.
+of load (load_N, force_kN, ...) and may have one of repeats (replicate,
+specimen). A machine that counts both negative is read with --sign -.
 
 Exit codes: 0 passed, 1 error in input or run, 2 fitted but not within the
 limits (curve error 5 %, modulus over 0-5 % strain 10 %, solver 3 %)."""
