@@ -41,10 +41,9 @@ if TYPE_CHECKING:
 MEASUREMENT = "measurement"  # title of the group of options that say what was measured
 BASELINE_HELP = f"of a force without --air: {', '.join(BASELINES)}"
 HELP = "fit a food to a measured knife-force trace, and report"
-DESCRIPTION = """Fit a food to a knife-force trace (CSV, JSON, HDF5; units in columns' names)."""
+DESCRIPTION = """Fit a food to a knife-force trace. Exit: 0 passed, 1 error, 2 did not pass."""
 EPILOG = """example:
-  calibrate --food potato --trace cut.csv --air air.csv --check
-Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass."""
+  calibrate --food potato --trace cut.csv --air air.csv --check"""
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
