@@ -1,4 +1,4 @@
-"""Reads a table of measured columns from a file of any kind that is known: CSV, JSON or HDF5."""
+"""Reads a table of measured columns from a file of any kind that is known."""
 
 from __future__ import annotations
 
@@ -15,7 +15,17 @@ from calib.table.table import Table
 
 _JSON_SUFFIXES = (".json", ".jsonl", ".ndjson")
 _JSON_START = re.compile(rb"(\xef\xbb\xbf)?\s*(\{|\[\s*[\[{])")
-_HDF5_ADDRESS = re.compile(r"(.+\.(?:h5|hdf5|hdf|he5)):(.*)", re.IGNORECASE | re.DOTALL)
+_ADDRESS = re.compile(r"(.+\.(?:h5|hdf5|hdf|he5|mat|xlsx|xlsm|tdms)):(.*)", re.IGNORECASE | re.DOTALL)
+_MATLAB_SIGNATURE = b"MATLAB "
+_PARQUET_SIGNATURE = b"PAR1"
+_ZIP_SIGNATURE = b"PK\x03\x04"
+_TDMS_SIGNATURE = b"TDSm"
+_BAG_SUFFIXES = (".bag", ".mcap", ".db3")
+_NOT_READ = {
+    b"\xd0\xcf\x11\xe0": "an .xls file or another document of Microsoft Office before 2007",
+    b"PK\x03\x04": "a ZIP archive",
+    b"\x1f\x8b": "compressed with gzip",
+}
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5")
 
@@ -24,8 +34,9 @@ def read_table(path: str | Path, decimal: str | None = None) -> Table:
     """Read a table from a file; its content and suffix tell of what kind it is.
 
     Args:
-        path: A CSV file with a header line, a JSON file of lists or records, or an HDF5 file (``file.h5``, or
-            ``file.h5:/group`` for a group or data set in it).
+        path: A text file of cells, a JSON file of lists or records, an HDF5 file (``file.h5``, or ``file.h5:/group``
+            for a group or data set in it), a MATLAB file, an .xlsx file (``file.xlsx:sheet``), a Parquet or TDMS file
+            (``file.tdms:group``), or a bag of ROS.
         decimal: The mark before decimals in a text file, a point or a comma; None to tell it from the numbers.
 
     Returns:
@@ -40,19 +51,45 @@ def read_table(path: str | Path, decimal: str | None = None) -> Table:
 def _table(path: str | Path, decimal: str | None) -> Table:
     """The table as the file holds it."""
     file, address = split_address(path)
+    suffix = file.suffix.lower()
+    if (file.is_dir() and (file / "metadata.yaml").is_file()) or (suffix in _BAG_SUFFIXES and file.is_file()):
+        from calib.formats.bag_table import table_of_bag
+
+        return table_of_bag(file)
     raw = _content(file)
-    if raw.startswith(_HDF5_SIGNATURE) or file.suffix.lower() in _HDF5_SUFFIXES:
+    source = f"{file.name}:{address}" if address else file.name
+    matlab = raw.startswith(_MATLAB_SIGNATURE)
+    if raw.startswith(_HDF5_SIGNATURE) or suffix in _HDF5_SUFFIXES or (matlab and _HDF5_SIGNATURE in raw[:4096]):
         from calib.formats.hdf5_table import table_of_hdf5  # brings h5py, which is slow to import
 
         return table_of_hdf5(file, raw, address)
-    if file.suffix.lower() in _JSON_SUFFIXES or _JSON_START.match(raw):
+    if matlab or suffix == ".mat":
+        from calib.formats.matlab_table import table_of_matlab
+
+        return table_of_matlab(source, raw, address)
+    if raw.startswith(_PARQUET_SIGNATURE):
+        from calib.formats.sheet_table import table_of_parquet
+
+        return table_of_parquet(file.name, raw)
+    if raw.startswith(_ZIP_SIGNATURE) and suffix in (".xlsx", ".xlsm"):
+        from calib.formats.sheet_table import table_of_sheet
+
+        return table_of_sheet(source, raw, address)
+    if raw.startswith(_TDMS_SIGNATURE):
+        from calib.formats.tdms_table import table_of_tdms
+
+        return table_of_tdms(source, raw, address)
+    for signature, what in _NOT_READ.items():
+        if raw.startswith(signature):
+            raise TraceError(f"{file.name}: {what}; export the record as CSV or .xlsx")
+    if suffix in _JSON_SUFFIXES or _JSON_START.match(raw):
         return table_of_json(file.name, raw)
     return table_of_csv(file.name, raw, decimal)
 
 
 def split_address(path: str | Path) -> tuple[Path, str]:
     """File and, for ``file.h5:/group``, the address in it; empty for none."""
-    found = _HDF5_ADDRESS.fullmatch(str(path))
+    found = _ADDRESS.fullmatch(str(path))
     if found is None or os.path.exists(path):
         return Path(path), ""
     return Path(found.group(1)), found.group(2).replace("\\", "/")

@@ -118,7 +118,7 @@ _NOT_OURS = (
 """Units of other quantities that stand in the headers of loggers and machines."""
 _BRACKETS_ONLY = frozenset(
     "A W J C F K L d l h ft tf bar bit bits day days d week step steps sample samples frame frames cycle cycles strain "
-    "digit digits tick ticks count counts pond hour mil".split()
+    "digit digits tick ticks count counts pond hour".split()
 )
 """Units that are names of their own after a blank or _: ``force_A`` may be that of sensor A, ``wrench_ft`` that of the
 force-torque sensor."""
@@ -204,7 +204,7 @@ _BRACKETED = re.compile(r"(.*?\S)[\s_]*[\[({<]\s*([^\[\](){}<>]{1,20}?)\s*[\])}>
 _SET_OFF = re.compile(r"(.*?\S)\s*(?:,|/|\bin\b)\s*([^\s,]{1,15})")
 _LAST_WORD = re.compile(r"(.*[^\s_])[\s_]+([^\s_]{1,15})")
 _NO_UNIT = re.compile(
-    r"[xyzXYZ]|\d+|raw|filtered|filt|corrected|primary|tared|max|min|mean|avg|average|abs|left|right|up|down|measured|actual|smoothed",
+    r"[xyzXYZ]|\d+|raw|filtered|filt|corrected|primary|tared|max|mean|avg|average|abs|left|right|up|down|measured|actual|smoothed",
     re.IGNORECASE,
 )
 """Words in brackets that are no units."""
@@ -218,7 +218,7 @@ def split_unit(name: str) -> NamedUnit:
     found = _BRACKETED.fullmatch(name)
     if found:
         stem, text = found.groups()
-        if _NO_UNIT.fullmatch(text) and not (text.lower() == "min" and re.search(r"time|^t$", stem, re.IGNORECASE)):
+        if _NO_UNIT.fullmatch(text) and not is_unit(text):
             return NamedUnit(name, "")
         return NamedUnit(stem, text, bracketed=True)
     for pattern in (_SET_OFF, _LAST_WORD):

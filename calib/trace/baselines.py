@@ -14,6 +14,9 @@ from calib.trace.trace import Trace
 CONSTANT, LINEAR, ZERO = "constant", "linear", "zero"
 BASELINES = (CONSTANT, LINEAR, ZERO)
 """What is subtracted from a force without an air run: the level before contact, the line through it, nothing."""
+RISING_PART, RISING_SD = 0.5, 3.0
+"""Slope of the force before contact over that after it [-], and over its standard uncertainty, from which on a record
+starts under load."""
 CLEAR_M = 1e-3
 """Height above that at contact from which on a knife that was raised is out of the food [m]."""
 
@@ -72,6 +75,31 @@ def drift_of(trace: Trace, force: np.ndarray, contact: ContactOnset) -> Drift:
     slope = (after.level - base.level) / (late - middle)
     own = float(np.hypot(_level_noise(base), _level_noise(after)))
     return Drift(float(slope), own / (late - middle), middle, True)
+
+
+def check_approach(trace: Trace, force: np.ndarray, contact: ContactOnset) -> None:
+    """Refuse a record that starts under load: what would be its baseline rises as the force does after contact.
+
+    Args:
+        trace: The cut.
+        force: Its force [N], shape (n,).
+        contact: Its contact.
+
+    Raises:
+        TraceError: It is so.
+    """
+    before = int(np.searchsorted(trace.time, contact.onset))
+    if before < MIN_BASELINE:
+        return
+    base = estimate_baseline(trace.time, force, 0, before)
+    top = before + int(np.argmax(force[before:] >= base.level + 0.9 * contact.peak))
+    rise = contact.peak / max(float(trace.time[top]) - contact.onset, trace.dt)
+    if base.slope > RISING_PART * rise and base.slope > RISING_SD * base.slope_sd:
+        raise TraceError(
+            f"{trace.source}: the force rises by {base.slope:.3g} N/s from the first sample on, and by {rise:.3g} N/s "
+            f"after what looks like contact at {contact.onset:.4g} s: the record starts under load; keep the approach "
+            "of the knife in the record, or say --baseline zero if it starts at the trigger of a zeroed machine"
+        )
 
 
 def _level_noise(base: Baseline) -> float:

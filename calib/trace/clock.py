@@ -11,6 +11,7 @@ from calib.io.wording import LONG, brief, quoted
 from calib.table.table import Table
 from calib.table.units import SI_OF_ROLE
 from calib.trace.columns import Column
+from calib.trace.names import COUNTERS, stem_of
 
 SLOWEST_S, FASTEST_S = 0.5, 2e-5
 """Median sampling intervals outside are taken for a unit mix-up [s]: a clock of a kilohertz in milliseconds read as
@@ -230,9 +231,10 @@ def _check_rate(table: Table, time: Column, t: np.ndarray, raw: np.ndarray) -> N
         factor = 10.0 ** round(np.log10(abs(time.factor)))
         finer = next((f for f in _PREFIXES if f < factor and median * f / factor < SLOWEST_S), None)
         counts = raw / time.factor
-        counter = (
-            "" if np.any(np.abs(np.diff(counts) - 1.0) > 1e-6) else ", or counts rows: give their rate with --rate"
-        )
+        counting = bool(np.all(counts == np.round(counts)) and np.median(np.diff(counts)) == 1.0)
+        if counting and stem_of(time.name) in COUNTERS:
+            raise TraceError(f"{where}; it counts rows: give their rate in Hz with --rate")
+        counter = ", or counts rows: give their rate with --rate" if counting else ""
         if finer is None:
             raise TraceError(f"{where}, less than {1 / SLOWEST_S:g} a second; check the unit of the column{counter}")
         name = quoted(f"{brief(time.name)}={_SHORT[finer]}")

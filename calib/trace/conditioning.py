@@ -10,7 +10,7 @@ import numpy as np
 from calib.errors import TraceError
 from calib.io.wording import quoted
 from calib.table.table import RECONSTRUCTED
-from calib.trace.baselines import BASELINES, CONSTANT, LINEAR, ZERO, Drift, drift_of, trigger_contact
+from calib.trace.baselines import BASELINES, CONSTANT, LINEAR, ZERO, Drift, check_approach, drift_of, trigger_contact
 from calib.trace.contact_onset import FLOOR_FRACTION, SUSTAIN, ContactOnset, find_contact_onset
 from calib.trace.cuts import single_cut
 from calib.trace.filters import FILTER_SD_M, N_STROKE, leading_grid, resample, smooth
@@ -194,6 +194,7 @@ def _contact(
         return force, trigger_contact(trace, force), None
     contact = find_contact_onset(trace.time[: last + 1], force[: last + 1], source=trace.source)
     if baseline != LINEAR:
+        check_approach(trace, force, contact)
         return force, contact, None
     drift = drift_of(trace, force, contact)
     force = drift.removed(trace.time, force)
