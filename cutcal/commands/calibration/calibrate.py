@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from calib.multi_specimen.result import HeldOutCut, InSampleCut, StudyResult
 
 MEASUREMENT = "measurement"  # title of the group of options that say what was measured
+CHECK_HELP = "say how the trace is read (and draw it), then end"
 BASELINE_HELP = f"of a force without --air: {', '.join(BASELINES)}"
 HELP = "fit a food to a measured knife-force trace, and report"
 DESCRIPTION = """Fit a food to a knife-force trace. Exit: 0 passed, 1 error, 2 did not pass."""
@@ -67,7 +68,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     fit.add_argument("--sample", action="store_true", help="sample the posterior as well (needs emcee)")
     fit.add_argument("--u-num", metavar="DIR", help="a converge study whose uncertainty the fit heeds")
     add_workers(p, "simulations")
-    titled(p, RUN).add_argument("--check", action="store_true", help="say how the trace is read, and simulate nothing")
+    titled(p, RUN).add_argument("--check", nargs="?", const="", metavar="PNG", help=CHECK_HELP)
     titled(p, RUN).add_argument("--resume", action="store_true", help=RESUME_HELP)
     add_run(p)
 
@@ -89,6 +90,17 @@ def add_trace(p: argparse.ArgumentParser, *, required: bool = True) -> None:
     g.add_argument("--baseline", choices=BASELINES, default=CONSTANT, metavar="KIND", help=BASELINE_HELP)
     g.add_argument("--cut", type=cut_number, metavar="N", help="which of several cuts in the file ('whole': it is one)")
     g.add_argument("--t-end", type=float, metavar="S", help="leave out what is later [s] (board contact)")
+
+
+def picture_of(text: str) -> Path | None:
+    """The file into which ``--check`` draws, None where none is named.
+
+    Raises:
+        CutcalError: It is no PNG.
+    """
+    if text and not text.lower().endswith(".png"):
+        raise CutcalError(f"--check {text}: the picture of the record is a PNG; name a file such as record.png")
+    return Path(text) if text else None
 
 
 def cut_number(text: str) -> int | str:
@@ -169,8 +181,8 @@ def run(args: argparse.Namespace) -> int:
         if args.cut is not None:
             raise CutcalError("--all beside --cut; give one of them")
         return run_cuts(args, study_of_cuts(request))
-    if args.check:
-        print(description(request))
+    if args.check is not None:
+        print(description(request, picture_of(args.check)))
         return 0
     out = Path(args.out or f"cutcal-{request.food.name}-{request.stem}")
 
@@ -187,7 +199,7 @@ def run_study(args: argparse.Namespace, command: Sequence[str]) -> int:
     """Fit and predict the cuts of a study; prints its table, or the summary as JSON."""
     from calib.multi_specimen.study_file import read_study
 
-    if args.check:
+    if args.check is not None:
         raise CutcalError("--check is for one trace: give --food and --trace, and leave --config out")
     taken = [n for n in ("food", "trace", "air", "material", "fit") if getattr(args, n) is not None]
     if taken:
@@ -198,8 +210,11 @@ def run_study(args: argparse.Namespace, command: Sequence[str]) -> int:
 
 def run_cuts(args: argparse.Namespace, study: StudySpec) -> int:
     """Fit all cuts of one record together, or say how each of them is read."""
-    if args.check:
-        print("\n\n".join(f"{name}\n{description(request)}" for name, request in study.requests.items()))
+    if args.check is not None:
+        png = picture_of(args.check)
+        pictures = {name: png and png.with_stem(f"{png.stem}-{name}") for name in study.requests}
+        said = {name: description(request, pictures[name]) for name, request in study.requests.items()}
+        print("\n\n".join(f"{name}\n{text}" for name, text in said.items()))
         return 0
     return fit_study(args, study, Path(args.out or f"cutcal-{study.food.name}-{study.first.stem}"))
 
