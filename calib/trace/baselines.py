@@ -17,6 +17,8 @@ BASELINES = (CONSTANT, LINEAR, ZERO)
 RISING_PART, RISING_SD = 0.5, 3.0
 """Slope of the force before contact over that after it [-], and over its standard uncertainty, from which on a record
 starts under load."""
+UNTOLD_PART = 0.2
+"""Standard uncertainty of the slope before contact, over the slope after it, from which on it tells nothing [-]."""
 CLEAR_M = 1e-3
 """Height above that at contact from which on a knife that was raised is out of the food [m]."""
 
@@ -65,7 +67,10 @@ def drift_of(trace: Trace, force: np.ndarray, contact: ContactOnset) -> Drift:
     Returns:
         The drift. Between two levels it is certain to their noise; from that before contact alone it is carried on.
     """
-    base = contact.baseline
+    base = estimate_baseline(trace.time, force, contact.baseline.start, contact.baseline.stop)
+    whole = estimate_baseline(trace.time, force, 0, contact.baseline.stop)
+    if whole.slope_sd < base.slope_sd:
+        base = whole
     middle = float(trace.time[base.start : base.stop].mean())
     out = _out_of_the_food(trace, contact)
     if len(out) < MIN_BASELINE:
@@ -77,7 +82,7 @@ def drift_of(trace: Trace, force: np.ndarray, contact: ContactOnset) -> Drift:
     return Drift(float(slope), own / (late - middle), middle, True)
 
 
-def check_approach(trace: Trace, force: np.ndarray, contact: ContactOnset) -> None:
+def check_approach(trace: Trace, force: np.ndarray, contact: ContactOnset) -> list[str]:
     """Refuse a record that starts under load: what would be its baseline rises as the force does after contact.
 
     Args:
@@ -85,12 +90,15 @@ def check_approach(trace: Trace, force: np.ndarray, contact: ContactOnset) -> No
         force: Its force [N], shape (n,).
         contact: Its contact.
 
+    Returns:
+        One sentence where too few samples are before contact to tell.
+
     Raises:
         TraceError: It is so.
     """
     before = int(np.searchsorted(trace.time, contact.onset))
     if before < MIN_BASELINE:
-        return
+        return []
     base = estimate_baseline(trace.time, force, 0, before)
     top = before + int(np.argmax(force[before:] >= base.level + 0.9 * contact.peak))
     rise = contact.peak / max(float(trace.time[top]) - contact.onset, trace.dt)
@@ -100,6 +108,12 @@ def check_approach(trace: Trace, force: np.ndarray, contact: ContactOnset) -> No
             f"after what looks like contact at {contact.onset:.4g} s: the record starts under load; keep the approach "
             "of the knife in the record, or say --baseline zero if it starts at the trigger of a zeroed machine"
         )
+    if base.slope_sd <= UNTOLD_PART * rise:
+        return []
+    return [
+        f"{trace.source}: {before} samples before contact at {contact.onset:.4g} s do not tell whether the force is "
+        "level there or the record starts under load, which would make the peak too low"
+    ]
 
 
 def _level_noise(base: Baseline) -> float:

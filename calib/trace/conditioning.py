@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from calib.errors import TraceError
 from calib.io.wording import quoted
 from calib.table.table import RECONSTRUCTED
 from calib.trace.baselines import BASELINES, CONSTANT, LINEAR, ZERO, Drift, check_approach, drift_of, trigger_contact
-from calib.trace.contact_onset import FLOOR_FRACTION, SUSTAIN, ContactOnset, find_contact_onset
+from calib.trace.contact_onset import FLOOR_FRACTION, SUSTAIN, ContactOnset, estimate_baseline, find_contact_onset
 from calib.trace.cuts import single_cut
 from calib.trace.filters import FILTER_SD_M, N_STROKE, leading_grid, resample, smooth
 from calib.trace.mending import mended
@@ -30,6 +30,8 @@ DRIFT_REACH = 10.0
 the cut."""
 DRIFT_SIGNIFICANCE = 3.0
 """Standard uncertainties by which a drift must differ from zero to be warned about."""
+DRIFT_ROUNDS = 2
+"""Times that drift and contact are found from each other: a drift that is not removed is taken for contact early."""
 PEAK_RANGE_N = (0.05, 5e3)
 """Peak forces outside are taken for a unit mix-up [N]."""
 NOTHING_N = 1e-6
@@ -131,6 +133,7 @@ def condition(
     last = end_of_descent(trace)
     _check_record(trace, force, last)
     force, contact, drift = _contact(trace, force, last, baseline)
+    approach = check_approach(trace, force, contact) if baseline == CONSTANT else []
     level = contact.baseline
     tared = force - level.level
     axis = stroke_axis(trace, tared, contact, last=last, speed=speed, height=height)
@@ -147,7 +150,7 @@ def condition(
     level_sd = _root_sum(level.level_sd, mend.level_sd, 0.0 if air_mend is None else air_mend.level_sd)
     at_peak = contact.onset + (end_s - contact.onset) * float(grid[int(np.argmax(curve))]) / length
     drift_sd = 0.0 if drift is None else drift.sd(at_peak)
-    said = (*mend.notes, *(() if air_mend is None else air_mend.notes), *held.notes)
+    said = (*approach, *mend.notes, *(() if air_mend is None else air_mend.notes), *held.notes)
     removed = () if drift is None else (drift.note(trace.source, end_s),)
     return Conditioned(
         trace=trace,
@@ -194,11 +197,12 @@ def _contact(
         return force, trigger_contact(trace, force), None
     contact = find_contact_onset(trace.time[: last + 1], force[: last + 1], source=trace.source)
     if baseline != LINEAR:
-        check_approach(trace, force, contact)
         return force, contact, None
-    drift = drift_of(trace, force, contact)
-    force = drift.removed(trace.time, force)
-    return force, find_contact_onset(trace.time[: last + 1], force[: last + 1], source=trace.source), drift
+    for _ in range(DRIFT_ROUNDS):
+        drift = drift_of(trace, force, contact)
+        level = drift.removed(trace.time, force)
+        contact = find_contact_onset(trace.time[: last + 1], level[: last + 1], source=trace.source)
+    return level, contact, drift
 
 
 def _check_options(trace: Trace, speed: float | None, height: float | None, baseline: str, air: Trace | None) -> None:
@@ -300,6 +304,9 @@ def _air_warnings(trace: Trace, air: Trace, onset: float) -> list[str]:
 def _drift_warnings(trace: Trace, force: np.ndarray, contact: ContactOnset, end: float) -> list[str]:
     """A constant baseline that the force before contact contradicts."""
     base = contact.baseline
+    whole = estimate_baseline(trace.time, force, 0, base.stop)
+    if whole.slope_sd < base.slope_sd:  # a drift is taken for contact early, which leaves a short window
+        base = replace(base, slope=whole.slope, slope_sd=whole.slope_sd, start=0)
     found = []
     drift = base.slope * (end - contact.onset)
     told = end - contact.onset < DRIFT_REACH * (trace.time[base.stop - 1] - trace.time[base.start])
@@ -307,7 +314,8 @@ def _drift_warnings(trace: Trace, force: np.ndarray, contact: ContactOnset, end:
     if told and significant and abs(drift) > DRIFT_FRACTION * contact.peak:
         found.append(
             f"the baseline drifts by {base.slope:.3g} N/s before contact, {drift:.2g} N over the cut "
-            f"({abs(drift) / contact.peak:.1%} of the peak); it was not removed: give an air run with --air"
+            f"({abs(drift) / contact.peak:.1%} of the peak); it was not removed: give an air run "
+            "with --air, or say --baseline linear"
         )
     first = force[: max(SUSTAIN, base.stop // 10)]
     moved = base.level - float(np.median(first))

@@ -13,7 +13,7 @@ from calib.trace.trace import Trace
 
 WHOLE = "whole"
 """Says that a record is one cut although its force is released in it."""
-PRESSED, RELEASED = 0.5, 0.15
+PRESSED, RELEASED = 0.2, 0.08
 """Parts of the largest force above which a knife cuts, and below which it is released [-]."""
 RAISED = 0.5
 """Part of the position's range by which a knife goes up again between two cuts [-]."""
@@ -116,10 +116,10 @@ def _released(force: np.ndarray) -> list[int]:
             stretches[-1][1] = i
         elif x < RELEASED * top:
             pressed = False
-    marks, longest = [], max((b - a for a, b in stretches), default=0)
-    for (_, end), (begin, _) in zip(stretches[:-1], stretches[1:], strict=True):
+    marks = []
+    for (start, end), (begin, stop) in zip(stretches[:-1], stretches[1:], strict=True):
         low = np.flatnonzero(loads[end:begin] < RELEASED * top)
-        if len(low) >= max(REST * longest, 5):
+        if len(low) >= max(REST * min(end - start, stop - begin), 5):
             marks.append(end + int(low[0] + low[-1]) // 2)
     return marks
 
