@@ -304,9 +304,10 @@ def _air_warnings(trace: Trace, air: Trace, onset: float) -> list[str]:
 def _drift_warnings(trace: Trace, force: np.ndarray, contact: ContactOnset, end: float) -> list[str]:
     """A constant baseline that the force before contact contradicts."""
     base = contact.baseline
-    whole = estimate_baseline(trace.time, force, 0, base.stop)
+    before = max(int(np.searchsorted(trace.time, contact.onset)), base.stop)
+    whole = estimate_baseline(trace.time, force, 0, before)
     if whole.slope_sd < base.slope_sd:  # a drift is taken for contact early, which leaves a short window
-        base = replace(base, slope=whole.slope, slope_sd=whole.slope_sd, start=0)
+        base = replace(base, slope=whole.slope, slope_sd=whole.slope_sd, start=0, stop=whole.stop)
     found = []
     drift = base.slope * (end - contact.onset)
     told = end - contact.onset < DRIFT_REACH * (trace.time[base.stop - 1] - trace.time[base.start])

@@ -13,8 +13,12 @@ from calib.trace.trace import Trace
 
 WHOLE = "whole"
 """Says that a record is one cut although its force is released in it."""
-PRESSED, RELEASED = 0.2, 0.08
-"""Parts of the largest force above which a knife cuts, and below which it is released [-]."""
+PRESSED = 0.5
+"""Part of the largest force from which on a knife that comes down is under load [-]."""
+TOUCHED, RELEASED = 0.12, 0.06
+"""Parts of the largest force above which a knife may cut, and below which it is released, by the force alone [-]."""
+AS_LONG = 0.3
+"""Part of the longest load's time that a load lasts to be a cut: skin that gives way and a start are shorter."""
 RAISED = 0.5
 """Part of the position's range by which a knife goes up again between two cuts [-]."""
 CLEAR_SD = 10.0
@@ -102,26 +106,33 @@ def _smooth(force: np.ndarray) -> np.ndarray:
 
 def _released(force: np.ndarray) -> list[int]:
     """Where the force is released between two loads, by the force alone."""
-    loads = np.abs(_smooth(force) - _level(force))
-    top = float(np.percentile(loads, 99.5))
+    away = _smooth(force) - _level(force)
+    low, top = np.percentile(away, (0.5, 99.5))
+    loads, top = (away, float(top)) if top >= -low else (-away, -float(low))
     if top < CLEAR_SD * noise_of(force):
         return []
-    stretches: list[list[int]] = []
+    stretches = _stretches(loads, TOUCHED * top, RELEASED * top)
+    longest = max((b - a for a, b in stretches), default=0)
+    cuts = [(a, b) for a, b in stretches if b - a >= AS_LONG * longest]
+    marks = []
+    for (start, end), (begin, stop) in zip(cuts[:-1], cuts[1:], strict=True):
+        free = end + np.flatnonzero(loads[end:begin] < RELEASED * top)
+        if len(free) >= max(REST * min(end - start, stop - begin), 5):
+            marks.append(int(free[0] + free[-1]) // 2)
+    return marks
+
+
+def _stretches(loads: np.ndarray, high: float, low: float) -> list[tuple[int, int]]:
+    """First and last sample above ``high`` of each stretch that does not go below ``low``."""
+    found: list[tuple[int, int]] = []
     pressed = False
     for i, x in enumerate(loads):
-        if x > PRESSED * top:
-            if not pressed:
-                stretches.append([i, i])
+        if x > high:
+            found = [*found[:-1], (found[-1][0], i)] if pressed else [*found, (i, i)]
             pressed = True
-            stretches[-1][1] = i
-        elif x < RELEASED * top:
+        elif x < low:
             pressed = False
-    marks = []
-    for (start, end), (begin, stop) in zip(stretches[:-1], stretches[1:], strict=True):
-        low = np.flatnonzero(loads[end:begin] < RELEASED * top)
-        if len(low) >= max(REST * min(end - start, stop - begin), 5):
-            marks.append(end + int(low[0] + low[-1]) // 2)
-    return marks
+    return found
 
 
 def _raised(force: np.ndarray, position: np.ndarray) -> list[int]:

@@ -211,7 +211,7 @@ def test_a_drift_is_removed_on_request() -> None:
     ends = Trace(CUT.time[down], drifting().force[down], CUT.height[down], "made.csv", "", {"force": "force_N"})
     ahead = condition(ends, baseline="linear")
     noted(ahead, "measured before contact, and carried on over the cut")
-    assert abs(ahead.peak_N - TRUE.peak_N) < 3.0 * ahead.peak_sd_N and ahead.peak_sd_N > 1.5 * both.peak_sd_N
+    assert abs(ahead.peak_N - TRUE.peak_N) < 3.0 * ahead.peak_sd_N and ahead.peak_sd_N > TRUE.peak_sd_N
     drift = next(n for n in nuisances(ahead, sensor_of(ahead, 0.0, None)[0]) if n.name == "drift")
     assert drift.sd == pytest.approx(ahead.drift_sd_N_per_s * (ahead.end_s - ahead.onset_s), rel=1e-9)
     with pytest.raises(TraceError, match="--baseline linear beside --air"):
