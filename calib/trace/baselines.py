@@ -72,7 +72,7 @@ def drift_of(trace: Trace, force: np.ndarray, contact: ContactOnset) -> Drift:
     if whole.slope_sd < base.slope_sd:
         base = whole
     middle = float(trace.time[base.start : base.stop].mean())
-    out = _out_of_the_food(trace, contact)
+    out = out_of_the_food(trace, contact)
     if len(out) < MIN_BASELINE:
         return Drift(base.slope, base.slope_sd, middle, False)
     after = estimate_baseline(trace.time, force, int(out[0]), int(out[-1]) + 1)
@@ -121,8 +121,16 @@ def _level_noise(base: Baseline) -> float:
     return base.noise_sd * float(np.sqrt(0.5 * np.pi * base.inflation / max(base.stop - base.start, 1)))
 
 
-def _out_of_the_food(trace: Trace, contact: ContactOnset) -> np.ndarray:
-    """Samples at the end of the record in which the knife is above the height of contact."""
+def out_of_the_food(trace: Trace, contact: ContactOnset) -> np.ndarray:
+    """Samples at the end of the record in which the knife is above the height of contact.
+
+    Args:
+        trace: The cut.
+        contact: Its contact.
+
+    Returns:
+        Their indices, none without a position.
+    """
     if trace.position is None:
         return np.empty(0, dtype=int)
     height = float(np.interp(contact.onset, trace.time, trace.position))

@@ -10,13 +10,24 @@ import numpy as np
 from calib.errors import TraceError
 from calib.io.wording import quoted
 from calib.table.table import RECONSTRUCTED
-from calib.trace.baselines import BASELINES, CONSTANT, LINEAR, ZERO, Drift, check_approach, drift_of, trigger_contact
+from calib.trace.baselines import (
+    BASELINES,
+    CONSTANT,
+    LINEAR,
+    ZERO,
+    Drift,
+    check_approach,
+    drift_of,
+    out_of_the_food,
+    trigger_contact,
+)
 from calib.trace.contact_onset import FLOOR_FRACTION, SUSTAIN, ContactOnset, estimate_baseline, find_contact_onset
 from calib.trace.cuts import single_cut
 from calib.trace.filters import FILTER_SD_M, N_STROKE, leading_grid, resample, smooth
 from calib.trace.mending import mended
 from calib.trace.missing import held_samples
 from calib.trace.stroke import DWELL_M, board_warnings, end_of_descent, ending_at_board, stroke_axis
+from calib.trace.sudden import sudden_changes
 from calib.trace.trace import MIN_SAMPLES, Trace
 
 AIR_SLACK_SAMPLES = 3
@@ -140,6 +151,8 @@ def condition(
     if board is not None:
         axis = ending_at_board(axis, board, trace.source)
     held = held_samples(trace, tared, axis.stroke, axis.end, level.noise_sd)
+    into, deep = (int(np.searchsorted(trace.time, contact.onset)), int(np.argmax(axis.stroke >= axis.end * (1 - 1e-9))))
+    sudden = sudden_changes(trace, tared, (into, deep), out_of_the_food(trace, contact), held.sound)
     grid, curve = _on_grid(trace.time, axis.stroke, tared, (contact.onset, axis.end), held.sound)
     length = float(grid[-1])
     samples = int(np.count_nonzero((axis.stroke >= 0.0) & (axis.stroke <= length)))
@@ -150,7 +163,7 @@ def condition(
     level_sd = _root_sum(level.level_sd, mend.level_sd, 0.0 if air_mend is None else air_mend.level_sd)
     at_peak = contact.onset + (end_s - contact.onset) * float(grid[int(np.argmax(curve))]) / length
     drift_sd = 0.0 if drift is None else drift.sd(at_peak)
-    said = (*approach, *mend.notes, *(() if air_mend is None else air_mend.notes), *held.notes)
+    said = (*approach, *mend.notes, *(() if air_mend is None else air_mend.notes), *sudden, *held.notes)
     removed = () if drift is None else (drift.note(trace.source, end_s),)
     return Conditioned(
         trace=trace,

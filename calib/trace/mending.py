@@ -63,11 +63,15 @@ def mended(trace: Trace) -> Mended:
     Raises:
         TraceError: So many values stand out that nothing is left of the record.
     """
-    force, spikes = _without_spikes(trace)
+    force, spikes = _without_spikes(trace, trace.force, "force")
+    position = trace.position
+    lost: list[str] = []
+    if position is not None:
+        position, lost = _without_spikes(trace, position, "position")
     force, level_sd, steps = _without_steps(replace(trace, force=force))
-    if not spikes and not steps:
+    if not spikes and not steps and not lost:
         return Mended(trace)
-    return Mended(replace(trace, force=force), level_sd, (*spikes, *steps))
+    return Mended(replace(trace, force=force, position=position), level_sd, (*spikes, *lost, *steps))
 
 
 def noise_of(force: np.ndarray) -> float:
@@ -82,14 +86,13 @@ def usual_range(force: np.ndarray) -> float:
     return float(high - low)
 
 
-def _place(trace: Trace, i: int) -> str:
-    return f"{trace.source}, {trace.where(i)}, column {brief(trace.columns.get('force', 'force'), LONG)}"
+def _place(trace: Trace, i: int, role: str = "force") -> str:
+    return f"{trace.source}, {trace.where(i)}, column {brief(trace.columns.get(role, role), LONG)}"
 
 
-def _without_spikes(trace: Trace) -> tuple[np.ndarray, list[str]]:
-    """The force without values that stand out alone, and what was done."""
-    force = trace.force
-    n = len(force)
+def _without_spikes(trace: Trace, force: np.ndarray, role: str) -> tuple[np.ndarray, list[str]]:
+    """The force, or the position, without values that stand out alone, and what was done."""
+    n, unit = len(force), {"force": "N", "position": "m"}[role]
     limit = max(SPIKE_SD * noise_of(force), SPIKE_PART * usual_range(force), 1e-9)
     out, count = force.copy(), 0
     notes: list[str] = []
@@ -106,8 +109,8 @@ def _without_spikes(trace: Trace) -> tuple[np.ndarray, list[str]]:
         if len(notes) < 3:
             many = f", and {length - 1} after it," if length > 1 else ""
             notes.append(
-                f"{_place(trace, i)}: {value:.4g} N{many} stands out alone from its neighbours; it was replaced by the "
-                "line between them"
+                f"{_place(trace, i, role)}: {value:.4g} {unit}{many} stands out alone from its neighbours; it was "
+                "replaced by the line between them"
             )
         i += length
     if count > max(SPIKE_SAMPLES, MOST_SPIKES * n):

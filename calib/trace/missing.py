@@ -16,6 +16,10 @@ HIDDEN_PEAK = 0.03
 """Part of the peak by which the force may exceed it where samples are missing; beyond it the record is refused."""
 SIDE = 8
 """Samples on each side of a gap from which the force is carried on into it."""
+LARGEST_GAP = 0.25
+"""Part of the stroke from which on samples that are missing are too many."""
+LOST_SD = 8.0
+"""Noise standard deviations by which the first value of a frozen force is away from the one before it to be none."""
 COARSE = 2e-3
 """Part of the peak from which on the steps in which a force counts are told."""
 
@@ -84,8 +88,10 @@ def held_samples(trace: Trace, tared: np.ndarray, stroke: np.ndarray, end: float
                 _stands(trace, place, "the sensor is clipped there and the peak is higher")
                 + "; record with a larger range, or end the cut before it with --t-end"
             )
-        sound[place.first + 1 : place.last + 1] = False
-        gaps.append(_Gap(place.first, min(place.last + 1, len(tared) - 1), "the force is frozen"))
+        lost = place.first > 0 and abs(trace.force[place.first] - trace.force[place.first - 1]) > LOST_SD * noise
+        before = place.first - 1 if lost else place.first  # a sensor that falls out shows no value of before
+        sound[before + 1 : place.last + 1] = False
+        gaps.append(_Gap(before, min(place.last + 1, len(tared) - 1), "the force is frozen"))
     peak_sd = 0.0
     for gap in sorted(gaps, key=lambda gap: gap.before):
         above, note = _bridged(trace, tared, stroke, (end, peak, noise), gap)
@@ -146,6 +152,11 @@ def _bridged(
             f"{where}: {gap.why} for {trace.time[j] - trace.time[i]:.3g} s, {length:.3g} mm of the cut, and the "
             f"force may reach {high:.3g} N there, where the largest that was recorded is {peak:.3g} N; record the "
             "cut again, or end it before with --t-end"
+        )
+    if stroke[j] - stroke[i] > LARGEST_GAP * end:
+        raise TraceError(
+            f"{where}: {gap.why} for {trace.time[j] - trace.time[i]:.3g} s, {length:.3g} mm of {1e3 * end:.3g} mm of "
+            "the cut, unless the clock has jumped; record the cut again, or name a position with --position-col"
         )
     said = (
         f"{where}: {gap.why} for {trace.time[j] - trace.time[i]:.3g} s, {length:.3g} mm of the cut; a line bridges it"

@@ -83,6 +83,21 @@ def _tare(cut: Cut, rng: np.random.Generator) -> Cut:
     return cut.but(force=np.where(np.arange(640) < rng.integers(30, 180), cut.force, cut.force - level))
 
 
+def _shift(cut: Cut, rng: np.random.Generator) -> Cut:
+    i = _index(rng, 0.35, 0.78)
+    moved = cut.force - (cut.force[i] if rng.random() < 0.5 else rng.choice([-6.0, -3.0, 3.0, 6.0]))
+    return cut.but(force=np.where(np.arange(640) < i, cut.force, moved))
+
+
+def _lost_place(cut: Cut, rng: np.random.Generator) -> Cut:
+    return cut.but(height=np.where(np.arange(640) == _index(rng), rng.choice([0.0, 1.0, -0.2]), cut.height))
+
+
+def _fallen_out(cut: Cut, rng: np.random.Generator) -> Cut:
+    i = _index(rng)
+    return cut.but(force=np.where((np.arange(640) >= i) & (np.arange(640) < i + rng.integers(8, 80)), 0.0, cut.force))
+
+
 def _drift(cut: Cut, rng: np.random.Generator) -> Cut:
     return cut.but(force=cut.force + rng.uniform(-1.0, 1.0) * cut.time)
 
@@ -127,7 +142,7 @@ def _board(cut: Cut, rng: np.random.Generator) -> Cut:
 
 FAULTS: tuple[Fault, ...] = (
     _nothing, _spike, _gap, _clipped, _frozen, _tare, _drift, _coarse, _jump, _jump_back, _slow_clock, _twice, _again,
-    _trigger, _board,
+    _trigger, _board, _shift, _lost_place, _fallen_out,
 )  # fmt: skip
 
 

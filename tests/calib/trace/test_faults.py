@@ -118,6 +118,57 @@ def test_missing_samples_elsewhere_are_bridged(tmp_path: Path, start: float, sto
     noted(done, r"row \d+ \(.* s\) to row \d+ \(.* s\): no samples were written for 0\.\d+ s")
 
 
+@pytest.mark.parametrize("shift", [None, -5.0, 4.0])
+def test_a_level_that_moves_within_the_cut_is_refused(tmp_path: Path, shift: float | None) -> None:
+    """A sensor that is zeroed under load, or knocked, shows it behind the cut, or by a zero that was not its level."""
+    moved = CUT.force - CUT.force[300] if shift is None else CUT.force + shift
+    force = np.where(np.arange(640) < 300, CUT.force, moved)
+    with pytest.raises(
+        TraceError, match=r"row 302 \(1.5 s\), column force_N: the force changes by .* N from one sample"
+    ):
+        condition(written(tmp_path, CUT.but(force=force)))
+    if shift is None:  # also where the record ends under load
+        with pytest.raises(TraceError, match="the sensor was zeroed or moved there"):
+            condition(written(tmp_path, CUT.but(force=force), CUT.time <= 2.59))
+
+
+def test_food_that_breaks_is_only_said() -> None:
+    """A fall within one sample, after which the force goes on and the level behind the cut is the old one."""
+    inside = (CUT.time > 1.6) & (CUT.time < 2.6)
+    done = condition(CUT.but(force=CUT.force - 3.0 * inside).trace())
+    noted(
+        done,
+        r"sample 321 \(1.605 s\), column force_N: the force changes by -2.* N from one sample .*: food that breaks",
+    )
+
+
+@pytest.mark.parametrize("value", [0.0, 9.0, -1.0])
+def test_a_position_that_stands_out_alone_is_replaced(tmp_path: Path, value: float) -> None:
+    """A lost sample of the robot's state would be the lowest point of the way otherwise."""
+    done = condition(written(tmp_path, CUT.but(height=np.where(np.arange(640) == 250, value, CUT.height))))
+    as_before(done)
+    assert done.stroke_length_m == pytest.approx(TRUE.stroke_length_m, abs=1e-4)
+    noted(done, rf"row 252 \(1.25 s\), column position_m: {value:g} m stands out alone")
+
+
+def test_a_sensor_that_falls_out_shows_nothing_of_the_force(tmp_path: Path) -> None:
+    """Zeros on end are no measurements, the first of them neither."""
+    done = condition(written(tmp_path, CUT.but(force=np.where(at(1.3, 1.4), 0.0, CUT.force))))
+    as_before(done)
+    noted(done, r"row 261 .* to row 283 .*: the force is frozen")
+    with pytest.raises(TraceError, match=r"row 361 .*the force is frozen for .* and the force may reach"):
+        condition(written(tmp_path, CUT.but(force=np.where(at(1.8, 2.25), 0.0, CUT.force))))
+
+
+def test_a_clock_that_jumps_ahead_without_a_position_is_refused() -> None:
+    """At a constant speed the time that was not would be a way that was not."""
+    time = np.where(CUT.time > 1.5, CUT.time + 3.0, CUT.time)
+    with pytest.raises(
+        TraceError, match="no samples were written for 3 s.* mm of the cut, unless the clock has jumped"
+    ):
+        condition(Trace(time, CUT.force, None, "made.csv", "", {"force": "force_N"}), speed=0.02)
+
+
 def test_a_clipped_force_is_refused(tmp_path: Path) -> None:
     """The largest values are one constant: so is the peak's lower bound, and no more is known."""
     for limit in (9.0, 13.0):
