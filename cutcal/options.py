@@ -15,7 +15,7 @@ from calib.material.scene import MID_LENGTH, Sizing
 from calib.simulation.dask_cluster import Cluster
 from calib.simulation.process_pool import Pool
 from calib.simulation.workers import Workers
-from calib.trace.units import metres
+from calib.table.units import metres
 from mpm.runtime import ARCHES
 from mpm.scene.errors import CutcalError
 from mpm.scene.shapes import SHAPE_KINDS
@@ -23,7 +23,7 @@ from mpm.scene.shapes import SHAPE_KINDS
 Group: TypeAlias = argparse._ActionsContainer
 """A parser, or a group of its options."""
 RUN = "run"  # title of the group of options that say where and how
-RESUME_HELP = "go on with the run in --out; nothing is simulated twice"
+RESUME_HELP = "go on with the run in --out; nothing is run twice"
 KNIFE_HELP = "knife of knives.yaml, or a YAML file (default kitchen)"
 LOCAL_WORKERS = 2  # simulations at a time on this machine: a process each
 

@@ -57,7 +57,8 @@ class Conditioning:
     Attributes:
         baseline_N: Force before contact that was subtracted [N].
         baseline_sd_N: Its standard deviation [N].
-        baseline_kind: What was subtracted: a constant, or the air run at equal time.
+        baseline_kind: What was subtracted: a constant, the line through the force before contact, nothing, or the air
+            run at equal time.
         onset_s: Time of first contact [s].
         onset_sd_s: Its standard deviation [s].
         end_s: Time at which the cut ends [s].
@@ -71,7 +72,7 @@ class Conditioning:
 
     baseline_N: float
     baseline_sd_N: Annotated[NotNegative | None, ALWAYS]
-    baseline_kind: Annotated[str, one_of("constant", "air")]
+    baseline_kind: Annotated[str, one_of("constant", "linear", "zero", "air")]
     onset_s: float
     onset_sd_s: Annotated[NotNegative | None, ALWAYS]
     end_s: float

@@ -10,11 +10,13 @@ from typing import Annotated
 import numpy as np
 
 from calib.errors import CurveError, TraceError
+from calib.formats.reader import read_table
 from calib.io.type_schema import Shared
+from calib.io.wording import brief
+from calib.table.table import Table
 from calib.trace.columns import candidates, choose, numbers
-from calib.trace.reader import read_table
-from calib.trace.table import Table
-from calib.trace.trace import MIN_SAMPLES
+from calib.trace.names import stem_of
+from calib.trace.recorded import MIN_SAMPLES, parse_sign
 from mpm.arrays import FloatArray
 from mpm.scene.shapes import Shape, volume
 
@@ -22,8 +24,10 @@ STRAIN_STEP = 0.001
 """Step of the common strain grid, about [-]."""
 SMALL_STRAIN = 0.05
 """Strain up to which the slope of the stress is the small-strain modulus [-]: the window of published moduli."""
-REPEAT_COLUMN = "replicate"
-"""Column that splits a file into repeats."""
+REPEAT_COLUMNS = ("replicate", "repeat", "specimen", "sample", "run", "trial", "test")
+"""Columns that split a file into repeats; one that counts rows does not."""
+LOADED, UNLOADED = 0.5, 0.2
+"""Parts of the largest way of the plate above which it is pressed, and below which it has come back [-]."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,7 @@ class MeasuredCompression:
         slope: Slope of the stress over 0 to 5 % strain of each repeat [Pa], shape (repeats,).
         names: Name of each repeat.
         files: The files.
+        notes: What was done to read them, and what of them was left out, one sentence each.
     """
 
     strain: FloatArray
@@ -60,6 +65,7 @@ class MeasuredCompression:
     slope: FloatArray
     names: list[str]
     files: tuple[MeasuredFile, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def mean(self) -> FloatArray:
@@ -99,18 +105,22 @@ def read_repeats(
     *,
     compression_col: str | None = None,
     force_col: str | None = None,
+    sign: str | None = None,
 ) -> MeasuredCompression:
     """Read the repeats of a compression test.
 
     The first sample of a repeat is its zero of compression and of load; no toe is corrected. Of each repeat the first
-    loading is used, up to ``strain``.
+    loading is used, up to ``strain``. A gap that closes is turned round.
 
     Args:
-        paths: CSV, JSON or HDF5 files, each one repeat or several with a column ``replicate``; all of one material.
+        paths: Files, each one repeat or several: with a column ``replicate``, ``specimen`` or the like, or a header
+            for each; all of one material.
         shape: The specimen.
         strain: Largest engineering strain [-].
         compression_col: Column of the way of the plate; metres if its name has no unit.
         force_col: Column of the load; newtons if its name has no unit.
+        sign: ``+`` or ``-``: the sign of the load that presses. The way is then counted in the direction in which it
+            goes.
 
     Returns:
         The repeats on a common strain grid.
@@ -121,17 +131,22 @@ def read_repeats(
     """
     grid = strain_grid(strain)
     names: list[str] = []
-    rows, slopes, files = [], [], []
+    rows, slopes, files, notes = [], [], [], []
     for path in map(Path, paths):
         table = read_table(path)
+        if compression_col in candidates(table, "force") or force_col in candidates(table, "compression"):
+            raise TraceError(
+                f"{table.source}: columns {compression_col or 'unnamed'} (compression) and {force_col or 'unnamed'} "
+                "(load) look swapped; exchange --compression-col and --force-col"
+            )
         compression = choose(table, "compression", compression_col)
         force = choose(table, "force", force_col)
-        if compression.name in candidates(table, "force") or force.name in candidates(table, "compression"):
-            raise TraceError(
-                f"{table.source}: columns {compression.name} (compression) and {force.name} (load) look swapped; "
-                "exchange --compression-col and --force-col"
-            )
+        notes += [*table.notes, *compression.notes, *force.notes]
         way, load = numbers(table, compression), numbers(table, force)
+        if sign is not None:
+            load = parse_sign(sign) * load
+            way, said = _its_own_way(table.source, compression.name, way)
+            notes += said
         for name, on in _repeats(table):
             label = name if len(paths) == 1 else f"{path.stem} {name}".strip()
             label = label or path.stem
@@ -140,20 +155,57 @@ def read_repeats(
                     f"{table.source}: a second repeat is called {label!r}; give each file once, by its own name"
                 )
             names.append(label)
-            e, s = _loading(f"{table.source}{f', repeat {name}' if name else ''}", way[on], load[on], shape, strain)
+            where = f"{table.source}{f', repeat {name}' if name else ''}"
+            e, s = _loading(where, way[on], load[on], shape, strain)
+            notes += _later_loadings(where, table, on, way[on])
             rows.append(np.interp(grid, e, s))
             slopes.append(slope(e, s))
         files.append(MeasuredFile(table.source, table.sha256, compression.name, force.name))
-    return MeasuredCompression(grid, np.array(rows), np.array(slopes), names, tuple(files))
+    return MeasuredCompression(grid, np.array(rows), np.array(slopes), names, tuple(files), tuple(notes))
 
 
 def _repeats(table: Table) -> list[tuple[str, np.ndarray]]:
-    """Name and rows of each repeat of a file; one without a name where there is no such column."""
-    column = next((cells for name, cells in table.columns.items() if name.lower() == REPEAT_COLUMN), None)
-    if column is None:
+    """Name and rows of each repeat of a file; one without a name where nothing splits it.
+
+    A column splits it whose name says so and each of whose values stands in many rows on end.
+    """
+    for wanted in REPEAT_COLUMNS:
+        for name, cells in table.columns.items():
+            if stem_of(name) not in (wanted, f"{wanted}_id", f"{wanted}_no", f"{wanted}_number", f"{wanted}_name"):
+                continue
+            of = np.array([str(cell).strip() for cell in cells])
+            blocks = np.flatnonzero(np.r_[True, of[1:] != of[:-1]])
+            if wanted == REPEAT_COLUMNS[0] or np.diff(np.r_[blocks, len(of)]).min() >= MIN_SAMPLES:
+                return [(value, np.flatnonzero(of == value)) for value in dict.fromkeys(of.tolist())]
+    ends = (*table.parts[1:], len(table.rows))
+    if len(ends) == 1:
         return [("", np.arange(len(table.rows)))]
-    of = np.array([str(cell).strip() for cell in column])
-    return [(name, np.flatnonzero(of == name)) for name in dict.fromkeys(of.tolist())]
+    return [(str(k), np.arange(*span)) for k, span in enumerate(zip(table.parts, ends, strict=True), start=1)]
+
+
+def _its_own_way(source: str, name: str, way: FloatArray) -> tuple[FloatArray, list[str]]:
+    """The way of the plate, positive in the direction in which it goes, and what was done."""
+    gone = way - way[0]
+    if gone.max() >= -gone.min():
+        return way, []
+    return -way, [f"{source}: {brief(name)} falls as the plates approach, so it is taken as negative in compression"]
+
+
+def _later_loadings(where: str, table: Table, on: np.ndarray, way: FloatArray) -> list[str]:
+    """What of a repeat is left out because the plate has come back and presses again, one sentence or none."""
+    part = (way - way[0]) / max(float(np.max(way - way[0])), 1e-12)
+    count, pressed = 0, False
+    again = None
+    for k, x in enumerate(part):
+        if not pressed and x > LOADED:
+            count, pressed = count + 1, True
+            again = k if count == 2 else again
+        elif pressed and x < UNLOADED:
+            pressed = False
+    if again is None:
+        return []
+    row = f"{table.row} {brief(table.rows[on[again]])}"
+    return [f"{where}: the plate presses {count} times; the first loading is used, what is from {row} on is left out"]
 
 
 def _loading(
@@ -174,7 +226,10 @@ def _loading(
     way, load = way - way[0], load - load[0]
     last = int(np.argmax(way))
     if way[last] <= 0 or -way.min() > way[last]:
-        raise TraceError(f"{where}: the compression is negative; count it positive when the plates approach each other")
+        raise TraceError(
+            f"{where}: the compression is negative; say with --sign - (or --sign + where the load is positive) which "
+            "sign the load has that presses, and the way is counted in its own direction"
+        )
     if way[last] >= shape.height:
         raise TraceError(
             f"{where}: a compression of {way[last]:g} m is more than the height of {shape.height:g} m; if it is in "
@@ -201,7 +256,7 @@ def _loading(
         raise TraceError(f"{where}: there is no load on the plate beyond noise; check --force-col")
     if rise < 0:
         raise TraceError(
-            f"{where}: the load falls with compression; count it positive in compression, or exchange "
+            f"{where}: the load falls with compression; say --sign -, or exchange "
             "--compression-col and --force-col if they are swapped"
         )
     if np.count_nonzero(e <= SMALL_STRAIN) < 3:

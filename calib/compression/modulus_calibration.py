@@ -61,6 +61,7 @@ class CompressionTest:
         bonded: Whether the food sticks to the plates; else they are frictionless.
         compression_col: Column of the compression, None to find it.
         force_col: Column of the load, None to find it.
+        sign: Sign of the load that presses, ``+`` or ``-``; None for both way and load positive.
     """
 
     paths: Sequence[str | Path]
@@ -70,6 +71,7 @@ class CompressionTest:
     bonded: bool = False
     compression_col: str | None = None
     force_col: str | None = None
+    sign: str | None = None
 
 
 @dataclass(frozen=True)
@@ -172,8 +174,10 @@ def calibrate_modulus(
             f"--cells {options.cells}: bonded plates need 6 or more, because a coarser grid judges the error"
         )
     scene = _scene(test, options)
-    columns = {"compression_col": test.compression_col, "force_col": test.force_col}
+    columns = {"compression_col": test.compression_col, "force_col": test.force_col, "sign": test.sign}
     measured = read_repeats(test.paths, test.shape, test.strain, **columns)
+    for text in measured.notes:
+        say(f"note: {text}")
     with prepare(out, "compress", resume=False):
         plates = _plates(test.bonded)
         say(f"pressing to a strain of {test.strain:g} on {options.cells} cells over the height, plates {plates}")
@@ -197,7 +201,7 @@ def calibrate_modulus(
                 for name, modulus, small in zip(measured.names, found.E, measured.slope, strict=True)
             ),
             verdicts=tuple(acceptance_lines(found, error, change)),
-            not_shown=tuple(unshown(test, options.bracket, len(found.E))),
+            not_shown=(*unshown(test, options.bracket, len(found.E)), *measured.notes),
             simulation=PressSimulation(unit.run, options.seed, options.arch),
             files=measured.files,
             versions=versions(),

@@ -9,6 +9,8 @@ import numpy as np
 
 LETTERS, NAMES = 40, 8
 """Letters of a name or value, and names of a list, that an error shows."""
+LONG, WHOLE_LIST = 120, 240
+"""Letters of a name that is to be typed again, such as that of a topic, and of a list of such names."""
 
 
 def brief(value: object, letters: int = LETTERS) -> str:
@@ -31,7 +33,15 @@ def quoted(value: object) -> str:
     return repr(brief(value)) if value.isprintable() else f"'{brief(value)}'"
 
 
-def listed(names: Sequence[object]) -> str:
-    """The first names of a list, and how many more there are."""
-    more = len(names) - NAMES
-    return ", ".join(brief(name) for name in names[:NAMES]) + (f" and {more} more" if more > 0 else "")
+def listed(names: Sequence[object], letters: int = LETTERS) -> str:
+    """The first names of a list, and how many more there are.
+
+    Args:
+        names: The names.
+        letters: Most letters of each; where names are long, fewer of them are shown.
+    """
+    shown = [brief(name, letters) for name in names[:NAMES]]
+    while len(shown) > 1 and letters > LETTERS and sum(map(len, shown)) > WHOLE_LIST:
+        shown.pop()
+    more = len(names) - len(shown)
+    return ", ".join(shown) + (f" and {more} more" if more > 0 else "")

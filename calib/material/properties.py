@@ -8,7 +8,7 @@ from typing import Any
 
 from calib.errors import MaterialError
 from calib.io.yaml_checks import Place, check_unit, choice, finite_number, suggest, text
-from calib.trace.units import metres
+from calib.table.units import metres
 from mpm.scene.material import MAX_POISSON
 
 #: Where a literature value comes from: measured on this food; Table 2 of the CulinaryCut paper; another food,

@@ -6,8 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from calib.errors import TraceError
 from calib.material.food import FoodSpec
 from calib.problem.request import Request
+from calib.trace.cuts import find_cuts
+from calib.trace.mending import mended
 
 CUT, COMPRESSION = "cut", "compression"
 """Kinds of traces."""
@@ -86,3 +89,31 @@ class StudySpec:
         spend = self.budget if budget is None else budget
         requests = {n: replace(r, budget=spend, arch=arch, command=command) for n, r in self.requests.items()}
         return replace(self, requests=requests, budget=spend)
+
+
+def study_of_cuts(request: Request) -> StudySpec:
+    """The cuts of one record as specimens of one food, which share flesh and blade.
+
+    Args:
+        request: What is to be calibrated, on a record of several cuts.
+
+    Returns:
+        A study with a trace for each cut, ``cut1``, ``cut2`` and so on; nothing is held out.
+
+    Raises:
+        TraceError: The record cannot be read, or holds one cut.
+    """
+    trace, _ = request.records()
+    count = len(find_cuts(mended(trace).trace))
+    if count < 2:
+        raise TraceError(f"{trace.source}: the record holds one cut; leave --all out")
+    return StudySpec(
+        source=trace.source,
+        food=request.food,
+        requests={f"cut{k}": replace(request, cut=k, scaled=True) for k in range(1, count + 1)},
+        compressions=(),
+        specimen_properties=SPECIMEN_PROPERTIES,
+        hold_out=(),
+        budget=request.budget,
+        seed=request.seed,
+    )

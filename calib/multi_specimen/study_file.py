@@ -33,8 +33,8 @@ LARGEST_SCATTER = 1.0
 EACH = "each"
 """What ``hold_out`` says where each cut is held out in turn."""
 TOP = ("material", "knife", "fit", "own", "hold_out", "scatter", "budget", "seed", "dx", "set")
-NUMBERS = ("speed", "t_end", "height", "width", "length", "at", "gain_sd", "lag_sd")
-TEXTS = ("time_col", "force_col", "position_col", "depth_col", "sign", "shape", "knife")
+NUMBERS = ("speed", "t_end", "height", "width", "length", "at", "gain_sd", "lag_sd", "rate", "cut")
+TEXTS = ("time_col", "force_col", "position_col", "depth_col", "sign", "decimal", "baseline", "shape", "knife")
 COMPRESSION_SIZES = ("height", "diameter", "width", "length")
 
 
@@ -126,13 +126,16 @@ def _request(place: Place, given: Mapping[str, Any], folder: Path, base: Request
         base,
         trace=folder / text(place.at("trace"), given["trace"]),
         air=None if air is None else folder / text(place.at("air"), air),
-        columns={n: words[n] for n in ("time_col", "force_col", "position_col", "depth_col", "sign")},
+        columns={n: words[n] for n in ("time_col", "force_col", "position_col", "depth_col", "sign", "decimal")}
+        | {"rate": numbers["rate"]},
         knife=_knife(words["knife"] or base.knife, folder),
         sizing=Sizing(
             words["shape"], numbers["height"], numbers["width"], numbers["length"], numbers["at"] or MID_LENGTH
         ),
         speed=numbers["speed"],
         t_end=numbers["t_end"],
+        baseline=words["baseline"] or base.baseline,
+        cut=None if numbers["cut"] is None else int(numbers["cut"]),
         gain_sd=numbers["gain_sd"],
         lag_sd=numbers["lag_sd"],
     )

@@ -31,6 +31,7 @@ import numpy as np
 
 from calib.errors import TraceError
 from calib.trace.conditioning import Conditioned
+from calib.trace.names import from_joint_torques
 from mpm.arrays import FloatArray
 
 #: Relative standard deviation of the gain of a calibrated force sensor, where nothing is said of it [-]. Assumed: no
@@ -38,8 +39,6 @@ from mpm.arrays import FloatArray
 GAIN_SD = 0.02
 #: The same for a wrench that a robot estimates from its joint torques [-] (docs/theory.md, "Measured choices").
 TORQUE_GAIN_SD = 0.15
-#: Beginnings of names of columns that hold such an estimate.
-TORQUE_COLUMNS = ("base_f", "knife_f", "o_f_ext", "k_f_ext")
 #: A drift is extrapolated over the cut. Beyond this part of the peak [-] it is a broken measurement, which is warned of
 #: and not fitted away.
 LARGEST_DRIFT = 0.05
@@ -86,8 +85,7 @@ def sensor_of(curve: Conditioned, gain_sd: float | None, lag_sd: float | None) -
     lag = 0.0 if lag_sd is None else lag_sd
     if gain_sd is not None:
         return Sensor(gain_sd, lag), None
-    name = curve.trace.columns.get("force", "").lower()
-    if name.startswith(TORQUE_COLUMNS):
+    if from_joint_torques(curve.trace.columns.get("force", "")):
         said = (
             f"{curve.trace.columns['force']} is estimated from joint torques: its gain is taken as known to "
             f"{TORQUE_GAIN_SD:.0%} (hung masses read 1 to 25 % too little on such an arm); give --gain-sd if you "

@@ -7,10 +7,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from calib.formats.reader import split_address
 from calib.material.food import FoodSpec
 from calib.material.scene import Sizing
 from calib.problem.target import ErrorModel
-from calib.trace.reader import split_address
+from calib.trace.baselines import CONSTANT
 from calib.trace.trace import Trace, read_trace
 
 
@@ -22,10 +23,12 @@ class Request:
         food: The food with its literature ranges.
         trace: The cut, or its file.
         air: The same motion without food, or its file, or None.
-        columns: ``time_col``, ``force_col``, ``position_col``, ``depth_col``, ``sign`` for reading files.
+        columns: How files are read: attributes of :class:`calib.trace.recorded.Reading`.
         knife: Name or YAML file.
         speed: Knife speed [m/s], or None.
         t_end: End of the record [s], or None.
+        baseline: What is subtracted without an air run, one of ``calib.trace.baselines.BASELINES``.
+        cut: Number of the cut in a record of several, from 1; ``whole`` for a record that is one; None for its only.
         sizing: What is known of the specimen.
         fit: Names of the fitted properties; None for the food's default.
         dx: Cell size [m], or None.
@@ -48,6 +51,8 @@ class Request:
     knife: str = "kitchen"
     speed: float | None = None
     t_end: float | None = None
+    baseline: str = CONSTANT
+    cut: int | str | None = None
     sizing: Sizing = field(default_factory=Sizing)
     fit: tuple[str, ...] | None = None
     dx: float | None = None

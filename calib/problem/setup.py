@@ -19,6 +19,7 @@ from calib.simulation.evaluation import Evaluators
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, Header
 from calib.simulation.workers import Workers
 from calib.trace.conditioning import Conditioned, condition
+from calib.trace.cuts import single_cut
 from calib.trace.filters import filter_simulated
 from mpm.scene import Scene
 
@@ -140,7 +141,13 @@ def conditioned(request: Request) -> tuple[Conditioned, str | None]:
     trace, air = request.records()
     known = request.sizing.height or request.food.dims["height"].value
     curve = condition(
-        trace, air=air, speed=request.speed, height=known, t_end=request.t_end, board=request.sizing.height
+        single_cut(trace, request.cut) if request.cut is not None else trace,
+        air=air,
+        speed=request.speed,
+        height=known,
+        t_end=request.t_end,
+        board=request.sizing.height,
+        baseline=request.baseline,
     )
     return curve, None if air is None else air.sha256
 

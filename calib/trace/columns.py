@@ -1,9 +1,8 @@
-"""What the name of a measured column says: quantity, unit and sign; and the choice of the columns that are read."""
+"""The choice of the columns that are read, and their numbers in SI."""
 
 from __future__ import annotations
 
 import difflib
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,48 +10,22 @@ from typing import Any
 import numpy as np
 
 from calib.errors import TraceError
-from calib.io.wording import brief, listed, quoted
-from calib.trace.table import Table, as_float
-from calib.trace.units import UNITS_OF_ROLE
+from calib.io.wording import LONG, brief, listed, quoted
+from calib.table.numerals import as_plain
+from calib.table.table import Table, as_float
+from calib.table.units import EXAMPLES, SI_OF_ROLE, Unit, unit_of
+from calib.trace.names import KNOWN, LONGEST_NAME, fits, is_depth, meaning, named_like, not_measured, sign_of
 
 _LIMITS = {"time": (1e11, "s"), "force": (1e6, "N"), "position": (1e3, "m"), "compression": (1e3, "m")}
 """Largest number of each role: beyond it there is no clock since 1970, no knife and no kitchen."""
-_STEMS = {
-    "time": (re.compile(r"time|t|timestamp|elapsed(_time)?"),),
-    "force": (re.compile(r"(.*_)?(force|load|resistance|f|fz)(_z)?|(.*_)?wrench_z"),),
-    "position": (
-        re.compile(r"((ee|knife|tool|tcp|blade)_)?(z|height|position|pos)(_z)?"),
-        re.compile(r"(.*_)?(stroke|displacement|travel|depth|extension|penetration)"),
-    ),
-    "compression": (re.compile(r"(.*_)?(compression|stroke|displacement|travel|extension)"),),
-}
-_DEPTH = _STEMS["position"][1]
-_KNOWN_FORCE = {"base_fz": -1.0, "knife_fz": 1.0}
-"""Columns whose sign is known: robot logs hold the force on the world in the base frame, downwards negative."""
-_KNOWN = {"force": tuple(_KNOWN_FORCE), "position": ("ee_z",), "time": ("stamp",)}
-"""Stems that are preferred to others of the same role. A ROS message's own stamp is the time of its measurement, the
-other clock in its file that of its recording."""
-_ROS = (
-    (re.compile(r"field\.(.*\.)?stamp"), "stamp", "ns"),
-    (re.compile(r"%time"), "time", "ns"),
-    (re.compile(r"/(.*/)?stamp"), "stamp", "s"),
-    (re.compile(r"__time"), "time", "s"),
-    (re.compile(r"(.*[./])?O_F_ext_hat_K[.\[]?2\]?"), "base_fz", "N"),
-    (re.compile(r"(.*[./])?K_F_ext_hat_K[.\[]?2\]?"), "knife_fz", "N"),
-    (re.compile(r"(.*[./])?O_T_EE[.\[]?14\]?"), "ee_z", "m"),
-    (re.compile(r"(.*[./])?force[./]z"), "force_z", "N"),
-    (re.compile(r"(.*[./])?position[./]z"), "position_z", "m"),
-)
-"""Names in text exports of ROS messages, whose units are SI (REP 103) and whose clocks are known by the program that
-writes such names: ``rostopic echo -p`` nanoseconds, PlotJuggler seconds."""
 _EXPECTED = {
     "time": ("time_s", "time_ms", "t_s"),
     "force": ("force_N", "fz_N", "base_Fz_N", "force_kN", "force_mN"),
     "position": ("ee_z_m", "position_m", "position_mm", "stroke_m", "displacement_mm"),
     "compression": ("compression_mm", "displacement_mm", "stroke_m"),
 }
-LONGEST_NAME = 200
-"""Letters from which on the name of a column means nothing."""
+SPARSE = 0.1
+"""Part of a column's cells that are empty from which on they are other topics' rows, not samples that are missing."""
 
 
 @dataclass(frozen=True)
@@ -63,30 +36,36 @@ class Column:
         name: Its name in the table.
         role: ``time``, ``force``, ``position`` or ``compression``.
         factor: What turns its numbers into SI with our sign.
+        depth: Whether its name is that of a way down.
+        notes: What was assumed of its unit, one sentence each.
     """
 
     name: str
     role: str
     factor: float
+    depth: bool = False
+    notes: tuple[str, ...] = ()
 
 
 def candidates(table: Table, role: str) -> list[str]:
     """Columns whose name and unit fit a role; known ones alone if there are any."""
-    fitting = [name for name in table.columns if _fits(table, name, role)]
-    for stem in _KNOWN.get(role, ()):
-        preferred = [name for name in fitting if _meaning(table, name)[0] == stem]
+    fitting = [name for name in table.columns if fits(table, name, role)]
+    for stem in KNOWN.get(role, ()):
+        preferred = [name for name in fitting if meaning(table, name).stem == stem]
         if preferred:
             return preferred
     return fitting
 
 
-def choose(table: Table, role: str, wanted: str | None) -> Column:
+def choose(table: Table, role: str, wanted: str | None, option: str | None = None) -> Column:
     """The column of a role, by name if the user gave one.
 
     Args:
         table: The table.
         role: ``time``, ``force``, ``position`` or ``compression``.
-        wanted: Name of a column, or None to choose one by its name and unit.
+        wanted: Name of a column, with ``=unit`` behind it where that is to be said; None to choose one by its name and
+            unit.
+        option: Option that names the column, for errors; ``--role-col`` if not given.
 
     Returns:
         The column, with the factor that its unit and its name stand for.
@@ -94,34 +73,67 @@ def choose(table: Table, role: str, wanted: str | None) -> Column:
     Raises:
         TraceError: There is no such column, no single one whose name fits, or a unit that is none of the role.
     """
-    option = f"--{role}-col"
+    option = option or f"--{role}-col"
     if wanted is not None:
-        if wanted not in table.columns:
-            why = table.left_out.get(wanted)
-            hint = f": it was left out, {why}" if why else _did_you_mean([wanted], table)
+        name, given = _with_unit(table, wanted)
+        if name not in table.columns:
+            why = table.left_out.get(name)
+            hint = f": it was left out, {why}" if why else _did_you_mean([name], table)
             raise TraceError(f"{table.source}: no column {quoted(wanted)} ({option}){hint}")
-        return _column(table, role, wanted)
+        return _column(table, role, name, option, given)
     fitting = candidates(table, role)
     if len(fitting) == 1:
-        return _column(table, role, fitting[0])
+        return _column(table, role, fitting[0], option)
     if fitting:
         raise TraceError(
-            f"{table.source}: several columns could be the {role}: {listed(fitting)}; choose one with {option}"
+            f"{table.source}: several columns could be the {role}: {listed(fitting, LONG)}; choose one with {option}"
         )
+    raise TraceError(f"{table.source}: {table.hint}" if table.hint else _nothing_fits(table, role, option))
+
+
+def _nothing_fits(table: Table, role: str, option: str) -> str:
+    """Why no column could be chosen, and what can be named instead."""
+    header = f"{table.source}: no {role} column with its unit in the name, such as {', '.join(_EXPECTED[role][:3])}"
+    asked = [name for name in table.columns if _would_fit(table, name, role)]
+    bare = [name for name in asked if not not_measured(name)]
+    if bare:
+        units = SI_OF_ROLE[role]
+        what = (
+            f"; did you mean {quoted(bare[0])}, which has no unit? name it with its unit: {option} "
+            f"{quoted(bare[0] + chr(61) + units)}"
+        )
+    else:
+        what = f"{_did_you_mean(_EXPECTED[role], table)}; name one with {option}"
+    derived = [name for name in asked if not_measured(name)]
+    more = f" ({listed(derived[:2], LONG)} was commanded or derived and is not chosen unasked)" if derived else ""
     left = "; ".join(f"{brief(name)} was left out, {why}" for name, why in list(table.left_out.items())[:3])
-    raise TraceError(
-        f"{table.source}: no {role} column with its unit in the name, such as "
-        f"{', '.join(_EXPECTED[role][:3])}{_did_you_mean(_EXPECTED[role], table)}; name one with "
-        f"{option}{f' ({left})' if left else ''}"
-    )
+    return f"{header}{what}{more}{f' ({left})' if left else ''}"
 
 
-def numbers(table: Table, column: Column) -> np.ndarray:
+def _would_fit(table: Table, name: str, role: str) -> bool:
+    """Whether a column would have a role if its unit were stated, or if it were measured."""
+    said = meaning(table, name)
+    measure = said.measure
+    unit_fits = measure.fits(role) if measure else not said.unit
+    return unit_fits and (named_like(said.stem, role) or (not_measured(name) and role in said.stem))
+
+
+def _with_unit(table: Table, wanted: str) -> tuple[str, Unit | None]:
+    """Name and given unit in the text of an option such as ``Fz=N``."""
+    name, equals, text = wanted.rpartition("=")
+    if wanted in table.columns or not equals:
+        return wanted, None
+    unit = unit_of(text)
+    return (name, unit) if unit is not None else (wanted, None)
+
+
+def numbers(table: Table, column: Column, *, sparse: bool = False) -> np.ndarray:
     """The numbers of a column.
 
     Args:
         table: The table.
         column: One of its columns.
+        sparse: Whether empty cells are other topics' rows, and become NaN.
 
     Returns:
         The numbers in SI with our sign, shape (n,) for n rows [s], [N] or [m] by the column's role.
@@ -130,13 +142,16 @@ def numbers(table: Table, column: Column) -> np.ndarray:
         TraceError: A cell holds no finite number, or one that is too large; the message names the first one.
     """
     cells = table.columns[column.name]
+    empty = empty_cells(cells) if sparse else np.zeros(len(cells), dtype=bool)
     if isinstance(cells, np.ndarray) and cells.dtype.kind in "iuf":
         values = cells.astype(float)
     else:
-        values = np.array([_number(table, column, i, cell) for i, cell in enumerate(cells)])
+        values = np.array(
+            [np.nan if empty[i] else _number(table, column, i, cell) for i, cell in enumerate(cells)], dtype=float
+        )
     limit, unit = _LIMITS[column.role]
     finite = np.isfinite(values)
-    usable = finite & (np.abs(np.where(finite, values, 0.0)) <= limit / abs(column.factor))
+    usable = empty | (finite & (np.abs(np.where(finite, values, 0.0)) <= limit / abs(column.factor)))
     if not usable.all():
         i = int(np.argmin(usable))
         where = _where(table, column, i)
@@ -147,6 +162,31 @@ def numbers(table: Table, column: Column) -> np.ndarray:
             "the column"
         )
     return values * column.factor
+
+
+def empty_cells(cells: Sequence[Any] | np.ndarray) -> np.ndarray:
+    """Which cells hold nothing, or say that they are not a number, shape (n,)."""
+    if isinstance(cells, np.ndarray) and cells.dtype.kind in "iuf":
+        return np.isnan(cells.astype(float))
+    return np.array([_is_empty(cell) for cell in cells], dtype=bool)
+
+
+def is_sparse(table: Table, name: str) -> bool:
+    """Whether a column has numbers in some rows of a table of several topics, and nothing in the others.
+
+    The empty cells come again and again: there are ``SPARSE`` of all at least, and at least one in ten numbers is
+    beside one.
+    """
+    empty = empty_cells(table.columns[name])
+    held = int(np.count_nonzero(~empty))
+    turns = int(np.count_nonzero(empty[1:] != empty[:-1]))
+    return bool(empty.mean() >= SPARSE and held >= 2 and turns >= 2 * SPARSE * held)
+
+
+def _is_empty(cell: Any) -> bool:
+    if cell is None or (isinstance(cell, float) and cell != cell):
+        return True
+    return isinstance(cell, str) and cell.strip().lower() in ("", "nan", "na", "n/a", "null", "none", "-")
 
 
 def _number(table: Table, column: Column, i: int, cell: Any) -> float:
@@ -160,14 +200,14 @@ def _number(table: Table, column: Column, i: int, cell: Any) -> float:
         return number
     if cell is None or (isinstance(cell, str) and not cell.strip()):
         raise TraceError(f"{_where(table, column, i)}: an empty cell is not a number; fill it or remove the row")
-    decimal = isinstance(cell, str) and as_float(cell.replace(",", ".")) is not None
-    hint = "; write decimals with a point" if decimal else ""
+    hint = "; write decimals with a point" if isinstance(cell, str) and as_plain(cell, ",") is not None else ""
+    hint = hint or "; remove or repair the row"
     raise TraceError(f"{_where(table, column, i)}: {_shown(cell)} is not a number{hint}")
 
 
 def _where(table: Table, column: Column, i: int) -> str:
     """A cell's place, as the table's file counts rows."""
-    return f"{table.source}, {table.row} {brief(table.rows[i])}, column {brief(column.name)}"
+    return f"{table.source}, {table.row} {brief(table.rows[i])}, column {brief(column.name, LONG)}"
 
 
 def _shown(cell: Any) -> str:
@@ -177,70 +217,54 @@ def _shown(cell: Any) -> str:
     return brief(cell) if isinstance(cell, (int, float, np.number)) else f"{type(cell).__name__} {brief(cell)}"
 
 
-def _split_unit(name: str) -> tuple[str, str]:
-    """Stem (lower case, words joined by _) and unit of a column name such as ``force_N`` or ``Force [N]``."""
-    found = re.fullmatch(r"(.+?)(?:[\s_]+|\s*[\[(])\[?\(?([A-Za-z]+)[\])]?", name)
-    stem, unit = (found.group(1), found.group(2)) if found else (name, "")
-    return _stem(stem), unit
-
-
-def _stem(name: str) -> str:
-    """Lower case, words joined by _."""
-    return re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
-
-
-def _meaning(table: Table, name: str) -> tuple[str, str]:
-    """Stem and unit of a column: from the unit stated beside its name, the conventions of ROS, or its name alone."""
-    if len(name) > LONGEST_NAME:
-        return "", ""
-    stem, unit = next(((s, u) for pattern, s, u in _ROS if pattern.fullmatch(name)), _split_unit(name))
-    stated = table.units.get(name, unit)
-    ends_in_unit = any(unit in units for units in UNITS_OF_ROLE.values())
-    return (stem, unit) if stated == unit else (stem if ends_in_unit else _stem(name), stated)
-
-
-def _fits(table: Table, name: str, role: str) -> bool:
-    """Whether a column can have a role; a ROS stamp that nobody has set, and so stands, is no clock."""
-    stem, unit = _meaning(table, name)
-    if unit not in UNITS_OF_ROLE[role]:
-        return False
-    if role == "time" and stem == "stamp":
-        cells = table.columns[name]
-        return any(cell != cells[0] for cell in cells)
-    return any(pattern.fullmatch(stem) for pattern in _STEMS[role])
-
-
-def _column(table: Table, role: str, name: str) -> Column:
+def _column(table: Table, role: str, name: str, option: str, given: Unit | None = None) -> Column:
     """Factor of a named column: unit, known sign of a force, depth turned into height.
 
     Raises:
-        TraceError: The unit stated beside the name is none of the role, or not that of the name.
+        TraceError: The unit in the name, or stated beside it, is none of the role or not known, or the two differ.
     """
-    stem, unit = _meaning(table, name)
-    named = _split_unit(name[:LONGEST_NAME])[1]
-    if name in table.units and unit not in UNITS_OF_ROLE[role]:
+    said = meaning(table, name)
+    where = f"{table.source}, column {brief(name, LONG)}"
+    remedy = f"say which it is with {option} {quoted(f'{brief(name)}={SI_OF_ROLE[role]}')}"
+    measure = given or said.measure
+    if given is None and said.unit and (measure is None or not measure.fits(role)):
+        kind = "is not known" if measure is None else f"is none of a {role}"
         raise TraceError(
-            f"{table.source}, column {brief(name)}: its unit is {quoted(unit)}, which is none of a {role}; use one of "
-            f"{', '.join(list(UNITS_OF_ROLE[role])[:6])}"
+            f"{where}: its unit is {quoted(said.unit)}, which {kind}; use one of {EXAMPLES[role]}, or {remedy} if it "
+            "is another column's or wrong"
         )
-    if name in table.units and UNITS_OF_ROLE[role].get(named, UNITS_OF_ROLE[role][unit]) != UNITS_OF_ROLE[role][unit]:
-        raise TraceError(
-            f"{table.source}, column {brief(name)}: its unit is stated as {quoted(unit)}; correct one of them"
+    if given is not None and not given.fits(role):
+        raise TraceError(f"{where}: {quoted(given.symbol)} is no unit of a {role} ({option}); use {EXAMPLES[role]}")
+    own = unit_of(said.named) if said.named else None
+    if given is None and said.stated and own is not None and measure is not None and own.factor != measure.factor:
+        raise TraceError(f"{where}: its unit is stated as {quoted(said.unit)}; correct one of them, or {remedy}")
+    notes = _unit_notes(table, name, role, measure, given is not None)
+    factor = (measure.factor if measure else 1.0) * sign_of(said.stem, role)
+    return Column(name, role, factor, is_depth(said.stem), notes)
+
+
+def _unit_notes(table: Table, name: str, role: str, measure: Unit | None, given: bool) -> tuple[str, ...]:
+    """What was assumed of a unit that is not stated, and what one of another system is in SI."""
+    si = SI_OF_ROLE[role]
+    if measure is None:
+        return (f"{table.source}: no unit is stated for {brief(name, LONG)}, which is taken in {si}",)
+    if not measure.common:
+        return (
+            f"{table.source}: {brief(name, LONG)} is in {measure.symbol}, of which one is {measure.factor:.6g} {si}",
         )
-    factor = UNITS_OF_ROLE[role].get(unit, 1.0)
-    if role == "force":
-        factor *= _KNOWN_FORCE.get(stem, 1.0)
-    if role == "position" and _DEPTH.fullmatch(stem):
-        factor = -factor
-    return Column(name, role, factor)
+    own = meaning(table, name).measure
+    if given and own is not None and own.factor != measure.factor:
+        return (f"{table.source}: {brief(name, LONG)} is taken in {measure.symbol} as asked, not in {own.symbol}",)
+    return ()
 
 
 def _did_you_mean(wanted: Sequence[str], table: Table) -> str:
     """A hint with the nearest existing names, or with all of them."""
     lower = {name.lower(): name for name in table.columns if len(name) <= LONGEST_NAME}
     near = [lower[n] for w in wanted for n in difflib.get_close_matches(w.lower(), lower, n=1, cutoff=0.7)]
+    near = [name for name in near if not not_measured(name)]
     if not near:
         labels = [f"{name} [{table.units[name]}]" if name in table.units else name for name in table.columns]
-        return f"; the columns are {listed(labels)}"
+        return f"; the columns are {listed(labels, LONG)}"
     stated = table.units.get(near[0])
     return f"; did you mean {quoted(near[0])}{f', whose unit is stated as {quoted(stated)}' if stated else ''}?"

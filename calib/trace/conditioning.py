@@ -2,15 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib.errors import TraceError
-from calib.trace.contact_onset import FLOOR_FRACTION, SUSTAIN, ContactOnset, find_contact_onset
+from calib.io.wording import quoted
+from calib.table.table import RECONSTRUCTED
+from calib.trace.baselines import (
+    BASELINES,
+    CONSTANT,
+    LINEAR,
+    ZERO,
+    Drift,
+    check_approach,
+    drift_of,
+    out_of_the_food,
+    trigger_contact,
+)
+from calib.trace.contact_onset import FLOOR_FRACTION, SUSTAIN, ContactOnset, estimate_baseline, find_contact_onset
+from calib.trace.cuts import single_cut
 from calib.trace.filters import FILTER_SD_M, N_STROKE, leading_grid, resample, smooth
-from calib.trace.stroke import DWELL_M, end_of_descent, ending_at_board, stroke_axis
-from calib.trace.table import RECONSTRUCTED
+from calib.trace.mending import mended
+from calib.trace.missing import held_samples
+from calib.trace.stroke import DWELL_M, board_warnings, end_of_descent, ending_at_board, stroke_axis
+from calib.trace.sudden import sudden_changes
 from calib.trace.trace import MIN_SAMPLES, Trace
 
 AIR_SLACK_SAMPLES = 3
@@ -24,6 +41,8 @@ DRIFT_REACH = 10.0
 the cut."""
 DRIFT_SIGNIFICANCE = 3.0
 """Standard uncertainties by which a drift must differ from zero to be warned about."""
+DRIFT_ROUNDS = 2
+"""Times that drift and contact are found from each other: a drift that is not removed is taken for contact early."""
 PEAK_RANGE_N = (0.05, 5e3)
 """Peak forces outside are taken for a unit mix-up [N]."""
 NOTHING_N = 1e-6
@@ -41,7 +60,7 @@ class Conditioned:
         baseline_N: Level subtracted from the force [N]; with an air run, what was left after subtracting it.
         baseline_sd_N: Standard uncertainty of that level (noise, its correlation, drift within the window)
             [N].
-        baseline_kind: ``constant`` or ``air``.
+        baseline_kind: ``constant``, ``linear``, ``zero`` or ``air``.
         onset_s: Time of contact on the trace's clock [s].
         onset_sd_s: Its standard uncertainty [s].
         end_s: Time at which the downward stroke ends [s].
@@ -57,7 +76,7 @@ class Conditioned:
         peak_N: Maximum of the curve from a parabola through the points around it [N].
         peak_sd_N: Its standard uncertainty from filtered noise and baseline [N].
         drift_N_per_s: Drift of the force in the baseline window [N/s].
-        drift_sd_N_per_s: Its standard uncertainty [N/s].
+        drift_sd_N_per_s: Its standard uncertainty; where the drift was removed, that of the removed one [N/s].
         warnings: What a reader should know, one sentence each.
     """
 
@@ -96,6 +115,7 @@ def condition(
     height: float | None = None,
     t_end: float | None = None,
     board: float | None = None,
+    baseline: str = CONSTANT,
 ) -> Conditioned:
     """Tare a trace, find contact, and put the force on a uniform stroke with a zero-phase filter.
 
@@ -107,6 +127,8 @@ def condition(
         t_end: End of the record on the trace's clock [s]; what comes later (board contact, say) is dropped.
         board: Stroke at which the edge is at the board, which is the specimen's height where that was measured [m]; the
             curve ends there.
+        baseline: What is subtracted where there is no air run: ``constant``, the level before contact; ``linear``, the
+            line through it; ``zero``, nothing, for a record that starts at its trigger.
 
     Returns:
         The conditioned cut.
@@ -114,50 +136,95 @@ def condition(
     Raises:
         TraceError: No usable cut in the trace; the message says why and what to do.
     """
-    _check_options(trace, speed, height)
+    _check_options(trace, speed, height, baseline, air)
     trace = trace if t_end is None else trace.until(t_end)
-    force = trace.force if air is None else trace.force - _air_force(trace, air)
+    mend, air_mend = mended(trace), None if air is None else mended(air)
+    trace = single_cut(mend.trace, None)
+    force = trace.force if air_mend is None else trace.force - _air_force(trace, air_mend.trace)
     last = end_of_descent(trace)
     _check_record(trace, force, last)
-    contact = find_contact_onset(trace.time[: last + 1], force[: last + 1], source=trace.source)
-    baseline = contact.baseline
-    tared = force - baseline.level
+    force, contact, drift = _contact(trace, force, last, baseline)
+    approach = check_approach(trace, force, contact) if baseline == CONSTANT else []
+    level = contact.baseline
+    tared = force - level.level
     axis = stroke_axis(trace, tared, contact, last=last, speed=speed, height=height)
     if board is not None:
         axis = ending_at_board(axis, board, trace.source)
-    grid, curve = _on_grid(trace, axis.stroke, tared, contact.onset, axis.end)
+    held = held_samples(trace, tared, axis.stroke, axis.end, level.noise_sd)
+    into, deep = (int(np.searchsorted(trace.time, contact.onset)), int(np.argmax(axis.stroke >= axis.end * (1 - 1e-9))))
+    sudden = sudden_changes(trace, tared, (into, deep), out_of_the_food(trace, contact), held.sound)
+    grid, curve = _on_grid(trace.time, axis.stroke, tared, (contact.onset, axis.end), held.sound)
     length = float(grid[-1])
     samples = int(np.count_nonzero((axis.stroke >= 0.0) & (axis.stroke <= length)))
     noise = _filtered_noise(contact, samples, length)
     peak = _peak(curve)
     _check_peak(trace, peak)
+    end_s = float(trace.time[int(np.argmax(axis.stroke >= length * (1 - 1e-9)))])
+    level_sd = _root_sum(level.level_sd, mend.level_sd, 0.0 if air_mend is None else air_mend.level_sd)
+    at_peak = contact.onset + (end_s - contact.onset) * float(grid[int(np.argmax(curve))]) / length
+    drift_sd = 0.0 if drift is None else drift.sd(at_peak)
+    said = (*approach, *mend.notes, *(() if air_mend is None else air_mend.notes), *sudden, *held.notes)
+    removed = () if drift is None else (drift.note(trace.source, end_s),)
     return Conditioned(
         trace=trace,
-        baseline_N=baseline.level,
-        baseline_sd_N=baseline.level_sd,
-        baseline_kind="constant" if air is None else "air",
+        baseline_N=level.level,
+        baseline_sd_N=level_sd,
+        baseline_kind=baseline if air is None else "air",
         onset_s=contact.onset,
-        onset_sd_s=contact.onset_sd,
-        end_s=float(trace.time[int(np.argmax(axis.stroke >= length * (1 - 1e-9)))]),
+        onset_sd_s=_root_sum(contact.onset_sd, trace.time_sd),
+        end_s=end_s,
         time=trace.time,
         force=tared,
         stroke=grid,
         curve=curve,
         stroke_source=axis.source,
         stroke_length_m=length,
-        noise_sd_N=baseline.noise_sd,
-        curve_noise_sd_N=noise,
+        noise_sd_N=level.noise_sd,
+        curve_noise_sd_N=_root_sum(noise, held.step_sd),
         filter_sd_m=FILTER_SD_M,
         peak_N=peak,
-        peak_sd_N=float(np.hypot(noise, baseline.level_sd)),
-        drift_N_per_s=baseline.slope,
-        drift_sd_N_per_s=baseline.slope_sd,
-        warnings=(*_record_warnings(trace), *_baseline_warnings(trace, air, force, contact, last), *axis.warnings),
+        peak_sd_N=_root_sum(noise, level_sd, drift_sd, held.peak_sd, held.step_sd),
+        drift_N_per_s=level.slope if drift is None else 0.0,
+        drift_sd_N_per_s=level.slope_sd if drift is None else drift.slope_sd,
+        warnings=(
+            *_record_warnings(trace),
+            *said,
+            *_baseline_warnings(trace, air, force, contact, last),
+            *removed,
+            *axis.warnings,
+            *board_warnings(trace.source, grid, curve),
+        ),
     )
 
 
-def _check_options(trace: Trace, speed: float | None, height: float | None) -> None:
-    """Speed and height must be positive, and one of them must be there if the trace has no position."""
+def _root_sum(*parts: float) -> float:
+    """Root of the sum of the squares."""
+    return math.hypot(*parts)
+
+
+def _contact(
+    trace: Trace, force: np.ndarray, last: int, baseline: str
+) -> tuple[np.ndarray, ContactOnset, Drift | None]:
+    """The force, without its drift where that is to be removed, its contact, and the drift."""
+    if baseline == ZERO:
+        return force, trigger_contact(trace, force), None
+    contact = find_contact_onset(trace.time[: last + 1], force[: last + 1], source=trace.source)
+    if baseline != LINEAR:
+        return force, contact, None
+    for _ in range(DRIFT_ROUNDS):
+        drift = drift_of(trace, force, contact)
+        level = drift.removed(trace.time, force)
+        contact = find_contact_onset(trace.time[: last + 1], level[: last + 1], source=trace.source)
+    return level, contact, drift
+
+
+def _check_options(trace: Trace, speed: float | None, height: float | None, baseline: str, air: Trace | None) -> None:
+    """Speed and height must be positive, one of them must be there if the trace has no position, and what an air run
+    subtracts needs no other baseline."""
+    if baseline not in BASELINES:
+        raise TraceError(f"baseline {quoted(baseline)} is not one of {', '.join(BASELINES)} (option --baseline)")
+    if air is not None and baseline != CONSTANT:
+        raise TraceError(f"{trace.source}: --baseline {baseline} beside --air, which is subtracted; give one of them")
     for name, value, unit in (("speed", speed, "m/s"), ("height", height, "m")):
         if value is not None and not (np.isfinite(value) and value > 0.0):
             raise TraceError(f"{name} is {value} {unit}; it must be positive (option --{name})")
@@ -250,6 +317,10 @@ def _air_warnings(trace: Trace, air: Trace, onset: float) -> list[str]:
 def _drift_warnings(trace: Trace, force: np.ndarray, contact: ContactOnset, end: float) -> list[str]:
     """A constant baseline that the force before contact contradicts."""
     base = contact.baseline
+    before = max(int(np.searchsorted(trace.time, contact.onset)), base.stop)
+    whole = estimate_baseline(trace.time, force, 0, before)
+    if whole.slope_sd < base.slope_sd:  # a drift is taken for contact early, which leaves a short window
+        base = replace(base, slope=whole.slope, slope_sd=whole.slope_sd, start=0, stop=whole.stop)
     found = []
     drift = base.slope * (end - contact.onset)
     told = end - contact.onset < DRIFT_REACH * (trace.time[base.stop - 1] - trace.time[base.start])
@@ -257,7 +328,8 @@ def _drift_warnings(trace: Trace, force: np.ndarray, contact: ContactOnset, end:
     if told and significant and abs(drift) > DRIFT_FRACTION * contact.peak:
         found.append(
             f"the baseline drifts by {base.slope:.3g} N/s before contact, {drift:.2g} N over the cut "
-            f"({abs(drift) / contact.peak:.1%} of the peak); it was not removed: give an air run with --air"
+            f"({abs(drift) / contact.peak:.1%} of the peak); it was not removed: give an air run "
+            "with --air, or say --baseline linear"
         )
     first = force[: max(SUSTAIN, base.stop // 10)]
     moved = base.level - float(np.median(first))
@@ -271,17 +343,19 @@ def _drift_warnings(trace: Trace, force: np.ndarray, contact: ContactOnset, end:
 
 
 def _on_grid(
-    trace: Trace, stroke: np.ndarray, tared: np.ndarray, onset: float, end: float
+    time: np.ndarray, stroke: np.ndarray, tared: np.ndarray, ends: tuple[float, float], sound: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Uniform stroke grid from 0 to ``end`` [m] and the filtered force on it [N]."""
+    """Uniform stroke grid from 0 to the end of the cut [m] and the filtered force of its sound samples on it [N]."""
+    onset, end = ends
     grid = np.linspace(0.0, end, N_STROKE)
     lead = leading_grid(grid)
     whole = np.concatenate([lead, grid])
-    last = int(np.argmax((trace.time > onset) & (stroke >= end)))
-    away = np.flatnonzero((trace.time < onset) & (stroke < whole[0]))
+    last = int(np.argmax((time > onset) & (stroke >= end)))
+    away = np.flatnonzero((time < onset) & (stroke < whole[0]))
     first = int(away[-1]) if len(away) else 0
     deepest = np.maximum.accumulate(stroke[first : last + 1])
-    advancing = deepest - stroke[first : last + 1] <= DWELL_M
+    advancing = (deepest - stroke[first : last + 1] <= DWELL_M) & sound[first : last + 1]
+    advancing[[0, -1]] = True
     s, f = deepest[advancing], tared[first : last + 1][advancing]
     if s[0] > whole[0]:
         s, f = np.concatenate([[whole[0]], s]), np.concatenate([[0.0], f])

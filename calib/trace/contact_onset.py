@@ -135,7 +135,8 @@ def find_contact_onset(time: np.ndarray, force: np.ndarray, *, source: str) -> C
     if before < MIN_BASELINE:
         raise TraceError(
             f"{source}: only {before} samples before contact at {onset:.4g} s, at least {MIN_BASELINE} are "
-            "needed for the baseline; keep the approach of the knife in the record"
+            "needed for the baseline; keep the approach of the knife in the record, or say --baseline zero if it "
+            "starts at the trigger of a zeroed machine"
         )
     baseline = estimate_baseline(time, force, before - max(before // 2, MIN_BASELINE), before)
     return ContactOnset(baseline, onset, onset_sd, coarse.height)
@@ -252,7 +253,8 @@ def _no_contact_message(force: np.ndarray, coarse: _Coarse, source: str) -> str:
         )
     return (
         f"{source}: the force rises within the first samples, so that fewer than {MIN_BASELINE} of them are "
-        "a baseline before contact; keep the approach of the knife in the record"
+        "a baseline before contact; keep the approach of the knife in the record, or say --baseline zero if it "
+        "starts at the trigger of a zeroed machine"
     )
 
 

@@ -23,6 +23,10 @@ knife's way."""
 STROKE_EXCESS = 0.1
 """Part of the specimen's height by which a stroke may exceed it: 10 N bend an arm of 3 kN/m by 3 mm, a tenth of a fruit
 of 3 cm."""
+BOARD_PART = 0.08
+"""Last part of a stroke in which an edge that touches the board raises the force [-]."""
+BOARD_SLOPE, BOARD_RISE = 3.0, 0.04
+"""Slope in that part over the usual one [-], and rise in it over the peak [-], from which on it may be the board."""
 MAX_DESCENT_FRACTION = 0.5
 """Part of the position's range that must lie before its lowest point for a record to be a downward stroke."""
 
@@ -155,6 +159,32 @@ def ending_at_board(axis: StrokeAxis, board: float, source: str) -> StrokeAxis:
         "below the board's top is left out"
     )
     return replace(axis, end=board, warnings=(*axis.warnings, said))
+
+
+def board_warnings(source: str, stroke: np.ndarray, curve: np.ndarray) -> list[str]:
+    """Whether the force rises at the end of the stroke as no food makes it rise, one sentence or none.
+
+    Args:
+        source: Name of the record for messages.
+        stroke: Stroke [m], shape (n,).
+        curve: Force on it [N], shape (n,).
+
+    Returns:
+        The sentence, or nothing.
+    """
+    last = int((1.0 - BOARD_PART) * len(curve))
+    low = last + int(np.argmin(curve[last:]))
+    peak, rise = float(curve.max()), float(curve[-1] - curve[low])
+    slopes = np.gradient(curve, stroke)
+    usual = max(float(np.percentile(np.abs(slopes[:last]), 90)), 1e-12)
+    steep = float(slopes[last:].max()) / usual
+    if rise <= BOARD_RISE * peak or steep <= BOARD_SLOPE:
+        return []
+    return [
+        f"{source}: the force rises by {rise:.3g} N over the last {1e3 * (stroke[-1] - stroke[low]):.2g} mm of the "
+        f"stroke, up to {steep:.0f} times as steeply as before: the edge may be on the board; end the cut before it "
+        "with --t-end, or give --height"
+    ]
 
 
 def _release(time: np.ndarray, tared: np.ndarray, contact: ContactOnset) -> tuple[float, bool]:

@@ -1,4 +1,4 @@
-"""A measured force trace: reading it from a table, and everything that can be wrong with its clock."""
+"""A measured force trace, and reading it from a file or a DataFrame."""
 
 from __future__ import annotations
 
@@ -10,28 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from calib.errors import TraceError
+from calib.formats.reader import read_table
 from calib.io.wording import brief, quoted
-from calib.trace.columns import Column, candidates, choose, numbers
-from calib.trace.reader import read_table
-from calib.trace.table import MEASURED, TRACE_LABELS, Table
+from calib.table.table import MEASURED, TRACE_LABELS, Table
+from calib.trace.recorded import MIN_SAMPLES as MIN_SAMPLES
+from calib.trace.recorded import Reading, recorded
 
 if TYPE_CHECKING:
     import pandas
 
-MIN_SAMPLES = 20
-"""Fewest samples of a trace: below this, baseline, onset and ramp have under seven samples each."""
-SLOWEST_S, FASTEST_S = 0.5, 2e-5
-"""Median sampling intervals outside are taken for a unit mix-up [s]: a clock of a kilohertz in milliseconds read as
-seconds has 1 s, one of 50 Hz in seconds read as milliseconds 2e-5 s."""
-CLOCK_START_S = 1000.0
-"""Time of the first sample from which on a clock has begun elsewhere [s], at the start of a robot or in 1970; the trace
-then counts from its first sample."""
-CLOCK_JITTER = 0.5
-"""Largest deviation of a step from the mean step for a column that looks like a clock [-]."""
 DATA_FRAME = "DataFrame"
 """What a trace from a DataFrame is called that says nothing else."""
-DISABLED = "none"
-"""Value of ``position_col`` that leaves a position column unused."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +37,11 @@ class Trace:
         label: ``measured`` or ``reconstructed``.
         start: Time of the first sample on the file's clock where that began elsewhere, and was subtracted [s].
         notes: What was done to read the file that its reader should know, one sentence each.
+        rows: What the file calls the row of each sample, n of them; empty for arrays.
+        row: What such a name is: ``row`` or ``index``.
+        time_sd: Standard uncertainty of a time that a repair of the clock leaves [s].
+        breaks: Indices of the samples with which another record of the file begins.
+        whole: Whether it is one cut, also where its force is released in it.
 
     Raises:
         TraceError: Too few samples, unequal lengths, a number that is not finite, a clock that does not run.
@@ -62,6 +56,11 @@ class Trace:
     label: str = MEASURED
     start: float = 0.0
     notes: tuple[str, ...] = ()
+    rows: tuple[Any, ...] = ()
+    row: str = "row"
+    time_sd: float = 0.0
+    breaks: tuple[int, ...] = ()
+    whole: bool = False
 
     def __post_init__(self) -> None:
         for name in ("time", "force", "position"):
@@ -94,8 +93,27 @@ class Trace:
                 f"{self.source}: t_end is {end:g} s, the record runs from {self.time[0]:g} to {self.time[-1]:g} s; "
                 f"choose a time inside it with at least {MIN_SAMPLES} samples before (option --t-end)"
             )
-        position = None if self.position is None else self.position[keep]
-        return replace(self, time=self.time[keep], force=self.force[keep], position=position)
+        return self.part(np.flatnonzero(keep))
+
+    def part(self, kept: np.ndarray) -> Trace:
+        """The trace on some of its samples.
+
+        Args:
+            kept: Their indices, increasing, shape (m,).
+        """
+        return replace(
+            self,
+            time=self.time[kept],
+            force=self.force[kept],
+            position=None if self.position is None else self.position[kept],
+            rows=tuple(self.rows[i] for i in kept) if self.rows else (),
+            breaks=tuple(sorted({int(np.searchsorted(kept, i)) for i in self.breaks} - {0, len(kept)})),
+        )
+
+    def where(self, i: int) -> str:
+        """The place of a sample, as the file counts its rows, with its time."""
+        row = f"{self.row} {brief(self.rows[i])}" if self.rows else f"sample {i}"
+        return f"{row} ({self.time[i]:.4g} s)"
 
     def _numbers(self, name: str) -> np.ndarray:
         """A column as an array of numbers.
@@ -118,7 +136,7 @@ class Trace:
 
     @classmethod
     def from_frame(
-        cls, frame: pandas.DataFrame, *, source: str | None = None, label: str | None = None, **columns: Any
+        cls, frame: pandas.DataFrame, *, source: str | None = None, label: str | None = None, **how: Any
     ) -> Trace:
         """A trace from a pandas DataFrame; columns as in :func:`read_trace`.
 
@@ -127,7 +145,7 @@ class Trace:
             source: Name in errors and reports, which say that it was a DataFrame; ``frame.attrs["source"]`` if not
                 given.
             label: ``measured`` or ``reconstructed``; ``frame.attrs["label"]`` or ``measured`` if not given.
-            columns: ``time_col``, ``force_col``, ``position_col``, ``depth_col`` and ``sign``.
+            how: Attributes of :class:`calib.trace.recorded.Reading`.
 
         Returns:
             The trace in SI units.
@@ -137,7 +155,7 @@ class Trace:
         """
         import pandas
 
-        from calib.trace.frame_table import table_of_frame
+        from calib.formats.frame_table import table_of_frame
 
         if not isinstance(frame, pandas.DataFrame):
             raise TraceError(f"a {type(frame).__name__} is no record: give the path of a file, or a pandas DataFrame")
@@ -145,7 +163,7 @@ class Trace:
         if DATA_FRAME not in source:
             source = f"{source} ({DATA_FRAME})" if source else DATA_FRAME
         label = label or str(frame.attrs.get("label") or MEASURED)
-        return _trace(table_of_frame(frame, source=source, label=label), **columns)
+        return _trace(table_of_frame(frame, source=source, label=label), Reading(**how))
 
     def frame(self) -> pandas.DataFrame:
         """The trace as a pandas DataFrame: ``time_s``, ``force_N`` and, where it has one, ``position_m``.
@@ -173,23 +191,15 @@ class Trace:
         return float(np.median(np.diff(self.time)))
 
 
-def read_trace(
-    path: str | Path | pandas.DataFrame,
-    *,
-    time_col: str | None = None,
-    force_col: str | None = None,
-    position_col: str | None = None,
-    depth_col: str | None = None,
-    sign: str | int | None = None,
-) -> Trace:
-    """Read a force trace from a CSV, JSON or HDF5 file, or a pandas DataFrame.
+def read_trace(path: str | Path | pandas.DataFrame, **how: Any) -> Trace:
+    """Read a force trace from a file of any known kind, or a pandas DataFrame.
 
     Columns are found by their names, which carry the unit: ``time_s``, ``time_ms``, ``t_s``; ``force_N``, ``fz_N``,
-    ``force_kN``; heights ``ee_z_m``, ``position_mm``; depths ``stroke_m``, ``displacement_mm`` (positive downwards,
-    turned into heights). ``base_Fz_N`` of a robot log is preferred to a derived ``cut_force_z_N`` and has its sign
-    turned round. In CSV files, lines that start with ``#`` are comments; ``# label: reconstructed`` sets the label.
-    Lines above the header, a row of units below it, and decimals after a comma (where something else separates cells)
-    are understood.
+    ``force_kN``, ``Force (g)``; heights ``ee_z_m``, ``position_mm``; depths ``stroke_m``, ``displacement_mm`` (positive
+    downwards, turned into heights). ``base_Fz_N`` of a robot log is preferred to a derived ``cut_force_z_N`` and has
+    its sign turned round. A commanded or filtered force is never chosen unasked. In CSV files, lines that start with
+    ``#`` are comments; ``# label: reconstructed`` sets the label. Lines above the header, a row of units below it,
+    units in a line above it, decimals after a comma, thousands, dates and times of the day are understood.
 
     JSON files hold lists by name, or a list of records; HDF5 files data sets of one group (``file.h5:/group``) or a
     structured one, with units in names or attributes. In both, vectors become columns ``_x``, ``_y``, ``_z``, and
@@ -199,11 +209,8 @@ def read_trace(
 
     Args:
         path: The file, or the DataFrame.
-        time_col: Column to use as time; without a unit in its name it is taken as seconds.
-        force_col: Column to use as force; without a unit in its name it is taken as newtons.
-        position_col: Column to use as position (metres if its name has no unit); ``none`` uses no position.
-        depth_col: The same where it holds the way down, which grows as the knife descends.
-        sign: ``+`` or 1 if positive numbers mean resistance to the knife, ``-`` or -1 if negative ones do.
+        how: Attributes of :class:`calib.trace.recorded.Reading`: ``time_col``, ``force_col``, ``position_col``,
+            ``depth_col``, ``sign``, ``rate``, ``decimal``.
 
     Returns:
         The trace in SI units.
@@ -211,96 +218,31 @@ def read_trace(
     Raises:
         TraceError: The file or a column cannot be used; the message names file, column and row.
     """
-    columns: dict[str, Any] = {
-        "time_col": time_col,
-        "force_col": force_col,
-        "position_col": position_col,
-        "depth_col": depth_col,
-        "sign": sign,
-    }
     if not isinstance(path, (str, Path)):
-        return Trace.from_frame(path, **columns)
-    return _trace(read_table(path), **columns)
+        return Trace.from_frame(path, **how)
+    reading = Reading(**how)
+    return _trace(read_table(path, reading.decimal), reading)
 
 
-def _trace(
-    table: Table,
-    *,
-    time_col: str | None = None,
-    force_col: str | None = None,
-    position_col: str | None = None,
-    depth_col: str | None = None,
-    sign: str | int | None = None,
-) -> Trace:
+def _trace(table: Table, how: Reading) -> Trace:
     """The trace in a table.
 
     Raises:
         TraceError: As :func:`read_trace`.
     """
-    columns = {
-        "time": choose(table, "time", time_col),
-        "force": choose(table, "force", force_col),
-    }
-    if depth_col is not None:
-        if position_col is not None:
-            raise TraceError(
-                f"{table.source}: --position-col beside --depth-col; the knife's place is in one column, give one"
-            )
-        column = choose(table, "position", depth_col)
-        columns["position"] = replace(column, factor=-abs(column.factor))
-    elif position_col != DISABLED and (position_col is not None or candidates(table, "position")):
-        columns["position"] = choose(table, "position", position_col)
-    if sign is not None:
-        force = columns["force"]
-        columns["force"] = replace(force, factor=abs(force.factor) * _parse_sign(sign))
-    if len(table.rows) < MIN_SAMPLES:
-        raise TraceError(f"{table.source}: {len(table.rows)} rows of data, at least {MIN_SAMPLES} are needed")
-    values = {role: numbers(table, column) for role, column in columns.items()}
-    _check_clock(table, columns["time"], columns["force"], values["time"], values["force"])
-    start = float(values["time"][0])
-    start = start if abs(start) > CLOCK_START_S else 0.0
+    record = recorded(table, how)
     return Trace(
-        time=values["time"] - start,
-        force=values["force"],
-        position=values.get("position"),
+        time=record.time,
+        force=record.force,
+        position=record.position,
         source=table.source,
         sha256=table.sha256,
-        columns={role: column.name for role, column in columns.items()},
+        columns=dict(record.columns),
         label=table.label,
-        start=start,
-        notes=table.notes,
+        start=record.start,
+        notes=record.notes,
+        rows=record.rows,
+        row=table.row,
+        time_sd=record.time_sd,
+        breaks=record.breaks,
     )
-
-
-def _parse_sign(sign: str | int) -> float:
-    """The factor of a ``--sign`` option."""
-    signs = {"+": 1.0, "-": -1.0, "1": 1.0, "+1": 1.0, "-1": -1.0}
-    if str(sign) not in signs:
-        raise TraceError(f"sign {quoted(sign)} is not one of +, -, 1, -1 (option --sign)")
-    return signs[str(sign)]
-
-
-def _check_clock(table: Table, time: Column, force: Column, t: np.ndarray, f: np.ndarray) -> None:
-    """Refuse a time that does not increase, columns that look swapped, and milliseconds named as seconds."""
-    steps = np.diff(t)
-    if np.any(steps <= 0.0):
-        force_steps = np.abs(np.diff(f)) if np.all(np.diff(f) > 0) or np.all(np.diff(f) < 0) else np.zeros(1)
-        mean = float(force_steps.mean())
-        if mean > 0.0 and np.all(np.abs(force_steps - mean) <= CLOCK_JITTER * mean):
-            raise TraceError(
-                f"{table.source}: columns {brief(time.name)} and {brief(force.name)} look swapped ({brief(force.name)} "
-                f"rises in equal steps like a clock, {brief(time.name)} does not); exchange their names or use "
-                "--time-col and --force-col"
-            )
-        i = int(np.argmax(steps <= 0.0))
-        raise TraceError(
-            f"{table.source}, {table.row} {brief(table.rows[i + 1])}, column {brief(time.name)}: time does not "
-            f"increase ({t[i]:.10g} s, then {t[i + 1]:.10g} s); remove repeated rows, or cut the file where the "
-            "clock restarts"
-        )
-    median = float(np.median(steps))
-    where = f"{table.source}, column {brief(time.name)}: samples are {median:g} s apart"
-    if median >= SLOWEST_S:
-        raise TraceError(f"{where}; this looks like milliseconds: name the column time_ms")
-    if median < FASTEST_S:
-        raise TraceError(f"{where}, more than {1 / FASTEST_S:g} a second; check the unit of the column")

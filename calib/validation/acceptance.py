@@ -241,7 +241,7 @@ def limits(
     Args:
         label: Whether the trace was ``measured`` or ``reconstructed``.
         stroke_source: What its stroke rests on: ``position``, ``speed`` or ``height``.
-        baseline_kind: What was subtracted: ``constant`` or ``air``.
+        baseline_kind: What was subtracted: ``constant``, ``linear``, ``zero`` or ``air``.
         verdicts: The verdict table.
         fitted: Fitted parameters by name.
         assumptions: What was assumed of the specimen and the sensor, each a sentence without capital and full stop.
@@ -286,6 +286,10 @@ def _limits_of_measurement(stroke_source: str, baseline_kind: str) -> list[str]:
         said.append(f"The trace has no position: its stroke axis rests on {how}.")
     if baseline_kind == "constant":
         said.append("A constant baseline was subtracted: drift of the sensor along the stroke is in the force.")
+    if baseline_kind == "linear":
+        said.append("The drift before contact was removed: one that was not steady along the stroke is in the force.")
+    if baseline_kind == "zero":
+        said.append("The machine's own zero was taken: what it was off by is in the force.")
     return said
 
 

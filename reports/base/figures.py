@@ -91,7 +91,7 @@ class ConditioningRecord:
         end: End of the downward stroke [s].
         end_sd: Its standard uncertainty [s], or None.
         window: Start and end of the baseline window [s], or None where it was not saved.
-        baseline_kind: ``constant`` or ``air``.
+        baseline_kind: ``constant``, ``linear``, ``zero`` or ``air``.
         peak: Peak of the filtered curve [N].
         peak_sd: Its standard uncertainty [N], or None.
     """
@@ -325,7 +325,7 @@ def _raw(axes: Axes, r: ConditioningRecord) -> None:
     x, y = envelope(r.time, r.raw)
     axes.plot(x, y, color=BLACK, lw=0.7, label="raw force")
     bx, by = envelope(r.time, r.raw - r.tared)
-    name = "baseline" if r.baseline_kind == "constant" else "air run, shifted"
+    name = "air run, shifted" if r.baseline_kind == "air" else "baseline"
     axes.plot(bx, by, color=RED, lw=1.2, dashes=(5.0, 2.0), label=name)
     if r.window is not None:
         axes.axvspan(*r.window, label="baseline window", **HATCHED)

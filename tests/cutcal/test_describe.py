@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+from matplotlib import image as plt_image
+
 from cutcal.main import main
+from tests.calib.made_cuts import made_cut, plain_rows, text_of
 from tests.data_dir import ROOT
 
 TRACE = ROOT / "force_data" / "banana_reconstructed.csv"
@@ -36,3 +40,37 @@ def test_check_refuses_what_a_fit_would_refuse(tmp_path: Path, capsys) -> None:
     assert error.startswith("cutcal: flat.csv") and error.count("\n") == 1
     assert main(["calibrate", "--check", "--config", str(path)]) == 1
     assert "--check is for one trace" in capsys.readouterr().err
+
+
+def test_check_draws_the_record_as_it_was_read(tmp_path: Path, capsys) -> None:
+    """A PNG of the size that is stated; a value that stands out is in it, and the cut is still seen. Another kind of
+    file, and a folder that is not there, are one line."""
+    cut = made_cut()
+    rows = plain_rows(cut.but(force=np.where(np.arange(640) == 150, 9999.0, cut.force)))
+    path, png = tmp_path / "cut.csv", tmp_path / "record.png"
+    path.write_text(text_of("time_s,force_N,position_m", rows))
+    check = ["calibrate", "--food", "banana", "--trace", str(path), "--check"]
+    assert main([*check, str(png)]) == 0
+    assert f"picture     {png}" in capsys.readouterr().out
+    pixels = plt_image.imread(png)
+    assert pixels.shape[:2] == (605, 880) and 0.02 < np.mean(pixels[..., :3].min(axis=-1) < 0.5) < 0.3
+    for name, says in (("record.pdf", "is a PNG"), ("none/record.png", "cannot be written")):
+        assert main([*check, str(tmp_path / name)]) == 1
+        assert says in capsys.readouterr().err
+
+
+def test_one_of_several_cuts_is_chosen(tmp_path: Path, capsys) -> None:
+    """Without a choice the file is refused; --cut takes one, --all says how each is read."""
+    cuts = [made_cut(peak=12.0), made_cut(peak=9.0, seed=1)]
+    rows = [
+        (f"{t + 3.2 * k:.4f}", *r) for k, c in enumerate(cuts) for (_, *r), t in zip(plain_rows(c), c.time, strict=True)
+    ]
+    path = tmp_path / "cuts.csv"
+    path.write_text(text_of("time_s,force_N,position_m", rows))
+    check = ["calibrate", "--food", "banana", "--trace", str(path), "--check"]
+    assert main(check) == 1 and "holds 2 cuts" in capsys.readouterr().err
+    assert main([*check, "--cut", "2"]) == 0 and "peak        8.9" in capsys.readouterr().out
+    assert main([*check, "--all"]) == 0
+    said = capsys.readouterr().out
+    assert "peak        11.8" in said and "peak        8.9" in said and "\ncut2\n" in said
+    assert main([*check, "--all", "--cut", "1"]) == 1

@@ -10,8 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from calib.io.progress import ProgressBar
+from calib.multi_specimen.spec import StudySpec, study_of_cuts
 from calib.problem.request import Request
 from calib.problem.target import ErrorModel
+from calib.trace.baselines import BASELINES, CONSTANT
+from calib.trace.cuts import WHOLE
 from calib.validation.acceptance import remedied
 from cutcal.commands.calibration.describe import description
 from cutcal.options import (
@@ -26,6 +29,7 @@ from cutcal.options import (
     print_json,
     sizing_of,
     titled,
+    whole,
     workers_of,
 )
 from cutcal.surroundings import interrupted
@@ -35,13 +39,13 @@ if TYPE_CHECKING:
     from calib.calibration.result import CalibrationResult
     from calib.multi_specimen.result import HeldOutCut, InSampleCut, StudyResult
 
+MEASUREMENT = "measurement"  # title of the group of options that say what was measured
+CHECK_HELP = "say how the trace is read (and draw it), then end"
+BASELINE_HELP = f"of a force without --air: {', '.join(BASELINES)}"
 HELP = "fit a food to a measured knife-force trace, and report"
-DESCRIPTION = """Fit a food to a knife-force trace (CSV, JSON, HDF5; units in columns' names)."""
-EPILOG = """examples:
-  calibrate --food potato --trace cut.csv --air air.csv --check
-  calibrate --config potatoes.yaml --out runs/potatoes
-
-Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass."""
+DESCRIPTION = """Fit a food to a knife-force trace. Exit: 0 passed, 1 error, 2 did not pass."""
+EPILOG = """example:
+  calibrate --food potato --trace cut.csv --air air.csv --check"""
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
@@ -49,7 +53,10 @@ def add_args(p: argparse.ArgumentParser) -> None:
     p.usage = "%(prog)s --food NAME --trace FILE [options]"
     add_trace(p, required=False)
     add_food(p, required=False)
-    fit = p.add_argument_group("fit")
+    titled(p, MEASUREMENT).add_argument(
+        "--all", action="store_true", help="all cuts in the file, as specimens of one food"
+    )
+    fit = titled(p, RUN)
     fit.add_argument("--config", metavar="YAML", help="fit the cuts of this study, in place of --trace")
     fit.add_argument("--fit", metavar="NAMES", help="properties, e.g. E,nu,R,mu (default: those a cut sees)")
     fit.add_argument("--budget", type=number(0, 1e6, ""), metavar="N", help="most simulations of a trace (default 100)")
@@ -62,25 +69,48 @@ def add_args(p: argparse.ArgumentParser) -> None:
     fit.add_argument("--sample", action="store_true", help="sample the posterior as well (needs emcee)")
     fit.add_argument("--u-num", metavar="DIR", help="a converge study whose uncertainty the fit heeds")
     add_workers(p, "simulations")
-    titled(p, RUN).add_argument("--check", action="store_true", help="say how the trace is read, and simulate nothing")
+    titled(p, RUN).add_argument("--check", nargs="?", const="", metavar="PNG", help=CHECK_HELP)
     titled(p, RUN).add_argument("--resume", action="store_true", help=RESUME_HELP)
     add_run(p)
 
 
 def add_trace(p: argparse.ArgumentParser, *, required: bool = True) -> None:
     """Options that say what was measured."""
-    g = p.add_argument_group("measurement")
+    g = p.add_argument_group(MEASUREMENT)
     g.add_argument("--trace", required=required, metavar="FILE", help="record of the cut")
     g.add_argument("--air", metavar="FILE", help="the same motion without food, to be subtracted")
-    g.add_argument("--time-col", metavar="NAME", help="column of the time")
+    g.add_argument("--time-col", metavar="NAME", help="column of the time; NAME=UNIT says its unit")
     g.add_argument("--force-col", metavar="NAME", help="column of the force on the knife")
     g.add_argument("--position-col", metavar="NAME", help="column of the knife's height ('none': none)")
     g.add_argument("--depth-col", metavar="NAME", help="the same where it grows as the knife descends")
     g.add_argument("--sign", choices=("+", "-"), metavar="+|-", help="sign that makes resistance positive")
+    g.add_argument("--rate", type=number(0, 1e6, "/s"), metavar="HZ", help="rows a second, where there is no clock")
     g.add_argument("--speed", type=number(0, 10, "m/s"), metavar="M/S", help="of the knife, where there is no position")
     g.add_argument("--gain-sd", type=number(0, 1, ""), metavar="PART", help="doubt of the sensor's gain (default 0.02)")
     g.add_argument("--lag-sd", type=number(0, 1, "s"), metavar="S", help="doubt of force against position in time [s]")
+    g.add_argument("--baseline", choices=BASELINES, default=CONSTANT, metavar="KIND", help=BASELINE_HELP)
+    g.add_argument("--cut", type=cut_number, metavar="N", help="which of several cuts in the file ('whole': it is one)")
     g.add_argument("--t-end", type=float, metavar="S", help="leave out what is later [s] (board contact)")
+
+
+def picture_of(text: str) -> Path | None:
+    """The file into which ``--check`` draws, None where none is named.
+
+    Raises:
+        CutcalError: It is no PNG.
+    """
+    if text and not text.lower().endswith(".png"):
+        raise CutcalError(f"--check {text}: the picture of the record is a PNG; name a file such as record.png")
+    return Path(text) if text else None
+
+
+def cut_number(text: str) -> int | str:
+    """The number of a cut, or the word that says there is one.
+
+    Raises:
+        ArgumentTypeError: It is neither.
+    """
+    return text if text == WHOLE else whole(1)(text)
 
 
 BUDGET = 100.0
@@ -114,13 +144,8 @@ def measured(args: argparse.Namespace, command: Sequence[str]) -> Request:
     Raises:
         CutcalError: An impossible value, an unknown name, a missing file.
     """
-    columns: dict[str, Any] = {
-        "time_col": args.time_col,
-        "force_col": args.force_col,
-        "position_col": args.position_col,
-        "depth_col": args.depth_col,
-        "sign": args.sign,
-    }
+    how = ("time_col", "force_col", "position_col", "depth_col", "sign", "rate")
+    columns: dict[str, Any] = {name: getattr(args, name) for name in how}
     return Request(
         food=food_of(args),
         trace=Path(args.trace),
@@ -129,6 +154,8 @@ def measured(args: argparse.Namespace, command: Sequence[str]) -> Request:
         knife=args.knife,
         speed=args.speed,
         t_end=args.t_end,
+        baseline=args.baseline,
+        cut=args.cut,
         gain_sd=args.gain_sd,
         lag_sd=args.lag_sd,
         sizing=sizing_of(args),
@@ -151,8 +178,12 @@ def run(args: argparse.Namespace) -> int:
     if missing:
         raise CutcalError(f"{' and '.join(missing)} missing: name the food and its trace, or a study with --config")
     request = request_of(args, command)
-    if args.check:
-        print(description(request))
+    if args.all:
+        if args.cut is not None:
+            raise CutcalError("--all beside --cut; give one of them")
+        return run_cuts(args, study_of_cuts(request))
+    if args.check is not None:
+        print(description(request, picture_of(args.check)))
         return 0
     out = Path(args.out or f"cutcal-{request.food.name}-{request.stem}")
 
@@ -169,17 +200,41 @@ def run(args: argparse.Namespace) -> int:
 
 def run_study(args: argparse.Namespace, command: Sequence[str]) -> int:
     """Fit and predict the cuts of a study; prints its table, or the summary as JSON."""
-    from calib.io.typed_document import to_document
-    from calib.multi_specimen.run import run as study_run
     from calib.multi_specimen.study_file import read_study
 
-    if args.check:
+    if args.check is not None:
         raise CutcalError("--check is for one trace: give --food and --trace, and leave --config out")
     taken = [n for n in ("food", "trace", "air", "material", "fit") if getattr(args, n) is not None]
     if taken:
         raise CutcalError(f"--{taken[0]} beside --config: write it into {args.config}, where it belongs to a trace")
     study = read_study(args.config).run_with(budget=args.budget, arch=args.arch, command=tuple(command))
-    out = Path(args.out or f"cutcal-{Path(args.config).stem}")
+    return fit_study(args, study, Path(args.out or f"cutcal-{Path(args.config).stem}"))
+
+
+def run_cuts(args: argparse.Namespace, study: StudySpec) -> int:
+    """Fit all cuts of one record together, or say how each of them is read."""
+    if args.check is not None:
+        png = picture_of(args.check)
+        pictures = {name: png and png.with_stem(f"{png.stem}-{name}") for name in study.requests}
+        said = {name: description(request, pictures[name]) for name, request in study.requests.items()}
+        print("\n\n".join(f"{name}\n{text}" for name, text in said.items()))
+        return 0
+    return fit_study(args, study, Path(args.out or f"cutcal-{study.food.name}-{study.first.stem}"))
+
+
+def fit_study(args: argparse.Namespace, study: StudySpec, out: Path) -> int:
+    """Fit a study and predict what it holds out; prints its table, or the summary as JSON.
+
+    Args:
+        args: The options.
+        study: The study.
+        out: Output folder.
+
+    Returns:
+        The exit code.
+    """
+    from calib.io.typed_document import to_document
+    from calib.multi_specimen.run import run as study_run
 
     with workers_of(args, note) as pool, ProgressBar() as bar:
         result = study_run(study, out, pool, resume=args.resume, progress=bar, say=note)

@@ -33,7 +33,8 @@ EPILOG = """examples:
       --nu 0.4 --strain 0.2 --bracket
 
 A trace has a column of compression (compression_mm, displacement_mm, ...), one
-of load (load_N, force_kN, ...) and may have one of repeats (replicate).
+of load (load_N, force_kN, ...) and may have one of repeats (replicate,
+specimen). A machine that counts both negative is read with --sign -.
 
 Exit codes: 0 passed, 1 error in input or run, 2 fitted but not within the
 limits (curve error 5 %, modulus over 0-5 % strain 10 %, solver 3 %)."""
@@ -59,6 +60,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     p.add_argument("--cells", type=whole(1), metavar="N", help="cells over the height (default 10, 15 if bonded)")
     p.add_argument("--compression-col", metavar="C", help="its column; metres without a unit")
     p.add_argument("--force-col", metavar="C", help="column of the load; newtons without a unit")
+    p.add_argument("--sign", choices=("+", "-"), metavar="+|-", help="sign of the load that presses")
     add_run(p)
 
 
@@ -73,7 +75,8 @@ def run(args: argparse.Namespace) -> int:
             "for instance 0.49 for a gel or a rubber, 0.2 to 0.4 for a food with pores"
         )
     out = Path(args.out or f"cutcal-compress-{Path(args.trace[0]).stem}")
-    test = CompressionTest(args.trace, shape, args.nu, args.strain, args.bonded, args.compression_col, args.force_col)
+    columns = (args.compression_col, args.force_col, args.sign)
+    test = CompressionTest(args.trace, shape, args.nu, args.strain, args.bonded, *columns)
     cells = args.cells if args.cells is not None else 15 if args.bonded else 10
     options = PressOptions(cells, args.bracket, args.seed, args.arch)
     command = ("compress", *(a for a in sys.argv[1:] if a != "compress"))

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+from calib.errors import OutputError
 from calib.problem.request import Request
 from calib.problem.setup import set_up
+from calib.trace.conditioning import Conditioned
 from mpm.scene import Knife
 
 SOURCES = {
@@ -14,8 +18,15 @@ SOURCES = {
 """What the stroke is taken from, in words."""
 
 
-def description(request: Request) -> str:
+def description(request: Request, png: Path | None = None) -> str:
     """What a calibration would start from: columns, tare, contact, stroke, specimen, cells, parameters and warnings.
+
+    Args:
+        request: What would be calibrated.
+        png: File into which the record is drawn as it was read, or None.
+
+    Returns:
+        A line for each of them.
 
     Raises:
         CutcalError: Anything wrong with the input.
@@ -40,6 +51,44 @@ def description(request: Request) -> str:
         ("fitted", ", ".join(p.name for p in setup.objective.parameters)),
         ("budget", f"{request.budget:g} simulations at most, one of screening is a quarter"),
     ]
+    if png is not None:
+        draw_record(request, c, png)
+        lines.append(("picture", f"{png}, the record as it was read"))
     words = [f"{name:12s}{text}" for name, text in lines]
     warned = [*c.warnings, *setup.assumed, *request.food.warnings()]
     return "\n".join([*words, *(f"note: {text}" for text in warned)])
+
+
+def draw_record(request: Request, done: Conditioned, png: Path) -> None:
+    """Draw a record as it was read into a file, with what was made of it.
+
+    Args:
+        request: What would be calibrated.
+        done: Its trace, conditioned.
+        png: The file, which is written anew.
+
+    Raises:
+        OutputError: It cannot be written.
+    """
+    from reports.calibration.record_picture import RecordPicture, record_png
+
+    read, _ = request.records()
+    named = ", ".join(f"{role} from {name}" for role, name in read.columns.items())
+    picture = RecordPicture(
+        title=f"{read.source}: {named}",
+        time=read.time,
+        force=read.force,
+        height=read.position,
+        used_time=done.time,
+        baseline=done.trace.force - done.force,
+        repaired=done.trace.force,
+        onset=done.onset_s,
+        onset_sd=done.onset_sd_s,
+        end=done.end_s,
+    )
+    try:
+        png.write_bytes(record_png(picture))
+    except OSError as error:
+        raise OutputError(
+            f"{png}: the picture cannot be written ({error.strerror}); name another with --check"
+        ) from None

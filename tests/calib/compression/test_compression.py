@@ -143,6 +143,65 @@ def test_units_of_columns_and_shapes_give_the_same(tmp_path):
     np.testing.assert_allclose(read_repeats([one], round_one, 0.2).stress, got.stress * 4 / math.pi)
 
 
+def columns_of(folder: Path, **columns: object) -> MeasuredCompression:
+    """The repeats in a file of columns."""
+    how = columns.pop("how", {})
+    return read_repeats([table_of(folder / "t.csv", **columns)], CUBE, 0.2, **how)
+
+
+def test_machines_of_all_kinds_give_the_same(tmp_path):
+    """Grams of a texture analyser, both negative, a negative load alone, the falling gap of a rheometer: one stress."""
+    want = columns_of(tmp_path, compression_mm=WAY, load_N=LOAD)
+    grams = columns_of(tmp_path, **{"Distance (mm)": WAY, "Force (g)": LOAD / 9.80665e-3})
+    both = columns_of(tmp_path, extension_mm=-WAY, load_N=-LOAD, how={"sign": "-"})
+    load = columns_of(tmp_path, extension_mm=WAY, load_N=-LOAD, how={"sign": "-"})
+    gap = columns_of(tmp_path, gap_um=1e3 * (9.9 - WAY), normal_force_N=LOAD)
+    for found in (grams, both, load, gap):
+        np.testing.assert_allclose(found.stress, want.stress, rtol=1e-9)
+    assert any("is in g, of which one is 0.00980665 N" in note for note in grams.notes)
+    assert any("taken as negative in compression" in note for note in both.notes) and load.notes == gap.notes == ()
+
+
+@pytest.mark.parametrize("name", ["Specimen", "replicate", "Sample ID", "run"])
+def test_specimens_in_a_file_are_repeats(tmp_path, name):
+    """None is dropped, whatever the column is called; one that counts rows splits nothing."""
+    found = columns_of(
+        tmp_path, **{name: ["A"] * N + ["B"] * N}, displacement_mm=np.r_[WAY, WAY], load_N=np.r_[LOAD, 1.2 * LOAD]
+    )
+    assert found.names == ["A", "B"]
+    np.testing.assert_allclose(found.stress[1], 1.2 * found.stress[0])
+    assert columns_of(tmp_path, sample=np.arange(N), displacement_mm=WAY, load_N=LOAD).names == ["t"]
+
+
+def test_a_header_for_each_specimen(tmp_path):
+    """A file that begins anew holds another repeat."""
+    rows = "".join(f"{w:.4f},{f:.4f}\n" for w, f in zip(WAY, LOAD, strict=True))
+    head = "Displacement,Load\n(mm),(N)\n"
+    (tmp_path / "t.csv").write_text(f"Specimen 1\n{head}{rows}\n{head}{rows}")
+    assert read_repeats([tmp_path / "t.csv"], CUBE, 0.2).names == ["1", "2"]
+
+
+def test_later_loadings_are_said_to_be_left_out(tmp_path):
+    """Two bites: the first is used, and the row is named from which on nothing is."""
+    way, load = np.r_[WAY, WAY[::-1], WAY], np.r_[LOAD, LOAD[::-1], 0.7 * LOAD]
+    found = columns_of(tmp_path, displacement_mm=way, load_N=load)
+    np.testing.assert_allclose(found.stress, columns_of(tmp_path, displacement_mm=WAY, load_N=LOAD).stress)
+    (note,) = found.notes
+    assert "the plate presses 2 times; the first loading is used, what is from row 1" in note
+
+
+def test_nrmse_is_over_the_largest_stress_not_the_range(tmp_path):
+    """A fit that is 1 kPa off everywhere has 1 kPa over the peak, also where the stress does not begin at zero."""
+    strain = np.linspace(0.0, 0.2, 201)
+    stress = 5e3 + 4e4 * strain
+    measured = MeasuredCompression(strain, stress[None], np.array([4e4]), ["a"], ())
+    off = stress + np.where(np.arange(201) % 2, 1e3, -1e3)
+    scale = float(stress @ off / (off @ off))
+    found = fit_modulus(measured, off)
+    assert found.nrmse == pytest.approx(np.sqrt(np.mean((scale * off - stress) ** 2)) / stress.max(), rel=1e-9)
+    assert stress.max() / np.ptp(stress) == pytest.approx(13.0 / 8.0)  # so the range would give another one
+
+
 def test_sensitivity_refits_at_other_poissons_ratios():
     """Data of nu 0.4 and E 1 fitted with 0.45: the modulus at 0.4 is 1; at the top nu stays below 0.5."""
     grid = strain_grid(0.4)
@@ -244,8 +303,14 @@ BAD: dict[str, tuple[dict[str, object] | None, tuple[str, ...], tuple[str, ...]]
         {"compression_mm": WAY, "load_N": np.random.default_rng(0).standard_normal(N)}, (), ("no load", "--force-col")
     ),
     "too little": ({"compression_mm": WAY / 4, "load_N": LOAD}, (), ("strain of 0.111, not 0.4", "--strain")),
-    "negative way": ({"compression_mm": -WAY, "load_N": LOAD}, (), ("compression is negative",)),
-    "negative load": ({"compression_mm": WAY, "load_N": -LOAD}, (), ("load falls",)),
+    "negative way": ({"compression_mm": -WAY, "load_N": LOAD}, (), ("compression is negative", "--sign")),
+    "negative load": ({"compression_mm": WAY, "load_N": -LOAD}, (), ("load falls", "--sign -")),
+    "a stress": (
+        {"compression_mm": WAY, "Stress (kPa)": LOAD}, ("--force-col", "Stress (kPa)"), ("unit is 'kPa'", "none of")
+    ),
+    "a strain": (
+        {"Strain (%)": WAY, "load_N": LOAD}, ("--compression-col", "Strain (%)"), ("unit is '%'", "none of")
+    ),
     "swapped": (
         {"compression_mm": WAY, "load_N": LOAD},
         ("--force-col", "compression_mm", "--compression-col", "load_N"),

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from calib.errors import TraceError
+from calib.formats import reader
+from calib.formats.reader import read_table
 from calib.io import number_columns as module
-from calib.trace import reader
-from calib.trace.reader import read_table
 from calib.trace.trace import read_trace
 
 N = 60

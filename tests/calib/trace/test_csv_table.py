@@ -88,7 +88,7 @@ def test_units_below_the_header_count(tmp_path: Path) -> None:
     ("change", "says"),
     [
         (lambda s: s.replace("0.300,12.00", "0.300"), r"row 32: 2 cells, the header has 3"),
-        (lambda s: "Record\n" + s.replace("0.300,12.00", "0.300"), r"row 3: 3 cells, the header has 1|not a CSV file"),
+        (lambda s: "Record\n" + s.replace("0.300,12.00", "0.300"), r"row 33: 2 cells, the header has 3"),
         (lambda s: s.replace("0.300,12.00", "0.300,N"), r"row 32, column force_N: 'N' is not a number"),
         (lambda s: s.split("\n", 1)[1], "the first row holds numbers"),
         (lambda s: "\n".join(f"word {k}" for k in range(80)) + "\n" + s, "not a CSV file with a force column"),

@@ -207,8 +207,8 @@ def test_hdf5_units_from_attributes(tmp_path: Path) -> None:
     np.testing.assert_allclose(trace.time, TIME)
     np.testing.assert_allclose(trace.force, LOAD)
     np.testing.assert_allclose(trace.position, HEIGHT)
-    with pytest.raises(TraceError, match="column load: its unit is 'lbf', which is none of a force; use one of N"):
-        read_trace(of_hdf5(tmp_path, "b.h5", units | {"load": "lbf"}, **sets), force_col="load")
+    with pytest.raises(TraceError, match="column load: its unit is 'psi', which is none of a force; use one of N"):
+        read_trace(of_hdf5(tmp_path, "b.h5", units | {"load": "psi"}, **sets), force_col="load")
     twice = of_hdf5(tmp_path, "c.h5", {"force_N": "kN"}, time_s=TIME, force_N=LOAD)
     with pytest.raises(TraceError, match="column force_N: its unit is stated as 'kN'; correct one"):
         read_trace(twice)

@@ -63,6 +63,22 @@ def test_ten_percent_too_strong() -> None:
     assert m.peak_sim_N == pytest.approx(13.2)
 
 
+def test_nrmse_is_over_the_peak_not_the_range() -> None:
+    """A curve from 6 N to 12 N that is 0.6 N off has an NRMSE of a twentieth; over its range it would be a tenth."""
+    real = np.linspace(6.0, 12.0, N)
+    assert compare(S, real, real + 0.6).nrmse == pytest.approx(0.05, rel=1e-9)
+
+
+def test_work_is_the_trapezium_sum() -> None:
+    """A straight line's work is exact on any grid; sums from the left or the right miss half a step of its height."""
+    line = 400.0 * S
+    m = compare(S, line, 1.5 * line)
+    exact = 0.5 * 400.0 * S[-1] ** 2
+    assert (m.work_real_J, m.work_sim_J) == pytest.approx((exact, 1.5 * exact), rel=1e-12)
+    step = S[1] - S[0]
+    assert abs(float(np.sum(line[:-1]) * step) / exact - 1.0) > 1e-4 < abs(float(np.sum(line[1:]) * step) / exact - 1.0)
+
+
 def test_shifted_sine_shows_in_the_phase_alone() -> None:
     """A full-period sine shifted by a fraction d of the period has M = 0 and P = 2 d."""
     x = np.linspace(0.0, 1.0, N)

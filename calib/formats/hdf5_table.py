@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,10 @@ import numpy as np
 
 from calib.errors import TraceError
 from calib.io.wording import brief, listed
-from calib.trace.table import MEASURED, Cells, Table
-from calib.trace.vector_fields import LONGEST_VECTOR, table_of_fields
+from calib.table.table import MEASURED, Cells, Table
+from calib.table.vector_fields import LONGEST_VECTOR, table_of_fields
 
-UNIT_ATTRIBUTES = ("unit", "units")
+UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "UNITS", "unit_string", "NX_units")
 MOST_VALUES = 10**8
 """Values of a data set, or of all columns together, from which on it is no record of a cut: days at a kilohertz. Data
 sets of zeros are small in a file: 20 kB unpack to that."""
@@ -70,18 +71,40 @@ def _node(source: str, name: str, file: h5py.File, address: str) -> h5py.Group |
         node = file.get(address)
         if node is None:
             raise TraceError(f"{source}: nothing of that name in the file{_hint(name, places)}")
-        if not _is_table(node):
+        if not _is_table(node) and not _is_one_record(node):
             raise TraceError(f"{source}: no columns there{_hint(name, places)}")
         return node
     if _is_table(file):
         return file
     if len(places) == 1:
         return file[places[0]]
+    if _is_one_record(file):
+        return file
     if not places:
         raise TraceError(
             f"{source}: no data sets of numbers; write one for each column, with units in names or attributes"
         )
     raise TraceError(f"{source}: several groups could be the record{_hint(name, places)}")
+
+
+def _is_one_record(node: Any) -> bool:
+    """Whether the data sets in all groups of a node are as long as each other: groups of one record, as of robots."""
+    if not isinstance(node, h5py.Group):
+        return False
+    lengths = Counter(len(item) for item in _deep(node).values())
+    return len(lengths) == 1 and sum(lengths.values()) > 1
+
+
+def _deep(group: h5py.Group) -> dict[str, h5py.Dataset]:
+    """The columns in a group and in the groups in it, with the names of the groups before their own."""
+    found: dict[str, h5py.Dataset] = {}
+
+    def look(name: str, item: Any) -> None:
+        if _is_column(item):
+            found[name] = item
+
+    group.visititems(look)
+    return found
 
 
 def _hint(name: str, places: list[str]) -> str:
@@ -117,13 +140,16 @@ def _is_column(node: Any) -> bool:
     """Whether a node is a data set with a number, a text or a short vector a row."""
     if not isinstance(node, h5py.Dataset) or node.dtype.names is not None or not 0 < node.size <= MOST_VALUES:
         return False
-    return node.ndim == 1 or (node.ndim == 2 and 0 < node.shape[1] <= LONGEST_VECTOR)
+    if node.ndim != 2:
+        return bool(node.ndim == 1)
+    return 0 < min(node.shape) <= LONGEST_VECTOR
 
 
 def _fields(node: h5py.Group | h5py.Dataset) -> tuple[dict[str, Cells], dict[str, str]]:
     """Cells and stated units of each column by name."""
     if isinstance(node, h5py.Group):
-        sets = {name: item for name in node if _is_column(item := node.get(name))}
+        own = {name: item for name in node if _is_column(item := node.get(name))}
+        sets = own if len(own) > 1 and not _is_one_record(node) else _deep(node) if _is_one_record(node) else own
         _check_size(sum(item.size for item in sets.values()))
         units = {name: unit for name, item in sets.items() if (unit := _unit(item))}
         return {name: _values(item[()]) for name, item in sets.items()}, units
@@ -160,6 +186,10 @@ def _comes_from_elsewhere(node: h5py.Group | h5py.Dataset, file: h5py.File) -> b
 
 def _values(values: np.ndarray) -> Cells:
     """The numbers of a column, or its texts."""
+    if values.ndim == 2 and values.shape[0] <= LONGEST_VECTOR < values.shape[1]:  # as MATLAB writes columns
+        values = values.T
+    if values.ndim == 2 and values.shape[1] == 1 < len(values):
+        values = values[:, 0]
     if values.dtype.kind in "iuf":
         return values
     if values.ndim == 1:

@@ -4,22 +4,31 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Iterator
 from typing import Any
 
 from calib.errors import TraceError
 from calib.io.wording import brief, quoted
-from calib.trace.table import MEASURED, Table, check_names, decoded
-from calib.trace.vector_fields import LONGEST_VECTOR, row_count, table_of_fields, width_of
+from calib.table.encoding import decode
+from calib.table.table import MEASURED, Table, check_names
+from calib.table.vector_fields import LONGEST_VECTOR, row_count, table_of_fields, width_of
+
+_UNITS = ("unit", "units")
+_VALUES = ("values", "value", "data", "samples")
+"""Names of a unit and of the numbers it belongs to, in a group that is one column."""
 
 
 def table_of_json(source: str, raw: bytes) -> Table:
     """The table in a JSON file.
 
     A list of values is a column, a list of records one for each of their fields, and a list of vectors one for each
-    part (see :func:`calib.trace.vector_fields.parts`). The name of a group stands before the names in it, with a point
+    part (see :func:`calib.table.vector_fields.parts`). The name of a group stands before the names in it, with a point
     between, but for a group that all columns are in. Lists that are not as long as the others are left out, and single
     values are not part of the record. One record a line (JSON Lines) is a list of records.
+
+    Units come from names, from ``"units": {"force": "kN"}`` beside the lists, from ``"force_unit": "kN"``, or from
+    ``"force": {"values": [...], "unit": "kN"}``.
 
     Args:
         source: Name of the file.
@@ -32,7 +41,7 @@ def table_of_json(source: str, raw: bytes) -> Table:
         TraceError: It is not JSON, or holds no lists.
     """
     try:
-        content = _parsed(source, decoded(source, raw, "JSON"))
+        content, stated = _units_apart(_parsed(source, decode(source, raw, "JSON")[0]))
         found = list(_fields(source, "", content))
     except RecursionError:
         raise TraceError(f"{source}: lists or groups are nested too deeply for a record of a cut") from None
@@ -42,9 +51,32 @@ def table_of_json(source: str, raw: bytes) -> Table:
             "units in the names such as time_s and force_N"
         )
     check_names(source, [name for name, _ in found])
-    return table_of_fields(
-        source, _common_group_removed(dict(found)), hashlib.sha256(raw).hexdigest(), label=_label(content)
-    )
+    fields = _common_group_removed(dict(found))
+    units = {name: unit for name in fields for key, unit in stated.items() if f".{name}".endswith(f".{key}")}
+    return table_of_fields(source, fields, hashlib.sha256(raw).hexdigest(), label=_label(content), stated=units)
+
+
+def _units_apart(content: Any) -> tuple[Any, dict[str, str]]:
+    """A document whose columns are lists, and the units that it states beside them, by name."""
+    units: dict[str, str] = {}
+
+    def plain(name: str, value: Any) -> Any:
+        if not isinstance(value, dict):
+            return value
+        lists = [key for key in value if key.lower() in _VALUES and isinstance(value[key], list)]
+        unit = next((value[key] for key in value if key.lower() in _UNITS and isinstance(value[key], str)), None)
+        if name and unit is not None and len(lists) == 1:
+            units[name] = unit
+            return value[lists[0]]
+        for key, inner in value.items():
+            if key.lower() in _UNITS and isinstance(inner, dict):
+                units.update({of: text for of, text in inner.items() if isinstance(text, str)})
+            found = re.fullmatch(r"(.+)_units?", key, re.IGNORECASE)
+            if found and isinstance(inner, str) and found.group(1) in value:
+                units[found.group(1)] = inner
+        return {key: plain(key, inner) for key, inner in value.items() if key.lower() not in _UNITS}
+
+    return plain("", content), units
 
 
 def _parsed(source: str, text: str) -> Any:

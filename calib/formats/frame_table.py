@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import hashlib
+import re
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from calib.errors import TraceError
-from calib.trace.table import Cells, Table, check_names
+from calib.table.clock_cells import with_clocks
+from calib.table.table import Cells, Table, check_names
+from calib.table.units import is_unit
 
 
 def table_of_frame(frame: pd.DataFrame, *, source: str, label: str) -> Table:
@@ -38,9 +42,10 @@ def table_of_frame(frame: pd.DataFrame, *, source: str, label: str) -> Table:
     columns, units = {}, {}
     for k, name in enumerate(names):
         columns[name], unit = _cells(whole.iloc[:, k])
+        unit = unit or _stated(frame, whole, k)
         if unit:
             units[name] = unit
-    return Table(
+    table = Table(
         source=source,
         columns=columns,
         rows=labels,
@@ -49,6 +54,22 @@ def table_of_frame(frame: pd.DataFrame, *, source: str, label: str) -> Table:
         label=label,
         units=units,
     )
+    return with_clocks(table)
+
+
+def _stated(frame: pd.DataFrame, whole: pd.DataFrame, k: int) -> str:
+    """The unit that a frame states of a column: in attributes, in the last level of a name, in the column's type."""
+    label, column = whole.columns[k], whole.iloc[:, k]
+    for units in (frame.attrs.get("units"), frame.attrs.get("unit")):
+        if isinstance(units, Mapping) and isinstance(units.get(label, units.get(str(label))), str):
+            return str(units.get(label, units.get(str(label))))
+    own = column.attrs.get("unit") or column.attrs.get("units")
+    if isinstance(own, str):
+        return own
+    if isinstance(label, tuple) and len(label) > 1 and is_unit(str(label[-1])):
+        return str(label[-1]).strip("[]() ")
+    typed = re.fullmatch(r"pint\[(.+?)\].*", str(column.dtype))
+    return typed.group(1) if typed else ""
 
 
 def _name(name: Any) -> str:

@@ -34,6 +34,8 @@ class Table:
         units: Units that the file states beside the names of columns.
         left_out: Columns that the table cannot hold, and why.
         notes: What was done to read the file that its reader should know, one sentence each.
+        parts: Index of the first row of each part of a file that begins anew, as where each specimen has its header.
+        hint: What to do where no column can be chosen, empty for the usual.
     """
 
     source: str
@@ -45,6 +47,8 @@ class Table:
     units: Mapping[str, str] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    parts: tuple[int, ...] = (0,)
+    hint: str = ""
 
 
 def as_float(cell: Any) -> float | None:
@@ -59,31 +63,6 @@ def as_float(cell: Any) -> float | None:
         return None
     except OverflowError:
         return float("inf")
-
-
-def decoded(source: str, raw: bytes, kind: str) -> str:
-    """The text of a file.
-
-    Args:
-        source: What errors call the file.
-        raw: Its content.
-        kind: What it should be, such as ``CSV``, for errors.
-
-    Returns:
-        The text, without a byte order mark.
-
-    Raises:
-        TraceError: It is not text.
-    """
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise TraceError(
-            f"{source}: not a text {kind} file (byte {error.start} is not UTF-8); save the record as CSV, JSON or HDF5"
-        ) from None
-    if "\0" in text:
-        raise TraceError(f"{source}: not a text {kind} file (it holds zero bytes)")
-    return text
 
 
 def check_names(source: str, names: Sequence[str]) -> None:

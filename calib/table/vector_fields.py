@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from calib.trace.table import MEASURED, Cells, Table, check_names
+from calib.table.table import MEASURED, Cells, Table, check_names
 
 FORCE_AXES = ("Fx_N", "Fy_N", "Fz_N", "Tx_Nm", "Ty_Nm", "Tz_Nm")
 FIELD_PARTS: Mapping[str, Mapping[int, str]] = {

@@ -1,0 +1,1 @@
+"""Files of all known kinds as tables of measured columns."""

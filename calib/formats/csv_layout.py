@@ -1,0 +1,232 @@
+"""Where the table is in a text file: what separates its cells, which line names them, which states their units."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from calib.errors import TraceError
+from calib.io.wording import quoted
+from calib.table.clock_cells import is_clock
+from calib.table.numerals import is_number
+from calib.table.units import is_unit
+
+SEPARATORS = (",", ";", "\t", "|", " ")
+"""What may stand between cells; a blank stands for any number of them."""
+MOST_ABOVE = 60
+"""Lines above a header that are taken for words about the record."""
+SAMPLE = 200
+"""Lines from which separator and header are told."""
+UNIT_CELL = re.compile(
+    r"\s*[\[(]?\s*[A-Za-z%\u00b5\u03bc\u00b0\"][\w/^%.*\u00b7-]{0,14}\s*[\])]?\s*|\s*[\[(]?\s*[-/]?\s*[\])]?\s*"
+)
+"""A cell of a row of units: a short word, in brackets or not, or nothing."""
+
+NumberedLines = list[tuple[int, str]]
+NumberedRows = list[tuple[int, list[str]]]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the table is in a file.
+
+    Attributes:
+        above: Cells of each line above the header.
+        header: Names of the columns, empty where the file has none.
+        units: Cells of the row of units, empty where there is none.
+        rows: Line number and cells of each row.
+        parts: Index of the row with which each part begins.
+        cut_off: Line number of a last row that is not whole and was left out, or None.
+    """
+
+    above: list[list[str]]
+    header: list[str]
+    units: list[str]
+    rows: NumberedRows
+    parts: tuple[int, ...]
+    cut_off: int | None = None
+
+
+def layout_of(source: str, body: NumberedLines) -> Layout:
+    """Find the table in the lines of a file.
+
+    The separator is the one that leaves the most cells that are numbers. The header is the first line of words below
+    which numbers of the same width follow, with a row of units between them or not. The same header again begins
+    another part.
+
+    Args:
+        source: What errors call the file.
+        body: Its lines with their numbers, without comments and empty lines.
+
+    Returns:
+        The layout.
+
+    Raises:
+        TraceError: It has one column, a quote is not closed, or a row has another width than the header.
+    """
+    separator = _separator([line for _, line in body[:SAMPLE]])
+    rows = _cells(source, body, separator)
+    width = _usual_width(cells for _, cells in rows[:SAMPLE])
+    head = _header(rows, width)
+    if head is None:
+        header, units, start = ([], [], 0) if _share(rows[0][1]) > 0.5 else (rows[0][1], [], 1)
+        above: list[list[str]] = []
+    else:
+        first, units_at = head
+        header, units = rows[first][1], rows[units_at][1] if units_at is not None else []
+        start = (first if units_at is None else units_at) + 1
+        above = [cells for _, cells in rows[:first]]
+    if header and len(header) < 2:
+        raise TraceError(
+            f"{source}: not a CSV file with a force column and one beside it (header: {quoted(header[0])}); separate "
+            "cells with commas, semicolons, tabs or blanks"
+        )
+    kept, parts = _parts(rows[start:], header)
+    kept, header = _without_empty_end(kept, header)
+    kept, cut_off = _whole_rows(source, kept, len(header) or width)
+    return Layout(above, header, units, kept, parts, cut_off)
+
+
+def is_words(cells: Sequence[str]) -> bool:
+    """Whether a line could be a header: words in two cells at least, and no number."""
+    return sum(bool(cell.strip()) for cell in cells) > 1 and not any(is_number(cell) for cell in cells)
+
+
+def are_units(cells: Sequence[str]) -> bool:
+    """Whether a line below a header is one of units: short words, most of them units or nothing."""
+    filled = [cell for cell in cells if cell.strip(" []()-")]
+    return bool(filled) and all(UNIT_CELL.fullmatch(cell) for cell in cells) and not any(map(is_number, cells))
+
+
+def _separator(lines: Sequence[str]) -> str:
+    """What separates cells: that with which the most of them are numbers, in rows of one width."""
+    tail = lines[len(lines) // 2 :]
+    best, most = max(SEPARATORS[:4], key=lines[0].count), 0.0
+    for separator in dict.fromkeys((best, *SEPARATORS)):
+        cells = [_split(line, separator) for line in tail]
+        width = _usual_width(cells)
+        share = sum(_share(row) for row in cells if len(row) == width) / len(cells) if width > 1 else 0.0
+        if share > most + 1e-9:
+            best, most = separator, share
+    return best
+
+
+def _usual_width(rows: Iterable[Sequence[str]]) -> int:
+    """The number of cells that most rows of a table's end have."""
+    widths = [len(cells) for cells in rows]
+    return Counter(widths[len(widths) // 2 :]).most_common(1)[0][0]
+
+
+def _split(line: str, separator: str) -> list[str]:
+    """The cells of one line."""
+    if separator == " ":
+        return line.split()
+    try:
+        return next(csv.reader([line], delimiter=separator), [])
+    except csv.Error:
+        return line.split(separator)
+
+
+def _share(cells: Sequence[str]) -> float:
+    """Part of the cells that hold anything which hold numbers or times; 0 where fewer than two do."""
+    filled = [cell for cell in cells if cell.strip()]
+    held = sum(is_number(cell) or is_clock(cell) for cell in filled)
+    return held / len(filled) if len(filled) > 1 else 0.0
+
+
+def _header(rows: NumberedRows, width: int) -> tuple[int, int | None] | None:
+    """Indices of the header and of the row of units; None where there is no header."""
+
+    def numbers_from(k: int) -> bool:
+        below = [cells for _, cells in rows[k : k + 4]]
+        held = [_share(cells) > 0.5 and abs(len(cells) - width) <= 1 for cells in below]
+        return bool(held) and held[0] and sum(held) >= min(3, len(held))
+
+    for k in range(min(len(rows) - 1, MOST_ABOVE + 1)):
+        cells = rows[k][1]
+        if abs(len(cells) - width) > 1 or not is_words(cells):
+            continue
+        if numbers_from(k + 1):
+            above_it = rows[k - 1][1] if k else []
+            if k and is_words(above_it) and len(above_it) == len(cells) and _mostly_units(cells):
+                return k - 1, k if are_units(cells) else None
+            return k, None
+        below = rows[k + 1][1]
+        units = len(below) == len(cells) and are_units(below) and _mostly_units(below) and not _mostly_units(cells)
+        if units and k + 2 < len(rows) and numbers_from(k + 2):
+            return k, k + 1
+    return None
+
+
+def _mostly_units(cells: Sequence[str]) -> bool:
+    filled = [cell for cell in cells if cell.strip()]
+    return 2 * sum(map(is_unit, filled)) > len(filled)
+
+
+def _parts(rows: NumberedRows, header: list[str]) -> tuple[NumberedRows, tuple[int, ...]]:
+    """The rows of data, and where the header stands again; words above it and units below it are left out."""
+    starts: list[int] = [0]
+    kept: NumberedRows = []
+    skip = False
+    for line, cells in rows:
+        if header and cells == header:
+            while len(kept) > starts[-1] and _share(kept[-1][1]) <= 0.5:
+                kept.pop()
+            if len(kept) > starts[-1]:
+                starts.append(len(kept))
+            skip = True
+        elif not (skip and are_units(cells)):
+            kept.append((line, cells))
+            skip = False
+    return kept, tuple(starts)
+
+
+def _without_empty_end(rows: NumberedRows, header: list[str]) -> tuple[NumberedRows, list[str]]:
+    """Rows and header without columns at the end that have neither a name nor a cell."""
+    width = max((len(cells) for _, cells in rows), default=0)
+    while width > 1 and not any(len(cells) >= width and cells[width - 1].strip() for _, cells in rows):
+        if len(header) >= width and header[width - 1].strip():
+            break
+        width -= 1
+        rows = [(line, cells[:width]) for line, cells in rows]
+    named = header[:width] if not any(cell.strip() for cell in header[width:]) else header
+    return rows, named
+
+
+def _whole_rows(source: str, rows: NumberedRows, width: int) -> tuple[NumberedRows, int | None]:
+    """The rows, and the number of a last one that was cut off.
+
+    Raises:
+        TraceError: Another row has more or fewer cells than the header.
+    """
+    for k, (line, cells) in enumerate(rows):
+        if len(cells) != width:
+            if k == len(rows) - 1 and k and len(cells) < width:
+                return rows[:-1], line
+            raise TraceError(
+                f"{source}, row {line}: {len(cells)} cells, the header has {width}; repair or remove the row"
+            )
+    return rows, None
+
+
+def _cells(source: str, body: NumberedLines, separator: str) -> NumberedRows:
+    """Line number and cells of each row; a quoted cell may hold several lines.
+
+    Raises:
+        TraceError: A quote that is not closed, or a cell that is too long.
+    """
+    if separator == " ":
+        return [(line, text.split()) for line, text in body]
+    reader = csv.reader([line for _, line in body], delimiter=separator, strict=True)
+    rows: NumberedRows = []
+    begin = 0
+    try:
+        for row in reader:
+            rows.append((body[begin][0], row))
+            begin = reader.line_num
+    except csv.Error as error:
+        raise TraceError(f"{source}, row {body[begin][0]}: not CSV ({error}); check the quotes in this row") from None
+    return rows

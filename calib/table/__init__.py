@@ -1,0 +1,1 @@
+"""Tables of measured columns, and what their cells and units mean."""

@@ -1,0 +1,165 @@
+"""Kinds of baseline beside the constant one: a drift that is removed, and the zero of a machine that starts loaded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib.errors import TraceError
+from calib.trace.contact_onset import MIN_BASELINE, Baseline, ContactOnset, estimate_baseline
+from calib.trace.mending import noise_of
+from calib.trace.trace import Trace
+
+CONSTANT, LINEAR, ZERO = "constant", "linear", "zero"
+BASELINES = (CONSTANT, LINEAR, ZERO)
+"""What is subtracted from a force without an air run: the level before contact, the line through it, nothing."""
+RISING_PART, RISING_SD = 0.5, 3.0
+"""Slope of the force before contact over that after it [-], and over its standard uncertainty, from which on a record
+starts under load."""
+UNTOLD_PART = 0.2
+"""Standard uncertainty of the slope before contact, over the slope after it, from which on it tells nothing [-]."""
+CLEAR_M = 1e-3
+"""Height above that at contact from which on a knife that was raised is out of the food [m]."""
+
+
+@dataclass(frozen=True)
+class Drift:
+    """A drift that is removed from a force.
+
+    Attributes:
+        slope: The drift [N/s].
+        slope_sd: Its standard uncertainty [N/s].
+        origin: Time at which nothing is removed [s].
+        both: Whether it was measured before contact and after the cut, and not before contact alone.
+    """
+
+    slope: float
+    slope_sd: float
+    origin: float
+    both: bool
+
+    def removed(self, time: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """The force without it [N], shape (n,)."""
+        return force - self.slope * (time - self.origin)
+
+    def sd(self, time: float) -> float:
+        """Standard uncertainty that it leaves in a force at a time [N]."""
+        return self.slope_sd * abs(time - self.origin)
+
+    def note(self, source: str, end: float) -> str:
+        """What was done, in one sentence."""
+        where = "before contact and after the cut" if self.both else "before contact, and carried on over the cut"
+        return (
+            f"{source}: a drift of {self.slope:.3g} +- {self.slope_sd:.2g} N/s was removed, measured {where}; it is "
+            f"{self.slope * (end - self.origin):.3g} +- {self.sd(end):.2g} N at the end of the cut"
+        )
+
+
+def drift_of(trace: Trace, force: np.ndarray, contact: ContactOnset) -> Drift:
+    """The drift of a force, from its samples before contact and, where the knife was raised again, after the cut.
+
+    Args:
+        trace: The cut.
+        force: Its force [N], shape (n,).
+        contact: Its contact.
+
+    Returns:
+        The drift. Between two levels it is certain to their noise; from that before contact alone it is carried on.
+    """
+    base = estimate_baseline(trace.time, force, contact.baseline.start, contact.baseline.stop)
+    whole = estimate_baseline(trace.time, force, 0, contact.baseline.stop)
+    if whole.slope_sd < base.slope_sd:
+        base = whole
+    middle = float(trace.time[base.start : base.stop].mean())
+    out = out_of_the_food(trace, contact)
+    if len(out) < MIN_BASELINE:
+        return Drift(base.slope, base.slope_sd, middle, False)
+    after = estimate_baseline(trace.time, force, int(out[0]), int(out[-1]) + 1)
+    late = float(trace.time[out].mean())
+    slope = (after.level - base.level) / (late - middle)
+    own = float(np.hypot(_level_noise(base), _level_noise(after)))
+    return Drift(float(slope), own / (late - middle), middle, True)
+
+
+def check_approach(trace: Trace, force: np.ndarray, contact: ContactOnset) -> list[str]:
+    """Refuse a record that starts under load: what would be its baseline rises as the force does after contact.
+
+    Args:
+        trace: The cut.
+        force: Its force [N], shape (n,).
+        contact: Its contact.
+
+    Returns:
+        One sentence where too few samples are before contact to tell.
+
+    Raises:
+        TraceError: It is so.
+    """
+    before = int(np.searchsorted(trace.time, contact.onset))
+    if before < MIN_BASELINE:
+        return []
+    base = estimate_baseline(trace.time, force, 0, before)
+    top = before + int(np.argmax(force[before:] >= base.level + 0.9 * contact.peak))
+    rise = contact.peak / max(float(trace.time[top]) - contact.onset, trace.dt)
+    if base.slope > RISING_PART * rise and base.slope > RISING_SD * base.slope_sd:
+        raise TraceError(
+            f"{trace.source}: the force rises by {base.slope:.3g} N/s from the first sample on, and by {rise:.3g} N/s "
+            f"after what looks like contact at {contact.onset:.4g} s: the record starts under load; keep the approach "
+            "of the knife in the record, or say --baseline zero if it starts at the trigger of a zeroed machine"
+        )
+    if base.slope_sd <= UNTOLD_PART * rise:
+        return []
+    return [
+        f"{trace.source}: {before} samples before contact at {contact.onset:.4g} s do not tell whether the force is "
+        "level there or the record starts under load, which would make the peak too low"
+    ]
+
+
+def _level_noise(base: Baseline) -> float:
+    """Uncertainty of a level by noise alone, without the drift within its window [N]."""
+    return base.noise_sd * float(np.sqrt(0.5 * np.pi * base.inflation / max(base.stop - base.start, 1)))
+
+
+def out_of_the_food(trace: Trace, contact: ContactOnset) -> np.ndarray:
+    """Samples at the end of the record in which the knife is above the height of contact.
+
+    Args:
+        trace: The cut.
+        contact: Its contact.
+
+    Returns:
+        Their indices, none without a position.
+    """
+    if trace.position is None:
+        return np.empty(0, dtype=int)
+    height = float(np.interp(contact.onset, trace.time, trace.position))
+    below = np.flatnonzero(trace.position < height + CLEAR_M)
+    last = int(below[-1]) + 1 if len(below) else len(trace.time)
+    return np.arange(last, len(trace.time))
+
+
+def trigger_contact(trace: Trace, force: np.ndarray) -> ContactOnset:
+    """Contact of a record that starts at its trigger, with the machine's own zero for a baseline.
+
+    Args:
+        trace: The cut.
+        force: Its force [N], shape (n,).
+
+    Returns:
+        Contact at the first sample; the force there is the uncertainty of the zero.
+
+    Raises:
+        TraceError: The first force is no small part of the largest, so that the machine was not zeroed.
+    """
+    top = float(np.max(np.convolve(force, np.full(3, 1 / 3), mode="same")))
+    first = float(np.median(force[:3]))
+    if not top > 0.0 or abs(first) > 0.2 * top:
+        raise TraceError(
+            f"{trace.source}, {trace.where(0)}: the force begins at {first:.3g} N, of {top:.3g} N at most: the machine "
+            "was not zeroed, or the record does not start at the trigger (--baseline zero); keep the approach in the "
+            "record"
+        )
+    noise = noise_of(force[: max(MIN_BASELINE, len(force) // 4)])
+    base = Baseline(0.0, float(np.hypot(abs(first), noise)), noise, 1.0, 0.0, 0.0, 0, MIN_BASELINE)
+    return ContactOnset(base, float(trace.time[0]), trace.dt, top)

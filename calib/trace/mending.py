@@ -1,0 +1,186 @@
+"""Faults of a record that are repaired before it is looked at: values that stand out alone, and a sensor that is zeroed
+while it runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib.errors import TraceError
+from calib.io.wording import LONG, brief
+from calib.trace.contact_onset import MAD_TO_SD
+from calib.trace.trace import Trace
+
+SPIKE_SD = 12.0
+"""Noise standard deviations by which a value stands out from those on both sides to be a spike."""
+SPIKE_PART = 0.1
+"""Part of the force's usual range by which it does."""
+SPIKE_SAMPLES = 3
+"""Most samples of a spike."""
+MOST_SPIKES = 0.01
+"""Part of the samples that may be spikes; a record with more of them has another fault."""
+SIDE = 3
+"""Samples on each side with which a spike is compared."""
+STEP_SIDE = 12
+"""Samples on each side of a step of the level, which are level themselves."""
+STEP_SD = 8.0
+"""Noise standard deviations by which the level steps."""
+STEP_PART = 0.02
+"""Part of the force's usual range by which it does."""
+NEAR_ZERO = 0.05
+"""Part of a step within which the level behind it is zero: the sensor was zeroed there."""
+
+
+@dataclass(frozen=True)
+class Mended:
+    """A record whose faults are repaired.
+
+    Attributes:
+        trace: The record.
+        level_sd: Standard uncertainty of the force's level that the repair leaves [N].
+        notes: What was done, with row and time, one sentence each.
+    """
+
+    trace: Trace
+    level_sd: float = 0.0
+    notes: tuple[str, ...] = ()
+
+
+def mended(trace: Trace) -> Mended:
+    """Repair spikes and steps of the level before contact.
+
+    A spike is replaced by the line between its neighbours. A step of the level is where the force, level on both sides,
+    goes to zero, or falls, from one sample to the next: the sensor was zeroed. What is before it is moved to the level
+    behind it.
+
+    Args:
+        trace: The record.
+
+    Returns:
+        The repaired record, and what was done.
+
+    Raises:
+        TraceError: So many values stand out that nothing is left of the record.
+    """
+    force, spikes = _without_spikes(trace, trace.force, "force")
+    position = trace.position
+    lost: list[str] = []
+    if position is not None:
+        position, lost = _without_spikes(trace, position, "position")
+    force, level_sd, steps = _without_steps(replace(trace, force=force))
+    if not spikes and not steps and not lost:
+        return Mended(trace)
+    return Mended(replace(trace, force=force, position=position), level_sd, (*spikes, *lost, *steps))
+
+
+def noise_of(force: np.ndarray) -> float:
+    """Standard deviation of independent noise from the differences of neighbours [N], whatever the trend."""
+    steps = np.diff(force)
+    return MAD_TO_SD * float(np.median(np.abs(steps - np.median(steps)))) / float(np.sqrt(2.0))
+
+
+def usual_range(force: np.ndarray) -> float:
+    """Range of the force without its rarest values [N]."""
+    low, high = np.percentile(force, (1.0, 99.0))
+    return float(high - low)
+
+
+def _place(trace: Trace, i: int, role: str = "force") -> str:
+    return f"{trace.source}, {trace.where(i)}, column {brief(trace.columns.get(role, role), LONG)}"
+
+
+def _without_spikes(trace: Trace, force: np.ndarray, role: str) -> tuple[np.ndarray, list[str]]:
+    """The force, or the position, without values that stand out alone, and what was done."""
+    n, unit = len(force), {"force": "N", "position": "m"}[role]
+    limit = max(SPIKE_SD * noise_of(force), SPIKE_PART * usual_range(force), 1e-9)
+    out, count = force.copy(), 0
+    notes: list[str] = []
+    i = 1
+    while i < n - 1:
+        length = next((k for k in range(1, SPIKE_SAMPLES + 1) if _stands_out(out, i, k, limit)), 0)
+        if not length:
+            i += 1
+            continue
+        value = force[i : i + length][int(np.argmax(np.abs(force[i : i + length] - out[i - 1])))]
+        after = min(i + length, n - 1)
+        out[i : i + length] = np.interp(trace.time[i : i + length], trace.time[[i - 1, after]], out[[i - 1, after]])
+        count += length
+        if len(notes) < 3:
+            many = f", and {length - 1} after it," if length > 1 else ""
+            notes.append(
+                f"{_place(trace, i, role)}: {value:.4g} {unit}{many} stands out alone from its neighbours; it was "
+                "replaced by the line between them"
+            )
+        i += length
+    if count > max(SPIKE_SAMPLES, MOST_SPIKES * n):
+        if count <= 0.1 * n:
+            raise TraceError(
+                f"{notes[0].partition(';')[0]}, and so do {count - 1} other samples; repair the sensor or its "
+                "cable, or remove those rows"
+            )
+        return force, []
+    if count > len(notes) > 2:
+        notes[-1] += f" ({count} samples in all)"
+    return out, notes
+
+
+def _stands_out(force: np.ndarray, i: int, length: int, limit: float) -> bool:
+    """Whether some samples on end are far from those on both sides, which are near each other."""
+    if abs(force[i] - force[i - 1]) <= limit or i + length >= len(force):
+        return False
+    left, right = force[max(i - SIDE, 0) : i], force[i + length : i + length + SIDE]
+    before, after = float(np.median(left)), float(np.median(right))
+    inside = force[i : i + length]
+    away = np.minimum(np.abs(inside - before), np.abs(inside - after))
+    same = np.sign(inside - before) == np.sign(inside - after)
+    calm = max(np.ptp(left), np.ptp(right))
+    needed = max(limit, 3.0 * abs(before - after), 3.0 * calm)
+    return bool(same.all() and np.all(away > needed))
+
+
+def _without_steps(trace: Trace) -> tuple[np.ndarray, float, list[str]]:
+    """The force with one level before the load, the uncertainty of that level, and what was done."""
+    force, side = trace.force, STEP_SIDE
+    noise = noise_of(force)
+    limit = max(STEP_SD * noise, STEP_PART * usual_range(force), 1e-9)
+    out, variance = force.copy(), 0.0
+    notes: list[str] = []
+    i = side
+    while i + side <= len(force):
+        left, right = force[i - side : i], force[i : i + side]
+        step = float(np.median(right) - np.median(left))
+        if not _is_step(out, i, step, limit, noise):
+            i += 1
+            continue
+        out[:i] += step
+        variance += np.pi / side * max(noise, 1e-12) ** 2
+        notes.append(
+            f"{_place(trace, i)}: the level goes from {np.median(left):.4g} to {np.median(right):.4g} N in one "
+            "sample, as where a sensor is zeroed; what is before was moved to the level after it"
+        )
+        i += side
+    if len(notes) > 3:
+        return force, 0.0, []
+    return out, float(np.sqrt(variance)), notes
+
+
+def _is_step(force: np.ndarray, i: int, step: float, limit: float, noise: float) -> bool:
+    """Whether the sensor was zeroed before sample ``i``, and not the food touched.
+
+    The force is level before, from the record's start or the step before, and after. Then it is at zero, or it has
+    fallen; and it leaves its new level by more than the step later on.
+    """
+    side = STEP_SIDE
+    if abs(step) <= limit or abs(force[i] - force[i - 1]) < 0.7 * abs(step):
+        return False
+    left, right = force[i - side : i], force[i : i + side]
+    flat = max(3.0 * noise, 0.003 * abs(step))
+    if np.std(left) > flat or np.std(right) > flat or abs(np.median(right[:4]) - np.median(right[-4:])) > 2.0 * flat:
+        return False
+    level = float(np.median(right))
+    zeroed = abs(level) <= max(4.0 * noise, NEAR_ZERO * abs(step)) and abs(np.median(left)) > 2.0 * abs(level)
+    before = force[:i]
+    loaded = np.percentile(before, 98) - np.percentile(before, 2) > 0.5 * abs(step) + 8.0 * noise
+    rises = float(np.percentile(force[i:], 98)) - level
+    return bool((zeroed or step < 0.0) and not loaded and rises > max(limit, 10.0 * noise))

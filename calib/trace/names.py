@@ -1,0 +1,168 @@
+"""What the name of a measured column says: its quantity, its unit, its sign, and whether it was measured at all."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from calib.table.table import Table
+from calib.table.units import Unit, is_unit, split_unit, unit_of
+
+_STEMS = {
+    "time": (re.compile(r"(test_|run_|relative_)?time|t|timestamp|elapsed(_time)?|date_?time|stamp"),),
+    "force": (re.compile(r"(.*_)?(force|load|resistance|f|fz)(_z)?|(.*_)?wrench_z"),),
+    "position": (
+        re.compile(r"((ee|knife|tool|tcp|blade)_)?(z|height|position|pos)(_z)?"),
+        re.compile(r"(.*_)?(stroke|displacement|travel|depth|extension|penetration|distance|crosshead)"),
+    ),
+    "compression": (
+        re.compile(r"gap"),
+        re.compile(r"(.*_)?(compression|stroke|displacement|travel|extension|distance|depth|crosshead)"),
+    ),
+}
+_DEPTH = _STEMS["position"][1]
+_FALLING = _STEMS["compression"][0]
+_KNOWN_FORCE = {"base_fz": -1.0, "knife_fz": 1.0}
+"""Columns whose sign is known: robot logs hold the force on the world in the base frame, downwards negative."""
+KNOWN = {"force": tuple(_KNOWN_FORCE), "position": ("ee_z",), "time": ("stamp",)}
+"""Stems that are preferred to others of the same role. A ROS message's own stamp is the time of its measurement, the
+other clock in its file that of its recording."""
+_ROS = (
+    (re.compile(r"field\.(.*\.)?stamp"), "stamp", "ns"),
+    (re.compile(r"%time"), "time", "ns"),
+    (re.compile(r"/(.*/)?stamp"), "stamp", "s"),
+    (re.compile(r"(.*[./])?header[./]stamp"), "stamp", "s"),
+    (re.compile(r"__time"), "time", "s"),
+    (re.compile(r"(.*[./])?O_F_ext_hat_K([./].*force[./]z|[.\[_]?2\]?)", re.IGNORECASE), "base_fz", "N"),
+    (re.compile(r"(.*[./])?K_F_ext_hat_K([./].*force[./]z|[.\[_]?2\]?)", re.IGNORECASE), "knife_fz", "N"),
+    (re.compile(r"(.*[./])?O_T_EE([./].*position[./]z|[.\[_]?14\]?)", re.IGNORECASE), "ee_z", "m"),
+    (re.compile(r"(.*[./])?actual_TCP_force[.\[_]?2\]?"), "force_z", "N"),
+    (re.compile(r"(.*[./])?actual_TCP_pose[.\[_]?2\]?"), "position_z", "m"),
+    (re.compile(r"(.*[./])?force[./]z"), "force_z", "N"),
+    (re.compile(r"(.*[./])?position[./]z"), "position_z", "m"),
+)
+"""Names that programs write whose units are known without being written: text exports of ROS messages, which are in SI
+(REP 103) and whose clocks are known by the program (``rostopic echo -p`` nanoseconds, PlotJuggler seconds), and the
+outputs of Universal Robots' RTDE."""
+_RTDE = re.compile(r"actual_(TCP|q|joint|current)")
+_NOT_MEASURED = re.compile(
+    r"(^|_)(target|cmd|command|commanded|desired|des|setpoint|set_?point|goal|ref|reference|nominal|limit|lim|thresh(old)?|"
+    r"max|maximum|min|minimum|mean|avg|average|median|rms|std|sd|var|peak|upper|lower|err|error|residual|"
+    r"norm|abs|magnitude|dot|rate|deriv(ative)?|delta|diff|filt|filtered|smooth|smoothed|pred|predicted|fit|fitted|sim|"
+    r"simulated|model|offset|bias|tare)(_|\d|$)"
+)
+"""Words in the name of a column that is commanded, or made of measured ones: such a column is never chosen unasked."""
+_JOINT_TORQUES = re.compile(
+    r"^(base|knife)_f|(^|_)[ok]_f_ext|external_wrench|ext(ernal)?_wrench|wrench_ext|external_force|(^|_)ext_force|"
+    r"(^|_)force_ext|(^|_)f_ext|(wrench|force)_est|est(imated)?_(wrench|force)|actual_tcp_force|cartesian_(wrench|force)|"
+    r"endpoint_state_wrench"
+)
+"""Names of wrenches that arms estimate from the torques or currents of their joints: libfranka, Kinova, KUKA, Sawyer,
+Universal Robots."""
+COUNTERS = frozenset(
+    "frame_index frame frames frame_number sample samples sample_index sample_number index counter count seq n i step "
+    "row field_header_seq".split()
+)
+"""Stems of columns that count samples."""
+LONGEST_NAME = 200
+"""Letters from which on the name of a column means nothing."""
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What is known of a column from its name and from what is stated beside it.
+
+    Attributes:
+        stem: The name without its unit, in lower case, words joined by _.
+        unit: Its unit as it is written, empty where there is none.
+        named: The unit in the name itself, empty where there is none.
+        stated: Whether the unit stands elsewhere than in the name.
+    """
+
+    stem: str
+    unit: str
+    named: str = ""
+    stated: bool = False
+
+    @property
+    def measure(self) -> Unit | None:
+        """The unit; None where there is none, or none that is known."""
+        return unit_of(self.unit) if self.unit else None
+
+
+def stem_of(name: str) -> str:
+    """Lower case, words joined by _; a capital after a small letter begins a word."""
+    apart = re.sub(r"(?<=[a-z])(?=[A-Z][a-z])", "_", name)
+    return re.sub(r"[^a-z0-9]+", "_", apart.lower()).strip("_")
+
+
+def meaning(table: Table, name: str) -> Meaning:
+    """Stem and unit of a column: from the unit stated beside its name, the programs' conventions, or its name alone."""
+    if len(name) > LONGEST_NAME:
+        return Meaning("", "")
+    known = next(((s, u) for pattern, s, u in _ROS if pattern.fullmatch(name)), None)
+    if known is None and name == "timestamp" and any(_RTDE.match(other) for other in table.columns):
+        known = ("time", "s")
+    if known is not None:
+        stem, usual = known
+        return Meaning(stem, table.units.get(name, "") or usual)
+    split = split_unit(name)
+    stem, named = stem_of(split.stem), split.text
+    stated = table.units.get(name, "")
+    if not stated:
+        return Meaning(stem, named, named)
+    return Meaning(stem if is_unit(named) else stem_of(name), stated, named, stated=True)
+
+
+def fits(table: Table, name: str, role: str) -> bool:
+    """Whether a column can have a role by its name and unit.
+
+    A ROS stamp that nobody has set, and so stands, is no clock, and what was commanded or derived is no measurement.
+
+    Args:
+        table: The table.
+        name: Name of the column.
+        role: ``time``, ``force``, ``position`` or ``compression``.
+
+    Returns:
+        Whether it can.
+    """
+    said = meaning(table, name)
+    measure = said.measure
+    if measure is None or not measure.fits(role) or not named_like(said.stem, role):
+        return False
+    if role == "time" and said.stem == "stamp":
+        cells = table.columns[name]
+        return any(cell != cells[0] for cell in cells)
+    return True
+
+
+def named_like(stem: str, role: str) -> bool:
+    """Whether a stem is one of a role, and of a measurement."""
+    return any(pattern.fullmatch(stem) for pattern in _STEMS[role]) and not not_measured(stem)
+
+
+def not_measured(name: str) -> bool:
+    """Whether a name says that its numbers were commanded, or derived from measured ones."""
+    return _NOT_MEASURED.search(stem_of(name)) is not None
+
+
+def from_joint_torques(name: str) -> bool:
+    """Whether a force column holds what an arm estimates from its joints, by any name that such columns have."""
+    return _JOINT_TORQUES.search(stem_of(name)) is not None
+
+
+def sign_of(stem: str, role: str) -> float:
+    """Sign that the name of a column stands for: a force on the world, a depth as a height, a gap that closes."""
+    if role == "force":
+        return _KNOWN_FORCE.get(stem, 1.0)
+    if role == "position":
+        return -1.0 if _DEPTH.fullmatch(stem) else 1.0
+    if role == "compression":
+        return -1.0 if _FALLING.fullmatch(stem) else 1.0
+    return 1.0
+
+
+def is_depth(stem: str) -> bool:
+    """Whether a stem is that of a way down, which grows as the knife descends."""
+    return _DEPTH.fullmatch(stem) is not None

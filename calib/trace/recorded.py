@@ -1,0 +1,257 @@
+"""From a table to the numbers of a record: which columns, on which rows, at which times, counted in which direction."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from calib.errors import TraceError
+from calib.io.wording import LONG, brief, quoted
+from calib.table.table import Table
+from calib.trace.clock import running_clock
+from calib.trace.columns import Column, candidates, choose, is_sparse, numbers
+from calib.trace.names import COUNTERS, stem_of
+
+MIN_SAMPLES = 20
+"""Fewest samples of a trace: below this, baseline, onset and ramp have under seven samples each."""
+CLOCK_START_S = 1000.0
+"""Time of the first sample from which on a clock has begun elsewhere [s], at the start of a robot or in 1970; the trace
+then counts from its first sample."""
+DISABLED = "none"
+"""Value of ``position_col`` that leaves a position column unused."""
+ROWS = "the rows"
+"""What the time is called where rows are counted."""
+TURNED = 0.2
+"""Part of a depth's range by which it must fall up to the load for it to be counted negative downwards."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a record is to be read.
+
+    Attributes:
+        time_col: Column to use as time; without a unit in its name it is taken as seconds. A unit behind ``=`` says it.
+        force_col: Column to use as force; without a unit in its name it is taken as newtons.
+        position_col: Column to use as position (metres if its name has no unit); ``none`` uses no position.
+        depth_col: The same where it holds the way down, which grows as the knife descends.
+        sign: ``+`` or 1 if positive numbers mean resistance to the knife, ``-`` or -1 if negative ones do.
+        rate: Rows a second [1/s], where the file has no clock or a counter in place of one.
+        decimal: The mark before decimals in a text file, ``.`` or ``,``; None to tell it from the numbers.
+
+    Raises:
+        TraceError: A rate that is not positive, a mark that is none.
+    """
+
+    time_col: str | None = None
+    force_col: str | None = None
+    position_col: str | None = None
+    depth_col: str | None = None
+    sign: str | int | None = None
+    rate: float | None = None
+    decimal: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.rate is not None and not (np.isfinite(self.rate) and self.rate > 0.0):
+            raise TraceError(f"rate {self.rate!r} is not positive; give the rows a second (option --rate)")
+        if self.decimal not in (None, ".", ","):
+            raise TraceError(f"decimal mark {quoted(self.decimal)} is neither . nor , (option --decimal)")
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """The numbers of a record.
+
+    Attributes:
+        time: Time [s], strictly increasing, shape (n,).
+        force: Force, resistance positive [N], shape (n,).
+        position: Height of the knife [m], shape (n,), or None.
+        rows: What the file calls each sample's row, n of them.
+        columns: Name of the column of each role.
+        start: Time of the first sample on a clock that began elsewhere [s], 0 for one that did not.
+        time_sd: Standard uncertainty of a time that a repair of the clock leaves [s].
+        breaks: Indices with which another record of the file begins.
+        notes: What was done, one sentence each.
+    """
+
+    time: np.ndarray
+    force: np.ndarray
+    position: np.ndarray | None
+    rows: tuple[object, ...]
+    columns: Mapping[str, str]
+    start: float
+    time_sd: float
+    breaks: tuple[int, ...]
+    notes: tuple[str, ...]
+
+
+def recorded(table: Table, how: Reading) -> Recorded:
+    """The record in a table.
+
+    Args:
+        table: The table.
+        how: How it is to be read.
+
+    Returns:
+        Its numbers.
+
+    Raises:
+        TraceError: A column or a cell cannot be used; the message names file, column and row.
+    """
+    time, said = _time_column(table, how)
+    force = choose(table, "force", how.force_col)
+    position = _position_column(table, how)
+    if how.sign is not None:
+        force = replace(force, factor=abs(force.factor) * parse_sign(how.sign))
+    if len(table.rows) < MIN_SAMPLES:
+        raise TraceError(f"{table.source}: {len(table.rows)} rows of data, at least {MIN_SAMPLES} are needed")
+    t = numbers(table, time) if time.name != ROWS else time.factor * np.arange(len(table.rows))
+    f = numbers(table, force, sparse=is_sparse(table, force.name))
+    p = None if position is None else numbers(table, position, sparse=is_sparse(table, position.name))
+    t, f, p, on, sparse = _on_the_forces_rows(table, (time, force), t, f, p)
+    part = replace(table, rows=[table.rows[i] for i in on], parts=_parts_of(table, on))
+    clock = running_clock(part, (time, force), t, f, p)
+    f, p = f[clock.kept], None if p is None else p[clock.kept]
+    turned: tuple[str, ...] = ()
+    if position is not None and p is not None and (position.depth or how.depth_col is not None):
+        p, turned = _downwards(table, position, f, p)
+    start = float(clock.time[0]) if abs(clock.time[0]) > CLOCK_START_S else 0.0
+    used = {"time": time, "force": force} | ({} if position is None else {"position": position})
+    notes = (*table.notes, *said, *(note for column in used.values() for note in column.notes), *sparse)
+    return Recorded(
+        time=clock.time - start,
+        force=f,
+        position=p,
+        rows=tuple(part.rows[i] for i in clock.kept),
+        columns={role: column.name for role, column in used.items()},
+        start=start,
+        time_sd=clock.sd,
+        breaks=clock.breaks,
+        notes=(*notes, *clock.notes, *turned),
+    )
+
+
+def parse_sign(sign: str | int) -> float:
+    """The factor of a ``--sign`` option.
+
+    Raises:
+        TraceError: It is none.
+    """
+    signs = {"+": 1.0, "-": -1.0, "1": 1.0, "+1": 1.0, "-1": -1.0}
+    if str(sign) not in signs:
+        raise TraceError(f"sign {quoted(sign)} is not one of +, -, 1, -1 (option --sign)")
+    return signs[str(sign)]
+
+
+def _time_column(table: Table, how: Reading) -> tuple[Column, list[str]]:
+    """The column of the time; with a rate, that of the counter, or the numbers of the rows.
+
+    Raises:
+        TraceError: There is none.
+    """
+    if how.rate is None:
+        return choose(table, "time", how.time_col), []
+    name = how.time_col
+    if name is None:
+        counters = [n for n in table.columns if stem_of(n) in COUNTERS and _counts(table, n)]
+        name = counters[0] if len(counters) == 1 else None
+    if name is not None and not _counts(table, name):
+        raise TraceError(
+            f"{table.source}, column {brief(name, LONG)}: not a counter that rises, so --rate {how.rate:g} says "
+            "nothing of it; leave --time-col out to count the rows, or leave --rate out"
+        )
+    what = f"counted by {brief(name, LONG)}" if name is not None else "counted by rows"
+    unused = [n for n in candidates(table, "time") if n != name]
+    beside = f"; the clock {brief(unused[0], LONG)} is not used" if unused else ""
+    said = [f"{table.source}: time is {what} at {how.rate:g} a second (--rate){beside}"]
+    if name is None:
+        return Column(ROWS, "time", 1.0 / how.rate), said
+    return Column(name, "time", 1.0 / how.rate), said
+
+
+def _counts(table: Table, name: str) -> bool:
+    """Whether a column holds whole numbers that never fall."""
+    if name not in table.columns:
+        raise TraceError(f"{table.source}: no column {quoted(name)} (--time-col); check its name")
+    try:
+        values = numbers(table, Column(name, "time", 1.0))
+    except TraceError:
+        return False
+    return len(values) > 1 and bool(np.all(values == np.round(values)) and np.all(np.diff(values) > 0))
+
+
+def _position_column(table: Table, how: Reading) -> Column | None:
+    """The column of the knife's place, None where there is none.
+
+    Raises:
+        TraceError: Two are named, or the named one cannot be used.
+    """
+    if how.depth_col is not None:
+        if how.position_col is not None:
+            raise TraceError(
+                f"{table.source}: --position-col beside --depth-col; the knife's place is in one column, give one"
+            )
+        column = choose(table, "position", how.depth_col, "--depth-col")
+        return replace(column, factor=-abs(column.factor), depth=True)
+    if how.position_col == DISABLED or (how.position_col is None and not candidates(table, "position")):
+        return None
+    return choose(table, "position", how.position_col)
+
+
+def _on_the_forces_rows(
+    table: Table, columns: tuple[Column, Column], t: np.ndarray, f: np.ndarray, p: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray, list[str]]:
+    """The record on those rows of a table of several topics that hold a force, the position interpolated there.
+
+    Raises:
+        TraceError: Forces and positions are not at the same time.
+    """
+    held = ~np.isnan(f)
+    places = np.ones(len(f), dtype=bool) if p is None else ~np.isnan(p)
+    if held.all() and places.all():
+        return t, f, p, np.arange(len(f)), []
+    if np.any(np.diff(t) < 0.0):
+        i = int(np.argmax(np.diff(t) < 0.0)) + 1
+        raise TraceError(
+            f"{table.source}, {table.row} {brief(table.rows[i])}, column {brief(columns[0].name, LONG)}: time falls in "
+            "a table of several topics; sort its rows by time"
+        )
+    said = []
+    if p is not None:
+        inside = (t >= t[places][0]) & (t <= t[places][-1])
+        edge = 2.0 * float(np.median(np.diff(t[places])))
+        inside |= (t >= t[places][0] - edge) & (t <= t[places][-1] + edge)
+        if not held.all() and np.count_nonzero(held & inside) < MIN_SAMPLES:
+            raise TraceError(
+                f"{table.source}: forces and positions are not at the same time; name a position of the same record "
+                "with --position-col, or none and give --speed"
+            )
+        held &= inside
+        p = np.interp(t, t[places], p[places])
+        said.append(
+            f"{table.source}: position and force are in rows of their own; the position was interpolated at the times "
+            "of the force"
+        )
+    else:
+        said.append(f"{table.source}: {np.count_nonzero(~held)} rows without a force, of other topics, were left out")
+    on = np.flatnonzero(held)
+    return t[on], f[on], None if p is None else p[on], on, said
+
+
+def _parts_of(table: Table, on: np.ndarray) -> tuple[int, ...]:
+    """Where the parts of a table begin among some of its rows."""
+    return tuple(int(np.searchsorted(on, start)) for start in table.parts)
+
+
+def _downwards(table: Table, column: Column, f: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
+    """The height of a knife whose depth may be counted negative downwards: it must be lower under load than before."""
+    loaded = np.abs(f - np.median(f[: max(5, len(f) // 20)]))
+    high = loaded >= 0.5 * np.percentile(loaded, 98)
+    risen = float(np.mean(p[high]) - p[0])
+    if risen <= TURNED * np.ptp(p):
+        return p, ()
+    note = (
+        f"{table.source}: {brief(column.name, LONG)} falls as the knife descends, so it is taken as negative downwards"
+    )
+    return -p, (note,)

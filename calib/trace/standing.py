@@ -1,0 +1,79 @@
+"""Where a force stands: a sensor that is clipped at its end, or frozen, and the steps in which it counts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+FEWEST = 6
+"""Equal samples on end from which on a force stands."""
+CHANCE = 1e-3
+"""Chance that a force which repeats itself as often as this one does stands anywhere in the record that long."""
+TOP_NOISE = 0.1
+"""Part of the noise within which values at the top are one value: an end of the range that flickers by a digit."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Samples on end that are one value.
+
+    Attributes:
+        first: Index of the first.
+        last: Index of the last.
+        value: The force [N].
+        top: Whether it is the largest of the record.
+    """
+
+    first: int
+    last: int
+    value: float
+    top: bool
+
+
+def standing(force: np.ndarray, noise: float) -> list[Standing]:
+    """Where the force stands longer than noise and counting in steps explain.
+
+    Args:
+        force: Force [N], shape (n,).
+        noise: Its noise before contact [N].
+
+    Returns:
+        The places, in order.
+    """
+    runs = _runs(force, 0.0)
+    short = [last - first for first, last in runs if last - first + 1 < FEWEST]
+    share = min(max(sum(short) / max(len(force) - 1, 1), 0.02), 0.98)
+    least = max(FEWEST, int(np.ceil(np.log(CHANCE / len(force)) / np.log(share))))
+    longest = [last - first for first, last in runs if last - first + 1 >= FEWEST]
+    if len(longest) > 0.02 * len(force):  # it counts in steps: most of the record stands
+        share = min(max((sum(short) + sum(longest)) / max(len(force) - 1, 1), 0.02), 0.995)
+        least = max(least, int(np.ceil(np.log(CHANCE / len(force)) / np.log(share))))
+    high = float(force.max())
+    near = max(TOP_NOISE * noise, 1e-9 * abs(high))
+    found = [Standing(a, b, float(force[a]), force[a] >= high - near) for a, b in runs if b - a + 1 >= least]
+    if not any(place.top for place in found):
+        top = [(a, b) for a, b in _runs((force >= high - near).astype(float), 0.0) if force[a] >= high - near]
+        found += [Standing(a, b, high, True) for a, b in top if b - a + 1 >= least + 2]
+    return sorted(found, key=lambda place: place.first)
+
+
+def _runs(force: np.ndarray, tolerance: float) -> list[tuple[int, int]]:
+    """First and last index of each stretch of equal values."""
+    change = np.flatnonzero(np.abs(np.diff(force)) > tolerance)
+    starts, ends = np.r_[0, change + 1], np.r_[change, len(force) - 1]
+    return [(int(a), int(b)) for a, b in zip(starts, ends, strict=True) if b > a]
+
+
+def quantum(force: np.ndarray) -> float:
+    """The step in which a force counts [N]: the smallest difference of its values, of which all others are multiples.
+
+    Zero where there is none.
+    """
+    values = np.unique(force)
+    if len(values) < 3 or len(values) > len(force) / 2:
+        return 0.0
+    steps = np.diff(values)
+    step = float(np.median(steps[steps < 1.5 * steps.min()]))
+    off = np.abs(steps / step - np.round(steps / step))
+    return step if float(np.mean(off < 0.1)) > 0.95 else 0.0
