@@ -22,6 +22,7 @@ from mpm.state.tables import (
     FRICTION_WORK,
     INV_DX,
     MASS,
+    SPACING,
     SPINE,
     TILT_COS,
     TILT_SIN,
@@ -184,15 +185,10 @@ def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
     above = (at[2] - edge_height(s, cut, at[0])) * cos_t
     touching = False
     dv, arm = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
-    tall = s.par[cut, BLADE_HEIGHT] + half_thickness(s, cut)
+    tall = s.par[cut, BLADE_HEIGHT] + half_thickness(s, cut) + s.par[cut, SPACING]
     if s.side[cut, p] != 0 and 0 < above < tall and under_blade(s, cut, at[0]):
         sign = 1.0 if s.side[cut, p] == 2 else -1.0
-        d, n = blade_distance(
-            sign * at[1], above, s.par[cut, SPINE], s.par[cut, WEDGE_COS], s.par[cut, WEDGE_SIN], s.par[cut, TIP_RADIUS]
-        )
-        back = (sign * at[1] - half_thickness(s, cut) + above - s.par[cut, BLADE_HEIGHT]) * ti.sqrt(0.5)
-        if back > d:
-            d, n = back, ti.Vector([0.0, ti.sqrt(0.5), ti.sqrt(0.5)])
+        d, n = blade_face(s, cut, sign * at[1], above)
         n = ti.Vector([-sin_t * n[2], sign * n[1], cos_t * n[2]])
         own = surface_traction(s, cut, p, s.surface_volume[cut, p][1], s.tool_gap[cut, p], n)
         opening = d - s.tool_gap[cut, p]
@@ -224,6 +220,51 @@ def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
     if not touching:
         s.stick[cut, 1, p] = ti.Vector.zero(float, 3)
     return dv, arm
+
+
+@ti.func
+def blade_face(s: ti.template(), cut, y, above):
+    """Distance of a particle's centre to the blade's face and the face's outward normal, in the plane across the edge.
+
+    A particle stands for a face as high as the spacing of the particles, so it meets the blade's profile as its mean
+    over that height (weights of a hat of twice the height). At a sharp shoulder whole rows would let go at once of the
+    force that the wedge had given them, and the halves would ring. The tip is left sharp.
+
+    Args:
+        y: Distance from the blade's plane towards the particle's own half [m].
+        above: Height above the edge [m].
+
+    Returns:
+        Distance [m], negative inside, and the unit normal (0, n_y, n_z).
+    """
+    cos_h, sin_h, radius = s.par[cut, WEDGE_COS], s.par[cut, WEDGE_SIN], s.par[cut, TIP_RADIUS]
+    d, n = 0.0, ti.Vector([0.0, cos_h, -sin_h])
+    if y * sin_h + (above - radius) * cos_h < 0:
+        size = ti.sqrt(y * y + (above - radius) ** 2)
+        d, n = size - radius, ti.Vector([0.0, y, above - radius]) / ti.max(size, 1e-12)
+    else:
+        slope, reach, top = sin_h / cos_h, s.par[cut, SPACING], s.par[cut, BLADE_HEIGHT]
+        shoulder = ti.min(radius + (0.5 * s.par[cut, SPINE] * cos_h - radius) / sin_h, top)
+        one, two = (above - shoulder) / reach, (above - top) / reach
+        half = (above - radius) * slope + radius / cos_h - reach * (slope * kink(one) + kink(two))
+        slope -= slope * passed(one) + passed(two)
+        n = ti.Vector([0.0, 1.0, -slope]) / ti.sqrt(1.0 + slope * slope)
+        d = (y - half) * n[1]
+    return d, n
+
+
+@ti.func
+def passed(q):
+    """Part of a hat of half width 1 that lies below q [-]."""
+    x = ti.math.clamp(q, -1.0, 1.0)
+    return 0.5 + x - 0.5 * x * ti.abs(x)
+
+
+@ti.func
+def kink(q):
+    """Integral of :func:`passed` up to q [-]: a kink of slope 1 at 0 that is averaged by a hat."""
+    x = ti.math.clamp(q, -1.0, 1.0)
+    return 1 / 6 + 0.5 * x + 0.5 * x * x - x * x * ti.abs(x) / 6 + ti.max(0.0, q - 1.0)
 
 
 @ti.func
