@@ -162,7 +162,8 @@ def _header(rows: NumberedRows, width: int) -> tuple[int, int | None] | None:
 
 
 def _mostly_units(cells: Sequence[str]) -> bool:
-    filled = [cell for cell in cells if cell.strip()]
+    """Whether more than half of the cells are units; a dash, as of a column without unit, says nothing."""
+    filled = [cell for cell in cells if cell.strip(" []()-")]
     return 2 * sum(map(is_unit, filled)) > len(filled)
 
 

@@ -80,7 +80,7 @@ SLIPS = {
     "simulate --food": ["--food", "expected one argument"],
     "simulate --food Bananna": ["did you mean 'banana'?"],
     "simulate --food banana --knife kichen": ["did you mean 'kitchen'?"],
-    "simulate --food banana --height 30in": ["--height", "'30in' is not a length such as 0.045 or 45mm"],
+    "simulate --food banana --height 30furlong": ["--height", "'30furlong' is not a length such as 0.045 or 45mm"],
     "simulate --food banana --height 3000mm": ["--height", "3000mm must lie between 0.001 and 1 m"],
     "simulate --food banana --height 30": ["--height", "30", "0.001 and 1 m"],
     "simulate --food banana --shape sylinder": ["--shape", "did you mean 'cylinder'?"],

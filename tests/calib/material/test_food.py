@@ -184,13 +184,15 @@ def test_default_fit_follows_the_skin(foods: dict[str, FoodSpec]) -> None:
     assert foods["cucumber"].default_fit == (
         "E",
         "yield_stress",
+        "tensile_strength",
         "R",
         "R_skin",
         "skin_thickness",
         "initiation_depth",
         "mu",
     )
-    assert foods["potato"].default_fit == ("E", "yield_stress", "R", "R_initiation", "initiation_depth", "mu")
+    start = ("R_initiation", "initiation_depth", "mu")
+    assert foods["potato"].default_fit == ("E", "yield_stress", "tensile_strength", "R", *start)
 
 
 def test_import_is_light() -> None:
@@ -298,7 +300,7 @@ def test_check_override(name: str, value: Any, expected: float) -> None:
         ("xyzzy", 1, ("known: rho, E, nu",)),
         ("E", "300 kPa", ("'300 kPa'", "plain number in Pa")),
         ("E", "3e5m", ("'3e5m'", "plain number in Pa")),
-        ("skin_thickness", "3in", ("'3in'", "plain number in m")),
+        ("skin_thickness", "3px", ("'3px'", "plain number in m")),
         ("E", -1.0, ("E: -1 Pa", "between 100 and 1e+10 Pa")),
         ("E", float("nan"), ("E: is nan", "finite")),
         ("E", "inf", ("finite",)),

@@ -49,9 +49,12 @@ def test_prior_is_that_of_the_literature() -> None:
     assert parameter.log and only.stress_like() == pytest.approx([1.0])
 
 
-@pytest.mark.parametrize("truth", [1.2e5, 4e5])
+@pytest.mark.parametrize("truth", [1.2e5, 2e5])
 def test_strength_of_a_made_up_cut_is_found(truth: float) -> None:
-    """Under a thick blade the force tells a weak food from a strong one of the same stiffness and toughness."""
+    """Under a thick blade the force tells a weak food from a strong one of the same stiffness and toughness.
+
+    From the yield stress of 0.3 MPa on, a stronger one changes nothing.
+    """
     cuts = Cuts(SPLIT)
     real = next(cuts.evaluate([{STRENGTH: truth}]))
     grid = np.linspace(0.0, 0.006, 60)
