@@ -33,6 +33,20 @@ def blade_distance(y, above, spine, cos_h, sin_h, radius):
 
 
 @ti.func
+def passed_part(q):
+    """Part of a hat of half width 1 that lies below q [-]."""
+    x = ti.math.clamp(q, -1.0, 1.0)
+    return 0.5 + x - 0.5 * x * ti.abs(x)
+
+
+@ti.func
+def kink(q):
+    """Integral of :func:`passed_part` up to q [-]: a kink of slope 1 at 0 that is averaged by a hat."""
+    x = ti.math.clamp(q, -1.0, 1.0)
+    return 1 / 6 + 0.5 * x + 0.5 * x * x - x * x * ti.abs(x) / 6 + ti.max(0.0, q - 1.0)
+
+
+@ti.func
 def adhesive_traction(opening, gap):
     """Traction of a sticky face over its strength when it has opened by ``opening`` [-]; ``gap`` [m] ends it.
 

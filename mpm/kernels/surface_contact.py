@@ -3,7 +3,7 @@
 import taichi as ti
 
 from mpm.kernels.constitutive import full
-from mpm.kernels.signed_distance import adhesive_traction, blade_distance, stick_slip
+from mpm.kernels.signed_distance import adhesive_traction, blade_distance, kink, passed_part, stick_slip
 from mpm.kernels.tool import blade_velocity, book_impulse, book_knife_impulse, edge_height, under_blade
 from mpm.state.accessors import to_grid_axes, to_scene_axes, velocity_gradient
 from mpm.state.tables import (
@@ -247,24 +247,10 @@ def blade_face(s: ti.template(), cut, y, above):
         shoulder = ti.min(radius + (0.5 * s.par[cut, SPINE] * cos_h - radius) / sin_h, top)
         one, two = (above - shoulder) / reach, (above - top) / reach
         half = (above - radius) * slope + radius / cos_h - reach * (slope * kink(one) + kink(two))
-        slope -= slope * passed(one) + passed(two)
+        slope -= slope * passed_part(one) + passed_part(two)
         n = ti.Vector([0.0, 1.0, -slope]) / ti.sqrt(1.0 + slope * slope)
         d = (y - half) * n[1]
     return d, n
-
-
-@ti.func
-def passed(q):
-    """Part of a hat of half width 1 that lies below q [-]."""
-    x = ti.math.clamp(q, -1.0, 1.0)
-    return 0.5 + x - 0.5 * x * ti.abs(x)
-
-
-@ti.func
-def kink(q):
-    """Integral of :func:`passed` up to q [-]: a kink of slope 1 at 0 that is averaged by a hat."""
-    x = ti.math.clamp(q, -1.0, 1.0)
-    return 1 / 6 + 0.5 * x + 0.5 * x * x - x * x * ti.abs(x) / 6 + ti.max(0.0, q - 1.0)
 
 
 @ti.func

@@ -9,6 +9,7 @@ import taichi as ti
 
 from mpm.kernels.constitutive import full
 from mpm.kernels.crack import IN_CONTACT
+from mpm.kernels.signed_distance import passed_part
 from mpm.kernels.tool import edge_height, under_blade
 from mpm.state.accessors import step_size, to_grid_axes, to_scene_axes, velocity_gradient
 from mpm.state.loops import locate_active, repetitions
@@ -60,13 +61,6 @@ def work_spent(opening, end):
 def passing_weight(height):
     """Weight with which the edge pays for a tie [-], a hat; ``height``: of the tie over the hat's middle [hats]."""
     return ti.max(0.0, 1.0 - ti.abs(height))
-
-
-@ti.func
-def passed_part(height):
-    """Part of a tie that the edge has cut [-]: the integral of :func:`passing_weight`."""
-    q = ti.math.clamp(height, -1.0, 1.0)
-    return 0.5 + q - 0.5 * q * ti.abs(q)
 
 
 @ti.func

@@ -107,3 +107,19 @@ def test_edge_level_falls_from_start_to_resistance(evaluate):
 def test_bspline_is_the_quadratic_b_spline(evaluate, r):
     """The process zone's weight is the quadratic B-spline."""
     assert evaluate("spline", r)[0] == pytest.approx(float(twins.bspline(r)), abs=1e-14)
+
+
+def test_kink_is_averaged_by_a_hat():
+    """The mean of a kink over a hat of half width 1, by quadrature; beyond it the kink itself."""
+    out, inp = ti.field(ti.f64, 1), ti.field(ti.f64, 1)
+
+    @ti.kernel
+    def run():
+        out[0] = signed_distance.kink(inp[0])
+
+    x = np.linspace(-1.0, 1.0, 20001)
+    for q in (-1.5, -0.7, 0.0, 0.4, 1.0, 2.5):
+        inp[0] = q
+        run()
+        mean = np.trapezoid(np.maximum(0.0, q - x) * (1 - np.abs(x)), x)
+        assert out[0] == pytest.approx(mean, abs=1e-8)

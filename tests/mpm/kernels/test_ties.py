@@ -7,7 +7,8 @@ import pytest
 import taichi as ti
 
 from mpm.batch import simulate_together
-from mpm.kernels.ties import passed_part, passing_weight, softened_tension, work_spent
+from mpm.kernels.signed_distance import passed_part
+from mpm.kernels.ties import passing_weight, softened_tension, work_spent
 from mpm.output.record import ENERGIES, ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
