@@ -131,7 +131,7 @@ def lines_of_a_report() -> list[Verdict]:
         nulls,
         conservation=Conservation(0.0, 0.0, 1.0, 0.0),
         fitted={},
-        checks=[Check(name, None, 0.0, 0.0, 0.0) for name in VARIANTS],
+        checks=[Check(name, None, 0.0, 0.0, 0.0) for name in (*VARIANTS, "twice the process zone")],
         nuisances=dict.fromkeys(NUISANCE_LINES, nuisance),
     )
 
