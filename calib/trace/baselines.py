@@ -23,6 +23,13 @@ CLEAR_M = 1e-3
 """Height above that at contact from which on a knife that was raised is out of the food [m]."""
 
 
+BEHIND_PART, BEHIND_SD = 0.03, 4.0
+"""Part of the peak, and noise standard deviations, by which the level behind a cut differs from that before it to be
+told."""
+BEHIND_SAMPLES = 10
+"""Samples behind the cut from which on they have a level."""
+
+
 @dataclass(frozen=True)
 class Drift:
     """A drift that is removed from a force.
@@ -163,3 +170,31 @@ def trigger_contact(trace: Trace, force: np.ndarray) -> ContactOnset:
     noise = noise_of(force[: max(MIN_BASELINE, len(force) // 4)])
     base = Baseline(0.0, float(np.hypot(abs(first), noise)), noise, 1.0, 0.0, 0.0, 0, MIN_BASELINE)
     return ContactOnset(base, float(trace.time[0]), trace.dt, top)
+
+
+def level_behind(
+    trace: Trace, tared: np.ndarray, out: np.ndarray, peak: float, noise: float
+) -> tuple[float, list[str]]:
+    """Whether the force is back at its level when the knife is out of the food.
+
+    Args:
+        trace: The cut.
+        tared: Its force above the baseline [N], shape (n,).
+        out: Indices of the samples in which the knife is out of the food, shape (k,) [-].
+        peak: Largest force [N].
+        noise: Noise of a sample [N].
+
+    Returns:
+        The standard uncertainty that a level which has moved leaves in the peak [N], and one sentence, or none.
+    """
+    if len(out) < BEHIND_SAMPLES:
+        return 0.0, []
+    behind = float(np.median(tared[out[len(out) // 2 :]]))
+    if abs(behind) <= max(BEHIND_PART * peak, BEHIND_SD * noise):
+        return 0.0, []
+    side = "above" if behind > 0.0 else "below"
+    return abs(behind) / 12**0.5, [
+        f"{trace.source}: behind the cut, from {trace.where(int(out[0]))} on, the force is {abs(behind):.3g} N {side} "
+        f"its level before it ({abs(behind) / peak:.1%} of the peak): the sensor has drifted or moved, or food sticks "
+        "to the blade; the peak may be off by as much"
+    ]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from calib.errors import TraceError
-from calib.trace import hdf5_table
+from calib.formats import hdf5_table
 from calib.trace.trace import read_trace
 
 N = 40
