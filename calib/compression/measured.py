@@ -14,7 +14,7 @@ from calib.formats.reader import read_table
 from calib.io.type_schema import Shared
 from calib.io.wording import brief
 from calib.table.table import Table
-from calib.trace.columns import candidates, choose, numbers
+from calib.trace.columns import candidates, choose, numbers, without_empty
 from calib.trace.names import stem_of
 from calib.trace.recorded import MIN_SAMPLES, parse_sign
 from mpm.arrays import FloatArray
@@ -141,6 +141,7 @@ def read_repeats(
             )
         compression = choose(table, "compression", compression_col)
         force = choose(table, "force", force_col)
+        table = without_empty(table, (compression, force), [int(on[0]) for _, on in _repeats(table)])
         notes += [*table.notes, *compression.notes, *force.notes]
         way, load = numbers(table, compression), numbers(table, force)
         if sign is not None:
