@@ -21,6 +21,7 @@ from calib.trace.baselines import (
     level_behind,
     out_of_the_food,
     trigger_contact,
+    untold_drift,
 )
 from calib.trace.contact_onset import FLOOR_FRACTION, SUSTAIN, ContactOnset, estimate_baseline, find_contact_onset
 from calib.trace.cuts import single_cut
@@ -167,7 +168,8 @@ def condition(
     at_peak = contact.onset + (end_s - contact.onset) * float(grid[int(np.argmax(curve))]) / length
     drift_sd = 0.0 if drift is None else drift.sd(at_peak)
     said = (*approach, *mend.notes, *(() if air_mend is None else air_mend.notes), *sudden, *behind, *held.notes)
-    removed = () if drift is None else (drift.note(trace.source, end_s),)
+    removed = untold_drift(trace, force, contact, out, end_s) if air is None else []
+    removed = removed if drift is None else [drift.note(trace.source, end_s)]
     return Conditioned(
         trace=trace,
         baseline_N=level.level,

@@ -28,6 +28,8 @@ STEP_SD = 8.0
 """Noise standard deviations by which the level steps."""
 STEP_PART = 0.02
 """Part of the force's usual range by which it does."""
+FEWEST_BEHIND = 5
+"""Samples behind the cut from which on they have a level."""
 STOPPED = 4
 """Samples for which a position stands that did not reach the file, at least."""
 NEAR_ZERO = 0.05
@@ -203,7 +205,7 @@ def _level_behind(trace: Trace, i: int) -> float | None:
         return None
     below = np.flatnonzero(trace.position < trace.position[i])
     out = trace.force[int(below[-1]) + 1 :] if len(below) else trace.force[:0]
-    return float(np.median(out)) if STEP_SIDE <= len(out) < len(trace.force) - i else None
+    return float(np.median(out)) if FEWEST_BEHIND <= len(out) < len(trace.force) - i else None
 
 
 def _is_step(force: np.ndarray, i: int, change: tuple[float, bool], limit: float, noise: float) -> bool:

@@ -102,3 +102,21 @@ def test_samples_that_stand_out_together_are_refused(count: int, value: float) -
     force[418 : 418 + count] += value
     with pytest.raises(TraceError, match=rf"sample 418 .*: this sample and {count - 1} after it stand out together"):
         conditioned(CUT.but(force=force))
+
+
+@pytest.mark.parametrize("slope", [0.3, 0.5])
+def test_a_drift_that_a_short_approach_does_not_tell_is_said(slope: float) -> None:
+    """Neither a tenth of a second before contact nor anything behind the cut tells of it."""
+    keep = between(0.9, 2.6)
+    short = Cut(CUT.time[keep], (CUT.force + slope * CUT.time)[keep], CUT.height[keep])
+    assert said(conditioned(short), r"a drift of up to .* N over the cut cannot be told from the \d+ samples before")
+    long = Cut(CUT.time[between(0.0, 2.6)], CUT.force[between(0.0, 2.6)], CUT.height[between(0.0, 2.6)])
+    assert not said(conditioned(long), "cannot be told")
+
+
+def test_four_equal_samples_at_the_top_are_clipped() -> None:
+    """A sensor may end just below the peak."""
+    top = np.sort(CUT.force)[-5]
+    force = np.where(between(2.07, 2.09), 15.5, np.minimum(CUT.force, top))
+    with pytest.raises(TraceError, match="the sensor is clipped there"):
+        conditioned(CUT.but(force=force))
