@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 
+from calib.compression.faults import without_faults
 from calib.errors import CurveError, TraceError
 from calib.formats.reader import read_table
 from calib.io.type_schema import Shared
@@ -157,7 +158,11 @@ def read_repeats(
                 )
             names.append(label)
             where = f"{table.source}{f', repeat {name}' if name else ''}"
-            e, s = _loading(where, way[on], load[on], shape, strain)
+            mended, faults = without_faults(
+                way[on], load[on], strain * shape.height, _places(where, table, force.name, on)
+            )
+            notes += faults
+            e, s = _loading(where, way[on], mended, shape, strain)
             notes += _later_loadings(where, table, on, way[on])
             rows.append(np.interp(grid, e, s))
             slopes.append(slope(e, s))
@@ -182,6 +187,11 @@ def _repeats(table: Table) -> list[tuple[str, np.ndarray]]:
     if len(ends) == 1:
         return [("", np.arange(len(table.rows)))]
     return [(str(k), np.arange(*span)) for k, span in enumerate(zip(table.parts, ends, strict=True), start=1)]
+
+
+def _places(where: str, table: Table, column: str, on: np.ndarray) -> Callable[[int], str]:
+    """What errors call a sample of a repeat, by its index in it."""
+    return lambda i: f"{where}, {table.row} {brief(table.rows[on[i]])}, column {brief(column)}"
 
 
 def _its_own_way(source: str, name: str, way: FloatArray) -> tuple[FloatArray, list[str]]:

@@ -130,7 +130,8 @@ def _nothing_fits(table: Table, role: str, option: str) -> str:
             f"{quoted(bare[0] + chr(61) + units)}"
         )
     else:
-        what = f"{_did_you_mean(_EXPECTED[role], table)}; name one with {option}"
+        near = _did_you_mean(_EXPECTED[role], table)
+        what = f"{near}; name one with {option} and its unit, as in 'NAME={SI_OF_ROLE[role]}'"
     derived = [name for name in asked if not_measured(name)]
     more = f" ({listed(derived[:2], LONG)} was commanded or derived and is not chosen unasked)" if derived else ""
     left = "; ".join(f"{brief(name)} was left out, {why}" for name, why in list(table.left_out.items())[:3])

@@ -67,11 +67,11 @@ def mended(trace: Trace) -> Mended:
     Raises:
         TraceError: So many values stand out that nothing is left of the record.
     """
-    force, spikes = _without_spikes(trace, trace.force, "force")
+    force, spikes = without_spikes(trace, trace.force, "force")
     position = trace.position
     lost: list[str] = []
     if position is not None:
-        position, lost = _without_spikes(trace, position, "position")
+        position, lost = without_spikes(trace, position, "position")
         position, stood = _without_stops(trace, position)
         lost = [*lost, *stood]
     force, level_sd, steps = _without_steps(replace(trace, force=force))
@@ -96,8 +96,20 @@ def _place(trace: Trace, i: int, role: str = "force") -> str:
     return f"{trace.source}, {trace.where(i)}, column {brief(trace.columns.get(role, role), LONG)}"
 
 
-def _without_spikes(trace: Trace, force: np.ndarray, role: str) -> tuple[np.ndarray, list[str]]:
-    """The force, or the position, without values that stand out alone, and what was done."""
+def without_spikes(trace: Trace, force: np.ndarray, role: str) -> tuple[np.ndarray, list[str]]:
+    """The force, or the position, without values that stand out alone.
+
+    Args:
+        trace: The record.
+        force: Its force [N], or position [m], shape (n,).
+        role: ``force`` or ``position``.
+
+    Returns:
+        The same with those values replaced, shape (n,), and what was done, one sentence each.
+
+    Raises:
+        TraceError: So many values stand out that nothing is left of the record.
+    """
     n, unit = len(force), {"force": "N", "position": "m"}[role]
     limit = max(SPIKE_SD * noise_of(force), SPIKE_PART * usual_range(force), 1e-9)
     out, count = force.copy(), 0

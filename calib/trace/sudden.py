@@ -52,7 +52,7 @@ def sudden_changes(
     after = float(np.median(force[out])) if len(out) >= LEVEL_SAMPLES else None
     _check_bursts(trace, force, span, max(CHANGE_SD * noise, BURST_RANGE * peak, 1.5 * quantum(trace.force)))
     notes: list[str] = []
-    steps, jumps = _steps(force)
+    steps, jumps = steps_of(force)
     large = np.abs(steps) > max(CHANGE_SD * noise, CHANGE_PART * peak, 1.5 * quantum(trace.force))
     alike = (jumps >= 0.7 * np.abs(steps)) & (jumps <= 1.5 * np.abs(steps))
     i = -SIDE
@@ -81,9 +81,17 @@ def _place(trace: Trace, i: int) -> str:
     return f"{trace.source}, {trace.where(i)}, column {brief(trace.columns.get('force', 'force'), LONG)}"
 
 
-def _steps(force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """By how much the line through the samples from each on is above that through the samples before it [N], and the
-    change from the sample before, counted in that direction and without the slope of the lines [N], shape (n,) each."""
+def steps_of(force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sudden changes of a force at each sample.
+
+    Args:
+        force: Force [N], shape (n,).
+
+    Returns:
+        By how much the line through the samples from each on is above that through the samples before it [N], shape
+        (n,), and the change from the sample before, counted in that direction and without the slope of the lines [N],
+        shape (n,).
+    """
     steps, jumps = np.zeros(len(force)), np.zeros(len(force))
     if len(force) < 2 * SIDE:
         return steps, jumps
