@@ -235,7 +235,7 @@ def _is_step(force: np.ndarray, i: int, change: tuple[float, bool], limit: float
     if np.std(left) > flat or np.std(right) > flat or abs(np.median(right[:4]) - np.median(right[-4:])) > 2.0 * flat:
         return False
     level = float(np.median(right))
-    if np.ptp(right) == 0.0 < np.ptp(left):
+    if step < 0.0 and np.ptp(right) == 0.0 < np.ptp(left):
         return False  # a sensor that has fallen out, not one that was zeroed
     zeroed = abs(level) <= max(4.0 * noise, NEAR_ZERO * abs(step)) and abs(np.median(left)) > 2.0 * abs(level)
     before = force[:i]
