@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -23,6 +23,9 @@ from calib.material.scene import MID_LENGTH, Sizing
 from calib.multi_specimen.spec import StudySpec
 from calib.multi_specimen.study_file import read_study
 from calib.problem.request import Request
+from calib.trace.baselines import BASELINES, CONSTANT
+from calib.trace.cuts import WHOLE
+from calib.trace.recorded import Reading
 from calib.trace.trace import Trace, read_trace
 from mpm.runtime import ARCHES
 from mpm.scene.errors import CutcalError, check_number
@@ -65,6 +68,10 @@ class Calibration:
         workers: Simulations at a time.
         seed: Seed of the particles and of the search.
         arch: Device of the simulations.
+        columns: How files and DataFrames are read: attributes of :class:`calib.trace.recorded.Reading` by name, such as
+            ``{"force_col": "Fz=N", "sign": "-", "rate": 200.0}``; None for what their names say.
+        baseline: What is subtracted without an air run, one of ``calib.trace.baselines.BASELINES``.
+        cut: Number of the cut in a record of several, from 1; ``whole`` for a record that is one; None for its only.
 
     Raises:
         CutcalError: An unknown food, a trace that cannot be read, or an impossible value.
@@ -87,6 +94,9 @@ class Calibration:
     workers: int = 2
     seed: int = 0
     arch: str = "cpu"
+    columns: Mapping[str, Any] | None = None
+    baseline: str = CONSTANT
+    cut: int | str | None = None
     _food: FoodSpec = field(init=False, repr=False)
     _records: tuple[Trace, Trace | None] = field(init=False, repr=False)
 
@@ -103,9 +113,21 @@ class Calibration:
                 raise CutcalError(f"Calibration: {name} = {brief(getattr(self, name))} is none of {', '.join(options)}")
         if isinstance(self.fit, str):
             raise CutcalError(f"Calibration: fit = {brief(self.fit)} is text; give a list of names, such as ['E', 'R']")
+        if self.baseline not in BASELINES:
+            raise CutcalError(f"Calibration: baseline = {brief(self.baseline)} is none of {', '.join(BASELINES)}")
+        if not (self.cut is None or self.cut == WHOLE or (type(self.cut) is int and self.cut > 0)):
+            raise CutcalError(f"Calibration: cut = {brief(self.cut)}; give a number from 1, or '{WHOLE}'")
+        names = [item.name for item in fields(Reading)]
+        unknown = next((name for name in self.columns or {} if name not in names), None)
+        if unknown is not None:
+            raise CutcalError(f"Calibration: columns has {brief(unknown)}, which is none of {', '.join(names)}")
+        if self.columns and isinstance(self.trace, Trace):
+            raise CutcalError("Calibration: columns say how a file is read, but the trace is a Trace, which has been")
         food = self.food if isinstance(self.food, FoodSpec) else FoodSpec.load(self.food)
         object.__setattr__(self, "_food", food)
-        object.__setattr__(self, "_records", (_record(self.trace), None if self.air is None else _record(self.air)))
+        object.__setattr__(
+            self, "_records", (self._record(self.trace), None if self.air is None else self._record(self.air))
+        )
 
     def request(self, out: str | Path = "") -> Request:
         """The same for :func:`calib.calibration.run.run`.
@@ -121,6 +143,8 @@ class Calibration:
             knife=str(self.knife),
             speed=self.speed,
             t_end=self.t_end,
+            baseline=self.baseline,
+            cut=self.cut,
             sizing=Sizing(self.shape, self.height, self.width, self.length, self.at),
             fit=None if self.fit is None else tuple(self.fit),
             dx=self.dx,
@@ -176,6 +200,10 @@ class Calibration:
         if missing:
             raise OutputError(f"{path}: not of a calibration ({', '.join(missing)} missing); name another folder")
         return read_result(folder, RESUME)
+
+    def _record(self, given: str | Path | Trace | pd.DataFrame) -> Trace:
+        """A record in any of its forms."""
+        return given if isinstance(given, Trace) else read_trace(given, **(self.columns or {}))
 
     def _call(self) -> str:
         """This object as it would be written, without what is as usual."""
@@ -240,11 +268,6 @@ class Study:
         with script_hidden(), Pool(workers, self.spec.first.arch) as pool:
             result = run(self.spec, Path(out), pool, resume=resume, progress=progress, say=say)
         return dict(finite(to_document(result)))
-
-
-def _record(given: str | Path | Trace | pd.DataFrame) -> Trace:
-    """A record in any of its forms."""
-    return given if isinstance(given, Trace) else read_trace(given)
 
 
 @contextmanager

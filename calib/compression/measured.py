@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 
+from calib.compression.faults import without_faults
 from calib.errors import CurveError, TraceError
 from calib.formats.reader import read_table
 from calib.io.type_schema import Shared
 from calib.io.wording import brief
 from calib.table.table import Table
-from calib.trace.columns import candidates, choose, numbers
+from calib.trace.columns import candidates, choose, numbers, without_empty
 from calib.trace.names import stem_of
 from calib.trace.recorded import MIN_SAMPLES, parse_sign
 from mpm.arrays import FloatArray
@@ -141,6 +142,7 @@ def read_repeats(
             )
         compression = choose(table, "compression", compression_col)
         force = choose(table, "force", force_col)
+        table = without_empty(table, (compression, force), [int(on[0]) for _, on in _repeats(table)])
         notes += [*table.notes, *compression.notes, *force.notes]
         way, load = numbers(table, compression), numbers(table, force)
         if sign is not None:
@@ -156,7 +158,11 @@ def read_repeats(
                 )
             names.append(label)
             where = f"{table.source}{f', repeat {name}' if name else ''}"
-            e, s = _loading(where, way[on], load[on], shape, strain)
+            mended, faults = without_faults(
+                way[on], load[on], strain * shape.height, _places(where, table, force.name, on)
+            )
+            notes += faults
+            e, s = _loading(where, way[on], mended, shape, strain)
             notes += _later_loadings(where, table, on, way[on])
             rows.append(np.interp(grid, e, s))
             slopes.append(slope(e, s))
@@ -181,6 +187,11 @@ def _repeats(table: Table) -> list[tuple[str, np.ndarray]]:
     if len(ends) == 1:
         return [("", np.arange(len(table.rows)))]
     return [(str(k), np.arange(*span)) for k, span in enumerate(zip(table.parts, ends, strict=True), start=1)]
+
+
+def _places(where: str, table: Table, column: str, on: np.ndarray) -> Callable[[int], str]:
+    """What errors call a sample of a repeat, by its index in it."""
+    return lambda i: f"{where}, {table.row} {brief(table.rows[on[i]])}, column {brief(column)}"
 
 
 def _its_own_way(source: str, name: str, way: FloatArray) -> tuple[FloatArray, list[str]]:

@@ -20,6 +20,9 @@ MOST_ABOVE = 60
 """Lines above a header that are taken for words about the record."""
 SAMPLE = 200
 """Lines from which separator and header are told."""
+MOST_BELOW, MOST_BETWEEN, FEW = 40, 20, 5
+"""Lines below the last row, lines of words between rows, and rows by which it is told what a row is like."""
+_COMMENT = re.compile(r"(comments?|remarks?|notes?|bemerkung(en)?|kommentar|)", re.IGNORECASE)
 UNIT_CELL = re.compile(
     r"\s*[\[(]?\s*[A-Za-z%\u00b5\u03bc\u00b0\"][\w/^%.*\u00b7-]{0,14}\s*[\])]?\s*|\s*[\[(]?\s*[-/]?\s*[\])]?\s*"
 )
@@ -40,6 +43,8 @@ class Layout:
         rows: Line number and cells of each row.
         parts: Index of the row with which each part begins.
         cut_off: Line number of a last row that is not whole and was left out, or None.
+        no_samples: Line numbers of lines of words between and below the rows, which were left out.
+        blocks: Specimens that stand beside each other, each with the same columns; they are parts.
     """
 
     above: list[list[str]]
@@ -48,6 +53,8 @@ class Layout:
     rows: NumberedRows
     parts: tuple[int, ...]
     cut_off: int | None = None
+    no_samples: tuple[int, ...] = ()
+    blocks: int = 1
 
 
 def layout_of(source: str, body: NumberedLines) -> Layout:
@@ -84,10 +91,21 @@ def layout_of(source: str, body: NumberedLines) -> Layout:
             f"{source}: not a CSV file with a force column and one beside it (header: {quoted(header[0])}); separate "
             "cells with commas, semicolons, tabs or blanks"
         )
-    kept, parts = _parts(rows[start:], header)
+    data = rows[start:]
+    if header:
+        data, words = _without_words(data, header)
+    kept, parts = _parts(data, header)
+    words = tuple(line for line in words if kept and line > kept[0][0]) if header else ()
     kept, header = _without_empty_end(kept, header)
+    kept, header = _as_wide(kept, header)
     kept, cut_off = _whole_rows(source, kept, len(header) or width)
-    return Layout(above, header, units, kept, parts, cut_off)
+    count = _blocks(header)
+    if count > 1 and len(parts) == 1:
+        kept, parts = _stacked(kept, len(header), count)
+        header, units = header[: (len(header) + 1) // count], units[: (len(header) + 1) // count]
+        if not header[-1].strip():
+            header, kept = header[:-1], [(line, cells[: len(header) - 1]) for line, cells in kept]
+    return Layout(above, header, units, kept, parts, cut_off, words, count)
 
 
 def is_words(cells: Sequence[str]) -> bool:
@@ -185,6 +203,77 @@ def _parts(rows: NumberedRows, header: list[str]) -> tuple[NumberedRows, tuple[i
     return kept, tuple(starts)
 
 
+def _without_words(rows: NumberedRows, header: list[str]) -> tuple[NumberedRows, tuple[int, ...]]:
+    """The rows without lines that hold no sample: words between rows, and what is below the last row.
+
+    The header where it stands again stays, with the lines between it and the rows before it.
+    """
+    usual = _usual_width(cells for _, cells in rows) if rows else 0
+    where = [j for j in range(usual) if sum(is_number(c[j]) for _, c in rows[: 2 * FEW] if len(c) == usual) > FEW]
+    if not where or sum(cells == header for _, cells in rows):
+        return rows, ()
+    end = len(rows)
+    while end > max(len(rows) - MOST_BELOW, 1) and _is_below(rows[end - 1][1], usual, where):
+        end -= 1
+    if end == len(rows) - 1 and 1 < len(rows[end][1]) < usual:  # the last row was cut off
+        end += 1
+    between = [k for k, (_, cells) in enumerate(rows[:end]) if k and not any(map(is_number, cells)) and any(cells)]
+    between = [k for k in between if not any(is_clock(cell) for cell in rows[k][1])]
+    if len(between) > MOST_BETWEEN:
+        between = []
+    left = {*between, *range(end, len(rows))}
+    return [row for k, row in enumerate(rows) if k not in left], tuple(rows[k][0] for k in sorted(left))
+
+
+def _is_below(cells: Sequence[str], usual: int, where: Sequence[int]) -> bool:
+    """Whether a line is none of the rows: of another width, empty, or begun with a word in place of a number."""
+    if len(cells) != usual or not any(cell.strip() for cell in cells):
+        return True
+    first = next(cell for cell in cells if cell.strip())
+    return bool(cells[where[0]] == first and re.match(r"[^\W\d_]{2}", first.strip()) and not is_number(first))
+
+
+def _as_wide(rows: NumberedRows, header: list[str]) -> tuple[NumberedRows, list[str]]:
+    """Rows and header of one width, where all rows lack the comment at their end, or the header the rows' number."""
+    widths = {len(cells) for _, cells in rows}
+    if not header or len(widths) != 1 or widths == {len(header)}:
+        return rows, header
+    (width,) = widths
+    if width < len(header) and all(_COMMENT.fullmatch(name.strip()) for name in header[width:]):
+        return [(line, [*cells, *[""] * (len(header) - width)]) for line, cells in rows], header
+    numbers = [cells[0].strip() for _, cells in rows]
+    if width == len(header) + 1 and numbers[0] in ("0", "1"):
+        if all(text == str(k) for k, text in enumerate(numbers, start=int(numbers[0]))):
+            return rows, ["index", *header]
+    return rows, header
+
+
+def _blocks(header: Sequence[str]) -> int:
+    """How often the same columns stand beside each other, with an empty column between them or not."""
+    names = [name.strip() for name in header]
+    for wide in (names, [*names, ""]):
+        for count in range(len(wide) // 2, 1, -1):
+            size, rest = divmod(len(wide), count)
+            if not rest and size > 1 and wide == wide[:size] * count and len(set(wide[:size])) == size:
+                return count
+    return 1
+
+
+def _stacked(rows: NumberedRows, width: int, count: int) -> tuple[NumberedRows, tuple[int, ...]]:
+    """Specimens beside each other, one below the other, and where each begins; a shorter one ends where it is empty."""
+    size = (width + 1) // count
+    out: NumberedRows = []
+    starts = []
+    for k in range(count):
+        block = [(line, (cells + [""])[k * size : (k + 1) * size]) for line, cells in rows]
+        while block and not any(cell.strip() for cell in block[-1][1]):
+            block.pop()
+        if block:
+            starts.append(len(out))
+        out += block
+    return out, tuple(starts or [0])
+
+
 def _without_empty_end(rows: NumberedRows, header: list[str]) -> tuple[NumberedRows, list[str]]:
     """Rows and header without columns at the end that have neither a name nor a cell."""
     width = max((len(cells) for _, cells in rows), default=0)
@@ -207,9 +296,13 @@ def _whole_rows(source: str, rows: NumberedRows, width: int) -> tuple[NumberedRo
         if len(cells) != width:
             if k == len(rows) - 1 and k and len(cells) < width:
                 return rows[:-1], line
-            raise TraceError(
-                f"{source}, row {line}: {len(cells)} cells, the header has {width}; repair or remove the row"
+            twice = len(cells) >= 2 * width - 1 > 2
+            remedy = (
+                "separate cells by semicolons if decimals follow a comma, or repair the row"
+                if twice
+                else "repair or remove the row"
             )
+            raise TraceError(f"{source}, row {line}: {len(cells)} cells, the header has {width}; {remedy}")
     return rows, None
 
 

@@ -85,6 +85,14 @@ def _left_out(source: str, layout: Layout) -> list[str]:
         notes.append(f"{source}: {above} {were} left out")
     if layout.cut_off is not None:
         notes.append(f"{source}: the last row, {layout.cut_off}, is cut off and was left out")
+    if layout.no_samples:
+        count, first = len(layout.no_samples), layout.no_samples[0]
+        many = f"{count} lines that are no samples, the first is row {first}, were" if count > 1 else f"row {first} was"
+        notes.append(f"{source}: {many} left out" if count > 1 else f"{source}: {many} left out, it is no sample")
+    if layout.blocks > 1:
+        notes.append(
+            f"{source}: the same columns stand beside each other {layout.blocks} times; each is a record of its own"
+        )
     return notes
 
 

@@ -76,7 +76,7 @@ def _node(source: str, name: str, file: h5py.File, address: str) -> h5py.Group |
         return node
     if _is_table(file):
         return file
-    if len(places) == 1:
+    if len(places) == 1 and not (_is_one_record(file) and not _has_clock(file[places[0]])):
         return file[places[0]]
     if _is_one_record(file):
         return file
@@ -91,8 +91,22 @@ def _is_one_record(node: Any) -> bool:
     """Whether the data sets in all groups of a node are as long as each other: groups of one record, as of robots."""
     if not isinstance(node, h5py.Group):
         return False
-    lengths = Counter(len(item) for item in _deep(node).values())
-    return len(lengths) == 1 and sum(lengths.values()) > 1
+    deep = _deep(node)
+    lengths = Counter(len(item) for item in deep.values())
+    if len(lengths) != 1 or sum(lengths.values()) < 2:
+        return False
+    groups: dict[str, list[str]] = {}
+    for name in deep:
+        group, _, own = name.rpartition("/")
+        groups.setdefault(group, []).append(own)
+    alike = Counter(tuple(sorted(names)) for names in groups.values())
+    return min(alike.values()) == 1  # else each group has a twin: records of their own
+
+
+def _has_clock(node: Any) -> bool:
+    """Whether a column of a table is called a time, or a stamp."""
+    names = node.dtype.names if isinstance(node, h5py.Dataset) else list(node)
+    return any(word in name.lower() for name in names for word in ("time", "stamp")) or "t_s" in names
 
 
 def _deep(group: h5py.Group) -> dict[str, h5py.Dataset]:

@@ -20,6 +20,9 @@ from calib.io.wording import brief, listed
 from calib.table.table import MEASURED, Cells, Table
 from calib.table.vector_fields import table_of_fields
 
+FEWEST_ROWS = 20
+"""Rows from which on a sheet is a record where another one is too short to be one."""
+
 
 def table_of_sheet(source: str, raw: bytes, address: str) -> Table:
     """The table in a sheet of an .xlsx file, with words above its header and units below it as in a CSV file.
@@ -56,6 +59,8 @@ def table_of_sheet(source: str, raw: bytes, address: str) -> Table:
             continue
         if not table.hint:
             found[name] = table
+    long = {name: table for name, table in found.items() if len(table.rows) >= FEWEST_ROWS}
+    found = long or found  # what is shorter is a list of settings
     if len(found) > 1:
         raise TraceError(f"{source}: several sheets hold a table, {listed(list(found))}; name one as {source}:SHEET")
     if not found:

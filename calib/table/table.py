@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,19 @@ class Table:
     notes: tuple[str, ...] = ()
     parts: tuple[int, ...] = (0,)
     hint: str = ""
+
+    def part(self, on: np.ndarray) -> Table:
+        """The table with some of its rows.
+
+        Args:
+            on: Their indices, increasing, shape (m,) [-].
+        """
+        columns = {
+            name: cells[on] if isinstance(cells, np.ndarray) else [cells[i] for i in on]
+            for name, cells in self.columns.items()
+        }
+        parts = tuple(int(np.searchsorted(on, start)) for start in self.parts)
+        return replace(self, columns=columns, rows=[self.rows[i] for i in on], parts=parts)
 
 
 def as_float(cell: Any) -> float | None:

@@ -23,6 +23,15 @@ CLEAR_M = 1e-3
 """Height above that at contact from which on a knife that was raised is out of the food [m]."""
 
 
+BEHIND_PART, BEHIND_SD = 0.03, 4.0
+"""Part of the peak, and noise standard deviations, by which the level behind a cut differs from that before it to be
+told."""
+UNTOLD_REACH = 5.0
+"""Lengths of what is before contact over which a drift may be carried on without a word."""
+BEHIND_SAMPLES = 5
+"""Samples behind the cut from which on they have a level."""
+
+
 @dataclass(frozen=True)
 class Drift:
     """A drift that is removed from a force.
@@ -163,3 +172,58 @@ def trigger_contact(trace: Trace, force: np.ndarray) -> ContactOnset:
     noise = noise_of(force[: max(MIN_BASELINE, len(force) // 4)])
     base = Baseline(0.0, float(np.hypot(abs(first), noise)), noise, 1.0, 0.0, 0.0, 0, MIN_BASELINE)
     return ContactOnset(base, float(trace.time[0]), trace.dt, top)
+
+
+def untold_drift(trace: Trace, force: np.ndarray, contact: ContactOnset, out: np.ndarray, end: float) -> list[str]:
+    """Whether neither the samples before contact nor those behind the cut tell of a drift that would matter.
+
+    Args:
+        trace: The cut.
+        force: Its force [N], shape (n,).
+        contact: Its contact.
+        out: Indices of the samples in which the knife is out of the food, shape (k,) [-].
+        end: Time at the end of the cut [s].
+
+    Returns:
+        One sentence, or none.
+    """
+    before = int(np.searchsorted(trace.time, contact.onset))
+    if len(out) >= BEHIND_SAMPLES or before < MIN_BASELINE:
+        return []
+    base = estimate_baseline(trace.time, force, 0, before)
+    long = end - contact.onset
+    most = (abs(base.slope) + 2.0 * base.slope_sd) * long
+    if long < UNTOLD_REACH * float(trace.time[before - 1] - trace.time[0]) or most <= BEHIND_PART * contact.peak:
+        return []
+    return [
+        f"{trace.source}: a drift of up to {most:.2g} N over the cut cannot be told from the {before} samples before "
+        f"contact ({most / contact.peak:.1%} of the peak); record a longer approach, or the way back out of the food"
+    ]
+
+
+def level_behind(
+    trace: Trace, tared: np.ndarray, out: np.ndarray, peak: float, noise: float
+) -> tuple[float, list[str]]:
+    """Whether the force is back at its level when the knife is out of the food.
+
+    Args:
+        trace: The cut.
+        tared: Its force above the baseline [N], shape (n,).
+        out: Indices of the samples in which the knife is out of the food, shape (k,) [-].
+        peak: Largest force [N].
+        noise: Noise of a sample [N].
+
+    Returns:
+        The standard uncertainty that a level which has moved leaves in the peak [N], and one sentence, or none.
+    """
+    if len(out) < BEHIND_SAMPLES:
+        return 0.0, []
+    behind = float(np.median(tared[out[len(out) // 2 :]]))
+    if abs(behind) <= max(BEHIND_PART * peak, BEHIND_SD * noise):
+        return 0.0, []
+    side = "above" if behind > 0.0 else "below"
+    return abs(behind) / 12**0.5, [
+        f"{trace.source}: behind the cut, from {trace.where(int(out[0]))} on, the force is {abs(behind):.3g} N {side} "
+        f"its level before it ({abs(behind) / peak:.1%} of the peak): the sensor has drifted or moved, or food sticks "
+        "to the blade; the peak may be off by as much"
+    ]

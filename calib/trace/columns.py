@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,8 +24,14 @@ _EXPECTED = {
     "position": ("ee_z_m", "position_m", "position_mm", "stroke_m", "displacement_mm"),
     "compression": ("compression_mm", "displacement_mm", "stroke_m"),
 }
+_EMPTY = frozenset(
+    ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "1.#qnan", "-1.#ind", "1.#ind", "missing")
+)
+"""What programs write into a cell that holds nothing."""
 SPARSE = 0.1
 """Part of a column's cells that are empty from which on they are other topics' rows, not samples that are missing."""
+MOST_EMPTY = 0.1
+"""Part of the rows that may lack a number; a record with more of them has another fault."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +94,28 @@ def choose(table: Table, role: str, wanted: str | None, option: str | None = Non
         raise TraceError(
             f"{table.source}: several columns could be the {role}: {listed(fitting, LONG)}; choose one with {option}"
         )
+    bare = _bare_force(table) if role == "force" else None
+    if bare is not None:
+        return bare
     raise TraceError(f"{table.source}: {table.hint}" if table.hint else _nothing_fits(table, role, option))
+
+
+def _bare_force(table: Table) -> Column | None:
+    """The only measured force, which has no unit, where others that were commanded or derived are in newtons."""
+    asked = [name for name in table.columns if _would_fit(table, name, "force")]
+    measured = [name for name in asked if not not_measured(name)]
+    beside = [
+        name
+        for name in asked
+        if not_measured(name) and (unit := meaning(table, name).measure) and unit.fits("force") and unit.factor == 1.0
+    ]
+    if len(measured) != 1 or not beside or table.hint:
+        return None
+    note = (
+        f"{table.source}: no unit is stated for {brief(measured[0], LONG)}, which is taken in N as "
+        f"{brief(beside[0], LONG)} is; that was commanded or derived and is not used"
+    )
+    return replace(_column(table, "force", measured[0], "--force-col"), notes=(note,))
 
 
 def _nothing_fits(table: Table, role: str, option: str) -> str:
@@ -103,7 +130,8 @@ def _nothing_fits(table: Table, role: str, option: str) -> str:
             f"{quoted(bare[0] + chr(61) + units)}"
         )
     else:
-        what = f"{_did_you_mean(_EXPECTED[role], table)}; name one with {option}"
+        near = _did_you_mean(_EXPECTED[role], table)
+        what = f"{near}; name one with {option} and its unit, as in 'NAME={SI_OF_ROLE[role]}'"
     derived = [name for name in asked if not_measured(name)]
     more = f" ({listed(derived[:2], LONG)} was commanded or derived and is not chosen unasked)" if derived else ""
     left = "; ".join(f"{brief(name)} was left out, {why}" for name, why in list(table.left_out.items())[:3])
@@ -171,6 +199,36 @@ def empty_cells(cells: Sequence[Any] | np.ndarray) -> np.ndarray:
     return np.array([_is_empty(cell) for cell in cells], dtype=bool)
 
 
+def without_empty(table: Table, columns: Sequence[Column], starts: Sequence[int] = ()) -> Table:
+    """A table without the rows in which a column has no number, which are samples that are missing.
+
+    Args:
+        table: The table.
+        columns: Columns that are read; a sparse one may have empty cells.
+        starts: Indices of rows that are needed, shape (k,) [-].
+
+    Returns:
+        The same where no cell is empty, or where too many are; else its other rows, with a note.
+    """
+    lacking = np.zeros(len(table.rows), dtype=bool)
+    names = []
+    for column in columns:
+        if column.name not in table.columns or is_sparse(table, column.name):
+            continue
+        empty = empty_cells(table.columns[column.name])
+        if empty.any():
+            names.append(brief(column.name, LONG))
+            lacking |= empty
+    count = int(np.count_nonzero(lacking))
+    if not names or count > MOST_EMPTY * len(lacking) or lacking[list(starts)].any():
+        return table
+    row = f"{table.row} {brief(table.rows[int(np.argmax(lacking))])}"
+    rows = f"{count} rows, the first is {row}, were" if count > 1 else f"{row} was"
+    note = f"{table.source}: {rows} left out, without a number in column {listed(names, LONG)}"
+    part = table.part(np.flatnonzero(~lacking))
+    return replace(part, notes=(*part.notes, note))
+
+
 def is_sparse(table: Table, name: str) -> bool:
     """Whether a column has numbers in some rows of a table of several topics, and nothing in the others.
 
@@ -186,7 +244,7 @@ def is_sparse(table: Table, name: str) -> bool:
 def _is_empty(cell: Any) -> bool:
     if cell is None or (isinstance(cell, float) and cell != cell):
         return True
-    return isinstance(cell, str) and cell.strip().lower() in ("", "nan", "na", "n/a", "null", "none", "-")
+    return isinstance(cell, str) and cell.strip().lower() in _EMPTY
 
 
 def _number(table: Table, column: Column, i: int, cell: Any) -> float:

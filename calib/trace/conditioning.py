@@ -18,8 +18,10 @@ from calib.trace.baselines import (
     Drift,
     check_approach,
     drift_of,
+    level_behind,
     out_of_the_food,
     trigger_contact,
+    untold_drift,
 )
 from calib.trace.contact_onset import FLOOR_FRACTION, SUSTAIN, ContactOnset, estimate_baseline, find_contact_onset
 from calib.trace.cuts import single_cut
@@ -152,19 +154,22 @@ def condition(
         axis = ending_at_board(axis, board, trace.source)
     held = held_samples(trace, tared, axis.stroke, axis.end, level.noise_sd)
     into, deep = (int(np.searchsorted(trace.time, contact.onset)), int(np.argmax(axis.stroke >= axis.end * (1 - 1e-9))))
-    sudden = sudden_changes(trace, tared, (into, deep), out_of_the_food(trace, contact), held.sound)
+    out = out_of_the_food(trace, contact)
+    sudden = sudden_changes(trace, tared, (into, deep), out, held.sound)
     grid, curve = _on_grid(trace.time, axis.stroke, tared, (contact.onset, axis.end), held.sound)
     length = float(grid[-1])
     samples = int(np.count_nonzero((axis.stroke >= 0.0) & (axis.stroke <= length)))
     noise = _filtered_noise(contact, samples, length)
     peak = _peak(curve)
     _check_peak(trace, peak)
+    behind_sd, behind = level_behind(trace, tared, out, peak, level.noise_sd)
     end_s = float(trace.time[int(np.argmax(axis.stroke >= length * (1 - 1e-9)))])
     level_sd = _root_sum(level.level_sd, mend.level_sd, 0.0 if air_mend is None else air_mend.level_sd)
     at_peak = contact.onset + (end_s - contact.onset) * float(grid[int(np.argmax(curve))]) / length
     drift_sd = 0.0 if drift is None else drift.sd(at_peak)
-    said = (*approach, *mend.notes, *(() if air_mend is None else air_mend.notes), *sudden, *held.notes)
-    removed = () if drift is None else (drift.note(trace.source, end_s),)
+    said = (*approach, *mend.notes, *(() if air_mend is None else air_mend.notes), *sudden, *behind, *held.notes)
+    removed = untold_drift(trace, force, contact, out, end_s) if air is None else []
+    removed = removed if drift is None else [drift.note(trace.source, end_s)]
     return Conditioned(
         trace=trace,
         baseline_N=level.level,
@@ -183,7 +188,7 @@ def condition(
         curve_noise_sd_N=_root_sum(noise, held.step_sd),
         filter_sd_m=FILTER_SD_M,
         peak_N=peak,
-        peak_sd_N=_root_sum(noise, level_sd, drift_sd, held.peak_sd, held.step_sd),
+        peak_sd_N=_root_sum(noise, level_sd, drift_sd, behind_sd, held.peak_sd, held.step_sd),
         drift_N_per_s=level.slope if drift is None else 0.0,
         drift_sd_N_per_s=level.slope_sd if drift is None else drift.slope_sd,
         warnings=(

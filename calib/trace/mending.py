@@ -28,6 +28,10 @@ STEP_SD = 8.0
 """Noise standard deviations by which the level steps."""
 STEP_PART = 0.02
 """Part of the force's usual range by which it does."""
+FEWEST_BEHIND = 5
+"""Samples behind the cut from which on they have a level."""
+STOPPED = 4
+"""Samples for which a position stands that did not reach the file, at least."""
 NEAR_ZERO = 0.05
 """Part of a step within which the level behind it is zero: the sensor was zeroed there."""
 
@@ -63,11 +67,13 @@ def mended(trace: Trace) -> Mended:
     Raises:
         TraceError: So many values stand out that nothing is left of the record.
     """
-    force, spikes = _without_spikes(trace, trace.force, "force")
+    force, spikes = without_spikes(trace, trace.force, "force")
     position = trace.position
     lost: list[str] = []
     if position is not None:
-        position, lost = _without_spikes(trace, position, "position")
+        position, lost = without_spikes(trace, position, "position")
+        position, stood = _without_stops(trace, position)
+        lost = [*lost, *stood]
     force, level_sd, steps = _without_steps(replace(trace, force=force))
     if not spikes and not steps and not lost:
         return Mended(trace)
@@ -90,8 +96,20 @@ def _place(trace: Trace, i: int, role: str = "force") -> str:
     return f"{trace.source}, {trace.where(i)}, column {brief(trace.columns.get(role, role), LONG)}"
 
 
-def _without_spikes(trace: Trace, force: np.ndarray, role: str) -> tuple[np.ndarray, list[str]]:
-    """The force, or the position, without values that stand out alone, and what was done."""
+def without_spikes(trace: Trace, force: np.ndarray, role: str) -> tuple[np.ndarray, list[str]]:
+    """The force, or the position, without values that stand out alone.
+
+    Args:
+        trace: The record.
+        force: Its force [N], or position [m], shape (n,).
+        role: ``force`` or ``position``.
+
+    Returns:
+        The same with those values replaced, shape (n,), and what was done, one sentence each.
+
+    Raises:
+        TraceError: So many values stand out that nothing is left of the record.
+    """
     n, unit = len(force), {"force": "N", "position": "m"}[role]
     limit = max(SPIKE_SD * noise_of(force), SPIKE_PART * usual_range(force), 1e-9)
     out, count = force.copy(), 0
@@ -125,6 +143,32 @@ def _without_spikes(trace: Trace, force: np.ndarray, role: str) -> tuple[np.ndar
     return out, notes
 
 
+def _without_stops(trace: Trace, position: np.ndarray) -> tuple[np.ndarray, list[str]]:
+    """The position without stretches in which it stands and then jumps to where the knife has gone meanwhile."""
+    steps = np.abs(np.diff(position))
+    moving = steps[steps > 0.02 * np.percentile(steps, 95)]
+    if not len(moving):
+        return position, []
+    usual = float(np.median(moving))
+    still = np.r_[False, steps == 0.0, False]
+    edges = np.flatnonzero(np.diff(still.astype(int)))
+    out, notes = position.copy(), []
+    for first, last in zip(edges[::2], edges[1::2], strict=True):  # the position is one value from first to last
+        if last + 1 >= len(position) or last - first < STOPPED:
+            continue
+        speed = float(np.median(steps[max(first - STEP_SIDE, 0) : first])) if first else 0.0
+        jump = float(steps[last])
+        if jump < max(3.0 * usual, 0.5 * speed * (last + 1 - first)) or jump < STOPPED * usual:
+            continue
+        ends = [first, last + 1]
+        out[first : last + 2] = np.interp(trace.time[first : last + 2], trace.time[ends], position[ends])
+        notes.append(
+            f"{_place(trace, int(first), 'position')}: the position stands until {trace.where(int(last))} and then "
+            f"jumps by {1e3 * jump:.3g} mm; a line bridges it"
+        )
+    return out, [*notes[:3], *([f"{len(notes) - 3} more places like these"] if len(notes) > 3 else [])]
+
+
 def _stands_out(force: np.ndarray, i: int, length: int, limit: float) -> bool:
     """Whether some samples on end are far from those on both sides, which are near each other."""
     if abs(force[i] - force[i - 1]) <= limit or i + length >= len(force):
@@ -150,7 +194,9 @@ def _without_steps(trace: Trace) -> tuple[np.ndarray, float, list[str]]:
     while i + side <= len(force):
         left, right = force[i - side : i], force[i : i + side]
         step = float(np.median(right) - np.median(left))
-        if not _is_step(out, i, step, limit, noise):
+        behind = _level_behind(trace, i)
+        same = behind is not None and abs(behind - float(np.median(right))) <= 0.2 * abs(step)
+        if not _is_step(out, i, (step, same), limit, noise):
             i += 1
             continue
         out[:i] += step
@@ -165,13 +211,23 @@ def _without_steps(trace: Trace) -> tuple[np.ndarray, float, list[str]]:
     return out, float(np.sqrt(variance)), notes
 
 
-def _is_step(force: np.ndarray, i: int, step: float, limit: float, noise: float) -> bool:
+def _level_behind(trace: Trace, i: int) -> float | None:
+    """The force at the end of the record while the knife is above where it was at a sample [N], None if it is not."""
+    if trace.position is None:
+        return None
+    below = np.flatnonzero(trace.position < trace.position[i])
+    out = trace.force[int(below[-1]) + 1 :] if len(below) else trace.force[:0]
+    return float(np.median(out)) if FEWEST_BEHIND <= len(out) < len(trace.force) - i else None
+
+
+def _is_step(force: np.ndarray, i: int, change: tuple[float, bool], limit: float, noise: float) -> bool:
     """Whether the sensor was zeroed before sample ``i``, and not the food touched.
 
     The force is level before, from the record's start or the step before, and after. Then it is at zero, or it has
-    fallen; and it leaves its new level by more than the step later on.
+    fallen, or its new level is that behind the cut; and it leaves its new level by more than the step later on.
     """
     side = STEP_SIDE
+    step, same = change
     if abs(step) <= limit or abs(force[i] - force[i - 1]) < 0.7 * abs(step):
         return False
     left, right = force[i - side : i], force[i : i + side]
@@ -179,8 +235,10 @@ def _is_step(force: np.ndarray, i: int, step: float, limit: float, noise: float)
     if np.std(left) > flat or np.std(right) > flat or abs(np.median(right[:4]) - np.median(right[-4:])) > 2.0 * flat:
         return False
     level = float(np.median(right))
+    if step < 0.0 and np.ptp(right) == 0.0 < np.ptp(left):
+        return False  # a sensor that has fallen out, not one that was zeroed
     zeroed = abs(level) <= max(4.0 * noise, NEAR_ZERO * abs(step)) and abs(np.median(left)) > 2.0 * abs(level)
     before = force[:i]
     loaded = np.percentile(before, 98) - np.percentile(before, 2) > 0.5 * abs(step) + 8.0 * noise
     rises = float(np.percentile(force[i:], 98)) - level
-    return bool((zeroed or step < 0.0) and not loaded and rises > max(limit, 10.0 * noise))
+    return bool((zeroed or step < 0.0 or same) and not loaded and rises > max(limit, 10.0 * noise))

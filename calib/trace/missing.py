@@ -77,7 +77,9 @@ def held_samples(trace: Trace, tared: np.ndarray, stroke: np.ndarray, end: float
     last = int(np.flatnonzero(inside)[-1]) if inside.any() else 0
     for place in standing(trace.force, noise):
         middle = (place.first + place.last) // 2
-        if not inside[min(middle, last)] or not inside[place.first : place.last + 1].any():
+        until = min(place.last + 1, len(tared) - 1)
+        hides = until <= last and stroke[until] > 0.0 and abs(np.diff(trace.force)[until - 1]) > LOST_SD * noise
+        if not hides and (not inside[min(middle, last)] or not inside[place.first : place.last + 1].any()):
             continue
         if noise < 1e-3 * peak:
             if place.top:
@@ -137,6 +139,8 @@ def _bridged(
     i, j = gap.before, gap.after
     where = f"{trace.source}, {trace.where(i)} to {trace.where(j)}"
     if stroke[j] <= 0.0 or stroke[i] >= end:
+        if stroke[i] >= end * (1 - 1e-3) and stroke[max(i - 1, 0)] < stroke[i] and trace.position is not None:
+            return 0.0, [f"{where}: {gap.why}, and the knife turns there; the stroke may be longer than what is used"]
         if stroke[i] >= end:
             return 0.0, []
         return 0.0, [f"{where}: {gap.why} for {trace.time[j] - trace.time[i]:.3g} s, before contact"]

@@ -33,6 +33,7 @@ _ROS = (
     (re.compile(r"/(.*/)?stamp"), "stamp", "s"),
     (re.compile(r"(.*[./])?header[./]stamp"), "stamp", "s"),
     (re.compile(r"__time"), "time", "s"),
+    (re.compile(r"X_Value"), "time", "s"),
     (re.compile(r"(.*[./])?O_F_ext_hat_K([./].*force[./]z|[.\[_]?2\]?)", re.IGNORECASE), "base_fz", "N"),
     (re.compile(r"(.*[./])?K_F_ext_hat_K([./].*force[./]z|[.\[_]?2\]?)", re.IGNORECASE), "knife_fz", "N"),
     (re.compile(r"(.*[./])?O_T_EE([./].*position[./]z|[.\[_]?14\]?)", re.IGNORECASE), "ee_z", "m"),
@@ -42,8 +43,8 @@ _ROS = (
     (re.compile(r"(.*[./])?position[./]z"), "position_z", "m"),
 )
 """Names that programs write whose units are known without being written: text exports of ROS messages, which are in SI
-(REP 103) and whose clocks are known by the program (``rostopic echo -p`` nanoseconds, PlotJuggler seconds), and the
-outputs of Universal Robots' RTDE."""
+(REP 103) and whose clocks are known by the program (``rostopic echo -p`` nanoseconds, PlotJuggler and LabVIEW seconds),
+and the outputs of Universal Robots' RTDE."""
 _RTDE = re.compile(r"actual_(TCP|q|joint|current)")
 _NOT_MEASURED = re.compile(
     r"(^|_)(target|cmd|command|commanded|desired|des|setpoint|set_?point|goal|ref|reference|nominal|limit|lim|thresh(old)?|"
@@ -64,6 +65,26 @@ COUNTERS = frozenset(
     "row field_header_seq".split()
 )
 """Stems of columns that count samples."""
+_WORDS = {
+    word: english
+    for english, words in {
+        "time": "prüfzeit zeit temps tiempo tempo tijd 試験時間 時間 时间 時刻",
+        "force": "standardkraft prüfkraft kraft fuerza forza força kracht 試験力 荷重 载荷 力",
+        "displacement": (
+            "standardweg traversenweg weg déplacement deplacement desplazamiento spostamento deslocamento verplaatsing "
+            "変位 位移 ストローク"
+        ),
+        "height": "höhe hauteur altura altezza hoogte 高さ 高度",
+    }.items()
+    for word in words.split()
+}
+"""Words of other languages in the headers of machines, and what they mean."""
+_FOREIGN = re.compile(
+    "|".join(
+        rf"(?<![^\W_]){word}(?![^\W_])" if word[0] < "\u3000" else word
+        for word in sorted(_WORDS, key=len, reverse=True)
+    )
+)
 LONGEST_NAME = 200
 """Letters from which on the name of a column means nothing."""
 
@@ -92,8 +113,11 @@ class Meaning:
 
 def stem_of(name: str) -> str:
     """Lower case, words joined by _; a capital after a small letter begins a word."""
-    apart = re.sub(r"(?<=[a-z])(?=[A-Z][a-z])", "_", name)
-    return re.sub(r"[^a-z0-9]+", "_", apart.lower()).strip("_")
+    apart = re.sub(r"(?<=[a-z])(?=[A-Z][a-z])", "_", name).lower()
+    if not apart.isascii() or _FOREIGN.search(apart):
+        apart = _FOREIGN.sub(lambda found: _WORDS[found.group()], apart)
+    stem = re.sub(r"[^a-z0-9]+", "_", apart).strip("_")
+    return re.sub(r"^(latest|(run|data_set|dataset|test|specimen|probe)_\d+)_(?=[a-z])", "", stem)
 
 
 def meaning(table: Table, name: str) -> Meaning:

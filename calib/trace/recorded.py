@@ -11,7 +11,7 @@ from calib.errors import TraceError
 from calib.io.wording import LONG, brief, quoted
 from calib.table.table import Table
 from calib.trace.clock import running_clock
-from calib.trace.columns import Column, candidates, choose, is_sparse, numbers
+from calib.trace.columns import Column, candidates, choose, is_sparse, numbers, without_empty
 from calib.trace.names import COUNTERS, stem_of
 
 MIN_SAMPLES = 20
@@ -104,6 +104,7 @@ def recorded(table: Table, how: Reading) -> Recorded:
     position = _position_column(table, how)
     if how.sign is not None:
         force = replace(force, factor=abs(force.factor) * parse_sign(how.sign))
+    table = without_empty(table, [column for column in (time, force, position) if column is not None])
     if len(table.rows) < MIN_SAMPLES:
         raise TraceError(f"{table.source}: {len(table.rows)} rows of data, at least {MIN_SAMPLES} are needed")
     t = numbers(table, time) if time.name != ROWS else time.factor * np.arange(len(table.rows))

@@ -130,6 +130,19 @@ def test_arrays_have_a_hash_and_a_name_of_their_own() -> None:
     assert call == "Calibration('banana', trace=Trace('lab 3'), air=Trace('lab 3'), fit=['E'], dx=0.003).run('out')"
 
 
+def test_reading_options_are_those_of_the_command_line() -> None:
+    """Columns, sign, rate, baseline and the number of the cut, for a file and a DataFrame."""
+    frame = pd.read_csv(BANANA, comment="#").rename(columns={"force_N": "Fz"})
+    frame["Fz"] *= -1.0
+    given = {"columns": {"force_col": "Fz=N", "sign": "-"}, "baseline": "linear", "cut": 1}
+    request = Calibration("banana", frame, **given).request("out")
+    np.testing.assert_allclose(request.records()[0].force, Trace.read(BANANA).force)
+    assert (request.baseline, request.cut) == ("linear", 1)
+    assert "columns={'force_col': 'Fz=N', 'sign': '-'}, baseline='linear', cut=1" in request.command[0]
+    with pytest.raises(CutcalError, match="columns say how a file is read, but the trace is a Trace"):
+        Calibration("banana", Trace.read(BANANA), columns={"sign": "-"})
+
+
 def test_groups_of_a_file_are_named_whole() -> None:
     """The summary names file and group of an air run, and the default folder the group."""
     request = Request(food=load_food("banana"), trace=Path("cuts.h5:/cut 3"), air=Path("cuts.h5:/air"))
@@ -153,6 +166,9 @@ def test_groups_of_a_file_are_named_whole() -> None:
         ({"shape": "banana"}, "shape = banana is none of block"),
         ({"arch": "tpu"}, "arch = tpu is none of"),
         ({"fit": "E,R"}, "fit = E,R is text; give a list"),
+        ({"baseline": "flat"}, "baseline = flat is none of constant, linear, zero"),
+        ({"cut": 0}, "cut = 0; give a number from 1, or 'whole'"),
+        ({"columns": {"force": "Fz"}}, "columns has force, which is none of time_col, force_col"),
     ],
 )
 def test_impossible_values_are_one_line(change: dict[str, Any], words: str) -> None:

@@ -108,18 +108,18 @@ def test_damaged_files_are_refused_with_their_place(tmp_path: Path, change, says
 def test_names_that_mean_nothing_are_listed_with_their_units(tmp_path: Path) -> None:
     """Which column is which is not guessed; the units that the file states help to say it."""
     with pytest.raises(
-        TraceError, match=r"the columns are Zeit \[s\], Kraft \[N\], Weg \[m\]; name one with --time-col"
+        TraceError, match=r"the columns are Tid \[s\], Voima \[N\], Matka \[m\]; name one with --time-col"
     ):
-        read_trace(plain(tmp_path, header="Zeit,Kraft,Weg\ns,N,m"))
+        read_trace(plain(tmp_path, header="Tid,Voima,Matka\ns,N,m"))
 
 
 def test_a_depth_may_be_named_as_one(tmp_path: Path) -> None:
     """A column that grows as the knife descends is turned round, whatever its name says; beside --position-col it is
     refused."""
-    path = plain(tmp_path, header="time_s,force_N,Weg [mm]")
-    trace = read_trace(path, depth_col="Weg [mm]")
+    path = plain(tmp_path, header="time_s,force_N,Matka [mm]")
+    trace = read_trace(path, depth_col="Matka [mm]")
     np.testing.assert_allclose(trace.position, -1e-3 * DEPTH, atol=6e-9)
-    np.testing.assert_allclose(read_trace(path, position_col="Weg [mm]").position, 1e-3 * DEPTH, atol=6e-9)
+    np.testing.assert_allclose(read_trace(path, position_col="Matka [mm]").position, 1e-3 * DEPTH, atol=6e-9)
     stroke = plain(tmp_path, header="time_s,force_N,stroke_m")
     np.testing.assert_allclose(read_trace(stroke, depth_col="stroke_m").position, -DEPTH, atol=6e-6)
     with pytest.raises(TraceError, match="--position-col beside --depth-col"):

@@ -138,7 +138,7 @@ def test_food_that_breaks_is_only_said() -> None:
     done = condition(CUT.but(force=CUT.force - 3.0 * inside).trace())
     noted(
         done,
-        r"sample 321 \(1.605 s\), column force_N: the force changes by -2.* N from one sample .*: food that breaks",
+        r"sample 321 \(1.605 s\), column force_N: the force changes by -3.* N from one sample .*: food that breaks",
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import h5py
 import numpy as np
 import pytest
@@ -67,3 +69,25 @@ def test_columns_are_limited_together(tmp_path, monkeypatch):
             file.create_dataset(f"zeros{k}", (N,), "f8", chunks=True, compression="gzip")
     with pytest.raises(TraceError, match="1280 values, at most 1000 are read"):
         read_trace(tmp_path / "cut.h5")
+
+
+def test_groups_with_twins_are_records_of_their_own(tmp_path: Path) -> None:
+    """Two groups with the same columns are two records, not one with columns of both."""
+    path = tmp_path / "runs.h5"
+    with h5py.File(path, "w") as file:
+        for run in ("run1", "run2"):
+            for name in ("time_s", "force_N", "position_m"):
+                file[f"{run}/{name}"] = np.linspace(0.0, 1.0, 40)
+    with pytest.raises(TraceError, match="several groups could be the record; name one: runs.h5:/run1, runs.h5:/run2"):
+        read_trace(path)
+
+
+def test_the_clock_may_be_in_another_group(tmp_path: Path) -> None:
+    """As in DROID, where one group has the robot's state, and another its times."""
+    path = tmp_path / "droid.h5"
+    with h5py.File(path, "w") as file:
+        file["observation/robot_state/wrench_N"] = np.tile(np.linspace(0.0, 1.0, 40)[:, None], 3)
+        file["observation/robot_state/joints"] = np.zeros((40, 7))
+        file["observation/timestamp/step_ms"] = 5 * np.arange(40)
+    trace = read_trace(path, time_col="observation/timestamp/step_ms", force_col="observation/robot_state/wrench_z_N")
+    np.testing.assert_allclose(trace.time, 0.005 * np.arange(40))

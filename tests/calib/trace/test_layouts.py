@@ -259,7 +259,8 @@ def test_a_slow_clock_is_spread_over_its_rows(tmp_path: Path) -> None:
     [
         ("frame_index,force_N", {}, r"column frame_index: .*it counts rows: give their rate in Hz with --rate"),
         ("t_ms,force_N", {}, r"column t_ms: samples are 5 s apart; this looks like microseconds: say --time-col 't_ms=us'"),
-        ("time_s,target_force_N,Fz", {}, r"did you mean 'Fz'.*--force-col 'Fz=N' \(target_force_N was commanded or derived"),
+        ("time_s,target_force_kN,Fz", {}, r"did you mean 'Fz'.*--force-col 'Fz=N' \(target_force_kN was commanded or der"),
+        ("time_s,target_force_N,Fz,load", {}, r"did you mean 'Fz'.*--force-col 'Fz=N' \(target_force_N was commanded or"),
         ("time_s,max_force_N", {}, "max_force_N was commanded or derived and is not chosen unasked"),
         ("time_s,force_filtered_N", {}, "force_filtered_N was commanded or derived"),
         ("time_s,Stress (kPa)", {"force_col": "Stress (kPa)"}, r"column Stress \(kPa\): its unit is 'kPa'.*none of a force"),

@@ -197,8 +197,6 @@ def test_ambiguous_force_lists_the_candidates(tmp_path: Path) -> None:
     ("cell", "message"),
     [
         ("abc", "row 8, column force_N: 'abc' is not a number"),
-        ("", "row 8, column force_N: an empty cell is not a number"),
-        ("nan", "row 8, column force_N: 'nan' is not finite"),
         ("inf", "row 8, column force_N: 'inf' is not finite"),
         ("1_000", "row 8, column force_N: '1_000' is not a number"),
         ("1\x0c2", r"row 8, column force_N: '1\\x0c2' is not a number"),
@@ -215,6 +213,21 @@ def test_bad_cells_are_located(tmp_path: Path, cell: str, message: str) -> None:
     path.write_text("\n".join(lines))
     with pytest.raises(TraceError, match=f"cut.csv, {message}"):
         read_trace(path)
+
+
+@pytest.mark.parametrize("cell", ["", "nan", "N/A", "#N/A", "-", "1.#QNAN"])
+def test_a_row_without_a_force_is_left_out(tmp_path: Path, cell: str) -> None:
+    """It is a sample that is missing, and said with its row; the first of more is named."""
+    path = write(tmp_path, "time_s,force_N", [clock(), load()])
+    lines = path.read_text().splitlines()
+    lines[7] = f"{lines[7].split(',')[0]},{cell}"
+    path.write_text("\n".join(lines))
+    trace = read_trace(path)
+    np.testing.assert_allclose(trace.force, np.delete(load(), 6))
+    assert "cut.csv: row 8 was left out, without a number in column force_N" in trace.notes
+    lines[9] = lines[7]
+    path.write_text("\n".join(lines))
+    assert any("2 rows, the first is row 8, were left out" in note for note in read_trace(path).notes)
 
 
 def test_cells_of_several_lines_do_not_shift_the_rows(tmp_path: Path) -> None:
