@@ -75,7 +75,6 @@ def test_a_long_file_is_read_as_a_short_one(head, layout, tmp_path, monkeypatch)
     ("row", "words"),
     [
         ("0.45,abc,45,a", "row 47"),
-        ("0.45,,45,a", "row 47"),
         ("0.45,1_0,45,a", "row 47"),
         ("0.45,nan,45,a", "row 47"),
         ("0.45,inf,45,a", "row 47"),
@@ -83,11 +82,19 @@ def test_a_long_file_is_read_as_a_short_one(head, layout, tmp_path, monkeypatch)
     ],
 )
 def test_a_bad_cell_is_named(row, words, long, tmp_path):
-    """A word, nothing, or no finite number in the force, far down: refused with its row."""
+    """A word, or no finite number in the force, far down: refused with its row."""
     rows = [*ROWS[:45], row, *ROWS[46:]]
     with pytest.raises(TraceError, match="cut.csv") as error:
         read_trace(written(tmp_path, HEADS["plain"] + "\n".join(rows) + "\n"))
     assert words in str(error.value) and "\n" not in str(error.value)
+
+
+def test_an_empty_cell_is_left_out_with_a_note(long, tmp_path):
+    """A row without a force is no sample, in a long file as in a short one."""
+    rows = [*ROWS[:45], "0.45,,45,a", *ROWS[46:]]
+    trace = read_trace(written(tmp_path, HEADS["plain"] + "\n".join(rows) + "\n"))
+    assert len(trace.time) == N - 1
+    assert any("row 47" in note for note in trace.notes)
 
 
 def test_columns_of_words_are_refused(long, tmp_path):
