@@ -163,7 +163,7 @@ class State:
         self._add_edge(real)
         self._add_tables(real)
         if self.cuts:
-            self._add_ties(real, own.ties)
+            self._add_ties(real, max(own.ties, 1))
         ti.sync()  # lays these fields out by themselves; Taichi does not manage those of eight scenes at once
 
     def _add_particles(self, real: Any, damage: bool) -> None:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
+from functools import partial
 
 import numpy as np
 
@@ -26,8 +27,13 @@ CONTACT_SHARE = 0.1
 
 
 def resting(options: SuiteOptions) -> Iterator[Comparison]:
-    """What stands on the board weighs its weight; what slides is slowed by mu g."""
-    body = options.body(BLOCK, DAMPED, numerics(gravity=G), board=0.0)
+    """What stands on the board weighs its weight; what slides is slowed by mu g.
+
+    The contact has no damping of its own, and with the default stiffness the block still rocks on it: 0.6 % of its
+    weight and 6 % of the energy of friction are missed. The contact is four times as stiff here.
+    """
+    stiff = partial(numerics, gravity=G, contact_stiffness=8.0)
+    body = options.body(BLOCK, DAMPED, stiff(), board=0.0)
     period = 4 * BLOCK.height / DAMPED.p_wave
     body.step(math.ceil((6 if options.quick else 12) * period / body.dt))
     before, since = body.impulse.copy(), body.time
@@ -42,7 +48,7 @@ def resting(options: SuiteOptions) -> Iterator[Comparison]:
         "m g",
     )
     mu, v0 = 0.4, 0.15
-    slide = options.body(BLOCK, DAMPED, numerics(gravity=G, room=1.0), board=mu)
+    slide = options.body(BLOCK, DAMPED, stiff(room=1.0), board=mu)
     slide.step(math.ceil(6 * period / slide.dt))
     slide.kick(np.array([v0, 0.0, 0.0]))
     slide.step(math.ceil(2 * period / slide.dt))
