@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
-from functools import partial
 
 import numpy as np
 
@@ -32,8 +30,8 @@ def resting(options: SuiteOptions) -> Iterator[Comparison]:
     The contact has no damping of its own, and with the default stiffness the block still rocks on it: 0.6 % of its
     weight and 6 % of the energy of friction are missed. The contact is four times as stiff here.
     """
-    stiff = partial(numerics, gravity=G, contact_stiffness=8.0)
-    body = options.body(BLOCK, DAMPED, stiff(), board=0.0)
+    stiff = replace(numerics(gravity=G), contact_stiffness=8.0)
+    body = options.body(BLOCK, DAMPED, stiff, board=0.0)
     period = 4 * BLOCK.height / DAMPED.p_wave
     body.step(math.ceil((6 if options.quick else 12) * period / body.dt))
     before, since = body.impulse.copy(), body.time
@@ -48,7 +46,7 @@ def resting(options: SuiteOptions) -> Iterator[Comparison]:
         "m g",
     )
     mu, v0 = 0.4, 0.15
-    slide = options.body(BLOCK, DAMPED, stiff(room=1.0), board=mu)
+    slide = options.body(BLOCK, DAMPED, replace(stiff, room=1.0), board=mu)
     slide.step(math.ceil(6 * period / slide.dt))
     slide.kick(np.array([v0, 0.0, 0.0]))
     slide.step(math.ceil(2 * period / slide.dt))

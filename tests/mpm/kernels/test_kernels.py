@@ -253,7 +253,8 @@ def test_scenes_of_a_class_share_kernels_and_keep_their_force():
     np.testing.assert_array_equal(one.run().resolved, force)
     seeds, grid = one.setup.seeds, one.setup.grid
     tight = (len(seeds.x), grid.nodes, small.mirrors, len(grid.stations))
-    one.state = State(Configuration(*tight, threads=1, nodal=False, press=False, damage=False))
+    ties = len(one.setup.ties())
+    one.state = State(Configuration(*tight, threads=1, nodal=False, press=False, damage=False, ties=ties))
     np.testing.assert_allclose(one.run().resolved, force, atol=1e-9 * force.max())
 
 
