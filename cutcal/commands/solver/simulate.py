@@ -140,6 +140,9 @@ def run(args: argparse.Namespace) -> int:
         if record.parted < FULLY_PARTED:
             assumed.append(pressed_away(record.parted))
             note(assumed[-1])
+        if scene.weakened:
+            assumed.append(_weakened(scene))
+            note(assumed[-1])
         doubted = doubts(record.budget, record.ke_over_ie) if record.status == "done" else []
         for text in doubted:
             say(f"not passed: {text}")
@@ -155,6 +158,16 @@ def run(args: argparse.Namespace) -> int:
     if record.status != "done":
         return 1
     return 2 if doubted else 0
+
+
+def _weakened(scene: Scene) -> str:
+    """What is said where the grid does not resolve the food's tensile strength."""
+    material, numerics = scene.food.material, scene.numerics
+    used = material.tie_strength(numerics.dx / numerics.ppc)
+    return (
+        f"the tensile strength of {material.cohesion / 1e3:.3g} kPa is more than cells of {numerics.dx * 1e3:.3g} mm "
+        f"resolve; {used / 1e3:.3g} kPa was used, R is the same; a smaller --dx resolves more"
+    )
 
 
 def _scene(args: argparse.Namespace, food: FoodSpec, shape: Shape) -> Scene:

@@ -314,3 +314,16 @@ def test_a_face_bears_its_yield_stress_in_shear_times_its_area():
     sim.load(replace(FLESH, mu=0.3))
     half_face = 0.012 * 0.024
     assert most_friction(sim.state) == pytest.approx(FLESH.yield_stress / np.sqrt(3) * half_face, rel=0.02)
+
+
+def test_contact_is_as_stiff_at_any_time_step_and_loss_factor():
+    """The contact's stiffness over mass belongs to layer and food, so half the step and a larger loss leave it."""
+    found = []
+    for safety, loss in ((0.7, 0.02), (0.35, 0.02), (0.7, 0.2)):
+        scene = replace(PRISM, numerics=replace(PRISM.numerics, safety=safety)).with_material(loss_factor=loss)
+        setup = Simulation(scene, Runtime(threads=1)).setup
+        food = scene.food.material
+        found.append(setup.contents(food).parameters[kn.CONTACT])
+        assert found[-1] * setup.time_step(food) ** 2 <= 2.0
+    assert found == [found[0]] * 3
+    assert found[0] == pytest.approx(2 * (FLESH.p_wave / 1.5e-3) ** 2)
