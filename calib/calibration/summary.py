@@ -34,6 +34,7 @@ from calib.io.provenance import Invocation, Software
 from calib.problem.parameters import STRESS_LIKE, property_of
 from calib.problem.request import Request
 from calib.problem.setup import Setup
+from calib.simulation.evaluation import weakened_ties
 from calib.trace.conditioning import Conditioned
 from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
@@ -72,7 +73,9 @@ def summarise(done: Calibrated, folder: Path, began: float) -> CalibrationResult
     )
     stopped = fit.status == "interrupted"
     label, source, kind = curve.trace.label, curve.stroke_source, curve.baseline_kind
-    said = limits(label, source, kind, verdicts, fitted, setup.assumed, record.fracture)
+    scene = setup.scene(fit.best.evaluation.parameters)
+    assumed = [*setup.assumed, *([weakened_ties(scene)] if scene.weakened else [])]
+    said = limits(label, source, kind, verdicts, fitted, assumed, record.fracture)
     nulls = {name: NullRating.of(model.metrics) for name, model in done.nulls.items()}
     return CalibrationResult(
         folder=folder,

@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from mpm.arrays import FloatArray
+from mpm.scene import Scene
 
 FULLY_PARTED, NOT_PARTED = 0.8, 0.5
 """Energy of the edge over R times the new area from which on a run is a cut, and up to which it is none at all [-]
@@ -29,6 +30,16 @@ def pressed_away(parted: float) -> str:
         f"the food was pressed away rather than cut: the edge took {parted:.0%} of R times the new area, so the force "
         "is that of flow and hangs on the width of the process zone; a food that is cut has a larger yield stress or a "
         "smaller R"
+    )
+
+
+def weakened_ties(scene: Scene) -> str:
+    """What is said where the grid does not resolve the food's tensile strength."""
+    material, numerics = scene.food.material, scene.numerics
+    used = material.tie_strength(numerics.dx / numerics.ppc)
+    return (
+        f"the tensile strength of {material.cohesion / 1e3:.3g} kPa is more than cells of {numerics.dx * 1e3:.3g} mm "
+        f"resolve; {used / 1e3:.3g} kPa was used, R is the same; a smaller cell (--dx) resolves more"
     )
 
 

@@ -17,7 +17,7 @@ from calib.io.schema import tag
 from calib.material.food import FoodSpec
 from calib.material.knife import load_knife
 from calib.material.scene import cut_scene, specimen
-from calib.simulation.evaluation import FULLY_PARTED, pressed_away
+from calib.simulation.evaluation import FULLY_PARTED, pressed_away, weakened_ties
 from calib.validation.method_constants import CONSTANTS
 from cutcal.options import (
     add_food,
@@ -141,7 +141,7 @@ def run(args: argparse.Namespace) -> int:
             assumed.append(pressed_away(record.parted))
             note(assumed[-1])
         if scene.weakened:
-            assumed.append(_weakened(scene))
+            assumed.append(weakened_ties(scene))
             note(assumed[-1])
         doubted = doubts(record.budget, record.ke_over_ie) if record.status == "done" else []
         for text in doubted:
@@ -158,16 +158,6 @@ def run(args: argparse.Namespace) -> int:
     if record.status != "done":
         return 1
     return 2 if doubted else 0
-
-
-def _weakened(scene: Scene) -> str:
-    """What is said where the grid does not resolve the food's tensile strength."""
-    material, numerics = scene.food.material, scene.numerics
-    used = material.tie_strength(numerics.dx / numerics.ppc)
-    return (
-        f"the tensile strength of {material.cohesion / 1e3:.3g} kPa is more than cells of {numerics.dx * 1e3:.3g} mm "
-        f"resolve; {used / 1e3:.3g} kPa was used, R is the same; a smaller --dx resolves more"
-    )
 
 
 def _scene(args: argparse.Namespace, food: FoodSpec, shape: Shape) -> Scene:
