@@ -63,8 +63,8 @@ def doubts(energy: Mapping[str, float], ke_over_ie: float) -> list[str]:
     if part is not None and not abs(part) <= MOST_UNBOOKED:
         gone = "taken" if part > 0 else "made"
         out.append(
-            f"{abs(part):.0%} of the work is {gone} by no law (limit {MOST_UNBOOKED:.0%}): a crack that leads the edge "
-            "releases it, or cells and contact lose it; try --crack cohesive, or smaller cells (--dx)"
+            f"{abs(part):.0%} of the work is {gone} by no law (limit {MOST_UNBOOKED:.0%}): cells and "
+            "contact lose it; use smaller cells (--dx), or a lower --mach"
         )
     if not ke_over_ie <= MOST_KINETIC:
         out.append(
