@@ -61,7 +61,21 @@ class Table:
             for name, cells in self.columns.items()
         }
         parts = tuple(int(np.searchsorted(on, start)) for start in self.parts)
-        return replace(self, columns=columns, rows=[self.rows[i] for i in on], parts=parts)
+        return replace(self, columns=columns, rows=rows_at(self.rows, on), parts=parts)
+
+
+def rows_at(rows: Sequence[Any], on: Sequence[int] | np.ndarray) -> Sequence[Any]:
+    """What a file calls some of its rows. Where it is all of them it stays what it is: a range of ten million rows is
+    nothing, and a list of as many numbers half a gigabyte.
+
+    Args:
+        rows: What it calls each row, n of them.
+        on: Indices of those that are wanted, increasing, shape (m,) [-].
+
+    Returns:
+        Their names, m of them.
+    """
+    return rows if len(on) == len(rows) else [rows[i] for i in on]
 
 
 def as_float(cell: Any) -> float | None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib.errors import TraceError
 from calib.io.wording import LONG, brief, quoted
-from calib.table.table import Table
+from calib.table.table import Table, rows_at
 from calib.trace.clock import running_clock
 from calib.trace.columns import Column, candidates, choose, is_sparse, numbers, without_empty
 from calib.trace.names import COUNTERS, stem_of
@@ -78,7 +78,7 @@ class Recorded:
     time: np.ndarray
     force: np.ndarray
     position: np.ndarray | None
-    rows: tuple[object, ...]
+    rows: Sequence[object]
     columns: Mapping[str, str]
     start: float
     time_sd: float
@@ -111,7 +111,7 @@ def recorded(table: Table, how: Reading) -> Recorded:
     f = numbers(table, force, sparse=is_sparse(table, force.name))
     p = None if position is None else numbers(table, position, sparse=is_sparse(table, position.name))
     t, f, p, on, sparse = _on_the_forces_rows(table, (time, force), t, f, p)
-    part = replace(table, rows=[table.rows[i] for i in on], parts=_parts_of(table, on))
+    part = replace(table, rows=rows_at(table.rows, on), parts=_parts_of(table, on))
     clock = running_clock(part, (time, force), t, f, p)
     f, p = f[clock.kept], None if p is None else p[clock.kept]
     turned: tuple[str, ...] = ()
@@ -124,7 +124,7 @@ def recorded(table: Table, how: Reading) -> Recorded:
         time=clock.time - start,
         force=f,
         position=p,
-        rows=tuple(part.rows[i] for i in clock.kept),
+        rows=rows_at(part.rows, clock.kept),
         columns={role: column.name for role, column in used.items()},
         start=start,
         time_sd=clock.sd,

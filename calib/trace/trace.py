@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,7 @@ import numpy as np
 from calib.errors import TraceError
 from calib.formats.reader import read_table
 from calib.io.wording import brief, quoted
-from calib.table.table import MEASURED, TRACE_LABELS, Table
+from calib.table.table import MEASURED, TRACE_LABELS, Table, rows_at
 from calib.trace.recorded import MIN_SAMPLES as MIN_SAMPLES
 from calib.trace.recorded import Reading, recorded
 
@@ -56,7 +57,7 @@ class Trace:
     label: str = MEASURED
     start: float = 0.0
     notes: tuple[str, ...] = ()
-    rows: tuple[Any, ...] = ()
+    rows: Sequence[Any] = ()
     row: str = "row"
     time_sd: float = 0.0
     breaks: tuple[int, ...] = ()
@@ -106,7 +107,7 @@ class Trace:
             time=self.time[kept],
             force=self.force[kept],
             position=None if self.position is None else self.position[kept],
-            rows=tuple(self.rows[i] for i in kept) if self.rows else (),
+            rows=rows_at(self.rows, kept) if self.rows else (),
             breaks=tuple(sorted({int(np.searchsorted(kept, i)) for i in self.breaks} - {0, len(kept)})),
         )
 

@@ -101,3 +101,9 @@ def test_columns_of_words_are_refused(long, tmp_path):
     """A file without numbers has no columns of numbers."""
     with pytest.raises(TraceError, match="no column of numbers alone"):
         read_table(written(tmp_path, "time_s,force_N\n" + "a,b\n" * 200))
+
+
+def test_the_names_of_all_rows_take_no_memory(long, tmp_path):
+    """A record of which every row is kept has them as a range, and not as a list of as many numbers."""
+    trace = read_trace(written(tmp_path, HEADS["plain"] + "\n".join(ROWS) + "\n"))
+    assert isinstance(trace.rows, range) and len(trace.rows) == N
