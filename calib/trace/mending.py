@@ -24,6 +24,8 @@ SIDE = 3
 """Samples on each side with which a spike is compared."""
 STEP_SIDE = 12
 """Samples on each side of a step of the level, which are level themselves."""
+SUDDEN_PART = 0.7
+"""Part of a step of the level that one sample makes, at least."""
 STEP_SD = 8.0
 """Noise standard deviations by which the level steps."""
 STEP_PART = 0.02
@@ -190,14 +192,15 @@ def _without_steps(trace: Trace) -> tuple[np.ndarray, float, list[str]]:
     limit = max(STEP_SD * noise, STEP_PART * usual_range(force), 1e-9)
     out, variance = force.copy(), 0.0
     notes: list[str] = []
-    i = side
-    while i + side <= len(force):
+    last = 0  # before which all is done; a step is a change of most of its size from one sample to the next
+    for i in (np.flatnonzero(np.abs(np.diff(force)) >= SUDDEN_PART * limit) + 1).tolist():
+        if not max(side, last) <= i <= len(force) - side:
+            continue
         left, right = force[i - side : i], force[i : i + side]
         step = float(np.median(right) - np.median(left))
         behind = _level_behind(trace, i)
         same = behind is not None and abs(behind - float(np.median(right))) <= 0.2 * abs(step)
         if not _is_step(out, i, (step, same), limit, noise):
-            i += 1
             continue
         out[:i] += step
         variance += np.pi / side * max(noise, 1e-12) ** 2
@@ -205,7 +208,7 @@ def _without_steps(trace: Trace) -> tuple[np.ndarray, float, list[str]]:
             f"{_place(trace, i)}: the level goes from {np.median(left):.4g} to {np.median(right):.4g} N in one "
             "sample, as where a sensor is zeroed; what is before was moved to the level after it"
         )
-        i += side
+        last = i + side
     if len(notes) > 3:
         return force, 0.0, []
     return out, float(np.sqrt(variance)), notes
@@ -228,7 +231,7 @@ def _is_step(force: np.ndarray, i: int, change: tuple[float, bool], limit: float
     """
     side = STEP_SIDE
     step, same = change
-    if abs(step) <= limit or abs(force[i] - force[i - 1]) < 0.7 * abs(step):
+    if abs(step) <= limit or abs(force[i] - force[i - 1]) < SUDDEN_PART * abs(step):
         return False
     left, right = force[i - side : i], force[i : i + side]
     flat = max(3.0 * noise, 0.003 * abs(step))
