@@ -20,7 +20,10 @@ ZONE_PARTS = 8
 CELL_PER_ZONE = 0.75
 """Default cell over the process zone [-], which then spans 1.3 cells; the coarse grid has one cell to the zone."""
 MACH = 0.01
-"""Speed of the blade over that of the P-wave [-]; the coarse cut has twice of it."""
+"""Largest speed of the blade over that of the P-wave [-]; the coarse cut has twice of it."""
+FACE_MACH = 3e-4
+"""Largest speed at which the blade's faces move the food aside over that of the P-wave [-]: what decides how far a cut
+is from a slow one (docs/theory.md, "Time step and speed")."""
 CLEARANCE_ZONES = 1.0
 """Least food left below the edge where a trace ends under load, in process zones."""
 HEIGHT_SPAN = 1.25
@@ -228,6 +231,11 @@ def with_other_particles(scene: Scene, k: int) -> Scene:
     return replace(scene, numerics=replace(scene.numerics, seed=scene.numerics.seed + k, grid_shift=moved))
 
 
+def quasi_static_mach(knife: Knife) -> float:
+    """Speed at which a blade cuts as if slowly, over the P-wave's [-]: the less, the thicker its wedge."""
+    return min(MACH, FACE_MACH / math.tan(knife.angle / 2))
+
+
 def cut_scene(
     food: FoodSpec,
     shape: Shape,
@@ -262,7 +270,7 @@ def cut_scene(
     zone = min(ZONE_M, min(shape.height, shape.width) / ZONE_PARTS)
     cell = dx if dx is not None else CELL_PER_ZONE * zone
     zone = max(zone, cell / CELL_PER_ZONE)
-    mach = MACH
+    mach = quasi_static_mach(knife)
     if coarse:
         cell, mach = cell / CELL_PER_ZONE, 2 * mach
     filled = food.to_scene_food()

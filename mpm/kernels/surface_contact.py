@@ -76,18 +76,18 @@ def surface_contact(s: ti.template(), cut, p, dt, u, at):
         s.board_gap[cut, p] = ti.math.clamp(s.board_gap[cut, p] * (1 + dt * up[2]), least, most)
         kick = board_contact(s, cut, p, m, dt, v - s.board_gap[cut, p] * up, there)
         high -= s.board_gap[cut, p] * kick
-    arm, push = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
+    push = ti.Vector.zero(float, 3)
     if ti.static(s.press):
         if there[2] > ti.cast(s.pose[cut, EDGE_Z], float) - 2 * s.par[cut, DX]:
             s.tool_gap[cut, p] = ti.math.clamp(s.tool_gap[cut, p] * (1 + dt * up[2]), least, most)
             arm = ti.Vector([0.0, 0.0, s.tool_gap[cut, p]])
             push = press_contact(s, cut, p, m, dt, v + kick + s.tool_gap[cut, p] * up, there + arm)
+            high += arm[2] * push
     else:
         if ti.abs(there[1]) < 2 * s.par[cut, DX]:
             s.tool_gap[cut, p] = ti.math.clamp(s.tool_gap[cut, p] * (1 + dt * across[1]), least, most)
-        push, arm = blade_contact(s, cut, p, m, dt, v + kick, up, across, there)
-    high += arm[2] * push
-    wide += arm[1] * push
+        push, lift, wide = blade_contact(s, cut, p, m, dt, v + kick, up, across, there)
+        high += lift
     scale = 4 * s.par[cut, INV_DX] * s.par[cut, INV_DX]
     high, wide = to_grid_axes(s, cut, high), to_grid_axes(s, cut, wide)
     new = v + kick + push
@@ -167,10 +167,13 @@ def board_contact(s: ti.template(), cut, p, m, dt, u, at):
 
 @ti.func
 def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
-    """Contact of one severed particle with the blade's faces; returns the change of velocity [m/s] and lever arm [m].
+    """Contact of one severed particle with the blade's faces; returns the change of velocity [m/s] and its moments.
 
     A particle meets the blade as far from its centre as it was from the cut plane when the food was whole, so that the
-    faces displace the food by the true half thickness of the blade.
+    faces displace the food by the true half thickness of the blade. The normal force is the gradient of the opening,
+    in the particle's place and in its stretch: a particle that passes the shoulder gives back what it was pressed with.
+
+    The two moments are those of the impulses with the lever's height and with its part across the blade [m^2/s].
 
     Args:
         p: The particle.
@@ -184,14 +187,15 @@ def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
     cos_t, sin_t = ti.cast(s.pose[cut, TILT_COS], float), ti.cast(s.pose[cut, TILT_SIN], float)
     above = (at[2] - edge_height(s, cut, at[0])) * cos_t
     touching = False
-    dv, arm = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
+    dv, lift, wide = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
     tall = s.par[cut, BLADE_HEIGHT] + half_thickness(s, cut) + s.par[cut, SPACING]
     if s.side[cut, p] != 0 and 0 < above < tall and under_blade(s, cut, at[0]):
         sign = 1.0 if s.side[cut, p] == 2 else -1.0
-        d, n = blade_face(s, cut, sign * at[1], above)
+        gap = s.tool_gap[cut, p]
+        opening, n = blade_opening(s, cut, sign * at[1], above, gap)
+        level = gap * ti.max(n[1], s.par[cut, WEDGE_COS])  # what the opening takes from the particle's stretch
         n = ti.Vector([-sin_t * n[2], sign * n[1], cos_t * n[2]])
-        own = surface_traction(s, cut, p, s.surface_volume[cut, p][1], s.tool_gap[cut, p], n)
-        opening = d - s.tool_gap[cut, p]
+        own = surface_traction(s, cut, p, s.surface_volume[cut, p][1], gap, n)
         force = own.dot(n) - opening
         press = ti.max(force, 0.0)
         own -= own.dot(n) * n
@@ -208,40 +212,52 @@ def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
                 s.adhering[cut, p] = 0
         if press > 0:
             touching = True
-            arm = -s.tool_gap[cut, p] * n
-            rel = u + arm[2] * up + arm[1] * across - blade_velocity(s, cut, at[0] + arm[0], at[2] + arm[2])
-            slide = rel - rel.dot(n) * n
+            arm = -gap * n
+            blade = blade_velocity(s, cut, at[0] + arm[0], at[2] + arm[2])
+            slide = u + arm[2] * up + arm[1] * across - blade
+            slide -= slide.dot(n) * n
             stick = s.stick[cut, 1, p] - s.stick[cut, 1, p].dot(n) * n
             hold = stick_slip(stick, dt * slide, own, friction_limit(s, cut, p, press))
             s.stick[cut, 1, p] = own - hold
-            dv = s.par[cut, CONTACT] * dt * (force * n + hold)
+            force *= s.par[cut, CONTACT] * dt
+            hold *= s.par[cut, CONTACT] * dt
+            dv = force * n + hold
+            lift, wide = arm[2] * hold, arm[1] * hold
+            wide[1] -= level * force
             book_knife_impulse(s, cut, FACE, -m * dv, at[0] + arm[0], at[2] + arm[2])
-            s.sums[cut, FRICTION_WORK] -= m * dv.dot(slide if force > 0 else rel)
+            s.sums[cut, FRICTION_WORK] -= m * hold.dot(slide)
+            if force < 0:
+                s.sums[cut, FRICTION_WORK] -= m * force * ((u - blade).dot(n) - level * across[1])
     if not touching:
         s.stick[cut, 1, p] = ti.Vector.zero(float, 3)
-    return dv, arm
+    return dv, lift, wide
 
 
 @ti.func
-def blade_face(s: ti.template(), cut, y, above):
-    """Distance of a particle's centre to the blade's face and the face's outward normal, in the plane across the edge.
+def blade_opening(s: ti.template(), cut, y, above, gap):
+    """Opening between a particle's face and the blade's, and the blade's outward normal, in the plane across the edge.
 
     A particle stands for a face as high as the spacing of the particles, so it meets the blade's profile as its mean
     over that height (weights of a hat of twice the height). At a sharp shoulder whole rows would let go at once of the
     force that the wedge had given them, and the halves would ring. The tip is left sharp.
 
+    The face lies across the blade from the centre, at the gap. So the opening's gradient is the normal wherever the
+    profile bends: a distance taken from the centre, less the gap, had none, and each row that passed the shoulder lost
+    a part of the energy that pressed it.
+
     Args:
         y: Distance from the blade's plane towards the particle's own half [m].
         above: Height above the edge [m].
+        gap: Distance of the particle's centre and its face [m].
 
     Returns:
-        Distance [m], negative inside, and the unit normal (0, n_y, n_z).
+        Opening [m], negative where they press, and the unit normal (0, n_y, n_z).
     """
     cos_h, sin_h, radius = s.par[cut, WEDGE_COS], s.par[cut, WEDGE_SIN], s.par[cut, TIP_RADIUS]
-    d, n = 0.0, ti.Vector([0.0, cos_h, -sin_h])
+    opening, n = 0.0, ti.Vector([0.0, cos_h, -sin_h])
     if y * sin_h + (above - radius) * cos_h < 0:
         size = ti.sqrt(y * y + (above - radius) ** 2)
-        d, n = size - radius, ti.Vector([0.0, y, above - radius]) / ti.max(size, 1e-12)
+        opening, n = size - radius - gap * cos_h, ti.Vector([0.0, y, above - radius]) / ti.max(size, 1e-12)
     else:
         slope, reach, top = sin_h / cos_h, s.par[cut, SPACING], s.par[cut, BLADE_HEIGHT]
         shoulder = ti.min(radius + (0.5 * s.par[cut, SPINE] * cos_h - radius) / sin_h, top)
@@ -249,8 +265,8 @@ def blade_face(s: ti.template(), cut, y, above):
         half = (above - radius) * slope + radius / cos_h - reach * (slope * kink(one) + kink(two))
         slope -= slope * passed_part(one) + passed_part(two)
         n = ti.Vector([0.0, 1.0, -slope]) / ti.sqrt(1.0 + slope * slope)
-        d = (y - half) * n[1]
-    return d, n
+        opening = (y - gap - half) * n[1]
+    return opening, n
 
 
 @ti.func

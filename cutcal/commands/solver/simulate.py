@@ -94,9 +94,8 @@ def add_args(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--mach",
         type=number(0, 0.05, ""),
-        default=0.01,
         metavar="PART",
-        help="blade speed over the P-wave's (default 0.01)",
+        help="blade speed over the P-wave's (default: 0.01, less for a thick wedge)",
     )
     p.add_argument(
         "--slice-ratio",
@@ -165,7 +164,7 @@ def _scene(args: argparse.Namespace, food: FoodSpec, shape: Shape) -> Scene:
     scene = cut_scene(food, shape, load_knife(args.knife), stroke=args.stroke, dx=args.dx, seed=args.seed)
     motion = replace(
         scene.motion,
-        mach=args.mach,
+        mach=scene.motion.mach if args.mach is None else args.mach,
         slice_ratio=args.slice_ratio,
         tilt=math.radians(args.tilt),
         retract=args.retract,

@@ -8,11 +8,11 @@ from dataclasses import replace
 
 from fem_reference.cutting.wedge import Blade, Block, Grid, Interface, split
 from fem_reference.laws import Linear
-from mpm.scene import Board, Motion
+from mpm.scene import Board
 from mpm.scene.material import Material
 from mpm.scene.shapes import Shape
 from studies.verification.case import SuiteOptions, VerificationCase
-from studies.verification.fracture.scene import MACH, TUBER, Wedge, brittle, scene, simulation
+from studies.verification.fracture.scene import TUBER, Wedge, brittle, scene, simulation
 from studies.verification.fracture.splitting import BEAMS, FORCE_OFF, STEADY, split_by_particles
 from studies.verification.result import Comparison
 
@@ -67,7 +67,7 @@ def slicing(options: SuiteOptions) -> Iterator[Comparison]:
     wedge, dx = Wedge(11.0), 3e-3
     for ratio in RATIOS:
         of = scene(LOAF, SLICED, wedge, TO + 0.5e-3, dx)
-        of = replace(of, motion=Motion(TO + 0.5e-3, MACH, slice_ratio=ratio), board=Board(GLUED))
+        of = replace(of, motion=replace(of.motion, slice_ratio=ratio), board=Board(GLUED))
         record = simulation(options, of).run()
         on = (record.stroke > FROM) & (record.stroke < TO)
         edge, face = record.edge[on].mean(axis=0), record.face[on].mean(axis=0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from calib.material.scene import quasi_static_mach
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
 from mpm.scene.material import Material
 from mpm.scene.shapes import Shape
@@ -15,7 +16,7 @@ TUBER_E, NU, TUBER_R, TUBER_STRENGTH = 9.5e6, 0.3, 87.0, 0.3e6
 """Young's modulus [Pa], Poisson's ratio [-], work of new surface [J/m^2] and strength [Pa] of a stiff tuber."""
 DENT = 0.2e-3  # indentation at which the cut starts [m]: little, because the finite elements have no start to overcome
 ZONE = 4e-3  # process zone of the edge [m]
-MACH = 0.01  # speed of the blade over that of the P-wave
+LEAST_MACH = 3e-3  # least speed of the blade over that of the P-wave, which decides how long the cases take
 
 
 def brittle(modulus: float, toughness: float, strength: float) -> Material:
@@ -83,7 +84,7 @@ def scene(block: Shape, food: Material, wedge: Wedge, stroke: float, dx: float) 
     return Scene(
         Food(block, food),
         knife,
-        Motion(stroke, MACH),
+        Motion(stroke, max(LEAST_MACH, quasi_static_mach(knife))),
         Board(0.0),
         EdgeLaw(zone=max(ZONE, dx)),
         Numerics(dx=dx, gravity=0.0, room=1.0),

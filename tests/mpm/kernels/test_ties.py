@@ -158,6 +158,15 @@ def test_new_surface_costs_the_same_under_a_thick_and_a_thin_blade(flows):
     assert abs(thin.unbooked[-1]) < 0.01 * thin.work
 
 
+def test_rows_that_pass_a_thick_shoulder_give_back_what_pressed_them():
+    """Elastic halves on a smooth wedge of 30 degrees: the work goes into new surface and bending, and no more."""
+    wide = replace(
+        SPLIT, food=replace(SPLIT.food, shape=Shape("block", 0.03, 0.012, 0.024)), motion=Motion(0.012, 2e-3)
+    )
+    record = cut(replace(wide, knife=replace(EDC, angle=np.deg2rad(30.0))))
+    assert record.unbooked[-1] == pytest.approx(0.0, abs=0.045 * record.work)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("shift", [(0.0, 0.5, 0.0), (0.3, 0.25, 0.5)], ids=str)
 def test_a_split_does_not_see_where_its_plane_lies_in_the_grid(shift):
