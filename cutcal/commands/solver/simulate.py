@@ -6,6 +6,7 @@ import argparse
 import math
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,6 +42,14 @@ if TYPE_CHECKING:
 
 HELP = "simulate one cut"
 DESCRIPTION = "Simulate one cut and write force.csv and summary.json."
+NUMERICAL = (
+    "contact_stiffness",
+    "face_height",
+    "edge_ahead",
+    "edge_band",
+    "least_gap",
+    "safety",
+)  # options of the numerics
 VIDEO_FRAMES = 72  # of a video: five seconds
 FRAMES_PER_PAGE_FRAME = 2  # frames of a video of which a page has one
 FRAMES_PER_LINE = 12  # pictures of a video after which a line says how many there are
@@ -87,6 +96,36 @@ def add_args(p: argparse.ArgumentParser) -> None:
         type=number(0.1, 100, "of a layer's"),
         metavar="K",
         help="contact over a layer of particles (default 2)",
+    )
+    p.add_argument(
+        "--face-height",
+        type=number(0.01, 10, "of a particle's spacing"),
+        metavar="H",
+        help="height over which the blade's profile is averaged, over the spacing of particles (default 1)",
+    )
+    p.add_argument(
+        "--edge-ahead",
+        type=number(-1e-9, 5, "cells"),
+        metavar="CELLS",
+        help="depth below the edge of the middle of what it cuts (default 0.5)",
+    )
+    p.add_argument(
+        "--edge-band",
+        type=number(0.01, 5, "cells"),
+        metavar="CELLS",
+        help="half height of what the edge is cutting (default 0.5)",
+    )
+    p.add_argument(
+        "--least-gap",
+        type=number(1e-6, 0.2, "cells"),
+        metavar="CELLS",
+        help="least distance of a particle from a surface (default 0.02)",
+    )
+    p.add_argument(
+        "--cohesive-zone",
+        type=number(1e-6, 10, "m"),
+        metavar="M",
+        help="least process zone of a food without tensile strength (default 10mm)",
     )
     p.add_argument(
         "--safety", type=number(0, 0.9, "of the stability limit"), metavar="F", help="time step (default 0.7)"
@@ -177,12 +216,16 @@ def _scene(args: argparse.Namespace, food: FoodSpec, shape: Shape) -> Scene:
         grid_shift=(0.0, args.offset, 0.0),
         grid_turn=math.radians(args.turn),
     )
-    given = {"contact_stiffness": args.contact_stiffness, "safety": args.safety}
-    numerics = replace(numerics, **{name: value for name, value in given.items() if value is not None})
-    sizes = {"zone": args.zone, "slip": args.slip}
-    edge = replace(scene.edge, **{name: value for name, value in sizes.items() if value is not None})
+    numerics = replace(numerics, **_given(args, NUMERICAL))
+    edge = replace(scene.edge, **_given(args, ("zone", "slip")))
     arm = Arm(args.arm_stiffness, args.force_limit)
+    scene = scene.with_material(**_given(args, ("cohesive_zone",)))
     return replace(scene, motion=motion, numerics=numerics, edge=edge, arm=arm)
+
+
+def _given(args: argparse.Namespace, names: Sequence[str]) -> dict[str, Any]:
+    """Options that were given, by the name of what they set."""
+    return {name: getattr(args, name) for name in names if getattr(args, name) is not None}
 
 
 def _simulated(args: argparse.Namespace, scene: Scene) -> tuple[Simulation, SnapshotRecorder | None, ForceRecord]:
