@@ -44,7 +44,16 @@ class MethodConstant:
             scene: A scene.
             factor: Of its value.
         """
-        new = {self.key: factor * self.value(scene)}
+        return self.put(scene, factor * self.value(scene))
+
+    def put(self, scene: Scene, value: float) -> Scene:
+        """The scene with a value of it.
+
+        Args:
+            scene: A scene.
+            value: The value [SI].
+        """
+        new = {self.key: value}
         if self.part == "material":
             return scene.with_material(**new)
         return replace(scene, **{self.part: replace(getattr(scene, self.part), **new)})
