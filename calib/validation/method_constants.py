@@ -19,6 +19,7 @@ class MethodConstant:
         factors: By how much it is varied; a factor that cannot be simulated is left out, and ``why`` says so.
         source: Where its value is from.
         why: Why not both half and twice; empty where it is both.
+        unless: Property of the food in whose place the number is taken, so that it is nothing where the food has it.
     """
 
     name: str
@@ -27,9 +28,12 @@ class MethodConstant:
     factors: tuple[float, ...]
     source: str
     why: str = ""
+    unless: str = ""
 
     def value(self, scene: Scene) -> float:
-        """Its value in a scene [SI]."""
+        """Its value in a scene [SI]; 0 where it has no part in it."""
+        if self.unless and getattr(scene.food.material, self.unless) is not None:
+            return 0.0
         part = scene.food.material if self.part == "material" else getattr(scene, self.part)
         return float(getattr(part, self.key))
 
@@ -40,7 +44,16 @@ class MethodConstant:
             scene: A scene.
             factor: Of its value.
         """
-        new = {self.key: factor * self.value(scene)}
+        return self.put(scene, factor * self.value(scene))
+
+    def put(self, scene: Scene, value: float) -> Scene:
+        """The scene with a value of it.
+
+        Args:
+            scene: A scene.
+            value: The value [SI].
+        """
+        new = {self.key: value}
         if self.part == "material":
             return scene.with_material(**new)
         return replace(scene, **{self.part: replace(getattr(scene, self.part), **new)})
@@ -55,6 +68,28 @@ CONSTANTS = (
     MethodConstant(
         "contact stiffness", "numerics", "contact_stiffness", (2.0,),
         "numerical: above the bound of Nitsche's method, 1.5 layers of particles", "half of it is below that bound",
+    ),
+    MethodConstant(
+        "height of a particle's face", "numerics", "face_height", (2.0,),
+        "numerical: over it the blade's profile is averaged, one spacing of the particles",
+        "over half of it rows of particles let go of the blade's shoulder one by one, and energy comes from nothing",
+    ),
+    MethodConstant(
+        "lead of the edge", "numerics", "edge_ahead", (0.5, 2.0),
+        "numerical: what the edge cuts has its middle half a cell below it",
+    ),
+    MethodConstant(
+        "band of the edge", "numerics", "edge_band", (0.5, 2.0),
+        "numerical: half a cell about that middle, one spacing of the particles",
+    ),
+    MethodConstant(
+        "least gap to a surface", "numerics", "least_gap", (0.5, 2.0),
+        "numerical: keeps the centre of a particle that is squeezed flat inside the food",
+    ),
+    MethodConstant(
+        "process zone of a food without strength", "material", "cohesive_zone", (0.5, 2.0),
+        "assumed, where the food has no tensile strength (materials.yaml has one for every food)",
+        unless="tensile_strength",
     ),
     MethodConstant(
         "time step", "numerics", "safety", (0.5,), "numerical: part of the stability limit",

@@ -19,10 +19,11 @@ from mpm.state.tables import (
     EDGE_VZ,
     EDGE_Z,
     FACE,
+    FACE_HEIGHT,
     FRICTION_WORK,
     INV_DX,
+    LEAST_GAP,
     MASS,
-    SPACING,
     SPINE,
     TILT_COS,
     TILT_SIN,
@@ -31,8 +32,6 @@ from mpm.state.tables import (
     WEDGE_SIN,
     YIELD,
 )
-
-LEAST_GAP = 0.02  # least distance between a particle's centre and the surface that squeezing leaves, over the cell
 
 
 @ti.func
@@ -70,7 +69,7 @@ def surface_contact(s: ti.template(), cut, p, dt, u, at):
     up = to_scene_axes(s, cut, c @ ti.Vector([0.0, 0.0, 1.0]))
     across = to_scene_axes(s, cut, c @ to_grid_axes(s, cut, ti.Vector([0.0, 1.0, 0.0])))
     there, v = to_scene_axes(s, cut, at), to_scene_axes(s, cut, u)
-    least, most = LEAST_GAP * s.par[cut, DX], 0.5 * s.par[cut, DX]
+    least, most = s.par[cut, LEAST_GAP], 0.5 * s.par[cut, DX]
     kick, high, wide = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
     if 0 < s.board_gap[cut, p] and there[2] < 2 * s.par[cut, DX]:  # a free body has none
         s.board_gap[cut, p] = ti.math.clamp(s.board_gap[cut, p] * (1 + dt * up[2]), least, most)
@@ -188,7 +187,7 @@ def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
     above = (at[2] - edge_height(s, cut, at[0])) * cos_t
     touching = False
     dv, lift, wide = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
-    tall = s.par[cut, BLADE_HEIGHT] + half_thickness(s, cut) + s.par[cut, SPACING]
+    tall = s.par[cut, BLADE_HEIGHT] + half_thickness(s, cut) + s.par[cut, FACE_HEIGHT]
     if s.side[cut, p] != 0 and 0 < above < tall and under_blade(s, cut, at[0]):
         sign = 1.0 if s.side[cut, p] == 2 else -1.0
         gap = s.tool_gap[cut, p]
@@ -237,9 +236,9 @@ def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
 def blade_opening(s: ti.template(), cut, y, above, gap):
     """Opening between a particle's face and the blade's, and the blade's outward normal, in the plane across the edge.
 
-    A particle stands for a face as high as the spacing of the particles, so it meets the blade's profile as its mean
-    over that height (weights of a hat of twice the height). At a sharp shoulder whole rows would let go at once of the
-    force that the wedge had given them, and the halves would ring. The tip is left sharp.
+    A particle stands for a face of a certain height (``Numerics.face_height``), so it meets the blade's profile as its
+    mean over that height (weights of a hat of twice the height). At a sharp shoulder whole rows would let go at once of
+    the force that the wedge had given them, and the halves would ring. The tip is left sharp.
 
     The face lies across the blade from the centre, at the gap. So the opening's gradient is the normal wherever the
     profile bends: a distance taken from the centre, less the gap, had none, and each row that passed the shoulder lost
@@ -259,7 +258,7 @@ def blade_opening(s: ti.template(), cut, y, above, gap):
         size = ti.sqrt(y * y + (above - radius) ** 2)
         opening, n = size - radius - gap * cos_h, ti.Vector([0.0, y, above - radius]) / ti.max(size, 1e-12)
     else:
-        slope, reach, top = sin_h / cos_h, s.par[cut, SPACING], s.par[cut, BLADE_HEIGHT]
+        slope, reach, top = sin_h / cos_h, s.par[cut, FACE_HEIGHT], s.par[cut, BLADE_HEIGHT]
         shoulder = ti.min(radius + (0.5 * s.par[cut, SPINE] * cos_h - radius) / sin_h, top)
         one, two = (above - shoulder) / reach, (above - top) / reach
         half = (above - radius) * slope + radius / cos_h - reach * (slope * kink(one) + kink(two))

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from mpm.scene.errors import SceneError, check_number
 
 MAX_POISSON = 0.49  # above it a single-field quadratic MPM locks volumetrically and dt falls as sqrt(1 - 2 nu)
-# Length E R / strength^2 of the process zone of a food whose tensile strength is not known, at least [m].
-COHESIVE_ZONE = 10e-3
+COHESIVE_ZONE = 10e-3  # of the process zone of a food whose tensile strength is not known, at least [m]
 LEAST_OPENING = 1e-9  # half opening at which a food without resistance has parted [m]; the ties divide by it
 
 
@@ -32,6 +31,8 @@ class Material:
         tensile_strength: Tension at which the food parts [Pa], or None. Across the plane of a cohesive crack the
             tension falls from there to nothing while the food opens, and the work is R; None: see :attr:`cohesion`.
             Bulk damage, where there is any, starts at it. Nothing else uses it.
+        cohesive_zone: Least length E R / strength^2 of the process zone of a food without a ``tensile_strength`` [m];
+            nothing else uses it.
         fracture_energy: Energy per crack area of bulk damage [J/m^2], or None for a food without bulk damage. It needs
             ``tensile_strength``.
         loss_factor: Mechanical loss factor tan(delta) [-] at the first axial mode of the specimen, Kelvin-Voigt. Apple
@@ -53,6 +54,7 @@ class Material:
     initiation_depth: float = 1e-3
     mu: float = 0.0
     tensile_strength: float | None = None
+    cohesive_zone: float = COHESIVE_ZONE
     fracture_energy: float | None = None
     loss_factor: float = 0.0
     prony: tuple[tuple[float, float], ...] = ()
@@ -85,6 +87,7 @@ class Material:
                 check_number(w, name, getattr(self, name), -1e-300, 1e6, "N/m")
         if self.tensile_strength is not None:
             check_number(w, "tensile_strength", self.tensile_strength, 0.0, 1e12, "Pa")
+        check_number(w, "cohesive_zone", self.cohesive_zone, 1e-6, 10.0, "m")
         if self.fracture_energy is not None:
             check_number(w, "fracture_energy", self.fracture_energy, 0.0, 1e9, "J/m^2")
             if self.tensile_strength is None:
@@ -125,10 +128,10 @@ class Material:
     @property
     def cohesion(self) -> float:
         """Strength of a cohesive crack [Pa]: the tensile strength; where that is None twice the yield stress, and no
-        more than makes a process zone E R / strength^2 of :data:`COHESIVE_ZONE`."""
+        more than makes a process zone E R / strength^2 of :attr:`cohesive_zone`."""
         if self.tensile_strength is not None:
             return self.tensile_strength
-        return min(2 * self.yield_stress, math.sqrt(self.E * self.R / COHESIVE_ZONE))
+        return min(2 * self.yield_stress, math.sqrt(self.E * self.R / self.cohesive_zone))
 
     def tie_strength(self, spacing: float) -> float:
         """Strength of ties across the cut plane [Pa]: the cohesive strength, and no more than their grid resolves.

@@ -15,7 +15,7 @@ from reports.base.labels import capital, in_words
 
 if TYPE_CHECKING:
     from studies.convergence.gci import Estimate
-    from studies.convergence.result import ConvergenceResult, ForceCurves, RunResult
+    from studies.convergence.result import AxisResult, ConvergenceResult, ForceCurves, RunResult
 
 AXIS_MEANINGS = {
     "safety": "time step over its limit",
@@ -109,7 +109,7 @@ def _brief(result: ConvergenceResult, curves: ForceCurves) -> Brief:
                 "Force on every grid", picture=_picture(result, curves), alt=FIGURE_ALT, table=_grids(result.grids)
             ),
             ReportPart("Order and uncertainty", ESTIMATES, table=_estimates(result)),
-            *([ReportPart("Apart from the grid", APART, table=_apart(result))] if _varied(result) else []),
+            *([ReportPart("Apart from the grid", APART, table=_apart(result))] if _seen(result) else []),
         ],
         limits=[*NOT_SHOWN, *_not_varied(result)],
         warnings=[capital(text) for text in result.warnings],
@@ -157,6 +157,11 @@ def _estimates(result: ConvergenceResult) -> ReportTable:
     return ReportTable(head, ("1fr", *["auto"] * 6), rows, left=2)
 
 
+def _seen(result: ConvergenceResult) -> bool:
+    """Whether anything was varied apart from the grid."""
+    return bool(_varied(result) or result.constants_seen)
+
+
 def _varied(result: ConvergenceResult) -> list[str]:
     """Axes whose spread is known."""
     return [name for name in AXIS_MEANINGS if result.axis(name) is not None]
@@ -170,15 +175,23 @@ def _apart(result: ConvergenceResult) -> ReportTable:
             continue
         tried = [getattr(row, name) for row in axis.rows if row.ok]
         values = f"{len(tried) - 1}" if name == "repeat" else listed([f"{v:g}" for v in tried])
-        spread = [quantity(part, "fraction", digits=2) for part in (axis.spread_peak, axis.spread_work)]
-        rows.append([meaning, values, *spread])
+        rows.append([meaning, values, *_spread(axis)])
+    for constant in result.constants_seen.values():
+        given = listed([f"{row.value:g}" for row in constant.rows if row.ok and row.value is not None])
+        rows.append([constant.name, given, *_spread(constant)])
     head = ("What is varied", "Values", "Peak within", "Work within")
     return ReportTable(head, ("1fr", "auto", "auto", "auto"), rows, left=2)
+
+
+def _spread(axis: AxisResult) -> list[str]:
+    """How far peak and work are from their mean."""
+    return [quantity(part, "fraction", digits=2) for part in (axis.spread_peak, axis.spread_work)]
 
 
 def _not_varied(result: ConvergenceResult) -> list[str]:
     varied = _varied(result)
     absent = [meaning for name, meaning in AXIS_MEANINGS.items() if name not in varied and name != "repeat"]
+    absent += [] if result.constants_seen else ["constants of the method (--numerics)"]
     return [f"Not varied here: {listed(absent)}."] if absent else []
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,10 +11,19 @@ from calib.errors import CurveError
 from calib.io.provenance import git_commit, versions
 from calib.simulation.evaluation import FULLY_PARTED, Evaluation, pressed_away
 from calib.trace.filters import N_STROKE, filter_simulated
+from calib.validation.method_constants import CONSTANTS
 from mpm.arrays import FloatArray
+from mpm.scene import Scene
 from studies.convergence.gci import curve_estimate, estimate
-from studies.convergence.plan import CutDescription, PlannedRun
-from studies.convergence.result import AxisResult, ConvergenceLimits, ConvergenceResult, ForceCurves, RunResult
+from studies.convergence.plan import AXES, CutDescription, PlannedRun
+from studies.convergence.result import (
+    AxisResult,
+    ConstantResult,
+    ConvergenceLimits,
+    ConvergenceResult,
+    ForceCurves,
+    RunResult,
+)
 
 LIMITS_OF_CHANGE = ConvergenceLimits(work=0.02, peak=0.03)
 """Largest change between the two finest grids that counts as converged [-]."""
@@ -74,6 +83,7 @@ def analyse(
         ppc=_axis_result(runs, evaluations, "ppc"),
         offset=_axis_result(runs, evaluations, "offset"),
         repeat=_axis_result(runs, evaluations, "repeat"),
+        constants=_constant_results(runs, evaluations),
         device=device,
         versions=versions(),
         git=git_commit(),
@@ -83,7 +93,7 @@ def analyse(
 
 def _run_result(axis: str, value: float, done: Evaluation) -> RunResult:
     get = done.scalars.get
-    varied: dict[str, Any] = {"dx_m" if axis == "dx" else axis: value}
+    varied: dict[str, Any] = {"dx_m" if axis == "dx" else axis if axis in AXES else "value": value}
     return RunResult(
         **varied,
         peak_N=get("peak_N"),
@@ -101,14 +111,29 @@ def _run_result(axis: str, value: float, done: Evaluation) -> RunResult:
     )
 
 
+def _constant_results(
+    runs: Sequence[PlannedRun], evaluations: Sequence[Evaluation]
+) -> Mapping[str, ConstantResult] | None:
+    """What each constant of the method changes, by its key; None where none was varied."""
+    found = {c: _axis_result(runs, evaluations, c.key) for c in CONSTANTS if c.key not in AXES}
+    out = {c.key: ConstantResult(name=c.name, **vars(axis)) for c, axis in found.items() if axis is not None}
+    return out or None
+
+
+def _own_values(scene: Scene) -> dict[str, float]:
+    """Values of a scene on the axes that are no shifts, by axis."""
+    own = {"safety": scene.numerics.safety, "mach": scene.motion.mach, "ppc": float(scene.numerics.ppc)}
+    return {c.key: c.value(scene) for c in CONSTANTS} | own
+
+
 def _axis_result(runs: Sequence[PlannedRun], evaluations: Sequence[Evaluation], axis: str) -> AxisResult | None:
     """Runs of one axis with the run that they differ from among them, and the spread of what they give."""
     base = _base(runs, axis)
-    own = {"safety": base.scene.numerics.safety, "mach": base.scene.motion.mach, "ppc": base.scene.numerics.ppc}
+    own = _own_values(base.scene)
     rows = [(run.value, done) for run, done in zip(runs, evaluations, strict=True) if run.axis == axis]
     if not rows:
         return None
-    rows = sorted([(float(own.get(axis, 0)), evaluations[runs.index(base)]), *rows], key=lambda row: row[0])
+    rows = sorted([(own.get(axis, 0.0), evaluations[runs.index(base)]), *rows], key=lambda row: row[0])
     rows = [row for k, row in enumerate(rows) if k == 0 or row[0] != rows[k - 1][0]]
     good = [(value, done) for value, done in rows if done.ok]
     spreads: dict[str, float] = {}

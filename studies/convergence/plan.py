@@ -7,12 +7,16 @@ from dataclasses import dataclass, replace
 
 from calib.errors import CurveError
 from calib.material.scene import with_other_particles
+from calib.validation.method_constants import CONSTANTS
 from mpm.scene import Scene
 from mpm.scene.shapes import Shape
 
 AXES = ("safety", "mach", "ppc", "offset", "repeat")
 """What can be varied beside the cell size, each apart from the others: dt over its limit, speed over the P-wave's,
 particles per cell and direction, blade against the grid [cells], and what should not matter at all."""
+HALF = 0.5
+"""Time step and speed over those of the cut, and the blade's place in the grid [cells], where all constants of the
+method are varied and no other values are asked for."""
 
 
 @dataclass(frozen=True)
@@ -23,11 +27,13 @@ class RefinementPlan:
         scene: The cut; its cell size is not used.
         axes: Values to try, by axis of :data:`AXES`; cell sizes [m] under ``dx``.
         repeats: Runs with other particles and the grid elsewhere, to tell noise from trend.
+        constants: Whether each constant of the method is halved and doubled as well.
     """
 
     scene: Scene
     axes: Mapping[str, Sequence[float]]
     repeats: int = 3
+    constants: bool = False
 
 
 @dataclass(frozen=True)
@@ -54,7 +60,7 @@ class PlannedRun:
     """One run.
 
     Attributes:
-        axis: What is varied: ``dx``, or one of :data:`AXES`.
+        axis: What is varied: ``dx``, one of :data:`AXES`, or the key of a constant of the method.
         value: Its value; cell sizes in [m], of ``repeat`` the number of the run.
         scene: The cut.
     """
@@ -77,19 +83,23 @@ class PlannedRun:
 
 
 def planned_runs(plan: RefinementPlan) -> list[PlannedRun]:
-    """Runs of a plan. The other axes are varied on the coarsest grid, runs are repeated on the next finer one.
+    """Runs of a plan. The other axes and constants are varied on the coarsest grid, runs are repeated on the next finer
+    one.
 
     Args:
         plan: What to run, with at least two cell sizes. With two grids the repeats are on the coarser one.
 
     Returns:
-        The runs: those on the grids from coarse to fine, then those of each axis, then the repeats.
+        The runs: those on the grids from coarse to fine, then those of each axis and constant, then the repeats.
 
     Raises:
         CurveError: Fewer than two cell sizes.
         SceneError: A value that cannot be simulated.
     """
-    scene, axes = plan.scene, plan.axes
+    scene, axes = plan.scene, dict(plan.axes)
+    if plan.constants:
+        own = {"safety": HALF * scene.numerics.safety, "mach": HALF * scene.motion.mach, "offset": HALF}
+        axes = {name: (value,) for name, value in own.items()} | axes
     cells = sorted(axes["dx"], reverse=True)
     if len(cells) < 2:
         raise CurveError(f"--dx {cells[0]:g}: give at least two cell sizes, for instance 3e-3,2e-3,1.5e-3")
@@ -104,7 +114,26 @@ def planned_runs(plan: RefinementPlan) -> list[PlannedRun]:
     for value in axes.get("offset", ()):
         shifted = replace(base.numerics, grid_shift=(0.0, value, 0.0))
         out.append(PlannedRun("offset", value, replace(base, numerics=shifted)))
-    own = out[min(1, len(cells) - 2)].scene
+    if plan.constants:
+        out += varied_constants(base)
+    again = out[min(1, len(cells) - 2)].scene
     for k in range(1, plan.repeats + 1):
-        out.append(PlannedRun("repeat", k, with_other_particles(own, k)))
+        out.append(PlannedRun("repeat", k, with_other_particles(again, k)))
     return out
+
+
+def varied_constants(scene: Scene) -> list[PlannedRun]:
+    """Runs with each constant of the method halved and doubled, where that can be and where it has a part in the cut.
+
+    Args:
+        scene: The cut.
+
+    Returns:
+        The runs; the time step is an axis of its own.
+    """
+    return [
+        PlannedRun(c.key, factor * c.value(scene), c.varied(scene, factor))
+        for c in CONSTANTS
+        if c.key not in AXES and c.value(scene) != 0
+        for factor in c.factors
+    ]

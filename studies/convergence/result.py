@@ -24,12 +24,13 @@ class RunResult:
     """One run: the value that was varied, and what came out.
 
     Attributes:
-        dx_m: Cell size [m], of a run on one of the grids; each of the next five is of a run of its own axis.
+        dx_m: Cell size [m], of a run on one of the grids; each of the next six is of a run of its own axis.
         safety: Time step over its limit [-].
         mach: Speed of the blade over that of the P-wave [-].
         ppc: Particles per cell and direction.
         offset: Place of the blade in the grid [cells].
         repeat: Number of a run with other particles and the grid elsewhere, 0 for the one that they differ from.
+        value: Of a constant of the method [SI].
         peak_N: Largest force [N]; this and the next numbers are None where the run broke down.
         work_J: Work [J].
         parted: Energy that the edge has taken over R times the new area [-]; NaN where there is nothing to judge.
@@ -50,6 +51,7 @@ class RunResult:
     ppc: float | None = None
     offset: float | None = None
     repeat: float | None = None
+    value: float | None = None
     peak_N: float | None
     work_J: float | None
     parted: float | None
@@ -88,6 +90,17 @@ class AxisResult:
     slope_work: float | None = None
 
 
+@dataclass(frozen=True, kw_only=True)
+class ConstantResult(AxisResult):
+    """What a constant of the method changes.
+
+    Attributes:
+        name: What it is, in words.
+    """
+
+    name: str
+
+
 @dataclass(frozen=True)
 class ConvergenceLimits:
     """Largest changes between the two finest grids that count as converged, of work and peak [-]."""
@@ -120,6 +133,8 @@ class ConvergenceResult:
         ppc: What the number of particles changes.
         offset: What the place of the blade in the grid changes.
         repeat: What should not matter: other particles, the grid elsewhere.
+        constants: What each constant of the method changes when it is halved and doubled, by its key; None where they
+            were not varied.
         device: Device of the runs.
         versions: Versions of cutcal, Python and packages.
         git: Commit of the checkout.
@@ -129,7 +144,7 @@ class ConvergenceResult:
     KEYS: ClassVar[tuple[str, ...]] = (
         "food", "knife", "shape", "command", "warnings", "grids", "order", "gci_peak", "gci_work", "verdict",
         "converged", "limits", "peak", "work", "order_curve", "gci_curve_median", "gci_curve_max", "repeat_sd_peak_N",
-        "repeat_sd_work_J", "safety", "mach", "ppc", "offset", "repeat", "device", "versions", "git",
+        "repeat_sd_work_J", "safety", "mach", "ppc", "offset", "repeat", "constants", "device", "versions", "git",
     )  # fmt: skip
 
     food: str
@@ -151,6 +166,7 @@ class ConvergenceResult:
     ppc: AxisResult | None
     offset: AxisResult | None
     repeat: AxisResult | None
+    constants: Mapping[str, ConstantResult] | None = None
     device: str
     versions: Mapping[str, str]
     git: str | None
@@ -184,6 +200,11 @@ class ConvergenceResult:
         """What a thing changes that was varied apart; None where it was not, or fewer than two runs ended."""
         found: AxisResult | None = getattr(self, name)
         return None if found is None or found.spread_work is None else found
+
+    @property
+    def constants_seen(self) -> Mapping[str, ConstantResult]:
+        """The constants of the method whose spread is known, by key."""
+        return {key: found for key, found in (self.constants or {}).items() if found.spread_work is not None}
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,7 +29,7 @@ from cutcal.options import (
 )
 
 if TYPE_CHECKING:
-    from studies.convergence.result import ConvergenceResult, RunResult
+    from studies.convergence.result import AxisResult, ConvergenceResult, RunResult
 
 HELP = "repeat a cut on finer grids: order, numerical uncertainty"
 DESCRIPTION = """Repeat one cut on finer grids, and apart from that with other time steps,
@@ -40,6 +40,7 @@ EPILOG = """examples:
   cutcal converge --food banana
   cutcal converge --food potato --material runs/potato/material.yaml \\
       --dx 3e-3,2e-3,1.5e-3 --mach 0.005 --safety 0.35 --ppc 3 --offset 0.5
+  cutcal converge --food apple --knife edc --numerics
 
 Ctrl-C keeps what was computed; the same command with --resume goes on.
 Exit codes: 0 converged (work within 2 %, peak within 3 % between the two
@@ -70,6 +71,11 @@ def add_args(p: argparse.ArgumentParser) -> None:
         type=numbers(-1, 1, "cells"),
         metavar="C,...",
         help="places of the blade against the grid",
+    )
+    p.add_argument(
+        "--numerics",
+        action="store_true",
+        help="halve and double every constant of the method as well",
     )
     p.add_argument(
         "--repeats",
@@ -111,7 +117,9 @@ def run(args: argparse.Namespace) -> int:
     for text in cut.warnings:
         say(f"note: {text}")
     with workers_of(args, say) as pool:
-        result = refine(RefinementPlan(scene, axes, args.repeats), cut, out, pool, resume=args.resume, say=say)
+        result = refine(
+            RefinementPlan(scene, axes, args.repeats, args.numerics), cut, out, pool, resume=args.resume, say=say
+        )
     if args.json:
         print_json(to_document(result))
     else:
@@ -137,11 +145,15 @@ def table(result: ConvergenceResult) -> str:
         axis = result.axis(name)
         if axis is not None:
             slope = f", log-log slope of the peak {axis.slope_peak:+.3f}" if axis.slope_peak is not None else ""
-            lines.append(
-                f"  {words}: work within {axis.spread_work:.2%}, peak within {axis.spread_peak:.2%} of the mean{slope}"
-            )
+            lines.append(_axis_line(words, axis) + slope)
+    lines += [_axis_line(constant.name, constant) for constant in result.constants_seen.values()]
     head = f"{result.food}: {'converged' if result.converged else 'not converged'}"
     return "\n".join([head, *lines])
+
+
+def _axis_line(words: str, axis: AxisResult) -> str:
+    """What one thing changes that was varied apart from the cell size."""
+    return f"  {words}: work within {axis.spread_work:.2%}, peak within {axis.spread_peak:.2%} of the mean"
 
 
 def _grid_line(grid: RunResult) -> str:

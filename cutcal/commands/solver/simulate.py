@@ -18,6 +18,7 @@ from calib.material.food import FoodSpec
 from calib.material.knife import load_knife
 from calib.material.scene import cut_scene, specimen
 from calib.simulation.evaluation import FULLY_PARTED, pressed_away, weakened_ties
+from calib.table.units import metres
 from calib.validation.method_constants import CONSTANTS
 from cutcal.options import (
     add_food,
@@ -34,6 +35,7 @@ from mpm.output.energy import doubts, spent, unbooked
 from mpm.output.record import ForceRecord
 from mpm.output.snapshot import SnapshotRecorder
 from mpm.scene import CONTACTS, Arm, Scene
+from mpm.scene.errors import CutcalError
 from mpm.scene.shapes import Shape
 
 if TYPE_CHECKING:
@@ -41,6 +43,15 @@ if TYPE_CHECKING:
 
 HELP = "simulate one cut"
 DESCRIPTION = "Simulate one cut and write force.csv and summary.json."
+NUMERICAL = (
+    "contact_stiffness",
+    "face_height",
+    "edge_ahead",
+    "edge_band",
+    "least_gap",
+    "safety",
+)  # options of the numerics
+LENGTHS = ("zone", "slip", "cohesive_zone")  # constants that may be written with a unit
 VIDEO_FRAMES = 72  # of a video: five seconds
 FRAMES_PER_PAGE_FRAME = 2  # frames of a video of which a page has one
 FRAMES_PER_LINE = 12  # pictures of a video after which a line says how many there are
@@ -87,6 +98,13 @@ def add_args(p: argparse.ArgumentParser) -> None:
         type=number(0.1, 100, "of a layer's"),
         metavar="K",
         help="contact over a layer of particles (default 2)",
+    )
+    p.add_argument(
+        "--constant",
+        action="append",
+        default=[],
+        metavar="N=VALUE",
+        help="another constant of the method (docs/theory.md)",
     )
     p.add_argument(
         "--safety", type=number(0, 0.9, "of the stability limit"), metavar="F", help="time step (default 0.7)"
@@ -176,12 +194,32 @@ def _scene(args: argparse.Namespace, food: FoodSpec, shape: Shape) -> Scene:
         grid_shift=(0.0, args.offset, 0.0),
         grid_turn=math.radians(args.turn),
     )
-    given = {"contact_stiffness": args.contact_stiffness, "safety": args.safety}
-    numerics = replace(numerics, **{name: value for name, value in given.items() if value is not None})
-    sizes = {"zone": args.zone, "slip": args.slip}
-    edge = replace(scene.edge, **{name: value for name, value in sizes.items() if value is not None})
     arm = Arm(args.arm_stiffness, args.force_limit)
-    return replace(scene, motion=motion, numerics=numerics, edge=edge, arm=arm)
+    scene = replace(scene, motion=motion, numerics=numerics, arm=arm)
+    for name, value in _constants(args).items():
+        constant = next(c for c in CONSTANTS if c.key == name)
+        scene = constant.put(scene, value)
+    return scene
+
+
+def _constants(args: argparse.Namespace) -> dict[str, float]:
+    """Constants of the method that the options give, by key.
+
+    Raises:
+        CutcalError: ``--constant`` without a value, with one that is no number, or of a constant that there is not.
+    """
+    own = {name: getattr(args, name) for name in ("zone", "slip", "contact_stiffness", "safety")}
+    out = {name: value for name, value in own.items() if value is not None}
+    known = [c.key for c in CONSTANTS]
+    for item in args.constant:
+        name, sign, text = item.partition("=")
+        if not sign or name.strip() not in known:
+            raise CutcalError(f"--constant {item}: write NAME=VALUE, with a name of {', '.join(known)}")
+        try:
+            out[name.strip()] = metres(text) if name.strip() in LENGTHS else float(text)
+        except ValueError:
+            raise CutcalError(f"--constant {item}: {text!r} is not a number") from None
+    return out
 
 
 def _simulated(args: argparse.Namespace, scene: Scene) -> tuple[Simulation, SnapshotRecorder | None, ForceRecord]:

@@ -5,7 +5,13 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+import pytest
+
 from calib.validation.method_constants import CONSTANTS, varied
+from mpm.runtime import Runtime
+from mpm.scene import Scene
+from mpm.setup.parameters import parameters
+from mpm.setup.setup import Setup
 from tests.mpm.scenes import PRISM
 
 
@@ -34,3 +40,23 @@ def test_what_cannot_be_varied_says_why():
     """Both half and twice, or a reason; a loss factor of nothing is not varied."""
     assert all(bool(c.why) is (c.factors != (0.5, 2.0)) and c.source for c in CONSTANTS)
     assert not any("loss factor" in name for name in varied(PRISM))
+
+
+def test_the_zone_of_a_food_without_strength_is_varied_only_there():
+    """A food that has a tensile strength does not ask for it."""
+    name = "process zone of a food without strength"
+    assert PRISM.food.material.tensile_strength is None
+    assert {f"half the {name}", f"twice the {name}"} <= set(varied(PRISM))
+    assert not any(name in other for other in varied(PRISM.with_material(tensile_strength=2e4)))
+
+
+@pytest.mark.parametrize("constant", [c for c in CONSTANTS if c.part == "numerics"], ids=lambda c: c.key)
+def test_a_constant_of_the_numerics_reaches_the_kernels(constant):
+    """Each changes what the kernels read, or the time step."""
+
+    def read(scene: Scene) -> tuple[float, ...]:
+        setup = Setup(scene, Runtime(threads=1))
+        material = scene.food.material
+        return (setup.time_step(material), *parameters(scene, material, setup.seeds, setup.grid))
+
+    assert all(read(constant.varied(PRISM, factor)) != read(PRISM) for factor in constant.factors)

@@ -47,6 +47,8 @@ def converge(folder: Path, **changes: Any) -> Path:
     estimate = {"verdict": "monotonic", "order": 1.9, "extrapolated": 12.0, "change": 0.0123, "gci": 0.02}
     estimate |= {"gci_coarsest": 0.05, "fitted": 12.1, "fitted_order": 2.0, "uncertainty": 0.03}
     mach = {"rows": [grid(3e-3, 13.0, mach=m) for m in (0.005, 0.01)], "spread_peak": 0.0042, "spread_work": 0.001}
+    zone: dict[str, Any] = {"name": "process zone", "spread_peak": 0.0123, "spread_work": 0.002}
+    zone["rows"] = [grid(3e-3, 13.0, value=z) for z in (0.004, 0.008)]
     document = {
         "food": "shine_muscat", "knife": "kitchen",
         "shape": {"kind": "sphere", "length": 0.03, "width": 0.03, "height": 0.03}, "warnings": ["E is assumed"],
@@ -54,7 +56,7 @@ def converge(folder: Path, **changes: Any) -> Path:
         "limits": {"work": 0.02, "peak": 0.03}, "peak": estimate, "work": estimate | {"order": None},
         "order_curve": 2.0, "gci_curve_median": 0.01, "gci_curve_max": 0.04, "repeat_sd_peak_N": 0.1,
         "repeat_sd_work_J": 0.002, "mach": mach, "safety": None, "ppc": None, "offset": None,
-        "repeat": None, **ORIGIN, **changes,
+        "repeat": None, "constants": {"zone": zone}, **ORIGIN, **changes,
     }  # fmt: skip
     x = np.linspace(0, 0.03, 20)
     forces = {f"force_dx_{dx:g}_N": np.sin(x / 0.03 * np.pi) for dx in (3e-3, 2e-3)}
@@ -193,7 +195,7 @@ WRITERS = {"converge": convergence, "verify": verification, "stress": stability,
 SAID = {
     "converge": [
         "Shine muscat", "changes by +1.2 %", "broke down: inverted", "0.005 and 0.01", "Not varied here",
-        "E is assumed",
+        "E is assumed", "process zone", "0.004 and 0.008",
     ],
     "verify": [
         "1 row fails, of 2", "1 case broke down", "two discs", "its process was killed", "≥ 2.000", '"no"',

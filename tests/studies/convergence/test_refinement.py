@@ -8,15 +8,17 @@ import pandas as pd
 import pytest
 
 from calib.simulation.evaluation import Evaluation
+from calib.validation.method_constants import CONSTANTS
 from cutcal.main import main
 from tests.calib.documents import valid
 
 SMALL = ["converge", "--food", "banana", "--stroke", "4e-3", "--repeats", "1", "--dx", "6e-3,4.5e-3", "--mach", "0.02"]
+SMALL += ["--numerics"]
 
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    """A study of two coarse grids and a second speed; returns its folder and exit code."""
+    """A study of two coarse grids, a second speed and other constants; returns its folder and exit code."""
     out = tmp_path_factory.mktemp("study")
     return out, main([*SMALL, "--out", str(out)])
 
@@ -53,7 +55,7 @@ def test_resume_simulates_nothing_twice(study, capsys):
     before = json.loads((out / "converge.json").read_text())["grids"]
     assert main([*SMALL, "--out", str(out), "--resume"]) == code
     err = capsys.readouterr().err
-    assert "4 of 4 runs are known already" in err
+    assert "19 of 19 runs are known already" in err
     assert "left" not in err
     assert json.loads((out / "converge.json").read_text())["grids"] == before
 
@@ -69,6 +71,24 @@ def test_a_food_that_is_pressed_away_is_said_to_be(study, capsys, monkeypatch):
     assert "the food was pressed away rather than cut: the edge took 40% of R" in capsys.readouterr().err
     document = valid(json.loads((out / "converge.json").read_text()))
     assert [text for text in document["warnings"] if text.startswith("the food was pressed away")]
+
+
+def test_a_study_varies_every_constant_of_the_method(study, capsys):
+    """Each has rows with the run of the coarsest grid among them, and a line on the terminal; values that are asked for
+    take the place of half the speed."""
+    out, code = study
+    document = json.loads((out / "converge.json").read_text())
+    zone = document["constants"]["zone"]
+    assert zone["rows"][0] == {k: v for k, v in document["grids"][0].items() if k != "dx_m"} | {"value": 8e-3}
+    assert [row["value"] for row in zone["rows"]] == [8e-3, 16e-3] and zone["spread_work"] > 1e-3
+    varied = {c.key for c in CONSTANTS} - {"safety", "cohesive_zone"}  # an axis, and of foods without strength
+    assert set(document["constants"]) == varied
+    assert [row["mach"] for row in document["mach"]["rows"]] == [0.01, 0.02]
+    assert [row["safety"] for row in document["safety"]["rows"]] == [0.35, 0.7]
+    assert [row["offset"] for row in document["offset"]["rows"]] == [0.0, 0.5]
+    assert main([*SMALL, "--out", str(out), "--resume"]) == code
+    said = capsys.readouterr().out
+    assert all(f"  {c.name}: work within " in said for c in CONSTANTS if c.key in varied)
 
 
 @pytest.mark.parametrize(
