@@ -174,11 +174,11 @@ def _predictions(truth: Truth, runtime: Runtime, values: Mapping[str, float]) ->
 def main() -> None:
     """Print what default cells predict of potato and apple under three blades."""
     parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("food", nargs="*", default=list(FLESH), choices=list(FLESH), help="foods (default: all)")
+    parser.add_argument("--food", action="append", choices=list(FLESH), help="food; all where none is given")
     parser.add_argument("--cell", type=float, default=FINE, help="cell of the truth [m] (default 1.5e-3)")
     args = parser.parse_args()
     runtime = Runtime()
-    for food in args.food:
+    for food in args.food or FLESH:
         truth = truth_of(scenes_of(food), args.cell, runtime)
         values, after = fitted(truth, runtime)
         _say(f"{food}: fitted under the first blade {', '.join(f'{n} {v:.4g}' for n, v in values.items())}")
