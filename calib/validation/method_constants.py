@@ -64,6 +64,11 @@ CONSTANTS = (
         "process zone", "edge", "zone", (2.0,), "numerical: as wide as the cells allow",
         "half of it is narrower than a cell",
     ),
+    MethodConstant(
+        "bearing of the process zone", "edge", "bearing", (2.0,),
+        "plastic collapse under a punch of the zone's width, and a quarter more",
+        "half of it is less than R, and the food flows along with the edge",
+    ),
     MethodConstant("slip of the edge", "edge", "slip", (0.5, 2.0), "numerical: elastic way of the edge's law"),
     MethodConstant(
         "contact stiffness", "numerics", "contact_stiffness", (2.0,),

@@ -84,6 +84,8 @@ class Board:
         check_number("board", "mu", self.mu, -1e-300, 10.0, "")
 
 
+PUNCH = (2 + math.pi) / math.sqrt(3)
+"""Pressure that a flat punch needs to flow into a rigid-plastic solid in plane strain, over its yield stress [-]."""
 STEEPEST = 1.2
 """Largest angle of the edge to the board [rad]: at 69 degrees the ends of what lies over the food are 2.6 of its widths
 apart in height."""
@@ -156,15 +158,20 @@ class EdgeLaw:
     """Regularisation of the cutting edge, fixed in metres so that the force does not follow the grid.
 
     Attributes:
-        zone: Width of the B-spline over which the edge's line force is spread [m]; at least one cell.
+        zone: Width of the B-spline over which the edge's line force is spread [m]; at least one cell, and wider where
+            the food asks for it (:meth:`Scene.process_zone`).
+        bearing: Line force that a food that flows bears over that width, over R [-]. Below about 1 it flows along with
+            the edge, and new surface is had for less than R.
         slip: Slip of the edge in the material at which the line force is fully developed [m].
     """
 
     zone: float = 3e-3
+    bearing: float = 1.25
     slip: float = 1e-3
 
     def __post_init__(self) -> None:
         check_number("edge", "zone", self.zone, 1e-5, 0.05, "m")
+        check_number("edge", "bearing", self.bearing, -1e-300, 100.0, "of R")
         check_number("edge", "slip", self.slip, 1e-5, 0.05, "m")
 
 
@@ -289,6 +296,19 @@ class Scene:
         """Whether the ties are weaker than the food, as the grid resolves no more (Material.tie_strength)."""
         m = self.food.material
         return self.tied and m.tie_strength(self.numerics.dx / self.numerics.ppc) < m.cohesion
+
+    def process_zone(self, material: Material) -> float:
+        """Width over which the edge's line force is spread [m].
+
+        It is ``edge.zone``, and wider where the food would flow under the edge in place of parting. A flat punch of
+        that width bears (2 + pi) / sqrt(3) of the yield stress (Prandtl 1920), which is to be ``edge.bearing`` times R.
+        It is no more than half the food's height: a food that bears less is squashed, whatever cuts it.
+
+        Args:
+            material: Constants of the food.
+        """
+        wide = self.edge.bearing * material.R / (PUNCH * material.yield_stress)
+        return max(self.edge.zone, min(wide, self.food.shape.height / 2))
 
     @property
     def drop(self) -> float:

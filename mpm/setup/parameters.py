@@ -76,8 +76,8 @@ def _put_tool(table: np.ndarray, scene: Scene, material: Material) -> None:
     table[row.BLADE_MU], table[row.BOARD_MU] = material.mu, scene.board.mu
     table[row.R_FLESH], table[row.R_START] = material.R, material.start
     table[row.INITIATION_DEPTH] = material.initiation_depth
-    table[row.SLIP], table[row.ZONE] = edge.slip, edge.zone
-    table[row.ZONE_MASS] = material.rho * scene.numerics.dx * edge.zone**2
+    table[row.SLIP], table[row.ZONE] = edge.slip, scene.process_zone(material)
+    table[row.ZONE_MASS] = material.rho * scene.numerics.dx * table[row.ZONE] ** 2
     if isinstance(tool, Press):
         half, table[row.BLADE_MU], table[row.SPINE] = tool.half_angle, tool.mu, ENDLESS
     else:

@@ -66,8 +66,8 @@ def test_a_prism_is_cut_alike_wherever_the_blade_is():
 
 
 def test_halves_that_tip_stay_on_the_grid():
-    """The skin under the edge drags the cut faces of a long soft food down and tips its halves; their ends rise by 9
-    mm."""
+    """The skin under an edge that it flows along with drags the faces of a long soft food down and tips its halves;
+    their ends rise by 9 mm."""
     fruit = Material(
         E=2.6e5, nu=0.35, rho=960, yield_stress=1.7e4, R=370, R_initiation=525, R_skin=434, skin_thickness=2.5e-3,
         initiation_depth=1.6e-3, mu=0.18,
@@ -76,7 +76,7 @@ def test_halves_that_tip_stay_on_the_grid():
     blade = Knife("flat", 2e-3, np.deg2rad(2.55), 0.045, 0.2)
     numerics = Numerics(dx=3e-3, far=8e-3, grid_shift=(0.5, 0.0, 0.57), seed=1)
     simulation = Simulation(
-        Scene(Food(shape, fruit), blade, Motion(0.033, 0.01), edge=EdgeLaw(zone=4e-3), numerics=numerics),
+        Scene(Food(shape, fruit), blade, Motion(0.033, 0.01), edge=EdgeLaw(zone=4e-3, bearing=0.0), numerics=numerics),
         Runtime(threads=1),
     )
     watch = SnapshotRecorder(10)
@@ -92,11 +92,21 @@ def test_thin_blade_needs_resistance_times_width(prism, modulus, R):
     assert plateau(record) == pytest.approx(R * 0.024, rel=0.03)
 
 
+def test_a_process_zone_is_as_wide_as_the_food_asks_for(prism):
+    """A punch of its width bears a quarter more than R, unless that is half the food's height; then R is paid also by a
+    food whose yield stress over the zone of a firm one is a tenth of R."""
+    zones = [PRISM.process_zone(replace(FLESH, yield_stress=y)) for y in (np.inf, 2e5, 2e4, 1e3)]
+    assert zones[:2] == [3e-3, 3e-3] and zones[3] == PRISM.food.shape.height / 2
+    assert (2 + np.pi) / np.sqrt(3) * 2e4 * zones[2] == pytest.approx(1.25 * FLESH.R)
+    assert prism.run(replace(FLESH, yield_stress=1e4)).parted == pytest.approx(1.0, abs=0.06)
+
+
 def test_food_that_flows_is_pressed_away_not_parted(prism):
     """The edge takes R from each new area of a food that is cut (5 %), and far less of one whose yield stress over the
-    process zone is a tenth of R: that one flows along with the edge. Where nothing is to be parted there is no such
-    number."""
-    cut, flown = (prism.run(replace(FLESH, yield_stress=y)) for y in (2e5, 1e4))
+    process zone is a tenth of R: under an edge that does not follow it, that one flows along. Where nothing is to be
+    parted there is no such number."""
+    cut = prism.run(replace(FLESH, yield_stress=2e5))
+    flown = run(replace(PRISM, edge=replace(PRISM.edge, bearing=0.0)), yield_stress=1e4)
     assert cut.parted == pytest.approx(1.0, abs=0.06)
     assert flown.status == "done" and flown.parted < 0.5
     assert flown.plastic[-1] > flown.parting[-1]
