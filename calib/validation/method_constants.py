@@ -75,17 +75,13 @@ CONSTANTS = (
         "numerical: above the bound of Nitsche's method, 1.5 layers of particles", "half of it is below that bound",
     ),
     MethodConstant(
-        "height of a particle's face", "numerics", "face_height", (2.0,),
+        "height of a particle's face", "numerics", "face_height", (0.5,),
         "numerical: over it the blade's profile is averaged, one spacing of the particles",
-        "over half of it rows of particles let go of the blade's shoulder one by one, and energy comes from nothing",
-    ),
-    MethodConstant(
-        "lead of the edge", "numerics", "edge_ahead", (0.5, 2.0),
-        "numerical: what the edge cuts has its middle half a cell below it",
+        "twice of it is coarser than the particles are",
     ),
     MethodConstant(
         "band of the edge", "numerics", "edge_band", (0.5, 2.0),
-        "numerical: half a cell about that middle, one spacing of the particles",
+        "numerical: half a cell about the edge, one spacing of the particles",
     ),
     MethodConstant(
         "least gap to a surface", "numerics", "least_gap", (0.5, 2.0),

@@ -18,7 +18,6 @@ from mpm.state.tables import (
     BLADE_HEIGHT,
     CONTACT,
     DX,
-    EDGE_AHEAD,
     EDGE_BAND,
     FIRST_STATION,
     INV_DX,
@@ -101,12 +100,12 @@ def pull_tie(s: ti.template(), cut, n, dt):
         jump[2] += s.face_shear[cut, n][1]
         at = 0.5 * (at + there)
     tip, end = edge_height(s, cut, at[0]), s.par[cut, TIE_OPENING]
-    ahead, band = s.par[cut, EDGE_AHEAD], s.par[cut, EDGE_BAND]
+    band = s.par[cut, EDGE_BAND]
     above = (at[2] - tip) * s.par[cut, INV_DX]
     between = False  # the blade
     if under_blade(s, cut, at[0]) and above * s.par[cut, DX] < s.par[cut, BLADE_HEIGHT]:
         if cut_has_started(s, cut, at[0]):
-            s.cut_part[cut, n] = ti.max(s.cut_part[cut, n], passed_part((above + ahead) / band))
+            s.cut_part[cut, n] = ti.max(s.cut_part[cut, n], passed_part(above / band))
         between = above > 0
     left = 1.0 - s.cut_part[cut, n]
     m = s.par[cut, MASS] * s.volume_ratio[cut, p]
@@ -132,7 +131,7 @@ def pull_tie(s: ti.template(), cut, n, dt):
         push_face(s, cut, p, s.tool_gap[cut, p], dv)
         if ti.static(not s.mirror_y):
             push_face(s, cut, other, -s.tool_gap[cut, other], -dv)
-    weight = passing_weight((above + ahead) / band)
+    weight = passing_weight(above / band)
     if weight > 0:
         tough = s.tie_toughness[cut, n]
         rest = tough * (1.0 - work_spent(s.largest_opening[cut, n], end)) if left > 0 else 0.0

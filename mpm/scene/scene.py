@@ -188,10 +188,7 @@ class Numerics:
             method is not stable in every food (docs/theory.md, "Measured choices"); stiffer asks for shorter steps.
         face_height: Height over which a particle meets the mean of the blade's profile, over the spacing of the
             particles [-].
-        edge_ahead: Distance by which the middle of what the edge is cutting lies below it [cells]. As large as the
-            band, the edge has cut all that is above it. Ties that are left there press the halves on the faces of a
-            thin blade, and the more friction do they make, the larger the cells.
-        edge_band: Half height of what the edge is cutting [cells].
+        edge_band: Half height of what the edge is cutting, about the edge [cells].
         least_gap: Least distance of a particle's centre from the food's surface that squeezing leaves [cells].
         contact: ``cohesive`` (edge law and particle contact) or ``nodal`` (the plain projection of grid velocities).
         grid_shift: Position of the grid against the scene along x, y, z [cells].
@@ -212,7 +209,6 @@ class Numerics:
     contact: str = "cohesive"
     contact_stiffness: float = 2.0
     face_height: float = 1.0
-    edge_ahead: float = 0.5
     edge_band: float = 0.5
     least_gap: float = 0.02
     grid_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -239,7 +235,6 @@ class Numerics:
         check_number(w, "room", self.room, 0.0, 100.0, "of half the food's size")
         check_number(w, "contact_stiffness", self.contact_stiffness, 0.1, 100.0, "of a layer's")
         check_number(w, "face_height", self.face_height, 0.01, 10.0, "of a particle's spacing")
-        check_number(w, "edge_ahead", self.edge_ahead, -1e-300, 5.0, "cells")
         check_number(w, "edge_band", self.edge_band, 0.01, 5.0, "cells")
         check_number(w, "least_gap", self.least_gap, 1e-6, 0.2, "cells")
         check_number(w, "safety", self.safety, 0.0, 0.9001, "of the stability limit")

@@ -46,7 +46,6 @@ DESCRIPTION = "Simulate one cut and write force.csv and summary.json."
 NUMERICAL = (
     "contact_stiffness",
     "face_height",
-    "edge_ahead",
     "edge_band",
     "least_gap",
     "safety",
