@@ -84,7 +84,7 @@ def scene(block: Shape, food: Material, wedge: Wedge, stroke: float, dx: float) 
     return Scene(
         Food(block, food),
         knife,
-        Motion(stroke, max(LEAST_MACH, quasi_static_mach(knife))),
+        Motion(stroke, max(LEAST_MACH, quasi_static_mach(knife, block))),
         Board(0.0),
         EdgeLaw(zone=max(ZONE, dx)),
         Numerics(dx=dx, gravity=0.0, room=1.0),
