@@ -9,7 +9,7 @@ from mpm.state.accessors import step_size, to_grid_axes, to_scene_axes
 from mpm.state.loops import block_range, locate_active, node_box, repetitions
 from mpm.state.state import NODE_ROWS, PARTS
 from mpm.state.stencil import add_to_node, base_node, bspline_weights, in_window, thread_node_index
-from mpm.state.tables import COUNT, DX, INV_DX, MASS, PLASTIC, VOLUME
+from mpm.state.tables import COUNT, DX, INV_DX, MASS, N_LOSSES, VOLUME
 
 
 @ti.func
@@ -20,11 +20,12 @@ def particles_to_grid(s: ti.template(), cut: ti.template()):
         first, last, thread = block_range(s, c, part)
         if mine and first < last:
             dt, w = step_size(s, c), node_box(s, c, NODE_ROWS)
-            total = ti.Vector.zero(float, 5)
+            total = ti.Vector.zero(float, N_LOSSES)
             for block in range(first, last):
                 total += p2g_block(s, c, block, thread, dt, w)
-            for r in ti.static(range(5)):
-                s.sums[c, PLASTIC + r] += total[r]
+            for r in ti.static(range(N_LOSSES)):
+                if total[r] != 0:  # most particles lose nothing
+                    s.losses[c, part % s.copies, r] += total[r]
 
 
 @ti.func
@@ -35,7 +36,7 @@ def p2g_block(s: ti.template(), cut, block, thread, dt, window):
         Plastic, damage and viscous loss over the volume of a particle beside the cut [J/m^3], and how many particles
         are inverted and outside.
     """
-    total = ti.Vector.zero(float, 5)
+    total = ti.Vector.zero(float, N_LOSSES)
     if ti.static(s.branches == 0):
         elastic_block(s, cut, block, dt)
     for lane in range(s.lanes):

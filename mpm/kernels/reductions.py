@@ -5,8 +5,8 @@ import taichi as ti
 from mpm.kernels.constitutive import damage_of, deviatoric_energy, left_cauchy_green, left_stretch, unit
 from mpm.kernels.crack import IN_CONTACT
 from mpm.state.accessors import deformation_gradient, velocity_gradient
-from mpm.state.loops import block_range, extent, locate, repetitions
-from mpm.state.state import BEYOND_GRID, CUTS, DAMAGE_ROWS, NODE_LINES, NODE_ROWS, PARTS
+from mpm.state.loops import block_range, locate, repetitions
+from mpm.state.state import BEYOND_GRID, CUTS, PARTS
 from mpm.state.stencil import base_node
 from mpm.state.tables import (
     BOOKED_IMPULSE,
@@ -19,11 +19,13 @@ from mpm.state.tables import (
     LAM,
     MASS,
     MU,
+    N_LOSSES,
     N_PARTICLE_SUMS,
     N_POSE,
     N_SUMS,
     NODES,
     PLANE_Y,
+    PLASTIC,
     VOLUME,
 )
 
@@ -37,9 +39,6 @@ def find_window(s: ti.template(), cut):
         c, _, _ = locate(s, cut, q, CUTS)
         for d in ti.static(range(3)):
             s.window[c, d], s.window[c, d + 3] = BEYOND_GRID, -BEYOND_GRID
-        if ti.static(s.atomic):
-            for what in ti.static((NODE_ROWS, NODE_LINES, DAMAGE_ROWS)):
-                s.extents[what] = 0
     for q in range(repetitions(s, cut, PARTS)):
         c, part, there = locate(s, cut, q, PARTS)
         first, last, _ = block_range(s, c, part)
@@ -51,8 +50,10 @@ def find_window(s: ti.template(), cut):
                     node = ti.min(ti.max(base[d], -BEYOND_GRID // 2), BEYOND_GRID // 2)
                     low[d], high[d] = ti.min(low[d], node), ti.max(high[d], node)
             for d in ti.static(range(3)):
-                ti.atomic_min(s.window[c, d], low[d])
-                ti.atomic_max(s.window[c, d + 3], high[d])
+                if low[d] < s.window[c, d]:  # most change nothing, and on a GPU would wait for each other
+                    ti.atomic_min(s.window[c, d], low[d])
+                if high[d] > s.window[c, d + 3]:
+                    ti.atomic_max(s.window[c, d + 3], high[d])
     for q in range(repetitions(s, cut, CUTS)):
         c, _, _ = locate(s, cut, q, CUTS)
         for d in ti.static(range(3)):
@@ -62,10 +63,6 @@ def find_window(s: ti.template(), cut):
                 low, high = ti.min(low, plane - 2), ti.max(high, plane + 3)
             s.window[c, d] = ti.max(low, 0)
             s.window[c, d + 3] = ti.max(ti.min(high, s.size[c, NODES + d]), s.window[c, d])
-        if ti.static(s.atomic):
-            for what in ti.static((NODE_ROWS, NODE_LINES)):
-                ti.atomic_max(s.extents[what], extent(s, c, what))
-            ti.atomic_max(s.extents[DAMAGE_ROWS], extent(s, c, NODE_ROWS))
 
 
 @ti.func
@@ -74,10 +71,6 @@ def report(s: ti.template(), cut, row, out: ti.template()):
 
     Images of mirrors are not counted.
     """
-    for q in range(repetitions(s, cut, CUTS)):
-        c, _, _ = locate(s, cut, q, CUTS)
-        for r in range(N_PARTICLE_SUMS):
-            s.particle_sums[c, r] = 0.0
     for q in range(repetitions(s, cut, PARTS)):
         c, part, there = locate(s, cut, q, PARTS)
         first, last, _ = block_range(s, c, part)
@@ -86,17 +79,29 @@ def report(s: ti.template(), cut, row, out: ti.template()):
             for p in range(first * s.lanes, ti.min(last * s.lanes, s.size[c, COUNT])):
                 total += momentum_and_energy(s, c, p)
             for r in ti.static(range(N_PARTICLE_SUMS)):
-                s.particle_sums[c, r] += total[r]
+                s.particle_sums[c, part % s.copies, r] += total[r]
     for q in range(repetitions(s, cut, CUTS)):
         c, _, _ = locate(s, cut, q, CUTS)
         for r in range(N_PARTICLE_SUMS):
-            out[c, row, N_SUMS + r] = s.particle_sums[c, r]
+            out[c, row, N_SUMS + r] = take_sum(s, s.particle_sums, c, r)
         for r in range(N_POSE):
             out[c, row, N_SUMS + N_PARTICLE_SUMS + r] = s.pose[c, r]
         s.pose[c, BOOKED_IMPULSE] -= s.sums[c, EDGE + 2] + s.sums[c, FACE + 2]  # the arm has felt that
         for r in range(s.booked_sums):
             out[c, row, r] = s.sums[c, r]
             s.sums[c, r] = 0.0
+        for r in range(N_LOSSES):
+            out[c, row, PLASTIC + r] = take_sum(s, s.losses, c, r)
+
+
+@ti.func
+def take_sum(s: ti.template(), field: ti.template(), cut, row):
+    """Sum of the copies of a sum over particles, which are cleared."""
+    total = ti.cast(0.0, ti.f64)
+    for k in range(s.copies):
+        total += field[cut, k, row]
+        field[cut, k, row] = 0.0
+    return total
 
 
 @ti.func

@@ -32,9 +32,8 @@ from mpm.state.contents import (
     WIDTH,
     Contents,
 )
-from mpm.state.state import CUTS, N_LOOPS, PARTS, SECOND_FIELD_CELLS, SLICES, TIES, State
+from mpm.state.state import SECOND_FIELD_CELLS, State
 from mpm.state.tables import (
-    BLOCKS,
     COUNT,
     N_PARAMETERS,
     N_POSE,
@@ -66,13 +65,9 @@ def begin(state: State, cuts: Sequence[Contents]) -> None:
     sizes = np.zeros((state.batch, N_SIZES), np.int32)
     sizes[: len(cuts)] = [_sizes(state, cut) for cut in cuts]
     state.n = sizes[:, COUNT]
-    most = np.zeros((1, N_LOOPS), np.int32)
-    most[0, [CUTS, PARTS, SLICES]] = 1, sizes[:, BLOCKS].max(), sizes[:, STATIONS].max()
-    most[0, TIES] = sizes[:, TIE_COUNT].max()
     _write(
         state,
         sizes,
-        most,
         _table(state, (state.n.max(), N_PARTICLE), [cut.particles for cut in cuts]),
         _table(state, (sizes[:, STATIONS].max(), N_SLICE), [cut.slices for cut in cuts]),
         _table(state, (N_PARAMETERS,), [cut.parameters for cut in cuts]),
@@ -108,7 +103,6 @@ def _table(state: State, shape: tuple[int, ...], parts: Sequence[np.ndarray]) ->
 def _write(
     s: ti.template(),
     sizes: INTEGERS,
-    most: INTEGERS,
     particles: TABLES,
     slices: TABLES,
     parameters: ROWS,
@@ -118,8 +112,6 @@ def _write(
     """Write the tables into the fields, and empty those that a run begins with empty."""
     for c, k in s.size:
         s.size[c, k] = sizes[c, k]
-    for k in s.extents:
-        s.extents[k] = most[0, k]
     for c, k in s.par:
         s.par[c, k] = ti.cast(parameters[c, k], float)
     for c, k in s.pose:
@@ -174,6 +166,10 @@ def _write(
         s.crack_front[c, i] = 1e3
     for c, k in s.sums:
         s.sums[c, k] = 0.0
+    for c, k, r in s.losses:
+        s.losses[c, k, r] = 0.0
+    for c, k, r in s.particle_sums:
+        s.particle_sums[c, k, r] = 0.0
 
 
 @ti.kernel

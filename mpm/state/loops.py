@@ -35,7 +35,7 @@ def extent(s: ti.template(), cut, what: ti.template()):
 @ti.func
 def repetitions(s: ti.template(), cut, what: ti.template()):
     """How often a loop over the places of a cut repeats; on a GPU it goes over those of all cuts."""
-    return s.batch * s.extents[what] if ti.static(s.atomic) else extent(s, cut, what)
+    return ti.static(s.batch * s.extents[what]) if ti.static(s.atomic) else extent(s, cut, what)
 
 
 @ti.func
@@ -43,8 +43,8 @@ def locate(s: ti.template(), cut, q, what: ti.template()):
     """Cut and place that repetition ``q`` of such a loop is for, and whether there is one."""
     c, r, there = cut, q, True
     if ti.static(s.atomic):
-        c = q // s.extents[what]
-        r = q - c * s.extents[what]
+        c = q // ti.static(s.extents[what])
+        r = q - c * ti.static(s.extents[what])
         there = r < extent(s, c, what)
     return c, r, there
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,16 +11,26 @@ import taichi as ti
 
 from mpm.discretisation.grid import MIRROR
 from mpm.runtime import adds_doubles
-from mpm.state.tables import N_ORDER, N_PARAMETERS, N_PARTICLE_SUMS, N_POSE, N_SIZES, N_STRESS, N_SUMS, TIE_WORK
+from mpm.state.tables import (
+    N_LOSSES,
+    N_ORDER,
+    N_PARAMETERS,
+    N_PARTICLE_SUMS,
+    N_POSE,
+    N_SIZES,
+    N_STRESS,
+    N_SUMS,
+    TIE_WORK,
+)
 
 BEYOND_GRID = 1 << 20  # a node that no grid has
 SECOND_FIELD_CELLS = 3  # cells on either side of the cut plane whose nodes may carry both halves
 REGISTER = 32  # bytes of a register of a CPU: as many particles as fill it have their elastic stress found at once
+SUM_COPIES = 64  # copies of a sum over particles on a GPU, where additions to one number wait for each other
 CPU_BLOCK = 512  # Taichi runs CPU loops shorter than this on one thread, so one iteration in 512 works for a thread
 # What a loop goes over: each cut, rows of nodes in reach, lines of nodes across the mirror, parts of the particles,
 # slices along the edge, rows of nodes about what could be damaged, ties across the cut plane.
 CUTS, NODE_ROWS, NODE_LINES, PARTS, SLICES, DAMAGE_ROWS, TIES = range(7)
-N_LOOPS = 7
 
 
 @dataclass(frozen=True)
@@ -125,10 +136,13 @@ class State:
             [J/m^2], and the weights [-], (cut, slice).
         passed_mean: Their last means: what is left, and toughness [J/m^2], (cut, slice).
         start_excess: Line force beyond the toughness at which a cut has started [N/m], (cut, slice).
-        sums, particle_sums, pose, order, par, size: Tables whose rows are in :mod:`mpm.state.tables`, (cut, row).
+        sums, pose, order, par, size: Tables whose rows are in :mod:`mpm.state.tables`, (cut, row).
+        losses, particle_sums: Sums over particles, of which different particles add to different copies,
+            (cut, copy, row); ``losses`` are the rows of the table of sums from ``PLASTIC`` on.
         window: Nodes that particles can reach before it is renewed: first, last + 1, (cut, 6).
         steps_left: Steps that a cut has yet to do before the next row of the report, on a GPU, (cut,).
-        extents: Most places that a loop goes over in any cut, (kind of loop,).
+        extents: Most places that a loop of a kind may go over in a cut. It is compiled in: to read a length a GPU needs
+            a launch more, and then starts more threads than there are places.
         n: Particles of each cut, shape (cuts,).
         owner: Whose cuts the fields hold.
     """
@@ -156,8 +170,11 @@ class State:
         ti.sync()
         booked = ti.f64 if adds_doubles() else ti.f32
         self.booked_sums = N_SUMS if self.cuts else TIE_WORK  # the last is of the ties
+        self.copies = SUM_COPIES if self.atomic else 1
         self.sums = ti.field(booked, (own.batch, self.booked_sums))
-        self.particle_sums = ti.field(booked, (own.batch, N_PARTICLE_SUMS))
+        self.losses = ti.field(booked, (own.batch, self.copies, N_LOSSES))
+        self.particle_sums = ti.field(booked, (own.batch, self.copies, N_PARTICLE_SUMS))
+        self.extents = self._extents(own)
         self._add_particles(real, own.damage)
         self._add_grid(real, own.nodes)
         self._add_edge(real)
@@ -165,6 +182,19 @@ class State:
         if self.cuts:
             self._add_ties(real, max(own.ties, 1))
         ti.sync()  # lays these fields out by themselves; Taichi does not manage those of eight scenes at once
+
+    def _extents(self, own: Configuration) -> dict[int, int]:
+        """Most places that the loops of a GPU go over, by their kind."""
+        nodes, lines = math.prod(own.nodes), math.prod(own.nodes[1:])
+        return {
+            CUTS: 1,
+            NODE_ROWS: nodes,
+            NODE_LINES: lines,
+            PARTS: self.blocks,
+            SLICES: self.slices,
+            DAMAGE_ROWS: nodes,
+            TIES: max(own.ties, 1),
+        }
 
     def _add_particles(self, real: Any, damage: bool) -> None:
         """Fields of the particles."""
@@ -226,4 +256,3 @@ class State:
         self.size = ti.field(ti.i32, (self.batch, N_SIZES))
         self.window = ti.field(ti.i32, (self.batch, 6))
         self.steps_left = ti.field(ti.i32, self.batch)
-        self.extents = ti.field(ti.i32, N_LOOPS)

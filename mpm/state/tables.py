@@ -41,6 +41,7 @@ N_SIZES = 12
 EDGE, FACE, BOARD = 0, 3, 6
 PLASTIC, DAMAGE, VISCOUS, INVERTED, OUTSIDE, FRICTION_WORK, CUTTING_WORK, MOMENT, TIE_WORK = range(9, 18)
 N_SUMS = 18
+N_LOSSES = 5  # rows from PLASTIC to OUTSIDE, which are sums over particles
 
 # Rows of the sums over all particles at an output: momentum (three), kinetic and elastic energy.
 MOMENTUM, KINETIC, ELASTIC = 0, 3, 4

@@ -9,6 +9,7 @@ from scipy.linalg import polar
 
 from mpm.discretisation.capacity import EXTRA_PARTICLES, node_capacity, particle_capacity
 from mpm.kernels.crack import ALL_VISIBLE
+from mpm.kernels.reductions import report
 from mpm.kernels.stress import elastic_block
 from mpm.kernels.surface_contact import friction_limit
 from mpm.kernels.time_step import advance
@@ -16,9 +17,10 @@ from mpm.runtime import Runtime
 from mpm.scene import EdgeLaw, Food, Motion, Numerics, Scene
 from mpm.scene.material import Material
 from mpm.scene.shapes import Shape
+from mpm.setup.setup import Setup
 from mpm.solver import Simulation, state_of
 from mpm.state import tables as kn
-from mpm.state.host_transfer import of_particles, particles, set_velocity_gradients, velocity_gradients
+from mpm.state.host_transfer import TABLES, fill, of_particles, particles, set_velocity_gradients, velocity_gradients
 from mpm.state.state import Configuration, State
 from tests.mpm import twins
 from tests.mpm.scenes import FLESH, PRISM, WEDGE
@@ -50,6 +52,12 @@ def elastic(k: ti.template(), dt: float):
     """The elastic pass alone."""
     for block in range(k.size[0, kn.BLOCKS]):
         elastic_block(k, 0, block, dt)
+
+
+@ti.kernel
+def report_row(k: ti.template(), out: TABLES):
+    """A row of the report alone."""
+    report(k, 0, 0, out)
 
 
 def padded(k, f):
@@ -327,3 +335,24 @@ def test_contact_is_as_stiff_at_any_time_step_and_loss_factor():
         assert found[-1] * setup.time_step(food) ** 2 <= 2.0
     assert found == [found[0]] * 3
     assert found[0] == pytest.approx(2 * (FLESH.p_wave / 1.5e-3) ** 2)
+
+
+def test_the_copies_of_a_sum_are_added_up_and_begin_anew(monkeypatch):
+    """A row of the report has what all copies of the losses hold, and the momentum of all particles, more than there
+    are copies; the next row has the momentum again and no losses.
+    """
+    monkeypatch.setattr(Setup, "threads", lambda self: 0)
+    simulation, rng = Simulation(PRISM, Runtime(threads=2)), np.random.default_rng(0)
+    simulation.load(PRISM.food.material)
+    state = simulation.state
+    booked, velocities = rng.uniform(1, 2, state.losses.shape), rng.uniform(1, 2, (state.n[0], 3))
+    assert 1 < state.copies < state.n[0]
+    state.losses.from_numpy(booked)
+    fill(state, state.v, velocities)
+    momentum = state.par.to_numpy()[0, kn.MASS] * (state.volume_ratio.to_numpy()[0, : state.n[0]] @ velocities)
+    for losses in (booked[0].sum(axis=0), np.zeros(kn.N_LOSSES)):
+        out = np.zeros((1, 1, kn.N_REPORT))
+        report_row(state, out)
+        row = kn.parts_of_report(out[0, 0])
+        np.testing.assert_allclose(row.sums[kn.PLASTIC : kn.PLASTIC + kn.N_LOSSES], losses, rtol=1e-12)
+        np.testing.assert_allclose(row.particles[kn.MOMENTUM : kn.KINETIC], momentum, rtol=1e-12)
