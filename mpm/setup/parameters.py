@@ -62,6 +62,7 @@ def _put_material(table: np.ndarray, scene: Scene, material: Material, seeds: Se
     table[row.CONTACT] = contact_stiffness(scene, material, seeds.spacing)
     if scene.tied:
         table[row.SPACING], table[row.TIE_OPENING] = seeds.spacing, material.tie_opening(seeds.spacing)
+        table[row.LAYERED] = material.layered
     table[row.ADHESION], table[row.ADHESION_GAP] = material.adhesion / (material.rho * seeds.spacing), 1.0
     if material.adhesion > 0:
         table[row.ADHESION_GAP] = 2 * material.adhesion_energy / material.adhesion
@@ -71,7 +72,7 @@ def _put_tool(table: np.ndarray, scene: Scene, material: Material) -> None:
     """Shape and friction of the tools, and the edge's law."""
     edge, tool = scene.edge, scene.knife
     table[row.BLADE_MU], table[row.BOARD_MU] = material.mu, scene.board.mu
-    table[row.R_FLESH], table[row.R_START] = material.R, material.start
+    table[row.R_START] = material.start
     table[row.INITIATION_DEPTH] = material.initiation_depth
     table[row.SLIP], table[row.ZONE] = edge.slip, edge.zone
     table[row.ZONE_MASS] = material.rho * scene.numerics.dx * edge.zone**2

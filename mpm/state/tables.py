@@ -8,12 +8,12 @@ import numpy as np
 
 # Rows of the table of parameters, which kernels read at run time.
 MU, LAM, YIELD, MASS, VOLUME, BLADE_MU, BOARD_MU = range(7)
-R_FLESH, R_START, INITIATION_DEPTH, SLIP, ZONE, ZONE_MASS, EPS0, EPSF = range(7, 15)
-SPINE, WEDGE_COS, WEDGE_SIN, HALF_LENGTH, BLADE_HEIGHT, GRAVITY, TIP_RADIUS, ETA_S, ETA_B = range(15, 24)
-YAW_COS, YAW_SIN, ADHESION, ADHESION_GAP = range(24, 28)
-ARM_K, ARM_C, ARM_MASS, ARM_LIMIT = range(28, 32)
-DX, INV_DX, ORIGIN_X, ORIGIN_Y, ORIGIN_Z, FIRST_STATION = range(32, 38)
-SPACING, TIE_OPENING, CONTACT = range(38, 41)
+R_START, INITIATION_DEPTH, SLIP, ZONE, ZONE_MASS, EPS0, EPSF = range(7, 14)
+SPINE, WEDGE_COS, WEDGE_SIN, HALF_LENGTH, BLADE_HEIGHT, GRAVITY, TIP_RADIUS, ETA_S, ETA_B = range(14, 23)
+YAW_COS, YAW_SIN, ADHESION, ADHESION_GAP = range(23, 27)
+ARM_K, ARM_C, ARM_MASS, ARM_LIMIT = range(27, 31)
+DX, INV_DX, ORIGIN_X, ORIGIN_Y, ORIGIN_Z, FIRST_STATION = range(31, 37)
+SPACING, TIE_OPENING, CONTACT, LAYERED = range(37, 41)
 N_PARAMETERS = 41
 
 # Rows of the table of sizes: particles, blocks of them, nodes along x, y, z, slices along the edge, the node plane
