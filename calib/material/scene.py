@@ -22,7 +22,7 @@ CELL_PER_ZONE = 0.75
 MACH = 0.01
 """Speed of the blade over that of the P-wave [-]; the coarse cut has twice of it."""
 CLEARANCE_ZONES = 1.0
-"""Least food left below the edge where a trace ends under load, in process zones."""
+"""Food that is likely left below the edge where a trace ends under load, in process zones."""
 HEIGHT_SPAN = 1.25
 """A specimen of unknown height may be at least this many times higher than the lowest it can be."""
 UNDER_LOAD = 0.5
@@ -100,8 +100,8 @@ def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple
         else:
             low, height, high = free
             said.append(
-                "the specimen's height is not known: the trace ends under load, so the edge stopped above the board, "
-                f"and {low * 1e3:.0f} to {high * 1e3:.0f} mm are possible; give --height if you measured it"
+                "the specimen's height is not known: the trace ends under load, so the edge stopped on the board or "
+                f"above it, and {low * 1e3:.0f} to {high * 1e3:.0f} mm are possible; give --height if you measured it"
             )
     height = default.height if height is None else height
     width = sizing.width
@@ -129,8 +129,8 @@ def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple
 def height_range(food: FoodSpec, trace: Conditioned, sizing: Sizing) -> tuple[float, float, float] | None:
     """Range of the height of a specimen whose trace ends under load.
 
-    The edge then stopped above the board: the food is higher than the stroke by a process zone at least. Its likely
-    height is the usual one where that is possible.
+    The edge then stopped on the board or above it: the food is as high as the stroke at least. Its likely height is the
+    usual one where that is possible, and leaves a process zone below the edge.
 
     Args:
         food: The food with its usual height and the literature's range of it.
@@ -145,9 +145,11 @@ def height_range(food: FoodSpec, trace: Conditioned, sizing: Sizing) -> tuple[fl
     if sizing.height is not None or trace.stroke_source == "height" or not loaded:
         return None
     known = food.dims["height"]
-    low = trace.stroke_length_m + CLEARANCE_ZONES * min(ZONE_M, trace.stroke_length_m / ZONE_PARTS)
+    low = trace.stroke_length_m
     high = max(known.high, HEIGHT_SPAN * low)
-    return low, known.value if low < known.value < high else (low * high) ** 0.5, high
+    likely = known.value if low < known.value < high else (low * high) ** 0.5
+    clear = low + CLEARANCE_ZONES * min(ZONE_M, low / ZONE_PARTS)
+    return low, max(likely, clear), high
 
 
 def at_fitted_height(
@@ -156,7 +158,8 @@ def at_fitted_height(
     """The scene at a fitted height, and the values that are left: those of the material.
 
     The cell grows with the height, so that every height has the same particles and nodes: on a fixed cell each height
-    would draw other particles, and the force would jump by several per cent from one to the next.
+    would draw other particles, and the force would jump by several per cent from one to the next. The stroke ends at
+    the board, where the height is less.
 
     Args:
         scene: The scene with any height.
@@ -180,6 +183,7 @@ def at_fitted_height(
         replace(
             scene,
             food=food,
+            motion=replace(scene.motion, stroke=min(scene.motion.stroke, height)),
             numerics=replace(scene.numerics, dx=cell, far=None if far is None else k * far),
             edge=replace(scene.edge, zone=max(scene.edge.zone, cell)),
         ),
@@ -202,8 +206,8 @@ def windowed(scene: Scene, heights: tuple[float, float, float] | None = None) ->
         The scene.
     """
     own = scene.food.shape.height
-    low, _, high = heights or (own, own, own)
-    stroke = min(scene.motion.stroke + 0.5 * scene.numerics.dx * high / own, low)
+    high = own if heights is None else heights[2]
+    stroke = min(scene.motion.stroke + 0.5 * scene.numerics.dx * high / own, own)
     return replace(scene, motion=replace(scene.motion, stroke=stroke))
 
 

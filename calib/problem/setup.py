@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from calib.errors import TraceError
 from calib.io.provenance import code_key, key_of
 from calib.material.knife import load_knife
 from calib.material.scene import at_fitted_height, cut_scene, height_range, specimen, windowed, with_other_particles
@@ -21,6 +22,7 @@ from calib.simulation.workers import Workers
 from calib.trace.conditioning import Conditioned, condition
 from calib.trace.cuts import single_cut
 from calib.trace.filters import filter_simulated
+from calib.trace.stroke import board_stroke
 from mpm.scene import Scene
 
 COARSE_SPEED = 2.0
@@ -125,6 +127,7 @@ def set_up(request: Request) -> Setup:
         CutcalError: Anything wrong with the input.
     """
     curve, air_sha256 = conditioned(request)
+    request = with_height(request, curve)
     heights = height_range(request.food, curve, request.sizing)
     fine, coarse, assumed = _scenes(request, curve, heights)
     sensor, said = sensor_of(curve, request.gain_sd, request.lag_sd)
@@ -138,6 +141,8 @@ def conditioned(request: Request) -> tuple[Conditioned, str | None]:
     Raises:
         CutcalError: Anything wrong with the records.
     """
+    if request.board_z is not None and request.sizing.height is not None:
+        raise TraceError("--board-z beside --height, which it is there to find; give one of them")
     trace, air = request.records()
     known = request.sizing.height or request.food.dims["height"].value
     curve = condition(
@@ -147,9 +152,18 @@ def conditioned(request: Request) -> tuple[Conditioned, str | None]:
         height=known,
         t_end=request.t_end,
         board=request.sizing.height,
+        board_z=request.board_z,
         baseline=request.baseline,
     )
     return curve, None if air is None else air.sha256
+
+
+def with_height(request: Request, curve: Conditioned) -> Request:
+    """The request with the specimen's height, where the height of the board says it."""
+    if request.board_z is None:
+        return request
+    height = board_stroke(curve.trace, curve.onset_s, request.board_z)
+    return replace(request, sizing=replace(request.sizing, height=height))
 
 
 def _scenes(request: Request, curve: Conditioned, heights: Heights | None) -> tuple[Scene, Scene, list[str]]:

@@ -15,7 +15,7 @@ from calib.io.typed_document import FLAT
 from calib.material.knife import load_knife
 from calib.material.scene import cut_scene, specimen, windowed
 from calib.problem.request import Request
-from calib.problem.setup import conditioned
+from calib.problem.setup import conditioned, with_height
 from calib.trace.filters import filter_simulated
 from calib.validation.metrics import Metrics, compare
 from mpm.output.record import ForceRecord
@@ -132,6 +132,7 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
         CutcalError: Anything wrong with the input, or a run that breaks down.
     """
     curve, _ = conditioned(request)
+    request = with_height(request, curve)
     shape, assumed = specimen(request.food, curve, request.sizing)
     knife = load_knife(request.knife)
     scene = windowed(

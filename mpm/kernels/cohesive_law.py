@@ -10,12 +10,12 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
     """Force per length of the edge in one slice after it moved against the material [N/m]: along the edge, forward.
 
     The slip is elastic up to a limit and points where the edge goes. A cut starts where the force reaches the
-    threshold, or the resistance of the layer there where that is more, at the indentation that belongs to it, and from
-    there runs along the blade to every slice that already carries the propagation resistance there: growing a crack
-    takes less than starting one. Then the force falls to that resistance. Until the start the slip is the mean over the
-    part of the slice that the edge has reached: on a round top more of it comes into contact, unslipped, as the edge
-    goes down. The force acts against the motion and only the way forward makes new surface, so that with a slice/push
-    ratio xi the forward force is R / (1 + xi^2) (Atkins, Xu and Jeronimidis 2004).
+    threshold, at the indentation that belongs to it, and from there runs along the blade to every slice that already
+    carries the propagation resistance there: growing a crack takes less than starting one. Then the force falls to that
+    resistance, or is it at once where a layer below is tougher than the threshold. Until the start the slip is the mean
+    over the part of the slice that the edge has reached: on a round top more of it comes into contact, unslipped, as
+    the edge goes down. The force acts against the motion and only the way forward makes new surface, so that with a
+    slice/push ratio xi the forward force is R / (1 + xi^2) (Atkins, Xu and Jeronimidis 2004).
 
     Args:
         i: The slice.
@@ -34,9 +34,8 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
     steep = e[1] / size if size > 0 else 0.0
     level = 0.0
     if s.start_force[cut, i] <= 0:
-        threshold = ti.max(s.par[cut, R_START], s.top_toughness[cut, i])
-        level = threshold * size / s.par[cut, INITIATION_DEPTH]
-        if level >= threshold or (s.started_beside[cut, i] > 0 and level >= flesh):
+        level = s.par[cut, R_START] * size / s.par[cut, INITIATION_DEPTH]
+        if level >= s.par[cut, R_START] or (s.started_beside[cut, i] > 0 and level >= flesh):
             s.start_force[cut, i] = ti.max(level, 1e-9)
             s.start_excess[cut, i] = ti.max(level - s.passed_mean[cut, i][1], 0.0)
             e *= limit / ti.max(size, 1e-30)  # without resistance a cut starts before the edge has slipped

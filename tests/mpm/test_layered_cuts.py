@@ -65,8 +65,8 @@ def test_a_rind_of_flesh_is_no_rind():
     assert cut(scene("half_cylinder", same)).work == pytest.approx(cut(scene("half_cylinder", FLESH)).work, rel=0.02)
 
 
-def test_a_tough_rind_is_the_threshold_of_the_start():
-    """No cut starts below the resistance of the layer that the edge is on."""
+def test_a_cut_that_has_started_takes_the_resistance_of_its_layer():
+    """The threshold starts the cut; from there on the edge is on the rind, and not on flesh."""
     shallow = replace(scene("half_cylinder"), motion=Motion(1.5e-3, 0.01))
     tough = replace(shallow, food=replace(shallow.food, material=replace(FRUIT, initiation_depth=1e-3)))
     flesh = replace(shallow, food=replace(shallow.food, material=replace(FLESH, initiation_depth=1e-3)))
