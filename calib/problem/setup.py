@@ -11,6 +11,7 @@ from calib.io.provenance import code_key, key_of
 from calib.material.knife import load_knife
 from calib.material.scene import at_fitted_height, cut_scene, height_range, specimen, windowed, with_other_particles
 from calib.problem.food_parameters import Heights, fit_parameters, size_relative_sd
+from calib.problem.layer_guess import layer_guess
 from calib.problem.nuisance import Sensor, nuisances, sensor_of
 from calib.problem.numerical_uncertainty import numerical_uncertainty
 from calib.problem.objective import Objective
@@ -189,12 +190,15 @@ def _objective(
     u_num = 0.0 if request.u_num is None else numerical_uncertainty(request.u_num, food.name, scene, curve)
     target = Target(curve.stroke, curve.curve, curve.curve_noise_sd_N, curve.peak_sd_N, filter_simulated, u_num)
     names = request.fit or (food.default_fit if heights is None else (*food.default_fit, "height"))
+    parameters = fit_parameters(food, names, heights)
+    guess = layer_guess(scene, parameters, curve.stroke, curve.curve)
     return Objective(
         target,
-        fit_parameters(food, names, heights),
+        parameters,
         request.errors,
         nuisances(curve, sensor, width_sd=width_sd, scaled=request.scaled),
         scale_sd=math.hypot(width_sd, sensor.gain_sd) if request.scaled else 0.0,
+        guesses=() if guess is None else (guess,),
     )
 
 
