@@ -11,7 +11,7 @@ import numpy as np
 from calib.material.food import FoodSpec
 from calib.trace.conditioning import Conditioned
 from mpm.scene import EdgeLaw, Knife, Motion, Numerics, Scene
-from mpm.scene.shapes import Shape
+from mpm.scene.shapes import Shape, half_width
 
 ZONE_M = 4e-3
 """Process zone of the edge [m]; small foods get an eighth of their height."""
@@ -124,6 +124,26 @@ def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple
             "food; the blade bends longer halves apart with more force; give --length if you measured it"
         )
     return Shape(default.kind, length, width, height, (left - right) / 2), said
+
+
+def blade_warnings(shape: Shape, knife: Knife) -> list[str]:
+    """What a blade that is shorter than the food is wide leaves uncut, one sentence or none.
+
+    Args:
+        shape: The specimen.
+        knife: The blade.
+
+    Returns:
+        The sentence, or nothing.
+    """
+    wide = 2.0 * half_width(shape, 0.0)
+    if wide <= knife.length * (1 + 1e-9):
+        return []
+    return [
+        f"the food is {wide * 1e3:.0f} mm wide where it is cut and the blade {knife.length * 1e3:.0f} mm long: "
+        f"{(wide - knife.length) * 5e2:.1f} mm on each side stay uncut and hold the halves together; give --width if "
+        "you measured it, or a longer knife"
+    ]
 
 
 def height_range(food: FoodSpec, trace: Conditioned, sizing: Sizing) -> tuple[float, float, float] | None:

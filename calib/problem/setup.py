@@ -9,7 +9,15 @@ from dataclasses import dataclass, replace
 from calib.errors import TraceError
 from calib.io.provenance import code_key, key_of
 from calib.material.knife import load_knife
-from calib.material.scene import at_fitted_height, cut_scene, height_range, specimen, windowed, with_other_particles
+from calib.material.scene import (
+    at_fitted_height,
+    blade_warnings,
+    cut_scene,
+    height_range,
+    specimen,
+    windowed,
+    with_other_particles,
+)
 from calib.problem.food_parameters import Heights, fit_parameters, size_relative_sd
 from calib.problem.layer_guess import layer_guess
 from calib.problem.nuisance import Sensor, nuisances, sensor_of
@@ -178,7 +186,7 @@ def _scenes(request: Request, curve: Conditioned, heights: Heights | None) -> tu
         for coarse in (False, True)
     )
     faster = replace(screening.motion, mach=COARSE_SPEED * screening.motion.mach)
-    return fine, replace(screening, motion=faster), assumed
+    return fine, replace(screening, motion=faster), [*assumed, *blade_warnings(shape, knife)]
 
 
 def _objective(
