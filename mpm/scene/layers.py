@@ -29,7 +29,7 @@ def toughness(shape: Shape, material: Material, points: np.ndarray) -> np.ndarra
     Returns:
         R of the layer that each lies in [J/m^2], shape (n,).
     """
-    out = np.full(len(points), material.R)
+    out = np.full(len(points), float(material.R))
     if material.core_ratio > 0 and material.R_core is not None:
         out[_in_core(shape, points, material.core_ratio)] = material.R_core
     if material.rind_thickness > 0 and material.R_rind is not None:
@@ -53,7 +53,7 @@ def layer_ties(shape: Shape, material: Material, spacing: float, places: np.ndar
         Toughness of each, the mean of R over its part [J/m^2], and its part over a square of the spacing [-], (k,).
     """
     if not material.layered or len(places) == 0:
-        return np.full(len(places), material.R), np.ones(len(places))
+        return np.full(len(places), float(material.R)), np.ones(len(places))
     step, mirrored = spacing / SUBSAMPLES, places[:, 0].min() > 0
     x = np.arange(0.0 if mirrored else -shape.width / 2, shape.width / 2, step) + step / 2
     points = _section(shape, x, np.arange(0.0, shape.height, step) + step / 2)

@@ -124,7 +124,7 @@ class Setup:
 
     def _top_toughness(self, material: Material) -> np.ndarray:
         """Toughness of the food within a cell below its upper surface, in each slice [J/m^2], shape (m,)."""
-        out = np.full(len(self.grid.stations), material.R)
+        out = np.full(len(self.grid.stations), float(material.R))
         if not (self.scene.tied and material.layered):
             return out
         dx = self.scene.numerics.dx

@@ -33,6 +33,13 @@ def test_a_point_has_the_toughness_of_its_layer():
     assert toughness(ball, FRUIT, places).tolist() == [500, 500, 500, 500, 30, 80]
 
 
+def test_a_whole_number_is_a_toughness_too():
+    """R as an integer takes no decimals off the other layers."""
+    ball = Shape("sphere", 0.04, 0.04, 0.04)
+    whole = replace(FRUIT, R=80, R_rind=500.5)
+    assert toughness(ball, whole, np.array([[0, 0, 0.039]])).tolist() == [500.5]
+
+
 def test_a_half_fruit_has_no_rind_where_it_was_halved():
     """The flat face of a half cylinder is flesh, and its core lies there."""
     half = Shape("half_cylinder", 0.1, 0.04, 0.02)
