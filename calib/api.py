@@ -58,6 +58,7 @@ class Calibration:
         air: The same motion without food, in any of these forms, or None.
         knife: Name in ``knives.yaml``, or path of a YAML file.
         speed: Knife speed [m/s], where the trace has no position.
+        board_z: What the trace's height, or depth, reads with the edge on the board [m]: it says how high the food is.
         t_end: Time after which the record is ignored [s], or None.
         shape: Outline of the specimen, one of ``mpm.scene.shapes.SHAPE_KINDS``; None for the food's.
         height, width, length: Sizes of the specimen [m], None where they were not measured.
@@ -82,6 +83,7 @@ class Calibration:
     air: str | Path | Trace | pd.DataFrame | None = None
     knife: str | Path = "kitchen"
     speed: float | None = None
+    board_z: float | None = None
     t_end: float | None = None
     shape: str | None = None
     height: float | None = None
@@ -142,6 +144,7 @@ class Calibration:
             air=air,
             knife=str(self.knife),
             speed=self.speed,
+            board_z=self.board_z,
             t_end=self.t_end,
             baseline=self.baseline,
             cut=self.cut,

@@ -176,7 +176,7 @@ class Search:
 
     def _begin(self) -> None:
         """Screen, or run the design; then further designs while every run breaks down."""
-        first = [self.parameters.start, self.parameters.prior_mean]
+        first = [self.parameters.start, self.parameters.prior_mean, *self.objective.guesses]
         if self.coarse is not None:
             points, first = self._screen(first), []
             begun = len(self.runs)

@@ -19,6 +19,7 @@ from calib.io.wording import listed
 from calib.io.yaml_checks import Dumper, Place, check_keys, choice, data_path, mapping, read_yaml, suggest, text
 from calib.material.properties import (
     DIMENSIONS,
+    LAYERS,
     OPTIONAL_KEYS,
     PROPERTIES,
     REQUIRED_KEYS,
@@ -48,7 +49,8 @@ __all__ = [
 GIVEN_SPREAD = 10.0
 """Range of a property that has no literature and is given by the user: the value over and times this."""
 
-_NULLABLE = ("R_skin", "tensile_strength", "fracture_energy")
+_OF_LAYERS = (*LAYERS, *LAYERS.values())
+_NULLABLE = ("R_skin", "tensile_strength", "fracture_energy", *_OF_LAYERS)
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,11 @@ class FoodSpec:
         check_keys(here.at("properties"), self.properties, needed, _NULLABLE, SYNONYMS)
         if self.properties["skin_thickness"].value > 0.0 and "R_skin" not in self.properties:
             raise here.at("properties").error("skin_thickness > 0 needs R_skin; give it, or skin_thickness 0")
+        for size, resistance in LAYERS.items():
+            have = [name for name in (size, resistance) if name in self.properties]
+            if len(have) == 1:
+                other = resistance if have[0] == size else size
+                raise here.at("properties").error(f"{have[0]} needs {other}; give both, or neither")
 
     @classmethod
     def load(cls, name: str | Path) -> FoodSpec:
@@ -99,7 +106,13 @@ class FoodSpec:
         """Names of the properties that a calibration fits unless told otherwise."""
         start = ("R_skin", "skin_thickness") if self.properties["skin_thickness"].value > 0.0 else ("R_initiation",)
         strength = ("tensile_strength",) if "tensile_strength" in self.properties else ()
-        return ("E", "yield_stress", *strength, "R", *start, "initiation_depth", "mu")
+        return ("E", "yield_stress", *strength, "R", *self.layers, *start, "initiation_depth", "mu")
+
+    @property
+    def layers(self) -> tuple[str, ...]:
+        """Names of the properties of the layers that the food has beside its flesh: resistance and size of each."""
+        there = [size for size in LAYERS if size in self.properties and self.properties[size].value > 0.0]
+        return tuple(name for size in there for name in (LAYERS[size], size))
 
     def value(self, name: str) -> float | None:
         """Value of a property [SI], None where the food has none.
@@ -161,7 +174,9 @@ class FoodSpec:
             x = check_override(name, raw)
             old = new.get(name)
             if old is None:
-                new[name] = Property(name, x, x / GIVEN_SPREAD, x * GIVEN_SPREAD, PROPERTIES[name].unit, source, status)
+                rule = PROPERTIES[name]
+                low, high = max(x / GIVEN_SPREAD, rule.low), min(x * GIVEN_SPREAD, rule.high)
+                new[name] = Property(name, x, low, high, rule.unit, source, status)
             else:
                 new[name] = replace(old, value=x, status=status, source=source)
         return replace(self, properties=new)
@@ -225,7 +240,8 @@ class FoodSpec:
         shape = {"kind": self.shape_kind} | {n: self.dims[n].as_dict() for n in DIMENSIONS}
         have = {n: p.as_dict() for n, p in self.properties.items()}
         said = {} if self.not_modelled is None else {"not_modelled": self.not_modelled}
-        return {**said, "shape": shape, "properties": {n: have.get(n) for n in PROPERTIES}}
+        named = [n for n in PROPERTIES if n in have or n not in _OF_LAYERS]
+        return {**said, "shape": shape, "properties": {n: have.get(n) for n in named}}
 
 
 def load_foods(path: Path | str | None = None) -> dict[str, FoodSpec]:
@@ -305,9 +321,10 @@ def _read_food(place: Place, raw: Any) -> FoodSpec:
     shape = mapping(place.at("shape"), food["shape"])
     given = mapping(place.at("properties"), food["properties"])
     check_keys(place.at("shape"), shape, ("kind", *DIMENSIONS), synonyms=SYNONYMS)
-    check_keys(place.at("properties"), given, PROPERTIES, synonyms=SYNONYMS)
+    needed = [n for n in PROPERTIES if n not in _OF_LAYERS]
+    check_keys(place.at("properties"), given, needed, _OF_LAYERS, SYNONYMS)
     dims = {n: read_property(place.at("shape"), n, shape[n]) for n in DIMENSIONS}
-    have = [n for n in PROPERTIES if given[n] is not None or n not in _NULLABLE]
+    have = [n for n in PROPERTIES if given.get(n) is not None or n not in _NULLABLE]
     properties = {n: read_property(place.at("properties"), n, given[n]) for n in have}
     try:
         return FoodSpec(place.path[-1], shape["kind"], dims, properties, not_modelled=said)

@@ -33,7 +33,8 @@ SYNONYMS = {
     "friction": "mu", "friction_coefficient": "mu",
     "toughness": "R", "fracture_toughness": "R", "cutting_resistance": "R", "resistance": "R",
     "initiation": "R_initiation", "depth": "initiation_depth", "damping": "loss_factor",
-    "skin": "skin_thickness", "skin_resistance": "R_skin",
+    "skin": "skin_thickness", "skin_resistance": "R_skin", "rind": "rind_thickness", "peel": "rind_thickness",
+    "wall": "rind_thickness", "core": "core_ratio", "core_part": "core_ratio",
     "gf": "fracture_energy", "strength": "tensile_strength", "cohesive_strength": "tensile_strength",
     "sigma_c": "tensile_strength", "sigma_t": "tensile_strength", "diameter": "width",
 }  # fmt: skip
@@ -70,12 +71,22 @@ PROPERTIES: dict[str, Rule] = {
     "R_initiation": Rule("N/m", 0.1, 1e5, "line force at which a cut starts in bare flesh"),
     "R_skin": Rule("N/m", 0.1, 1e5, "line force at which the edge goes through the skin"),
     "skin_thickness": Rule("m", 0.0, 0.05, "thickness of the skin, 0 = no skin"),
+    "R_rind": Rule("J/m^2", 0.1, 1e5, "cutting (propagation) resistance of the rind"),
+    "rind_thickness": Rule("m", 0.0, 0.05, "thickness of the rind all round, 0 = no rind"),
+    "R_core": Rule("J/m^2", 0.1, 1e5, "cutting (propagation) resistance of the core"),
+    "core_ratio": Rule(
+        "-", 0.0, 0.95, "radius of the core over that of the food's section, 0 = no core",
+        "a larger one leaves no flesh around it",
+    ),
     "initiation_depth": Rule("m", 1e-4, 0.05, "indentation under the edge at which a cut starts"),
     "mu": Rule("-", 0.0, 2.0, "Coulomb friction of food on blade"),
     "loss_factor": Rule("-", 0.0, 1.0, "mechanical loss factor tan(delta) at the first axial mode"),
     "tensile_strength": Rule("Pa", 10.0, 1e9, "tension at which the flesh parts"),
     "fracture_energy": Rule("J/m^2", 0.1, 1e6, "energy per crack area of bulk damage"),
 }  # fmt: skip
+
+LAYERS = {"rind_thickness": "R_rind", "core_ratio": "R_core"}
+"""The size of each layer beside the flesh and its resistance. Only foods whose anatomy has the layer have the two."""
 
 MEANINGS = {name: rule.meaning for name, rule in PROPERTIES.items()}
 """What each property is, in words."""

@@ -11,7 +11,7 @@ import numpy as np
 from calib.material.food import FoodSpec
 from calib.trace.conditioning import Conditioned
 from mpm.scene import EdgeLaw, Knife, Motion, Numerics, Scene
-from mpm.scene.shapes import Shape
+from mpm.scene.shapes import Shape, half_width
 
 ZONE_M = 4e-3
 """Process zone of the edge [m]; small foods get an eighth of their height."""
@@ -25,7 +25,7 @@ FACE_MACH = 3e-4
 """Largest speed at which the blade's faces move the food aside over that of the P-wave [-]: what decides how far a cut
 is from a slow one (docs/theory.md, "Time step and speed")."""
 CLEARANCE_ZONES = 1.0
-"""Least food left below the edge where a trace ends under load, in process zones."""
+"""Food that is likely left below the edge where a trace ends under load, in process zones."""
 HEIGHT_SPAN = 1.25
 """A specimen of unknown height may be at least this many times higher than the lowest it can be."""
 UNDER_LOAD = 0.5
@@ -103,8 +103,8 @@ def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple
         else:
             low, height, high = free
             said.append(
-                "the specimen's height is not known: the trace ends under load, so the edge stopped above the board, "
-                f"and {low * 1e3:.0f} to {high * 1e3:.0f} mm are possible; give --height if you measured it"
+                "the specimen's height is not known: the trace ends under load, so the edge stopped on the board or "
+                f"above it, and {low * 1e3:.0f} to {high * 1e3:.0f} mm are possible; give --height if you measured it"
             )
     height = default.height if height is None else height
     width = sizing.width
@@ -129,11 +129,31 @@ def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple
     return Shape(default.kind, length, width, height, (left - right) / 2), said
 
 
+def blade_warnings(shape: Shape, knife: Knife) -> list[str]:
+    """What a blade that is shorter than the food is wide leaves uncut, one sentence or none.
+
+    Args:
+        shape: The specimen.
+        knife: The blade.
+
+    Returns:
+        The sentence, or nothing.
+    """
+    wide = 2.0 * half_width(shape, 0.0)
+    if wide <= knife.length * (1 + 1e-9):
+        return []
+    return [
+        f"the food is {wide * 1e3:.0f} mm wide where it is cut and the blade {knife.length * 1e3:.0f} mm long: "
+        f"{(wide - knife.length) * 5e2:.1f} mm on each side stay uncut and hold the halves together; give --width if "
+        "you measured it, or a longer knife"
+    ]
+
+
 def height_range(food: FoodSpec, trace: Conditioned, sizing: Sizing) -> tuple[float, float, float] | None:
     """Range of the height of a specimen whose trace ends under load.
 
-    The edge then stopped above the board: the food is higher than the stroke by a process zone at least. Its likely
-    height is the usual one where that is possible.
+    The edge then stopped on the board or above it: the food is as high as the stroke at least. Its likely height is the
+    usual one where that is possible, and leaves a process zone below the edge.
 
     Args:
         food: The food with its usual height and the literature's range of it.
@@ -148,9 +168,11 @@ def height_range(food: FoodSpec, trace: Conditioned, sizing: Sizing) -> tuple[fl
     if sizing.height is not None or trace.stroke_source == "height" or not loaded:
         return None
     known = food.dims["height"]
-    low = trace.stroke_length_m + CLEARANCE_ZONES * min(ZONE_M, trace.stroke_length_m / ZONE_PARTS)
+    low = trace.stroke_length_m
     high = max(known.high, HEIGHT_SPAN * low)
-    return low, known.value if low < known.value < high else (low * high) ** 0.5, high
+    likely = known.value if low < known.value < high else (low * high) ** 0.5
+    clear = low + CLEARANCE_ZONES * min(ZONE_M, low / ZONE_PARTS)
+    return low, max(likely, clear), high
 
 
 def at_fitted_height(
@@ -159,7 +181,8 @@ def at_fitted_height(
     """The scene at a fitted height, and the values that are left: those of the material.
 
     The cell grows with the height, so that every height has the same particles and nodes: on a fixed cell each height
-    would draw other particles, and the force would jump by several per cent from one to the next.
+    would draw other particles, and the force would jump by several per cent from one to the next. The stroke ends at
+    the board, where the height is less.
 
     Args:
         scene: The scene with any height.
@@ -183,6 +206,7 @@ def at_fitted_height(
         replace(
             scene,
             food=food,
+            motion=replace(scene.motion, stroke=min(scene.motion.stroke, height)),
             numerics=replace(scene.numerics, dx=cell, far=None if far is None else k * far),
             edge=replace(scene.edge, zone=max(scene.edge.zone, cell)),
         ),
@@ -205,8 +229,8 @@ def windowed(scene: Scene, heights: tuple[float, float, float] | None = None) ->
         The scene.
     """
     own = scene.food.shape.height
-    low, _, high = heights or (own, own, own)
-    stroke = min(scene.motion.stroke + 0.5 * scene.numerics.dx * high / own, low)
+    high = own if heights is None else heights[2]
+    stroke = min(scene.motion.stroke + 0.5 * scene.numerics.dx * high / own, own)
     return replace(scene, motion=replace(scene.motion, stroke=stroke))
 
 

@@ -33,7 +33,7 @@ LARGEST_SCATTER = 1.0
 EACH = "each"
 """What ``hold_out`` says where each cut is held out in turn."""
 TOP = ("material", "knife", "fit", "own", "hold_out", "scatter", "budget", "seed", "dx", "set")
-NUMBERS = ("speed", "t_end", "height", "width", "length", "at", "gain_sd", "lag_sd", "rate", "cut")
+NUMBERS = ("speed", "board_z", "t_end", "height", "width", "length", "at", "gain_sd", "lag_sd", "rate", "cut")
 TEXTS = ("time_col", "force_col", "position_col", "depth_col", "sign", "decimal", "baseline", "shape", "knife")
 COMPRESSION_SIZES = ("height", "diameter", "width", "length")
 
@@ -133,6 +133,7 @@ def _request(place: Place, given: Mapping[str, Any], folder: Path, base: Request
             words["shape"], numbers["height"], numbers["width"], numbers["length"], numbers["at"] or MID_LENGTH
         ),
         speed=numbers["speed"],
+        board_z=numbers["board_z"],
         t_end=numbers["t_end"],
         baseline=words["baseline"] or base.baseline,
         cut=None if numbers["cut"] is None else int(numbers["cut"]),

@@ -62,10 +62,12 @@ class JointObjective:
     Attributes:
         parameters: All parameters with their priors.
         terms: One per trace.
+        guesses: Points in internal coordinates that a search tries first, each (p,).
     """
 
     parameters: ParameterSet
     terms: tuple[ObjectiveTerm, ...]
+    guesses: tuple[FloatArray, ...] = ()
 
     @classmethod
     def of(cls, objectives: Mapping[str, Objective], shared: Sequence[str]) -> JointObjective:

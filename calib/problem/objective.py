@@ -88,6 +88,7 @@ class Objective:
         errors: The error model.
         nuisances: What the measurement leaves open.
         scale_sd: Standard deviation of the logarithm of the factor of width and sensor [-]; 0: there is no factor.
+        guesses: Points in internal coordinates that a search tries first, each (p,).
     """
 
     target: Target
@@ -95,6 +96,7 @@ class Objective:
     errors: ErrorModel = field(default_factory=ErrorModel)
     nuisances: tuple[Nuisance, ...] = ()
     scale_sd: float = 0.0
+    guesses: tuple[FloatArray, ...] = ()
 
     @cached_property
     def sigmas(self) -> FloatArray:

@@ -32,9 +32,11 @@ LOG_STEP = math.log(1.1)
 #: Width of a finite difference in a linear coordinate, as a part of the prior's 95 % range (same argument).
 LINEAR_STEP = 0.1
 
-#: Material properties with the dimension of a stress or of a force per length. Multiplying all of them by k multiplies
-#: every quasi-static force by k and leaves the geometry of the cut alone.
-STRESS_LIKE = ("E", "yield_stress", "R", "R_initiation", "R_skin", "tensile_strength", "fracture_energy")
+#: Properties with the dimension of a force per length: what the edge works against.
+RESISTANCES = ("R", "R_rind", "R_core", "R_initiation", "R_skin")
+#: Material properties with that dimension or that of a stress. Multiplying all of them by k multiplies every
+#: quasi-static force by k and leaves the geometry of the cut alone.
+STRESS_LIKE = ("E", "yield_stress", *RESISTANCES, "tensile_strength", "fracture_energy")
 
 #: Between the name of a property and that of the trace which has a value of its own: ``R_skin@cut2``.
 OF_TRACE = "@"

@@ -26,6 +26,7 @@ class Request:
         columns: How files are read: attributes of :class:`calib.trace.recorded.Reading`.
         knife: Name or YAML file.
         speed: Knife speed [m/s], or None.
+        board_z: Reading of the knife's height, or of its depth, with the edge on the board [m], or None.
         t_end: End of the record [s], or None.
         baseline: What is subtracted without an air run, one of ``calib.trace.baselines.BASELINES``.
         cut: Number of the cut in a record of several, from 1; ``whole`` for a record that is one; None for its only.
@@ -50,6 +51,7 @@ class Request:
     columns: Mapping[str, Any] = field(default_factory=dict)
     knife: str = "kitchen"
     speed: float | None = None
+    board_z: float | None = None
     t_end: float | None = None
     baseline: str = CONSTANT
     cut: int | str | None = None

@@ -6,10 +6,20 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from calib.errors import TraceError
 from calib.io.provenance import code_key, key_of
 from calib.material.knife import load_knife
-from calib.material.scene import at_fitted_height, cut_scene, height_range, specimen, windowed, with_other_particles
+from calib.material.scene import (
+    at_fitted_height,
+    blade_warnings,
+    cut_scene,
+    height_range,
+    specimen,
+    windowed,
+    with_other_particles,
+)
 from calib.problem.food_parameters import Heights, fit_parameters, size_relative_sd
+from calib.problem.layer_guess import layer_guess
 from calib.problem.nuisance import Sensor, nuisances, sensor_of
 from calib.problem.numerical_uncertainty import numerical_uncertainty
 from calib.problem.objective import Objective
@@ -21,6 +31,7 @@ from calib.simulation.workers import Workers
 from calib.trace.conditioning import Conditioned, condition
 from calib.trace.cuts import single_cut
 from calib.trace.filters import filter_simulated
+from calib.trace.stroke import board_stroke
 from mpm.scene import Scene
 
 COARSE_SPEED = 2.0
@@ -125,6 +136,7 @@ def set_up(request: Request) -> Setup:
         CutcalError: Anything wrong with the input.
     """
     curve, air_sha256 = conditioned(request)
+    request = with_height(request, curve)
     heights = height_range(request.food, curve, request.sizing)
     fine, coarse, assumed = _scenes(request, curve, heights)
     sensor, said = sensor_of(curve, request.gain_sd, request.lag_sd)
@@ -138,6 +150,8 @@ def conditioned(request: Request) -> tuple[Conditioned, str | None]:
     Raises:
         CutcalError: Anything wrong with the records.
     """
+    if request.board_z is not None and request.sizing.height is not None:
+        raise TraceError("--board-z beside --height, which it is there to find; give one of them")
     trace, air = request.records()
     known = request.sizing.height or request.food.dims["height"].value
     curve = condition(
@@ -147,9 +161,18 @@ def conditioned(request: Request) -> tuple[Conditioned, str | None]:
         height=known,
         t_end=request.t_end,
         board=request.sizing.height,
+        board_z=request.board_z,
         baseline=request.baseline,
     )
     return curve, None if air is None else air.sha256
+
+
+def with_height(request: Request, curve: Conditioned) -> Request:
+    """The request with the specimen's height, where the height of the board says it."""
+    if request.board_z is None:
+        return request
+    height = board_stroke(curve.trace, curve.onset_s, request.board_z)
+    return replace(request, sizing=replace(request.sizing, height=height))
 
 
 def _scenes(request: Request, curve: Conditioned, heights: Heights | None) -> tuple[Scene, Scene, list[str]]:
@@ -163,7 +186,7 @@ def _scenes(request: Request, curve: Conditioned, heights: Heights | None) -> tu
         for coarse in (False, True)
     )
     faster = replace(screening.motion, mach=COARSE_SPEED * screening.motion.mach)
-    return fine, replace(screening, motion=faster), assumed
+    return fine, replace(screening, motion=faster), [*assumed, *blade_warnings(shape, knife)]
 
 
 def _objective(
@@ -175,12 +198,15 @@ def _objective(
     u_num = 0.0 if request.u_num is None else numerical_uncertainty(request.u_num, food.name, scene, curve)
     target = Target(curve.stroke, curve.curve, curve.curve_noise_sd_N, curve.peak_sd_N, filter_simulated, u_num)
     names = request.fit or (food.default_fit if heights is None else (*food.default_fit, "height"))
+    parameters = fit_parameters(food, names, heights)
+    guess = layer_guess(scene, parameters, curve.stroke, curve.curve)
     return Objective(
         target,
-        fit_parameters(food, names, heights),
+        parameters,
         request.errors,
         nuisances(curve, sensor, width_sd=width_sd, scaled=request.scaled),
         scale_sd=math.hypot(width_sd, sensor.gain_sd) if request.scaled else 0.0,
+        guesses=() if guess is None else (guess,),
     )
 
 

@@ -25,10 +25,10 @@ from calib.trace.baselines import (
 )
 from calib.trace.contact_onset import FLOOR_FRACTION, SUSTAIN, ContactOnset, estimate_baseline, find_contact_onset
 from calib.trace.cuts import single_cut
-from calib.trace.filters import FILTER_SD_M, N_STROKE, leading_grid, resample, smooth
+from calib.trace.filters import FILTER_SD_M, N_STROKE, leading_grid, parabola_peak, resample, smooth
 from calib.trace.mending import mended
 from calib.trace.missing import held_samples
-from calib.trace.stroke import DWELL_M, board_warnings, end_of_descent, ending_at_board, stroke_axis
+from calib.trace.stroke import DWELL_M, board_warnings, end_of_descent, stroke_axis, stroke_in_food
 from calib.trace.sudden import sudden_changes
 from calib.trace.trace import MIN_SAMPLES, Trace
 
@@ -49,8 +49,6 @@ PEAK_RANGE_N = (0.05, 5e3)
 """Peak forces outside are taken for a unit mix-up [N]."""
 NOTHING_N = 1e-6
 """Variation of a force below which there is nothing in it but rounding [N]."""
-PEAK_HALF_WIDTH = 2
-"""Points on each side of the maximum through which the parabola of the peak is fitted."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +115,7 @@ def condition(
     height: float | None = None,
     t_end: float | None = None,
     board: float | None = None,
+    board_z: float | None = None,
     baseline: str = CONSTANT,
 ) -> Conditioned:
     """Tare a trace, find contact, and put the force on a uniform stroke with a zero-phase filter.
@@ -128,7 +127,9 @@ def condition(
         height: Height of the food [m]; without position and speed, onset to release is taken for this height.
         t_end: End of the record on the trace's clock [s]; what comes later (board contact, say) is dropped.
         board: Stroke at which the edge is at the board, which is the specimen's height where that was measured [m]; the
-            curve ends there.
+            curve ends there. Without it and ``board_z`` it ends where a force that falls to little and stays there says
+            that the edge is through.
+        board_z: Reading of the knife's height, or of its depth, with the edge on the board [m].
         baseline: What is subtracted where there is no air run: ``constant``, the level before contact; ``linear``, the
             line through it; ``zero``, nothing, for a record that starts at its trigger.
 
@@ -150,8 +151,7 @@ def condition(
     level = contact.baseline
     tared = force - level.level
     axis = stroke_axis(trace, tared, contact, last=last, speed=speed, height=height)
-    if board is not None:
-        axis = ending_at_board(axis, board, trace.source)
+    axis = stroke_in_food(trace, tared, axis, contact.onset, board=board, board_z=board_z)
     held = held_samples(trace, tared, axis.stroke, axis.end, level.noise_sd)
     into, deep = (int(np.searchsorted(trace.time, contact.onset)), int(np.argmax(axis.stroke >= axis.end * (1 - 1e-9))))
     out = out_of_the_food(trace, contact)
@@ -160,7 +160,7 @@ def condition(
     length = float(grid[-1])
     samples = int(np.count_nonzero((axis.stroke >= 0.0) & (axis.stroke <= length)))
     noise = _filtered_noise(contact, samples, length)
-    peak = _peak(curve)
+    peak = parabola_peak(curve)
     _check_peak(trace, peak)
     behind_sd, behind = level_behind(trace, tared, out, peak, level.noise_sd)
     end_s = float(trace.time[int(np.argmax(axis.stroke >= length * (1 - 1e-9)))])
@@ -366,17 +366,6 @@ def _on_grid(
         s, f = np.concatenate([[whole[0]], s]), np.concatenate([[0.0], f])
     force = resample(s, f, whole)
     return grid, smooth(grid, force[len(lead) :], FILTER_SD_M, before=force[: len(lead)])
-
-
-def _peak(curve: np.ndarray) -> float:
-    """Peak by a parabola around the maximum [N]."""
-    i = int(np.argmax(curve))
-    if PEAK_HALF_WIDTH <= i < len(curve) - PEAK_HALF_WIDTH:
-        x = np.arange(-PEAK_HALF_WIDTH, PEAK_HALF_WIDTH + 1)
-        a, b, c = np.polyfit(x, curve[i + x], 2)
-        if a < 0.0 and abs(b / (2.0 * a)) <= PEAK_HALF_WIDTH:
-            return float(c - b * b / (4.0 * a))
-    return float(curve[i])
 
 
 def _filtered_noise(contact: ContactOnset, samples: int, length: float) -> float:

@@ -13,6 +13,8 @@ FILTER_SD_M = 0.5e-3
 in cuts."""
 REACH_SD = 4.0
 """Half width of the filter's kernel in standard deviations; 6e-5 of a Gaussian lies beyond."""
+PEAK_HALF_WIDTH = 2
+"""Points on each side of the maximum through which the parabola of the peak is fitted."""
 UNIFORM_TOLERANCE = 1e-6
 """Largest relative deviation of a step from the mean step in a uniform stroke (rounding in a CSV of 7
 digits)."""
@@ -124,6 +126,17 @@ def filter_simulated(grid: np.ndarray, stroke: np.ndarray, force: np.ndarray, sd
     f = np.concatenate([np.zeros(len(rest)), force])
     values = resample(s, f, np.concatenate([lead, grid]))
     return smooth(grid, values[len(lead) :], sd_m, before=values[: len(lead)])
+
+
+def parabola_peak(curve: np.ndarray) -> float:
+    """Largest force of a curve [N], shape (n,), by a parabola around its maximum [N]."""
+    i = int(np.argmax(curve))
+    if PEAK_HALF_WIDTH <= i < len(curve) - PEAK_HALF_WIDTH:
+        x = np.arange(-PEAK_HALF_WIDTH, PEAK_HALF_WIDTH + 1)
+        a, b, c = np.polyfit(x, curve[i + x], 2)
+        if a < 0.0 and abs(b / (2.0 * a)) <= PEAK_HALF_WIDTH:
+            return float(c - b * b / (4.0 * a))
+    return float(curve[i])
 
 
 def leading_grid(grid: np.ndarray, sd_m: float = FILTER_SD_M) -> np.ndarray:

@@ -8,6 +8,7 @@ import numpy as np
 
 from calib.errors import TraceError
 from calib.trace.contact_onset import SUSTAIN, ContactOnset, first_sustained
+from calib.trace.filters import N_STROKE, resample, smooth
 from calib.trace.trace import Trace
 
 DWELL_M = 0.1e-3
@@ -27,6 +28,11 @@ BOARD_PART = 0.08
 """Last part of a stroke in which an edge that touches the board raises the force [-]."""
 BOARD_SLOPE, BOARD_RISE = 3.0, 0.04
 """Slope in that part over the usual one [-], and rise in it over the peak [-], from which on it may be the board."""
+THROUGH_LEVEL, THROUGH_FALL = 0.1, 0.5
+"""Part of the peak below which the force stays once the edge is through [-], and above which it was shortly before."""
+THROUGH_FALL_M, THROUGH_REST_M = 3e-3, 1e-3
+"""Way over which the force falls from the one to the other at most, and way of the knife behind it at least [m]: a
+force that falls with the chord of a round food, or where the stroke ends, does not tell where the board is."""
 MAX_DESCENT_FRACTION = 0.5
 """Part of the position's range that must lie before its lowest point for a record to be a downward stroke."""
 
@@ -132,6 +138,92 @@ def _at_constant_speed(
     return StrokeAxis(rate * (trace.time - contact.onset), rate * (release - contact.onset), source, warnings)
 
 
+def stroke_in_food(
+    trace: Trace, tared: np.ndarray, axis: StrokeAxis, onset: float, *, board: float | None, board_z: float | None
+) -> StrokeAxis:
+    """The stroke, ended where the edge is at the board: where that is said, or where the force says so.
+
+    Args:
+        trace: The cut.
+        tared: Its force above the baseline [N], shape (n,).
+        axis: The stroke of every sample.
+        onset: Time of contact [s].
+        board: Stroke at which the edge is at the board [m], the specimen's height where that was measured.
+        board_z: Reading of the knife's height, or of its depth, with the edge on the board [m].
+
+    Returns:
+        The same, or one that ends earlier, with a warning.
+
+    Raises:
+        TraceError: A reading that the knife has not, or a stroke that goes far beyond the board.
+    """
+    if board_z is not None:
+        board = board_stroke(trace, onset, board_z)
+    if board is not None:
+        return ending_at_board(axis, board, trace.source)
+    through = edge_through(axis.stroke, tared, axis.end) if axis.source == "position" else None
+    if through is None:
+        return axis
+    said = (
+        f"the force falls to little at {1e3 * through:.1f} mm of the stroke of {1e3 * axis.end:.1f} mm and stays so: "
+        "the edge is through, and that stroke is taken for the specimen's height; what is later is the board or the "
+        "arm's ringing and left out; say --height or --board-z if the specimen ends elsewhere"
+    )
+    return replace(axis, end=through, warnings=(*axis.warnings, said))
+
+
+def board_stroke(trace: Trace, onset: float, board_z: float) -> float:
+    """Stroke at which the edge is at the board [m].
+
+    Args:
+        trace: The cut.
+        onset: Time of contact [s].
+        board_z: Reading of the knife's height, or of its depth, with the edge on the board [m].
+
+    Returns:
+        The height of the board below contact, the specimen's height.
+
+    Raises:
+        TraceError: There is no height, or the board would not be below contact.
+    """
+    if trace.position is None:
+        raise TraceError(f"{trace.source}: --board-z is a reading of the knife's height, but the trace has none")
+    contact = float(np.interp(onset, trace.time, trace.position))
+    low, high = STROKE_RANGE_M
+    below = contact - (board_z if contact > 0 else -abs(board_z))  # a depth is kept as a height below 0
+    if not low <= below <= high:
+        raise TraceError(
+            f"{trace.source}: --board-z {board_z:g} m is no height below contact, which is at {contact:.4g} m of "
+            f"column {trace.columns.get('position')}; give what that column reads with the edge on the board"
+        )
+    return below
+
+
+def edge_through(stroke: np.ndarray, tared: np.ndarray, end: float) -> float | None:
+    """Stroke at which the edge comes through the food: there a force that was large falls to little, and stays so.
+
+    Args:
+        stroke: Way of the edge after contact [m], shape (n,).
+        tared: Force above the baseline [N], shape (n,).
+        end: Stroke at the end of the descent [m].
+
+    Returns:
+        The stroke [m], None where there is no such fall.
+    """
+    inside = (stroke >= 0.0) & (np.maximum.accumulate(stroke) <= end)
+    deepest = np.maximum.accumulate(stroke[inside])
+    if deepest.size < 2 or deepest[-1] < THROUGH_FALL_M + THROUGH_REST_M:
+        return None
+    grid = np.linspace(deepest[0], deepest[-1], N_STROKE)
+    force = smooth(grid, resample(deepest, tared[inside], grid))
+    high = np.flatnonzero(force > THROUGH_LEVEL * force.max())
+    last = int(high[-1])
+    before = float(np.interp(grid[last] - THROUGH_FALL_M, grid, force))
+    if grid[-1] - grid[last] < THROUGH_REST_M or before < THROUGH_FALL * force.max():
+        return None
+    return float(grid[last + 1])
+
+
 def ending_at_board(axis: StrokeAxis, board: float, source: str) -> StrokeAxis:
     """The stroke, ended where the edge is at the board: what is recorded beyond is no cut.
 
@@ -183,7 +275,7 @@ def board_warnings(source: str, stroke: np.ndarray, curve: np.ndarray) -> list[s
     return [
         f"{source}: the force rises by {rise:.3g} N over the last {1e3 * (stroke[-1] - stroke[low]):.2g} mm of the "
         f"stroke, up to {steep:.0f} times as steeply as before: the edge may be on the board; end the cut before it "
-        "with --t-end, or give --height"
+        "with --t-end, or give --height or --board-z"
     ]
 
 

@@ -13,9 +13,9 @@ from calib.io.provenance import Invocation, Software
 from calib.io.type_schema import NotNegative, Positive, Shared, keywords, one_of
 from calib.io.typed_document import FLAT
 from calib.material.knife import load_knife
-from calib.material.scene import cut_scene, specimen, windowed
+from calib.material.scene import blade_warnings, cut_scene, specimen, windowed
 from calib.problem.request import Request
-from calib.problem.setup import conditioned
+from calib.problem.setup import conditioned, with_height
 from calib.trace.filters import filter_simulated
 from calib.validation.metrics import Metrics, compare
 from mpm.output.record import ForceRecord
@@ -132,12 +132,13 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
         CutcalError: Anything wrong with the input, or a run that breaks down.
     """
     curve, _ = conditioned(request)
+    request = with_height(request, curve)
     shape, assumed = specimen(request.food, curve, request.sizing)
     knife = load_knife(request.knife)
     scene = windowed(
         cut_scene(request.food, shape, knife, stroke=curve.stroke_length_m, dx=request.dx, seed=request.seed)
     )
-    warnings = (*request.food.warnings(), *curve.warnings, *assumed)
+    warnings = (*request.food.warnings(), *curve.warnings, *assumed, *blade_warnings(shape, knife))
     for text in warnings:
         say(text)
     with prepare(out, "predict", resume=False):

@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from mpm.state.tables import INITIATION_DEPTH, R_START, SLIP, STATIONS
+from mpm.state.tables import INITIATION_DEPTH, LAYERED, R_START, SLIP, STATIONS
 
 
 @ti.func
@@ -11,11 +11,11 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
 
     The slip is elastic up to a limit and points where the edge goes. A cut starts where the force reaches the
     threshold, at the indentation that belongs to it, and from there runs along the blade to every slice that already
-    carries the propagation resistance: growing a crack takes less than starting one. Then the force falls to that
-    resistance. Until the start the slip is the mean over the part of the slice that the edge has reached: on a round
-    top more of it comes into contact, unslipped, as the edge goes down. The force acts against the motion and only the
-    way forward makes new surface, so that with a slice/push ratio xi the forward force is R / (1 + xi^2) (Atkins, Xu
-    and Jeronimidis 2004).
+    carries the propagation resistance there: growing a crack takes less than starting one. Then the force falls to that
+    resistance, or is it at once where a layer below is tougher than the threshold. Until the start the slip is the mean
+    over the part of the slice that the edge has reached: on a round top more of it comes into contact, unslipped, as
+    the edge goes down. The force acts against the motion and only the way forward makes new surface, so that with a
+    slice/push ratio xi the forward force is R / (1 + xi^2) (Atkins, Xu and Jeronimidis 2004).
 
     Args:
         i: The slice.
@@ -54,9 +54,18 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
 def resistance_left(s: ti.template(), cut, i):
     """Line force in a slice that the opening of the food ahead of the edge leaves to it [N/m].
 
-    It is the mean over the ties that the edge passes; where it passes none it stays what it was.
+    It is the mean over the ties that the edge passes; where it passes none it stays what it was. In a food of layers it
+    is the part that these have left of the toughness at the edge; where only the last of them are passed, which are
+    mostly cut, that part says nothing of the food.
     """
-    if s.passing[cut, i][2] > 0:
+    if s.par[cut, LAYERED] > 0:
+        s.most_passed[cut, i] = ti.max(s.most_passed[cut, i], s.passing[cut, i][2])
+        if s.passing[cut, i][2] > 0.5 * s.most_passed[cut, i]:
+            s.part_left[cut, i] = s.passing[cut, i][0] / s.passing[cut, i][1]
+        if s.at_edge[cut, i][1] > 0:
+            s.passed_mean[cut, i][1] = s.at_edge[cut, i][0] / s.at_edge[cut, i][1]
+        s.passed_mean[cut, i][0] = s.part_left[cut, i] * s.passed_mean[cut, i][1]
+    elif s.passing[cut, i][2] > 0:
         s.passed_mean[cut, i] = ti.Vector([s.passing[cut, i][0], s.passing[cut, i][1]]) / s.passing[cut, i][2]
     return s.passed_mean[cut, i][0]
 

@@ -14,6 +14,7 @@ from mpm.state.tables import (
     EDGE,
     FIRST_STATION,
     INV_DX,
+    LAYERED,
     MIRROR_SUM,
     NODES,
     ORIGIN_X,
@@ -75,14 +76,17 @@ def find_reaction(s: ti.template(), cut, i, dt):
     # the zone reaches below the edge and beside the food, so the width that is cut is that of the outline
     begun = ti.math.clamp((s.top_high[cut, i] - tip) / (s.top_high[cut, i] - s.top_low[cut, i]), 0.0, 1.0)
     ended = ti.math.clamp((s.floor_high[cut, i] - tip) / (s.floor_high[cut, i] - s.floor_low[cut, i]), 0.0, 1.0)
-    width = s.par[cut, DX] * s.width[cut, i] * (begun - ended)
+    part = begun - ended
+    if s.par[cut, LAYERED] > 0:
+        part = begun ** s.top_power[cut, i] - ended ** s.floor_power[cut, i]
+    width = s.par[cut, DX] * s.width[cut, i] * part
     full = SURFACE_FILL * s.par[cut, ZONE_MASS] * width * s.par[cut, INV_DX]
     if width > 0 and mass > EMPTY_ZONE * full:
         c, t = ti.cast(s.pose[cut, TILT_COS], float), ti.cast(s.pose[cut, TILT_SIN], float)
         mean, blade = s.zone_velocity[cut, i], blade_velocity(s, cut, place, tip)
         if over > 0 and tip <= s.crack_front[cut, i] + s.par[cut, SLIP]:
             slide, fall = (blade[0] - mean[0]) * dt, (mean[2] - blade[2]) * dt
-            line = line_force(s, cut, i, c * slide - t * fall, c * fall + t * slide, begun - ended)
+            line = line_force(s, cut, i, c * slide - t * fall, c * fall + t * slide, part)
             along, down = c * line[0] + t * line[1], c * line[1] - t * line[0]
             impulse = ti.Vector([along, -down]) * width / c * over * dt
             s.reaction[cut, i] = impulse / mass

@@ -21,6 +21,7 @@ from mpm.state.tables import (
     EDGE_BAND,
     FIRST_STATION,
     INV_DX,
+    LAYERED,
     MASS,
     MIRROR_SUM,
     SPACING,
@@ -67,6 +68,7 @@ def hold_together(s: ti.template(), cut: ti.template()):
         c, i, mine = locate_active(s, cut, q, SLICES)
         if mine:
             s.passing[c, i] = ti.Vector.zero(float, 3)
+            s.at_edge[c, i] = ti.Vector.zero(float, 2)
     for q in range(repetitions(s, cut, TIES)):
         c, n, mine = locate_active(s, cut, q, TIES)
         if mine:
@@ -132,10 +134,14 @@ def pull_tie(s: ti.template(), cut, n, dt):
         if ti.static(not s.mirror_y):
             push_face(s, cut, other, -s.tool_gap[cut, other], -dv)
     weight = passing_weight(above / band)
+    layered = s.par[cut, LAYERED] > 0
     if weight > 0:
         tough = s.tie_toughness[cut, n]
         rest = tough * (1.0 - work_spent(s.largest_opening[cut, n], end)) if left > 0 else 0.0
         charge_edge(s, cut, at[0], weight * ti.Vector([rest, tough, 1.0]))
+    if layered:
+        weight = s.tie_share[cut, n] * passing_weight(above / AHEAD_CELLS)
+        count_layer(s, cut, at[0], s.tie_toughness[cut, n], weight)
 
 
 @ti.func
@@ -187,3 +193,16 @@ def charge_edge(s: ti.template(), cut, place, sums):
         if ti.static(s.mirror_x):
             i = ti.max(i, s.size[cut, MIRROR_SUM] - i)
         s.passing[cut, i] += (t if ti.static(d == 1) else 1.0 - t) * sums
+
+
+@ti.func
+def count_layer(s: ti.template(), cut, place, tough, weight):
+    """Count the toughness of the food at the edge itself for the slice it lies in, or for its mirror image.
+
+    What the opening has left is known half a cell below the edge. Where layers differ, the food there may be another
+    one: on the flank of a round food the edge would miss the rind on its way in, and pay it twice on its way out.
+    """
+    i = ti.floor((place - s.par[cut, FIRST_STATION]) * s.par[cut, INV_DX] + 0.5, ti.i32)
+    i = ti.math.clamp(i, s.first_slice, s.size[cut, STATIONS] - 1)
+    if weight > 0:
+        s.at_edge[cut, i] += weight * ti.Vector([tough, 1.0])

@@ -65,7 +65,8 @@ class ForceRecord:
         status: ``done``, or the reason why the run stopped early.
         fraction: Part of the stroke completed [-].
         section: The food across the blade's middle, where it was asked for.
-        resistance: Cutting resistance R of the flesh [J/m^2]; NaN where no edge parts the food.
+        resistance: Cutting resistance R of the food that is parted [J/m^2], the mean over its layers; NaN where no edge
+            parts it.
         cohesion: Energy that the ties of a cohesive crack have taken so far, where the food opened ahead of the edge
             [J], shape (n,); None without one.
     """

@@ -10,6 +10,7 @@ import numpy as np
 from mpm.output.health import health
 from mpm.output.record import ForceRecord
 from mpm.output.topology import Topology
+from mpm.scene.layers import mean_toughness
 from mpm.scene.material import Material
 from mpm.scene.shapes import section_area
 from mpm.setup.setup import Setup
@@ -162,6 +163,8 @@ class Recorder:
         """
         setup, material, scene = self._setup, self._material, self._setup.scene
         cohesive = scene.cuts and scene.numerics.contact != "nodal"
+        section = section_area(scene.food.shape)
+        parted = section - pieces.uncut_area if pieces is not None else 0.0
         return ForceRecord(
             stroke=self._column("stroke"),
             command=self._column("command"),
@@ -191,12 +194,12 @@ class Recorder:
             particles=len(setup.seeds.x),
             images=setup.grid.images,
             cells=int(np.prod(setup.grid.nodes)),
-            severed_area=section_area(scene.food.shape) - pieces.uncut_area if pieces is not None else 0.0,
+            severed_area=parted,
             pieces=pieces,
             counters=self._counters,
             wall=wall,
             status=self.status,
             fraction=fraction,
-            resistance=material.R if cohesive else math.nan,
+            resistance=mean_toughness(scene.food.shape, material, parted / section) if cohesive else math.nan,
             cohesion=np.cumsum(self._column("cohesion")) if scene.tied else None,
         )

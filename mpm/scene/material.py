@@ -25,6 +25,11 @@ class Material:
         R_initiation: Force per width at which a cut starts in bare flesh [N/m]; at least R.
         R_skin: Force per width at which the edge goes through the skin [N/m].
         skin_thickness: Thickness of the skin [m]; 0 = no skin.
+        R_rind: Cutting resistance of the rind [J/m^2], the layer all round the food; needed with ``rind_thickness``.
+        rind_thickness: Thickness of the rind [m]; 0 = no rind. It is there when the edge comes out below, too, while
+            the skin is what it takes to start a cut.
+        R_core: Cutting resistance of the core [J/m^2]; needed with ``core_ratio``.
+        core_ratio: Radius of the core over that of the food's section [-]; 0 = no core.
         initiation_depth: Indentation under the edge at which a cut starts [m]; soft solids go deep before a cut
             nucleates (Reyssat et al. 2012, Phys. Rev. Lett. 109:244301).
         mu: Coulomb friction of food on the blade's faces [-].
@@ -51,6 +56,10 @@ class Material:
     R_initiation: float | None = None
     R_skin: float | None = None
     skin_thickness: float = 0.0
+    R_rind: float | None = None
+    rind_thickness: float = 0.0
+    R_core: float | None = None
+    core_ratio: float = 0.0
     initiation_depth: float = 1e-3
     mu: float = 0.0
     tensile_strength: float | None = None
@@ -75,6 +84,7 @@ class Material:
         for name, unit in (
             ("R", "J/m^2"),
             ("skin_thickness", "m"),
+            ("rind_thickness", "m"),
             ("mu", ""),
             ("loss_factor", ""),
             ("adhesion", "Pa"),
@@ -99,6 +109,7 @@ class Material:
             raise SceneError(
                 "material: skin_thickness > 0 needs R_skin, the force per width that goes through the skin"
             )
+        self._check_layers(w)
         if (self.adhesion > 0) != (self.adhesion_energy > 0):
             raise SceneError(
                 "material: adhesion [Pa] and adhesion_energy [J/m^2] make sticky faces together; give both"
@@ -108,6 +119,32 @@ class Material:
             check_number(w, "time of a prony branch", time, 0.0, 1e9, "s")
         if sum(share for share, _ in self.prony) >= 1.0:
             raise SceneError("material: the shares of the prony branches must add up to less than 1, or a solid flows")
+
+    def _check_layers(self, where: str) -> None:
+        """Refuse layers without a resistance, and a core as large as the food."""
+        for resistance, size, what in (
+            ("R_rind", "rind_thickness", "the rind"),
+            ("R_core", "core_ratio", "the core"),
+        ):
+            if getattr(self, resistance) is not None:
+                check_number(where, resistance, getattr(self, resistance), 0.0, 1e6, "J/m^2")
+            elif getattr(self, size) > 0:
+                raise SceneError(f"material: {size} > 0 needs {resistance}, the cutting resistance of {what}")
+        check_number(where, "core_ratio", self.core_ratio, -1e-300, 1.0, "of the food's radius")
+        if self.layered and self.R == 0:
+            raise SceneError("material: a rind or a core needs flesh with a resistance; give R > 0")
+
+    @property
+    def layered(self) -> bool:
+        """Whether the food has a rind or a core."""
+        return self.rind_thickness > 0 or self.core_ratio > 0
+
+    @property
+    def toughest(self) -> float:
+        """Largest cutting resistance of flesh, rind and core [J/m^2]."""
+        rind = self.R_rind if self.rind_thickness > 0 else None
+        core = self.R_core if self.core_ratio > 0 else None
+        return max(self.R, rind or 0.0, core or 0.0)
 
     @property
     def shear(self) -> float:
@@ -137,12 +174,16 @@ class Material:
         """Strength of ties across the cut plane [Pa]: the cohesive strength, and no more than their grid resolves.
 
         A tie softens over E R / strength^2. Where that is shorter than half a spacing it would snap back, so it is
-        made weaker until it is not. The work R is the same (Turon et al. 2007, Eng. Fract. Mech. 74:1665).
+        made weaker until it is not. The work R is the same (Turon et al. 2007, Eng. Fract. Mech. 74:1665). A tougher
+        rind or core is stronger in proportion, so that all layers end at the same opening; the toughest softens over
+        the shortest length.
 
         Args:
             spacing: Distance of the ties [m].
         """
-        return min(self.cohesion, math.sqrt(self.E * self.R / (spacing / 2)))
+        if not self.R > 0:
+            return 0.0
+        return min(self.cohesion, math.sqrt(self.E * self.R * (self.R / self.toughest) / (spacing / 2)))
 
     def tie_opening(self, spacing: float) -> float:
         """Half opening at which ties across the cut plane hold nothing any more [m]; ``spacing``: their distance."""

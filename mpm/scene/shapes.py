@@ -19,7 +19,7 @@ SHAPE_KINDS = (
     "ellipsoid",
     "capsule",
 )
-_FLAT_DOWN = ("half_cylinder", "hemisphere")
+FLAT_DOWN = ("half_cylinder", "hemisphere")
 FLAT_TOP = ("block", "upright_cylinder")
 
 
@@ -59,8 +59,18 @@ class Shape:
         return -self.length / 2 - self.cut, self.length / 2 - self.cut
 
 
-def _radius2(shape: Shape, x: np.ndarray, y: np.ndarray, thinner: float = 0.0) -> np.ndarray:
-    """Squared distance from the axis or plane over that of the rim [-], of an outline ``thinner`` [m] on all sides."""
+def radius2(shape: Shape, x: np.ndarray, y: np.ndarray, thinner: float = 0.0) -> np.ndarray:
+    """Squared distance from the axis or plane over that of the rim.
+
+    Args:
+        shape: The outline.
+        x: Positions along the blade [m], any shape.
+        y: Positions across the blade [m], same shape.
+        thinner: By how much the outline is thinner on all sides [m].
+
+    Returns:
+        The ratio [-], same shape; beyond 1 a point is not in the food.
+    """
     a, b = (max(size / 2 - thinner, 5e-10) for size in (shape.width, shape.length))
     y = y + shape.cut
     if shape.kind in ("cylinder", "half_cylinder"):
@@ -75,7 +85,7 @@ def half_width(shape: Shape, y: float) -> float:
     """Half of the width of the section at y [m], 0 where there is none."""
     if shape.kind == "block":
         return shape.width / 2 if abs(y + shape.cut) <= shape.length / 2 else 0.0
-    r2 = float(_radius2(shape, np.zeros(1), np.array([y]))[0])
+    r2 = float(radius2(shape, np.zeros(1), np.array([y]))[0])
     return shape.width / 2 * math.sqrt(max(1.0 - r2, 0.0))
 
 
@@ -94,11 +104,11 @@ def surface(shape: Shape, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.
     if shape.kind == "block":
         inside = (np.abs(x) <= shape.width / 2) & (np.abs(y + shape.cut) <= shape.length / 2)
         return np.where(inside, 0.0, np.nan), np.where(inside, shape.height, np.nan)
-    r2 = _radius2(shape, x, y)
+    r2 = radius2(shape, x, y)
     if shape.kind == "upright_cylinder":
         return np.where(r2 <= 1, 0.0, np.nan), np.where(r2 <= 1, shape.height, np.nan)
     rise = np.sqrt(np.where(r2 <= 1, 1 - r2, np.nan))
-    if shape.kind in _FLAT_DOWN:
+    if shape.kind in FLAT_DOWN:
         return 0.0 * rise, shape.height * rise
     half = shape.height / 2
     return half * (1 - rise), half * (1 + rise)
@@ -150,14 +160,14 @@ def skin_path(shape: Shape, x: np.ndarray, thickness: float) -> np.ndarray:
     x = np.asarray(x, float)
     bottom, top = surface(shape, x, np.zeros_like(x))
     inner_width = max(shape.width - 2 * thickness, 1e-9)
-    r2 = _radius2(shape, x, np.zeros_like(x), thickness)
-    lift = 0.0 if shape.kind in (*_FLAT_DOWN, *FLAT_TOP) else thickness
+    r2 = radius2(shape, x, np.zeros_like(x), thickness)
+    lift = 0.0 if shape.kind in (*FLAT_DOWN, *FLAT_TOP) else thickness
     inner_height = max(shape.height - thickness - lift, 1e-9)
     if shape.kind in FLAT_TOP:
         inner_top = np.where(np.abs(x) <= inner_width / 2, inner_height, bottom)
     else:
         rise = np.sqrt(np.maximum(1 - r2, 0.0))
-        inner_top = inner_height * rise if shape.kind in _FLAT_DOWN else shape.height / 2 + inner_height / 2 * rise
+        inner_top = inner_height * rise if shape.kind in FLAT_DOWN else shape.height / 2 + inner_height / 2 * rise
         inner_top = np.where(r2 <= 1, inner_top, bottom)
     return np.nan_to_num(np.maximum(top - inner_top, 0.0))
 
@@ -180,9 +190,7 @@ def slices(shape: Shape, x: np.ndarray, dx: float) -> tuple[np.ndarray, np.ndarr
         the highest and lowest height of the lower surface [m], each of shape (n,); a slice without food is 0 high and
         has the part 0. The highest is above the lowest.
     """
-    offsets = (np.arange(SLICE_SAMPLES) + 0.5) / SLICE_SAMPLES - 0.5
-    points = x[:, None] + dx * offsets
-    bottom, top = surface(shape, points, np.zeros_like(points))
+    bottom, top = _slice_samples(shape, x, dx)
     there = np.isfinite(top)
     some = there.any(axis=1)
     out = []
@@ -191,3 +199,35 @@ def slices(shape: Shape, x: np.ndarray, dx: float) -> tuple[np.ndarray, np.ndarr
         low = np.where(some, np.where(there, heights, np.inf).min(axis=1), 0.0)
         out += [high, np.minimum(low, high - 1e-6 * dx)]
     return out[0], out[1], there.mean(axis=1), out[2], out[3]
+
+
+def slice_powers(shape: Shape, x: np.ndarray, dx: float) -> tuple[np.ndarray, np.ndarray]:
+    """How the part of a slice that an edge has reached grows on its way from the first point of a surface to the last.
+
+    The part is a power of the way, such that the area of the section between the two is right: 1 where the outline is
+    straight, less on the flank of a round food.
+
+    Args:
+        shape: The outline.
+        x: Middle of each slice [m], shape (n,).
+        dx: Width of a slice [m].
+
+    Returns:
+        The powers for the upper and for the lower surface [-], each of shape (n,).
+    """
+    out = []
+    for heights in _slice_samples(shape, x, dx)[::-1]:
+        there = np.isfinite(heights)
+        count = np.maximum(there.sum(axis=1), 1)
+        low = np.where(there, heights, np.inf).min(axis=1, initial=np.inf)
+        high = np.where(there, heights, -np.inf).max(axis=1, initial=-np.inf)
+        sloped = high - low > 1e-6 * dx
+        rise = np.where(there & sloped[:, None], heights - np.where(sloped, low, 0.0)[:, None], 0.0).sum(axis=1) / count
+        out.append(np.where(sloped, np.where(sloped, high - low, 1.0) / np.where(sloped, rise, 1.0) - 1.0, 1.0))
+    return out[0], out[1]
+
+
+def _slice_samples(shape: Shape, x: np.ndarray, dx: float) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper surface at some points of each slice [m], (n, SLICE_SAMPLES), NaN where there is no food."""
+    points = x[:, None] + dx * ((np.arange(SLICE_SAMPLES) + 0.5) / SLICE_SAMPLES - 0.5)
+    return surface(shape, points, np.zeros_like(points))

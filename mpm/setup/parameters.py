@@ -63,6 +63,7 @@ def _put_material(table: np.ndarray, scene: Scene, material: Material, seeds: Se
     if scene.tied:
         table[row.SPACING], table[row.TIE_OPENING] = seeds.spacing, material.tie_opening(seeds.spacing)
         table[row.EDGE_BAND] = scene.numerics.edge_band
+        table[row.LAYERED] = material.layered
     table[row.FACE_HEIGHT] = scene.numerics.face_height * seeds.spacing
     table[row.LEAST_GAP] = scene.numerics.least_gap * scene.numerics.dx
     table[row.ADHESION], table[row.ADHESION_GAP] = material.adhesion / (material.rho * seeds.spacing), 1.0
@@ -74,7 +75,7 @@ def _put_tool(table: np.ndarray, scene: Scene, material: Material) -> None:
     """Shape and friction of the tools, and the edge's law."""
     edge, tool = scene.edge, scene.knife
     table[row.BLADE_MU], table[row.BOARD_MU] = material.mu, scene.board.mu
-    table[row.R_FLESH], table[row.R_START] = material.R, material.start
+    table[row.R_START] = material.start
     table[row.INITIATION_DEPTH] = material.initiation_depth
     table[row.SLIP], table[row.ZONE] = edge.slip, scene.process_zone(material)
     table[row.ZONE_MASS] = material.rho * scene.numerics.dx * table[row.ZONE] ** 2

@@ -11,8 +11,9 @@ from mpm.discretisation.grid import lay_out
 from mpm.discretisation.particles import seed
 from mpm.runtime import Runtime
 from mpm.scene import Scene
+from mpm.scene.layers import layer_ties
 from mpm.scene.material import Material
-from mpm.scene.shapes import skin_path
+from mpm.scene.shapes import skin_path, slice_powers, surface
 from mpm.scene.shapes import slices as outline
 from mpm.setup.parameters import parameters, pose
 from mpm.setup.stable_step import stable_step
@@ -114,8 +115,27 @@ class Setup:
 
     def _ties(self, material: Material) -> np.ndarray:
         """The table of ties (k, N_TIE)."""
-        pairs = self.ties()
-        return np.column_stack([pairs, np.full(len(pairs), material.R)])
+        return np.column_stack([self.ties(), *self._layers(material)])
+
+    def _layers(self, material: Material) -> tuple[np.ndarray, np.ndarray]:
+        """Toughness of each tie [J/m^2] and its part of the section over a square of the spacing [-], shape (k,)."""
+        places = self.seeds.x[self.ties()[:, 0]][:, [0, 2]]
+        return layer_ties(self.scene.food.shape, material, self.seeds.spacing, places)
+
+    def _top_toughness(self, material: Material) -> np.ndarray:
+        """Toughness of the food within a cell below its upper surface, in each slice [J/m^2], shape (m,)."""
+        out = np.full(len(self.grid.stations), float(material.R))
+        if not (self.scene.tied and material.layered):
+            return out
+        dx = self.scene.numerics.dx
+        x, _, z = self.seeds.x[self.ties()[:, 0]].T
+        depth = surface(self.scene.food.shape, x, np.zeros_like(x))[1] - z
+        place = np.abs(self.grid.stations) if self.scene.mirrors[0] else self.grid.stations
+        toughness, share = self._layers(material)
+        weight = share * np.maximum(1.0 - np.abs(place[:, None] - x) / dx, 0.0) * (depth < dx)
+        total = weight.sum(axis=1)
+        np.divide(weight @ toughness, total, out=out, where=total > 0)
+        return out
 
     def _particles(self, material: Material) -> np.ndarray:
         """The table of particles (n, N_PARTICLE)."""
@@ -139,7 +159,10 @@ class Setup:
         path = skin_path(scene.food.shape, xs, material.skin_thickness) if material.skin_thickness > 0 else 0 * xs
         out = np.empty((len(xs), column.N_SLICE))
         out[:, : column.SOFTENING] = np.transpose(outline(scene.food.shape, xs, scene.numerics.dx))
-        out[:, column.SOFTENING] = scene.edge.slip + path
+        out[:, column.TOP_POWER :] = 1.0
+        if material.layered:
+            out[:, column.TOP_POWER :] = np.transpose(slice_powers(scene.food.shape, xs, scene.numerics.dx))
+        out[:, column.SOFTENING], out[:, column.TOP_TOUGHNESS] = scene.edge.slip + path, self._top_toughness(material)
         return out
 
     def _relaxation(self, material: Material) -> np.ndarray:

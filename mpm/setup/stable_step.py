@@ -53,7 +53,8 @@ def stable_step(scene: Scene, material: Material, spacing: float) -> float:
     if num.contact == "cohesive":
         dt = min(dt, math.sqrt(CONTACT_LIMIT / contact_stiffness(scene, material, spacing)))
     if num.contact == "cohesive" and scene.cuts:
-        spring = math.sqrt(max(material.start, 1e-12) / (edge.slip * material.rho * scene.process_zone(material) ** 2))
+        toughest = max(material.start, material.toughest, 1e-12)
+        spring = math.sqrt(toughest / (edge.slip * material.rho * scene.process_zone(material) ** 2))
         dt = min(dt, EDGE_STABILITY / spring)
         if material.adhesion > 0:
             pull = material.adhesion / (material.rho * spacing)  # acceleration at full strength

@@ -10,11 +10,11 @@ import numpy as np
 # Columns of the tables of particles and of slices that a run begins with.
 POSITION, BOARD_GAP, TOOL_GAP, VOLUME_RATIO, SURFACE_VOLUME, ADHERING = 0, 3, 4, 5, 6, 8
 N_PARTICLE = 9
-TOP_HIGH, TOP_LOW, WIDTH, FLOOR_HIGH, FLOOR_LOW, SOFTENING = range(6)
-N_SLICE = 6
-# Columns of the table of ties: left and right particle, toughness.
-LEFT, RIGHT, TOUGHNESS = range(3)
-N_TIE = 3
+TOP_HIGH, TOP_LOW, WIDTH, FLOOR_HIGH, FLOOR_LOW, SOFTENING, TOP_TOUGHNESS, TOP_POWER, FLOOR_POWER = range(9)
+N_SLICE = 9
+# Columns of the table of ties: left and right particle, toughness, part of the section over a square of the spacing.
+LEFT, RIGHT, TOUGHNESS, SHARE = range(4)
+N_TIE = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,13 +29,14 @@ class Contents:
         particles: Table, shape (n, N_PARTICLE): position in the grid's axes, distances at which board and tool are met
             [m], volume over that of a particle beside the cut [-], reference volumes before the board and before the
             tool [m^3], 0 for a surface that can stick and -1 for others.
-        slices: Table, shape (m, N_SLICE): outline of the food in each slice [m], and the slip over which the edge's
-            resistance falls [m].
+        slices: Table, shape (m, N_SLICE): outline of the food in each slice [m], the slip over which the edge's
+            resistance falls [m], the toughness below its upper surface [J/m^2], and the powers with which upper and
+            lower surface are passed [-].
         parameters: Shape (N_PARAMETERS,), rows as in :mod:`mpm.state.tables`.
         pose: Of the tool, shape (N_POSE,), rows as in :mod:`mpm.state.tables`.
         relaxation: Share of each Prony branch [-], and time step over its time [-], shape (2, branches).
         ties: Table of the ties across the cut plane, shape (k, N_TIE): left and right particle, -1 for a mirror image,
-            and toughness [J/m^2]; none without a cohesive crack.
+            toughness [J/m^2], and part of the section over a square of the spacing [-]; none without a cohesive crack.
         half: Half of the food that each particle belongs to, 0 left, 1 right, shape (n,); empty without ties.
     """
 

@@ -16,17 +16,21 @@ from mpm.state.contents import (
     BOARD_GAP,
     FLOOR_HIGH,
     FLOOR_LOW,
+    FLOOR_POWER,
     LEFT,
     N_PARTICLE,
     N_SLICE,
     N_TIE,
     POSITION,
     RIGHT,
+    SHARE,
     SOFTENING,
     SURFACE_VOLUME,
     TOOL_GAP,
     TOP_HIGH,
     TOP_LOW,
+    TOP_POWER,
+    TOP_TOUGHNESS,
     TOUGHNESS,
     VOLUME_RATIO,
     WIDTH,
@@ -38,7 +42,6 @@ from mpm.state.tables import (
     N_PARAMETERS,
     N_POSE,
     N_SIZES,
-    R_FLESH,
     STATIONS,
     STRETCH,
     STRETCH_AT_REST,
@@ -155,7 +158,8 @@ def _write(
                 row[k] = ti.cast(slices[c, i, k], float)
         s.top_high[c, i], s.top_low[c, i], s.width[c, i] = row[TOP_HIGH], row[TOP_LOW], row[WIDTH]
         s.floor_high[c, i], s.floor_low[c, i] = row[FLOOR_HIGH], row[FLOOR_LOW]
-        s.softening[c, i] = row[SOFTENING]
+        s.top_power[c, i], s.floor_power[c, i] = row[TOP_POWER], row[FLOOR_POWER]
+        s.softening[c, i], s.top_toughness[c, i] = row[SOFTENING], row[TOP_TOUGHNESS]
         s.slip[c, i] = ti.Vector.zero(float, 2)
         s.reaction[c, i] = ti.Vector.zero(float, 2)
         s.zone_velocity[c, i] = ti.Vector.zero(float, 3)
@@ -184,10 +188,13 @@ def _write_ties(s: ti.template(), ties: TABLES, half: ROWS):
                 row[k] = ti.cast(ties[c, n, k], float)
         s.tie_ends[c, n] = ti.Vector([ti.cast(row[LEFT], ti.i32), ti.cast(row[RIGHT], ti.i32)])
         s.tie_toughness[c, n], s.largest_opening[c, n], s.cut_part[c, n] = row[TOUGHNESS], 0.0, 0.0
+        s.tie_share[c, n] = row[SHARE]
         s.face_shear[c, n] = ti.Vector.zero(float, 2)
     for c, i in s.passing:
         s.passing[c, i] = ti.Vector.zero(float, 3)
-        s.passed_mean[c, i] = ti.Vector([s.par[c, R_FLESH], s.par[c, R_FLESH]])
+        s.at_edge[c, i] = ti.Vector.zero(float, 2)
+        s.part_left[c, i], s.most_passed[c, i] = 1.0, 0.0
+        s.passed_mean[c, i] = ti.Vector([s.top_toughness[c, i], s.top_toughness[c, i]])
         s.start_excess[c, i] = 0.0
 
 

@@ -119,6 +119,9 @@ class State:
         front_drift: Way of the front with the material in this step [m], (cut, slice).
         cut_depth: Way that has been cut since the start [m], (cut, slice).
         softening: Slip over which the resistance falls after the start [m], (cut, slice).
+        top_power: Power of the way through the upper surface of a slice that is the part of it that the edge has
+            reached [-], (cut, slice); ``floor_power`` the same for the lower one.
+        top_toughness: Toughness of the food below its upper surface [J/m^2], (cut, slice).
         start_force: Force at which the cut has started [N/m], 0 before, (cut, slice).
         contact_part: Part of the slice that the edge was in before [-], (cut, slice).
         started_beside: Neighbours in which the cut has started, (cut, slice).
@@ -129,12 +132,18 @@ class State:
             to ``start_excess`` is there only where ``cuts``.
         tie_ends: Left and right particle of a tie, (cut, tie).
         tie_toughness: Its work of fracture over its area [J/m^2], (cut, tie).
+        tie_share: Its part of the section over a square of the spacing, where toughness differs [-], (cut, tie).
         largest_opening: Largest half opening of its two faces so far [m], (cut, tie).
         cut_part: Part of it that the edge has cut [-], (cut, tie).
         face_shear: Half of the shear of the two faces against their centres, along the cut and upwards [m], (cut, tie).
         passing: Sums over the ties that the edge passes, with their weights: what is left of their toughness, toughness
             [J/m^2], and the weights [-], (cut, slice).
+        at_edge: Sums over the ties at the edge, with their weights, where toughness differs: toughness [J/m^2], and the
+            weights [-], (cut, slice).
         passed_mean: Their last means: what is left, and toughness [J/m^2], (cut, slice).
+        part_left: Part of their toughness that the ties that the edge passes have left, where it differs [-],
+            (cut, slice).
+        most_passed: Largest sum of their weights so far [-], (cut, slice).
         start_excess: Line force beyond the toughness at which a cut has started [N/m], (cut, slice).
         sums, pose, order, par, size: Tables whose rows are in :mod:`mpm.state.tables`, (cut, row).
         losses, particle_sums: Sums over particles, of which different particles add to different copies,
@@ -236,6 +245,7 @@ class State:
         self.zone_velocity = vec3.field(shape=shape)
         self.crack_front, self.front_drift, self.cut_depth = (ti.field(real, shape) for _ in range(3))
         self.softening, self.start_force, self.contact_part = (ti.field(real, shape) for _ in range(3))
+        self.top_toughness, self.top_power, self.floor_power = (ti.field(real, shape) for _ in range(3))
         self.started_beside = ti.field(ti.i32, shape)
         self.top_high, self.top_low, self.width = (ti.field(real, shape) for _ in range(3))
         self.floor_high, self.floor_low = (ti.field(real, shape) for _ in range(2))
@@ -246,9 +256,11 @@ class State:
         self.half = ti.field(ti.i32, (batch, self.room))
         self.tie_ends = ti.Vector.field(2, ti.i32, (batch, ties))
         self.tie_toughness, self.largest_opening, self.cut_part = (ti.field(real, (batch, ties)) for _ in range(3))
+        self.tie_share = ti.field(real, (batch, ties))
         self.face_shear = vec2.field(shape=(batch, ties))
         self.passing, self.passed_mean = ti.types.vector(3, real).field(shape=slices), vec2.field(shape=slices)
-        self.start_excess = ti.field(real, slices)
+        self.start_excess, self.part_left, self.most_passed = (ti.field(real, slices) for _ in range(3))
+        self.at_edge = vec2.field(shape=slices)
 
     def _add_tables(self, real: Any) -> None:
         """Tables of numbers that the host sets, and of what the loops go over."""

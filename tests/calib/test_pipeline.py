@@ -27,6 +27,7 @@ from calib.material.knife import load_knife
 from calib.material.scene import (
     Sizing,
     at_fitted_height,
+    blade_warnings,
     cut_scene,
     height_range,
     specimen,
@@ -53,7 +54,7 @@ from mpm.output.record import ENERGIES, ForceRecord
 from mpm.runtime import Runtime, start
 from mpm.scene import Scene
 from mpm.scene.errors import SceneError, SimulationError
-from mpm.scene.shapes import SHAPE_KINDS
+from mpm.scene.shapes import SHAPE_KINDS, Shape
 from tests.calib.cheap import LOG, SECONDS, CheapPool, noted
 from tests.calib.cheap import cut as cheap_cut
 from tests.data_dir import ROOT
@@ -82,7 +83,7 @@ def test_height_follows_the_stroke():
     assert through.height == pytest.approx(0.04, rel=0.03)
     short, words = specimen(food, trace(loaded=True), Sizing())
     low, likely, high = height_range(food, trace(loaded=True), Sizing())
-    assert low == pytest.approx(0.044, rel=0.03) and high == pytest.approx(0.055, rel=0.03)
+    assert low == pytest.approx(0.040, rel=0.03) and high == pytest.approx(0.055, rel=0.03)
     assert low < short.height == likely < high
     assert height_range(food, trace(loaded=False), Sizing()) is None
     assert height_range(food, trace(loaded=True), Sizing(height=0.05)) is None
@@ -95,6 +96,16 @@ def test_given_sizes_are_taken_and_not_assumed():
     shape, said = specimen(load_food("apple"), None, Sizing("block", 0.03, 0.04, 0.05))
     assert (shape.kind, shape.height, shape.width, shape.length) == ("block", 0.03, 0.04, 0.05)
     assert said == []
+
+
+def test_a_blade_that_is_too_short_is_said():
+    """What stays uncut beside the blade, by its width; a blade that is long enough is nothing to speak of."""
+    shape = Shape("hemisphere", 0.077, 0.077, 0.038)
+    (said,) = blade_warnings(shape, load_knife("edc"))
+    assert "77 mm wide" in said and "blade 65 mm long" in said and "6.0 mm on each side" in said
+    assert blade_warnings(shape, load_knife("kitchen")) == []
+    aside = Shape("hemisphere", 0.077, 0.077, 0.038, cut=0.03)
+    assert blade_warnings(aside, load_knife("edc")) == []
 
 
 def test_a_food_is_simulated_as_long_as_it_matters():
@@ -155,7 +166,7 @@ def test_the_mean_over_a_cell_has_its_whole_window_up_to_the_end_of_the_trace(tm
     for scene in (setup.fine, setup.coarse):
         for height in (heights.low, heights.value, heights.high):
             placed, _ = at_fitted_height(scene, {"height": height})
-            assert length + 0.5 * placed.numerics.dx <= placed.motion.stroke * (1 + 1e-9)
+            assert min(length + 0.5 * placed.numerics.dx, height) <= placed.motion.stroke * (1 + 1e-9)
             assert placed.motion.stroke <= height * (1 + 1e-9)
     measured = set_up(Calibration("cucumber", path, height=length + 1e-4).request())
     assert measured.fine.motion.stroke == measured.fine.food.shape.height

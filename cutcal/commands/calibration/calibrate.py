@@ -86,6 +86,7 @@ def add_trace(p: argparse.ArgumentParser, *, required: bool = True) -> None:
     g.add_argument("--sign", choices=("+", "-"), metavar="+|-", help="sign that makes resistance positive")
     g.add_argument("--rate", type=number(0, 1e6, "/s"), metavar="HZ", help="rows a second, where there is no clock")
     g.add_argument("--speed", type=number(0, 10, "m/s"), metavar="M/S", help="of the knife, where there is no position")
+    g.add_argument("--board-z", type=float, metavar="M", help="what its height reads with the edge on the board [m]")
     g.add_argument("--gain-sd", type=number(0, 1, ""), metavar="PART", help="doubt of the sensor's gain (default 0.02)")
     g.add_argument("--lag-sd", type=number(0, 1, "s"), metavar="S", help="doubt of force against position in time [s]")
     g.add_argument("--baseline", choices=BASELINES, default=CONSTANT, metavar="KIND", help=BASELINE_HELP)
@@ -153,6 +154,7 @@ def measured(args: argparse.Namespace, command: Sequence[str]) -> Request:
         columns=columns,
         knife=args.knife,
         speed=args.speed,
+        board_z=args.board_z,
         t_end=args.t_end,
         baseline=args.baseline,
         cut=args.cut,

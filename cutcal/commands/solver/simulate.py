@@ -16,7 +16,7 @@ from calib.io.provenance import git_commit, versions
 from calib.io.schema import tag
 from calib.material.food import FoodSpec
 from calib.material.knife import load_knife
-from calib.material.scene import cut_scene, specimen
+from calib.material.scene import blade_warnings, cut_scene, specimen
 from calib.simulation.evaluation import FULLY_PARTED, pressed_away, weakened_ties
 from calib.table.units import metres
 from calib.validation.method_constants import CONSTANTS
@@ -150,6 +150,10 @@ def run(args: argparse.Namespace) -> int:
     out = Path(args.out or f"cutcal-simulate-{food.name}")
     shape, assumed = specimen(food, None, sizing_of(args))
     scene = _scene(args, food, shape)
+    narrow = blade_warnings(shape, load_knife(args.knife))
+    assumed += narrow
+    for text in narrow:
+        note(text)
     with prepare(out, "simulate", resume=False):
         simulation, watch, record = _simulated(args, scene)
         write_csv(out / "force.csv", record.columns())

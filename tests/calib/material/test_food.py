@@ -22,7 +22,7 @@ from calib.material.food import (
     load_foods,
     load_material_file,
 )
-from calib.material.properties import DIMENSIONS, PROPERTIES, Property, Source
+from calib.material.properties import DIMENSIONS, LAYERS, PROPERTIES, Property, Source
 from tests.data_dir import data_file
 
 TABLE2 = {  # rho, E, nu of CulinaryCut, Table 2
@@ -74,7 +74,13 @@ def test_shipped_foods(foods: dict[str, FoodSpec]) -> None:
     """The fifteen foods of the paper and potato are there, each with every property but the nullable ones."""
     assert set(FOODS) == set(foods)
     for food in foods.values():
-        assert set(PROPERTIES) - set(food.properties) <= {"R_skin", "tensile_strength", "fracture_energy"}
+        assert set(PROPERTIES) - set(food.properties) <= {
+            "R_skin",
+            "tensile_strength",
+            "fracture_energy",
+            *LAYERS,
+            *LAYERS.values(),
+        }
         assert tuple(food.dims) == tuple(DIMENSIONS)
 
 
@@ -186,6 +192,10 @@ def test_default_fit_follows_the_skin(foods: dict[str, FoodSpec]) -> None:
         "yield_stress",
         "tensile_strength",
         "R",
+        "R_rind",
+        "rind_thickness",
+        "R_core",
+        "core_ratio",
         "R_skin",
         "skin_thickness",
         "initiation_depth",
@@ -540,3 +550,28 @@ def test_exponents_are_numbers(tmp_path: Path, document: dict[str, Any]) -> None
     text = yaml.safe_dump(document).replace("value: 300000.0", "value: 3e5")
     assert "value: 3e5" in text
     assert load_foods(write(tmp_path, text))["banana"].value("E") == 3e5
+
+
+RIND = {"R_rind": 500.0, "rind_thickness": 2e-3}
+
+
+def test_layers_are_read_fitted_and_written_where_a_food_has_them(tmp_path: Path) -> None:
+    """Values for a rind and a core join the default fit and the solver's material, and a file gives them back."""
+    plain = load_food("banana")
+    assert plain.layers == () and not set(LAYERS) & set(plain.as_dict()["properties"])
+    food = plain.with_values(RIND | {"R_core": 60.0, "core_ratio": 0.3})
+    assert food.layers == ("R_rind", "rind_thickness", "R_core", "core_ratio")
+    assert set(food.layers) <= set(food.default_fit)
+    assert food.properties["core_ratio"].high <= 0.95
+    material = food.to_scene_food().material
+    assert (material.rind_thickness, material.R_core, material.layered) == (2e-3, 60.0, True)
+    dump_material(food, tmp_path / "food.yaml", {})
+    assert load_material_file(tmp_path / "food.yaml") == food
+    assert food.with_values({"rind_thickness": 0.0}).layers == ("R_core", "core_ratio")
+
+
+@pytest.mark.parametrize("name", [*LAYERS, *LAYERS.values()])
+def test_half_a_layer_is_an_error(name: str) -> None:
+    """A size without a resistance, or a resistance without a size, says what is missing."""
+    with pytest.raises(MaterialError, match=f"banana.properties: {name} needs .*; give both, or neither"):
+        load_food("banana").with_values({name: 0.01 if name in LAYERS else 100.0})

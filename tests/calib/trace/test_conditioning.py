@@ -555,3 +555,44 @@ def test_digitised_cuts(food: str, length: float, peak: float) -> None:
     assert done.onset_s == pytest.approx(0.152, abs=0.005)
     assert done.stroke_length_m == pytest.approx(length, rel=0.01)
     assert done.peak_N == pytest.approx(peak, rel=0.01)
+
+
+def falling(fall: float, rest: float = 0.003) -> Trace:
+    """A cut of 40 mm whose force falls from 20 N to nothing over the last ``fall`` m; ``rest`` m of stroke come after,
+    in which the arm rings."""
+    stroke = np.arange(-0.01, 0.04 + rest, 1e-4)
+    level = 20 * np.clip(stroke / 0.004, 0, 1) * np.clip((0.04 - stroke) / fall, 0, 1)
+    ring = -4.0 * np.sin(2 * np.pi * (stroke - 0.04) / 0.002) * np.exp(-(stroke - 0.04) / 0.001) * (stroke > 0.04)
+    noise = np.random.default_rng(3).normal(0, 0.05, len(stroke))
+    return Trace(
+        stroke / SPEED, level + ring + noise, 0.09 - stroke, "fruit.csv", "", {"position": "z_m"}, label="measured"
+    )
+
+
+def test_the_edge_is_through_where_the_force_falls_to_little() -> None:
+    """A steep fall before the stroke's end is the height of the food; what rings behind it is no cut."""
+    cut = condition(falling(0.002))
+    assert cut.stroke_length_m == pytest.approx(0.040, abs=4e-4)
+    assert any("edge is through" in text for text in cut.warnings)
+    assert cut.curve[-1] < 0.1 * cut.peak_N
+
+
+@pytest.mark.parametrize(("fall", "rest"), [(0.02, 0.003), (0.002, 0.0005)])
+def test_a_fall_that_says_nothing_of_the_board_is_left_in(fall: float, rest: float) -> None:
+    """A force that falls with the chord, or at the very end, leaves the stroke as it is."""
+    cut = condition(falling(fall, rest))
+    assert cut.stroke_length_m == pytest.approx(0.04 + rest, abs=4e-4)
+    assert not any("edge is through" in text for text in cut.warnings)
+
+
+def test_the_board_may_be_a_reading_of_the_height() -> None:
+    """The stroke ends where the height reads what it does on the board, also where the column is a depth."""
+    trace = falling(0.02)
+    assert trace.position is not None
+    assert condition(trace, board_z=0.050).stroke_length_m == pytest.approx(0.040, abs=2e-4)
+    depth = replace(trace, position=trace.position - 0.1)
+    assert condition(depth, board_z=0.050).stroke_length_m == pytest.approx(0.040, abs=2e-4)
+    with pytest.raises(TraceError, match="--board-z 0.3 m is no height below contact"):
+        condition(trace, board_z=0.3)
+    with pytest.raises(TraceError, match="the trace has none"):
+        condition(replace(trace, position=None), speed=SPEED, board_z=0.05)

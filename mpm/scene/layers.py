@@ -1,0 +1,114 @@
+"""Layers of a food in the section that a cut severs: a rind all round, flesh, and a core, each with its own toughness.
+
+The rind lies between the outline and the outline shrunk by its thickness on all sides, the lower one too; the flat face
+of a half fruit has none, for there it was halved. The core is the outline shrunk in proportion about its middle, or
+about that of the flat face; in a food with parallel sides it runs along all of its length.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mpm.scene.material import Material
+from mpm.scene.shapes import FLAT_DOWN, FLAT_TOP, Shape, half_width, inside, radius2
+
+SUBSAMPLES = 8  # points along each side of a particle's square of the section
+SECTION_SAMPLES = 400  # points along the width and along the height of a whole section
+PRISMS = ("block", "cylinder", "half_cylinder", "capsule")  # their core runs along y
+
+
+def toughness(shape: Shape, material: Material, points: np.ndarray) -> np.ndarray:
+    """Cutting resistance of the food at some points.
+
+    Args:
+        shape: The outline.
+        material: Its constants.
+        points: Places in the food before it is cut [m], shape (n, 3).
+
+    Returns:
+        R of the layer that each lies in [J/m^2], shape (n,).
+    """
+    out = np.full(len(points), float(material.R))
+    if material.core_ratio > 0 and material.R_core is not None:
+        out[_in_core(shape, points, material.core_ratio)] = material.R_core
+    if material.rind_thickness > 0 and material.R_rind is not None:
+        out[~_within(shape, points, material.rind_thickness)] = material.R_rind
+    return out
+
+
+def layer_ties(shape: Shape, material: Material, spacing: float, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ties across the cut plane in the layers: each stands for the part of the section that is nearest to it.
+
+    The section is sampled on a lattice finer than the ties', so a rind thinner than their spacing counts by its share.
+
+    Args:
+        shape: The outline.
+        material: Its constants.
+        spacing: Distance of the ties [m].
+        places: Where they are in the uncut food, along the blade and upwards [m], shape (k, 2); only those at x > 0
+            where x = 0 is a mirror.
+
+    Returns:
+        Toughness of each, the mean of R over its part [J/m^2], and its part over a square of the spacing [-], (k,).
+    """
+    if not material.layered or len(places) == 0:
+        return np.full(len(places), float(material.R)), np.ones(len(places))
+    step, mirrored = spacing / SUBSAMPLES, places[:, 0].min() > 0
+    x = np.arange(0.0 if mirrored else -shape.width / 2, shape.width / 2, step) + step / 2
+    points = _section(shape, x, np.arange(0.0, shape.height, step) + step / 2)
+    _, owner = cKDTree(places).query(points[:, [0, 2]])
+    count = np.bincount(owner, minlength=len(places))
+    total = np.bincount(owner, toughness(shape, material, points), len(places))
+    own = toughness(shape, material, np.insert(places, 1, 0.0, axis=1))
+    return np.where(count > 0, total / np.maximum(count, 1), own), count / SUBSAMPLES**2
+
+
+def mean_toughness(shape: Shape, material: Material, part: float = 1.0) -> float:
+    """Mean of R over the section of a cut, or over the upper part of it: what new surface costs an area.
+
+    Args:
+        shape: The outline.
+        material: Its constants.
+        part: Part of the section's area that is cut, from above [-].
+
+    Returns:
+        The mean [J/m^2].
+    """
+    if not material.layered:
+        return material.R
+    even = (np.arange(SECTION_SAMPLES) + 0.5) / SECTION_SAMPLES
+    points = _section(shape, (2 * even - 1) * half_width(shape, 0.0), even * shape.height)
+    upper = points[np.argsort(-points[:, 2], kind="stable")][: max(round(part * len(points)), 1)]
+    return float(toughness(shape, material, upper).mean())
+
+
+def _section(shape: Shape, x: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Points (n, 3) of a lattice in the plane of the cut that lie in the food."""
+    along, up = (axis.ravel() for axis in np.meshgrid(x, z, indexing="ij"))
+    points = np.column_stack([along, np.zeros_like(along), up])
+    return points[inside(shape, points)]
+
+
+def _within(shape: Shape, points: np.ndarray, thickness: float) -> np.ndarray:
+    """Which points (n, 3) lie in the outline shrunk by a thickness [m] on all sides that have a rind, shape (n,)."""
+    x, y, z = points.T
+    floor = 0.0 if shape.kind in FLAT_DOWN else thickness
+    if shape.kind == "block":
+        beside = (np.abs(x) <= shape.width / 2 - thickness) & (np.abs(y + shape.cut) <= shape.length / 2 - thickness)
+        return beside & (z >= floor) & (z <= shape.height - thickness)
+    r2 = radius2(shape, x, y, thickness)
+    if shape.kind in FLAT_TOP:
+        return (r2 <= 1) & (z >= floor) & (z <= shape.height - thickness)
+    middle = floor if shape.kind in FLAT_DOWN else shape.height / 2
+    half = max(shape.height - middle - thickness, 1e-9)
+    return r2 + ((z - middle) / half) ** 2 <= 1
+
+
+def _in_core(shape: Shape, points: np.ndarray, ratio: float) -> np.ndarray:
+    """Which points (n, 3) lie in the core, whose radius is a part of the outline's, shape (n,)."""
+    x, y, z = points.T
+    middle = 0.0 if shape.kind in FLAT_DOWN else shape.height / 2
+    along = y if shape.kind in PRISMS else (y + shape.cut) / ratio - shape.cut
+    up = z if shape.kind == "upright_cylinder" else (z - middle) / ratio + middle
+    return inside(shape, np.column_stack([x / ratio, along, up]))

@@ -1,0 +1,51 @@
+"""Where a search for layers begins: at the resistances and sizes that a made-up force was made of."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calib.material.food import load_food
+from calib.material.knife import load_knife
+from calib.material.scene import cut_scene
+from calib.problem.food_parameters import fit_parameters
+from calib.problem.layer_guess import EDGE_PART, _chords, layer_guess
+from mpm.scene.shapes import Shape
+
+HEIGHT = 0.042
+CUCUMBER = load_food("cucumber")
+SCENE = cut_scene(CUCUMBER, Shape("cylinder", 0.15, HEIGHT, HEIGHT), load_knife("kitchen"))
+TRUE = {"R": 120.0, "R_rind": 400.0, "rind_thickness": 2.5e-3, "R_core": 30.0, "core_ratio": 0.5}
+DENT = 4.2e-3
+
+
+def made() -> tuple[np.ndarray, np.ndarray]:
+    """Stroke and force of a fruit of these layers that gives way by a dent, until there is nothing below it."""
+    stroke = np.linspace(0.0, HEIGHT, 240)
+    food = replace(SCENE.food.material, rind_thickness=TRUE["rind_thickness"], core_ratio=TRUE["core_ratio"])
+    depth, chords = _chords(SCENE.food.shape, food)
+    at = np.clip((stroke - DENT) * HEIGHT / (HEIGHT - DENT), 0.0, HEIGHT)
+    force = sum(TRUE[name] * np.interp(at, depth, c) for name, c in zip(("R", "R_rind", "R_core"), chords, strict=True))
+    return stroke, np.maximum(force, 0.3 * stroke / DENT) / EDGE_PART
+
+
+def test_the_layers_of_a_made_up_force_are_found() -> None:
+    """Two peaks, a dip and a fall tell the three resistances to a quarter and the sizes to a step of what is tried."""
+    names = ("E", "R", "R_rind", "rind_thickness", "R_core", "core_ratio", "R_skin", "initiation_depth", "mu")
+    parameters = fit_parameters(CUCUMBER, names)
+    guess = layer_guess(SCENE, parameters, *made())
+    assert guess is not None
+    found = parameters.to_dict(guess)
+    for name in ("R", "R_rind", "rind_thickness", "core_ratio"):
+        assert found[name] == pytest.approx(TRUE[name], rel=0.25), name
+    assert found["R_core"] < 0.5 * found["R"]
+    assert found["R_skin"] == pytest.approx(found["R_rind"])
+    assert 0 < found["mu"] < CUCUMBER.properties["mu"].value
+
+
+@pytest.mark.parametrize("names", [("E", "R", "R_skin"), ("E", "R_rind", "rind_thickness"), ("R", "R_rind")])
+def test_there_is_no_guess_without_layers_to_fit(names: tuple[str, ...]) -> None:
+    """A food without layers, or one whose flesh or size of layers is held, begins as it did."""
+    assert layer_guess(SCENE, fit_parameters(CUCUMBER, names), *made()) is None
