@@ -23,8 +23,12 @@ from calib.fit.options import FitOptions
 from calib.io.folder import prepare, write_csv, write_json
 from calib.io.progress import Progress
 from calib.material.food import dump_material
+from calib.posterior.answer import analysis_of, coordinates_of, fit_of
+from calib.posterior.posterior import sample_posterior
+from calib.posterior.sampling import check_installed
 from calib.problem.request import Request
 from calib.problem.setup import FINE, Setup, set_up
+from calib.simulation.evaluation import Evaluators
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore
 from calib.simulation.record_file import read_record, record_errands
 from calib.simulation.workers import Errand, Workers
@@ -71,7 +75,10 @@ def run(
     for text in [*setup.warnings, *setup.assumed]:
         say(text)
     options = FitOptions(budget=request.budget, batch=pool.batch, seed=request.seed)
-    options.check(len(setup.objective.parameters))
+    if request.sample:
+        check_installed()
+    else:
+        options.check(len(setup.objective.parameters))
     with prepare(out, "calibrate", resume=resume):
         with EvaluationStore(out / STORE, setup.header, resume=resume, say=say) as store:
             work = _Calibration(setup, pool, store, out, say)
@@ -101,10 +108,18 @@ class _Calibration:
         """The fit, and its uncertainty."""
         setup = self.setup
         evaluators = setup.evaluators(self.pool, self.store)
+        if setup.request.sample:
+            return self._sampled(evaluators)
         listener = Listener(progress, self.say, self._begin_longest_check)
-        return fit_with_uncertainty(
-            setup.objective, evaluators, options, sample=setup.request.sample, listener=listener
-        )
+        return fit_with_uncertainty(setup.objective, evaluators, options, listener)
+
+    def _sampled(self, evaluators: Evaluators) -> tuple[FitResult, UncertaintyAnalysis]:
+        """The best food of the sampled posterior, and what is uncertain."""
+        setup, seed = self.setup, self.setup.request.seed
+        posterior = sample_posterior(setup.objective, coordinates_of(setup), evaluators, seed, self.say)
+        fit = fit_of(posterior)
+        self._begin_longest_check(fit)
+        return fit, analysis_of(posterior, fit, seed)
 
     def _begin_longest_check(self, fit: FitResult) -> None:
         """Begin the longest of the last simulations, beside those of the intervals."""

@@ -66,7 +66,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
         metavar="PART",
         help="how far a right model may be, of the peak (0.03)",
     )
-    fit.add_argument("--sample", action="store_true", help="sample the posterior as well (needs emcee)")
+    fit.add_argument("--sample", action="store_true", help="sample all plausible foods, not search one (slower; needs dynesty)")
     fit.add_argument("--u-num", metavar="DIR", help="a converge study whose uncertainty the fit heeds")
     add_workers(p, "simulations")
     titled(p, RUN).add_argument("--check", nargs="?", const="", metavar="PNG", help=CHECK_HELP)
