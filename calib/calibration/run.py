@@ -116,7 +116,7 @@ class _Calibration:
     def _sampled(self, evaluators: Evaluators) -> tuple[FitResult, UncertaintyAnalysis]:
         """The best food of the sampled posterior, and what is uncertain."""
         setup, seed = self.setup, self.setup.request.seed
-        posterior = sample_posterior(setup.objective, coordinates_of(setup), evaluators, seed, self.say)
+        posterior = sample_posterior(setup.objective, coordinates_of(setup), evaluators, None, seed, self.say)
         fit = fit_of(posterior)
         self._begin_longest_check(fit)
         return fit, analysis_of(posterior, fit, seed)

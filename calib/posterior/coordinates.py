@@ -8,8 +8,10 @@ how near to yield it is when the edge goes in.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -18,6 +20,8 @@ from mpm.arrays import FloatArray
 
 SCALES = ("R", "R_skin", "R_initiation", "E", "yield_stress", "tensile_strength")
 """Properties that may be the scale of the force, the first fitted one is."""
+HEIGHT = "height"
+"""The specimen's height among the factors of a product."""
 START_WORK = 2.0
 """Work of surface over modulus and height which the edge presses in before it cuts, times this [-]."""
 
@@ -36,7 +40,7 @@ class Coordinates:
     fixed: Mapping[str, float]
     height: float
 
-    @property
+    @cached_property
     def scale_name(self) -> str | None:
         """The fitted property that is the scale of the force; None where no stress-like one is fitted."""
         names = {property_of(n): n for n in self.parameters.names}
@@ -45,76 +49,84 @@ class Coordinates:
     def scale(self, z: FloatArray) -> FloatArray:
         """Logarithm of the scale of the force (q,) at internal coordinates (q, p); zero where nothing scales it.
 
-        It is one only where all stress-like properties that matter are fitted: a fixed one does not scale along, and
-        its ratio to the scale is an axis then.
+        Where a stress-like property is fixed it does not scale along, and the scale itself is an axis too.
         """
-        name = self.scale_name
-        if name is None:
+        if self.scale_name is None:
             return np.zeros(len(z))
-        out: FloatArray = z[:, self.parameters.names.index(name)]
+        out: FloatArray = z[:, self.parameters.names.index(self.scale_name)]
         return out
 
     def __call__(self, z: FloatArray) -> FloatArray:
         """Coordinates (q, d) at internal coordinates (q, p)."""
-        scale = self.scale(z)
-        axes: list[FloatArray] = []
-        for k, p in enumerate(self.parameters):
-            if p.name == self.scale_name:
-                if self._fixed_stress():
-                    axes.append(z[:, k])
-            elif property_of(p.name) in STRESS_LIKE and p.log:
-                axes.append(z[:, k] - scale)
-            else:
-                axes.append(z[:, k])
-        return np.column_stack([*axes, *self._physics(z)])
+        rows, constants = self._linear
+        linear = z @ rows.T + constants
+        if self._start is None:
+            return linear
+        pressed, depth = self._start
+        start = START_WORK * np.exp(z @ pressed[:-1] + pressed[-1])
+        if depth is not None:
+            start = start + np.exp(z @ depth[:-1] + depth[-1])
+        return np.column_stack([linear, np.log(start)])
 
     def combinations(self, z: FloatArray) -> dict[str, FloatArray]:
         """Logarithms (q,) of the combinations that a cut sees, by their formula, those whose properties are known."""
-        h = np.log(self.height)
-        modulus, strength = self._log(z, "E"), self._log(z, "yield_stress")
-        work, start, depth = self._log(z, "R"), self._log(z, "R_skin", "R_initiation"), self._log(z, "initiation_depth")
-        tensile = self._log(z, "tensile_strength")
         terms = {
-            "E R / (yield_stress^2 h)": ((modulus, 1.0), (work, 1.0), (strength, -2.0), (h, -1.0)),
-            "R / (yield_stress h)": ((work, 1.0), (strength, -1.0), (h, -1.0)),
-            "yield_stress / E": ((strength, 1.0), (modulus, -1.0)),
-            "tensile_strength / yield_stress": ((tensile, 1.0), (strength, -1.0)),
-            "R_start / R": ((start, 1.0), (work, -1.0)),
-            "initiation_depth / h": ((depth, 1.0), (h, -1.0)),
+            "E R / (yield_stress^2 h)": {"E": 1.0, "R": 1.0, "yield_stress": -2.0, HEIGHT: -1.0},
+            "R / (yield_stress h)": {"R": 1.0, "yield_stress": -1.0, HEIGHT: -1.0},
+            "yield_stress / E": {"yield_stress": 1.0, "E": -1.0},
+            "tensile_strength / yield_stress": {"tensile_strength": 1.0, "yield_stress": -1.0},
+            "R_skin / R": {"R_skin": 1.0, "R": -1.0},
+            "R_initiation / R": {"R_initiation": 1.0, "R": -1.0},
+            "initiation_depth / h": {"initiation_depth": 1.0, HEIGHT: -1.0},
         }
-        out = {}
-        for formula, parts in terms.items():
-            known = [power * np.broadcast_to(log, len(z)) for log, power in parts if log is not None]
-            if len(known) == len(parts):
-                out[formula] = np.sum(known, axis=0)
-        return out
+        rows = {formula: self._row(powers) for formula, powers in terms.items()}
+        return {formula: z @ row[:-1] + row[-1] for formula, row in rows.items() if row is not None}
 
-    def _fixed_stress(self) -> bool:
-        """Whether a stress-like property keeps its value whatever the scale."""
-        return any(self.fixed.get(n, 0.0) > 0.0 for n in STRESS_LIKE)
+    @cached_property
+    def _linear(self) -> tuple[FloatArray, FloatArray]:
+        """Axes that are linear in the internal coordinates, and their constants: (d, p) and (d,)."""
+        unit = np.eye(len(self.parameters) + 1)
+        of = {p.name: unit[k] for k, p in enumerate(self.parameters)}
+        fixed_stress = any(self.fixed.get(n, 0.0) > 0.0 for n in STRESS_LIKE)
+        rows = []
+        for p in self.parameters:
+            if p.name == self.scale_name:
+                rows += [of[p.name]] if fixed_stress else []
+            elif property_of(p.name) in STRESS_LIKE and p.log and self.scale_name is not None:
+                rows.append(of[p.name] - of[self.scale_name])
+            else:
+                rows.append(of[p.name])
+        start = self._start_name
+        for powers in (
+            {"E": 1.0, "R": 1.0, "yield_stress": -2.0, HEIGHT: -1.0},
+            {"E": 0.5, start: 0.5, "yield_stress": -1.0, HEIGHT: -0.5},
+        ):
+            row = self._row(powers)
+            rows += [] if row is None else [row]
+        found = np.array(rows).reshape(-1, len(self.parameters) + 1)
+        return found[:, :-1], found[:, -1]
 
-    def _log(self, z: FloatArray, *names: str) -> FloatArray | None:
-        """Logarithm (q,) of the first of some properties that is fitted or fixed; None where none is."""
+    @cached_property
+    def _start(self) -> tuple[FloatArray, FloatArray | None] | None:
+        """Linear forms (p + 1,) of the logarithms of what the edge presses in before it cuts, and of the depth of the
+        start, both over the height."""
+        pressed = self._row({self._start_name: 1.0, "E": -1.0, HEIGHT: -1.0})
+        return None if pressed is None else (pressed, self._row({"initiation_depth": 1.0, HEIGHT: -1.0}))
+
+    @property
+    def _start_name(self) -> str:
+        """The property that is the work of a start."""
+        return next((n for n in ("R_skin", "R_initiation") if self._row({n: 1.0}) is not None), "R")
+
+    def _row(self, powers: Mapping[str, float]) -> FloatArray | None:
+        """Linear form (p + 1,) of the logarithm of a product of powers; None where a property is not known."""
         fitted = {property_of(p.name): k for k, p in enumerate(self.parameters) if p.log}
-        for name in names:
+        row = np.zeros(len(self.parameters) + 1)
+        for name, power in powers.items():
             if name in fitted:
-                out: FloatArray = z[:, fitted[name]]
-                return out
-            if self.fixed.get(name, 0.0) > 0.0:
-                return np.full(len(z), np.log(self.fixed[name]))
-        return None
-
-    def _physics(self, z: FloatArray) -> list[FloatArray]:
-        """The axes of physics (q,), those whose properties are known."""
-        modulus, strength = self._log(z, "E"), self._log(z, "yield_stress")
-        work, start = self._log(z, "R"), self._log(z, "R_skin", "R_initiation", "R")
-        depth, h = self._log(z, "initiation_depth"), np.log(self.height)
-        out = []
-        if modulus is not None and start is not None:
-            pressed = START_WORK * np.exp(start - modulus - h)
-            out.append(np.log(pressed + (0.0 if depth is None else np.exp(depth - h))))
-        if modulus is not None and strength is not None and work is not None:
-            out.append(modulus + work - 2.0 * strength - h)
-        if modulus is not None and strength is not None and start is not None:
-            out.append(0.5 * (modulus + start - h) - strength)
-        return out
+                row[fitted[name]] += power
+            elif name == HEIGHT or self.fixed.get(name, 0.0) > 0.0:
+                row[-1] += power * math.log(self.height if name == HEIGHT else self.fixed[name])
+            else:
+                return None
+        return row

@@ -44,6 +44,7 @@ class Expected:
         shape: Components of the shape [-] (q, k).
         shape_sd: Standard deviation of each of them [-] (q,).
         completed: Part of the stroke that was completed as a cut [-] (q,).
+        x: Coordinates, each axis of about unit variance [-] (q, d).
     """
 
     size: FloatArray
@@ -51,6 +52,7 @@ class Expected:
     shape: FloatArray
     shape_sd: FloatArray
     completed: FloatArray
+    x: FloatArray
 
 
 class CurveEmulator:
@@ -113,7 +115,7 @@ class CurveEmulator:
         parted = self.parted.expected(x)[:, 0]
         completed = np.clip((parted - NOT_PARTED) / (FULLY_PARTED - NOT_PARTED), 0.0, 1.0)
         size = np.exp(np.clip(sizes[:, 0] + self.coordinates.scale(z), -30.0, 30.0))
-        return Expected(size, size_sd, shape, shape_sd, completed)
+        return Expected(size, size_sd, shape, shape_sd, completed, x)
 
     def curves(self, z: FloatArray) -> FloatArray:
         """Expected curves [N] (q, n) at internal coordinates (q, p)."""

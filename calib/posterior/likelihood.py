@@ -12,14 +12,12 @@ there.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from calib.posterior.correction import Correction
 from calib.posterior.emulator import CurveEmulator, Expected
-from calib.problem.objective import Objective
-from calib.problem.scored_run import ScoredRun
+from calib.problem.objective import LARGEST_DIFFERENCE, Objective
 from mpm.arrays import FloatArray
 
 SIZE_SD = 0.5
@@ -30,54 +28,6 @@ OVERSHOOT = 0.1
 what can be cut is not."""
 NO_CURVE = 1e12
 """Chi-square of a food whose expected curve is no number."""
-
-
-@dataclass(frozen=True, eq=False)
-class Correction:
-    """What finer cells change of emulated curves, the same for all foods.
-
-    Attributes:
-        log_size: Added to the logarithm of the size.
-        shape: Mean shape with it [-] (n,).
-        unknown: Covariance, between foods, of the changes of size and components (1 + k, 1 + k).
-    """
-
-    log_size: float
-    shape: FloatArray
-    unknown: FloatArray
-
-    @classmethod
-    def none(cls, emulator: CurveEmulator) -> Correction:
-        """No change."""
-        k = 1 + len(emulator.components)
-        return cls(0.0, emulator.shape, np.zeros((k, k)))
-
-    @classmethod
-    def of(cls, emulator: CurveEmulator, runs: Sequence[ScoredRun]) -> Correction:
-        """The mean change and its scatter.
-
-        Args:
-            emulator: The emulator.
-            runs: Whole runs on the finer cells, two at least.
-
-        Returns:
-            The correction.
-        """
-        found = emulator(np.array([run.z for run in runs]))
-        curves = np.array([run.curve for run in runs])
-        means = curves.mean(axis=1)
-        sizes = np.log(means / found.size)
-        shapes = curves / means[:, None] - found.shape @ emulator.components
-        scores = (shapes - emulator.shape) @ emulator.components.T
-        unknown = np.cov(np.column_stack([sizes, scores]), rowvar=False)
-        return cls(float(sizes.mean()), shapes.mean(axis=0), unknown)
-
-    def curves(self, emulator: CurveEmulator, z: FloatArray) -> FloatArray:
-        """Expected curves on the finer cells [N] (q, n) at internal coordinates (q, p)."""
-        found = emulator(z)
-        size = found.size[:, None] * math.exp(self.log_size)
-        out: FloatArray = size * (self.shape + found.shape @ emulator.components)
-        return out
 
 
 class Likelihood:
@@ -99,7 +49,7 @@ class Likelihood:
         searched: bool = False,
     ) -> None:
         self.objective, self.emulator = objective, emulator
-        self.correction = correction or Correction.none(emulator)
+        self.correction = correction or Correction(emulator)
         self.rows = objective.effective_points
         """Effective number of independent points of the curve [-]."""
         weights = math.sqrt(self.rows / objective.target.stroke.size) / objective.sigmas
@@ -124,32 +74,29 @@ class Likelihood:
         Returns:
             The logarithm of the likelihood.
         """
-        found = self.emulator(z)
-        ratio, inverse, _ = self._solved(found, np.exp(2.0 * log_size))
-        chi2 = np.einsum("qi,qij,qj->q", ratio, inverse[0], ratio)
+        found = self.correction(z)
+        residual, covariance = self._moments(found, np.exp(2.0 * log_size))
+        root = np.linalg.cholesky(covariance)
+        part = np.linalg.solve(root, residual[:, :, None])[:, :, 0]
+        spread = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1) - len(self._unit) * log_size
         missing = np.maximum(1.0 - OVERSHOOT - found.completed, 0.0) * self.objective.failure_weight
-        value = -0.5 * (chi2 + inverse[1] + missing**2) - self.rows * log_size
+        value = -0.5 * (np.sum(part**2, axis=1) + missing**2) - spread - self.rows * log_size
         return np.where(np.isfinite(value), value, -NO_CURVE)
 
-    def _solved(
-        self, found: Expected, size: FloatArray
-    ) -> tuple[FloatArray, tuple[FloatArray, FloatArray], FloatArray]:
-        """Residuals (q, r), inverse covariances (q, r, r) with the logarithms of their determinants less those of the
-        errors alone (q,), and the covariances."""
-        factor = found.size[:, None] * math.exp(self.correction.log_size)
+    def _moments(self, found: Expected, size: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Residuals (q, r) and their covariances (q, r, r)."""
+        most = LARGEST_DIFFERENCE * self.objective.target.peak
+        factor = np.minimum(found.size, most)[:, None]
         shapes = self._mean + found.shape @ self._components.T
         residual = factor * shapes - self._trace
-        slopes = factor[:, :, None] * np.concatenate(
-            [shapes[:, :, None], np.broadcast_to(self._components, (len(factor), *self._components.shape))], axis=2
-        )
-        own = np.broadcast_to(self.correction.unknown, (len(factor), *self.correction.unknown.shape)).copy()
-        own[:, 0, 0] += found.size_sd**2
+        many = np.broadcast_to(self._components, (len(factor), *self._components.shape))
+        slopes = factor[:, :, None] * np.concatenate([shapes[:, :, None], many], axis=2)
+        own = np.zeros((len(factor), slopes.shape[2], slopes.shape[2]))
+        own[:, 0, 0] = found.size_sd**2
         places = np.arange(1, own.shape[1])
-        own[:, places, places] += (found.shape_sd**2)[:, None]
-        covariance = size[:, None, None] * self._unit + self._open + slopes @ own @ np.swapaxes(slopes, 1, 2)
-        inverse = np.linalg.inv(covariance)
-        _, log = np.linalg.slogdet(covariance)
-        return residual, (inverse, log - len(self._unit) * np.log(size)), covariance
+        own[:, places, places] = (found.shape_sd**2)[:, None]
+        known = size[:, None, None] * self._unit + self._open
+        return residual, known + slopes @ own @ np.swapaxes(slopes, 1, 2)
 
     def chi2(self, curves: FloatArray, log_size: FloatArray) -> FloatArray:
         """Chi-square (q,) of simulated curves [N] (q, n), nuisances integrated out and without the emulator's doubt."""

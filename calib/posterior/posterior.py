@@ -13,20 +13,30 @@ from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
 from calib.posterior.coordinates import Coordinates
+from calib.posterior.correction import Correction
 from calib.posterior.emulator import was_cut
-from calib.posterior.likelihood import SIZE_SD, Correction, Likelihood
+from calib.posterior.likelihood import SIZE_SD, Likelihood
 from calib.posterior.modes import Mode, climbed, modes
-from calib.posterior.sampling import FINAL, SCOUTING, Sample, sample
-from calib.posterior.waves import Matched, match_history, on_lattice, prediction_errors, proposals, quantiles, simulated
+from calib.posterior.sampling import Sample, sample
+from calib.posterior.waves import (
+    GOOD_ERROR,
+    Matched,
+    Plan,
+    match_history,
+    on_lattice,
+    prediction_errors,
+    proposals,
+    quantiles,
+    simulated,
+)
 from calib.problem.objective import Objective
 from calib.problem.scored_run import ScoredRun
 from calib.simulation.evaluation import Evaluators
 from mpm.arrays import FloatArray
 from mpm.scene.errors import SimulationError
 
-JUDGES = (16, 8)
-"""Fine runs of the posterior, spread out: the first correct the emulator from coarse to fine cells, and all of the
-second are predicted before, which says how good that is."""
+JUDGED = 3
+"""Rounds of judges at most."""
 TOPS = 2
 """Foods at the top of each mode that are simulated on fine cells."""
 MOST_MODES = 3
@@ -102,7 +112,7 @@ class SampledPosterior:
         return np.array([factor(self.objective, m) * m for m in self._emulated(some)])
 
     def _emulated(self, z: FloatArray) -> FloatArray:
-        return self.likelihood.correction.curves(self.likelihood.emulator, z)
+        return self.likelihood.correction.curves(z)
 
     @cached_property
     def explained(self) -> float:
@@ -138,6 +148,7 @@ def sample_posterior(
     objective: Objective,
     coordinates: Coordinates,
     evaluators: Evaluators,
+    plan: Plan | None = None,
     seed: int = 0,
     say: Callable[[str], None] = lambda text: None,
 ) -> SampledPosterior:
@@ -147,6 +158,7 @@ def sample_posterior(
         objective: The trace.
         coordinates: Where the emulator lives.
         evaluators: Coarse and fine simulations.
+        plan: How much is simulated and sampled.
         seed: Seed of what is drawn.
         say: Called with a sentence for each stage.
 
@@ -156,43 +168,40 @@ def sample_posterior(
     Raises:
         SimulationError: Too few foods of the literature's ranges are cut to learn from.
     """
+    plan = plan or Plan()
     with threadpool_limits(1, "blas"):  # sums in another order would ask for other points
         try:
-            matched = match_history(objective, coordinates, evaluators.coarse, seed, say)
+            matched = match_history(objective, coordinates, evaluators, plan, seed, say)
         except ValueError as e:
             raise SimulationError(
                 f"the posterior cannot be sampled: {e}; narrow the ranges, or fit fewer properties",
                 reason="too_few_cut",
                 fraction=0.0,
             ) from None
-        return _Judged(objective, matched, evaluators, seed, say).posterior()
+        judged = _Judged(objective, matched, evaluators, plan, seed)
+        judged.say = say
+        return judged.posterior()
 
 
 class _Judged:
     """The part after the waves."""
 
-    def __init__(
-        self,
-        objective: Objective,
-        matched: Matched,
-        evaluators: Evaluators,
-        seed: int,
-        say: Callable[[str], None],
-    ) -> None:
-        self.objective, self.matched, self.evaluators = objective, matched, evaluators
-        self.seed, self.say = seed, say
-        self.fine: list[ScoredRun] = []
-        self.correction: Correction | None = None
+    def __init__(self, objective: Objective, matched: Matched, evaluators: Evaluators, plan: Plan, seed: int) -> None:
+        self.objective, self.matched, self.evaluators, self.plan, self.seed = objective, matched, evaluators, plan, seed
+        self.say: Callable[[str], None] = lambda text: None
+        self.fine = list(matched.fine)
+        self.correction = self._corrected()
         self.judged: tuple[float, float] | None = None
 
     def posterior(self) -> SampledPosterior:
         """Fine runs, the sample, its modes and their tops."""
-        drawn = self.matched.sample
-        for count in JUDGES:
-            self._judge(drawn, count)
-            last = count == JUDGES[-1]
+        drawn, plan = self.matched.sample, self.plan
+        for stage in range(JUDGED):
+            good = self._judge(drawn, plan.judges) or stage == JUDGED - 1
             likelihood = Likelihood(self.objective, self.matched.emulator, self.correction)
-            drawn = sample(likelihood, FINAL if last else SCOUTING, self.seed + count)
+            drawn = sample(likelihood, plan.final if good else plan.scouting, self.seed + stage)
+            if good:
+                break
         found = modes(self._points(drawn), self._density(likelihood))
         self.say(f"posterior: {len(found)} mode{'s' if len(found) > 1 else ''} in {drawn.calls} likelihoods")
         bests = [self._top(likelihood, drawn, m) for m in found[:MOST_MODES]]
@@ -204,19 +213,19 @@ class _Judged:
         both = tuple(PosteriorMode(m, best) for m, best in zip(found, bests, strict=True))
         return SampledPosterior(likelihood, drawn, self.matched, tuple(self.fine), self.judged, both)
 
-    def _judge(self, drawn: Sample, count: int) -> None:
-        """Fine runs of the posterior, and the correction through all."""
-        emulator = self.matched.emulator
-        points = proposals(drawn, emulator, self.fine, count, self.seed + count, 1.0)
+    def _judge(self, drawn: Sample, count: int) -> bool:
+        """Fine runs of the posterior, predicted before, and the correction through all; whether it was good."""
+        points = proposals(drawn, self.matched.emulator, self.fine, count, self.seed + len(self.fine), 1.0)
         new = [run for run in self._run(points) if was_cut(run)]
-        if self.correction is not None and len(new) > 1:
-            expected = self.correction.curves(emulator, np.array([run.z for run in new]))
-            errors = prediction_errors(self.objective, expected, new)
+        if new:
+            errors = prediction_errors(self.objective, self.correction.curves(np.array([run.z for run in new])), new)
             self.judged = float(np.median(errors)), float(np.quantile(errors, 0.9))
             self.say(f"fine cells: predicted to {self.judged[0]:.1%} of the peak (90 %: {self.judged[1]:.1%})")
-        cut = [run for run in self.fine if was_cut(run)]
-        if len(cut) > 1:
-            self.correction = Correction.of(emulator, cut)
+        self.correction = self._corrected()
+        return self.judged is not None and self.judged[1] <= GOOD_ERROR
+
+    def _corrected(self) -> Correction:
+        return Correction(self.matched.emulator, [run for run in self.fine if was_cut(run)], finer=True)
 
     def _run(self, points: FloatArray) -> list[ScoredRun]:
         self.say(f"{len(points)} foods of the posterior on fine cells")
@@ -248,7 +257,7 @@ class _Judged:
         places = drawn.drawn(DRAWS, 0)[mode.members]
         z = np.unique(drawn.z[places], axis=0)
         z = z[:: max(len(z) // 200, 1)]
-        curves = likelihood.correction.curves(likelihood.emulator, z)
+        curves = likelihood.correction.curves(z)
         along = p.stress_like()
         scaled = p.clip(z + np.log([factor(self.objective, m) for m in curves])[:, None] * along)
         spread = np.maximum(drawn.z[places].std(axis=0), 1e-6)

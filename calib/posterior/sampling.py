@@ -33,7 +33,7 @@ class Effort:
     left: float
 
 
-SCOUTING, FINAL = Effort(80, 15, 1.0), Effort(250, 25, 0.1)
+SCOUTING, FINAL = Effort(120, 20, 1.0), Effort(400, 25, 0.1)
 """That between waves, which only says where to simulate next, and that of the result."""
 
 

@@ -22,17 +22,16 @@ from scipy.stats import qmc
 from calib.fit.acquisition import LATTICE
 from calib.fit.surrogate import coordinate_unit
 from calib.posterior.coordinates import Coordinates
+from calib.posterior.correction import Correction
 from calib.posterior.emulator import CurveEmulator, was_cut
 from calib.posterior.likelihood import Likelihood
-from calib.posterior.sampling import SCOUTING, Sample, sample
+from calib.posterior.sampling import FINAL, SCOUTING, Effort, Sample, sample
 from calib.problem.objective import Objective
 from calib.problem.parameters import ParameterSet
 from calib.problem.scored_run import ScoredRun
-from calib.simulation.evaluation import Evaluator
+from calib.simulation.evaluation import Evaluator, Evaluators
 from mpm.arrays import FloatArray
 
-FIRST_WAVE, LATER_WAVES = 256, 96
-"""Runs of the first wave and of each further one."""
 TEMPERATURES = (2.0, 1.5, 1.2, 1.0)
 """Temperatures of the posteriors that further waves are drawn from; the last one holds for all after."""
 MOST_WAVES = 8
@@ -50,6 +49,29 @@ REACH = 1.25
 """Standard deviation of the first wave over the prior's [-]."""
 CANDIDATES = 8
 """Draws for each run of a wave, from which the most spread ones are chosen."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How much is simulated and sampled for a posterior.
+
+    Attributes:
+        first: Coarse runs of the first wave.
+        later: Those of each further one.
+        pairs: Points of each wave that are simulated on fine cells as well: those of the first wave that are nearest
+            to the trace, of others the most spread ones.
+        judges: Fine runs of the posterior after the last wave, spread out, whose curves are predicted before: as often
+            until that is good enough.
+        scouting: Sampling between waves, which only says where to simulate next.
+        final: Sampling of the result.
+    """
+
+    first: int = 256
+    later: int = 96
+    pairs: int = 6
+    judges: int = 12
+    scouting: Effort = SCOUTING
+    final: Effort = FINAL
 
 
 @dataclass(frozen=True)
@@ -79,7 +101,8 @@ class Matched:
     """What the waves have left.
 
     Attributes:
-        runs: All runs.
+        runs: All coarse runs.
+        fine: All fine ones.
         emulator: The emulator through those that were learnt from.
         sample: Draws from prior to posterior by it.
         waves: What each wave was.
@@ -87,6 +110,7 @@ class Matched:
     """
 
     runs: tuple[ScoredRun, ...]
+    fine: tuple[ScoredRun, ...]
     emulator: CurveEmulator
     sample: Sample
     waves: tuple[Wave, ...]
@@ -102,7 +126,7 @@ def on_lattice(parameters: ParameterSet, z: FloatArray) -> FloatArray:
     return parameters.clip(np.round(z / grid) * grid)
 
 
-def first_wave(parameters: ParameterSet, count: int = FIRST_WAVE) -> FloatArray:
+def first_wave(parameters: ParameterSet, count: int) -> FloatArray:
     """Points (count, p) that fill the prior: the same for each trace, so that a store serves the next one."""
     cube = qmc.Sobol(len(parameters), scramble=True, seed=0).random(count)
     z = parameters.prior_mean + REACH * parameters.prior_sd * ndtri(0.005 + 0.99 * cube)
@@ -112,7 +136,8 @@ def first_wave(parameters: ParameterSet, count: int = FIRST_WAVE) -> FloatArray:
 def match_history(
     objective: Objective,
     coordinates: Coordinates,
-    evaluator: Evaluator,
+    evaluators: Evaluators,
+    plan: Plan,
     seed: int = 0,
     say: Callable[[str], None] = lambda text: None,
 ) -> Matched:
@@ -121,7 +146,8 @@ def match_history(
     Args:
         objective: The trace.
         coordinates: Where the emulator lives.
-        evaluator: Runs the simulations.
+        evaluators: Coarse and fine simulations.
+        plan: How many, and how they are sampled between.
         seed: Seed of what is drawn.
         say: Called with a sentence for each wave.
 
@@ -132,13 +158,18 @@ def match_history(
         ValueError: Too few foods of the first wave are cut.
     """
     parameters = objective.parameters
-    runs = simulated(objective, evaluator, first_wave(parameters), "wave")
+    runs = simulated(objective, evaluators.coarse, first_wave(parameters, plan.first), "wave")
+    near = sorted(filter(was_cut, runs), key=_distance)[: plan.pairs]
+    fine = (
+        simulated(objective, evaluators.fine, np.array([run.z for run in near]), "pair", coarse=False) if near else []
+    )
     waves = [Wave(len(runs), sum(map(was_cut, runs)))]
     emulator: CurveEmulator | None = None
     last: tuple[FloatArray, FloatArray] | None = None
     while True:
         emulator = learnt(coordinates, runs, emulator)
-        drawn = sample(Likelihood(objective, emulator), SCOUTING, seed + len(waves))
+        corrected = Correction(emulator, [run for run in fine if was_cut(run)], finer=True)
+        drawn = sample(Likelihood(objective, emulator, corrected), plan.scouting, seed + len(waves))
         spread = summary(drawn)
         moved = None if last is None else float(np.max(np.abs(spread[0] - last[0]) / last[1]))
         last = spread
@@ -146,10 +177,11 @@ def match_history(
         say(_words(len(waves), waves[-1]))
         good = _good(waves[-1])
         if good or len(waves) == MOST_WAVES:
-            return Matched(tuple(runs), emulator, drawn, tuple(waves), good)
+            return Matched(tuple(runs), tuple(fine), emulator, drawn, tuple(waves), good)
         temperature = TEMPERATURES[min(len(waves), len(TEMPERATURES)) - 1]
-        points = proposals(drawn, emulator, runs, LATER_WAVES, seed + len(waves), temperature)
-        new = simulated(objective, evaluator, points, "wave")
+        points = proposals(drawn, emulator, runs, plan.later, seed + len(waves), temperature)
+        new = simulated(objective, evaluators.coarse, points, "wave")
+        fine += simulated(objective, evaluators.fine, points[: plan.pairs], "pair", coarse=False)
         cut = [run for run in new if was_cut(run)]
         errors = prediction_errors(objective, emulator.curves(np.array([run.z for run in cut])), cut) if cut else None
         waves.append(_wave(len(new), temperature, errors))

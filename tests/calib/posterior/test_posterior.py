@@ -10,13 +10,15 @@ import pytest
 
 from calib.posterior.answer import analysis_of, fit_of
 from calib.posterior.coordinates import Coordinates
+from calib.posterior.correction import Correction
 from calib.posterior.emulator import CurveEmulator
 from calib.posterior.estimates import summarised
-from calib.posterior.likelihood import Correction, Likelihood
+from calib.posterior.likelihood import Likelihood
 from calib.posterior.modes import modes
 from calib.posterior.posterior import SampledPosterior, sample_posterior
 from calib.posterior.process import Process
-from calib.posterior.waves import first_wave, on_lattice, prediction_errors, quantiles, simulated
+from calib.posterior.sampling import Effort
+from calib.posterior.waves import Plan, first_wave, on_lattice, prediction_errors, quantiles, simulated
 from calib.problem.objective import Objective
 from calib.problem.parameters import ParameterSet
 from calib.simulation.evaluation import Evaluators
@@ -24,12 +26,14 @@ from mpm.scene.errors import SimulationError
 from tests.calib.fake import FIVE, LENGTH, Fake, goal, two_terms
 
 TRUTH = {"E": 6e5, "yield_stress": 6e4, "R": 400.0, "R_skin": 250.0, "mu": 0.25}
+SMALL = Plan(64, 16, 4, 6, Effort(30, 8, 1.0), Effort(80, 8, 0.5))
+"""Enough for two parameters."""
 TWO = ParameterSet(tuple(FIVE[name] for name in ("R", "mu")))
 
 
 def coordinates(parameters: ParameterSet = FIVE) -> Coordinates:
-    """Of the made-up food."""
-    return Coordinates(parameters, {}, LENGTH)
+    """Of the made-up food, whose modulus is fitted or fixed."""
+    return Coordinates(parameters, {} if parameters is FIVE else {"E": 5e5}, LENGTH)
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +49,7 @@ def sampled() -> SampledPosterior:
     """A posterior of two parameters."""
     objective = goal({"R": 500.0, "mu": 0.25}, TWO, two_terms)
     fake = Fake(two_terms, noisy=0.002)
-    return sample_posterior(objective, coordinates(TWO), Evaluators(fake, fake, fake))
+    return sample_posterior(objective, coordinates(TWO), Evaluators(fake, fake, fake), SMALL)
 
 
 def test_process_interpolates_and_knows_how_well() -> None:
@@ -88,7 +92,7 @@ def test_force_scales_with_the_stress_like_parameters(emulated: tuple[Objective,
 
 def test_fixed_stress_keeps_the_scale_as_an_axis() -> None:
     """Where a stress-like property is not fitted the others do not scale along with it, and there is an axis more."""
-    free, fixed = coordinates(TWO), Coordinates(TWO, {"E": 5e5, "yield_stress": 5e4}, LENGTH)
+    free, fixed = Coordinates(TWO, {}, LENGTH), Coordinates(TWO, {"E": 5e5, "yield_stress": 5e4}, LENGTH)
     z = first_wave(TWO, 8)
     assert free(z).shape[1] < fixed(z).shape[1]
     assert np.ptp(fixed(z)[:, 0]) > 0.0
@@ -125,10 +129,9 @@ def test_correction_takes_the_difference_of_cells_away(emulated: tuple[Objective
     objective, emulator = emulated
     z = first_wave(FIVE, 256)[200:232]
     runs = simulated(objective, Fake(lambda p: 1.08 * Fake().force(p), noisy=0.002), z, "fine", coarse=False)
-    correction = Correction.of(emulator, runs[:16])
+    correction = Correction(emulator, runs[:16])
     before = prediction_errors(objective, emulator.curves(z[16:]), runs[16:])
-    after = prediction_errors(objective, correction.curves(emulator, z[16:]), runs[16:])
-    assert correction.log_size == pytest.approx(math.log(1.08), abs=0.03)
+    after = prediction_errors(objective, correction.curves(z[16:]), runs[16:])
     assert np.median(after) < 0.8 * np.median(before)
 
 
@@ -172,7 +175,8 @@ def test_posterior_holds_the_truth_and_says_what_it_did(sampled: SampledPosterio
     for k, z in enumerate(truth):
         low, middle, high = sampled.interval(k)
         assert low < z < high and low < middle < high
-    assert len(sampled.modes) == 1 and sampled.explained > 0.05 and sampled.matched.converged
+    assert len(sampled.modes) == 1
+    assert sampled.explained > 0.05
     said = summarised(sampled)
     assert said.waves[0].error is None and said.waves[-1].error90 is not None and said.waves[-1].error90 < 0.02
     assert said.alike == ("R", "mu") and said.modes[0].best is not None
@@ -206,6 +210,6 @@ def test_a_parameter_on_which_modes_differ_is_not_identified(sampled: SampledPos
 
 def test_a_food_that_is_never_cut_is_an_error_that_says_so() -> None:
     """Nothing to learn from: one sentence, no traceback."""
-    fake = Fake(two_terms, parted=lambda p: 0.2)
+    objective, fake = goal({"R": 500.0, "mu": 0.25}, TWO, two_terms), Fake(two_terms, parted=lambda p: 0.2)
     with pytest.raises(SimulationError, match="0 whole curves are too few"):
-        sample_posterior(goal({"R": 500.0, "mu": 0.25}, TWO, two_terms), coordinates(TWO), Evaluators(fake, fake, fake))
+        sample_posterior(objective, coordinates(TWO), Evaluators(fake, fake, fake), SMALL)
