@@ -7,6 +7,7 @@ from functools import cached_property
 
 from calib.fit.multistart import FitResult
 from calib.material.food import FoodSpec
+from calib.posterior.posterior import SampledPosterior
 from calib.problem.setup import Setup
 from calib.trace.filters import filter_simulated
 from calib.uncertainty.analysis import UncertaintyAnalysis
@@ -29,6 +30,7 @@ class Calibrated:
         record: Whole record of the best values.
         checks: What numerical choices change; none where the search was interrupted.
         start: Smoothed curve of the literature's values [N] (n,), NaN where that run broke down or was not made.
+        posterior: The posterior over all plausible foods, where it was sampled.
     """
 
     setup: Setup
@@ -37,6 +39,7 @@ class Calibrated:
     record: ForceRecord
     checks: list[Check]
     start: FloatArray
+    posterior: SampledPosterior | None = None
 
     @cached_property
     def metrics(self) -> Metrics:

@@ -24,7 +24,7 @@ from calib.io.folder import prepare, write_csv, write_json
 from calib.io.progress import Progress
 from calib.material.food import dump_material
 from calib.posterior.answer import analysis_of, coordinates_of, fit_of
-from calib.posterior.posterior import sample_posterior
+from calib.posterior.posterior import SampledPosterior, sample_posterior
 from calib.posterior.sampling import check_installed
 from calib.problem.request import Request
 from calib.problem.setup import FINE, Setup, set_up
@@ -82,10 +82,19 @@ def run(
     with prepare(out, "calibrate", resume=resume):
         with EvaluationStore(out / STORE, setup.header, resume=resume, say=say) as store:
             work = _Calibration(setup, pool, store, out, say)
-            fit, analysis = work.fitted(options, progress)
-            calibrated = work.repeated(fit, analysis)
+            found = work.fitted(options, progress)
+            calibrated = work.repeated(found)
         add_conditioning(out / STORE, setup.curve)
         return _write(calibrated, out, began)
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A fit, its uncertainty where it did not end too early for that, and the posterior where it was sampled."""
+
+    fit: FitResult
+    analysis: UncertaintyAnalysis | None
+    posterior: SampledPosterior | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,24 +111,22 @@ class _Calibration:
     out: Path
     say: Callable[[str], None]
 
-    def fitted(
-        self, options: FitOptions, progress: Callable[[Progress], None] | None
-    ) -> tuple[FitResult, UncertaintyAnalysis | None]:
+    def fitted(self, options: FitOptions, progress: Callable[[Progress], None] | None) -> _Found:
         """The fit, and its uncertainty."""
         setup = self.setup
         evaluators = setup.evaluators(self.pool, self.store)
         if setup.request.sample:
             return self._sampled(evaluators)
         listener = Listener(progress, self.say, self._begin_longest_check)
-        return fit_with_uncertainty(setup.objective, evaluators, options, listener)
+        return _Found(*fit_with_uncertainty(setup.objective, evaluators, options, listener))
 
-    def _sampled(self, evaluators: Evaluators) -> tuple[FitResult, UncertaintyAnalysis]:
+    def _sampled(self, evaluators: Evaluators) -> _Found:
         """The best food of the sampled posterior, and what is uncertain."""
         setup, seed = self.setup, self.setup.request.seed
         posterior = sample_posterior(setup.objective, coordinates_of(setup), evaluators, None, seed, self.say)
         fit = fit_of(posterior)
         self._begin_longest_check(fit)
-        return fit, analysis_of(posterior, fit, seed)
+        return _Found(fit, analysis_of(posterior, fit, seed), posterior)
 
     def _begin_longest_check(self, fit: FitResult) -> None:
         """Begin the longest of the last simulations, beside those of the intervals."""
@@ -127,8 +134,9 @@ class _Calibration:
         for errand in sorted(check_errands(scene, self.store), key=lambda e: e.haste)[:1]:
             self.pool.begin(errand)
 
-    def repeated(self, fit: FitResult, analysis: UncertaintyAnalysis | None) -> Calibrated:
+    def repeated(self, found: _Found) -> Calibrated:
         """The best values simulated once more, whole and otherwise, and those of the literature."""
+        fit = found.fit
         setup, best, path = self.setup, fit.best.evaluation, self.out / RECORD
         scene, ended = setup.scene(best.parameters), fit.status != "interrupted"
         errands = record_errands(scene, path)
@@ -140,7 +148,7 @@ class _Calibration:
         record = read_record(scene, path)
         checks = check(scene, best, self.store, setup.curve.stroke_length_m) if ended else []
         start = self._start_curve() if ended else np.full_like(setup.curve.stroke, np.nan)
-        return Calibrated(setup.sized(best.parameters), fit, analysis, record, checks, start)
+        return Calibrated(setup.sized(best.parameters), fit, found.analysis, record, checks, start, found.posterior)
 
     @cached_property
     def _fine(self) -> CachedEvaluator:

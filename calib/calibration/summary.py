@@ -31,6 +31,7 @@ from calib.calibration.result_parts import (
 from calib.errors import OutputError
 from calib.fit.multistart import FitResult
 from calib.io.provenance import Invocation, Software
+from calib.posterior.estimates import summarised
 from calib.problem.parameters import STRESS_LIKE, property_of
 from calib.problem.request import Request
 from calib.problem.setup import Setup
@@ -101,6 +102,7 @@ def summarise(done: Calibrated, folder: Path, began: float) -> CalibrationResult
         warnings=tuple(setup.warnings),
         limits=(*(() if analysis is None else analysis.remarks), *said),
         sensitivity=_sensitivity(done),
+        sampled=None if done.posterior is None else summarised(done.posterior),
         wall_s=time.monotonic() - began,
     )
 

@@ -67,7 +67,16 @@ class Sample:
         return result
 
     def drawn(self, count: int, seed: int, temperature: float = 1.0) -> FloatArray:
-        """Places (count,) of draws of equal weight, systematically resampled."""
+        """Draws of equal weight, systematically resampled.
+
+        Args:
+            count: How many.
+            seed: Seed of where the first one is.
+            temperature: As of :meth:`weights`.
+
+        Returns:
+            Their places (count,).
+        """
         start = np.random.default_rng(seed).random()
         at = (start + np.arange(count)) / count
         return np.searchsorted(np.cumsum(self.weights(temperature)), at).clip(max=len(self.z) - 1)

@@ -189,7 +189,19 @@ def match_history(
 
 
 def learnt(coordinates: Coordinates, runs: Sequence[ScoredRun], earlier: CurveEmulator | None = None) -> CurveEmulator:
-    """The emulator of the runs that are near enough to the trace."""
+    """The emulator of the runs that are near enough to the trace.
+
+    Args:
+        coordinates: Where it lives.
+        runs: All runs.
+        earlier: One of fewer runs, whose hyperparameters this one starts from.
+
+    Returns:
+        The emulator.
+
+    Raises:
+        ValueError: Too few of them were cut.
+    """
     far = np.array([_distance(run) if was_cut(run) else np.inf for run in runs])
     near = np.sort(far[np.isfinite(far)])
     limit = max(HOPELESS, float(near[min(ENOUGH, len(near)) - 1])) if len(near) else HOPELESS
@@ -200,7 +212,18 @@ def learnt(coordinates: Coordinates, runs: Sequence[ScoredRun], earlier: CurveEm
 def simulated(
     objective: Objective, evaluator: Evaluator, points: FloatArray, stage: str, *, coarse: bool = True
 ) -> list[ScoredRun]:
-    """The runs at some points (q, p), in their order."""
+    """The runs at some points.
+
+    Args:
+        objective: The trace.
+        evaluator: Runs them.
+        points: Internal coordinates [-] (q, p).
+        stage: What they are run for.
+        coarse: Whether they are on coarse cells.
+
+    Returns:
+        The runs in the order of the points.
+    """
     found = sorted(evaluator.evaluate([objective.parameters.to_dict(z) for z in points]), key=lambda e: e.index)
     return [objective.score(e, coarse=coarse, stage=stage) for e in found]
 
@@ -216,6 +239,17 @@ def proposals(
     """Points (count, p) of the tempered posterior, spread out among themselves and from what was run.
 
     Each is the farthest of what is left from all before (farthest-first traversal: Gonzalez 1985).
+
+    Args:
+        drawn: The draws from prior to posterior.
+        emulator: The emulator, whose lengths are the measure.
+        runs: What was run.
+        count: How many.
+        seed: Seed of the draw.
+        temperature: That of the posterior.
+
+    Returns:
+        The points, on the lattice; fewer where the draws have no more.
     """
     parameters = emulator.coordinates.parameters
     places = np.unique(drawn.drawn(CANDIDATES * count, seed, temperature))
@@ -230,7 +264,16 @@ def proposals(
 
 
 def prediction_errors(objective: Objective, curves: FloatArray, runs: Sequence[ScoredRun]) -> FloatArray:
-    """Root mean square of expected (q, n) less simulated curves over the trace's peak [-] (q,)."""
+    """Errors of expected curves.
+
+    Args:
+        objective: The trace.
+        curves: Expected curves [N] (q, n).
+        runs: The runs that they were expected of.
+
+    Returns:
+        Root mean square of expected less simulated curve over the trace's peak [-] (q,).
+    """
     simulated_ = np.array([run.curve for run in runs])
     out: FloatArray = np.sqrt(np.mean((curves - simulated_) ** 2, axis=1)) / objective.target.peak
     return out
@@ -243,7 +286,16 @@ def summary(drawn: Sample) -> tuple[FloatArray, FloatArray]:
 
 
 def quantiles(values: FloatArray, weights: FloatArray, parts: Sequence[float]) -> FloatArray:
-    """Quantiles (len(parts), p) of weighted values (k, p)."""
+    """Quantiles of weighted values.
+
+    Args:
+        values: The values [any unit] (k, p).
+        weights: Their weights, of sum one [-] (k,).
+        parts: Parts of the weight below a quantile [-].
+
+    Returns:
+        The quantiles (len(parts), p).
+    """
     out = []
     for column in values.T:
         order = np.argsort(column)
