@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from scipy.stats import chi2
+
 from calib.fit.multistart import FitResult
 from calib.material.food import FoodSpec
 from calib.posterior.posterior import SampledPosterior
@@ -15,6 +17,7 @@ from calib.uncertainty.sobol import Indices, sensitivity
 from calib.validation.metrics import Metrics, compare
 from calib.validation.null_models import NullModel, null_models
 from calib.validation.numerical_checks import Check
+from calib.validation.predictive_score import PredictiveScore, predictive_score
 from mpm.arrays import FloatArray
 from mpm.output.record import ForceRecord
 
@@ -51,6 +54,25 @@ class Calibrated:
     def nulls(self) -> dict[str, NullModel]:
         """Curves that explain nothing, against the trace."""
         return null_models(self.setup.curve.stroke, self.setup.curve.curve)
+
+    @cached_property
+    def predictive(self) -> PredictiveScore | None:
+        """How good the predictive band is; None where the fit ended too early for one."""
+        if self.analysis is None:
+            return None
+        band = self.analysis.bands[0]
+        return predictive_score(self._explained, (band.low, band.high), self.setup.curve.curve, self.nulls)
+
+    @property
+    def _explained(self) -> float:
+        """Posterior predictive p-value [-]: of the sampled posterior, or of the best curve by chi-square."""
+        if self.posterior is not None:
+            return self.posterior.explained
+        assert self.analysis is not None
+        return min(
+            self.analysis.uncertainty.probability,
+            float(chi2.sf(self.fit.best.misfit, self.setup.objective.effective_rows)),
+        )
 
     @cached_property
     def sensitivity(self) -> Indices:

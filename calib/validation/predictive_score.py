@@ -1,7 +1,8 @@
 """How good a predictive band is: narrow, and the measured curve within it.
 
-A band that is wide enough holds any curve. The interval score charges for width and for what lies outside alike, so that
-neither a wide band nor a wrong one has a good score (Gneiting & Raftery 2007, J. Am. Stat. Assoc. 102:359, eq. 43).
+A band that is wide enough holds any curve. The interval score charges for width and for what lies outside alike, so
+that neither a wide band nor a wrong one has a good score (Gneiting & Raftery 2007, J. Am. Stat. Assoc. 102:359,
+eq. 43).
 """
 
 from __future__ import annotations
