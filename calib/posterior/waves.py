@@ -34,8 +34,6 @@ from mpm.arrays import FloatArray
 
 TEMPERATURES = (2.0, 1.5, 1.2, 1.0)
 """Temperatures of the posteriors that further waves are drawn from; the last one holds for all after."""
-MOST_WAVES = 8
-"""Waves at most."""
 GOOD_ERROR = 0.02
 """Hold-out error that 90 % of a wave's runs stay below, part of the peak, where no further one is needed [-]."""
 MOVED = 0.2
@@ -64,6 +62,7 @@ class Plan:
             until that is good enough.
         scouting: Sampling between waves, which only says where to simulate next.
         final: Sampling of the result.
+        waves: Waves at most.
     """
 
     first: int = 256
@@ -72,6 +71,7 @@ class Plan:
     judges: int = 12
     scouting: Effort = SCOUTING
     final: Effort = FINAL
+    waves: int = 8
 
 
 @dataclass(frozen=True)
@@ -158,6 +158,7 @@ def match_history(
         ValueError: Too few foods of the first wave are cut.
     """
     parameters = objective.parameters
+    say(f"wave 1: {plan.first} foods of the literature's ranges on coarse cells")
     runs = simulated(objective, evaluators.coarse, first_wave(parameters, plan.first), "wave")
     near = sorted(filter(was_cut, runs), key=_distance)[: plan.pairs]
     fine = (
@@ -176,7 +177,7 @@ def match_history(
         waves[-1] = _with(waves[-1], moved)
         say(_words(len(waves), waves[-1]))
         good = _good(waves[-1])
-        if good or len(waves) == MOST_WAVES:
+        if good or len(waves) == plan.waves:
             return Matched(tuple(runs), tuple(fine), emulator, drawn, tuple(waves), good)
         temperature = TEMPERATURES[min(len(waves), len(TEMPERATURES)) - 1]
         points = proposals(drawn, emulator, runs, plan.later, seed + len(waves), temperature)

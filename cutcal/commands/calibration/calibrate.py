@@ -172,6 +172,8 @@ def run(args: argparse.Namespace) -> int:
     from calib.calibration.run import run as calibrate
 
     command = ["calibrate", *(a for a in sys.argv[1:] if a != "calibrate")]
+    if args.sample and (args.all or args.config is not None):
+        raise CutcalError("--sample is for one trace; leave it out of a fit of several, or name one with --cut")
     if args.config is not None:
         return run_study(args, command)
     missing = [f"--{name}" for name in ("food", "trace") if getattr(args, name) is None]

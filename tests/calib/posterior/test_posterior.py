@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,13 +22,15 @@ from calib.posterior.sampling import Effort
 from calib.posterior.waves import Plan, first_wave, on_lattice, prediction_errors, quantiles, simulated
 from calib.problem.objective import Objective
 from calib.problem.parameters import ParameterSet
-from calib.simulation.evaluation import Evaluators
+from calib.simulation.evaluation import Evaluation, Evaluators
 from mpm.scene.errors import SimulationError
 from tests.calib.fake import FIVE, LENGTH, Fake, goal, two_terms
 
 TRUTH = {"E": 6e5, "yield_stress": 6e4, "R": 400.0, "R_skin": 250.0, "mu": 0.25}
-SMALL = Plan(64, 16, 4, 6, Effort(30, 8, 1.0), Effort(80, 8, 0.5))
+SMALL = Plan(64, 16, 4, 6, Effort(20, 5, 1.0), Effort(50, 5, 0.5), waves=4)
 """Enough for two parameters."""
+TINY = Plan(32, 8, 4, 4, Effort(12, 3, 3.0), Effort(12, 3, 3.0), waves=2)
+"""Enough to see that it runs."""
 TWO = ParameterSet(tuple(FIVE[name] for name in ("R", "mu")))
 
 
@@ -181,6 +184,33 @@ def test_posterior_holds_the_truth_and_says_what_it_did(sampled: SampledPosterio
     assert said.waves[0].error is None and said.waves[-1].error90 is not None and said.waves[-1].error90 < 0.02
     assert said.alike == ("R", "mu") and said.modes[0].best is not None
     assert said.modes[0].misfit == sampled.best.misfit
+
+
+class Remembering:
+    """A simulator that knows the runs of an earlier start."""
+
+    def __init__(self, known: dict[str, Evaluation]) -> None:
+        self.fake, self.known = Fake(two_terms, noisy=0.002), known
+
+    def evaluate(self, batch: Sequence[Mapping[str, float]]) -> Iterator[Evaluation]:
+        """Known runs are not made again."""
+        for index, values in enumerate(batch):
+            key = repr(sorted(values.items()))
+            if key not in self.known:
+                self.known[key] = next(iter(self.fake.evaluate([values])))
+            yield replace(self.known[key], index=index)
+
+
+def test_a_second_start_simulates_nothing_and_finds_the_same() -> None:
+    """What a kill has left behind is not made again, and leads to the same draws bit for bit."""
+    objective, known = goal({"R": 500.0, "mu": 0.25}, TWO, two_terms), dict[str, Evaluation]()
+    found = []
+    for _ in range(2):
+        simulator = Remembering(known)
+        found.append(sample_posterior(objective, coordinates(TWO), Evaluators(simulator, simulator, simulator), TINY))
+    assert simulator.fake.runs == 0
+    assert np.array_equal(found[0].sample.z, found[1].sample.z)
+    assert found[0].best.evaluation.parameters == found[1].best.evaluation.parameters
 
 
 def test_answer_is_the_best_simulated_food_of_the_posterior(sampled: SampledPosterior) -> None:

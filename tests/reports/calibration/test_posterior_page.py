@@ -36,7 +36,7 @@ def test_modes_are_told_with_weights_and_best_members(tmp_path: Path) -> None:
     said = {k: sample.spaced(str(v).replace("\\xa0", " ")) for k, v in told.items()}
     assert "'70.0 %', '-15.6', '16.1'" in said["modes"] and "none was cut" in said["modes"]
     assert said["differ"] == "E, yield_stress and R_skin"
-    assert "'prior', '-'" in said["waves"].replace("–", "-") and "2.4 %" in said["waves"] and "5.3 %" in said["waves"]
+    assert "'prior', '-'" in said["waves"].replace("–", "-") and "2.40 %" in said["waves"] and "5.30 %" in said["waves"]
     assert "9" in said["combinations"] and told["judged90"].startswith("1.95")
     assert posterior(None, fitted) is None
 
