@@ -23,8 +23,8 @@ from calib.fit.options import FitOptions
 from calib.io.folder import prepare, write_csv, write_json
 from calib.io.progress import Progress
 from calib.material.food import dump_material
-from calib.posterior.answer import analysis_of, coordinates_of, fit_of
-from calib.posterior.posterior import SampledPosterior, sample_posterior
+from calib.posterior.answer import sampled_answer
+from calib.posterior.posterior import SampledPosterior
 from calib.posterior.sampling import check_installed
 from calib.problem.request import Request
 from calib.problem.setup import FINE, Setup, set_up
@@ -122,11 +122,9 @@ class _Calibration:
 
     def _sampled(self, evaluators: Evaluators) -> _Found:
         """The best food of the sampled posterior, and what is uncertain."""
-        setup, seed = self.setup, self.setup.request.seed
-        posterior = sample_posterior(setup.objective, coordinates_of(setup), evaluators, None, seed, self.say)
-        fit = fit_of(posterior)
-        self._begin_longest_check(fit)
-        return _Found(fit, analysis_of(posterior, fit, seed), posterior)
+        found = _Found(*sampled_answer(self.setup, evaluators, self.setup.request.seed, self.say))
+        self._begin_longest_check(found.fit)
+        return found
 
     def _begin_longest_check(self, fit: FitResult) -> None:
         """Begin the longest of the last simulations, beside those of the intervals."""

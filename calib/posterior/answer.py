@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields, replace
 
 import numpy as np
@@ -9,10 +10,11 @@ import numpy as np
 from calib.fit.multistart import FitResult
 from calib.fit.surrogate import Surrogate
 from calib.posterior.coordinates import Coordinates
-from calib.posterior.posterior import SampledPosterior, runs_near
+from calib.posterior.posterior import SampledPosterior, runs_near, sample_posterior
 from calib.problem.objective import EXPLAINED
 from calib.problem.parameters import Z95, Parameter, property_of
 from calib.problem.setup import Setup
+from calib.simulation.evaluation import Evaluators
 from calib.uncertainty.analysis import UncertaintyAnalysis, nuisances_of
 from calib.uncertainty.intervals import (
     IDENTIFIED,
@@ -38,6 +40,28 @@ def coordinates_of(setup: Setup) -> Coordinates:
     values = {f.name: getattr(material, f.name) for f in fields(material) if f.name not in fitted}
     fixed = {name: value for name, value in values.items() if isinstance(value, float) and value > 0.0}
     return Coordinates(parameters, fixed, setup.fine.food.shape.height)
+
+
+def sampled_answer(
+    setup: Setup, evaluators: Evaluators, seed: int, say: Callable[[str], None] = lambda text: None
+) -> tuple[FitResult, UncertaintyAnalysis, SampledPosterior]:
+    """Sample the posterior of a trace, and answer with its best simulated food.
+
+    Args:
+        setup: What was decided for the trace.
+        evaluators: Coarse and fine simulations.
+        seed: Seed of what is drawn.
+        say: Called with a sentence for each stage.
+
+    Returns:
+        The fit, its uncertainty, and the posterior.
+
+    Raises:
+        SimulationError: Too few foods of the literature's ranges are cut to learn from.
+    """
+    posterior = sample_posterior(setup.objective, coordinates_of(setup), evaluators, None, seed, say)
+    fit = fit_of(posterior)
+    return fit, analysis_of(posterior, fit, seed), posterior
 
 
 def fit_of(posterior: SampledPosterior) -> FitResult:

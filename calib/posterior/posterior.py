@@ -20,6 +20,7 @@ from calib.posterior.modes import Mode, climbed, modes
 from calib.posterior.sampling import Sample, sample
 from calib.posterior.waves import (
     GOOD_ERROR,
+    SEEDS,
     Matched,
     Plan,
     match_history,
@@ -199,7 +200,7 @@ class _Judged:
         for stage in range(JUDGED):
             good = self._judge(drawn, plan.judges) or stage == JUDGED - 1
             likelihood = Likelihood(self.objective, self.matched.emulator, self.correction)
-            drawn = sample(likelihood, plan.final if good else plan.scouting, self.seed + stage)
+            drawn = sample(likelihood, plan.final if good else plan.scouting, SEEDS * (self.seed + 1) - 1 - stage)
             if good:
                 break
         found = modes(self._points(drawn), self._density(likelihood))
@@ -215,7 +216,7 @@ class _Judged:
 
     def _judge(self, drawn: Sample, count: int) -> bool:
         """Fine runs of the posterior, predicted before, and the correction through all; whether it was good."""
-        points = proposals(drawn, self.matched.emulator, self.fine, count, self.seed + len(self.fine), 1.0)
+        points = proposals(drawn, self.matched.emulator, self.fine, count, SEEDS * self.seed + len(self.fine), 1.0)
         new = [run for run in self._run(points) if was_cut(run)]
         if new:
             errors = prediction_errors(self.objective, self.correction.curves(np.array([run.z for run in new])), new)

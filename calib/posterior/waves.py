@@ -42,7 +42,9 @@ moves it by 0.1."""
 HOPELESS = 1000.0
 """Chi-square of a run's curve beyond which it is not learnt from where others are enough [-]."""
 ENOUGH = 160
-"""Runs learnt from at least, the nearest ones, where there are so many; twice as many are at most."""
+"""Runs learnt from at least, the nearest ones, where there are so many; three times as many are at most."""
+SEEDS = 1000
+"""Seeds of draws between one seed of a posterior and the next."""
 REACH = 1.25
 """Standard deviation of the first wave over the prior's [-]."""
 CANDIDATES = 8
@@ -170,7 +172,7 @@ def match_history(
     while True:
         emulator = learnt(coordinates, runs, emulator)
         corrected = Correction(emulator, [run for run in fine if was_cut(run)], finer=True)
-        drawn = sample(Likelihood(objective, emulator, corrected), plan.scouting, seed + len(waves))
+        drawn = sample(Likelihood(objective, emulator, corrected), plan.scouting, SEEDS * seed + len(waves))
         spread = summary(drawn)
         moved = None if last is None else float(np.max(np.abs(spread[0] - last[0]) / last[1]))
         last = spread
@@ -180,7 +182,7 @@ def match_history(
         if good or len(waves) == plan.waves:
             return Matched(tuple(runs), tuple(fine), emulator, drawn, tuple(waves), good)
         temperature = TEMPERATURES[min(len(waves), len(TEMPERATURES)) - 1]
-        points = proposals(drawn, emulator, runs, plan.later, seed + len(waves), temperature)
+        points = proposals(drawn, emulator, runs, plan.later, SEEDS * seed + len(waves), temperature)
         new = simulated(objective, evaluators.coarse, points, "wave")
         fine += simulated(objective, evaluators.fine, points[: plan.pairs], "pair", coarse=False)
         cut = [run for run in new if was_cut(run)]

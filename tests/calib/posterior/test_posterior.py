@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib.posterior.answer import analysis_of, fit_of
+from calib.material.food import load_food
+from calib.posterior.answer import analysis_of, coordinates_of, fit_of
 from calib.posterior.coordinates import Coordinates
 from calib.posterior.correction import Correction
 from calib.posterior.emulator import CurveEmulator
@@ -22,13 +23,17 @@ from calib.posterior.sampling import Effort
 from calib.posterior.waves import Plan, first_wave, on_lattice, prediction_errors, quantiles, simulated
 from calib.problem.objective import Objective
 from calib.problem.parameters import ParameterSet
+from calib.problem.request import Request
+from calib.problem.setup import set_up
 from calib.simulation.evaluation import Evaluation, Evaluators
 from mpm.scene.errors import SimulationError
 from tests.calib.fake import FIVE, LENGTH, Fake, goal, two_terms
+from tests.data_dir import ROOT
 
 TRUTH = {"E": 6e5, "yield_stress": 6e4, "R": 400.0, "R_skin": 250.0, "mu": 0.25}
 SMALL = Plan(64, 16, 4, 6, Effort(20, 5, 1.0), Effort(50, 5, 0.5), waves=4)
 """Enough for two parameters."""
+BANANA = ROOT / "force_data" / "banana_reconstructed.csv"
 TINY = Plan(32, 8, 4, 4, Effort(12, 3, 3.0), Effort(12, 3, 3.0), waves=2)
 """Enough to see that it runs."""
 TWO = ParameterSet(tuple(FIVE[name] for name in ("R", "mu")))
@@ -91,6 +96,21 @@ def test_force_scales_with_the_stress_like_parameters(emulated: tuple[Objective,
     z = FIVE.to_vector(TRUTH)[None]
     along = FIVE.stress_like()
     assert np.allclose(emulator.curves(z + math.log(7.0) * along), 7.0 * emulator.curves(z))
+
+
+def test_coordinates_of_a_trace_are_those_of_its_food() -> None:
+    """All that a cut of a banana sees is fitted: R is the scale. With E fixed the scale is an axis of its own."""
+    whole, part = (
+        coordinates_of(set_up(Request(load_food("banana"), BANANA, fit=fit))) for fit in (None, ("R", "R_skin", "mu"))
+    )
+    assert whole.scale_name == part.scale_name == "R"
+    z = whole.parameters.prior_mean[None]
+    along = whole.parameters.stress_like()
+    assert np.allclose(whole(z), whole(z + along)) and np.allclose(whole.scale(z + along), whole.scale(z) + 1.0)
+    other = part.parameters.prior_mean[None]
+    assert not np.allclose(part(other), part(other + part.parameters.stress_like()))
+    assert "E R / (yield_stress^2 h)" in whole.combinations(z)
+    assert whole.combinations(z)["R_skin / R"] == pytest.approx(z[0, 4] - z[0, 3])
 
 
 def test_fixed_stress_keeps_the_scale_as_an_axis() -> None:
