@@ -38,7 +38,8 @@ def coordinates_of(setup: Setup) -> Coordinates:
     parameters, material = setup.objective.parameters, setup.fine.food.material
     fitted = {property_of(n) for n in parameters.names}
     values = {f.name: getattr(material, f.name) for f in fields(material) if f.name not in fitted}
-    fixed = {name: value for name, value in values.items() if isinstance(value, float) and value > 0.0}
+    unused = ("R_initiation",) if material.skin_thickness > 0.0 else ("R_skin",)  # a cut starts in skin or in flesh
+    fixed = {n: value for n, value in values.items() if isinstance(value, float) and value > 0.0 and n not in unused}
     return Coordinates(parameters, fixed, setup.fine.food.shape.height)
 
 

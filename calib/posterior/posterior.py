@@ -117,11 +117,8 @@ class SampledPosterior:
 
     @cached_property
     def explained(self) -> float:
-        """Posterior predictive p-value [-]: how probably the right food, with errors of the stated size, would leave a
-        larger chi-square than these foods do (Gelman, Meng & Stern 1996, Statistica Sinica 6:733)."""
-        some = self._emulated(self.z[:: DRAWS // CHECKED])
-        seen = self.likelihood.chi2(some, np.zeros(len(some)))
-        return float(np.mean(chi2.sf(seen, self.likelihood.rows)))
+        """Posterior predictive p-value [-] (:func:`predictive_p_value`)."""
+        return predictive_p_value(self.likelihood, self.z[:: DRAWS // CHECKED])
 
     def interval(self, index: int, mode: Mode | None = None) -> tuple[float, float, float]:
         """Ends of the central 95 % interval and the median of a parameter, in its internal coordinate: low, median,
@@ -281,6 +278,22 @@ class _Judged:
         z = drawn.z[drawn.drawn(DRAWS, 0)]
         gap = np.sum(((z - run.z) / np.maximum(z.std(axis=0), 1e-9)) ** 2, axis=1)
         return bool(np.isin(int(np.argmin(gap)), mode.members))
+
+
+def predictive_p_value(likelihood: Likelihood, z: FloatArray) -> float:
+    """How probably the right food, with errors of the stated size, would leave a larger chi-square than some foods do.
+
+    Source: Gelman, Meng & Stern (1996), Statistica Sinica 6:733.
+
+    Args:
+        likelihood: The likelihood of the trace.
+        z: Internal coordinates of draws from the posterior [-] (q, p).
+
+    Returns:
+        The probability, the mean over the draws [-].
+    """
+    seen = likelihood.chi2(likelihood.correction.curves(z), np.zeros(len(z)))
+    return float(np.mean(chi2.sf(seen, likelihood.rows)))
 
 
 def factor(objective: Objective, curve: FloatArray) -> float:

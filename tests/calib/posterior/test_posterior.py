@@ -17,9 +17,9 @@ from calib.posterior.emulator import CurveEmulator
 from calib.posterior.estimates import summarised
 from calib.posterior.likelihood import Likelihood
 from calib.posterior.modes import modes
-from calib.posterior.posterior import SampledPosterior, sample_posterior
+from calib.posterior.posterior import SampledPosterior, predictive_p_value, sample_posterior
 from calib.posterior.process import Process
-from calib.posterior.sampling import Effort
+from calib.posterior.sampling import Effort, sample
 from calib.posterior.waves import Plan, first_wave, on_lattice, prediction_errors, quantiles, simulated
 from calib.problem.objective import Objective
 from calib.problem.parameters import ParameterSet
@@ -27,7 +27,7 @@ from calib.problem.request import Request
 from calib.problem.setup import set_up
 from calib.simulation.evaluation import Evaluation, Evaluators
 from mpm.scene.errors import SimulationError
-from tests.calib.fake import FIVE, LENGTH, Fake, goal, two_terms
+from tests.calib.fake import FIVE, GRID, LENGTH, Fake, goal, two_terms
 from tests.data_dir import ROOT
 
 TRUTH = {"E": 6e5, "yield_stress": 6e4, "R": 400.0, "R_skin": 250.0, "mu": 0.25}
@@ -145,6 +145,28 @@ def test_likelihood_is_that_of_the_dense_covariance(emulated: tuple[Objective, C
     log_det = np.linalg.slogdet(dense)[1] - len(weights) * math.log(t2)
     expected = -0.5 * (row @ np.linalg.solve(dense, row) + log_det) - likelihood.rows * size
     assert likelihood.log(z, np.array([size]))[0] == pytest.approx(expected, rel=1e-6)
+
+
+def p_value(emulator: CurveEmulator, curve: np.ndarray) -> float:
+    """Posterior predictive p-value of a measured curve, by a small sample."""
+    right = goal(TRUTH)
+    size = 0.01 * curve.max()
+    target = replace(right.target, curve=curve, noise_sd=size, peak_sd=size)
+    likelihood = Likelihood(replace(right, target=target), emulator)
+    found = sample(likelihood, Effort(24, 5, 1.0), 0)
+    return predictive_p_value(likelihood, found.z[found.drawn(50, 0)])
+
+
+def test_wrong_traces_are_refused_and_right_ones_are_not(emulated: tuple[Objective, CurveEmulator]) -> None:
+    """The food's own cut, also where the specimen is 30 % wider, which only scales R; a reversed trace, a plateau and
+    another kind of food, which flows all the way and has no skin."""
+    objective, emulator = emulated
+    right = objective.target.curve
+    part = GRID / LENGTH
+    for curve in (right, 1.3 * right):
+        assert p_value(emulator, curve) > 0.05
+    for curve in (right[::-1].copy(), np.full_like(right, right.mean()), right.max() * part**3):
+        assert p_value(emulator, curve) < 0.01
 
 
 def test_correction_takes_the_difference_of_cells_away(emulated: tuple[Objective, CurveEmulator]) -> None:
