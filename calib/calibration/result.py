@@ -86,7 +86,7 @@ class CalibrationResult:
         limits: What the result does not show, one sentence each.
         sensitivity: Sobol indices over the prior, by quantity (peak, work, initial_slope) and parameter; empty where
             the fit ended too early.
-        sampled: The posterior over all plausible foods, with --sample; null without.
+        sampled: The posterior over all plausible foods, with --sample; left out without.
         wall_s: Run time [s].
         at_literature: The simulation at the literature's values against the trace. It is not in the document but
             follows from the curves; None where that simulation did not end.
@@ -126,7 +126,7 @@ class CalibrationResult:
     warnings: Annotated[tuple[str, ...], Shared("warnings")]
     limits: Annotated[tuple[str, ...], Shared("limits")]
     sensitivity: Mapping[str, Mapping[str, SobolIndices]] = field(default_factory=dict)
-    sampled: PosteriorSummary | None = field(default=None, metadata=NULL)
+    sampled: PosteriorSummary | None = None
     wall_s: Annotated[NotNegative | None, ALWAYS]
     at_literature: NullRating | None = None
 

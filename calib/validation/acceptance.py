@@ -184,7 +184,7 @@ def discrimination(found: PredictiveScore) -> list[Verdict]:
         Verdict(EXPLAINED_LINE, found.explained, EXPLAINED_LIMIT, "fraction", explained, note),
         _below("width of the 95 % band", found.width, BAND_LIMIT, note="mean, of the peak"),
         Verdict(
-            "interval score better than ramp and half sine",
+            "interval score better than null models",
             found.score,
             limit,
             "fraction",

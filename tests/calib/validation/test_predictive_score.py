@@ -42,7 +42,7 @@ def test_a_band_that_holds_anything_does_not_pass() -> None:
     """One and a half peaks either way hold the whole curve, and fail twice."""
     found = lines(1.5)
     assert found["width of the 95 % band"] is False
-    assert found["interval score better than ramp and half sine"] is False
+    assert found["interval score better than null models"] is False
     assert found["curve explained by the food"] is True
 
 
@@ -50,7 +50,7 @@ def test_a_narrow_band_beside_the_curve_does_not_pass() -> None:
     """Sharp and wrong: by its score."""
     found = lines(0.02, off=0.4)
     assert found["width of the 95 % band"] is True
-    assert found["interval score better than ramp and half sine"] is False
+    assert found["interval score better than null models"] is False
 
 
 def test_a_misfit_that_the_right_food_would_not_leave_fails() -> None:
