@@ -66,6 +66,7 @@ class Calibration:
         fit: Names of the fitted properties; None for those that cutting sees.
         dx: Cell size [m], or None.
         budget: Largest number of simulations.
+        sample: Whether all plausible foods are sampled, in place of a search for one; the budget does not bound it.
         workers: Simulations at a time.
         seed: Seed of the particles and of the search.
         arch: Device of the simulations.
@@ -93,6 +94,7 @@ class Calibration:
     fit: Sequence[str] | None = None
     dx: float | None = None
     budget: float = 100
+    sample: bool = False
     workers: int = 2
     seed: int = 0
     arch: str = "cpu"
@@ -152,6 +154,7 @@ class Calibration:
             fit=None if self.fit is None else tuple(self.fit),
             dx=self.dx,
             budget=self.budget,
+            sample=self.sample,
             seed=self.seed,
             arch=self.arch,
             command=(f"{self._call()}.run({str(out)!r})",),

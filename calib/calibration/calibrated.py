@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from scipy.stats import chi2
+
 from calib.fit.multistart import FitResult
 from calib.material.food import FoodSpec
+from calib.posterior.posterior import SampledPosterior
 from calib.problem.setup import Setup
 from calib.trace.filters import filter_simulated
 from calib.uncertainty.analysis import UncertaintyAnalysis
@@ -14,6 +17,7 @@ from calib.uncertainty.sobol import Indices, sensitivity
 from calib.validation.metrics import Metrics, compare
 from calib.validation.null_models import NullModel, null_models
 from calib.validation.numerical_checks import Check
+from calib.validation.predictive_score import PredictiveScore, predictive_score
 from mpm.arrays import FloatArray
 from mpm.output.record import ForceRecord
 
@@ -29,6 +33,7 @@ class Calibrated:
         record: Whole record of the best values.
         checks: What numerical choices change; none where the search was interrupted.
         start: Smoothed curve of the literature's values [N] (n,), NaN where that run broke down or was not made.
+        posterior: The posterior over all plausible foods, where it was sampled.
     """
 
     setup: Setup
@@ -37,6 +42,7 @@ class Calibrated:
     record: ForceRecord
     checks: list[Check]
     start: FloatArray
+    posterior: SampledPosterior | None = None
 
     @cached_property
     def metrics(self) -> Metrics:
@@ -48,6 +54,25 @@ class Calibrated:
     def nulls(self) -> dict[str, NullModel]:
         """Curves that explain nothing, against the trace."""
         return null_models(self.setup.curve.stroke, self.setup.curve.curve)
+
+    @cached_property
+    def predictive(self) -> PredictiveScore | None:
+        """How good the predictive band is; None where the fit ended too early for one."""
+        if self.analysis is None:
+            return None
+        band = self.analysis.bands[0]
+        return predictive_score(self._explained, (band.low, band.high), self.setup.curve.curve, self.nulls)
+
+    @property
+    def _explained(self) -> float:
+        """Posterior predictive p-value [-]: of the sampled posterior, or of the best curve by chi-square."""
+        if self.posterior is not None:
+            return self.posterior.explained
+        assert self.analysis is not None
+        return min(
+            self.analysis.uncertainty.probability,
+            float(chi2.sf(self.fit.best.misfit, self.setup.objective.effective_rows)),
+        )
 
     @cached_property
     def sensitivity(self) -> Indices:

@@ -34,6 +34,7 @@ from calib.io.typed_document import FLAT, NULL, renamed
 from calib.io.wording import brief
 from calib.material.food import FoodSpec, load_material_file
 from calib.material.properties import MEANINGS
+from calib.posterior.estimates import PosteriorSummary
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.validation.acceptance import Verdict
 from calib.validation.metrics import Metrics, compare
@@ -85,6 +86,7 @@ class CalibrationResult:
         limits: What the result does not show, one sentence each.
         sensitivity: Sobol indices over the prior, by quantity (peak, work, initial_slope) and parameter; empty where
             the fit ended too early.
+        sampled: The posterior over all plausible foods, with --sample; left out without.
         wall_s: Run time [s].
         at_literature: The simulation at the literature's values against the trace. It is not in the document but
             follows from the curves; None where that simulation did not end.
@@ -94,7 +96,7 @@ class CalibrationResult:
     KEYS: ClassVar[tuple[str, ...]] = (
         *("food", "created", "status", "search", "passed", "verdicts", "trace", "trace_sha256", "air", "conditioning"),
         *("agreement", "fitted", "nuisances", "posterior", "fixed_parameters", "history", "cut", "software"),
-        *("invocation", "numerical_checks", "warnings", "limits", "sensitivity", "wall_s"),
+        *("invocation", "numerical_checks", "warnings", "limits", "sensitivity", "sampled", "wall_s"),
     )
 
     folder: Path = Path()
@@ -124,6 +126,7 @@ class CalibrationResult:
     warnings: Annotated[tuple[str, ...], Shared("warnings")]
     limits: Annotated[tuple[str, ...], Shared("limits")]
     sensitivity: Mapping[str, Mapping[str, SobolIndices]] = field(default_factory=dict)
+    sampled: PosteriorSummary | None = None
     wall_s: Annotated[NotNegative | None, ALWAYS]
     at_literature: NullRating | None = None
 

@@ -23,8 +23,12 @@ from calib.fit.options import FitOptions
 from calib.io.folder import prepare, write_csv, write_json
 from calib.io.progress import Progress
 from calib.material.food import dump_material
+from calib.posterior.answer import sampled_answer
+from calib.posterior.posterior import SampledPosterior
+from calib.posterior.sampling import check_installed
 from calib.problem.request import Request
 from calib.problem.setup import FINE, Setup, set_up
+from calib.simulation.evaluation import Evaluators
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore
 from calib.simulation.record_file import read_record, record_errands
 from calib.simulation.workers import Errand, Workers
@@ -71,14 +75,26 @@ def run(
     for text in [*setup.warnings, *setup.assumed]:
         say(text)
     options = FitOptions(budget=request.budget, batch=pool.batch, seed=request.seed)
-    options.check(len(setup.objective.parameters))
+    if request.sample:
+        check_installed()
+    else:
+        options.check(len(setup.objective.parameters))
     with prepare(out, "calibrate", resume=resume):
         with EvaluationStore(out / STORE, setup.header, resume=resume, say=say) as store:
             work = _Calibration(setup, pool, store, out, say)
-            fit, analysis = work.fitted(options, progress)
-            calibrated = work.repeated(fit, analysis)
+            found = work.fitted(options, progress)
+            calibrated = work.repeated(found)
         add_conditioning(out / STORE, setup.curve)
         return _write(calibrated, out, began)
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A fit, its uncertainty where it did not end too early for that, and the posterior where it was sampled."""
+
+    fit: FitResult
+    analysis: UncertaintyAnalysis | None
+    posterior: SampledPosterior | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,16 +111,20 @@ class _Calibration:
     out: Path
     say: Callable[[str], None]
 
-    def fitted(
-        self, options: FitOptions, progress: Callable[[Progress], None] | None
-    ) -> tuple[FitResult, UncertaintyAnalysis | None]:
+    def fitted(self, options: FitOptions, progress: Callable[[Progress], None] | None) -> _Found:
         """The fit, and its uncertainty."""
         setup = self.setup
         evaluators = setup.evaluators(self.pool, self.store)
+        if setup.request.sample:
+            return self._sampled(evaluators)
         listener = Listener(progress, self.say, self._begin_longest_check)
-        return fit_with_uncertainty(
-            setup.objective, evaluators, options, sample=setup.request.sample, listener=listener
-        )
+        return _Found(*fit_with_uncertainty(setup.objective, evaluators, options, listener))
+
+    def _sampled(self, evaluators: Evaluators) -> _Found:
+        """The best food of the sampled posterior, and what is uncertain."""
+        found = _Found(*sampled_answer(self.setup, evaluators, self.setup.request.seed, self.say))
+        self._begin_longest_check(found.fit)
+        return found
 
     def _begin_longest_check(self, fit: FitResult) -> None:
         """Begin the longest of the last simulations, beside those of the intervals."""
@@ -112,8 +132,9 @@ class _Calibration:
         for errand in sorted(check_errands(scene, self.store), key=lambda e: e.haste)[:1]:
             self.pool.begin(errand)
 
-    def repeated(self, fit: FitResult, analysis: UncertaintyAnalysis | None) -> Calibrated:
+    def repeated(self, found: _Found) -> Calibrated:
         """The best values simulated once more, whole and otherwise, and those of the literature."""
+        fit = found.fit
         setup, best, path = self.setup, fit.best.evaluation, self.out / RECORD
         scene, ended = setup.scene(best.parameters), fit.status != "interrupted"
         errands = record_errands(scene, path)
@@ -125,7 +146,7 @@ class _Calibration:
         record = read_record(scene, path)
         checks = check(scene, best, self.store, setup.curve.stroke_length_m) if ended else []
         start = self._start_curve() if ended else np.full_like(setup.curve.stroke, np.nan)
-        return Calibrated(setup.sized(best.parameters), fit, analysis, record, checks, start)
+        return Calibrated(setup.sized(best.parameters), fit, found.analysis, record, checks, start, found.posterior)
 
     @cached_property
     def _fine(self) -> CachedEvaluator:

@@ -31,6 +31,7 @@ from calib.calibration.result_parts import (
 from calib.errors import OutputError
 from calib.fit.multistart import FitResult
 from calib.io.provenance import Invocation, Software
+from calib.posterior.estimates import summarised
 from calib.problem.parameters import STRESS_LIKE, property_of
 from calib.problem.request import Request
 from calib.problem.setup import Setup
@@ -70,12 +71,13 @@ def summarise(done: Calibrated, folder: Path, began: float) -> CalibrationResult
         fitted=fitted,
         checks=done.checks,
         nuisances=nuisances,
+        predictive=done.predictive,
     )
     stopped = fit.status == "interrupted"
     label, source, kind = curve.trace.label, curve.stroke_source, curve.baseline_kind
     scene = setup.scene(fit.best.evaluation.parameters)
     assumed = [*setup.assumed, *([weakened_ties(scene)] if scene.weakened else [])]
-    said = limits(label, source, kind, verdicts, fitted, assumed, record.fracture)
+    said = [*limits(label, source, kind, verdicts, fitted, assumed, record.fracture), *_no_better(done)]
     nulls = {name: NullRating.of(model.metrics) for name, model in done.nulls.items()}
     return CalibrationResult(
         folder=folder,
@@ -101,8 +103,18 @@ def summarise(done: Calibrated, folder: Path, began: float) -> CalibrationResult
         warnings=tuple(setup.warnings),
         limits=(*(() if analysis is None else analysis.remarks), *said),
         sensitivity=_sensitivity(done),
+        sampled=None if done.posterior is None else summarised(done.posterior),
         wall_s=time.monotonic() - began,
     )
+
+
+def _no_better(done: Calibrated) -> list[str]:
+    """A sentence on curves with a few free numbers that have the better band."""
+    better = () if done.predictive is None else done.predictive.better
+    if not better:
+        return []
+    named = " and ".join(name.replace("_", " ") for name in better)
+    return [f"In interval score the simulation is no better than what it should be better than: {named}, fitted alike."]
 
 
 def _sensitivity(done: Calibrated) -> dict[str, dict[str, SobolIndices]]:

@@ -38,7 +38,7 @@ class Request:
         scaled: Whether the search has a factor for the width of the specimen, as it has in a fit of several.
         u_num: Folder of a convergence study whose numerical uncertainty enters the likelihood, or None.
         errors: How far a right model may be from the trace.
-        sample: Whether the posterior is sampled beside its profiles.
+        sample: Whether the posterior over all plausible foods is sampled, in place of a search for the best one.
         budget: Largest number of simulations.
         seed: Seed of particles and search.
         arch: Device.

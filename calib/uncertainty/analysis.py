@@ -16,7 +16,6 @@ from calib.problem.objective import Objective
 from calib.problem.scored_run import ScoredRun
 from calib.simulation.evaluation import Evaluator
 from calib.uncertainty.intervals import Uncertainty, linearised_likelihood, uncertainty
-from calib.uncertainty.posterior import Posterior, credible_intervals
 from calib.uncertainty.predictive import Band, predictive_bands
 from calib.uncertainty.profile_likelihood import RISE, Profile, profile_likelihoods, with_profile_intervals
 from mpm.arrays import FloatArray
@@ -60,7 +59,6 @@ def analyse(
     coarse: Evaluator | None = None,
     fine: Evaluator | None = None,
     seed: int = 0,
-    sample: bool = False,
     say: Callable[[str], None] = lambda text: None,
 ) -> UncertaintyAnalysis | None:
     """Intervals, profiles, nuisances and predictive bands of a fit.
@@ -74,14 +72,10 @@ def analyse(
             identified or weak. The profiles are computed again with them, and ends of identified parameters that have
             moved are simulated again.
         seed: Seed of the predictive draws.
-        sample: Whether the posterior is sampled as well.
         say: Called before each round of simulations, with one sentence.
 
     Returns:
         The analysis; None where the fit ended before there were runs enough for one.
-
-    Raises:
-        CurveError: A sample is asked for and emcee is not installed.
     """
     if result.jacobian is None or result.surrogate is None:
         return None
@@ -96,10 +90,8 @@ def analyse(
             found, profiles = _profiled(objective, result, surrogate, surrogate.jacobian(better.z))
         result = replace(result, history=tuple(runs), surrogate=surrogate, jacobian=surrogate.jacobian(result.best.z))
         bands = predictive_bands(surrogate, result.best.z, found, seed)
-        posterior = Posterior(surrogate, result.parameters, found)
-        sampled = credible_intervals(posterior, result.best.z, seed) if sample else {}
     intervals = with_profile_intervals(found, profiles, [t.z for t in equally_good(result, found)])
-    return UncertaintyAnalysis(result, intervals, profiles, _nuisances(objective, result, found), bands, sampled)
+    return UncertaintyAnalysis(result, intervals, profiles, nuisances_of(objective, result, found), bands)
 
 
 def search_uncertainty(objective: Objective | JointObjective, result: FitResult) -> Uncertainty | None:
@@ -199,10 +191,19 @@ def _run(
     return [objective.score(e, coarse=coarse, stage="profile") for e in found]
 
 
-def _nuisances(
+def nuisances_of(
     objective: Objective | JointObjective, result: FitResult, found: Uncertainty
 ) -> tuple[NuisanceEstimate, ...]:
-    """Searched ones given the best curves, the others with the parameters free beside them."""
+    """What the best curves say of the measurement, trace by trace.
+
+    Args:
+        objective: What was fitted.
+        result: How.
+        found: The normal approximation about the best values.
+
+    Returns:
+        Nuisances that a search integrates out given the best curves, the others with the parameters free beside them.
+    """
     out: list[NuisanceEstimate] = []
     beside = iter(found.unsearched)
     for case, trial in zip(objective.terms, result.best.each, strict=True):

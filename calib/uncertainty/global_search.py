@@ -85,8 +85,6 @@ def fit_with_uncertainty(
     objective: Objective | JointObjective,
     evaluators: Evaluators,
     options: FitOptions,
-    *,
-    sample: bool = False,
     listener: Listener | None = None,
 ) -> tuple[FitResult, UncertaintyAnalysis | None]:
     """Fit, analyse the uncertainty of the fit, and search once more for what it calls identified.
@@ -95,7 +93,6 @@ def fit_with_uncertainty(
         objective: Target, parameters and error model.
         evaluators: What runs the simulations.
         options: Budget and the like, of all that is searched.
-        sample: Whether the posterior is sampled as well.
         listener: What is told of it; None for nothing.
 
     Returns:
@@ -104,7 +101,6 @@ def fit_with_uncertainty(
     Raises:
         MaterialError: A budget too small for the number of parameters.
         SimulationError: No simulation of the design reached the end of its stroke.
-        CurveError: A sample is asked for and emcee is not installed.
         KeyboardInterrupt: Interrupted before any simulation reached the end of its stroke.
     """
     told = listener or Listener()
@@ -113,7 +109,7 @@ def fit_with_uncertainty(
         objective, fine, coarse=coarse, replicate=replicate, options=options, progress=told.progress
     )
     if first.status == "interrupted":
-        return first, analyse(objective, first, seed=options.seed, sample=sample)
+        return first, analyse(objective, first, seed=options.seed)
     alone = search_uncertainty(objective, first)
     claimed = [] if alone is None else [i for i in alone.intervals if i.verdict == "identified" and _claimable(i)]
     if claimed:
@@ -124,7 +120,7 @@ def fit_with_uncertainty(
         told.say(f"a second search, from another design, for a food with another {_names(claimed, ' or ')}")
         result = second = _second_search(objective, first, claimed, evaluators, options, told.progress)
     told.found(result)
-    analysis = analyse(objective, result, coarse=coarse, fine=fine, seed=options.seed, sample=sample, say=told.say)
+    analysis = analyse(objective, result, coarse=coarse, fine=fine, seed=options.seed, say=told.say)
     if analysis is None:
         return result, None
     analysis = _reviewed(objective, analysis, _Searches(first, second, claimed), replicate, options.budget)

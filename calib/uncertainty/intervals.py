@@ -157,7 +157,12 @@ class Uncertainty:
     @property
     def explained(self) -> bool:
         """Whether the best curve follows the data as the right one would."""
-        return self.data.met and self.reduced_chi2 * self.freedom <= chi2.ppf(EXPLAINED, self.freedom)
+        return self.data.met and self.probability >= 1.0 - EXPLAINED
+
+    @property
+    def probability(self) -> float:
+        """Probability that the right material would leave a larger chi-square [-]."""
+        return float(chi2.sf(self.reduced_chi2 * self.freedom, self.freedom))
 
     def rows(self, residuals: FloatArray) -> FloatArray:
         """Residual vectors (q, k + p) of runs as the intervals see them: errors of the data widened, weighted,

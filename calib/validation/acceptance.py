@@ -9,11 +9,13 @@ from typing import Any
 
 from calib.io.typed_document import ANY, FORMER, to_document
 from calib.problem.nuisance import OUTSIDE
+from calib.problem.objective import EXPLAINED
 from calib.problem.parameters import property_of
 from calib.simulation.evaluation import FULLY_PARTED, Evaluation
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.validation.metrics import Metrics
 from calib.validation.numerical_checks import FINER_GRID, HALF_SPEED, VARIANTS, Check
+from calib.validation.predictive_score import PredictiveScore
 
 # Limits of a single in-sample calibration. Peak: the figure that published work quotes (CulinaryCut, "within 5 %").
 # Curve and shape: twice the target of a validated model (5 %), because absolute forces of the sensors that such traces
@@ -28,6 +30,8 @@ CONSTANTS_LINE = "constants of the method halved and doubled"
 LOST = "energy lost by the discretisation"
 PRESSED, PRESSED_LIMIT = "food pressed away, not parted", round(1.0 - FULLY_PARTED, 6)
 KINETIC_LIMIT = 0.10  # explicit quasi-static practice: kinetic energy below 5 to 10 % of internal energy
+EXPLAINED_LINE, EXPLAINED_LIMIT = "curve explained by the food", round(1.0 - EXPLAINED, 6)
+BAND_LIMIT = 0.5  # a band wider than a quarter of the peak either way predicts nothing that anyone would use
 OPENING_REMARKED = 0.1  # part of the new surface that opens ahead of the edge, from which on it is said [-]
 # Ends of what is physically possible: a fit that ends there found a one-sided answer (the cut shows no friction, say),
 # whereas one that ends on a bound of ours asks for a value that it was not allowed.
@@ -164,6 +168,32 @@ def agreement(metrics: Metrics) -> list[Verdict]:
     ]
 
 
+def discrimination(found: PredictiveScore) -> list[Verdict]:
+    """Lines that a wrong food, a wrong knife or a band that holds anything does not pass.
+
+    Args:
+        found: How good the band is, and how probable the misfit.
+
+    Returns:
+        The lines.
+    """
+    name, limit = found.simple
+    explained = bool(found.explained >= EXPLAINED_LIMIT)
+    note = "probability that the right food would leave a larger misfit"
+    return [
+        Verdict(EXPLAINED_LINE, found.explained, EXPLAINED_LIMIT, "fraction", explained, note),
+        _below("width of the 95 % band", found.width, BAND_LIMIT, note="mean, of the peak"),
+        Verdict(
+            "interval score better than null models",
+            found.score,
+            limit,
+            "fraction",
+            found.score < limit,
+            f"best null model: {name.replace('_', ' ')}; of the peak",
+        ),
+    ]
+
+
 def _at_natural_limit(name: str, p: FittedParameter) -> bool:
     """Whether a parameter at a bound is at the end of what is possible: its interval reaches there, and its value is
     nearer to that end than to the other."""
@@ -181,6 +211,7 @@ def judge(
     fitted: Mapping[str, FittedParameter],
     checks: Sequence[Check] = (),
     nuisances: Mapping[str, FittedNuisance] | None = None,
+    predictive: PredictiveScore | None = None,
 ) -> list[Verdict]:
     """The verdict table of a calibration.
 
@@ -191,11 +222,13 @@ def judge(
         fitted: Fitted parameters by name.
         checks: What numerical choices change; none were made where the fit was interrupted.
         nuisances: What the fit says of the measurement, by name.
+        predictive: How good the band is; None where the fit ended too early for one.
 
     Returns:
         All lines; those with ``passed`` None were not run and decide nothing.
     """
     lines = [*agreement(metrics), _against_nulls(metrics, nulls)]
+    lines += [] if predictive is None else discrimination(predictive)
     lines += [*balances(conservation), *changes(checks)]
     lines += [_nuisance(name, n) for name, n in (nuisances or {}).items() if name in NUISANCE_LINES]
     lines.append(_bounds(fitted))
@@ -312,6 +345,13 @@ def _limits_of_simulation(fracture: Mapping[str, float] | None) -> list[str]:
         "One finer grid was tried, which gives a difference but neither an order nor an uncertainty (cutcal converge "
         "--material measures both; calibrate --u-num takes them into the likelihood).",
     ]
+
+
+def identified_words(fitted: Mapping[str, FittedParameter]) -> str:
+    """How many of the fitted parameters the trace identifies, and which."""
+    names = [name for name, p in fitted.items() if p.verdict == "identified"]
+    which = f": {', '.join(names)}" if names else ""
+    return f"{len(names)} of {len(fitted)} parameters identified{which}"
 
 
 def remedied(line: Verdict) -> str:

@@ -29,6 +29,7 @@ from calib.io.schema import tag
 from calib.material.food import FoodSpec
 from calib.material.knife import load_knife
 from calib.material.scene import Sizing, cut_scene, specimen
+from calib.posterior.answer import sampled_answer
 from calib.problem.food_parameters import fit_parameters
 from calib.problem.request import Request
 from calib.problem.setup import replicated, set_up
@@ -123,6 +124,7 @@ class CoveragePlan:
         dx: Cell of truths and fits [m], or None for the food's own.
         seed: Seed of truths, sensors and fits.
         sensor: How a simulated force is measured.
+        sample: Whether each trace's posterior is sampled, in place of a search.
         command: Command line, for provenance.
     """
 
@@ -132,6 +134,7 @@ class CoveragePlan:
     dx: float | None = None
     seed: int = 0
     sensor: MadeUpSensor = MadeUpSensor()
+    sample: bool = False
     command: tuple[str, ...] = ()
 
     @cached_property
@@ -147,7 +150,9 @@ class CoveragePlan:
     @property
     def header(self) -> Header:
         """What the store of the study belongs to."""
-        return Header("", key_of({"scene": self.scene.as_dict(), "sensor": vars(self.sensor), "seed": self.seed}))
+        how = {"sample": True} if self.sample else {}
+        content = {"scene": self.scene.as_dict(), "sensor": vars(self.sensor), "seed": self.seed, **how}
+        return Header("", key_of(content))
 
     def request(self, k: int, trace: Path, arch: str) -> Request:
         """How the trace of a number is calibrated.
@@ -224,6 +229,7 @@ def _one(plan: CoveragePlan, k: int, path: Path, store: EvaluationStore, pool: W
     plan.sensor.measure(*force, random).to_csv(path, index=False, float_format="%.6g")
     row: dict[str, Any] = {"trace": k, "truth": values, "peak_N": float(force[1].max())}
     request = plan.request(k, path, pool.arch)
+    analysis: UncertaintyAnalysis | None
     try:
         setup = set_up(request)
         fine, coarse, again = (
@@ -233,7 +239,11 @@ def _one(plan: CoveragePlan, k: int, path: Path, store: EvaluationStore, pool: W
             for name, scene in (("fine", setup.fine), ("coarse", setup.coarse), ("again", replicated(setup.fine)))
         )
         options = FitOptions(budget=request.budget, batch=pool.batch, seed=k)
-        result, analysis = fit_with_uncertainty(setup.objective, Evaluators(fine, coarse, again), options)
+        evaluators = Evaluators(fine, coarse, again)
+        if plan.sample:
+            result, analysis, _ = sampled_answer(setup, evaluators, k)
+        else:
+            result, analysis = fit_with_uncertainty(setup.objective, evaluators, options)
     except CutcalError as e:
         return row | {"error": str(e)}
     if result.status == "interrupted":

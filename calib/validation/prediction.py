@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar
 from calib.io import typed_document
 from calib.io.folder import prepare, write_csv, write_json
 from calib.io.provenance import Invocation, Software
-from calib.io.type_schema import NotNegative, Positive, Shared, keywords, one_of
+from calib.io.type_schema import NotNegative, Positive, Shared, one_of
 from calib.io.typed_document import FLAT
 from calib.material.knife import load_knife
 from calib.material.scene import blade_warnings, cut_scene, specimen, windowed
@@ -54,7 +54,7 @@ class PredictionResult:
         food: Food of materials.yaml, or of the file given.
         trace: Whether the record was measured or reconstructed from published figures.
         trace_sha256: SHA-256 of a file's content.
-        held_out: That no value but the width was fitted to this trace.
+        held_out: Whether no value but the width was fitted to this trace, by its SHA-256.
         passed: Whether curve error and rating are within the limits.
         width_scale: Factor on the force that was fitted to this trace, with --scale-width; null without.
         width_m: Width of the specimen, with that factor [m].
@@ -76,7 +76,7 @@ class PredictionResult:
     food: str
     trace: Annotated[str, one_of("measured", "reconstructed")]
     trace_sha256: Annotated[str, Shared("sha256")]
-    held_out: Annotated[bool, keywords(const=True)] = True
+    held_out: bool
     passed: bool
     width_scale: float | None
     width_m: Positive
@@ -138,7 +138,11 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
     scene = windowed(
         cut_scene(request.food, shape, knife, stroke=curve.stroke_length_m, dx=request.dx, seed=request.seed)
     )
-    warnings = (*request.food.warnings(), *curve.warnings, *assumed, *blade_warnings(shape, knife))
+    warnings: tuple[str, ...] = (*request.food.warnings(), *curve.warnings, *assumed, *blade_warnings(shape, knife))
+    held_out = _held_out(request, curve.trace.sha256)
+    if not held_out:
+        said = "in-sample: the values were fitted to this very trace (equal SHA-256), so the agreement predicts nothing"
+        warnings = (*warnings, said)
     for text in warnings:
         say(text)
     with prepare(out, "predict", resume=False):
@@ -161,6 +165,7 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
             food=request.food.name,
             trace=curve.trace.label,
             trace_sha256=curve.trace.sha256,
+            held_out=held_out,
             passed=PredictionLimits().hold(metrics),
             width_scale=factor if scale_width else None,
             width_m=factor * shape.width,
@@ -177,6 +182,12 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
         )
         write_json(out / "summary.json", to_document(result))
         return result
+
+
+def _held_out(request: Request, sha256: str) -> bool:
+    """Whether the food's values were not fitted to the trace of this SHA-256, as far as its file says."""
+    provenance = request.food.calibration or {}
+    return provenance.get("trace_sha256") != sha256
 
 
 def _simulated(scene: Scene, arch: str) -> ForceRecord:

@@ -134,14 +134,12 @@ def pull_tie(s: ti.template(), cut, n, dt):
         if ti.static(not s.mirror_y):
             push_face(s, cut, other, -s.tool_gap[cut, other], -dv)
     weight = passing_weight(above / band)
-    layered = s.par[cut, LAYERED] > 0
     if weight > 0:
         tough = s.tie_toughness[cut, n]
         rest = tough * (1.0 - work_spent(s.largest_opening[cut, n], end)) if left > 0 else 0.0
         charge_edge(s, cut, at[0], weight * ti.Vector([rest, tough, 1.0]))
-    if layered:
-        weight = s.tie_share[cut, n] * passing_weight(above / AHEAD_CELLS)
-        count_layer(s, cut, at[0], s.tie_toughness[cut, n], weight)
+    if s.par[cut, LAYERED] > 0:
+        count_layer(s, cut, at[0], s.tie_toughness[cut, n], s.tie_share[cut, n] * weight)
 
 
 @ti.func

@@ -22,6 +22,7 @@ from reports.calibration import (
     numerics_page,
     parameter_figures,
     parameter_page,
+    posterior_page,
 )
 
 if TYPE_CHECKING:
@@ -29,9 +30,9 @@ if TYPE_CHECKING:
     from calib.calibration.result_parts import Agreement, NullRating
     from calib.validation.acceptance import Verdict
 
-#: First page [mm]: what title, a sentence of two lines and facts leave; a line of the table and one more line in it; a
-#: line of the sentence; a banner.
-PAGE_ROOM, LINE_HEIGHT, NEXT_LINE, SENTENCE_LINE, BANNER_HEIGHT = 200.0, 4.9, 3.7, 5.2, 20.0
+#: First page [mm]: what title, a line, a sentence of two lines and facts leave; a line of the table, one more line in it,
+#: a line of the sentence, a banner.
+PAGE_ROOM, LINE_HEIGHT, NEXT_LINE, SENTENCE_LINE, BANNER_HEIGHT = 193.0, 4.9, 3.7, 5.2, 20.0
 #: Letters in a line of a name, a note and the sentence.
 NAME_LETTERS, NOTE_LETTERS, SENTENCE_LETTERS = 42, 47, 92
 #: Least and largest height of the main figure [mm].
@@ -148,6 +149,7 @@ def _content(done: Finished) -> Data:
         "reconstructed": result.trace.label == "reconstructed",
         "passed": result.passed,
         "sentence": _sentence(result),
+        "identified": posterior_page.identified(fitted),
         "verdicts": [_verdict_line(v) for v in result.verdicts],
         "trace": _trace(result),
         "specimen": _specimen(result.cut.shape),
@@ -160,6 +162,7 @@ def _content(done: Finished) -> Data:
         "metrics": _metrics(result.agreement),
         "parameters": [parameter_page.parameter(name, p, result.meaning(name)) for name, p in fitted.items()],
         "legend": parameter_page.legend(fitted),
+        "posterior": posterior_page.posterior(result.sampled, fitted),
         "influences": parameter_page.influences(result.sensitivity),
         "correlations": parameter_page.correlations(correlations) if correlations else None,
         "fixed": [parameter_page.fixed(name, p, result.meaning(name)) for name, p in fixed.items()],

@@ -40,9 +40,9 @@ def test_a_missing_package_is_named_with_its_remedy(monkeypatch):
     monkeypatch.setattr(metadata, "version", version)
     gone = {"scipy"}
     assert doctor.packages() == doctor.Finding("packages", "fail", "missing: pip install scipy")
-    gone = {"emcee"}
+    gone = {"dynesty"}
     found = doctor.packages()
-    assert found.state == "ok" and "emcee for --sample (pip install 'cutcal[sample]')" in found.words
+    assert found.state == "ok" and "dynesty for --sample (pip install 'cutcal[sample]')" in found.words
 
 
 @pytest.mark.parametrize(

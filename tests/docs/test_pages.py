@@ -22,6 +22,7 @@ from calib.validation.acceptance import NUISANCE_LINES, Conservation, Verdict, j
 from calib.validation.metrics import compare
 from calib.validation.null_models import null_models
 from calib.validation.numerical_checks import VARIANTS, Check
+from calib.validation.predictive_score import PredictiveScore
 from cutcal.main import COMMANDS, parser
 from tests.data_dir import ROOT
 
@@ -133,6 +134,7 @@ def lines_of_a_report() -> list[Verdict]:
         fitted={},
         checks=[Check(name, None, 0.0, 0.0, 0.0) for name in (*VARIANTS, "twice the process zone")],
         nuisances=dict.fromkeys(NUISANCE_LINES, nuisance),
+        predictive=PredictiveScore(0.5, 0.1, 0.1, {"ramp": 0.5}),
     )
 
 

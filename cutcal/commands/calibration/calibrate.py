@@ -15,7 +15,7 @@ from calib.problem.request import Request
 from calib.problem.target import ErrorModel
 from calib.trace.baselines import BASELINES, CONSTANT
 from calib.trace.cuts import WHOLE
-from calib.validation.acceptance import remedied
+from calib.validation.acceptance import identified_words, remedied
 from cutcal.commands.calibration.describe import description
 from cutcal.options import (
     RESUME_HELP,
@@ -66,7 +66,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
         metavar="PART",
         help="how far a right model may be, of the peak (0.03)",
     )
-    fit.add_argument("--sample", action="store_true", help="sample the posterior as well (needs emcee)")
+    fit.add_argument("--sample", action="store_true", help="sample all plausible foods (needs dynesty)")
     fit.add_argument("--u-num", metavar="DIR", help="a converge study whose uncertainty the fit heeds")
     add_workers(p, "simulations")
     titled(p, RUN).add_argument("--check", nargs="?", const="", metavar="PNG", help=CHECK_HELP)
@@ -174,6 +174,8 @@ def run(args: argparse.Namespace) -> int:
     from calib.calibration.run import run as calibrate
 
     command = ["calibrate", *(a for a in sys.argv[1:] if a != "calibrate")]
+    if args.sample and (args.all or args.config is not None):
+        raise CutcalError("--sample is for one trace; leave it out of a fit of several, or name one with --cut")
     if args.config is not None:
         return run_study(args, command)
     missing = [f"--{name}" for name in ("food", "trace") if getattr(args, name) is None]
@@ -285,6 +287,7 @@ def verdict_text(result: CalibrationResult) -> str:
     for name, p in result.fitted.items():
         interval = "" if p.low95 is None else f"{p.low95:.3g} to {p.high95:.3g}"
         lines.append(f"  {'':8s}{name:18s}{p.value:>10.4g} {p.unit:6s}{interval:>24s}  {p.verdict}")
+    lines.insert(0, f"  {identified_words(result.fitted)}")
     state = "interrupted" if result.status == "interrupted" else "passed" if result.passed else "not passed"
     peak, real = result.agreement.peak_sim_N, result.agreement.peak_real_N
     head = (

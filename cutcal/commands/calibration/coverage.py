@@ -40,6 +40,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
     add_food(p)
     p.add_argument("--traces", type=whole(1), default=100, metavar="N", help="how many (default 100)")
+    p.add_argument("--sample", action="store_true", help="sample each posterior, as calibrate --sample does")
     add_workers(p, "simulations")
     titled(p, RUN).add_argument("--resume", action="store_true", help=RESUME_HELP)
     add_run(p)
@@ -47,12 +48,15 @@ def add_args(p: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the study; prints its table, or coverage.json."""
+    from calib.posterior.sampling import check_installed
     from calib.validation.interval_coverage import CoveragePlan
     from calib.validation.interval_coverage import run as study
 
     food = food_of(args)
     command = ("coverage", *(a for a in sys.argv[1:] if a != "coverage"))
-    plan = CoveragePlan(food, args.traces, args.knife, args.dx, args.seed, command=command)
+    plan = CoveragePlan(food, args.traces, args.knife, args.dx, args.seed, sample=args.sample, command=command)
+    if args.sample:
+        check_installed()
     out = Path(args.out or f"cutcal-coverage-{food.name}")
 
     with workers_of(args, say) as pool:

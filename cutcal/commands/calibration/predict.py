@@ -59,8 +59,9 @@ def agreement_text(result: PredictionResult) -> str:
     """What the terminal shows at the end."""
     m, scale, limits = result.metrics, result.width_scale, result.limits
     factor = "" if scale is None else f" but one factor {scale:.3g} for the width"
+    how = f"predicted without fitting{factor}" if result.held_out else f"in-sample, fitted to this trace{factor}"
     lines = [
-        f"{result.food}: {'passed' if result.passed else 'not passed'}, predicted without fitting{factor}",
+        f"{result.food}: {'passed' if result.passed else 'not passed'}, {how}",
         f"  peak {m.peak_sim_N:.2f} N against {m.peak_real_N:.2f} N ({m.peak_error:+.1%}), "
         f"NRMSE {m.nrmse:.3f} (limit {limits.nrmse:.2f}), R {m.iso18571.R:.3f} (limit {limits.rating:.2f}), "
         f"shape {m.shape_error:.3f}, work {m.work_error:+.1%}",

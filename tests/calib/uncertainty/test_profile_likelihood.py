@@ -230,16 +230,3 @@ def test_fake_and_noise_are_repeatable() -> None:
     assert isinstance(first, Evaluation) and np.array_equal(first.force, second.force)
     assert not np.array_equal(noise(values, NOISE), noise(values | {"mu": 0.21}, NOISE))
     assert three_terms(values).shape == STROKE.shape
-
-
-def test_a_sample_agrees_with_the_profile(one_sided: tuple[Objective, FitResult, UncertaintyAnalysis]) -> None:
-    """R by the ensemble of walkers and by its profile: the ends within a quarter of the interval."""
-    objective, result, _ = one_sided
-    scout = Fake(elastic, noisy=0.004)
-    analysis = analyse(objective, result, coarse=scout, sample=True)
-    assert analysis is not None
-    interval = next(i for i in analysis.uncertainty.intervals if i.parameter.name == "R")
-    width = interval.high95 - interval.low95
-    assert analysis.sampled["R"] == pytest.approx((interval.low95, interval.high95), abs=0.25 * width)
-    again = analyse(objective, result, coarse=scout, sample=True)
-    assert again is not None and again.sampled == analysis.sampled

@@ -90,3 +90,15 @@ def test_the_study_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.
     assert FakePool.runs == before
     assert json.loads((out / "coverage.json").read_text())["parameters"] == first["parameters"]
     assert (out / "coverage.jsonl").read_text().splitlines()[-1] == lines[-1]
+
+
+@pytest.mark.slow
+def test_a_study_can_sample_each_posterior(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One trace on the analytic simulator: most intervals hold the truth, and the waves' runs are counted."""
+    monkeypatch.setattr(cutcal.commands.calibration.coverage, "workers_of", lambda args, say: FakePool())
+    out = tmp_path / "out"
+    main(["coverage", "--food", "banana", "--traces", "1", "--sample", "--out", str(out)])
+    (row,) = (json.loads(line) for line in (out / "coverage.jsonl").read_text().splitlines())
+    held = [p["low95"] <= row["truth"][name] <= p["high95"] for name, p in row["parameters"].items()]
+    assert sum(held) >= len(held) - 1
+    assert row["coarse_simulations"] >= 352 and row["simulations"] >= 18

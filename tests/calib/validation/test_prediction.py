@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -36,7 +38,8 @@ def test_prediction_takes_one_number_from_the_trace(material, tmp_path, capsys):
     bare, scaled = (valid(json.loads((tmp_path / n / "summary.json").read_text())) for n in ("bare", "scaled"))
     a, b = (pd.read_csv(tmp_path / n / "curves.csv") for n in ("bare", "scaled"))
     k = scaled["width_scale"]
-    assert bare["width_scale"] is None and bare["metrics"] == bare["unscaled"] == scaled["unscaled"]
+    assert bare["held_out"] and bare["width_scale"] is None
+    assert bare["metrics"] == bare["unscaled"] == scaled["unscaled"]
     np.testing.assert_allclose(b["sim_N"], k * a["sim_N"], rtol=1e-6, atol=1e-9)
     assert scaled["width_m"] == pytest.approx(k * bare["width_m"])
     assert scaled["metrics"]["best_scale"] == pytest.approx(1.0)
@@ -47,6 +50,18 @@ def test_prediction_takes_one_number_from_the_trace(material, tmp_path, capsys):
         result = read_prediction(tmp_path / name)
         assert finite(to_document(result)) == s and result.metrics.nrmse == s["metrics"]["nrmse"]
     assert "one factor" in capsys.readouterr().out
+
+
+def test_a_trace_that_was_fitted_is_not_held_out(tmp_path, capsys):
+    """Values fitted to the very trace, by its SHA-256: in-sample, in the document and in words."""
+    path, out = tmp_path / "material.yaml", tmp_path / "out"
+    sha256 = hashlib.sha256(Path(TRACE[1]).read_bytes()).hexdigest()
+    dump_material(load_food("banana"), path, {"trace_sha256": sha256})
+    main(["predict", "--food", "banana", "--material", str(path), *TRACE, "--out", str(out)])
+    summary = valid(json.loads((out / "summary.json").read_text()))
+    assert summary["held_out"] is False and any("in-sample" in text for text in summary["warnings"])
+    said = capsys.readouterr().out
+    assert "in-sample, fitted to this trace" in said and "predicted without fitting" not in said
 
 
 def test_a_void_phase_is_said_beside_the_rating(material, tmp_path, capsys, monkeypatch):
