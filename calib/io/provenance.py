@@ -18,7 +18,7 @@ from calib.io.typed_document import ANY
 from calib.io.yaml_checks import PACKAGE
 
 DATA = "data"  # folder of a package that an installed one has and a checkout has not
-PACKAGES = ("taichi", "numpy", "scipy", "SALib", "pandas", "h5py", "matplotlib", "typst")
+PACKAGES = ("taichi", "numpy", "scipy", "SALib", "dynesty", "pandas", "h5py", "matplotlib", "typst")
 
 
 def versions() -> dict[str, str]:

@@ -70,7 +70,7 @@ def fit_of(posterior: SampledPosterior) -> FitResult:
     best, objective = posterior.best, posterior.objective
     surrogate = Surrogate(objective, runs_near(posterior, ABOUT_BEST), best)
     return FitResult(
-        status="converged" if posterior.matched.converged else "stalled",
+        status="converged" if posterior.converged else "stalled",
         best=best,
         parameters=objective.parameters.with_values(best.evaluation.parameters),
         jacobian=surrogate.jacobian(best.z),
@@ -131,7 +131,7 @@ def _verdict(posterior: SampledPosterior, index: int, p: Parameter, width: float
     if not (below and above):
         return "one_sided"
     relative = sd if p.log else sd / max(abs(p.from_internal(middle)), 1e-12)
-    sure = posterior.agree(index) and posterior.matched.converged and posterior.explained >= 1.0 - EXPLAINED
+    sure = posterior.agree(index) and posterior.converged and posterior.explained >= 1.0 - EXPLAINED
     return "identified" if width < IDENTIFIED and relative <= KNOWN and sure else "weak"
 
 
@@ -152,8 +152,13 @@ def _remarks(posterior: SampledPosterior) -> tuple[str, ...]:
         differ = [p.name for k, p in enumerate(posterior.objective.parameters) if not posterior.agree(k)]
         of = f", which differ in {', '.join(differ)}" if differ else ""
         said.append(f"The posterior has {len(posterior.modes)} modes ({weights} of its probability){of}.")
+    last = posterior.matched.waves[-1]
     if not posterior.matched.converged:
-        last = posterior.matched.waves[-1]
-        error = "unknown" if last.error90 is None else f"{last.error90:.1%} of the peak"
-        said.append(f"The waves ended before the emulator was good enough (90 % of its errors: {error}).")
+        error, moved = ("unknown" if x is None else f"{x:.1%}" for x in (last.error90, last.moved))
+        said.append(
+            f"The waves ended before the posterior had settled: 90 % of the last curves were predicted to {error} of "
+            f"the peak, and a median moved by {moved} of its interval."
+        )
+    elif not posterior.converged:
+        said.append("Fine simulations of the posterior were not predicted well enough for anything to be identified.")
     return tuple(said)

@@ -104,7 +104,7 @@ def summarised(posterior: SampledPosterior) -> PosteriorSummary:
     median, most = posterior.judged or (None, None)
     combined = posterior.likelihood.emulator.coordinates.combinations(posterior.z)
     return PosteriorSummary(
-        converged=posterior.matched.converged,
+        converged=posterior.converged,
         waves=tuple(WaveSummary(**vars(w)) for w in posterior.matched.waves),
         judged=median,
         judged90=most,

@@ -94,6 +94,11 @@ class SampledPosterior:
         """The run on fine cells of largest posterior density."""
         return min((run for run in self.fine if run.ok), key=lambda run: run.misfit)
 
+    @property
+    def converged(self) -> bool:
+        """Whether the emulator was good where foods are plausible, on coarse cells and on fine ones, and settled."""
+        return self.matched.converged and self.judged is not None and self.judged[1] <= GOOD_ERROR
+
     @cached_property
     def draws(self) -> FloatArray:
         """Places (DRAWS,) of draws of equal weight."""

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from calib.calibration.result_parts import Agreement, NullRating
     from calib.validation.acceptance import Verdict
 
-#: First page [mm]: what title, a line, a sentence of two lines and facts leave; a line of the table, a line more in it,
-#: a line of the sentence, a banner.
+#: First page [mm]: what title, a line, a sentence of two lines and facts leave; a line of the table, one more line in
+#: it, a line of the sentence, a banner.
 PAGE_ROOM, LINE_HEIGHT, NEXT_LINE, SENTENCE_LINE, BANNER_HEIGHT = 193.0, 4.9, 3.7, 5.2, 20.0
 #: Letters in a line of a name, a note and the sentence.
 NAME_LETTERS, NOTE_LETTERS, SENTENCE_LETTERS = 42, 47, 92

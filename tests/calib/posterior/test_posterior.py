@@ -280,6 +280,16 @@ def test_a_parameter_on_which_modes_differ_is_not_identified(sampled: SampledPos
     assert "2 modes" in analysis.remarks[0] and "R" in analysis.remarks[0]
 
 
+def test_nothing_is_identified_where_fine_runs_are_not_predicted(sampled: SampledPosterior) -> None:
+    """The same posterior, had its judges been 3 % off, and had its waves not settled."""
+    off = replace(sampled, judged=(0.01, 0.03))
+    early = replace(sampled, matched=replace(sampled.matched, converged=False))
+    for posterior, said in ((off, "Fine simulations"), (early, "The waves ended")):
+        analysis = analysis_of(posterior, fit_of(posterior))
+        assert analysis.uncertainty.intervals[0].verdict == "weak"
+        assert analysis.remarks[0].startswith(said)
+
+
 def test_a_food_that_is_never_cut_is_an_error_that_says_so() -> None:
     """Nothing to learn from: one sentence, no traceback."""
     objective, fake = goal({"R": 500.0, "mu": 0.25}, TWO, two_terms), Fake(two_terms, parted=lambda p: 0.2)
