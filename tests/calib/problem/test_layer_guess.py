@@ -12,7 +12,10 @@ from calib.material.knife import load_knife
 from calib.material.scene import cut_scene
 from calib.problem.food_parameters import fit_parameters
 from calib.problem.layer_guess import EDGE_PART, _chords, layer_guess
+from calib.problem.request import Request
+from calib.problem.setup import set_up
 from mpm.scene.shapes import Shape
+from tests.data_dir import data_file
 
 HEIGHT = 0.042
 CUCUMBER = load_food("cucumber")
@@ -49,3 +52,21 @@ def test_the_layers_of_a_made_up_force_are_found() -> None:
 def test_there_is_no_guess_without_layers_to_fit(names: tuple[str, ...]) -> None:
     """A food without layers, or one whose flesh or size of layers is held, begins as it did."""
     assert layer_guess(SCENE, fit_parameters(CUCUMBER, names), *made()) is None
+
+
+def test_a_whole_cucumber_is_through_before_its_stroke_ends() -> None:
+    """The measured force falls to nothing 2 mm before the knife stops: that is the height. Peaks, dip and fall ask for
+    a rind tougher than the flesh and a softer core."""
+    request = Request(
+        food=CUCUMBER,
+        trace=data_file("franka_knife_cutting", "cucumber_large_cut1.csv"),
+        air=data_file("franka_knife_cutting", "cucumber_session_large_air.csv"),
+        knife="slicing",
+    )
+    setup = set_up(request)
+    assert setup.curve.stroke_length_m == pytest.approx(0.0425, abs=3e-4) == setup.fine.food.shape.height
+    assert any("edge is through" in text for text in setup.curve.warnings)
+    (guess,) = setup.objective.guesses
+    found = setup.objective.parameters.to_dict(guess)
+    assert found["R_rind"] > 2 * found["R"] > 4 * found["R_core"]
+    assert 2e-3 < found["rind_thickness"] < 3.5e-3 and 0.4 < found["core_ratio"] < 0.65
