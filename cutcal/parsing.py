@@ -56,7 +56,7 @@ class Parser(argparse.ArgumentParser):
 
     def finish(self) -> None:
         """Add --help to the last group of options, and show in the first line only what must be given."""
-        self._action_groups[-1].add_argument("-h", "--help", action="help", help="show this and end")
+        self._action_groups[-1].add_argument("-h", "--help", action="help", help=argparse.SUPPRESS)
         needed = [a for a in self._actions if a.option_strings and a.required]
         words = [f"{a.option_strings[0]} {a.metavar or a.dest.upper()}" for a in needed]
         for a in self._actions:

@@ -112,7 +112,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
         "--mach",
         type=number(0, 0.05, ""),
         metavar="PART",
-        help="blade speed over the P-wave's (default: 0.01, less for a thick wedge)",
+        help="blade speed over the P-wave's (default 0.01 or less)",
     )
     p.add_argument(
         "--slice-ratio",
