@@ -71,9 +71,15 @@ def test_numerical_choices_are_checked(finished):
         "grid and particles elsewhere",
         "cells of two thirds",
         "twice the process zone",
+        "twice the bearing of the process zone",
         "half the slip of the edge",
         "twice the slip of the edge",
         "twice the contact stiffness",
+        "half the height of a particle's face",
+        "half the band of the edge",
+        "twice the band of the edge",
+        "half the least gap to a surface",
+        "twice the least gap to a surface",
         "half the time step",
         "half the loss factor",
         "twice the loss factor",
@@ -88,6 +94,8 @@ def test_numerical_choices_are_checked(finished):
     assert lines[speed[0]] == 2 * speed[1]
     assert all(lines[name] == size for name, size in (elsewhere, finer))
     assert lines["constants of the method halved and doubled"] == max(size for _, size in constants)
+    idle = [name for name in found if "least gap" in name or "face" in name]
+    assert [found.pop(name) for name in idle] == [0, 0, 0]  # none is squeezed flat, none meets the blade's shoulder
     assert all(0 < size < 0.2 for size in found.values())
 
 
