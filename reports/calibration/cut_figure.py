@@ -117,7 +117,7 @@ def glance(section: Section, knife: Knife, height: float, stroke: np.ndarray, fo
         _tools(axes, knife, height - float(section.stroke[k]), top, half)
         axes.set(xlim=(-1e3 * half, 1e3 * half), ylim=(-1e3 * MARGIN * height, 1e3 * top), aspect="equal")
         axes.set(xlabel="across the blade [mm]", ylabel="height [mm]")
-        axes.set_title(f"largest force, {1e3 * float(section.stroke[k]):.1f} mm deep")
+        axes.set_title(f"largest force, {1e3 * float(section.stroke[k]):.1f} mm", loc="right")
         axes.grid(visible=False)
         axes.figure.colorbar(
             colour, ax=axes, location="bottom", shrink=0.9, aspect=25, extend="max", label="von Mises stress [kPa]"

@@ -169,7 +169,7 @@ def test_the_glance_on_the_first_page_is_the_food_about_the_blade_at_the_largest
     axes = Figure().subplots()
     pictures.glance(section, KNIFE, height, stroke, np.sin(np.pi * stroke / 0.024))(axes)
     deep = section.stroke[np.argmin(np.abs(section.stroke - 0.012))]
-    assert axes.get_title() == f"largest force, {1e3 * deep:.1f} mm deep"
+    assert axes.get_title(loc="right") == f"largest force, {1e3 * deep:.1f} mm"
     edge = axes.patches[0].get_xy()[0]
     np.testing.assert_allclose(edge, [0.0, 1e3 * (height - deep)])
     reach = min(np.abs(section.y).max() + 0.12 * height, 0.8 * height)
