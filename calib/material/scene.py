@@ -11,7 +11,7 @@ import numpy as np
 from calib.material.food import FoodSpec
 from calib.trace.conditioning import Conditioned
 from mpm.scene import EdgeLaw, Knife, Motion, Numerics, Scene
-from mpm.scene.shapes import Shape, half_width
+from mpm.scene.shapes import PRISMS, Shape, half_width
 
 ZONE_M = 4e-3
 """Process zone of the edge [m]; small foods get an eighth of their height."""
@@ -37,8 +37,6 @@ LENGTH_PER_HEIGHT = 4.0
 """Largest simulated length across the blade of a food with parallel sides, over its height. The blade bends its halves
 apart like the arms of a double cantilever beam (Gurney and Hunt 1967), so the force on its faces grows with the length
 (docs/theory.md, "Measured choices")."""
-PRISMS = ("block", "cylinder", "half_cylinder", "capsule")
-"""Shapes with parallel sides."""
 MID_LENGTH = 0.5
 """Where the blade cuts when nothing else is said, in parts of the length."""
 FAR_PER_HEIGHT = 0.25

@@ -16,12 +16,12 @@ from calib.io.yaml_checks import Place, check_keys, choice, finite_number, mappi
 from calib.material.food import FoodSpec, load_food, read_property
 from calib.material.knife import load_knife
 from calib.material.properties import DIMENSIONS, Rule
-from calib.material.scene import LENGTH_PER_HEIGHT, PRISMS
+from calib.material.scene import LENGTH_PER_HEIGHT
 from calib.problem.food_parameters import fit_parameters
 from calib.problem.parameters import ParameterSet
 from mpm.scene import Knife
 from mpm.scene.errors import CutcalError, SceneError
-from mpm.scene.shapes import SHAPE_KINDS, Shape, section_area
+from mpm.scene.shapes import PRISMS, SHAPE_KINDS, Shape, section_area
 
 PEAK_FORCE, CUT_ENERGY = "peak_N", "energy_J_m2"
 QUANTITIES = {PEAK_FORCE: "largest force [N]", CUT_ENERGY: "work over the area of the cut [J/m^2]"}

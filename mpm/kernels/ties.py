@@ -138,8 +138,8 @@ def pull_tie(s: ti.template(), cut, n, dt):
         tough = s.tie_toughness[cut, n]
         rest = tough * (1.0 - work_spent(s.largest_opening[cut, n], end)) if left > 0 else 0.0
         charge_edge(s, cut, at[0], weight * ti.Vector([rest, tough, 1.0]))
-    if s.par[cut, LAYERED] > 0:
-        count_layer(s, cut, at[0], s.tie_toughness[cut, n], s.tie_share[cut, n] * weight)
+        if s.par[cut, LAYERED] > 0:
+            count_layer(s, cut, at[0], tough, s.tie_share[cut, n] * weight)
 
 
 @ti.func
@@ -195,12 +195,11 @@ def charge_edge(s: ti.template(), cut, place, sums):
 
 @ti.func
 def count_layer(s: ti.template(), cut, place, tough, weight):
-    """Count the toughness of the food at the edge itself for the slice it lies in, or for its mirror image.
+    """Count the toughness of what the edge passes for the slice it lies in, or for its mirror image.
 
-    What the opening has left is known half a cell below the edge. Where layers differ, the food there may be another
-    one: on the flank of a round food the edge would miss the rind on its way in, and pay it twice on its way out.
+    A tie on the outline stands for less than its square of the section and counts by its share. Neighbouring slices
+    have no part of it: on the flank of a round food they may be of another layer.
     """
     i = ti.floor((place - s.par[cut, FIRST_STATION]) * s.par[cut, INV_DX] + 0.5, ti.i32)
     i = ti.math.clamp(i, s.first_slice, s.size[cut, STATIONS] - 1)
-    if weight > 0:
-        s.at_edge[cut, i] += weight * ti.Vector([tough, 1.0])
+    s.at_edge[cut, i] += weight * ti.Vector([tough, 1.0])

@@ -11,11 +11,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mpm.scene.material import Material
-from mpm.scene.shapes import FLAT_DOWN, FLAT_TOP, Shape, half_width, inside, radius2
+from mpm.scene.shapes import FLAT_DOWN, FLAT_TOP, PRISMS, Shape, half_width, inside, radius2
 
 SUBSAMPLES = 8  # points along each side of a particle's square of the section
 SECTION_SAMPLES = 400  # points along the width and along the height of a whole section
-PRISMS = ("block", "cylinder", "half_cylinder", "capsule")  # their core runs along y
 
 
 def toughness(shape: Shape, material: Material, points: np.ndarray) -> np.ndarray:

@@ -19,6 +19,7 @@ SHAPE_KINDS = (
     "ellipsoid",
     "capsule",
 )
+PRISMS = ("block", "cylinder", "half_cylinder", "capsule")  # shapes with parallel sides, alike all along y
 FLAT_DOWN = ("half_cylinder", "hemisphere")
 FLAT_TOP = ("block", "upright_cylinder")
 

@@ -158,6 +158,19 @@ def test_new_surface_costs_the_same_under_a_thick_and_a_thin_blade(flows):
     assert abs(thin.unbooked[-1]) < 0.01 * thin.work
 
 
+def test_the_edge_cuts_what_it_passes_and_not_what_lies_below():
+    """Work of a stiff food that rubs against finite elements whose edge has no band: half a cell of lead takes 14 %.
+
+    Theirs is that of ``fem_reference.cutting.wedge`` on elements of 1 mm, from 2 to 10 mm deep (``cutcal verify --only
+    "cut by finite elements"`` computes it).
+    """
+    food = replace(TUBER, mu=0.17, tensile_strength=0.3e6, initiation_depth=0.2e-3)
+    block = Food(Shape("block", 0.03, 0.012, 0.03), food)
+    record = cut(replace(SPLIT, food=block, knife=replace(EDC, height=0.06), motion=Motion(0.0105, 5e-3)))
+    done = np.interp([2e-3, 10e-3], np.append(0.0, record.stroke), np.append(0.0, record.work_done))
+    assert (done[1] - done[0]) / 0.012 == pytest.approx(3.4136, rel=0.03)
+
+
 def test_rows_that_pass_a_thick_shoulder_give_back_what_pressed_them():
     """Elastic halves on a smooth wedge of 30 degrees: the work goes into new surface and bending, and no more."""
     wide = replace(
