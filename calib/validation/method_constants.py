@@ -75,11 +75,6 @@ CONSTANTS = (
         "numerical: above the bound of Nitsche's method, 1.5 layers of particles", "half of it is below that bound",
     ),
     MethodConstant(
-        "height of a particle's face", "numerics", "face_height", (0.5,),
-        "numerical: over it the blade's profile is averaged, one spacing of the particles",
-        "twice of it is coarser than the particles are",
-    ),
-    MethodConstant(
         "band of the edge", "numerics", "edge_band", (0.5, 2.0),
         "numerical: half a cell about the edge, one spacing of the particles",
     ),

@@ -47,19 +47,25 @@ class Blade:
         angle: Angle between its faces [rad].
         thickness: [m].
         friction: Coulomb's coefficient on its faces [-].
-        rounding: Radius of the shoulder [m]. A sharp one would dent the food without limit as elements become smaller.
+        rounding: Radius of the shoulder [m]; None: half the thickness. A sharp one would dent the food without limit as
+            elements become smaller.
     """
 
     angle: float
     thickness: float
     friction: float = 0.0
-    rounding: float = 1e-3
+    rounding: float | None = None
 
     def __post_init__(self) -> None:
         if not 0 < self.angle < math.pi:
             raise CutCaseError(f"blade: an angle of {math.degrees(self.angle):g} degrees is none of a wedge; 0 to 180")
-        if not 0 < 2 * self.rounding <= self.thickness:
+        if self.rounding is not None and not 0 < 2 * self.rounding <= self.thickness:
             raise CutCaseError("blade: round the shoulder with a radius above 0 and up to half the thickness")
+
+    @property
+    def fillet(self) -> float:
+        """Radius of the shoulder [m]."""
+        return self.thickness / 2 if self.rounding is None else self.rounding
 
     @property
     def shoulder(self) -> float:

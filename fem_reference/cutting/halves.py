@@ -42,7 +42,7 @@ class Halves:
         plane = mesh.facets_satisfying(lambda p: p[-2] < near, boundaries_only=True)
         under = mesh.facets_satisfying(lambda p: p[-1] < near, boundaries_only=True)
         self.modulus = (block.law.lam + 2 * block.law.mu) / grid.size  # that all penalties are measured by [Pa/m]
-        self.wedge = Wedge(h, blade.angle / 2, blade.thickness, blade.rounding, single=True)
+        self.wedge = Wedge(h, blade.angle / 2, blade.thickness, blade.fillet, single=True)
         self.points: SurfacePoints = nodal(self.solid, plane)
         self.height = self.points.at(self.solid.nodes)[:, 2]
         row = np.round(2 * rows * self.height / h).astype(int)

@@ -33,17 +33,48 @@ def blade_distance(y, above, spine, cos_h, sin_h, radius):
 
 
 @ti.func
+def rounded_blade_distance(y, above, spine, cos_h, sin_h, radius, height):
+    """As :func:`blade_distance`, with a shoulder and a back that are rounded with half the spine's thickness.
+
+    The arc of the shoulder touches both faces. The back is half round and stands on top of ``height``, so the blade is
+    nowhere thinner than with sharp corners but at the shoulder.
+
+    Args:
+        y: Distance from the blade plane towards the particle's own side [m]; negative beyond the plane.
+        above: Height above the lowest point of the edge [m].
+        spine: Thickness of the spine [m].
+        cos_h: Cosine of half the included angle.
+        sin_h: Sine of half the included angle.
+        radius: Radius of the tip [m].
+        height: Height of the blade [m].
+
+    Returns:
+        Distance [m], negative inside, and the unit normal (0, n_y, n_z).
+    """
+    d, n = blade_distance(y, above, spine, cos_h, sin_h, radius)
+    arc = 0.5 * spine
+    up = above - radius - (arc - radius) / sin_h
+    if up < 0 and y * sin_h + up * cos_h > 0:
+        size = ti.sqrt(y * y + up * up)
+        d, n = size - arc, ti.Vector([0.0, y, up]) / size
+    up = above - height
+    if up > 0:
+        size = ti.sqrt(y * y + up * up)
+        d, n = size - half_thickness(spine, cos_h, sin_h, radius, height), ti.Vector([0.0, y, up]) / size
+    return d, n
+
+
+@ti.func
+def half_thickness(spine, cos_h, sin_h, radius, height):
+    """Half thickness of a blade at its back [m]; its arguments are those of :func:`rounded_blade_distance`."""
+    return ti.min(0.5 * spine, (height - radius) * sin_h / cos_h + radius / cos_h)
+
+
+@ti.func
 def passed_part(q):
     """Part of a hat of half width 1 that lies below q [-]."""
     x = ti.math.clamp(q, -1.0, 1.0)
     return 0.5 + x - 0.5 * x * ti.abs(x)
-
-
-@ti.func
-def kink(q):
-    """Integral of :func:`passed_part` up to q [-]: a kink of slope 1 at 0 that is averaged by a hat."""
-    x = ti.math.clamp(q, -1.0, 1.0)
-    return 1 / 6 + 0.5 * x + 0.5 * x * x - x * x * ti.abs(x) / 6 + ti.max(0.0, q - 1.0)
 
 
 @ti.func

@@ -3,7 +3,7 @@
 import taichi as ti
 
 from mpm.kernels.constitutive import full
-from mpm.kernels.signed_distance import adhesive_traction, blade_distance, kink, passed_part, stick_slip
+from mpm.kernels.signed_distance import adhesive_traction, blade_distance, rounded_blade_distance, stick_slip
 from mpm.kernels.tool import blade_velocity, book_impulse, book_knife_impulse, edge_height, under_blade
 from mpm.state.accessors import to_grid_axes, to_scene_axes, velocity_gradient
 from mpm.state.tables import (
@@ -14,16 +14,17 @@ from mpm.state.tables import (
     BOARD,
     BOARD_MU,
     CONTACT,
+    COUNT,
     DX,
     EDGE_VS,
     EDGE_VZ,
     EDGE_Z,
     FACE,
-    FACE_HEIGHT,
     FRICTION_WORK,
     INV_DX,
     LEAST_GAP,
     MASS,
+    SPACING,
     SPINE,
     TILT_COS,
     TILT_SIN,
@@ -32,6 +33,8 @@ from mpm.state.tables import (
     WEDGE_SIN,
     YIELD,
 )
+
+FACE_POINTS = 4  # points of a particle's face, one above another
 
 
 @ti.func
@@ -85,6 +88,8 @@ def surface_contact(s: ti.template(), cut, p, dt, u, at):
     else:
         if ti.abs(there[1]) < 2 * s.par[cut, DX]:
             s.tool_gap[cut, p] = ti.math.clamp(s.tool_gap[cut, p] * (1 + dt * across[1]), least, most)
+            rise = s.face_rise[cut, p]  # turns and stretches with the food; its part along the blade stays small
+            s.face_rise[cut, p] = rise + (dt * rise[2]) * up + (dt * rise[1]) * across
         push, lift, wide = blade_contact(s, cut, p, m, dt, v + kick, up, across, there)
         high += lift
     scale = 4 * s.par[cut, INV_DX] * s.par[cut, INV_DX]
@@ -117,19 +122,27 @@ def surface_traction(s: ti.template(), cut, p, shell, depth, n):
 
 
 @ti.func
-def friction_limit(s: ti.template(), cut, p, press):
-    """Largest friction on the tool at a normal force, both over the contact's stiffness [m].
+def friction_limit(s: ti.template(), cut, p, press, own):
+    """Largest friction on the tool at a normal force, over the contact's stiffness [m].
 
-    It is Coulomb's, and on the food's face no more than its yield stress in shear (Orowan 1943; Zorev 1963).
+    It is Coulomb's, and on the food's face no more than its yield stress in shear (Orowan 1943; Zorev 1963): the
+    coefficient is mu, or the yield stress over the pressure. The pressure is that of the food's own stress. The force
+    of one particle's contact changes from particle to particle with what the grid can't follow of the blade's profile,
+    and the stiffer the contact, the more; a limit on it would bind by chance.
 
-    Beyond that the food shears in a band of no thickness along the face. A grid without this limit shears a whole layer
-    of cells, drags it down with the blade and is pressed for it the more, the finer the cells.
+    Beyond the limit the food shears in a band of no thickness along the face. A grid without it shears a whole layer of
+    cells, drags it down with the blade and is pressed for it the more, the finer the cells.
+
+    Args:
+        p: The particle.
+        press: Normal force over the contact's stiffness [m].
+        own: What the food's own stress gives of it on the whole face, over the contact's stiffness [m].
     """
-    most, shell = s.par[cut, BLADE_MU] * press, s.surface_volume[cut, p][1]
-    if shell > 0:
+    mu, shell = s.par[cut, BLADE_MU], s.surface_volume[cut, p][1]
+    if shell > 0 and own > 0:
         yields = s.par[cut, YIELD] / ti.sqrt(3.0) * shell / s.tool_gap[cut, p]
-        most = ti.min(most, yields / (s.par[cut, CONTACT] * s.par[cut, MASS] * s.volume_ratio[cut, p]))
-    return most
+        mu = ti.min(mu, yields / (own * s.par[cut, CONTACT] * s.par[cut, MASS] * s.volume_ratio[cut, p]))
+    return mu * press
 
 
 @ti.func
@@ -168,10 +181,6 @@ def board_contact(s: ti.template(), cut, p, m, dt, u, at):
 def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
     """Contact of one severed particle with the blade's faces; returns the change of velocity [m/s] and its moments.
 
-    A particle meets the blade as far from its centre as it was from the cut plane when the food was whole, so that the
-    faces displace the food by the true half thickness of the blade. The normal force is the gradient of the opening,
-    in the particle's place and in its stretch: a particle that passes the shoulder gives back what it was pressed with.
-
     The two moments are those of the impulses with the lever's height and with its part across the blade [m^2/s].
 
     Args:
@@ -183,99 +192,135 @@ def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
         across: Gradient of the velocity across the blade [1/s].
         at: Position of its centre [m].
     """
-    cos_t, sin_t = ti.cast(s.pose[cut, TILT_COS], float), ti.cast(s.pose[cut, TILT_SIN], float)
-    above = (at[2] - edge_height(s, cut, at[0])) * cos_t
+    above = (at[2] - edge_height(s, cut, at[0])) * ti.cast(s.pose[cut, TILT_COS], float)
     touching = False
     dv, lift, wide = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
-    tall = s.par[cut, BLADE_HEIGHT] + half_thickness(s, cut) + s.par[cut, FACE_HEIGHT]
+    tall = s.par[cut, BLADE_HEIGHT] + 0.5 * s.par[cut, SPINE] + s.par[cut, SPACING]
     if s.side[cut, p] != 0 and 0 < above < tall and under_blade(s, cut, at[0]):
         sign = 1.0 if s.side[cut, p] == 2 else -1.0
-        gap = s.tool_gap[cut, p]
-        opening, n = blade_opening(s, cut, sign * at[1], above, gap)
-        level = gap * ti.max(n[1], s.par[cut, WEDGE_COS])  # what the opening takes from the particle's stretch
-        n = ti.Vector([-sin_t * n[2], sign * n[1], cos_t * n[2]])
-        own = surface_traction(s, cut, p, s.surface_volume[cut, p][1], gap, n)
-        force = own.dot(n) - opening
-        press = ti.max(force, 0.0)
-        own -= own.dot(n) * n
-        if force > 0 and s.adhering[cut, p] == 0:
-            s.adhering[cut, p] = 1
-        if force <= 0 and s.adhering[cut, p] == 1:
-            if opening < s.par[cut, ADHESION_GAP]:
-                opening = ti.max(opening, 0.0)
-                force = (
-                    -s.par[cut, ADHESION] * adhesive_traction(opening, s.par[cut, ADHESION_GAP]) / s.par[cut, CONTACT]
-                )
-                press = -force
-            else:
-                s.adhering[cut, p] = 0
+        gap, high = s.tool_gap[cut, p], s.par[cut, SPACING] * s.face_rise[cut, p]
+        press, normal, turned, middle = press_face(s, cut, p, sign, high, at)
         if press > 0:
+            if s.adhering[cut, p] == 0:
+                s.adhering[cut, p] = 1
+        elif s.adhering[cut, p] == 1:
+            press, normal = stick_face(s, cut, p, sign, at)
+        if press != 0:
             touching = True
-            arm = -gap * n
+            n = (1 / press) * normal
+            n *= 1 / n.norm()
+            own = surface_traction(s, cut, p, s.surface_volume[cut, p][1], gap, n)
+            most = friction_limit(s, cut, p, ti.abs(press), own.dot(n))
+            own -= own.dot(n) * n
+            arm = middle * high - gap * n
             blade = blade_velocity(s, cut, at[0] + arm[0], at[2] + arm[2])
             slide = u + arm[2] * up + arm[1] * across - blade
             slide -= slide.dot(n) * n
             stick = s.stick[cut, 1, p] - s.stick[cut, 1, p].dot(n) * n
-            hold = stick_slip(stick, dt * slide, own, friction_limit(s, cut, p, press))
+            hold = stick_slip(stick, dt * slide, own, most)
             s.stick[cut, 1, p] = own - hold
-            force *= s.par[cut, CONTACT] * dt
-            hold *= s.par[cut, CONTACT] * dt
-            dv = force * n + hold
-            lift, wide = arm[2] * hold, arm[1] * hold
-            wide[1] -= level * force
+            scale = s.par[cut, CONTACT] * dt
+            normal *= scale
+            turned *= scale
+            hold *= scale
+            dv = normal + hold
+            lift = high[2] * turned + arm[2] * hold
+            wide = high[1] * turned + arm[1] * hold
+            wide[1] -= gap * sign * normal[1]  # the opening is taken from the face, which stretches with the particle
             book_knife_impulse(s, cut, FACE, -m * dv, at[0] + arm[0], at[2] + arm[2])
             s.sums[cut, FRICTION_WORK] -= m * hold.dot(slide)
-            if force < 0:
-                s.sums[cut, FRICTION_WORK] -= m * force * ((u - blade).dot(n) - level * across[1])
+            if press < 0:
+                s.sums[cut, FRICTION_WORK] -= m * (normal.dot(u - blade) - gap * sign * normal[1] * across[1])
     if not touching:
         s.stick[cut, 1, p] = ti.Vector.zero(float, 3)
     return dv, lift, wide
 
 
 @ti.func
-def blade_opening(s: ti.template(), cut, y, above, gap):
-    """Opening between a particle's face and the blade's, and the blade's outward normal, in the plane across the edge.
+def press_face(s: ti.template(), cut, p, sign, high, at):
+    """Normal force of the blade on the face of a particle.
 
-    A particle stands for a face of a certain height (``Numerics.face_height``), so it meets the blade's profile as its
-    mean over that height (weights of a hat of twice the height). At a sharp shoulder whole rows would let go at once of
-    the force that the wedge had given them, and the halves would ring. The tip is left sharp.
+    A particle meets the blade with a face. The face lies as far from its centre as the centre was from the cut plane
+    when the food was whole, so that the blade displaces the food by its true half thickness. It is as high as the
+    particle is in the food, and turns and stretches with it. Each of its :data:`FACE_POINTS` points feels the blade's
+    profile, so a face passes a shoulder point by point. With one point a whole row of particles would let go at once of
+    all that the wedge had given it.
 
-    The face lies across the blade from the centre, at the gap. So the opening's gradient is the normal wherever the
-    profile bends: a distance taken from the centre, less the gap, had none, and each row that passed the shoulder lost
-    a part of the energy that pressed it.
+    The force of a point is the gradient of its opening, in the particle's place and in its stretch: what passes the
+    shoulder gives back what it was pressed with.
 
     Args:
-        y: Distance from the blade's plane towards the particle's own half [m].
-        above: Height above the edge [m].
-        gap: Distance of the particle's centre and its face [m].
+        p: The particle.
+        sign: 1 for the half at +y, else -1.
+        high: Way along the face from its lower end to its upper [m].
+        at: Position of its centre [m].
+
+    Returns:
+        Over the contact's stiffness: size of the force, summed over the points [m]; the force [m]; its moment along the
+        face over the face's height [m]. Place of its middle along the face, from -1/2 to 1/2.
+    """
+    cos_t, sin_t = ti.cast(s.pose[cut, TILT_COS], float), ti.cast(s.pose[cut, TILT_SIN], float)
+    gap, shell = s.tool_gap[cut, p], s.surface_volume[cut, p][1]
+    y, wide = sign * at[1] - gap, sign * high[1]
+    above, rise = (at[2] - edge_height(s, cut, at[0])) * cos_t, high[2] * cos_t - high[0] * sin_t
+    press, middle = 0.0, 0.0
+    normal, turned = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
+    # an end that LLVM can't know keeps the points one by one, so that every kernel adds them in the same order
+    for q in range(ti.min(FACE_POINTS, s.size[cut, COUNT])):
+        part = (q + 0.5) / FACE_POINTS - 0.5
+        opening, n = blade_opening(s, cut, y + part * wide, above + part * rise)
+        n = ti.Vector([-sin_t * n[2], sign * n[1], cos_t * n[2]])
+        force = (surface_traction(s, cut, p, shell, gap, n).dot(n) - opening) / FACE_POINTS
+        if force > 0:
+            press += force
+            middle += part * force
+            normal += force * n
+            turned += part * force * n
+    if press > 0:
+        middle /= press
+    return press, normal, turned, middle
+
+
+@ti.func
+def stick_face(s: ti.template(), cut, p, sign, at):
+    """Pull of a sticky blade on a particle that has touched it, until they are too far apart.
+
+    Args:
+        p: The particle.
+        sign: 1 for the half at +y, else -1.
+        at: Position of its centre [m].
+
+    Returns:
+        Over the contact's stiffness: the force along the blade's outward normal, 0 or negative [m], and the force [m].
+    """
+    cos_t, sin_t = ti.cast(s.pose[cut, TILT_COS], float), ti.cast(s.pose[cut, TILT_SIN], float)
+    press, y = 0.0, sign * at[1] - s.tool_gap[cut, p]
+    opening, n = blade_opening(s, cut, y, (at[2] - edge_height(s, cut, at[0])) * cos_t)
+    if opening < s.par[cut, ADHESION_GAP]:
+        pull = s.par[cut, ADHESION] * adhesive_traction(ti.max(opening, 0.0), s.par[cut, ADHESION_GAP])
+        press = -pull / s.par[cut, CONTACT]
+    else:
+        s.adhering[cut, p] = 0
+    return press, press * ti.Vector([-sin_t * n[2], sign * n[1], cos_t * n[2]])
+
+
+@ti.func
+def blade_opening(s: ti.template(), cut, y, above):
+    """Opening between a point of a particle's face and the blade, and the blade's outward normal there.
+
+    In the plane across the edge. Beside the tip a point that is pressed beyond the blade's plane counts as on it.
+
+    Args:
+        y: Distance of the point from the blade's plane towards its own half [m].
+        above: Its height above the edge [m].
 
     Returns:
         Opening [m], negative where they press, and the unit normal (0, n_y, n_z).
     """
     cos_h, sin_h, radius = s.par[cut, WEDGE_COS], s.par[cut, WEDGE_SIN], s.par[cut, TIP_RADIUS]
-    opening, n = 0.0, ti.Vector([0.0, cos_h, -sin_h])
     if y * sin_h + (above - radius) * cos_h < 0:
-        size = ti.sqrt(y * y + (above - radius) ** 2)
-        opening, n = size - radius - gap * cos_h, ti.Vector([0.0, y, above - radius]) / ti.max(size, 1e-12)
-    else:
-        slope, reach, top = sin_h / cos_h, s.par[cut, FACE_HEIGHT], s.par[cut, BLADE_HEIGHT]
-        shoulder = ti.min(radius + (0.5 * s.par[cut, SPINE] * cos_h - radius) / sin_h, top)
-        one, two = (above - shoulder) / reach, (above - top) / reach
-        half = (above - radius) * slope + radius / cos_h - reach * (slope * kink(one) + kink(two))
-        slope -= slope * passed_part(one) + passed_part(two)
-        n = ti.Vector([0.0, 1.0, -slope]) / ti.sqrt(1.0 + slope * slope)
-        opening = (y - gap - half) * n[1]
-    return opening, n
-
-
-@ti.func
-def half_thickness(s: ti.template(), cut):
-    """Half thickness of the blade at its back [m].
-
-    With ties across the cut plane, which close the halves above it, the back is a roof of 90 degrees: food that has
-    passed it is let go without a jolt, and a blade that is drawn out opens what has closed.
-    """
-    return ti.min(0.5 * s.par[cut, SPINE], s.par[cut, BLADE_HEIGHT] * s.par[cut, WEDGE_SIN] / s.par[cut, WEDGE_COS])
+        y = ti.max(y, 0.0)
+    return rounded_blade_distance(y, above, s.par[cut, SPINE], cos_h, sin_h, radius, s.par[cut, BLADE_HEIGHT])
 
 
 @ti.func
@@ -297,14 +342,15 @@ def press_contact(s: ti.template(), cut, p, m, dt, u, at):
     n = ti.Vector([0.0, sign * n[1], n[2]])
     own = surface_traction(s, cut, p, s.surface_volume[cut, p][1], s.tool_gap[cut, p], n)
     force = own.dot(n) - d
-    own -= own.dot(n) * n
+    normal = own.dot(n)
+    own -= normal * n
     dv = ti.Vector.zero(float, 3)
     if force > 0:
         tool = ti.Vector([ti.cast(s.pose[cut, EDGE_VS], float), 0.0, ti.cast(s.pose[cut, EDGE_VZ], float)])
         stick = s.stick[cut, 1, p] - s.stick[cut, 1, p].dot(n) * n
         slide = u - tool
         slide -= slide.dot(n) * n
-        hold = stick_slip(stick, dt * slide, own, friction_limit(s, cut, p, force))
+        hold = stick_slip(stick, dt * slide, own, friction_limit(s, cut, p, force, normal))
         s.stick[cut, 1, p] = own - hold
         dv = s.par[cut, CONTACT] * dt * (force * n + hold)
         book_impulse(s, cut, FACE, -m * dv)

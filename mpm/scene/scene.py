@@ -186,8 +186,6 @@ class Numerics:
             one a cell altogether [m]; None: nowhere. Only the outline needs as many there as elsewhere.
         contact_stiffness: Stiffness of the contact's spring over that of a layer of particles [-]. Below 1.5 Nitsche's
             method is not stable in every food (docs/theory.md, "Measured choices"); stiffer asks for shorter steps.
-        face_height: Height over which a particle meets the mean of the blade's profile, over the spacing of the
-            particles [-].
         edge_band: Half height of what the edge is cutting, about the edge [cells].
         least_gap: Least distance of a particle's centre from the food's surface that squeezing leaves [cells].
         contact: ``cohesive`` (edge law and particle contact) or ``nodal`` (the plain projection of grid velocities).
@@ -208,7 +206,6 @@ class Numerics:
     far: float | None = None
     contact: str = "cohesive"
     contact_stiffness: float = 2.0
-    face_height: float = 1.0
     edge_band: float = 0.5
     least_gap: float = 0.02
     grid_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -234,7 +231,6 @@ class Numerics:
             check_number(w, "far", self.far, 0.0, 1.0, "m")
         check_number(w, "room", self.room, 0.0, 100.0, "of half the food's size")
         check_number(w, "contact_stiffness", self.contact_stiffness, 0.1, 100.0, "of a layer's")
-        check_number(w, "face_height", self.face_height, 0.01, 10.0, "of a particle's spacing")
         check_number(w, "edge_band", self.edge_band, 0.01, 5.0, "cells")
         check_number(w, "least_gap", self.least_gap, 1e-6, 0.2, "cells")
         check_number(w, "safety", self.safety, 0.0, 0.9001, "of the stability limit")

@@ -61,10 +61,10 @@ def _put_material(table: np.ndarray, scene: Scene, material: Material, seeds: Se
     table[row.ETA_S], table[row.ETA_B] = beta * material.shear, beta * (material.lame + 2 / 3 * material.shear)
     table[row.CONTACT] = contact_stiffness(scene, material, seeds.spacing)
     if scene.tied:
-        table[row.SPACING], table[row.TIE_OPENING] = seeds.spacing, material.tie_opening(seeds.spacing)
+        table[row.TIE_OPENING] = material.tie_opening(seeds.spacing)
         table[row.EDGE_BAND] = scene.numerics.edge_band
         table[row.LAYERED] = material.layered
-    table[row.FACE_HEIGHT] = scene.numerics.face_height * seeds.spacing
+    table[row.SPACING] = seeds.spacing
     table[row.LEAST_GAP] = scene.numerics.least_gap * scene.numerics.dx
     table[row.ADHESION], table[row.ADHESION_GAP] = material.adhesion / (material.rho * seeds.spacing), 1.0
     if material.adhesion > 0:

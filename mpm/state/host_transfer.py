@@ -128,6 +128,7 @@ def _write(
             for k in ti.static(range(N_PARTICLE)):
                 row[k] = ti.cast(particles[c, p, k], float)
         s.x[c, p] = ti.Vector([row[POSITION], row[POSITION + 1], row[POSITION + 2]])
+        s.face_rise[c, p] = ti.Vector([0.0, 0.0, 1.0])
         s.board_gap[c, p], s.tool_gap[c, p], s.volume_ratio[c, p] = row[BOARD_GAP], row[TOOL_GAP], row[VOLUME_RATIO]
         s.surface_volume[c, p] = ti.Vector([row[SURFACE_VOLUME], row[SURFACE_VOLUME + 1]])
         s.adhering[c, p] = ti.cast(row[ADHERING], ti.i32)

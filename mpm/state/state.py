@@ -99,6 +99,8 @@ class State:
             [1/s]; the fourth entry upwards is the kinetic energy per mass that this impulse gave [J/kg],
             (cut, particle, 2).
         stick: Stretch of the friction's spring on board and tool [m], (cut, 2, particle).
+        face_rise: Way along the face of a particle beside the cut plane from its lower end to its upper, in the scene's
+            axes, over the spacing of the particles [-], (cut, particle).
         adhering: 1 where a particle sticks to the blade, 0 where it may, -1 where not, (cut, particle).
         visibility: What :func:`mpm.kernels.crack.visible_columns` found in the last step, with ``IN_CONTACT`` where
             ``contact_moment`` is of this step; elsewhere it means nothing, (cut, particle).
@@ -220,6 +222,7 @@ class State:
         self.contact_moment = vec4.field(shape=(batch, room, 2))
         self.kappa, self.driving_strain = (ti.field(real, (batch, worn)) for _ in range(2))
         self.stick = vec3.field(shape=(batch, 2, room))
+        self.face_rise = vec3.field(shape=(batch, room))
         self.adhering, self.visibility = (ti.field(ti.i32, (batch, room)) for _ in range(2))
         self.prony_stress = mat3.field(shape=(batch, branches, aged))
         self.prony_before = mat3.field(shape=(batch, aged))

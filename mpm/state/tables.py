@@ -14,8 +14,8 @@ YAW_COS, YAW_SIN, ADHESION, ADHESION_GAP = range(23, 27)
 ARM_K, ARM_C, ARM_MASS, ARM_LIMIT = range(27, 31)
 DX, INV_DX, ORIGIN_X, ORIGIN_Y, ORIGIN_Z, FIRST_STATION = range(31, 37)
 SPACING, TIE_OPENING, CONTACT, LAYERED = range(37, 41)
-FACE_HEIGHT, EDGE_BAND, LEAST_GAP = range(41, 44)
-N_PARAMETERS = 44
+EDGE_BAND, LEAST_GAP = range(41, 43)
+N_PARAMETERS = 43
 
 # Rows of the table of sizes: particles, blocks of them, nodes along x, y, z, slices along the edge, the node plane
 # along y that is nearest to y = 0, the first and last + 1 node plane along y whose nodes have a second field, how far

@@ -45,7 +45,6 @@ HELP = "simulate one cut"
 DESCRIPTION = "Simulate one cut and write force.csv and summary.json."
 NUMERICAL = (
     "contact_stiffness",
-    "face_height",
     "edge_band",
     "least_gap",
     "safety",

@@ -157,7 +157,7 @@ def test_errors_of_cuts_say_what_to_do():
     with pytest.raises(EquilibriumError, match="runs through"):
         crack_length(BEAM, THICK, 0.02, 1e-3, Grid(2.5e-3))
     with pytest.raises(CutCaseError, match="up to half the thickness"):
-        Blade(math.radians(11), 1e-3)
+        Blade(math.radians(11), 1e-3, rounding=1e-3)
     with pytest.raises(CutCaseError, match="0 to 180"):
         Blade(0.0, 2e-3)
     with pytest.raises(CutCaseError, match="above 0"):

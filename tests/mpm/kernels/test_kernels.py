@@ -312,7 +312,7 @@ def most_friction(k: ti.template()) -> ti.f64:
     for p in range(k.size[0, kn.COUNT]):
         if k.surface_volume[0, p][1] > 0:
             stiffness = k.par[0, kn.CONTACT] * k.par[0, kn.MASS] * k.volume_ratio[0, p]
-            total += stiffness * friction_limit(k, 0, p, 1e9)
+            total += stiffness * friction_limit(k, 0, p, 1e9, 1e9)
     return total
 
 

@@ -109,17 +109,53 @@ def test_bspline_is_the_quadratic_b_spline(evaluate, r):
     assert evaluate("spline", r)[0] == pytest.approx(float(twins.bspline(r)), abs=1e-14)
 
 
-def test_kink_is_averaged_by_a_hat():
-    """The mean of a kink over a hat of half width 1, by quadrature; beyond it the kink itself."""
-    out, inp = ti.field(ti.f64, 1), ti.field(ti.f64, 1)
+HALF = ANGLE / 2
+ARC_TO_TANGENT = 0.5 * SPINE * np.cos(HALF) ** 2 / np.sin(HALF)  # height above the edge where the shoulder's arc begins
+
+
+@pytest.mark.parametrize(
+    ("y", "above", "distance", "normal"),
+    [
+        (2e-3, 3e-3, 2e-3 * np.cos(HALF) - 3e-3 * np.sin(HALF), (np.cos(HALF), -np.sin(HALF))),  # the wedge
+        (1.5e-3, 30e-3, 0.5e-3, (1.0, 0.0)),  # the parallel faces
+        (0.0, 41.5e-3, 0.5e-3, (0.0, 1.0)),  # above the back, which is half round
+        (1e-3, 41e-3, np.sqrt(2) * 1e-3 - 1e-3, (np.sqrt(0.5), np.sqrt(0.5))),
+        (0.5e-3, 40e-3, -0.5e-3, (1.0, 0.0)),  # where the back begins it is as thick as the spine
+    ],
+)
+def test_rounded_blade(rounded, y, above, distance, normal):
+    """A blade 2 mm thick and 40 mm high: the wedge, its parallel faces, and a back that is half round."""
+    d, n = rounded(y, above)
+    assert d == pytest.approx(distance, abs=1e-12)
+    np.testing.assert_allclose(n, normal, atol=1e-12)
+
+
+def test_the_shoulder_is_an_arc_that_touches_both_faces(rounded):
+    """Distance and normal go over from the wedge to the arc and on to the parallel face without a step."""
+    middle = 0.5 * SPINE / np.sin(HALF)
+    for height in (ARC_TO_TANGENT, middle):
+        below, above = rounded(1e-3, height - 1e-9), rounded(1e-3, height + 1e-9)
+        assert below[0] == pytest.approx(above[0], abs=1e-8)
+        np.testing.assert_allclose(below[1], above[1], atol=1e-5)
+    between = 0.5 * (ARC_TO_TANGENT + middle)
+    d, n = rounded(1e-3, between)
+    assert d == pytest.approx(np.hypot(1e-3, between - middle) - 0.5 * SPINE, abs=1e-12)
+    assert np.hypot(*n) == pytest.approx(1.0)
+
+
+@pytest.fixture(scope="module")
+def rounded():
+    """Distance and normal (across, up) of a rounded blade 40 mm high, or as high as its shoulder lies."""
+    out, inp = ti.field(ti.f64, 3), ti.field(ti.f64, 2)
 
     @ti.kernel
     def run():
-        out[0] = signed_distance.kink(inp[0])
+        d, n = signed_distance.rounded_blade_distance(inp[0], inp[1], SPINE, ti.cos(HALF), ti.sin(HALF), 0.0, 40e-3)
+        out[0], out[1], out[2] = d, n[1], n[2]
 
-    x = np.linspace(-1.0, 1.0, 20001)
-    for q in (-1.5, -0.7, 0.0, 0.4, 1.0, 2.5):
-        inp[0] = q
+    def call(y: float, above: float):
+        inp[0], inp[1] = y, above
         run()
-        mean = np.trapezoid(np.maximum(0.0, q - x) * (1 - np.abs(x)), x)
-        assert out[0] == pytest.approx(mean, abs=1e-8)
+        return out[0], (out[1], out[2])
+
+    return call
