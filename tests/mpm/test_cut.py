@@ -253,6 +253,16 @@ def test_a_weaker_food_rubs_less():
     assert abs(rubbed.budget["unbooked"]) < 0.05 * rubbed.work
 
 
+def test_the_limit_of_friction_is_the_foods_not_the_contacts():
+    """Where friction is at its limit a contact of twice the stiffness rubs as much, to 1 %.
+
+    A limit on the force of each particle binds the more often the stiffer the contact is: 5 % less work.
+    """
+    weak = replace(PRISM, knife=WEDGE).with_material(mu=0.7, R=50.0, R_initiation=50.0, yield_stress=25e3)
+    stiff = replace(weak, numerics=replace(weak.numerics, contact_stiffness=4.0))
+    assert run(stiff).work == pytest.approx(run(weak).work, rel=0.01)
+
+
 def test_work_is_never_below_resistance_times_area(prism):
     """The edge's work is at least R times the area it has swept, less the slip it needs to develop (one slip
     length)."""
