@@ -35,7 +35,7 @@ from calib.posterior.estimates import summarised
 from calib.problem.parameters import STRESS_LIKE, property_of
 from calib.problem.request import Request
 from calib.problem.setup import Setup
-from calib.simulation.evaluation import weakened_ties
+from calib.simulation.evaluation import doubts_of_the_crack
 from calib.trace.conditioning import Conditioned
 from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
@@ -76,7 +76,7 @@ def summarise(done: Calibrated, folder: Path, began: float) -> CalibrationResult
     stopped = fit.status == "interrupted"
     label, source, kind = curve.trace.label, curve.stroke_source, curve.baseline_kind
     scene = setup.scene(fit.best.evaluation.parameters)
-    assumed = [*setup.assumed, *([weakened_ties(scene)] if scene.weakened else [])]
+    assumed = [*setup.assumed, *doubts_of_the_crack(scene)]
     said = [*limits(label, source, kind, verdicts, fitted, assumed, record.fracture), *_no_better(done)]
     nulls = {name: NullRating.of(model.metrics) for name, model in done.nulls.items()}
     return CalibrationResult(

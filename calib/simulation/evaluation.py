@@ -33,14 +33,31 @@ def pressed_away(parted: float) -> str:
     )
 
 
-def weakened_ties(scene: Scene) -> str:
-    """What is said where the grid does not resolve the food's tensile strength."""
+def doubts_of_the_crack(scene: Scene) -> list[str]:
+    """What is said where the grid does not resolve the food's crack: a sentence each.
+
+    Args:
+        scene: The cut.
+
+    Returns:
+        Nothing where it does; that its tensile strength was lowered, or that it flows at the crack's tip
+        (docs/theory.md, "Constants of the method").
+    """
     material, numerics = scene.food.material, scene.numerics
-    used = material.tie_strength(numerics.dx / numerics.ppc)
-    return (
-        f"the tensile strength of {material.cohesion / 1e3:.3g} kPa is more than cells of {numerics.dx * 1e3:.3g} mm "
-        f"resolve; {used / 1e3:.3g} kPa was used, R is the same; a smaller cell (--dx) resolves more"
-    )
+    used, cell = material.tie_strength(numerics.dx / numerics.ppc), f"{numerics.dx * 1e3:.3g} mm"
+    out = []
+    if scene.weakened:
+        out.append(
+            f"the tensile strength of {material.cohesion / 1e3:.3g} kPa is more than cells of {cell} resolve; "
+            f"{used / 1e3:.3g} kPa was used, R is the same; a smaller cell (--dx) resolves more"
+        )
+    if scene.flows_at_its_crack:
+        out.append(
+            f"the food parts at {used / 1e3:.3g} kPa and yields at {material.yield_stress / 1e3:.3g} kPa, so it flows "
+            f"at the tip of its crack, which cells of {cell} hardly resolve: finer ones need up to a quarter more work; "
+            "give it a tensile_strength below its yield_stress, or look at smaller cells (--dx)"
+        )
+    return out
 
 
 @dataclass(frozen=True, eq=False)

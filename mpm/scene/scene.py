@@ -288,6 +288,12 @@ class Scene:
         m = self.food.material
         return self.tied and m.tie_strength(self.numerics.dx / self.numerics.ppc) < m.cohesion
 
+    @property
+    def flows_at_its_crack(self) -> bool:
+        """Whether the ties are stronger than the food's yield stress, so that it flows at the tip of its crack."""
+        m = self.food.material
+        return self.tied and m.tie_strength(self.numerics.dx / self.numerics.ppc) > m.yield_stress
+
     def process_zone(self, material: Material) -> float:
         """Width over which the edge's line force is spread [m].
 

@@ -119,13 +119,15 @@ def test_simulate_judges_itself(tmp_path: Path, capsys):
 
 
 def test_simulate_says_that_the_grid_weakens_a_strong_food(tmp_path: Path, capsys):
-    """Where cells do not resolve the tensile strength, the one that was used stands in the warnings."""
+    """Where cells do not resolve the tensile strength, the one that was used stands in the warnings; so it does where
+    the food yields before it parts."""
     argv = ["simulate", "--food", "potato", "--knife", "edc", "--stroke", "0.002", "--threads", "1", "--dx", "4mm"]
     for strength, said in (("2e5", False), ("5e6", True)):
         main([*argv, "--set", f"tensile_strength={strength}", "--out", str(tmp_path / strength)])
         capsys.readouterr()
         warnings = json.loads((tmp_path / strength / "summary.json").read_text())["warnings"]
         assert any("cells of 4 mm resolve" in text for text in warnings) is said
+        assert any("flows at the tip of its crack" in text for text in warnings) is said
 
 
 def test_simulate_has_an_option_for_each_constant(tmp_path: Path, capsys):

@@ -17,7 +17,7 @@ from calib.io.schema import tag
 from calib.material.food import FoodSpec
 from calib.material.knife import load_knife
 from calib.material.scene import blade_warnings, cut_scene, specimen
-from calib.simulation.evaluation import FULLY_PARTED, pressed_away, weakened_ties
+from calib.simulation.evaluation import FULLY_PARTED, doubts_of_the_crack, pressed_away
 from calib.table.units import metres
 from calib.validation.method_constants import CONSTANTS
 from cutcal.options import (
@@ -159,9 +159,9 @@ def run(args: argparse.Namespace) -> int:
         if record.parted < FULLY_PARTED:
             assumed.append(pressed_away(record.parted))
             note(assumed[-1])
-        if scene.weakened:
-            assumed.append(weakened_ties(scene))
-            note(assumed[-1])
+        for text in doubts_of_the_crack(scene):
+            assumed.append(text)
+            note(text)
         doubted = doubts(record.budget, record.ke_over_ie) if record.status == "done" else []
         for text in doubted:
             say(f"not passed: {text}")
