@@ -54,7 +54,7 @@ def doubts_of_the_crack(scene: Scene) -> list[str]:
     if scene.flows_at_its_crack:
         out.append(
             f"the food parts at {used / 1e3:.3g} kPa and yields at {material.yield_stress / 1e3:.3g} kPa, so it flows "
-            f"at the tip of its crack, which cells of {cell} hardly resolve: finer ones need up to a quarter more work; "
+            f"at the tip of its crack, which cells of {cell} hardly resolve: finer ones need up to a quarter more; "
             "give it a tensile_strength below its yield_stress, or look at smaller cells (--dx)"
         )
     return out

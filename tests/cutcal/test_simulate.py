@@ -122,6 +122,7 @@ def test_simulate_says_that_the_grid_weakens_a_strong_food(tmp_path: Path, capsy
     """Where cells do not resolve the tensile strength, the one that was used stands in the warnings; so it does where
     the food yields before it parts."""
     argv = ["simulate", "--food", "potato", "--knife", "edc", "--stroke", "0.002", "--threads", "1", "--dx", "4mm"]
+    argv += ["--set", "yield_stress=3e5"]
     for strength, said in (("2e5", False), ("5e6", True)):
         main([*argv, "--set", f"tensile_strength={strength}", "--out", str(tmp_path / strength)])
         capsys.readouterr()
