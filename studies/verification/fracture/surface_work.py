@@ -17,7 +17,7 @@ ANGLES = (2.5, 11.0, 20.0, 30.0)
 MODULI = (0.3e6, 1e6, 10e6)
 CELLS = (3e-3, 2e-3, 1.5e-3)
 LENGTH = 0.036  # of the block, across the blade [m]
-HEIGHTS = (0.036, 0.072)
+HEIGHTS = (0.024, 0.048)
 """Heights of two blocks [m]. What the higher one takes more is free of the beginning, where a dent is cut for the work
 of the start, and of the end, where the last of the food is squeezed on the board."""
 SURFACE_OFF, UNBOOKED = 0.03, 0.05  # largest errors that pass
@@ -124,7 +124,7 @@ def _case(degrees: float) -> VerificationCase:
         else:
             yield from sweep(options, degrees, EVERY, CELLS)
 
-    return VerificationCase(f"work of new surface: {degrees:g} degrees", run, fast=degrees in ANGLES[::2], cost=400)
+    return VerificationCase(f"work of new surface: {degrees:g} degrees", run, fast=degrees in ANGLES[::2], cost=500)
 
 
 CASES = [_case(degrees) for degrees in ANGLES]
