@@ -3,6 +3,7 @@
 import taichi as ti
 
 from mpm.kernels.constitutive import full
+from mpm.kernels.crack import particle_half
 from mpm.kernels.signed_distance import adhesive_traction, blade_distance, rounded_blade_distance, stick_slip
 from mpm.kernels.tool import blade_velocity, book_impulse, book_knife_impulse, edge_height, under_blade
 from mpm.state.accessors import to_grid_axes, to_scene_axes, velocity_gradient
@@ -179,7 +180,10 @@ def board_contact(s: ti.template(), cut, p, m, dt, u, at):
 
 @ti.func
 def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
-    """Contact of one severed particle with the blade's faces; returns the change of velocity [m/s] and its moments.
+    """Contact of one particle with the blade's faces; returns the change of velocity [m/s] and its moments.
+
+    What lies above the edge of a particle's face touches the blade, also before the edge has come to its centre: a face
+    that met the blade all at once would meet it with a depth, and energy would come from nothing.
 
     The two moments are those of the impulses with the lever's height and with its part across the blade [m^2/s].
 
@@ -196,8 +200,8 @@ def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
     touching = False
     dv, lift, wide = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
     tall = s.par[cut, BLADE_HEIGHT] + 0.5 * s.par[cut, SPINE] + s.par[cut, SPACING]
-    if s.side[cut, p] != 0 and 0 < above < tall and under_blade(s, cut, at[0]):
-        sign = 1.0 if s.side[cut, p] == 2 else -1.0
+    if -s.par[cut, SPACING] < above < tall and under_blade(s, cut, at[0]):
+        sign = 1.0 if particle_half(s, cut, p) == 1 else -1.0
         gap, high = s.tool_gap[cut, p], s.par[cut, SPACING] * s.face_rise[cut, p]
         press, normal, turned, middle = press_face(s, cut, p, sign, high, at)
         if press > 0:
