@@ -89,8 +89,9 @@ def surface_contact(s: ti.template(), cut, p, dt, u, at):
     else:
         if ti.abs(there[1]) < 2 * s.par[cut, DX]:
             s.tool_gap[cut, p] = ti.math.clamp(s.tool_gap[cut, p] * (1 + dt * across[1]), least, most)
-            rise = s.face_rise[cut, p]  # turns and stretches with the food; its part along the blade stays small
-            s.face_rise[cut, p] = rise + (dt * rise[2]) * up + (dt * rise[1]) * across
+            rise = s.face_rise[cut, p]  # turns with the food; its part along the blade stays small
+            rise += (dt * rise[2]) * up + (dt * rise[1]) * across
+            s.face_rise[cut, p] = rise * ti.min(1.0, 1 / rise.norm())  # never taller than at rest
         push, lift, wide = blade_contact(s, cut, p, m, dt, v + kick, up, across, there)
         high += lift
     scale = 4 * s.par[cut, INV_DX] * s.par[cut, INV_DX]
@@ -246,9 +247,9 @@ def press_face(s: ti.template(), cut, p, sign, high, at):
 
     A particle meets the blade with a face. The face lies as far from its centre as the centre was from the cut plane
     when the food was whole, so that the blade displaces the food by its true half thickness. It is as high as the
-    particle is in the food, and turns and stretches with it. Each of its :data:`FACE_POINTS` points feels the blade's
-    profile, so a face passes a shoulder point by point. With one point a whole row of particles would let go at once of
-    all that the wedge had given it.
+    particle is in the food, but never higher than at rest, and turns with it. Each of its :data:`FACE_POINTS` points
+    feels the blade's profile, so a face passes a shoulder point by point. With one point a whole row of particles would
+    let go at once of all that the wedge had given it.
 
     The force of a point is the gradient of its opening, in the particle's place and in its stretch: what passes the
     shoulder gives back what it was pressed with.

@@ -75,7 +75,6 @@ def test_numerical_choices_are_checked(finished):
         "half the slip of the edge",
         "twice the slip of the edge",
         "twice the contact stiffness",
-        "half the height of a particle's face",
         "half the band of the edge",
         "twice the band of the edge",
         "half the least gap to a surface",
