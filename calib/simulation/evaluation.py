@@ -43,8 +43,8 @@ def doubts_of_the_crack(scene: Scene) -> list[str]:
         Nothing where it does; that its tensile strength was lowered, or that it flows at the crack's tip
         (docs/theory.md, "Constants of the method").
     """
-    material, numerics = scene.food.material, scene.numerics
-    used, cell = material.tie_strength(numerics.dx / numerics.ppc), f"{numerics.dx * 1e3:.3g} mm"
+    material = scene.food.material
+    used, cell = scene.tie_strength, f"{scene.numerics.dx * 1e3:.3g} mm"
     out = []
     if scene.weakened:
         out.append(

@@ -283,16 +283,19 @@ class Scene:
         return self.cuts and self.numerics.contact == "cohesive"
 
     @property
+    def tie_strength(self) -> float:
+        """Strength of the ties on this grid [Pa] (Material.tie_strength)."""
+        return self.food.material.tie_strength(self.numerics.dx / self.numerics.ppc)
+
+    @property
     def weakened(self) -> bool:
         """Whether the ties are weaker than the food, as the grid resolves no more (Material.tie_strength)."""
-        m = self.food.material
-        return self.tied and m.tie_strength(self.numerics.dx / self.numerics.ppc) < m.cohesion
+        return self.tied and self.tie_strength < self.food.material.cohesion
 
     @property
     def flows_at_its_crack(self) -> bool:
         """Whether the ties are stronger than the food's yield stress, so that it flows at the tip of its crack."""
-        m = self.food.material
-        return self.tied and m.tie_strength(self.numerics.dx / self.numerics.ppc) > m.yield_stress
+        return self.tied and self.tie_strength > self.food.material.yield_stress
 
     def process_zone(self, material: Material) -> float:
         """Width over which the edge's line force is spread [m].
