@@ -4,6 +4,7 @@ import taichi as ti
 
 from mpm.kernels.constitutive import damage_of, deviatoric_energy, left_cauchy_green, left_stretch, unit
 from mpm.kernels.crack import IN_CONTACT
+from mpm.kernels.membrane import membrane_energy
 from mpm.state.accessors import deformation_gradient, velocity_gradient
 from mpm.state.loops import block_range, locate, repetitions
 from mpm.state.state import BEYOND_GRID, CUTS, PARTS
@@ -134,4 +135,6 @@ def momentum_and_energy(s: ti.template(), cut, p):
     given = s.contact_moment[cut, p, 0][3] if s.visibility[cut, p] & IN_CONTACT else 0.0
     kinetic = m * (0.5 * u.norm_sqr() - given + 0.125 * s.par[cut, DX] * s.par[cut, DX] * spin)
     energy = s.par[cut, VOLUME] * s.volume_ratio[cut, p] * (keep * dev + (keep if j > 1 else 1.0) * vol)
+    if ti.static(s.membrane):
+        energy += s.par[cut, VOLUME] * s.volume_ratio[cut, p] * membrane_energy(s, cut, p)
     return ti.Vector([m * u[0], m * u[1], m * u[2], kinetic, energy])

@@ -10,6 +10,7 @@ from mpm.scene.errors import SceneError, check_number
 MAX_POISSON = 0.49  # above it a single-field quadratic MPM locks volumetrically and dt falls as sqrt(1 - 2 nu)
 COHESIVE_ZONE = 10e-3  # of the process zone of a food whose tensile strength is not known, at least [m]
 PARTS_BEFORE_IT_FLOWS = 0.8  # strength of such a food over its yield stress: that of apple (materials.yaml, remark 5)
+SKIN_POISSON = 0.3  # of a skin in its plane [-]
 LEAST_OPENING = 1e-9  # half opening at which a food without resistance has parted [m]; the ties divide by it
 
 
@@ -26,6 +27,8 @@ class Material:
         R_initiation: Force per width at which a cut starts in bare flesh [N/m]; at least R.
         R_skin: Force per width at which the edge goes through the skin [N/m].
         skin_thickness: Thickness of the skin [m]; 0 = no skin.
+        skin_stiffness: Young's modulus of the skin times its thickness [N/m]: it bears tension in its plane, all round
+            the food; 0 = it bears none.
         R_rind: Cutting resistance of the rind [J/m^2], the layer all round the food; needed with ``rind_thickness``.
         rind_thickness: Thickness of the rind [m]; 0 = no rind. It is there when the edge comes out below, too, while
             the skin is what it takes to start a cut.
@@ -57,6 +60,7 @@ class Material:
     R_initiation: float | None = None
     R_skin: float | None = None
     skin_thickness: float = 0.0
+    skin_stiffness: float = 0.0
     R_rind: float | None = None
     rind_thickness: float = 0.0
     R_core: float | None = None
@@ -85,6 +89,7 @@ class Material:
         for name, unit in (
             ("R", "J/m^2"),
             ("skin_thickness", "m"),
+            ("skin_stiffness", "N/m"),
             ("rind_thickness", "m"),
             ("mu", ""),
             ("loss_factor", ""),

@@ -9,7 +9,7 @@ import numpy as np
 from mpm.discretisation.grid import Grid
 from mpm.discretisation.particles import Seeds
 from mpm.scene import BAND_CELLS, Press, Scene
-from mpm.scene.material import Material
+from mpm.scene.material import SKIN_POISSON, Material
 from mpm.scene.shapes import section_area
 from mpm.setup.stable_step import contact_stiffness, retardation_time
 from mpm.state import tables as row
@@ -65,6 +65,7 @@ def _put_material(table: np.ndarray, scene: Scene, material: Material, seeds: Se
         table[row.EDGE_BAND] = scene.numerics.edge_band
         table[row.LAYERED] = material.layered
     table[row.SPACING] = seeds.spacing
+    table[row.SKIN_STIFFNESS], table[row.SKIN_POISSON] = material.skin_stiffness, SKIN_POISSON
     table[row.LEAST_GAP] = scene.numerics.least_gap * scene.numerics.dx
     table[row.ADHESION], table[row.ADHESION_GAP] = material.adhesion / (material.rho * seeds.spacing), 1.0
     if material.adhesion > 0:

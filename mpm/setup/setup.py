@@ -15,6 +15,7 @@ from mpm.scene.layers import layer_ties
 from mpm.scene.material import Material
 from mpm.scene.shapes import skin_path, slice_powers, surface
 from mpm.scene.shapes import slices as outline
+from mpm.scene.skin import skin_areas, tangents
 from mpm.setup.parameters import parameters, pose
 from mpm.setup.stable_step import stable_step
 from mpm.state import contents as column
@@ -68,6 +69,7 @@ class Setup:
             branches=len(scene.food.material.prony),
             batch=batch_capacity(batch),
             ties=particle_capacity(len(self.ties())) if scene.tied else 0,
+            membrane=scene.food.material.skin_stiffness > 0,
         )
 
     def ties(self) -> np.ndarray:
@@ -110,6 +112,7 @@ class Setup:
             pose=pose(scene.food.shape.height + self.gap, 0.0, scene.motion.tilt),
             relaxation=self._relaxation(material),
             ties=self._ties(material),
+            skin=self._skin(material),
             half=self.seeds.x[:, 1] >= 0 if scene.tied else np.zeros(0),
         )
 
@@ -151,6 +154,19 @@ class Setup:
         out[:, column.SURFACE_VOLUME] = seeds.areas * seeds.board_gap * seeds.bottom
         out[:, column.SURFACE_VOLUME + 1] = seeds.areas * gap * outer
         out[:, column.ADHERING] = np.where(seeds.beside & (material.adhesion > 0), 0, -1)
+        return out
+
+    def _skin(self, material: Material) -> np.ndarray:
+        """The table of skin (n, N_SKIN)."""
+        if not material.skin_stiffness > 0:
+            return np.zeros((0, column.N_SKIN))
+        seeds, out = self.seeds, np.zeros((len(self.seeds.x), column.N_SKIN))
+        area = skin_areas(self.scene.food.shape, seeds.spacing, seeds.x, self.scene.mirrors)
+        size = np.linalg.norm(area, axis=1)
+        some = size > 0
+        one, two = (self.to_grid_axes(t) for t in tangents(area[some] / size[some, None]))
+        out[some, :3], out[some, 3:6] = one, two
+        out[some, 6] = size[some] / (seeds.volume * seeds.volume_ratio[some])
         return out
 
     def _slices(self, material: Material) -> np.ndarray:

@@ -47,7 +47,8 @@ def stable_step(scene: Scene, material: Material, spacing: float) -> float:
     """
     num, edge = scene.numerics, scene.edge
     speed = scene.motion.mach * material.p_wave
-    omega = 2 * (material.stability_speed + speed) / num.dx  # highest frequency of a lone particle
+    sound = math.sqrt(material.stability_speed**2 + material.skin_stiffness / (spacing * material.rho))
+    omega = 2 * (sound + speed) / num.dx  # highest frequency of a lone particle
     zeta = retardation_time(scene, material) * omega / 2
     dt = num.safety * 2 / omega * (math.sqrt(1 + zeta * zeta) - zeta)
     if num.contact == "cohesive":

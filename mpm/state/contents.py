@@ -15,6 +15,7 @@ N_SLICE = 9
 # Columns of the table of ties: left and right particle, toughness, part of the section over a square of the spacing.
 LEFT, RIGHT, TOUGHNESS, SHARE = range(4)
 N_TIE = 4
+N_SKIN = 7  # columns of the table of skin: two vectors in it, and its area over the particle's volume
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +38,8 @@ class Contents:
         relaxation: Share of each Prony branch [-], and time step over its time [-], shape (2, branches).
         ties: Table of the ties across the cut plane, shape (k, N_TIE): left and right particle, -1 for a mirror image,
             toughness [J/m^2], and part of the section over a square of the spacing [-]; none without a cohesive crack.
+        skin: Table of the particles' skin, shape (n, N_SKIN): two unit vectors in it in the grid's axes [-], and its area
+            over their volume [1/m]; empty where it bears nothing.
         half: Half of the food that each particle belongs to, 0 left, 1 right, shape (n,); empty without ties.
     """
 
@@ -49,4 +52,5 @@ class Contents:
     pose: np.ndarray
     relaxation: np.ndarray
     ties: np.ndarray
+    skin: np.ndarray
     half: np.ndarray

@@ -19,6 +19,7 @@ from mpm.state.contents import (
     FLOOR_POWER,
     LEFT,
     N_PARTICLE,
+    N_SKIN,
     N_SLICE,
     N_TIE,
     POSITION,
@@ -83,6 +84,8 @@ def begin(state: State, cuts: Sequence[Contents]) -> None:
             _table(state, (max(sizes[:, TIE_COUNT].max(), 1), N_TIE), [cut.ties for cut in cuts]),
             _table(state, (state.n.max(),), [cut.half for cut in cuts]),
         )
+    if state.membrane:
+        _write_skin(state, _table(state, (state.n.max(), N_SKIN), [cut.skin for cut in cuts]))
 
 
 def _sizes(state: State, cut: Contents) -> list[int]:
@@ -197,6 +200,18 @@ def _write_ties(s: ti.template(), ties: TABLES, half: ROWS):
         s.part_left[c, i], s.most_passed[c, i] = 1.0, 0.0
         s.passed_mean[c, i] = ti.Vector([s.top_toughness[c, i], s.top_toughness[c, i]])
         s.start_excess[c, i] = 0.0
+
+
+@ti.kernel
+def _write_skin(s: ti.template(), skin: TABLES):
+    """Write the skin of the particles, unstretched."""
+    for c, p in s.skin_share:
+        row = ti.Vector.zero(float, N_SKIN)
+        if p < s.size[c, COUNT]:
+            for k in ti.static(range(N_SKIN)):
+                row[k] = ti.cast(skin[c, p, k], float)
+        s.skin[c, p, 0], s.skin[c, p, 1] = ti.Vector([row[0], row[1], row[2]]), ti.Vector([row[3], row[4], row[5]])
+        s.skin_share[c, p] = row[6]
 
 
 def particles(state: State, cut: int = 0) -> Particles:

@@ -50,6 +50,7 @@ class Configuration:
         branches: Number of Prony branches.
         batch: Most cuts side by side; more than one on a GPU or with one thread a cut.
         ties: Most ties across the cut plane, 0 without a cohesive crack.
+        membrane: Skin that bears tension.
     """
 
     room: int
@@ -64,6 +65,7 @@ class Configuration:
     branches: int = 0
     batch: int = 1
     ties: int = 0
+    membrane: bool = False
 
 
 @ti.data_oriented
@@ -110,6 +112,8 @@ class State:
         prony_before: Deviator of the last step [Pa], (cut, particle).
         prony_share: Share of a branch [-], (cut, branch).
         prony_rate: Time step over its time [-], (cut, branch).
+        skin: Two vectors in the skin of a particle, of unit length and at right angles at first [-], (cut, particle, 2).
+        skin_share: Area of its skin at first over its volume [1/m], 0 inside the food, (cut, particle).
         g: Momentum [N s] and mass [kg] of the nodes, a grid for each thread.
         u: Velocity [m/s] and mass [kg] of the nodes.
         planes: Sums over the planes of nodes of the particle that a thread moves, (cut, thread, 16).
@@ -168,7 +172,7 @@ class State:
         self.atomic = own.threads == 0
         self.serial = not self.atomic  # short loops run where the kernel was launched
         self.parts = 1 if self.threads == 1 else self.threads * CPU_BLOCK
-        self.branches, self.second_fields = own.branches, not own.nodal
+        self.branches, self.second_fields, self.membrane = own.branches, not own.nodal, own.membrane
         self.owner: Any = None
         self.n = np.zeros(own.batch, np.int32)
         real = ti.lang.impl.get_runtime().default_fp
@@ -227,6 +231,8 @@ class State:
         self.prony_stress = mat3.field(shape=(batch, branches, aged))
         self.prony_before = mat3.field(shape=(batch, aged))
         self.prony_share, self.prony_rate = (ti.field(real, (batch, branches)) for _ in range(2))
+        skinned = room if self.membrane else 1
+        self.skin, self.skin_share = vec3.field(shape=(batch, skinned, 2)), ti.field(real, (batch, skinned))
 
     def _add_grid(self, real: Any, nodes: tuple[int, ...]) -> None:
         """Fields of the grid, one for each thread to add to."""
