@@ -7,13 +7,14 @@ from mpm.kernels.crack import IN_CONTACT
 from mpm.kernels.membrane import membrane_energy
 from mpm.state.accessors import deformation_gradient, velocity_gradient
 from mpm.state.loops import block_range, locate, repetitions
-from mpm.state.state import BEYOND_GRID, CUTS, PARTS
+from mpm.state.state import BEYOND_GRID, CUTS, PARTS, SKIN
 from mpm.state.stencil import base_node
 from mpm.state.tables import (
     BOOKED_IMPULSE,
     COUNT,
     DX,
     EDGE,
+    ELASTIC,
     EPS0,
     EPSF,
     FACE,
@@ -81,6 +82,12 @@ def report(s: ti.template(), cut, row, out: ti.template()):
                 total += momentum_and_energy(s, c, p)
             for r in ti.static(range(N_PARTICLE_SUMS)):
                 s.particle_sums[c, part % s.copies, r] += total[r]
+    if ti.static(s.membrane):
+        ti.loop_config(serialize=s.serial)
+        for q in range(repetitions(s, cut, SKIN)):
+            c, n, there = locate(s, cut, q, SKIN)
+            if there:
+                s.particle_sums[c, n % s.copies, ELASTIC] += membrane_energy(s, c, n)
     for q in range(repetitions(s, cut, CUTS)):
         c, _, _ = locate(s, cut, q, CUTS)
         for r in range(N_PARTICLE_SUMS):
@@ -135,6 +142,4 @@ def momentum_and_energy(s: ti.template(), cut, p):
     given = s.contact_moment[cut, p, 0][3] if s.visibility[cut, p] & IN_CONTACT else 0.0
     kinetic = m * (0.5 * u.norm_sqr() - given + 0.125 * s.par[cut, DX] * s.par[cut, DX] * spin)
     energy = s.par[cut, VOLUME] * s.volume_ratio[cut, p] * (keep * dev + (keep if j > 1 else 1.0) * vol)
-    if ti.static(s.membrane):
-        energy += s.par[cut, VOLUME] * s.volume_ratio[cut, p] * membrane_energy(s, cut, p)
     return ti.Vector([m * u[0], m * u[1], m * u[2], kinetic, energy])

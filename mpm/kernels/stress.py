@@ -31,7 +31,6 @@ from mpm.kernels.constitutive import (
     upper,
 )
 from mpm.kernels.damage import update_damage
-from mpm.kernels.membrane import membrane_stress
 from mpm.state.accessors import deformation_gradient, velocity_gradient
 from mpm.state.tables import (
     EPS0,
@@ -76,11 +75,6 @@ def constitutive_update(
         for r in ti.static(range(6)):
             tau[r] = s.tau[cut, block, r][lane]
         loss[2], loss[0] = s.tau[cut, block, VISCOUS_LOSS][lane], s.tau[cut, block, PLASTIC_LOSS][lane]
-    if ti.static(s.membrane):
-        if s.skin_share[cut, p] > 0:
-            tau += membrane_stress(s, cut, p, dt)
-            for r in ti.static(range(6)):
-                s.tau[cut, block, r][lane] = tau[r]
 
 
 @ti.func

@@ -86,9 +86,13 @@ def pull_tie(s: ti.template(), cut, n, dt):
     p, other = s.tie_ends[cut, n][0], s.tie_ends[cut, n][1]
     at = to_scene_axes(s, cut, s.x[cut, p])
     own = plane_traction(s, cut, p)
+    skin = ti.Vector.zero(float, 3)
+    if ti.static(s.membrane):
+        skin = s.skin_pull[cut, n]
+        s.skin_pull[cut, n] = ti.Vector.zero(float, 3)
     jump = ti.Vector([0.0, -at[1] - s.tool_gap[cut, p], 0.0])  # half of it
     if ti.static(s.mirror_y):
-        own[0], own[2] = 0.0, 0.0
+        own[0], own[2], skin[0], skin[2] = 0.0, 0.0, 0.0, 0.0
     else:
         there = to_scene_axes(s, cut, s.x[cut, other])
         own = 0.5 * (own + plane_traction(s, cut, other))
@@ -112,7 +116,7 @@ def pull_tie(s: ti.template(), cut, n, dt):
     left = 1.0 - s.cut_part[cut, n]
     m = s.par[cut, MASS] * s.volume_ratio[cut, p]
     stiff = s.par[cut, CONTACT] * m
-    force = own + stiff * jump
+    force = own + skin + stiff * jump
     pressed = ti.min(force[1], 0.0)
     if left > 0 or (pressed < 0 and not between):
         opening = ti.sqrt(ti.max(jump[1], 0.0) ** 2 + jump[0] ** 2 + jump[2] ** 2)

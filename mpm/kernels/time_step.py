@@ -10,6 +10,7 @@ from mpm.kernels.cutting_edge import apply_edge_law
 from mpm.kernels.damage import clear_damage_box, smooth_driving_strain
 from mpm.kernels.g2p import grid_to_particles
 from mpm.kernels.grid_update import clear_grid, fold_mirror_images, update_grid
+from mpm.kernels.membrane import grid_to_skin, skin_to_grid
 from mpm.kernels.p2g import particles_to_grid
 from mpm.kernels.reductions import find_window, report
 from mpm.kernels.ties import hold_together
@@ -28,6 +29,8 @@ def time_step(s: ti.template(), cut):
         advance_crack_fronts(s, cut)
     clear_grid(s, cut)
     particles_to_grid(s, cut)  # with the constitutive update
+    if ti.static(s.membrane):
+        skin_to_grid(s, cut)
     if ti.static(s.mirror_x):
         fold_mirror_images(s, cut)
     update_grid(s, cut)
@@ -35,6 +38,8 @@ def time_step(s: ti.template(), cut):
         apply_edge_law(s, cut)
     move_tools(s, cut)
     grid_to_particles(s, cut)  # with the contact of the particles
+    if ti.static(s.membrane):
+        grid_to_skin(s, cut)
     if ti.static(s.cuts):
         hold_together(s, cut)
     if ti.static(s.damage):

@@ -10,7 +10,7 @@ from mpm.scene.errors import SceneError, check_number
 MAX_POISSON = 0.49  # above it a single-field quadratic MPM locks volumetrically and dt falls as sqrt(1 - 2 nu)
 COHESIVE_ZONE = 10e-3  # of the process zone of a food whose tensile strength is not known, at least [m]
 PARTS_BEFORE_IT_FLOWS = 0.8  # strength of such a food over its yield stress: that of apple (materials.yaml, remark 5)
-SKIN_POISSON = 0.3  # of a skin in its plane [-]
+SKIN_POISSON = 0.5  # of a skin in its plane [-]: tomato skin has about a half (Int. Agrophys. 26:39, 2012)
 LEAST_OPENING = 1e-9  # half opening at which a food without resistance has parted [m]; the ties divide by it
 
 
@@ -28,7 +28,7 @@ class Material:
         R_skin: Force per width at which the edge goes through the skin [N/m].
         skin_thickness: Thickness of the skin [m]; 0 = no skin.
         skin_stiffness: Young's modulus of the skin times its thickness [N/m]: it bears tension in its plane, all round
-            the food; 0 = it bears none.
+            the food; 0 = it bears none. Across the cut plane the ties of the flesh hold it.
         R_rind: Cutting resistance of the rind [J/m^2], the layer all round the food; needed with ``rind_thickness``.
         rind_thickness: Thickness of the rind [m]; 0 = no rind. It is there when the edge comes out below, too, while
             the skin is what it takes to start a cut.

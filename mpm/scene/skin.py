@@ -1,4 +1,4 @@
-"""Where the skin of a food lies: the area and the direction of its surface that each particle stands for.
+"""Where the skin of a food lies: points on its outline, with the area and the normal that each stands for.
 
 The outline is sampled on a lattice finer than that of the particles. The gradient of its smoothed inside test is the
 surface's area with its normal, whatever the outline is. The skin is all round; the flat face of a half food has none,
@@ -7,29 +7,48 @@ for there it was halved, and the ends of a food with parallel sides have none, f
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.ndimage import gaussian_filter
-from scipy.spatial import cKDTree
+from scipy.special import ndtri
 
 from mpm.scene.shapes import FLAT_DOWN, Shape, inside
 
 SUBSAMPLES = 3  # samples along each side of a particle's cell
 SMOOTHING = 1.0  # standard deviation of the filter [samples]: wide enough for the gradient of a step
 MARGIN = 4  # samples beyond the outline, beyond the reach of the filter
+LEAST_AREA = 1e-6  # of a sample over that of its face, below which there is no surface
+INSET = 1.0  # of the points behind the outline [spacings]: nodes further out have hardly any mass, and would need a short step
+END = 2.0  # of the skin before an end that was cut off [spacings], for the same reason
 CUT_ENDS = ("block", "cylinder", "half_cylinder")  # shapes whose ends are cut from a longer food
 
 
-def skin_areas(shape: Shape, spacing: float, places: np.ndarray, mirrors: tuple[bool, bool]) -> np.ndarray:
-    """Skin that each particle stands for: that which is nearest to it.
+@dataclass(frozen=True, eq=False)
+class SkinPoints:
+    """Points of the skin, each of which stands for a part of it.
+
+    Attributes:
+        x: Places in the uncut food [m], shape (m, 3).
+        areas: Area of each part [m^2], shape (m,).
+        normals: Its outward normal, shape (m, 3).
+    """
+
+    x: np.ndarray
+    areas: np.ndarray
+    normals: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.areas)
+
+
+def skin_points(shape: Shape, spacing: float, mirrors: tuple[bool, bool]) -> SkinPoints:
+    """Points of the skin, one for each cell of a lattice that the outline passes.
 
     Args:
         shape: The outline.
-        spacing: Distance of the particles [m].
-        places: Where they are in the uncut food [m], shape (n, 3).
+        spacing: Of the lattice [m].
         mirrors: Whether there are mirror planes x = 0 and y = 0; only x > 0 and y < 0 are modelled then.
-
-    Returns:
-        Area vectors [m^2], shape (n, 3): their length is the area, their direction that of the outward normal.
     """
     step = spacing / SUBSAMPLES
     near, far = shape.ends
@@ -41,15 +60,29 @@ def skin_areas(shape: Shape, spacing: float, places: np.ndarray, mirrors: tuple[
     points = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
     there = _skinned_inside(shape, points.reshape(-1, 3)).reshape(points.shape[:-1])
     smooth = gaussian_filter(there.astype(float), SMOOTHING)
-    areas = -np.stack(np.gradient(smooth, step), -1) * step**3
-    kept = np.linalg.norm(areas, axis=-1) > 1e-6 * step**2
+    vectors = -np.stack(np.gradient(smooth, step), -1) * step**3
+    kept = np.linalg.norm(vectors, axis=-1) > LEAST_AREA * step**2
     for axis, mirrored, sign in ((0, mirrors[0], 1.0), (1, mirrors[1], -1.0)):
         if mirrored:
             kept &= sign * points[..., axis] > 0
-    ends = (points[..., 1] > near) & (points[..., 1] < far) if shape.kind in CUT_ENDS else True
-    kept &= ends & ((points[..., 2] > 0) if shape.kind in FLAT_DOWN else True)
-    _, owner = cKDTree(places).query(points[kept])
-    return np.stack([np.bincount(owner, axis, len(places)) for axis in areas[kept].T], axis=1)
+    if shape.kind in CUT_ENDS:
+        kept &= (points[..., 1] > near + END * spacing) & (points[..., 1] < far - END * spacing)
+    if shape.kind in FLAT_DOWN:
+        kept &= points[..., 2] > 0
+    normals = vectors[kept] / np.linalg.norm(vectors[kept], axis=-1, keepdims=True)
+    outside = -SMOOTHING * step * ndtri(np.clip(smooth[kept], 1e-9, 1 - 1e-9))  # a filtered step tells the distance
+    return _gathered(points[kept] - outside[:, None] * normals, vectors[kept], spacing)
+
+
+def _gathered(points: np.ndarray, vectors: np.ndarray, spacing: float) -> SkinPoints:
+    """Samples (k, 3) and their area vectors (k, 3) gathered by the cells of a lattice."""
+    _, cell = np.unique(np.floor(points / spacing).astype(int), axis=0, return_inverse=True)
+    cell, size = cell.ravel(), np.linalg.norm(vectors, axis=1)
+    areas = np.bincount(cell, size)
+    x = np.stack([np.bincount(cell, size * along) for along in points.T], axis=1) / areas[:, None]
+    normals = np.stack([np.bincount(cell, along) for along in vectors.T], axis=1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return SkinPoints(x - INSET * spacing * normals, areas, normals)
 
 
 def _skinned_inside(shape: Shape, points: np.ndarray) -> np.ndarray:

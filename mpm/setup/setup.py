@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from mpm.discretisation.capacity import batch_capacity, node_capacity, particle_capacity
 from mpm.discretisation.grid import lay_out
@@ -15,7 +17,7 @@ from mpm.scene.layers import layer_ties
 from mpm.scene.material import Material
 from mpm.scene.shapes import skin_path, slice_powers, surface
 from mpm.scene.shapes import slices as outline
-from mpm.scene.skin import skin_areas, tangents
+from mpm.scene.skin import SkinPoints, skin_points, tangents
 from mpm.setup.parameters import parameters, pose
 from mpm.setup.stable_step import stable_step
 from mpm.state import contents as column
@@ -69,7 +71,7 @@ class Setup:
             branches=len(scene.food.material.prony),
             batch=batch_capacity(batch),
             ties=particle_capacity(len(self.ties())) if scene.tied else 0,
-            membrane=scene.food.material.skin_stiffness > 0,
+            skin=particle_capacity(len(self.skin)) if scene.food.material.skin_stiffness > 0 else 0,
         )
 
     def ties(self) -> np.ndarray:
@@ -120,6 +122,17 @@ class Setup:
         """The table of ties (k, N_TIE)."""
         return np.column_stack([self.ties(), *self._layers(material)])
 
+    def _skin_at_plane(self) -> tuple[SkinPoints, np.ndarray, np.ndarray]:
+        """Points of the skin, the tie that bears the tension of each across the cut plane, -1 for none, and over what
+        length [m]; of two halves each bears half."""
+        skin, ties, h = self.skin, self.ties(), self.seeds.spacing
+        tie = np.full(len(skin), -1)
+        beside = (np.abs(skin.x[:, 1]) < h) & (len(ties) > 0)
+        if beside.any():
+            places = self.seeds.x[ties[:, 0]][:, [0, 2]]
+            tie[beside] = cKDTree(places).query(skin.x[beside][:, [0, 2]])[1]
+        return skin, tie, skin.areas / h / (1 if self.scene.mirrors[1] else 2)
+
     def _layers(self, material: Material) -> tuple[np.ndarray, np.ndarray]:
         """Toughness of each tie [J/m^2] and its part of the section over a square of the spacing [-], shape (k,)."""
         places = self.seeds.x[self.ties()[:, 0]][:, [0, 2]]
@@ -156,18 +169,19 @@ class Setup:
         out[:, column.ADHERING] = np.where(seeds.beside & (material.adhesion > 0), 0, -1)
         return out
 
+    @cached_property
+    def skin(self) -> SkinPoints:
+        """Points of the skin all round the food, those of the modelled half or quarter."""
+        return skin_points(self.scene.food.shape, self.seeds.spacing, self.scene.mirrors)
+
     def _skin(self, material: Material) -> np.ndarray:
-        """The table of skin (n, N_SKIN)."""
+        """The table of the skin's points (m, N_SKIN)."""
         if not material.skin_stiffness > 0:
             return np.zeros((0, column.N_SKIN))
-        seeds, out = self.seeds, np.zeros((len(self.seeds.x), column.N_SKIN))
-        area = skin_areas(self.scene.food.shape, seeds.spacing, seeds.x, self.scene.mirrors)
-        size = np.linalg.norm(area, axis=1)
-        some = size > 0
-        one, two = (self.to_grid_axes(t) for t in tangents(area[some] / size[some, None]))
-        out[some, :3], out[some, 3:6] = one, two
-        out[some, 6] = size[some] / (seeds.volume * seeds.volume_ratio[some])
-        return out
+        skin, tie, length = self._skin_at_plane()
+        axes = (skin.x, *tangents(skin.normals))
+        half = (skin.x[:, 1] >= 0) & (not self.scene.mirrors[1])
+        return np.column_stack([*(self.to_grid_axes(a) for a in axes), skin.areas, half, tie, length])
 
     def _slices(self, material: Material) -> np.ndarray:
         """The table of slices (m, N_SLICE)."""

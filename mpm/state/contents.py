@@ -15,7 +15,10 @@ N_SLICE = 9
 # Columns of the table of ties: left and right particle, toughness, part of the section over a square of the spacing.
 LEFT, RIGHT, TOUGHNESS, SHARE = range(4)
 N_TIE = 4
-N_SKIN = 7  # columns of the table of skin: two vectors in it, and its area over the particle's volume
+# Columns of the table of the skin's points: position, two vectors in the skin, area, half, tie beside them, length that
+# crosses the cut plane there.
+SKIN_POSITION, SKIN_SIDES, SKIN_AREA, SKIN_HALF, SKIN_TIE, SKIN_LENGTH = 0, 3, 9, 10, 11, 12
+N_SKIN = 13
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +41,9 @@ class Contents:
         relaxation: Share of each Prony branch [-], and time step over its time [-], shape (2, branches).
         ties: Table of the ties across the cut plane, shape (k, N_TIE): left and right particle, -1 for a mirror image,
             toughness [J/m^2], and part of the section over a square of the spacing [-]; none without a cohesive crack.
-        skin: Table of the particles' skin, shape (n, N_SKIN): two unit vectors in it in the grid's axes [-], and its area
-            over their volume [1/m]; empty where it bears nothing.
+        skin: Table of the skin's points, shape (m, N_SKIN): position [m] and two unit vectors in the skin [-] in the grid's
+            axes, area [m^2], half of the food, 0 left, 1 right, tie that bears its tension across the cut plane, -1 for
+            none, and length over which it does [m]; empty where the skin bears nothing.
         half: Half of the food that each particle belongs to, 0 left, 1 right, shape (n,); empty without ties.
     """
 

@@ -25,6 +25,12 @@ from mpm.state.contents import (
     POSITION,
     RIGHT,
     SHARE,
+    SKIN_AREA,
+    SKIN_HALF,
+    SKIN_LENGTH,
+    SKIN_POSITION,
+    SKIN_SIDES,
+    SKIN_TIE,
     SOFTENING,
     SURFACE_VOLUME,
     TOOL_GAP,
@@ -43,6 +49,7 @@ from mpm.state.tables import (
     N_PARAMETERS,
     N_POSE,
     N_SIZES,
+    SKIN_COUNT,
     STATIONS,
     STRETCH,
     STRETCH_AT_REST,
@@ -85,7 +92,7 @@ def begin(state: State, cuts: Sequence[Contents]) -> None:
             _table(state, (state.n.max(),), [cut.half for cut in cuts]),
         )
     if state.membrane:
-        _write_skin(state, _table(state, (state.n.max(), N_SKIN), [cut.skin for cut in cuts]))
+        _write_skin(state, _table(state, (sizes[:, SKIN_COUNT].max(), N_SKIN), [cut.skin for cut in cuts]))
 
 
 def _sizes(state: State, cut: Contents) -> list[int]:
@@ -94,7 +101,7 @@ def _sizes(state: State, cut: Contents) -> list[int]:
     first = 0 if state.turned else max(cut.plane - SECOND_FIELD_CELLS, 0)
     end = nodes[1] if state.turned else min(cut.plane + SECOND_FIELD_CELLS + 1, nodes[1])
     blocks, mirror_sum = -(-n // state.lanes), 2 * state.plane_x - cut.between
-    return [n, blocks, *nodes, len(cut.slices), cut.plane, first, end, nodes[1] - first, mirror_sum, len(cut.ties)]
+    return [n, blocks, *nodes, len(cut.slices), cut.plane, first, end, nodes[1] - first, mirror_sum, len(cut.ties), len(cut.skin)]
 
 
 def _table(state: State, shape: tuple[int, ...], parts: Sequence[np.ndarray]) -> np.ndarray:
@@ -204,14 +211,21 @@ def _write_ties(s: ti.template(), ties: TABLES, half: ROWS):
 
 @ti.kernel
 def _write_skin(s: ti.template(), skin: TABLES):
-    """Write the skin of the particles, unstretched."""
-    for c, p in s.skin_share:
+    """Write the points of the skin, unstretched."""
+    for c, n in s.skin_area:
         row = ti.Vector.zero(float, N_SKIN)
-        if p < s.size[c, COUNT]:
+        if n < s.size[c, SKIN_COUNT]:
             for k in ti.static(range(N_SKIN)):
-                row[k] = ti.cast(skin[c, p, k], float)
-        s.skin[c, p, 0], s.skin[c, p, 1] = ti.Vector([row[0], row[1], row[2]]), ti.Vector([row[3], row[4], row[5]])
-        s.skin_share[c, p] = row[6]
+                row[k] = ti.cast(skin[c, n, k], float)
+        s.skin_x[c, n] = ti.Vector([row[SKIN_POSITION + d] for d in range(3)])
+        for side in ti.static(range(2)):
+            s.skin_sides[c, n, side] = ti.Vector([row[SKIN_SIDES + 3 * side + d] for d in range(3)])
+        s.skin_area[c, n], s.skin_half[c, n] = row[SKIN_AREA], ti.cast(row[SKIN_HALF], ti.i32)
+        s.skin_tie[c, n], s.skin_length[c, n] = ti.cast(row[SKIN_TIE], ti.i32), row[SKIN_LENGTH]
+        s.skin_visibility[c, n] = 0
+    if ti.static(s.cuts):
+        for c, n in s.skin_pull:
+            s.skin_pull[c, n] = ti.Vector.zero(float, 3)
 
 
 def particles(state: State, cut: int = 0) -> Particles:

@@ -10,8 +10,8 @@ launch of its own. Short loops are run where the kernel was launched (``serializ
 
 import taichi as ti
 
-from mpm.state.state import CPU_BLOCK, DAMAGE_ROWS, NODE_LINES, NODE_ROWS, PARTS, SLICES, TIES
-from mpm.state.tables import BLOCKS, STATIONS, TIE_COUNT
+from mpm.state.state import CPU_BLOCK, DAMAGE_ROWS, NODE_LINES, NODE_ROWS, PARTS, SKIN, SLICES, TIES
+from mpm.state.tables import BLOCKS, SKIN_COUNT, STATIONS, TIE_COUNT
 
 
 @ti.func
@@ -24,6 +24,8 @@ def extent(s: ti.template(), cut, what: ti.template()):
         n = s.size[cut, STATIONS]
     elif ti.static(what == TIES):
         n = s.size[cut, TIE_COUNT]
+    elif ti.static(what == SKIN):
+        n = s.size[cut, SKIN_COUNT]
     elif ti.static(what == NODE_LINES):
         n = (s.window[cut, 4] - s.window[cut, 1]) * (s.window[cut, 5] - s.window[cut, 2])
     elif ti.static(what == NODE_ROWS or what == DAMAGE_ROWS):

@@ -29,8 +29,8 @@ REGISTER = 32  # bytes of a register of a CPU: as many particles as fill it have
 SUM_COPIES = 64  # copies of a sum over particles on a GPU, where additions to one number wait for each other
 CPU_BLOCK = 512  # Taichi runs CPU loops shorter than this on one thread, so one iteration in 512 works for a thread
 # What a loop goes over: each cut, rows of nodes in reach, lines of nodes across the mirror, parts of the particles,
-# slices along the edge, rows of nodes about what could be damaged, ties across the cut plane.
-CUTS, NODE_ROWS, NODE_LINES, PARTS, SLICES, DAMAGE_ROWS, TIES = range(7)
+# slices along the edge, rows of nodes about what could be damaged, ties across the cut plane, points of the skin.
+CUTS, NODE_ROWS, NODE_LINES, PARTS, SLICES, DAMAGE_ROWS, TIES, SKIN = range(8)
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Configuration:
         branches: Number of Prony branches.
         batch: Most cuts side by side; more than one on a GPU or with one thread a cut.
         ties: Most ties across the cut plane, 0 without a cohesive crack.
-        membrane: Skin that bears tension.
+        skin: Most points of a skin that bears tension, 0 without.
     """
 
     room: int
@@ -65,7 +65,7 @@ class Configuration:
     branches: int = 0
     batch: int = 1
     ties: int = 0
-    membrane: bool = False
+    skin: int = 0
 
 
 @ti.data_oriented
@@ -112,8 +112,14 @@ class State:
         prony_before: Deviator of the last step [Pa], (cut, particle).
         prony_share: Share of a branch [-], (cut, branch).
         prony_rate: Time step over its time [-], (cut, branch).
-        skin: Two vectors in the skin of a particle, of unit length and at right angles at first [-], (cut, particle, 2).
-        skin_share: Area of its skin at first over its volume [1/m], 0 inside the food, (cut, particle).
+        skin_x: Positions of the points of the skin in the grid's axes [m], (cut, point).
+        skin_sides: Two vectors in the skin at a point, of unit length and at right angles at first [-], (cut, point, 2).
+        skin_area: Area of the skin that a point stands for, at first [m^2], (cut, point).
+        skin_half: Half of the food that it belongs to, 0 left, 1 right, (cut, point).
+        skin_visibility: As ``visibility``, (cut, point).
+        skin_tie: Tie that bears its tension across the cut plane, -1 for none, (cut, point).
+        skin_length: Length over which it does [m], (cut, point).
+        skin_pull: Tension of the skin across the cut plane at a tie, in the scene's axes [N], (cut, tie).
         g: Momentum [N s] and mass [kg] of the nodes, a grid for each thread.
         u: Velocity [m/s] and mass [kg] of the nodes.
         planes: Sums over the planes of nodes of the particle that a thread moves, (cut, thread, 16).
@@ -172,7 +178,7 @@ class State:
         self.atomic = own.threads == 0
         self.serial = not self.atomic  # short loops run where the kernel was launched
         self.parts = 1 if self.threads == 1 else self.threads * CPU_BLOCK
-        self.branches, self.second_fields, self.membrane = own.branches, not own.nodal, own.membrane
+        self.branches, self.second_fields, self.membrane = own.branches, not own.nodal, own.skin > 0
         self.owner: Any = None
         self.n = np.zeros(own.batch, np.int32)
         real = ti.lang.impl.get_runtime().default_fp
@@ -196,6 +202,8 @@ class State:
         self._add_tables(real)
         if self.cuts:
             self._add_ties(real, max(own.ties, 1))
+        if self.membrane:
+            self._add_skin(real, own.skin, max(own.ties, 1))
         ti.sync()  # lays these fields out by themselves; Taichi does not manage those of eight scenes at once
 
     def _extents(self, own: Configuration) -> dict[int, int]:
@@ -209,6 +217,7 @@ class State:
             SLICES: self.slices,
             DAMAGE_ROWS: nodes,
             TIES: max(own.ties, 1),
+            SKIN: max(own.skin, 1),
         }
 
     def _add_particles(self, real: Any, damage: bool) -> None:
@@ -231,8 +240,14 @@ class State:
         self.prony_stress = mat3.field(shape=(batch, branches, aged))
         self.prony_before = mat3.field(shape=(batch, aged))
         self.prony_share, self.prony_rate = (ti.field(real, (batch, branches)) for _ in range(2))
-        skinned = room if self.membrane else 1
-        self.skin, self.skin_share = vec3.field(shape=(batch, skinned, 2)), ti.field(real, (batch, skinned))
+
+    def _add_skin(self, real: Any, points: int, ties: int) -> None:
+        """Fields of the points of the skin."""
+        vec3, shape = ti.types.vector(3, real), (self.batch, points)
+        self.skin_x, self.skin_sides = vec3.field(shape=shape), vec3.field(shape=(*shape, 2))
+        self.skin_area, self.skin_length = (ti.field(real, shape) for _ in range(2))
+        self.skin_half, self.skin_visibility, self.skin_tie = (ti.field(ti.i32, shape) for _ in range(3))
+        self.skin_pull = vec3.field(shape=(self.batch, ties))
 
     def _add_grid(self, real: Any, nodes: tuple[int, ...]) -> None:
         """Fields of the grid, one for each thread to add to."""

@@ -20,9 +20,9 @@ N_PARAMETERS = 45
 
 # Rows of the table of sizes: particles, blocks of them, nodes along x, y, z, slices along the edge, the node plane
 # along y that is nearest to y = 0, the first and last + 1 node plane along y whose nodes have a second field, how far
-# behind the first that is stored, the sum of the indices of two nodes that are mirror images across x, and ties across
-# the cut plane.
-COUNT, BLOCKS, NODES, STATIONS, PLANE_Y, SECOND_BEGIN, SECOND_END, SECOND_OFFSET, MIRROR_SUM, TIE_COUNT = (
+# behind the first that is stored, the sum of the indices of two nodes that are mirror images across x, ties across
+# the cut plane, and points of the skin.
+COUNT, BLOCKS, NODES, STATIONS, PLANE_Y, SECOND_BEGIN, SECOND_END, SECOND_OFFSET, MIRROR_SUM, TIE_COUNT, SKIN_COUNT = (
     0,
     1,
     2,
@@ -33,8 +33,9 @@ COUNT, BLOCKS, NODES, STATIONS, PLANE_Y, SECOND_BEGIN, SECOND_END, SECOND_OFFSET
     9,
     10,
     11,
+    12,
 )
-N_SIZES = 12
+N_SIZES = 13
 
 # Rows of the table of sums over an output interval: impulses on edge, faces and board (three each), losses of the
 # particles, how many were inverted or left the grid, work of friction and of the edge, moment on the knife, work of
