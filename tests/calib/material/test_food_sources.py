@@ -83,3 +83,18 @@ def test_what_is_measured_names_who_measured_it() -> None:
     for food, item in items():
         if item.status in ("measured", "proxy"):
             assert any(name in item.source for name in known), (food.name, item.name, item.source)
+
+
+def test_layers_are_of_foods_that_have_them() -> None:
+    """Rind and core are where anatomy has them, and in the default cut of no other food."""
+    assert {name: food.layers[1::2] for name, food in FOODS.items() if food.layers} == {
+        "cucumber": ("rind_thickness", "core_ratio"),
+        "melon": ("rind_thickness",),
+        "orange": ("rind_thickness",),
+        "kiwi": ("core_ratio",),
+        "tomato": ("core_ratio",),
+    }
+    for food in FOODS.values():
+        if food.layers:
+            shape, rind = food.to_scene_food().shape, food.properties.get("rind_thickness")
+            assert rind is None or rind.high < min(shape.height, shape.width) / 4
