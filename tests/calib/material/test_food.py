@@ -288,10 +288,20 @@ def test_sizes_by_hand(foods: dict[str, FoodSpec]) -> None:
 
 @pytest.mark.parametrize(
     ("name", "value", "expected"),
-    [("E", "3e5", 3e5), ("nu", 0.3, 0.3), ("mu", "0", 0.0), ("skin_thickness", "0.3mm", 3e-4)],
+    [
+        ("E", "3e5", 3e5),
+        ("nu", 0.3, 0.3),
+        ("mu", "0", 0.0),
+        ("skin_thickness", "0.3mm", 3e-4),
+        ("E", "300 kPa", 3e5),
+        ("R", "0.2 kJ/m^2", 200.0),
+        ("R_skin", "0.4N/mm", 400.0),
+        ("rho", "1.03 g/cm3", 1030.0),
+        ("core_ratio", "55%", 0.55),
+    ],
 )
 def test_check_override(name: str, value: Any, expected: float) -> None:
-    """Numbers, and text that is one, become numbers; a length may have its unit."""
+    """Numbers, and text that is one, become numbers; each may have its unit."""
     assert check_override(name, value) == expected
 
 
@@ -301,9 +311,10 @@ def test_check_override(name: str, value: Any, expected: float) -> None:
         ("youngs", 1e5, ("unknown property 'youngs'", "did you mean 'E'")),
         ("Yield_Stress", 1e5, ("did you mean 'yield_stress'",)),
         ("xyzzy", 1, ("known: rho, E, nu",)),
-        ("E", "300 kPa", ("'300 kPa'", "plain number in Pa")),
-        ("E", "3e5m", ("'3e5m'", "plain number in Pa")),
-        ("skin_thickness", "3px", ("'3px'", "plain number in m")),
+        ("E", "300 mm", ("E: '300 mm' is not a stress", "in Pa", "kPa, MPa", "Young's modulus")),
+        ("E", "3e5m", ("'3e5m'", "write it in Pa")),
+        ("skin_thickness", "3px", ("'3px' is not a length", "write it in m")),
+        ("nu", "0,3", ("'0,3' is not a part", "0.3")),
         ("E", -1.0, ("E: -1 Pa", "between 100 and 1e+10 Pa")),
         ("E", float("nan"), ("E: is nan", "finite")),
         ("E", "inf", ("finite",)),
