@@ -15,7 +15,7 @@ from calib.material.scene import MID_LENGTH, Sizing
 from calib.simulation.dask_cluster import Cluster
 from calib.simulation.process_pool import Pool
 from calib.simulation.workers import Workers
-from calib.table.units import metres
+from calib.table.si_numbers import si_number
 from mpm.runtime import ARCHES
 from mpm.scene.errors import CutcalError
 from mpm.scene.shapes import SHAPE_KINDS
@@ -44,7 +44,7 @@ def number(low: float, high: float, unit: str) -> Callable[[str], float]:
     Args:
         low: Lower limit, in the option's unit.
         high: Upper limit, in the option's unit.
-        unit: The unit, for the error; a length [m] may also be written with its own, as in ``45mm``.
+        unit: The unit, ``-`` for a part; a number may also be written with its own, as in ``45mm`` or ``30%``.
 
     Returns:
         What argparse calls with the text of the option.
@@ -55,12 +55,13 @@ def number(low: float, high: float, unit: str) -> Callable[[str], float]:
 
     def convert(text: str) -> float:
         try:
-            value = metres(text) if unit == "m" else float(text)
-        except ValueError:
-            what = "a length such as 0.045 or 45mm" if unit == "m" else "a number"
-            raise argparse.ArgumentTypeError(f"{text!r} is not {what}") from None
-        if not (math.isfinite(value) and low < value < high):
-            raise argparse.ArgumentTypeError(f"{text} must lie between {low:g} and {high:g} {unit}".rstrip())
+            value = si_number(text, unit)
+        except ValueError as e:
+            raise argparse.ArgumentTypeError(str(e)) from None
+        if not math.isfinite(value):
+            raise argparse.ArgumentTypeError(f"{text} is not a finite number")
+        if not low < value < high:
+            raise argparse.ArgumentTypeError(f"{text} must lie between {low:g} and {high:g} {unit}".rstrip(" -"))
         return value
 
     return convert
@@ -118,7 +119,7 @@ def add_food(p: Group, *, cell: bool = True, required: bool = True) -> None:
     p.add_argument("--food", required=required, metavar="NAME", help="food of materials.yaml (cutcal foods lists them)")
     p.add_argument("--material", metavar="YAML", help="take the food from this file: a material.yaml")
     p.add_argument(
-        "--set", action="append", default=[], metavar="NAME=VALUE", help="give a property another value [SI]"
+        "--set", action="append", default=[], metavar="NAME=VALUE", help="give a property a value [SI, or its unit]"
     )
     p.add_argument("--knife", default="kitchen", metavar="NAME", help=KNIFE_HELP)
     p.add_argument(
@@ -128,7 +129,7 @@ def add_food(p: Group, *, cell: bool = True, required: bool = True) -> None:
         p.add_argument(f"--{name}", type=number(1e-3, 1.0, "m"), metavar="M", help=f"{name} of the specimen{what} [m]")
     p.add_argument(
         "--at",
-        type=number(0, 1, ""),
+        type=number(0, 1, "-"),
         default=MID_LENGTH,
         metavar="PART",
         help="place of the blade, part of the length (default 0.5)",

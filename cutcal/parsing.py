@@ -13,6 +13,7 @@ from calib.io.yaml_checks import suggest
 from mpm.scene.errors import CutcalError
 
 COLUMN = 24  # where the explanations of options begin
+NEGATIVE = re.compile(r"-\.?\d")  # how a value begins that is no option, such as -4mm or -1e-3
 
 
 class Formatter(argparse.RawDescriptionHelpFormatter):
@@ -42,6 +43,7 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **how: Any) -> None:
         super().__init__(**{"formatter_class": Formatter, "add_help": False, **how})
+        self._negative_number_matcher = NEGATIVE
 
     def error(self, message: str) -> NoReturn:
         """Raise the message as it is meant.

@@ -8,7 +8,7 @@ from typing import Any
 
 from calib.errors import MaterialError
 from calib.io.yaml_checks import Place, check_unit, choice, finite_number, suggest, text
-from calib.table.units import metres
+from calib.table.si_numbers import si_number
 from mpm.scene.material import MAX_POISSON
 
 #: Where a literature value comes from: measured on this food; Table 2 of the CulinaryCut paper; another food,
@@ -201,7 +201,7 @@ def check_override(name: str, value: float | str) -> float:
 
     Args:
         name: Property name.
-        value: A number, or text that is one, in the property's SI unit; a length may also have its own, as in ``3mm``.
+        value: A number, or text that is one, in the property's SI unit or with its own, as in ``3mm`` or ``0.3MPa``.
 
     Raises:
         MaterialError: An unknown property, text that is no number, or a value out of its limits.
@@ -210,11 +210,9 @@ def check_override(name: str, value: float | str) -> float:
     place = Place("", (name,))
     if isinstance(value, str):
         try:
-            value = metres(value) if rule.unit == "m" else float(value)
-        except ValueError:
-            raise place.error(
-                f"{value!r} is not a number; give the {rule.meaning} as a plain number in {rule.unit}"
-            ) from None
+            value = si_number(value, rule.unit)
+        except ValueError as e:
+            raise place.error(f"{e}; it is the {rule.meaning}") from None
     x = finite_number(place, value)
     _check_limits(place, x, rule)
     return x

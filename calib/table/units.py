@@ -12,8 +12,6 @@ from enum import Enum
 
 STANDARD_GRAVITY = 9.80665
 """What the weight of a mass on a load cell is divided by to give the mass [m/s^2] (CGPM 1901)."""
-LENGTH_DECIMALS = 12
-"""Decimals of a length that is converted [m]: 0.3 mm is 0.0003 m, and not 0.00029999999999999997."""
 POUND = 0.45359237
 """A pound [kg] (international yard and pound agreement of 1959)."""
 
@@ -174,28 +172,6 @@ def _is_part(word: str) -> bool:
     """Whether this is a unit, perhaps to a power, or a power."""
     found = _POWER.fullmatch(word)
     return bool(re.fullmatch(r"\d", word)) or word in UNITS or (found is not None and found.group(1) in UNITS)
-
-
-def metres(text: str) -> float:
-    """Length of a text: a number of metres, or a number and its unit, with a blank between them or not.
-
-    >>> metres("0.045"), metres("45mm"), metres("4.5 cm")
-    (0.045, 0.045, 0.045)
-
-    Args:
-        text: Such as ``0.045`` or ``45mm``.
-
-    Returns:
-        The length [m].
-
-    Raises:
-        ValueError: It is neither.
-    """
-    found = re.fullmatch(r"\s*(.*?[0-9.])\s*([^\s0-9.]+)\s*", text)
-    unit = None if found is None else unit_of(found[2])
-    if found is None or unit is None or unit.quantity is not Quantity.LENGTH:
-        return float(text)
-    return round(float(found[1]) * unit.factor, LENGTH_DECIMALS)
 
 
 def is_unit(text: str) -> bool:

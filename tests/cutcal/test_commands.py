@@ -70,6 +70,38 @@ def test_a_length_may_have_its_unit(text):
     assert parse(parser(), ["converge", "--food", "banana", "--dx", "3mm,0.002"]).dx == (0.003, 0.002)
 
 
+def test_every_option_in_metres_takes_millimetres():
+    """Whatever is called M in a help takes 2mm for two thousandths: none is left that reads plain numbers alone."""
+    seen = set()
+    for name, one in commands(parser()).items():
+        for action in one._actions:
+            if action.metavar and action.metavar.split(",")[0] == "M":
+                assert action.type is not None, (name, action.dest)
+                found = action.type("2mm")
+                assert found in (0.002, (0.002,)), (name, action.dest)
+                seen.add(action.dest)
+    assert {"height", "width", "length", "diameter", "dx", "stroke", "retract", "zone", "board_z", "sigma"} <= seen
+
+
+@pytest.mark.parametrize(
+    ("typed", "dest", "value"),
+    [
+        ("--board-z -4mm", "board_z", -0.004),
+        ("--board-z -4e-3", "board_z", -0.004),
+        ("--speed 20mm/s", "speed", 0.02),
+        ("--lag-sd 5ms", "lag_sd", 0.005),
+        ("--rate 1kHz", "rate", 1000.0),
+        ("--t-end 1.7e9", "t_end", 1.7e9),
+        ("--at 30%", "at", 0.3),
+        ("--set E=0.3MPa", "set", ["E=0.3MPa"]),
+    ],
+)
+def test_other_quantities_may_have_their_units_too(typed, dest, value):
+    """Speeds, times, frequencies and parts as well; a negative number with a unit is a value, and no option."""
+    args = parse(parser(), ["calibrate", "--food", "banana", "--trace", "x.csv", *typed.split()])
+    assert getattr(args, dest) == value
+
+
 SLIPS = {
     "": ["name a command", "cutcal --help"],
     "calibrat": ["no command 'calibrat'", "did you mean 'calibrate'?"],
@@ -80,14 +112,18 @@ SLIPS = {
     "simulate --food": ["--food", "expected one argument"],
     "simulate --food Bananna": ["did you mean 'banana'?"],
     "simulate --food banana --knife kichen": ["did you mean 'kitchen'?"],
-    "simulate --food banana --height 30furlong": ["--height", "'30furlong' is not a length such as 0.045 or 45mm"],
+    "simulate --food banana --height 30furlong": ["--height", "'30furlong' is not a length: write it in m", "mm, cm"],
     "simulate --food banana --height 3000mm": ["--height", "3000mm must lie between 0.001 and 1 m"],
     "simulate --food banana --height 30": ["--height", "30", "0.001 and 1 m"],
     "simulate --food banana --shape sylinder": ["--shape", "did you mean 'cylinder'?"],
     "simulate --food banana --trace x.csv": ["--trace", "calibrate", "predict", "have it"],
     "simulate --food banana --seed -1": ["--seed", "at least 0"],
     "simulate --food banana --seed x": ["--seed", "'x' is not a whole number"],
-    "simulate --food banana --set E=200kPa": ["'200kPa'", "Pa"],
+    "simulate --food banana --set E=200mm": ["E: '200mm' is not a stress", "in Pa", "kPa", "Young's modulus"],
+    "simulate --food banana --speed 20kg": ["--speed", "'20kg' is not a speed: write it in m/s", "mm/s"],
+    "simulate --food banana --at 20mm": ["--at", "'20mm' is not a part", "0.3", "%"],
+    "simulate --food banana --constant zone=2px": ["--constant zone=2px", "'2px' is not a length"],
+    "calibrate --food banana --trace x.csv --board-z nan": ["--board-z", "nan is not a finite number"],
     "foods banan": ["did you mean 'banana'?"],
     "foods banana apple": ["apple is too much", "cutcal foods --help"],
     "knives ed": ["did you mean 'edc'?"],

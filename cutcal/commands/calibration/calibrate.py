@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -62,7 +63,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     fit.add_argument("--budget", type=number(0, 1e6, ""), metavar="N", help="most simulations of a trace (default 100)")
     fit.add_argument(
         "--discrepancy",
-        type=number(0, 1, ""),
+        type=number(0, 1, "-"),
         metavar="PART",
         help="how far a right model may be, of the peak (0.03)",
     )
@@ -86,12 +87,16 @@ def add_trace(p: argparse.ArgumentParser, *, required: bool = True) -> None:
     g.add_argument("--sign", choices=("+", "-"), metavar="+|-", help="sign that makes resistance positive")
     g.add_argument("--rate", type=number(0, 1e6, "/s"), metavar="HZ", help="rows a second, where there is no clock")
     g.add_argument("--speed", type=number(0, 10, "m/s"), metavar="M/S", help="of the knife, where there is no position")
-    g.add_argument("--board-z", type=float, metavar="M", help="what its height reads with the edge on the board [m]")
-    g.add_argument("--gain-sd", type=number(0, 1, ""), metavar="PART", help="doubt of the sensor's gain (default 0.02)")
+    height = number(-100, 100, "m")
+    g.add_argument("--board-z", type=height, metavar="M", help="what its height reads with the edge on the board [m]")
+    g.add_argument(
+        "--gain-sd", type=number(0, 1, "-"), metavar="PART", help="doubt of the sensor's gain (default 0.02)"
+    )
     g.add_argument("--lag-sd", type=number(0, 1, "s"), metavar="S", help="doubt of force against position in time [s]")
     g.add_argument("--baseline", choices=BASELINES, default=CONSTANT, metavar="KIND", help=BASELINE_HELP)
     g.add_argument("--cut", type=cut_number, metavar="N", help="which of several cuts in the file ('whole': it is one)")
-    g.add_argument("--t-end", type=float, metavar="S", help="leave out what is later [s] (board contact)")
+    time = number(-math.inf, math.inf, "s")
+    g.add_argument("--t-end", type=time, metavar="S", help="leave out what is later [s] (board contact)")
 
 
 def picture_of(text: str) -> Path | None:

@@ -50,7 +50,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     p.add_argument("--nu", type=float, metavar="NU", help="Poisson's ratio, which the test does not tell")
     p.add_argument(
         "--strain",
-        type=number(0.0, 0.8, ""),
+        type=number(0.0, 0.8, "-"),
         default=0.4,
         metavar="E",
         help="largest engineering strain to fit (default 0.4)",

@@ -64,7 +64,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
         metavar="F,...",
         help="time steps to try, over their limit",
     )
-    p.add_argument("--mach", type=numbers(0, 0.05, ""), metavar="F,...", help="blade speeds to try, over the P-wave's")
+    p.add_argument("--mach", type=numbers(0, 0.05, "-"), metavar="F,...", help="blade speeds to try, over the P-wave's")
     p.add_argument("--ppc", type=numbers(0.5, 8.5, ""), metavar="N,...", help="particles per cell and direction to try")
     p.add_argument(
         "--offset",

@@ -18,7 +18,7 @@ from calib.material.food import FoodSpec
 from calib.material.knife import load_knife
 from calib.material.scene import blade_warnings, cut_scene, specimen
 from calib.simulation.evaluation import FULLY_PARTED, doubts_of_the_crack, pressed_away
-from calib.table.units import metres
+from calib.table.si_numbers import si_number
 from calib.validation.method_constants import CONSTANTS
 from cutcal.options import (
     add_food,
@@ -109,7 +109,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument(
         "--mach",
-        type=number(0, 0.05, ""),
+        type=number(0, 0.05, "-"),
         metavar="PART",
         help="blade speed over the P-wave's (default 0.01 or less)",
     )
@@ -218,9 +218,9 @@ def _constants(args: argparse.Namespace) -> dict[str, float]:
         if not sign or name.strip() not in known:
             raise CutcalError(f"--constant {item}: write NAME=VALUE, with a name of {', '.join(known)}")
         try:
-            out[name.strip()] = metres(text) if name.strip() in LENGTHS else float(text)
-        except ValueError:
-            raise CutcalError(f"--constant {item}: {text!r} is not a number") from None
+            out[name.strip()] = si_number(text, "m" if name.strip() in LENGTHS else "")
+        except ValueError as e:
+            raise CutcalError(f"--constant {item}: {e}") from None
     return out
 
 

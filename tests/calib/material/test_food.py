@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import math
-import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -126,11 +125,11 @@ def test_banana_stiffness_is_not_the_papers(foods: dict[str, FoodSpec]) -> None:
 
 
 def test_kiwi_yield_and_potato_density(foods: dict[str, FoodSpec]) -> None:
-    """The measured kiwi yield stress is used; the density of a floating potato is listed but not used."""
+    """The measured kiwi yield stress is used; a potato sinks, whatever a simulation's settings say."""
     assert foods["kiwi"].properties["yield_stress"].status == "measured"
     assert foods["kiwi"].value("yield_stress") == 24e3
     rho = foods["potato"].properties["rho"]
-    assert rho.low > 1000 and [s.value for s in rho.sources] == [630] and rho.flag
+    assert rho.low > 1000 and 630 not in [s.value for s in rho.sources]
 
 
 @pytest.mark.parametrize("name", FOODS)
@@ -145,7 +144,9 @@ def test_ranges_are_honest(name: str, foods: dict[str, FoodSpec]) -> None:
 
 
 def test_published_numbers_are_listed(foods: dict[str, FoodSpec]) -> None:
-    """Each published density, modulus, Poisson's ratio and toughness of these foods is the value used or beside it."""
+    """Each published density, modulus, Poisson's ratio and toughness of these foods is the value used or beside it,
+    the settings of a simulation excepted.
+    """
     table = pd.read_csv(data_file("literature_properties.csv"), dtype=str)
     columns = {
         "density_kg_m3": ("rho",),
@@ -158,7 +159,7 @@ def test_published_numbers_are_listed(foods: dict[str, FoodSpec]) -> None:
     }
     seen = 0
     for row in table.to_dict("records"):
-        food = foods.get(row["food"].replace(" ", "_"))
+        food = None if row["test"] == "simulation input" else foods.get(row["food"].replace(" ", "_"))
         for column, names in columns.items():
             if food is None or not isinstance(row[column], str) or "~" in row[column]:
                 continue  # "~0" for peel alone is no number
@@ -261,14 +262,6 @@ def test_tensile_strength_is_known_and_breaks_nothing_in_bulk(name: str, foods: 
     assert not any("not used, because" in w for w in food.warnings())
 
 
-@pytest.mark.parametrize("name", FOODS)
-def test_no_prior_is_made_of_the_traces(name: str, foods: dict[str, FoodSpec]) -> None:
-    """No source of a value or of a size is a cut or a grip that is calibrated to or compared with."""
-    for item in (*foods[name].properties.values(), *foods[name].dims.values()):
-        for said in (item.source, *(s.source for s in item.sources)):
-            assert not re.search(r"robot's cut|real cuts|gripper|FruitRupture|panda-force|SliceIt", said), item.name
-
-
 # Values by hand -----------------------------------------------------------------------------------
 
 
@@ -295,10 +288,20 @@ def test_sizes_by_hand(foods: dict[str, FoodSpec]) -> None:
 
 @pytest.mark.parametrize(
     ("name", "value", "expected"),
-    [("E", "3e5", 3e5), ("nu", 0.3, 0.3), ("mu", "0", 0.0), ("skin_thickness", "0.3mm", 3e-4)],
+    [
+        ("E", "3e5", 3e5),
+        ("nu", 0.3, 0.3),
+        ("mu", "0", 0.0),
+        ("skin_thickness", "0.3mm", 3e-4),
+        ("E", "300 kPa", 3e5),
+        ("R", "0.2 kJ/m^2", 200.0),
+        ("R_skin", "0.4N/mm", 400.0),
+        ("rho", "1.03 g/cm3", 1030.0),
+        ("core_ratio", "55%", 0.55),
+    ],
 )
 def test_check_override(name: str, value: Any, expected: float) -> None:
-    """Numbers, and text that is one, become numbers; a length may have its unit."""
+    """Numbers, and text that is one, become numbers; each may have its unit."""
     assert check_override(name, value) == expected
 
 
@@ -308,9 +311,10 @@ def test_check_override(name: str, value: Any, expected: float) -> None:
         ("youngs", 1e5, ("unknown property 'youngs'", "did you mean 'E'")),
         ("Yield_Stress", 1e5, ("did you mean 'yield_stress'",)),
         ("xyzzy", 1, ("known: rho, E, nu",)),
-        ("E", "300 kPa", ("'300 kPa'", "plain number in Pa")),
-        ("E", "3e5m", ("'3e5m'", "plain number in Pa")),
-        ("skin_thickness", "3px", ("'3px'", "plain number in m")),
+        ("E", "300 mm", ("E: '300 mm' is not a stress", "in Pa", "kPa, MPa", "Young's modulus")),
+        ("E", "3e5m", ("'3e5m'", "write it in Pa")),
+        ("skin_thickness", "3px", ("'3px' is not a length", "write it in m")),
+        ("nu", "0,3", ("'0,3' is not a part", "0.3")),
         ("E", -1.0, ("E: -1 Pa", "between 100 and 1e+10 Pa")),
         ("E", float("nan"), ("E: is nan", "finite")),
         ("E", "inf", ("finite",)),
