@@ -2,9 +2,9 @@
 
 import taichi as ti
 
-from mpm.kernels.constitutive import unit
+from mpm.kernels.constitutive.laws import unit
+from mpm.kernels.constitutive.stress import constitutive_update, elastic_block
 from mpm.kernels.crack import ALL_VISIBLE, IN_CONTACT, field_offsets, particle_half, sever, visible_columns
-from mpm.kernels.stress import constitutive_update, elastic_block
 from mpm.state.accessors import step_size, to_grid_axes, to_scene_axes
 from mpm.state.loops import block_range, locate_active, node_box, repetitions
 from mpm.state.state import NODE_ROWS, PARTS

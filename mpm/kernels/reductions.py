@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from mpm.kernels.constitutive import damage_of, deviatoric_energy, left_cauchy_green, left_stretch, unit
+from mpm.kernels.constitutive.laws import damage_of, deviatoric_energy, left_cauchy_green, left_stretch, unit
 from mpm.kernels.crack import IN_CONTACT
 from mpm.kernels.membrane import membrane_energy
 from mpm.state.accessors import deformation_gradient, velocity_gradient

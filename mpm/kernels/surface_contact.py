@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from mpm.kernels.constitutive import full
+from mpm.kernels.constitutive.laws import full
 from mpm.kernels.crack import particle_half
 from mpm.kernels.signed_distance import adhesive_traction, blade_distance, rounded_blade_distance, stick_slip
 from mpm.kernels.tool import blade_velocity, book_impulse, book_knife_impulse, edge_height, under_blade

@@ -7,7 +7,7 @@ food's own law of fracture, whoever loads it (docs/theory.md, "A crack with a la
 
 import taichi as ti
 
-from mpm.kernels.constitutive import full
+from mpm.kernels.constitutive.laws import full
 from mpm.kernels.crack import IN_CONTACT
 from mpm.kernels.signed_distance import passed_part
 from mpm.kernels.tool import edge_height, under_blade

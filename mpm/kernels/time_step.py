@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 import taichi as ti
 
+from mpm.kernels.constitutive.damage import clear_damage_box, smooth_driving_strain
 from mpm.kernels.crack import advance_crack_fronts
 from mpm.kernels.cutting_edge import apply_edge_law
-from mpm.kernels.damage import clear_damage_box, smooth_driving_strain
 from mpm.kernels.g2p import grid_to_particles
 from mpm.kernels.grid_update import clear_grid, fold_mirror_images, update_grid
 from mpm.kernels.membrane import grid_to_skin, skin_to_grid

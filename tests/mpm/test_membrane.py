@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
 from mpm.discretisation.particles import seed
+from mpm.run import Order
 from mpm.runtime import Runtime
-from mpm.scene import Food, Knife, Motion, Numerics, Scene
+from mpm.scene import Food, Motion, Numerics, Scene
 from mpm.scene.material import SKIN_POISSON, Material
 from mpm.scene.shapes import Shape
 from mpm.scene.skin import skin_areas, tangents
 from mpm.solver import Simulation
-from mpm.run import Order
 from mpm.state.host_transfer import particles
-from tests.mpm.scenes import THIN, cut
+from tests.mpm.scenes import THIN
 
 BALL = Shape("sphere", 0.03, 0.03, 0.03)
 SOFT = Material(E=1e5, nu=0.3, rho=1000, loss_factor=1.0, skin_stiffness=200.0)
@@ -93,7 +92,9 @@ def test_stretched_skin_compresses_a_ball(dx):
     bulk = SOFT.E / (3 * (1 - 2 * SOFT.nu))
 
     def off(e: float) -> float:
-        line = SOFT.skin_stiffness / (1 - SKIN_POISSON) * 0.5 * ((stretch * (1 + e)) ** 2 - 1) * (stretch * (1 + e)) ** 2
+        line = (
+            SOFT.skin_stiffness / (1 - SKIN_POISSON) * 0.5 * ((stretch * (1 + e)) ** 2 - 1) * (stretch * (1 + e)) ** 2
+        )
         j = (1 + e) ** 3
         mean = bulk * j * (j - 1)  # Kirchhoff
         return mean + 2 / 3 * line * (3 / 0.015) / 1.0

@@ -8,9 +8,9 @@ import taichi as ti
 from scipy.linalg import polar
 
 from mpm.discretisation.capacity import EXTRA_PARTICLES, node_capacity, particle_capacity
+from mpm.kernels.constitutive.stress import elastic_block
 from mpm.kernels.crack import ALL_VISIBLE
 from mpm.kernels.reductions import report
-from mpm.kernels.stress import elastic_block
 from mpm.kernels.surface_contact import friction_limit
 from mpm.kernels.time_step import advance
 from mpm.runtime import Runtime

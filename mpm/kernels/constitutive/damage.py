@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from mpm.kernels.constitutive import (
+from mpm.kernels.constitutive.laws import (
     damage_of,
     deviatoric_energy,
     double,

@@ -1,12 +1,13 @@
 """Constitutive update: deformation gradient and Kirchhoff stress of the particles.
 
 Those that are elastic or flow are done for a block of particles at once (:func:`elastic_block`), the others one by one
-(:func:`particle_stress`). The laws themselves are in :mod:`mpm.kernels.constitutive`.
+(:func:`particle_stress`). The laws themselves are in :mod:`mpm.kernels.constitutive.laws`.
 """
 
 import taichi as ti
 
-from mpm.kernels.constitutive import (
+from mpm.kernels.constitutive.damage import update_damage
+from mpm.kernels.constitutive.laws import (
     STRETCH_TOLERANCE,
     cofactor,
     cofactors,
@@ -30,7 +31,6 @@ from mpm.kernels.constitutive import (
     unit,
     upper,
 )
-from mpm.kernels.damage import update_damage
 from mpm.state.accessors import deformation_gradient, velocity_gradient
 from mpm.state.tables import (
     EPS0,
