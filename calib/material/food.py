@@ -49,8 +49,8 @@ __all__ = [
 GIVEN_SPREAD = 10.0
 """Range of a property that has no literature and is given by the user: the value over and times this."""
 
-_OF_LAYERS = (*LAYERS, *LAYERS.values())
-_NULLABLE = ("R_skin", "tensile_strength", "fracture_energy", *_OF_LAYERS)
+_OPTIONAL = (*LAYERS, *LAYERS.values(), "skin_stiffness")  # that a file leaves out where a food has none
+_NULLABLE = ("R_skin", "tensile_strength", "fracture_energy", *_OPTIONAL)
 
 
 @dataclass(frozen=True)
@@ -240,7 +240,7 @@ class FoodSpec:
         shape = {"kind": self.shape_kind} | {n: self.dims[n].as_dict() for n in DIMENSIONS}
         have = {n: p.as_dict() for n, p in self.properties.items()}
         said = {} if self.not_modelled is None else {"not_modelled": self.not_modelled}
-        named = [n for n in PROPERTIES if n in have or n not in _OF_LAYERS]
+        named = [n for n in PROPERTIES if n in have or n not in _OPTIONAL]
         return {**said, "shape": shape, "properties": {n: have.get(n) for n in named}}
 
 
@@ -321,8 +321,8 @@ def _read_food(place: Place, raw: Any) -> FoodSpec:
     shape = mapping(place.at("shape"), food["shape"])
     given = mapping(place.at("properties"), food["properties"])
     check_keys(place.at("shape"), shape, ("kind", *DIMENSIONS), synonyms=SYNONYMS)
-    needed = [n for n in PROPERTIES if n not in _OF_LAYERS]
-    check_keys(place.at("properties"), given, needed, _OF_LAYERS, SYNONYMS)
+    needed = [n for n in PROPERTIES if n not in _OPTIONAL]
+    check_keys(place.at("properties"), given, needed, _OPTIONAL, SYNONYMS)
     dims = {n: read_property(place.at("shape"), n, shape[n]) for n in DIMENSIONS}
     have = [n for n in PROPERTIES if given.get(n) is not None or n not in _NULLABLE]
     properties = {n: read_property(place.at("properties"), n, given[n]) for n in have}

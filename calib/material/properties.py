@@ -71,6 +71,7 @@ PROPERTIES: dict[str, Rule] = {
     "R_initiation": Rule("N/m", 0.1, 1e5, "line force at which a cut starts in bare flesh"),
     "R_skin": Rule("N/m", 0.1, 1e5, "line force at which the edge goes through the skin"),
     "skin_thickness": Rule("m", 0.0, 0.05, "thickness of the skin, 0 = no skin"),
+    "skin_stiffness": Rule("N/m", 0.0, 1e6, "Young's modulus of the skin times its thickness, 0 = it bears no tension"),
     "R_rind": Rule("J/m^2", 0.1, 1e5, "cutting (propagation) resistance of the rind"),
     "rind_thickness": Rule("m", 0.0, 0.05, "thickness of the rind all round, 0 = no rind"),
     "R_core": Rule("J/m^2", 0.1, 1e5, "cutting (propagation) resistance of the core"),

@@ -1,4 +1,4 @@
-"""The skin as a membrane: points on the food's surface that bear tension in its plane, without bending and without mass.
+"""The skin as a membrane: points at the food's surface that bear tension in its plane, without bending or mass.
 
 They move with the grid as the particles do. Each keeps two vectors that lie in the skin; their strain gives a line
 force, which the point scatters to the nodes about it as a particle does its stress. What is stretched in one direction

@@ -19,7 +19,7 @@ SUBSAMPLES = 3  # samples along each side of a particle's cell
 SMOOTHING = 1.0  # standard deviation of the filter [samples]: wide enough for the gradient of a step
 MARGIN = 4  # samples beyond the outline, beyond the reach of the filter
 LEAST_AREA = 1e-6  # of a sample over that of its face, below which there is no surface
-INSET = 1.0  # of the points behind the outline [spacings]: nodes further out have hardly any mass, and would need a short step
+INSET = 1.0  # of the points behind the outline [spacings]: nodes further out have hardly any mass, so short steps
 END = 2.0  # of the skin before an end that was cut off [spacings], for the same reason
 CUT_ENDS = ("block", "cylinder", "half_cylinder")  # shapes whose ends are cut from a longer food
 
@@ -49,6 +49,9 @@ def skin_points(shape: Shape, spacing: float, mirrors: tuple[bool, bool]) -> Ski
         shape: The outline.
         spacing: Of the lattice [m].
         mirrors: Whether there are mirror planes x = 0 and y = 0; only x > 0 and y < 0 are modelled then.
+
+    Returns:
+        The points.
     """
     step = spacing / SUBSAMPLES
     near, far = shape.ends
@@ -81,7 +84,7 @@ def _gathered(points: np.ndarray, vectors: np.ndarray, spacing: float) -> SkinPo
     areas = np.bincount(cell, size)
     x = np.stack([np.bincount(cell, size * along) for along in points.T], axis=1) / areas[:, None]
     normals = np.stack([np.bincount(cell, along) for along in vectors.T], axis=1)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     return SkinPoints(x - INSET * spacing * normals, areas, normals)
 
 

@@ -41,9 +41,9 @@ class Contents:
         relaxation: Share of each Prony branch [-], and time step over its time [-], shape (2, branches).
         ties: Table of the ties across the cut plane, shape (k, N_TIE): left and right particle, -1 for a mirror image,
             toughness [J/m^2], and part of the section over a square of the spacing [-]; none without a cohesive crack.
-        skin: Table of the skin's points, shape (m, N_SKIN): position [m] and two unit vectors in the skin [-] in the grid's
-            axes, area [m^2], half of the food, 0 left, 1 right, tie that bears its tension across the cut plane, -1 for
-            none, and length over which it does [m]; empty where the skin bears nothing.
+        skin: Table of the skin's points, shape (m, N_SKIN): position [m] and two unit vectors in the skin [-] in the
+            grid's axes, area [m^2], half of the food, 0 left, 1 right, tie that bears its tension across the cut plane,
+            -1 for none, and length over which it does [m]; empty where the skin bears nothing.
         half: Half of the food that each particle belongs to, 0 left, 1 right, shape (n,); empty without ties.
     """
 

@@ -101,19 +101,8 @@ def _sizes(state: State, cut: Contents) -> list[int]:
     first = 0 if state.turned else max(cut.plane - SECOND_FIELD_CELLS, 0)
     end = nodes[1] if state.turned else min(cut.plane + SECOND_FIELD_CELLS + 1, nodes[1])
     blocks, mirror_sum = -(-n // state.lanes), 2 * state.plane_x - cut.between
-    return [
-        n,
-        blocks,
-        *nodes,
-        len(cut.slices),
-        cut.plane,
-        first,
-        end,
-        nodes[1] - first,
-        mirror_sum,
-        len(cut.ties),
-        len(cut.skin),
-    ]
+    second = [first, end, nodes[1] - first]
+    return [n, blocks, *nodes, len(cut.slices), cut.plane, *second, mirror_sum, len(cut.ties), len(cut.skin)]
 
 
 def _table(state: State, shape: tuple[int, ...], parts: Sequence[np.ndarray]) -> np.ndarray:

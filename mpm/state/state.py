@@ -113,7 +113,7 @@ class State:
         prony_share: Share of a branch [-], (cut, branch).
         prony_rate: Time step over its time [-], (cut, branch).
         skin_x: Positions of the points of the skin in the grid's axes [m], (cut, point).
-        skin_sides: Two vectors in the skin at a point, of unit length and at right angles at first [-], (cut, point, 2).
+        skin_sides: Two vectors in the skin at a point, at first units at right angles [-], (cut, point, 2).
         skin_area: Area of the skin that a point stands for, at first [m^2], (cut, point).
         skin_half: Half of the food that it belongs to, 0 left, 1 right, (cut, point).
         skin_visibility: As ``visibility``, (cut, point).
