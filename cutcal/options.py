@@ -7,11 +7,14 @@ import json
 import math
 import sys
 from collections.abc import Callable
+from dataclasses import fields
 from typing import Any, TypeAlias
 
 from calib.io.folder import finite
 from calib.material.food import FoodSpec, check_override, load_food, load_material_file
 from calib.material.scene import MID_LENGTH, Sizing
+from calib.outline.outline_file import ACROSS, AXES, UP, OutlineFile
+from calib.outline.silhouette import WAYS
 from calib.simulation.dask_cluster import Cluster
 from calib.simulation.process_pool import Pool
 from calib.simulation.workers import Workers
@@ -124,6 +127,7 @@ def add_food(p: Group, *, cell: bool = True, required: bool = True) -> None:
     p.add_argument(
         "--shape", choices=SHAPE_KINDS, metavar="KIND", help="outline of the specimen, such as half_cylinder"
     )
+    add_outline(p)
     for name, what in (("height", ", 0.045 or 45mm"), ("width", ", along the blade"), ("length", ", across the blade")):
         p.add_argument(f"--{name}", type=number(1e-3, 1.0, "m"), metavar="M", help=f"{name} of the specimen{what} [m]")
     p.add_argument(
@@ -137,6 +141,19 @@ def add_food(p: Group, *, cell: bool = True, required: bool = True) -> None:
         p.add_argument(
             "--dx", type=number(1e-4, 0.02, "m"), metavar="M", help="cell of the grid [m] (default: by the food)"
         )
+
+
+def add_outline(p: Group) -> None:
+    """Options that say which file has the outline of the specimen, and how it is read."""
+    p.add_argument("--outline", metavar="FILE", help="its silhouette (PNG, JPEG) or radii (CSV, YAML), for --shape")
+    p.add_argument("--scale", metavar="SIZE", help="size of a pixel of the picture, such as 0.1mm/px")
+    p.add_argument("--outline-as", choices=WAYS, metavar="WAY", help=f"how it becomes a food: {', '.join(WAYS)}")
+    p.add_argument("--mesh", metavar="FILE", help="its closed surface (STL, OBJ, VTK, MSH), in place of --outline")
+    p.add_argument("--mesh-unit", metavar="UNIT", help="of the coordinates of the mesh, such as mm")
+    p.add_argument("--mesh-up", choices=AXES, default=UP, metavar="AXIS", help="axis of it that points up (default z)")
+    p.add_argument(
+        "--mesh-across", choices=AXES, default=ACROSS, metavar="AXIS", help="axis of it across the blade (default y)"
+    )
 
 
 def add_run(p: Group) -> None:
@@ -215,5 +232,11 @@ def food_of(args: argparse.Namespace) -> FoodSpec:
 
 
 def sizing_of(args: argparse.Namespace) -> Sizing:
-    """Sizes that the user gave."""
-    return Sizing(args.shape, args.height, args.width, args.length, args.at)
+    """Sizes that the user gave, and the outline of a file.
+
+    Raises:
+        ShapeError: The file gives no outline that can be simulated.
+    """
+    names = [one.name for one in fields(OutlineFile)]
+    file = OutlineFile(**{name: getattr(args, name) for name in names})
+    return file.sizing(Sizing(args.shape, args.height, args.width, args.length, args.at))
