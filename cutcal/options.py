@@ -13,12 +13,13 @@ from typing import Any, TypeAlias
 from calib.io.folder import finite
 from calib.material.food import FoodSpec, check_override, load_food, load_material_file
 from calib.material.scene import MID_LENGTH, Sizing
-from calib.outline.outline_file import ACROSS, AXES, UP, OutlineFile
+from calib.outline.outline_file import POSE, OutlineFile
 from calib.outline.silhouette import WAYS
 from calib.simulation.dask_cluster import Cluster
 from calib.simulation.process_pool import Pool
 from calib.simulation.workers import Workers
 from calib.table.units import metres
+from cutcal.parsing import NamedBeside
 from mpm.runtime import ARCHES
 from mpm.scene.errors import CutcalError
 from mpm.scene.shapes import SHAPE_KINDS
@@ -28,6 +29,7 @@ Group: TypeAlias = argparse._ActionsContainer
 RUN = "run"  # title of the group of options that say where and how
 RESUME_HELP = "go on with the run in --out; nothing is run twice"
 KNIFE_HELP = "knife of knives.yaml, or a YAML file (default kitchen)"
+WIDTH, LENGTH = "along the blade", "across the blade"  # of a food
 LOCAL_WORKERS = 2  # simulations at a time on this machine: a process each
 
 
@@ -124,12 +126,7 @@ def add_food(p: Group, *, cell: bool = True, required: bool = True) -> None:
         "--set", action="append", default=[], metavar="NAME=VALUE", help="give a property another value [SI]"
     )
     p.add_argument("--knife", default="kitchen", metavar="NAME", help=KNIFE_HELP)
-    p.add_argument(
-        "--shape", choices=SHAPE_KINDS, metavar="KIND", help="outline of the specimen, such as half_cylinder"
-    )
     add_outline(p)
-    for name, what in (("height", ", 0.045 or 45mm"), ("width", ", along the blade"), ("length", ", across the blade")):
-        p.add_argument(f"--{name}", type=number(1e-3, 1.0, "m"), metavar="M", help=f"{name} of the specimen{what} [m]")
     p.add_argument(
         "--at",
         type=number(0, 1, ""),
@@ -144,16 +141,21 @@ def add_food(p: Group, *, cell: bool = True, required: bool = True) -> None:
 
 
 def add_outline(p: Group) -> None:
-    """Options that say which file has the outline of the specimen, and how it is read."""
-    p.add_argument("--outline", metavar="FILE", help="its silhouette (PNG, JPEG) or radii (CSV, YAML), for --shape")
-    p.add_argument("--scale", metavar="SIZE", help="size of a pixel of the picture, such as 0.1mm/px")
-    p.add_argument("--outline-as", choices=WAYS, metavar="WAY", help=f"how it becomes a food: {', '.join(WAYS)}")
-    p.add_argument("--mesh", metavar="FILE", help="its closed surface (STL, OBJ, VTK, MSH), in place of --outline")
-    p.add_argument("--mesh-unit", metavar="UNIT", help="of the coordinates of the mesh, such as mm")
-    p.add_argument("--mesh-up", choices=AXES, default=UP, metavar="AXIS", help="axis of it that points up (default z)")
+    """Options that say what the specimen looks like: a kind of shape or a file, and its sizes."""
     p.add_argument(
-        "--mesh-across", choices=AXES, default=ACROSS, metavar="AXIS", help="axis of it across the blade (default y)"
+        "--shape", choices=SHAPE_KINDS, metavar="KIND", help="outline of the specimen, such as half_cylinder"
     )
+    p.add_argument("--outline", metavar="FILE", help="its silhouette, radii or mesh, with --scale 0.1mm/px")
+    p.add_argument("--scale", action=NamedBeside, metavar="SIZE", help="size of a pixel, or of a unit of a mesh")
+    p.add_argument("--outline-as", metavar="WAY", help=f"{', '.join(WAYS)}; of a mesh its axes {POSE}")
+    for name, what in (("height", "0.045 or 45mm; so --width and --length"), ("width", WIDTH), ("length", LENGTH)):
+        p.add_argument(
+            f"--{name}",
+            action="store" if name == "height" else NamedBeside,
+            type=number(1e-3, 1.0, "m"),
+            metavar="M",
+            help=f"of the specimen, {what}",
+        )
 
 
 def add_run(p: Group) -> None:

@@ -37,7 +37,6 @@ TOP = ("material", "knife", "fit", "own", "hold_out", "scatter", "budget", "seed
 NUMBERS = ("speed", "board_z", "t_end", "height", "width", "length", "at", "gain_sd", "lag_sd", "rate", "cut")
 TEXTS = ("time_col", "force_col", "position_col", "depth_col", "sign", "decimal", "baseline", "shape", "knife")
 OUTLINES = tuple(one.name for one in fields(OutlineFile))
-FILES = ("outline", "mesh")
 COMPRESSION_SIZES = ("height", "diameter", "width", "length")
 
 
@@ -148,7 +147,8 @@ def _sizing(
 ) -> Sizing:
     """Sizes of a specimen, and its outline where a file beside the study has it."""
     words: dict[str, Any] = {n: text(place.at(n), given[n]) for n in OUTLINES if n in given}
-    words |= {n: folder / words[n] for n in FILES if n in words}
+    if "outline" in words:
+        words["outline"] = folder / words["outline"]
     known = Sizing(shape, numbers["height"], numbers["width"], numbers["length"], numbers["at"] or MID_LENGTH)
     try:
         return OutlineFile(**words).sizing(known)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
 
 import meshio
@@ -35,7 +35,7 @@ def food_of(path: Path, unit: float, up: str, across: str) -> Sized:
         path: File of any format that meshio reads, of triangles, quadrilaterals or tetrahedra.
         unit: One unit of its coordinates [m].
         up: Axis of the mesh that points up, such as ``z`` or ``-x``.
-        across: Axis that lies across the blade.
+        across: Another axis, which lies across the blade.
 
     Returns:
         The food.
@@ -46,7 +46,7 @@ def food_of(path: Path, unit: float, up: str, across: str) -> Sized:
     points, faces = _read(path)
     points, faces = _merged(points * unit, faces)
     _check_closed(path, faces)
-    corners = points[faces] @ _turn(path, up, across).T
+    corners = points[faces] @ _turn(up, across).T
     volumes = np.einsum("ti,ti->t", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
     if volumes.sum() <= 0:
         raise ShapeError(
@@ -63,7 +63,7 @@ def food_of(path: Path, unit: float, up: str, across: str) -> Sized:
 def _read(path: Path) -> tuple[FloatArray, np.ndarray]:
     """Vertices (k, 3), and triangles (t, 3) of the surface seen from outside."""
     try:
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()), np.errstate(all="ignore"):
             mesh = meshio.read(path)
     except (OSError, meshio.ReadError, SystemExit, LookupError, ValueError, AssertionError, TypeError) as e:
         why = str(e).splitlines()[0][:80] if str(e) else type(e).__name__
@@ -123,20 +123,16 @@ def _check_closed(path: Path, faces: np.ndarray) -> None:
         )
 
 
-def _turn(path: Path, up: str, across: str) -> FloatArray:
+def _turn(up: str, across: str) -> FloatArray:
     """Rotation (3, 3) from the axes of the mesh to those of the scene."""
     z, y = (np.eye(3)["xyz".index(axis[-1])] * (-1.0 if axis[0] == "-" else 1.0) for axis in (up, across))
-    if up[-1] == across[-1]:
-        raise ShapeError(
-            f"{path}: {up} of the mesh cannot point up while {across} lies across the blade; name two axes"
-        )
     return np.stack([np.cross(y, z), y, z])
 
 
 def _check_standing(path: Path, points: FloatArray, centre: FloatArray, low: FloatArray, high: FloatArray) -> None:
     """Refuse a mesh whose centre of mass does not lie above what touches the board."""
     foot = np.unique(points[points[:, 2] <= low[2] + FOOT * (high - low)[2]][:, :2], axis=0)
-    with contextlib.suppress(QhullError, ValueError):  # a point or a line has no hull
+    with suppress(QhullError, ValueError):  # a point or a line has no hull
         foot = foot[ConvexHull(foot).vertices]
     # nearest point of the hull: weights that are not negative and add up to one, which the last row sees to
     size = float((high - low)[:2].max())
@@ -146,7 +142,7 @@ def _check_standing(path: Path, points: FloatArray, centre: FloatArray, low: Flo
     if beside > RESTS * size:
         raise ShapeError(
             f"{path}: the mesh is tilted: its centre of mass lies {beside * 1e3:.1f} mm beside what touches the board, "
-            "so that it would tip over; turn it until it stands, or say which axis points up (--mesh-up)"
+            "so that it would tip over; turn it until it stands, or say which of its axes points up (--outline-as)"
         )
 
 

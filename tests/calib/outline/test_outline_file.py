@@ -13,7 +13,7 @@ from calib.io.typed_document import from_document, to_document
 from calib.material.food import load_food
 from calib.material.knife import load_knife
 from calib.material.scene import Sizing, blade_warnings, cut_scene, specimen
-from calib.outline.outline_file import OutlineFile, scale_of
+from calib.outline.outline_file import OutlineFile, scale_of, unit_size
 from mpm.scene.errors import SceneError
 from mpm.scene.shapes import Shape, volume
 from tests.calib.made_outlines import ellipse, half_ellipsoid, mesh, picture
@@ -34,21 +34,23 @@ def test_an_impossible_scale_is_refused(text):
         scale_of(text)
 
 
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        ({"outline": "a.png", "mesh": "a.stl"}, "--outline beside --mesh"),
-        ({"scale": "1mm/px"}, "give its file with --outline"),
-        ({"outline_as": "half"}, "give its file with --outline"),
-        ({"mesh_unit": "mm"}, "give its file with --mesh"),
-        ({"mesh_up": "x"}, "give its file with --mesh"),
-        ({"mesh": "a.stl", "mesh_up": "w"}, "--mesh-up w"),
-        ({"outline": "a.png", "outline_as": "round"}, "--outline-as round"),
-    ],
-)
-def test_options_that_do_not_go_together_are_refused(options, said):
-    """Before any file is read."""
-    with pytest.raises(ShapeError, match=said):
+@pytest.mark.parametrize(("text", "size"), [("mm", 1e-3), ("1mm", 1e-3), ("2.5 cm", 0.025), ("inch", 0.0254)])
+def test_a_unit_of_a_mesh_has_a_size(text, size):
+    """One of it, or as many as are said."""
+    assert unit_size(text) == pytest.approx(size)
+
+
+@pytest.mark.parametrize("text", ["1", "", "kg", "0mm", "-1mm", "0.1mm/px", "1e400mm", "m m"])
+def test_an_impossible_unit_is_refused(text):
+    """No unit of length, or nothing of it."""
+    with pytest.raises(ShapeError, match="--scale"):
+        unit_size(text)
+
+
+@pytest.mark.parametrize("options", [{"scale": "1mm/px"}, {"outline_as": "half"}])
+def test_options_of_a_file_need_the_file(options):
+    """They say how it is read."""
+    with pytest.raises(ShapeError, match="give its file with --outline"):
         OutlineFile(**options)
 
 
@@ -63,24 +65,27 @@ def files(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("options", "given", "said"),
     [
-        ({"outline": "p.png", "outline_as": "half"}, {}, "a picture has no scale"),
-        ({"outline": "p.png", "scale": "1mm/px"}, {}, "say --outline-as"),
-        ({"outline": "m.stl", "outline_as": "half"}, {}, "give it with --mesh"),
-        ({"outline": "no.png", "scale": "1mm/px", "outline_as": "half"}, {}, "cannot be read"),
-        ({"outline": "p.csv", "scale": "1mm/px", "outline_as": "half"}, {}, "leave --scale out"),
-        ({"mesh": "m.stl"}, {}, "--mesh-unit mm"),
-        ({"mesh": "m.stl", "mesh_unit": "kg"}, {}, "no unit of length"),
-        ({"mesh": "m.stl", "mesh_unit": "mm", "mesh_up": "y"}, {}, "name two axes"),
-        ({"mesh": "m.stl", "mesh_unit": "mm"}, {"height": 0.03}, "--height beside --mesh"),
-        ({"mesh": "m.stl", "mesh_unit": "mm"}, {"shape": "block"}, "--shape block beside --mesh"),
+        (("p.png", None, "half"), {}, "a picture has no scale"),
+        (("p.png", "1mm/px"), {}, "how does the outline become a food.*say --outline-as"),
+        (("p.png", "1mm/px", "z,y"), {}, "'z,y' is no way"),
+        (("no.png", "1mm/px", "half"), {}, "cannot be read"),
+        (("", "1mm/px", "half"), {}, "cannot be read"),
+        (("p.csv", "1mm/px", "half"), {}, "leave --scale out"),
+        (("m.stl",), {}, "a mesh has no unit.*--scale 1mm"),
+        (("m.stl", "mm", "y"), {}, "name two axes"),
+        (("m.stl", "mm", "y,-y"), {}, "name two axes"),
+        (("m.stl", "mm", "half"), {}, "name two axes"),
+        (("m.stl", "mm"), {"height": 0.03}, "--height beside --outline"),
+        (("m.stl", "mm"), {"shape": "block"}, "--shape block beside --outline"),
+        (("p.png", "0.5mm/px", "extruded"), {"width": 0.1}, "--width beside --outline"),
     ],
 )
 def test_what_a_file_needs_is_said(files, options, given, said):
     """A scale, a way, a unit, two axes, and nothing that the file says itself."""
     (files / "p.csv").write_text("y_mm,radius_mm\n")
-    options = {n: files / x if n in ("outline", "mesh") else x for n, x in options.items()}
+    name, *how = options
     with pytest.raises(ShapeError, match=said):
-        OutlineFile(**options).sizing(Sizing(**given))
+        OutlineFile(files / name, *how).sizing(Sizing(**given))
 
 
 def test_without_a_file_nothing_changes():
@@ -120,7 +125,7 @@ def test_a_bent_default_is_as_thick_as_the_food():
 
 def test_a_document_keeps_where_an_outline_comes_from(files):
     """Name, hash and way go to the document and come back, the table does not; other shapes have no word of it."""
-    sized = OutlineFile(mesh=files / "m.stl", mesh_unit="mm").sizing(Sizing())
+    sized = OutlineFile(files / "m.stl", "mm").sizing(Sizing())
     shape = Shape("outline", sized.length, sized.width, sized.height, outline=sized.outline)
     document = to_document(shape)
     assert document["outline"] == {"source": "m.stl", "sha256": sized.outline.sha256, "how": "mesh, mm, z up, y across"}
