@@ -3,6 +3,7 @@
 import taichi as ti
 
 from mpm.kernels.cohesive_law import count_started_beside, line_force
+from mpm.kernels.stone.rigid_motion import move_stone
 from mpm.kernels.tool import blade_velocity, book_knife_impulse, covered_part, edge_height
 from mpm.state.accessors import multiplicity_x, step_size, to_grid_axes, to_scene_axes
 from mpm.state.loops import locate_active, repetitions
@@ -12,6 +13,7 @@ from mpm.state.tables import (
     CUTTING_WORK,
     DX,
     EDGE,
+    EDGE_BAND,
     FIRST_STATION,
     INV_DX,
     LAYERED,
@@ -22,6 +24,7 @@ from mpm.state.tables import (
     ORIGIN_Z,
     SECOND_OFFSET,
     SLIP,
+    SPACING,
     TILT_COS,
     TILT_SIN,
     ZONE,
@@ -36,7 +39,10 @@ EMPTY_ZONE = 0.15  # filled less than this the zone carries no edge; at the boar
 
 @ti.func
 def apply_edge_law(s: ti.template(), cut: ti.template()):
-    """Find the edge's reaction on every slice, give it to the grid, and see how the material moves then."""
+    """Find the edge's reaction on every slice, give it to the grid, and see how the material moves then.
+
+    A stone gets its motion in between: the edge's reaction acts on it, too, and the material moves with it.
+    """
     ti.loop_config(serialize=s.serial)
     for q in range(repetitions(s, cut, SLICES)):
         c, i, mine = locate_active(s, cut, q, SLICES)
@@ -52,6 +58,8 @@ def apply_edge_law(s: ti.template(), cut: ti.template()):
         c, i, mine = locate_active(s, cut, q, SLICES)
         if mine and i >= s.plane_x:
             apply_reaction(s, c, i)
+    if ti.static(s.stone):
+        move_stone(s, cut)
     ti.loop_config(serialize=s.serial)
     for q in range(repetitions(s, cut, SLICES)):
         c, i, mine = locate_active(s, cut, q, SLICES)
@@ -80,6 +88,9 @@ def find_reaction(s: ti.template(), cut, i, dt):
     if s.par[cut, LAYERED] > 0:
         part = begun ** s.top_power[cut, i] - ended ** s.floor_power[cut, i]
     width = s.par[cut, DX] * s.width[cut, i] * part
+    if ti.static(s.hollow):
+        if s.start_force[cut, i] > 0:
+            width = ti.cast(part > 0, float) * tied_width(s, cut, i)
     full = SURFACE_FILL * s.par[cut, ZONE_MASS] * width * s.par[cut, INV_DX]
     if width > 0 and mass > EMPTY_ZONE * full:
         c, t = ti.cast(s.pose[cut, TILT_COS], float), ti.cast(s.pose[cut, TILT_SIN], float)
@@ -100,6 +111,17 @@ def find_reaction(s: ti.template(), cut, i, dt):
                 s.front_drift[cut, i] = mean[2] * dt
     else:
         s.slip[cut, i] = ti.Vector.zero(float, 2)
+
+
+@ti.func
+def tied_width(s: ti.template(), cut, i):
+    """Width of flesh in slice i that the edge is cutting, by the ties that it passes [m].
+
+    Each of them stands for its part of the section, so a slice that lies half in a stone or a cavity has half of its
+    width, and what is cut in all is the flesh's area, wherever that has moved.
+    """
+    many = 2.0 / multiplicity_x(s, cut, i) if ti.static(s.mirror_x) else 1.0  # half of the middle one is modelled
+    return many * s.at_edge[cut, i][1] * s.par[cut, SPACING] ** 2 / (s.par[cut, EDGE_BAND] * s.par[cut, DX])
 
 
 @ti.func

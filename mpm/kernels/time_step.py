@@ -12,6 +12,7 @@ from mpm.kernels.g2p import grid_to_particles
 from mpm.kernels.grid_update import clear_grid, fold_mirror_images, update_grid
 from mpm.kernels.p2g import particles_to_grid
 from mpm.kernels.reductions import find_window, report
+from mpm.kernels.stone.rigid_motion import move_stone
 from mpm.kernels.ties import hold_together
 from mpm.kernels.tool import move_tools, set_tool_velocity
 from mpm.state.host_transfer import ROWS, TABLES
@@ -32,7 +33,9 @@ def time_step(s: ti.template(), cut):
         fold_mirror_images(s, cut)
     update_grid(s, cut)
     if ti.static(s.cuts):
-        apply_edge_law(s, cut)
+        apply_edge_law(s, cut)  # with the motion of a stone
+    elif ti.static(s.stone):
+        move_stone(s, cut)
     move_tools(s, cut)
     grid_to_particles(s, cut)  # with the contact of the particles
     if ti.static(s.cuts):
