@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from mpm.kernels.time_step import advance
 from mpm.output.record import ForceRecord
 from mpm.output.snapshot import Snapshot, SnapshotRecorder, snapshot
 from mpm.output.topology import Topology, topology
@@ -23,6 +22,7 @@ from mpm.setup.stone import half_of_stone
 from mpm.state import host_transfer
 from mpm.state.state import Configuration, State
 from mpm.state.tables import EPS0, EPSF, STONE_MET, STONE_MIDDLE, STONE_TURN
+from mpm.step.time_step import advance
 
 KEPT = 3  # states that a process keeps: of the default cells, of coarse ones and of one scene more
 _kept: dict[tuple[int, Configuration], State] = {}

@@ -86,11 +86,14 @@ def with_inclusions(scene: Scene, food: FoodSpec, stone: str | None = None, cavi
         MaterialError: The food has none, or a size cannot be read.
         SceneError: They do not lie within the food, or cells do not resolve the stone.
     """
-    asked = {name: size for name, size in (("stone", stone), ("cavity", cavity)) if size is not None}
-    held = {name: inclusion(food, name, scene.food.shape.height, size) for name, size in asked.items()}
-    if not held:
+    if stone is None and cavity is None:
         return scene
-    scene = replace(scene, food=replace(scene.food, **held))
+    held, height = scene.food, scene.food.shape.height
+    if stone is not None:
+        held = replace(held, stone=inclusion(food, "stone", height, stone))
+    if cavity is not None:
+        held = replace(held, cavity=inclusion(food, "cavity", height, cavity))
+    scene = replace(scene, food=held)
     if scene.food.stone not in scene.food.crossed:
         return scene
     return replace(scene, motion=replace(scene.motion, mach=min(scene.motion.mach, STONE_MACH)))

@@ -3,7 +3,6 @@
 import taichi as ti
 
 from mpm.kernels.cohesive_law import count_started_beside, line_force
-from mpm.kernels.stone.rigid_motion import move_stone
 from mpm.kernels.tool import blade_velocity, book_knife_impulse, covered_part, edge_height
 from mpm.state.accessors import multiplicity_x, step_size, to_grid_axes, to_scene_axes
 from mpm.state.loops import locate_active, repetitions
@@ -39,10 +38,7 @@ EMPTY_ZONE = 0.15  # filled less than this the zone carries no edge; at the boar
 
 @ti.func
 def apply_edge_law(s: ti.template(), cut: ti.template()):
-    """Find the edge's reaction on every slice, give it to the grid, and see how the material moves then.
-
-    A stone gets its motion in between: the edge's reaction acts on it, too, and the material moves with it.
-    """
+    """Find the edge's reaction on every slice, and give it to the grid."""
     ti.loop_config(serialize=s.serial)
     for q in range(repetitions(s, cut, SLICES)):
         c, i, mine = locate_active(s, cut, q, SLICES)
@@ -58,8 +54,11 @@ def apply_edge_law(s: ti.template(), cut: ti.template()):
         c, i, mine = locate_active(s, cut, q, SLICES)
         if mine and i >= s.plane_x:
             apply_reaction(s, c, i)
-    if ti.static(s.stone):
-        move_stone(s, cut)
+
+
+@ti.func
+def follow_slices(s: ti.template(), cut: ti.template()):
+    """See how the material moves about every slice, after the edge's reaction and what else acts on the grid."""
     ti.loop_config(serialize=s.serial)
     for q in range(repetitions(s, cut, SLICES)):
         c, i, mine = locate_active(s, cut, q, SLICES)

@@ -78,7 +78,7 @@ def topology(
         severed: Whether the edge has passed it [-], shape (n,).
         swell: Volume over volume at rest [-], shape (n,).
         damage: Bulk damage [-], shape (n,).
-        stony: Whether it is in the stone, shape (n,); None where there is no stone.
+        stony: Whether it is in the stone [-], shape (n,); None where there is no stone.
 
     Returns:
         What the cut has left.

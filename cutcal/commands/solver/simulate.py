@@ -56,6 +56,10 @@ LENGTHS = ("zone", "slip", "cohesive_zone")  # constants that may be written wit
 VIDEO_FRAMES = 72  # of a video: five seconds
 FRAMES_PER_PAGE_FRAME = 2  # frames of a video of which a page has one
 FRAMES_PER_LINE = 12  # pictures of a video after which a line says how many there are
+CRUSHED = (
+    "the flesh between stone and board was crushed at {force:.0f} N, further than cells can follow; give a lower "
+    "--force-limit, or cut around the stone (--around)"
+)
 EPILOG = """example:
   cutcal simulate --food cucumber --knife edc --out runs/cucumber
 
@@ -186,6 +190,9 @@ def run(args: argparse.Namespace) -> int:
         doubted = doubts(record.budget, record.ke_over_ie) if record.status == "done" else []
         for text in doubted:
             say(f"not passed: {text}")
+        if record.status == "inverted" and scene.food.stone in scene.food.crossed:
+            doubted = [CRUSHED.format(force=float(record.knife[-1, 2]))]
+            say(f"not passed: {doubted[0]}")
         assumed += doubted
         summary = _summary(args, food, scene, record, assumed) | ({} if done is None else {"around": document(done)})
         write_json(out / "summary.json", summary)

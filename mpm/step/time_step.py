@@ -6,7 +6,7 @@ import numpy as np
 import taichi as ti
 
 from mpm.kernels.crack import advance_crack_fronts
-from mpm.kernels.cutting_edge import apply_edge_law
+from mpm.kernels.cutting_edge import apply_edge_law, follow_slices
 from mpm.kernels.damage import clear_damage_box, smooth_driving_strain
 from mpm.kernels.g2p import grid_to_particles
 from mpm.kernels.grid_update import clear_grid, fold_mirror_images, update_grid
@@ -33,9 +33,11 @@ def time_step(s: ti.template(), cut):
         fold_mirror_images(s, cut)
     update_grid(s, cut)
     if ti.static(s.cuts):
-        apply_edge_law(s, cut)  # with the motion of a stone
-    elif ti.static(s.stone):
+        apply_edge_law(s, cut)
+    if ti.static(s.stone):
         move_stone(s, cut)
+    if ti.static(s.cuts):
+        follow_slices(s, cut)
     move_tools(s, cut)
     grid_to_particles(s, cut)  # with the contact of the particles
     if ti.static(s.cuts):
