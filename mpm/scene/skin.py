@@ -21,7 +21,6 @@ MARGIN = 4  # samples beyond the outline, beyond the reach of the filter
 LEAST_AREA = 1e-6  # of a sample over that of its face, below which there is no surface
 INSET = 1.0  # of the points behind the outline [spacings]: nodes further out have hardly any mass, so short steps
 END = 2.0  # of the skin before an end that was cut off [spacings], for the same reason
-CUT_ENDS = ("block", "cylinder", "half_cylinder")  # shapes whose ends are cut from a longer food
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +67,9 @@ def skin_points(shape: Shape, spacing: float, mirrors: tuple[bool, bool]) -> Ski
     for axis, mirrored, sign in ((0, mirrors[0], 1.0), (1, mirrors[1], -1.0)):
         if mirrored:
             kept &= sign * points[..., axis] > 0
-    if shape.kind in CUT_ENDS:
+    if _cut_off(shape):
         kept &= (points[..., 1] > near + END * spacing) & (points[..., 1] < far - END * spacing)
-    if shape.kind in FLAT_DOWN:
+    if _halved(shape):
         kept &= points[..., 2] > 0
     normals = vectors[kept] / np.linalg.norm(vectors[kept], axis=-1, keepdims=True)
     outside = -SMOOTHING * step * ndtri(np.clip(smooth[kept], 1e-9, 1 - 1e-9))  # a filtered step tells the distance
@@ -88,12 +87,22 @@ def _gathered(points: np.ndarray, vectors: np.ndarray, spacing: float) -> SkinPo
     return SkinPoints(x - INSET * spacing * normals, areas, normals)
 
 
+def _halved(shape: Shape) -> bool:
+    """Whether the food lies on the face where it was halved."""
+    return shape.kind in FLAT_DOWN if shape.table is None else shape.table.halved
+
+
+def _cut_off(shape: Shape) -> bool:
+    """Whether its ends are cut from a longer food: those of parallel sides, but for a capsule's."""
+    return shape.prism and shape.kind != "capsule"
+
+
 def _skinned_inside(shape: Shape, points: np.ndarray) -> np.ndarray:
     """Which points (n, 3) lie in the food, were it whole: not halved, and without ends where it was cut off."""
     x, y, z = points.T
-    if shape.kind in FLAT_DOWN:
+    if _halved(shape):
         z = np.abs(z)
-    if shape.kind in CUT_ENDS:
+    if _cut_off(shape):
         y = np.full_like(y, -shape.cut)
     return inside(shape, np.column_stack([x, y, z]))
 
