@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from calib.errors import MaterialError
 from calib.material.food import FoodSpec
-from calib.table.units import metres
+from calib.table.si_numbers import si_number
 from mpm.scene import Inclusion, Scene
 from mpm.scene.errors import SceneError
 
@@ -33,7 +33,7 @@ def sizes_of(text: str) -> tuple[float, ...]:
     """
     parts = text.lower().replace("\u00d7", "x").split("x")
     unit = parts[-1].lstrip("0123456789.eE+- ")
-    values = tuple(metres(part if part[-1:].isalpha() else part + unit) for part in map(str.strip, parts))
+    values = tuple(si_number(part if part[-1:].isalpha() else part + unit, "m") for part in map(str.strip, parts))
     if len(values) != SIZES or not all(math.isfinite(v) and v > 0 for v in values):
         raise ValueError(text)
     return values

@@ -77,6 +77,7 @@ def test_shipped_foods(foods: dict[str, FoodSpec]) -> None:
             "R_skin",
             "tensile_strength",
             "fracture_energy",
+            "skin_stiffness",
             *LAYERS,
             *LAYERS.values(),
         }
@@ -579,3 +580,12 @@ def test_half_a_layer_is_an_error(name: str) -> None:
     """A size without a resistance, or a resistance without a size, says what is missing."""
     with pytest.raises(MaterialError, match=f"banana.properties: {name} needs .*; give both, or neither"):
         load_food("banana").with_values({name: 0.01 if name in LAYERS else 100.0})
+
+
+def test_a_skin_that_bears_tension_is_asked_for() -> None:
+    """No food has one by default, and its file says nothing of it; a given one reaches the solver and comes back."""
+    plain = load_food("grape")
+    assert plain.to_scene_food().material.skin_stiffness == 0.0 and "skin_stiffness" not in plain.as_dict()["properties"]
+    skinned = plain.with_values({"skin_stiffness": 3000.0})
+    assert skinned.to_scene_food().material.skin_stiffness == 3000.0
+    assert skinned.as_dict()["properties"]["skin_stiffness"]["value"] == 3000.0
