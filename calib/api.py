@@ -22,6 +22,7 @@ from calib.material.food import FoodSpec
 from calib.material.scene import MID_LENGTH, Sizing
 from calib.multi_specimen.spec import StudySpec
 from calib.multi_specimen.study_file import read_study
+from calib.outline.outline_file import OutlineFile
 from calib.problem.request import Request
 from calib.trace.baselines import BASELINES, CONSTANT
 from calib.trace.cuts import WHOLE
@@ -63,6 +64,9 @@ class Calibration:
         shape: Outline of the specimen, one of ``mpm.scene.shapes.SHAPE_KINDS``; None for the food's.
         height, width, length: Sizes of the specimen [m], None where they were not measured.
         at: Where the blade cuts, as the part of the length on one side [-].
+        outline: Picture, radii or mesh of the specimen, in place of ``shape``; None without one.
+        scale: Size of a pixel, such as ``0.1mm/px``, or of a unit of a mesh.
+        outline_as: How it becomes a food, as :class:`calib.outline.outline_file.OutlineFile` has it.
         fit: Names of the fitted properties; None for those that cutting sees.
         dx: Cell size [m], or None.
         budget: Largest number of simulations.
@@ -91,6 +95,9 @@ class Calibration:
     width: float | None = None
     length: float | None = None
     at: float = MID_LENGTH
+    outline: str | Path | None = None
+    scale: str | None = None
+    outline_as: str | None = None
     fit: Sequence[str] | None = None
     dx: float | None = None
     budget: float = 100
@@ -103,6 +110,7 @@ class Calibration:
     cut: int | str | None = None
     _food: FoodSpec = field(init=False, repr=False)
     _records: tuple[Trace, Trace | None] = field(init=False, repr=False)
+    _sizing: Sizing = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name, (low, high, unit) in LIMITS.items():
@@ -129,6 +137,9 @@ class Calibration:
             raise CutcalError("Calibration: columns say how a file is read, but the trace is a Trace, which has been")
         food = self.food if isinstance(self.food, FoodSpec) else FoodSpec.load(self.food)
         object.__setattr__(self, "_food", food)
+        given = Sizing(self.shape, self.height, self.width, self.length, self.at)
+        file = OutlineFile(self.outline, self.scale, self.outline_as)
+        object.__setattr__(self, "_sizing", file.sizing(given))
         object.__setattr__(
             self, "_records", (self._record(self.trace), None if self.air is None else self._record(self.air))
         )
@@ -150,7 +161,7 @@ class Calibration:
             t_end=self.t_end,
             baseline=self.baseline,
             cut=self.cut,
-            sizing=Sizing(self.shape, self.height, self.width, self.length, self.at),
+            sizing=self._sizing,
             fit=None if self.fit is None else tuple(self.fit),
             dx=self.dx,
             budget=self.budget,

@@ -32,3 +32,7 @@ class DocumentError(OutputError):
 
 class ClusterError(CutcalError):
     """A Dask cluster that cannot be reached, has no workers, or such as cannot be used."""
+
+
+class ShapeError(CutcalError):
+    """A photograph, a mesh or a profile that gives no outline which can be simulated."""

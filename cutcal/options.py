@@ -7,15 +7,19 @@ import json
 import math
 import sys
 from collections.abc import Callable
+from dataclasses import fields
 from typing import Any, TypeAlias
 
 from calib.io.folder import finite
 from calib.material.food import FoodSpec, check_override, load_food, load_material_file
 from calib.material.scene import MID_LENGTH, Sizing
+from calib.outline.outline_file import POSE, OutlineFile
+from calib.outline.silhouette import WAYS
 from calib.simulation.dask_cluster import Cluster
 from calib.simulation.process_pool import Pool
 from calib.simulation.workers import Workers
 from calib.table.units import metres
+from cutcal.parsing import NamedBeside
 from mpm.runtime import ARCHES
 from mpm.scene.errors import CutcalError
 from mpm.scene.shapes import SHAPE_KINDS
@@ -25,6 +29,7 @@ Group: TypeAlias = argparse._ActionsContainer
 RUN = "run"  # title of the group of options that say where and how
 RESUME_HELP = "go on with the run in --out; nothing is run twice"
 KNIFE_HELP = "knife of knives.yaml, or a YAML file (default kitchen)"
+WIDTH, LENGTH = "along the blade", "across the blade"  # of a food
 LOCAL_WORKERS = 2  # simulations at a time on this machine: a process each
 
 
@@ -121,11 +126,7 @@ def add_food(p: Group, *, cell: bool = True, required: bool = True) -> None:
         "--set", action="append", default=[], metavar="NAME=VALUE", help="give a property another value [SI]"
     )
     p.add_argument("--knife", default="kitchen", metavar="NAME", help=KNIFE_HELP)
-    p.add_argument(
-        "--shape", choices=SHAPE_KINDS, metavar="KIND", help="outline of the specimen, such as half_cylinder"
-    )
-    for name, what in (("height", ", 0.045 or 45mm"), ("width", ", along the blade"), ("length", ", across the blade")):
-        p.add_argument(f"--{name}", type=number(1e-3, 1.0, "m"), metavar="M", help=f"{name} of the specimen{what} [m]")
+    add_outline(p)
     p.add_argument(
         "--at",
         type=number(0, 1, ""),
@@ -136,6 +137,24 @@ def add_food(p: Group, *, cell: bool = True, required: bool = True) -> None:
     if cell:
         p.add_argument(
             "--dx", type=number(1e-4, 0.02, "m"), metavar="M", help="cell of the grid [m] (default: by the food)"
+        )
+
+
+def add_outline(p: Group) -> None:
+    """Options that say what the specimen looks like: a kind of shape or a file, and its sizes."""
+    p.add_argument(
+        "--shape", choices=SHAPE_KINDS, metavar="KIND", help="outline of the specimen, such as half_cylinder"
+    )
+    p.add_argument("--outline", metavar="FILE", help="its silhouette, radii or mesh, with --scale 0.1mm/px")
+    p.add_argument("--scale", action=NamedBeside, metavar="SIZE", help="size of a pixel, or of a unit of a mesh")
+    p.add_argument("--outline-as", metavar="WAY", help=f"{', '.join(WAYS)}; of a mesh its axes {POSE}")
+    for name, what in (("height", "0.045 or 45mm; so --width and --length"), ("width", WIDTH), ("length", LENGTH)):
+        p.add_argument(
+            f"--{name}",
+            action="store" if name == "height" else NamedBeside,
+            type=number(1e-3, 1.0, "m"),
+            metavar="M",
+            help=f"of the specimen, {what}",
         )
 
 
@@ -215,5 +234,11 @@ def food_of(args: argparse.Namespace) -> FoodSpec:
 
 
 def sizing_of(args: argparse.Namespace) -> Sizing:
-    """Sizes that the user gave."""
-    return Sizing(args.shape, args.height, args.width, args.length, args.at)
+    """Sizes that the user gave, and the outline of a file.
+
+    Raises:
+        ShapeError: The file gives no outline that can be simulated.
+    """
+    names = [one.name for one in fields(OutlineFile)]
+    file = OutlineFile(**{name: getattr(args, name) for name in names})
+    return file.sizing(Sizing(args.shape, args.height, args.width, args.length, args.at))

@@ -15,6 +15,10 @@ from mpm.scene.errors import CutcalError
 COLUMN = 24  # where the explanations of options begin
 
 
+class NamedBeside(argparse._StoreAction):
+    """An option that the help of the one before names: it has no line of its own."""
+
+
 class Formatter(argparse.RawDescriptionHelpFormatter):
     """Help of one line an option where it can be, and groups without blank lines between them."""
 
@@ -23,6 +27,8 @@ class Formatter(argparse.RawDescriptionHelpFormatter):
 
     def add_argument(self, action: argparse.Action) -> None:
         """Take one more option; the names of commands are measured as deep as they stand."""
+        if isinstance(action, NamedBeside):
+            return
         super().add_argument(action)
         if isinstance(action, argparse._SubParsersAction):
             deep = self._current_indent + self._indent_increment

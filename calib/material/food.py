@@ -229,7 +229,7 @@ class FoodSpec:
         from mpm.scene.shapes import Shape
 
         sizes = {"length": length, "width": width, "height": height}
-        size = {n: self.dims[n].value if given is None else given for n, given in sizes.items()}
+        size: dict[str, Any] = {n: self.dims[n].value if given is None else given for n, given in sizes.items()}
         values: dict[str, Any] = {n: p.value for n, p in self.properties.items()}
         if self._lacks_strength:
             del values["fracture_energy"]

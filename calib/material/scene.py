@@ -11,7 +11,9 @@ import numpy as np
 from calib.material.food import FoodSpec
 from calib.trace.conditioning import Conditioned
 from mpm.scene import EdgeLaw, Knife, Motion, Numerics, Scene
-from mpm.scene.shapes import PRISMS, Shape, half_width
+from mpm.scene.outline import Outline
+from mpm.scene.profiles import spread
+from mpm.scene.shapes import OUTLINE, Shape, span
 
 ZONE_M = 4e-3
 """Process zone of the edge [m]; small foods get an eighth of their height."""
@@ -49,11 +51,13 @@ class Sizing:
     """Sizes of the specimen, each given by the user or None, and where along its length it is cut.
 
     Attributes:
-        shape: Outline, one of ``mpm.scene.shapes.SHAPE_KINDS``.
+        shape: Kind of its outline, one of ``mpm.scene.shapes.SHAPE_KINDS``.
         height: Height [m].
         width: Width along the blade [m].
         length: Length across the blade [m].
         at: Part of the length on the left of the blade (y < 0) [-].
+        outline: Measured outline in place of a shape; the sizes are then its own.
+        said: What must be known of it, one sentence each.
     """
 
     shape: str | None = None
@@ -61,6 +65,8 @@ class Sizing:
     width: float | None = None
     length: float | None = None
     at: float = MID_LENGTH
+    outline: Outline | None = None
+    said: tuple[str, ...] = ()
 
     @property
     def kept(self) -> tuple[str, ...]:
@@ -87,8 +93,10 @@ def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple
     Raises:
         SceneError: A shape or size that cannot be simulated.
     """
-    said: list[str] = []
+    said = list(sizing.said)
     default = food.to_scene_food(shape=sizing.shape).shape
+    if sizing.outline is not None:
+        default = replace(default, kind=OUTLINE, outline=sizing.outline)
     height = sizing.height
     if height is None and trace is not None and trace.stroke_source != "height":
         free = height_range(food, trace, sizing)
@@ -107,7 +115,7 @@ def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple
     height = default.height if height is None else height
     width = sizing.width
     if width is None:
-        width = default.width * height / default.height
+        width = default.width * height / default.height * spread(default.kind)
         said.append(
             "the specimen's width is not known: it keeps the proportions of the food; resistances are only identified "
             "as their product with it; give --width if you measured it"
@@ -115,7 +123,7 @@ def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple
     whole, most = sizing.length, math.inf
     if whole is None:
         whole = default.length * height / default.height
-        if default.kind in PRISMS:
+        if default.prism:
             most = LENGTH_PER_HEIGHT * height / 2
     left, right = min(sizing.at * whole, most), min((1 - sizing.at) * whole, most)
     length = left + right
@@ -124,7 +132,7 @@ def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple
             f"the specimen's length across the blade is not known: {length * 1e3:.0f} mm keep the proportions of the "
             "food; the blade bends longer halves apart with more force; give --length if you measured it"
         )
-    return Shape(default.kind, length, width, height, (left - right) / 2), said
+    return Shape(default.kind, length, width, height, (left - right) / 2, default.outline), said
 
 
 def blade_warnings(shape: Shape, knife: Knife) -> list[str]:
@@ -137,12 +145,13 @@ def blade_warnings(shape: Shape, knife: Knife) -> list[str]:
     Returns:
         The sentence, or nothing.
     """
-    wide = 2.0 * half_width(shape, 0.0)
-    if wide <= knife.length * (1 + 1e-9):
+    left, right = span(shape, 0.0)
+    wide, beyond = right - left, max(right, -left) - knife.length / 2
+    if beyond <= knife.length / 2 * 1e-9:
         return []
     return [
         f"the food is {wide * 1e3:.0f} mm wide where it is cut and the blade {knife.length * 1e3:.0f} mm long: "
-        f"{(wide - knife.length) * 5e2:.1f} mm on each side stay uncut and hold the halves together; give --width if "
+        f"{beyond * 1e3:.1f} mm on each side stay uncut and hold the halves together; give --width if "
         "you measured it, or a longer knife"
     ]
 

@@ -15,16 +15,17 @@ Paths are taken from the folder of the file.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from calib.errors import MaterialError
+from calib.errors import MaterialError, ShapeError
 from calib.io.yaml_checks import Place, check_keys, choice, finite_number, mapping, read_yaml, text
 from calib.material.food import FoodSpec, load_food, load_material_file
 from calib.material.properties import check_override
 from calib.material.scene import MID_LENGTH, Sizing
 from calib.multi_specimen.spec import COMPRESSION, CUT, SCATTER, SPECIMEN_PROPERTIES, CompressionSpec, StudySpec
+from calib.outline.outline_file import OutlineFile
 from calib.problem.parameters import OF_TRACE
 from calib.problem.request import Request
 
@@ -35,6 +36,7 @@ EACH = "each"
 TOP = ("material", "knife", "fit", "own", "hold_out", "scatter", "budget", "seed", "dx", "set")
 NUMBERS = ("speed", "board_z", "t_end", "height", "width", "length", "at", "gain_sd", "lag_sd", "rate", "cut")
 TEXTS = ("time_col", "force_col", "position_col", "depth_col", "sign", "decimal", "baseline", "shape", "knife")
+OUTLINES = tuple(one.name for one in fields(OutlineFile))
 COMPRESSION_SIZES = ("height", "diameter", "width", "length")
 
 
@@ -118,7 +120,7 @@ def _traces(
 
 
 def _request(place: Place, given: Mapping[str, Any], folder: Path, base: Request) -> Request:
-    check_keys(place, given, ("trace",), ("kind", "air", *NUMBERS, *TEXTS))
+    check_keys(place, given, ("trace",), ("kind", "air", *NUMBERS, *TEXTS, *OUTLINES))
     numbers = {n: _number(place, given, n) for n in NUMBERS}
     words = {n: None if n not in given else text(place.at(n), given[n]) for n in TEXTS}
     air = given.get("air")
@@ -129,9 +131,7 @@ def _request(place: Place, given: Mapping[str, Any], folder: Path, base: Request
         columns={n: words[n] for n in ("time_col", "force_col", "position_col", "depth_col", "sign", "decimal")}
         | {"rate": numbers["rate"]},
         knife=_knife(words["knife"] or base.knife, folder),
-        sizing=Sizing(
-            words["shape"], numbers["height"], numbers["width"], numbers["length"], numbers["at"] or MID_LENGTH
-        ),
+        sizing=_sizing(place, given, folder, numbers, words["shape"]),
         speed=numbers["speed"],
         board_z=numbers["board_z"],
         t_end=numbers["t_end"],
@@ -140,6 +140,20 @@ def _request(place: Place, given: Mapping[str, Any], folder: Path, base: Request
         gain_sd=numbers["gain_sd"],
         lag_sd=numbers["lag_sd"],
     )
+
+
+def _sizing(
+    place: Place, given: Mapping[str, Any], folder: Path, numbers: Mapping[str, float | None], shape: str | None
+) -> Sizing:
+    """Sizes of a specimen, and its outline where a file beside the study has it."""
+    words: dict[str, Any] = {n: text(place.at(n), given[n]) for n in OUTLINES if n in given}
+    if "outline" in words:
+        words["outline"] = folder / words["outline"]
+    known = Sizing(shape, numbers["height"], numbers["width"], numbers["length"], numbers["at"] or MID_LENGTH)
+    try:
+        return OutlineFile(**words).sizing(known)
+    except ShapeError as e:
+        raise place.error(str(e)) from None
 
 
 def _knife(name: str, folder: Path) -> str:

@@ -221,7 +221,8 @@ def _cut(place: Place, name: str, raw: Any) -> PublishedCut:
     given = mapping(place, raw)
     check_keys(place, given, ("shape", "width_m", "height_m"), ("length_m", "given", "predicted"), _SYNONYMS)
     kind = choice(place.at("shape"), given["shape"], SHAPE_KINDS)
-    size = {n: _size(place.at(key), given[key], DIMENSIONS[n]) for n, key in SIZE_KEYS.items() if key in given}
+    here = {n: key for n, key in SIZE_KEYS.items() if key in given}
+    size: dict[str, Any] = {n: _size(place.at(key), given[key], DIMENSIONS[n]) for n, key in here.items()}
     size.setdefault("length", (LENGTH_PER_HEIGHT if kind in PRISMS else 1.0) * size["height"])
     try:
         shape = Shape(kind, **size)

@@ -12,6 +12,7 @@ from typing import Any
 from calib.errors import CurveError, OutputError
 from calib.io.progress import Countdown
 from calib.io.provenance import code_key, git_commit, key_of, versions
+from calib.io.typed_document import to_document
 from calib.material.knife import load_knife
 from calib.simulation.workers import Workers
 from intsim.data.dataset_document import (
@@ -107,7 +108,8 @@ def _entry(spec: TrajectorySpec, demos: str, track: Demonstration, seconds: Mapp
         "instructions": instructions(episode.spec, spec.seed),
         "task": {**asdict(episode.spec), "ratio": float(episode.spec.ratio)},
         "items": [
-            {"name": i.name, "x": i.x, "y": i.y, "yaw": i.yaw, **vars(i.shape)} for i in (episode.item, *episode.others)
+            {"name": i.name, "x": i.x, "y": i.y, "yaw": i.yaw, **to_document(i.shape)}
+            for i in (episode.item, *episode.others)
         ],
         "values": spec.values,
         "peak_N": max((float(f[:, 2].max()) for f in track.force), default=0.0),

@@ -8,14 +8,14 @@ their weighted mean.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from mpm.discretisation.particles import Seeds
 from mpm.output.snapshot import Snapshot
-from mpm.scene.shapes import FLAT_TOP, Shape, half_width, surface
+from mpm.scene.shapes import Shape, span, surface
 
 NEAR = 16  # particles that a vertex goes with
 AROUND = 64  # vertices of a ring
@@ -37,17 +37,21 @@ class Half:
     triangles: np.ndarray
 
 
-def half_of(shape: Shape, spacing: float) -> Half:
-    """The surface of the part at y >= 0, whose cut face is y = 0.
+def half_of(shape: Shape, spacing: float, side: float = 1.0) -> Half:
+    """The surface of the part on one side of the cut, whose cut face is y = 0.
 
     Args:
         shape: The outline.
         spacing: Distance of the rings beside the cut [m].
+        side: 1 for the part at y > 0, -1 for the other.
+
+    Returns:
+        Its vertices and triangles.
     """
-    b = shape.ends[1]
-    count = max(int(np.ceil(np.pi / 2 * b / spacing)), 4)
+    b = shape.ends[1] if side > 0 else shape.ends[0]
+    count = max(int(np.ceil(np.pi / 2 * abs(b) / spacing)), 4)
     rings = [_ring(shape, b * float(np.sin(np.pi / 2 * t))) for t in np.linspace(0.0, 1.0, count + 1)]
-    middle = [np.array([[0.0, ring[0, 1], ring[:, 2].mean()]]) for ring in (rings[0], rings[-1])]
+    middle = [_middle(ring) for ring in (rings[0], rings[-1])]
     face, end = (
         [centre + (ring - centre) * part for part in np.arange(1, DISCS) / DISCS]
         for ring, centre in zip((rings[0], rings[-1]), middle, strict=True)
@@ -63,25 +67,32 @@ def half_of(shape: Shape, spacing: float) -> Half:
         triangles.append(np.stack([low + around, low + after, high + after], axis=1))
         triangles.append(np.stack([low + around, high + after, high + around], axis=1))
     triangles.append(np.stack([np.full(AROUND, last), first[-1] + around, first[-1] + after], axis=1))
-    return Half(points, np.concatenate(triangles)[:, ::-1])
+    return Half(points, np.concatenate(triangles)[:, :: -1 if side > 0 else 1])
+
+
+def _middle(ring: np.ndarray) -> np.ndarray:
+    """The middle of a ring, half-way between its flanks, shape (1, 3)."""
+    x = ring[:, 0]
+    return np.array([[(x.min() + x.max()) / 2, ring[0, 1], ring[:, 2].mean()]])
 
 
 def _ring(shape: Shape, y: float) -> np.ndarray:
     """Vertices (AROUND, 3) around the section at y: over its top towards -x, down, below it towards +x, and up."""
-    w = half_width(shape, y)
-    upright = AROUND // 4 if shape.kind in FLAT_TOP else 0  # vertices of each side, where there are sides
+    left, right = span(shape, y)
+    middle, w = (left + right) / 2, (right - left) / 2
+    upright = AROUND // 4 if shape.walled else 0  # vertices of each side, where there are sides
     part = np.arange(AROUND // 2 - upright) / (AROUND // 2 - upright)
-    side = np.arange(upright) / max(upright, 1)
-    x = w * np.cos(np.pi * part)
-    inner = (1 - ROUNDING) * np.array([x, np.full_like(x, y)])
-    floor, roof = surface(shape, *inner)
+    up = np.arange(upright) / max(upright, 1)
+    x, inner = w * np.cos(np.pi * part), 1 - ROUNDING
+    floor, roof = surface(shape, middle + inner * x, np.full_like(x, inner * y))
     low, high = np.nan_to_num([floor[0], roof[0]], nan=shape.height / 2)
-    below = surface(shape, -inner[0], inner[1])[0]
+    below, above = surface(shape, middle - inner * x, np.full_like(x, inner * y))
+    base, crest = np.nan_to_num([below[0], above[0]], nan=shape.height / 2)
     parts = [
-        (x, np.nan_to_num(roof, nan=low)),
-        (np.full_like(side, -w), high + (low - high) * side),
-        (-x, np.nan_to_num(below, nan=low)),
-        (np.full_like(side, w), low + (high - low) * side),
+        (middle + x, np.nan_to_num(roof, nan=low)),
+        (np.full_like(up, middle - w), crest + (base - crest) * up),
+        (middle - x, np.nan_to_num(below, nan=base)),
+        (np.full_like(up, middle + w), low + (high - low) * up),
     ]
     return np.concatenate([np.stack([a, np.full_like(a, y), z], axis=1) for a, z in parts])
 
@@ -100,12 +111,12 @@ class Surface:
     """
 
     def __init__(self, shape: Shape, seeds: Seeds, mirrors: tuple[bool, bool]) -> None:
-        left, right = (half_of(replace(shape, cut=side * shape.cut), seeds.spacing) for side in (-1.0, 1.0))
-        places = {-1.0: left.points * [1.0, -1.0, 1.0], 1.0: right.points}
+        left, right = (half_of(shape, seeds.spacing, side) for side in (-1.0, 1.0))
+        places = {-1.0: left.points, 1.0: right.points}
         self._mirrored = mirrors[1]
         sides = (-1.0,) if self._mirrored else (-1.0, 1.0)
         self._carried = [_Carried(places[side], seeds.x, side, mirrors[0]) for side in sides]
-        self.triangles = np.concatenate([left.triangles[:, ::-1], right.triangles + len(left.points)])
+        self.triangles = np.concatenate([left.triangles, right.triangles + len(left.points)])
         self.rest = np.concatenate(list(places.values()))
 
     def points(self, now: Snapshot) -> np.ndarray:

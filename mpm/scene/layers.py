@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mpm.scene.material import Material
-from mpm.scene.shapes import FLAT_DOWN, FLAT_TOP, PRISMS, Shape, half_width, inside, radius2
+from mpm.scene.shapes import FLAT_DOWN, FLAT_TOP, Shape, depth, half_width, inside, radius2, span, surface
 
 SUBSAMPLES = 8  # points along each side of a particle's square of the section
 SECTION_SAMPLES = 400  # points along the width and along the height of a whole section
@@ -91,6 +91,8 @@ def _section(shape: Shape, x: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 def _within(shape: Shape, points: np.ndarray, thickness: float) -> np.ndarray:
     """Which points (n, 3) lie in the outline shrunk by a thickness [m] on all sides that have a rind, shape (n,)."""
+    if shape.table is not None:
+        return depth(shape, points, thickness) >= thickness
     x, y, z = points.T
     floor = 0.0 if shape.kind in FLAT_DOWN else thickness
     if shape.kind == "block":
@@ -107,7 +109,22 @@ def _within(shape: Shape, points: np.ndarray, thickness: float) -> np.ndarray:
 def _in_core(shape: Shape, points: np.ndarray, ratio: float) -> np.ndarray:
     """Which points (n, 3) lie in the core, whose radius is a part of the outline's, shape (n,)."""
     x, y, z = points.T
+    if shape.table is not None:
+        return _in_tabulated_core(shape, points, ratio)
     middle = 0.0 if shape.kind in FLAT_DOWN else shape.height / 2
-    along = y if shape.kind in PRISMS else (y + shape.cut) / ratio - shape.cut
+    along = y if shape.prism else (y + shape.cut) / ratio - shape.cut
     up = z if shape.kind == "upright_cylinder" else (z - middle) / ratio + middle
     return inside(shape, np.column_stack([x / ratio, along, up]))
+
+
+def _in_tabulated_core(shape: Shape, points: np.ndarray, ratio: float) -> np.ndarray:
+    """The same about the line through the middles of the sections, which may be bent."""
+    assert shape.table is not None
+    x, y, z = points.T
+    along = y if shape.prism else (y + shape.cut) / ratio - shape.cut
+    middle = np.array([sum(span(shape, float(v))) / 2 for v in np.unique(along)])[
+        np.unique(along, return_inverse=True)[1]
+    ]
+    floor, roof = surface(shape, middle, along)
+    level = 0.0 if shape.table.halved else (floor + roof) / 2
+    return inside(shape, np.column_stack([middle + (x - middle) / ratio, along, level + (z - level) / ratio]))

@@ -364,7 +364,7 @@ class Scene:
 
     @property
     def mirrors(self) -> tuple[bool, bool]:
-        """Whether x = 0 and y = 0 are used as mirrors: only where the motion allows and they mirror the grid.
+        """Whether x = 0 and y = 0 are used as mirrors: only where motion and outline allow and they mirror the grid.
 
         They do with nodes on them, and x = 0 also half-way between nodes.
         """
@@ -372,8 +372,9 @@ class Scene:
         cohesive = self.numerics.contact == "cohesive"
         on = self.numerics.mirror and self.numerics.grid_turn == 0
         straight = self.motion.slice_ratio == 0 and self.motion.tilt == 0
-        even = self.food.shape.cut == 0
-        return on and straight and float(2 * sx).is_integer(), on and cohesive and even and float(sy).is_integer()
+        along, across = self.food.shape.symmetric
+        free = on and straight and along
+        return free and float(2 * sx).is_integer(), on and cohesive and across and float(sy).is_integer()
 
     @property
     def mirrored_between(self) -> bool:
@@ -386,7 +387,11 @@ class Scene:
 
     def as_dict(self) -> dict[str, Any]:
         """All numbers of the scene as plain data, for provenance and for the key of a stored run."""
-        return asdict(self)
+        out, outline = asdict(self), self.food.shape.outline
+        del out["food"]["shape"]["outline"]
+        if outline is not None:
+            out["food"]["shape"]["outline"] = outline.as_dict()
+        return out
 
 
 # Width of a crack band of grid-smoothed damage, in cells (docs/theory.md, "Measured choices").

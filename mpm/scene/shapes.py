@@ -8,6 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mpm.scene.errors import SceneError, check_number
+from mpm.scene.outline import Outline, Sections
+from mpm.scene.profiles import TABLES, profile
+from mpm.scene.surface_distance import surface_distance
 
 SHAPE_KINDS = (
     "block",
@@ -18,7 +21,9 @@ SHAPE_KINDS = (
     "hemisphere",
     "ellipsoid",
     "capsule",
+    *TABLES,
 )
+OUTLINE = "outline"  # kind of a shape whose outline was measured
 PRISMS = ("block", "cylinder", "half_cylinder", "capsule")  # shapes with parallel sides, alike all along y
 FLAT_DOWN = ("half_cylinder", "hemisphere")
 FLAT_TOP = ("block", "upright_cylinder")
@@ -31,11 +36,12 @@ class Shape:
     A cylinder lies along y, an upright one stands on its end.
 
     Attributes:
-        kind: One of :data:`SHAPE_KINDS`.
+        kind: One of :data:`SHAPE_KINDS`, or ``outline`` where it was measured.
         length: Along y [m].
-        width: Along x [m].
+        width: Along x, over all [m].
         height: Along z [m].
         cut: Place of the blade along y from the food's middle [m].
+        outline: What was measured, None for the other kinds.
     """
 
     kind: str
@@ -43,9 +49,12 @@ class Shape:
     width: float
     height: float
     cut: float = 0.0
+    outline: Outline | None = None
 
     def __post_init__(self) -> None:
-        if self.kind not in SHAPE_KINDS:
+        if (self.kind == OUTLINE) != (self.outline is not None):
+            raise SceneError(f"shape: kind {self.kind!r}; a measured outline, and nothing else, has the kind {OUTLINE}")
+        if self.kind not in (*SHAPE_KINDS, OUTLINE):
             raise SceneError(f"shape: unknown kind {self.kind!r}; one of {', '.join(SHAPE_KINDS)}")
         for name in ("length", "width", "height"):
             check_number("shape", name, getattr(self, name), 1e-3, 1.0, "m")
@@ -58,6 +67,35 @@ class Shape:
     def ends(self) -> tuple[float, float]:
         """Where the food begins and ends along y [m], the blade being at 0."""
         return -self.length / 2 - self.cut, self.length / 2 - self.cut
+
+    @property
+    def table(self) -> Sections | None:
+        """Its tabulated sections, None where it has a closed form."""
+        if self.outline is not None:
+            return self.outline.sections
+        return profile(self.kind) if self.kind in TABLES else None
+
+    @property
+    def symmetric(self) -> tuple[bool, bool]:
+        """Whether x = 0 and the plane of the blade are mirrors of it."""
+        table = self.table
+        along, across = (True, True) if table is None else table.symmetric
+        return along, across and self.cut == 0
+
+    @property
+    def words(self) -> str:
+        """What it is called: its kind, or the file of a measured outline and how that was read."""
+        return self.kind if self.outline is None else f"{self.kind} of {self.outline.source} ({self.outline.how})"
+
+    @property
+    def prism(self) -> bool:
+        """Whether its sides are parallel, so that its sections are alike all along y."""
+        return self.kind in PRISMS if self.table is None else self.table.prism
+
+    @property
+    def walled(self) -> bool:
+        """Whether its flanks are upright."""
+        return self.kind in FLAT_TOP if self.table is None else self.table.walled
 
 
 def radius2(shape: Shape, x: np.ndarray, y: np.ndarray, thinner: float = 0.0) -> np.ndarray:
@@ -82,8 +120,19 @@ def radius2(shape: Shape, x: np.ndarray, y: np.ndarray, thinner: float = 0.0) ->
     return (x / a) ** 2 + (y / b) ** 2
 
 
+def span(shape: Shape, y: float) -> tuple[float, float]:
+    """Where the section at y begins and ends along the blade [m], both 0 where there is none."""
+    if shape.table is None:
+        half = half_width(shape, y)
+        return -half, half
+    left, right = (float(side) for side in shape.table.span(_along(shape, np.array(y))))
+    return (shape.width / 2 * left, shape.width / 2 * right) if right > left else (0.0, 0.0)
+
+
 def half_width(shape: Shape, y: float) -> float:
-    """Half of the width of the section at y [m], 0 where there is none."""
+    """Half of the width about x = 0 that holds the section at y [m], 0 where there is none."""
+    if shape.table is not None:
+        return max(abs(side) for side in span(shape, y))
     if shape.kind == "block":
         return shape.width / 2 if abs(y + shape.cut) <= shape.length / 2 else 0.0
     r2 = float(radius2(shape, np.zeros(1), np.array([y]))[0])
@@ -102,6 +151,9 @@ def surface(shape: Shape, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.
         ``(bottom, top)`` [m], NaN where there is no food above the point.
     """
     x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+    if shape.table is not None:
+        bottom, top = shape.table.surface(x / (shape.width / 2), _along(shape, y))
+        return shape.height * bottom, shape.height * top
     if shape.kind == "block":
         inside = (np.abs(x) <= shape.width / 2) & (np.abs(y + shape.cut) <= shape.length / 2)
         return np.where(inside, 0.0, np.nan), np.where(inside, shape.height, np.nan)
@@ -122,9 +174,27 @@ def inside(shape: Shape, points: np.ndarray) -> np.ndarray:
         return (points[:, 2] >= bottom) & (points[:, 2] <= top)
 
 
+def depth(shape: Shape, points: np.ndarray, most: float = math.inf) -> np.ndarray:
+    """How deep points of a tabulated food lie below its surface; the face where a food was halved is none.
+
+    Args:
+        shape: The outline.
+        points: Places in the food [m], shape (n, 3).
+        most: Depth that is asked for [m]; what lies deeper may be given as infinite.
+
+    Returns:
+        Distances [m], shape (n,).
+    """
+    assert shape.table is not None  # other kinds are shrunk in closed form
+    distance = surface_distance(shape.table, shape.length, shape.width, shape.height)
+    return distance(points + np.array([0.0, shape.cut, 0.0]), most)
+
+
 def volume(shape: Shape) -> float:
-    """Volume of the food [m^3], closed form."""
+    """Volume of the food [m^3], in closed form where there is one."""
     box = shape.length * shape.width * shape.height
+    if shape.table is not None:
+        return box * shape.table.volume
     if shape.kind == "block":
         return box
     if shape.kind in ("cylinder", "half_cylinder", "upright_cylinder"):
@@ -138,6 +208,8 @@ def volume(shape: Shape) -> float:
 
 def section_area(shape: Shape) -> float:
     """Area of the section in the blade plane y = 0 [m^2]: what a complete cut severs."""
+    if shape.table is not None:
+        return shape.width * shape.height * shape.table.area(2 * shape.cut / shape.length)
     width = 2 * half_width(shape, 0.0)
     if shape.kind in FLAT_TOP:
         return width * shape.height
@@ -159,6 +231,8 @@ def skin_path(shape: Shape, x: np.ndarray, thickness: float) -> np.ndarray:
         Way through the skin [m], shape (n,), 0 where there is no food.
     """
     x = np.asarray(x, float)
+    if shape.table is not None:
+        return _skin_above(shape, x, thickness)
     bottom, top = surface(shape, x, np.zeros_like(x))
     inner_width = max(shape.width - 2 * thickness, 1e-9)
     r2 = radius2(shape, x, np.zeros_like(x), thickness)
@@ -173,6 +247,29 @@ def skin_path(shape: Shape, x: np.ndarray, thickness: float) -> np.ndarray:
     return np.nan_to_num(np.maximum(top - inner_top, 0.0))
 
 
+def _skin_above(shape: Shape, x: np.ndarray, thickness: float) -> np.ndarray:
+    """The same of a tabulated food: the way from its top to where it is as deep as the skin is thick."""
+    bottom, top = surface(shape, x, np.zeros_like(x))
+    way = (top - bottom)[:, None] * np.linspace(0.0, 1.0, SKIN_SAMPLES)
+    there = np.isfinite(way)
+    points = np.stack(np.broadcast_arrays(x[:, None], 0.0, top[:, None] - way), -1)
+    deep = np.zeros_like(way)
+    deep[there] = np.minimum(depth(shape, points[there], 2 * thickness), 2 * thickness)
+    out = np.nan_to_num(way[:, -1])
+    rows = np.flatnonzero((deep >= thickness).any(axis=1))
+    k = np.maximum((deep[rows] >= thickness).argmax(axis=1), 1)
+    before, after = deep[rows, k - 1], deep[rows, k]
+    part = np.clip((thickness - before) / np.maximum(after - before, 1e-12), 0.0, 1.0)
+    out[rows] = way[rows, k - 1] + part * (way[rows, k] - way[rows, k - 1])
+    return out
+
+
+def _along(shape: Shape, y: np.ndarray) -> np.ndarray:
+    """Places across the blade [m] over the half length, from the food's middle [-]."""
+    return np.asarray((y + shape.cut) / (shape.length / 2))
+
+
+SKIN_SAMPLES = 200  # points down a food at which its skin is looked for
 SLICE_SAMPLES = 64
 """Points at which a slice's outline is looked up: an even number, so that none lies where the rim of a food of whole or
 half cells does. There the last bit would decide whether it counts (docs/theory.md, "Measured choices")."""

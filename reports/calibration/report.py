@@ -177,7 +177,8 @@ def _content(done: Finished) -> Data:
 
 def _specimen(shape: Shape) -> str:
     sizes = " × ".join(plain(1e3 * size) for size in (shape.length, shape.width, shape.height))
-    return f"{in_words(shape.kind)}, {sizes} mm (across the blade, along it, height)"
+    name = in_words(shape.kind) if shape.outline is None else breakable(shape.words)
+    return f"{name}, {sizes} mm (across the blade, along it, height)"
 
 
 def _knife(knife: Knife) -> Data:

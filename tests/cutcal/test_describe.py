@@ -9,6 +9,7 @@ from matplotlib import image as plt_image
 
 from cutcal.main import main
 from tests.calib.made_cuts import made_cut, plain_rows, text_of
+from tests.calib.made_outlines import half_ellipsoid, mesh
 from tests.data_dir import ROOT
 
 TRACE = ROOT / "force_data" / "banana_reconstructed.csv"
@@ -29,6 +30,18 @@ def test_check_says_what_a_fit_would_start_from(tmp_path: Path, capsys, monkeypa
     assert said["specimen"].startswith("cylinder") and said["specimen"].split(" mm")[0].endswith("30")
     assert said["fitted"] == "E, R" and said["budget"].startswith("100 simulations")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_check_names_the_file_of_an_outline(tmp_path: Path, capsys) -> None:
+    """The specimen is that of the mesh, with its sizes; a size beside it is one line."""
+    path = mesh(tmp_path / "food.stl", *half_ellipsoid(15, 30, 30))
+    argv = ["calibrate", "--check", "--food", "banana", "--trace", str(TRACE), "--outline", str(path), "--scale", "mm"]
+    assert main(argv) == 0
+    said = capsys.readouterr().out
+    assert "outline of food.stl (mesh, mm, z up, y across), 60 x 30 x 30 mm" in said
+    assert "--width" not in said and "--length" not in said
+    assert main([*argv, "--width", "30mm"]) == 1
+    assert capsys.readouterr().err.startswith("cutcal: --width beside --outline: food.stl says how large")
 
 
 def test_check_refuses_what_a_fit_would_refuse(tmp_path: Path, capsys) -> None:

@@ -116,6 +116,18 @@ def test_the_request_is_that_of_the_command_line() -> None:
         assert curve.trace.source == ("DataFrame" if trace is frame else "banana_reconstructed.csv")
 
 
+def test_an_outline_is_that_of_the_command_line(tmp_path: Path) -> None:
+    """A file's sizes and hash reach the request, and the call that is kept names it."""
+    (tmp_path / "egg.csv").write_text("y_mm,radius_mm\n0,0\n30,20\n60,0\n")
+    made = Calibration("banana", BANANA, outline=tmp_path / "egg.csv", outline_as="half")
+    request = made.request()
+    assert (request.sizing.length, request.sizing.height) == pytest.approx((0.06, 0.02))
+    assert request.sizing.outline is not None and request.sizing.outline.source == "egg.csv"
+    assert "egg.csv" in request.command[0] and "outline_as='half'" in request.command[0]
+    with pytest.raises(CutcalError, match="--height beside --outline"):
+        Calibration("banana", BANANA, outline=tmp_path / "egg.csv", outline_as="half", height=0.02)
+
+
 def test_arrays_have_a_hash_and_a_name_of_their_own() -> None:
     """A trace made of arrays is told from a file: by its name, and by a hash that follows every number."""
     trace = Trace.read(BANANA)

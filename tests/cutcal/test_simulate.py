@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import sys
 from pathlib import Path
@@ -14,6 +15,7 @@ from calib.trace.trace import read_trace
 from cutcal.main import main
 from mpm.output.energy import doubts
 from tests.calib.documents import valid
+from tests.calib.made_outlines import half, picture
 
 
 def test_simulate_writes_a_force_record_that_reads_back(tmp_path: Path, capsys):
@@ -45,6 +47,17 @@ def test_simulate_cuts_where_it_is_told(tmp_path: Path, capsys):
     assert summary["severed"] and small / (large + small) == pytest.approx(5 / 32, abs=0.01)
     assert main([*argv[:-3], "--at", "0.99", "--out", str(tmp_path / "end")]) != 0
     assert "leaves a slice of" in capsys.readouterr().err
+
+
+def test_simulate_keeps_where_an_outline_comes_from(tmp_path: Path, capsys):
+    """Name, hash and scale of a picture, in a document that its schema knows."""
+    path = picture(tmp_path / "p.png", half(100, 70))
+    argv = ["simulate", "--food", "strawberry", "--outline", str(path), "--scale", "0.1mm/px", "--outline-as", "half"]
+    assert main([*argv, "--stroke", "2mm", "--threads", "1", "--json", "--out", str(tmp_path / "cut")]) == 0
+    shape = valid(json.loads(capsys.readouterr().out))["shape"]
+    sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+    assert shape["kind"] == "outline"
+    assert shape["outline"] == {"source": "p.png", "sha256": sha256, "how": "half, 0.1mm/px"}
 
 
 def test_simulate_says_what_was_not_cut(tmp_path: Path, capsys):

@@ -45,7 +45,7 @@ def description(request: Request, png: Path | None = None) -> str:
         ("contact", f"at {c.onset_s:.4g} s +- {c.onset_sd_s:.2g}; the stroke ends at {c.end_s:.4g} s"),
         ("stroke", f"{1e3 * c.stroke_length_m:.4g} mm, from {SOURCES[c.stroke_source]}"),
         ("peak", f"{c.peak_N:.4g} N +- {c.peak_sd_N:.2g}, noise {c.noise_sd_N:.2g} N a sample"),
-        ("specimen", f"{shape.kind}, {sizes} mm (across the blade, along it, height)"),
+        ("specimen", f"{shape.words}, {sizes} mm (across the blade, along it, height)"),
         ("knife", f"{knife.name}{blade}"),
         ("cells", f"{1e3 * scene.numerics.dx:.3g} mm, screening on {1e3 * setup.coarse.numerics.dx:.3g} mm"),
         ("fitted", ", ".join(p.name for p in setup.objective.parameters)),

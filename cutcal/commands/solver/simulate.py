@@ -14,6 +14,7 @@ from calib.io.folder import prepare, write_csv, write_json
 from calib.io.progress import Countdown, clock
 from calib.io.provenance import git_commit, versions
 from calib.io.schema import tag
+from calib.io.typed_document import to_document
 from calib.material.food import FoodSpec
 from calib.material.knife import load_knife
 from calib.material.scene import blade_warnings, cut_scene, specimen
@@ -257,7 +258,7 @@ def _summary(
         "mach": scene.motion.mach,
         "contact": scene.numerics.contact,
         "constants": {constant.key: constant.value(scene) for constant in CONSTANTS},
-        "shape": vars(scene.food.shape),
+        "shape": to_document(scene.food.shape),
         "speed_real_m_s": args.speed,
         "seed": args.seed,
         "device": args.arch,

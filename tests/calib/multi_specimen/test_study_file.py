@@ -48,6 +48,17 @@ def test_a_study_is_read_with_paths_from_its_folder(tmp_path: Path) -> None:
     assert study.compressions[0].traces == (tmp_path / "one.csv", tmp_path / "two.csv")
 
 
+def test_a_trace_of_a_study_has_its_own_outline(tmp_path: Path) -> None:
+    """A file beside the study; what is wrong with it is said with its place."""
+    (tmp_path / "egg.csv").write_text("y_mm,radius_mm\n0,0\n30,20\n60,0\n")
+    text = GOOD.replace("width: 0.03", "outline: egg.csv, outline_as: half, at: 0.25")
+    sizing = read_study(written(tmp_path, text)).requests["a"].sizing
+    assert (sizing.length, sizing.width, sizing.height, sizing.at) == pytest.approx((0.06, 0.04, 0.02, 0.25))
+    assert sizing.outline is not None and sizing.outline.how == "half"
+    with pytest.raises(CutcalError, match=r"study.yaml: traces.a: .*egg.csv: .*leave --scale out"):
+        read_study(written(tmp_path, text.replace("at: 0.25", "scale: 1mm/px")))
+
+
 def test_each_is_all_in_turn(tmp_path: Path) -> None:
     """hold_out: each names every cut, and no compression test."""
     study = read_study(written(tmp_path, GOOD.replace("hold_out: b", "hold_out: each")))

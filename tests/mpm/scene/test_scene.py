@@ -14,6 +14,7 @@ from mpm.output.record import _moving_mean
 from mpm.scene import Food, Knife, Motion, Numerics, Scene
 from mpm.scene.errors import SceneError
 from mpm.scene.material import Material
+from mpm.scene.profiles import TABLES
 from mpm.scene.shapes import SHAPE_KINDS, Shape, inside, section_area, skin_path, slices, surface, volume
 
 MATERIAL = Material(E=1e6, nu=0.35, rho=1000.0)
@@ -54,15 +55,17 @@ def test_particles_add_up_to_the_food(kind, mirror, cut):
     sc = scene(kind, mirror=mirror)
     sc = replace(sc, food=replace(sc.food, shape=replace(sc.food.shape, cut=cut)))
     seeds = seed(sc)
-    images = (2 if mirror else 1) * (2 if mirror and cut == 0 else 1)
-    assert sc.mirrors == (mirror, mirror and cut == 0)
+    along, across = sc.food.shape.symmetric
+    assert (along, across) == (kind != "bent", cut == 0 and kind not in ("pear", "cone"))
+    images = (2 if mirror and along else 1) * (2 if mirror and across else 1)
+    assert sc.mirrors == (mirror and along, mirror and across)
     assert seeds.total * images == pytest.approx(volume(sc.food.shape), rel=1e-12)
     assert inside(sc.food.shape, seeds.x).all()
     assert seeds.volume == pytest.approx(seeds.spacing**3, rel=0.06)
     assert (seeds.board_gap >= 0).all() and seeds.board_gap.max() <= seeds.spacing
-    if mirror:
+    if mirror and along:
         assert seeds.x[:, 0].min() >= 0
-    if images == 4:
+    if mirror and across:
         assert seeds.x[:, 1].max() <= 0
     else:
         near = np.abs(seeds.x[:, 1]) < seeds.spacing
@@ -87,7 +90,7 @@ def test_a_blade_beside_the_food_or_at_its_very_end_is_refused():
 @pytest.mark.parametrize("mirror", [True, False])
 def test_far_from_the_cut_a_particle_stands_for_a_cell_across_the_blade(kind, mirror):
     """Half as many, within the food an eighth; those beside the cut, the mass and its middle are the same, and so is
-    the outline."""
+    the outline: what lies on the board to 3 %, of foods that taper to 7 %."""
     far, sc = 6e-3, scene(kind, mirror=mirror)
     all_, some = seed(sc), seed(replace(sc, numerics=replace(sc.numerics, far=far)))
     assert some.total == pytest.approx(all_.total, rel=1e-12) and set(some.volume_ratio) <= {1.0, 2.0, 8.0}
@@ -97,7 +100,7 @@ def test_far_from_the_cut_a_particle_stands_for_a_cell_across_the_blade(kind, mi
     assert len(some.x) - len(b) < 0.7 * (len(all_.x) - len(a))
     outer = some.bottom | some.top
     assert some.volume_ratio[outer].max() == 2.0 and some.areas @ some.bottom == pytest.approx(
-        all_.areas @ all_.bottom, rel=0.03
+        all_.areas @ all_.bottom, rel=0.07 if kind in TABLES else 0.03
     )
     assert (some.beside == (np.abs(some.x[:, 1]) < some.spacing)).all()
     np.testing.assert_array_equal(np.bincount(some.owner), some.volume_ratio)
