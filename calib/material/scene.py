@@ -113,6 +113,11 @@ def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple
                 f"above it, and {low * 1e3:.0f} to {high * 1e3:.0f} mm are possible; give --height if you measured it"
             )
     height = default.height if height is None else height
+    if sizing.shape is None and sizing.outline is None:
+        said.append(
+            f"the specimen's shape is not known: it is taken for the food's, {default.kind}; another one has another "
+            "stiffness and resistance at the same force; give --outline if you have a picture of it, or --shape"
+        )
     width = sizing.width
     if width is None:
         width = default.width * height / default.height * spread(default.kind)

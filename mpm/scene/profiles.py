@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import CubicSpline
 
 from mpm.scene.outline import ALONG, Sections, bent, places, revolved
 
@@ -22,7 +22,9 @@ SLENDER = 0.22
 """Its largest diameter over its length."""
 TAPER = 0.55
 """Part of its half length at each end over which it tapers."""
-TABLES = ("pear", "cone", "bent")
+FULL = 4
+"""Exponent of a barrel along its axis: 2 is an ellipsoid, and a cylinder has no end to it."""
+TABLES = ("pear", "cone", "bent", "barrel", "half_barrel")
 """Kinds of shapes that are made here."""
 
 
@@ -31,6 +33,8 @@ def profile(kind: str) -> Sections:
     """The table of a kind, one of :data:`TABLES`."""
     if kind == "bent":
         return _banana()
+    if kind in ("barrel", "half_barrel"):
+        return revolved((1 - np.abs(places(ALONG)) ** FULL) ** (1 / FULL), halved=kind == "half_barrel")
     return revolved(_radius(*(PEAR if kind == "pear" else CONE)))
 
 
@@ -43,9 +47,9 @@ def spread(kind: str) -> float:
 
 
 def _radius(at: tuple[float, ...], size: tuple[float, ...]) -> np.ndarray:
-    """Radius at the places of a table, through given ones without overshoot; round at both ends."""
+    """Radius at the places of a table, smooth through given ones; round at both ends."""
     v = places(ALONG)
-    squared = PchipInterpolator(at, np.square(size))(v)
+    squared = CubicSpline(at, np.square(size))(v)
     radius = np.sqrt(np.maximum(squared, 0.0))
     return np.asarray(radius / radius.max())
 

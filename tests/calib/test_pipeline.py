@@ -88,7 +88,8 @@ def test_height_follows_the_stroke():
     assert height_range(food, trace(loaded=False), Sizing()) is None
     assert height_range(food, trace(loaded=True), Sizing(height=0.05)) is None
     assert "under load" in words[0] and "released" in said[0]
-    assert any("width" in w for w in words)
+    assert any("width" in w for w in words) and any("shape is not known" in w and "cylinder" in w for w in words)
+    assert not any("shape" in w for w in specimen(food, trace(loaded=True), Sizing("block"))[1])
 
 
 def test_given_sizes_are_taken_and_not_assumed():
