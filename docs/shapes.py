@@ -36,7 +36,7 @@ def main(picture: Path) -> None:
     plot = pyvista.Plotter(off_screen=True, window_size=list(SIZE), shape=(1, len(FOODS)), border=False)
     for k, (name, kind, colour) in enumerate(FOODS):
         plot.subplot(0, k)
-        shape, _ = specimen(load_food(name), None, Sizing(kind, length=None if name != "banana" else 0.18))
+        shape, _ = specimen(load_food(name), None, Sizing(kind))
         plot.add_mesh(halves(shape), color=colour, ambient=0.25, specular=0.2)
         plot.add_text(f"{name}, --shape {kind}", position=(0.05, 0.9), viewport=True, font_size=10, color="black")
         plot.camera_position = [tuple(MIDDLE + 5 * EYE), tuple(MIDDLE), (0.0, 0.0, 1.0)]
