@@ -103,8 +103,9 @@ class OutlineFile:
         way = self._way(path)
         if self.scale is None:
             raise ShapeError(f"{path}: a picture has no scale; say how large a pixel is, such as --scale 0.1mm/px")
-        points, pixel = outline_in(path, content, scale_of(self.scale))
-        return silhouette.food_of(path, points, pixel, way), f"{way}, {self.scale}"
+        seen = outline_in(path, content, scale_of(self.scale))
+        sized = silhouette.food_of(path, seen.points, seen.pixel, way)
+        return replace(sized, said=(*seen.said, *sized.said)), f"{way}, {self.scale}"
 
     def _mesh(self, path: Path, content: bytes) -> tuple[Sized, str]:
         """The food of a mesh, and how it was read."""

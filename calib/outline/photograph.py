@@ -7,6 +7,7 @@ Man Cybern. 9:62), and the outline is the contour at that level, finer than a pi
 from __future__ import annotations
 
 import io
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -29,9 +30,27 @@ SOLID = 0.35
 BLUR = 1.0
 """Standard deviation by which a picture is smoothed against noise [pixels]; straight edges stay where they are."""
 LEVELS = 256  # of the threshold
+VARIED, SHARP, EDGE = 0.25, 0.03, 2.0
+"""An outline is sharp where the threshold, a quarter lower and higher, changes its area by no more than this part, or
+moves it by no more than so many pixels."""
 
 
-def silhouette(path: Path, content: bytes, scale: float) -> tuple[FloatArray, float]:
+@dataclass(frozen=True, eq=False)
+class Silhouette:
+    """The outline of the food in a picture.
+
+    Attributes:
+        points: Corners of a closed polygon, to the right and upwards in the picture [m], shape (k, 2).
+        pixel: Size of a pixel that was looked at [m].
+        said: What must be known of it, one sentence each.
+    """
+
+    points: FloatArray
+    pixel: float
+    said: tuple[str, ...] = ()
+
+
+def silhouette(path: Path, content: bytes, scale: float) -> Silhouette:
     """The outline of the food in a photograph.
 
     Args:
@@ -40,8 +59,7 @@ def silhouette(path: Path, content: bytes, scale: float) -> tuple[FloatArray, fl
         scale: Size of a pixel [m].
 
     Returns:
-        Corners of a closed polygon, to the right and upwards in the picture [m], shape (k, 2); and the size of a pixel
-        that was looked at [m].
+        The outline.
 
     Raises:
         ShapeError: It is no picture, or has not one food with a closed outline in it.
@@ -64,7 +82,20 @@ def silhouette(path: Path, content: bytes, scale: float) -> tuple[FloatArray, fl
             "own hull; fill the silhouette, or photograph the whole food before an even background"
         )
     pixel = smaller * scale
-    return np.column_stack([x, -y])[:-1] * pixel, pixel
+    return Silhouette(np.column_stack([x, -y])[:-1] * pixel, pixel, _doubts(path, field, level, food, points))
+
+
+def _doubts(path: Path, field: FloatArray, level: float, food: np.ndarray, points: FloatArray) -> tuple[str, ...]:
+    """What is said of an edge that is not sharp, as beside a shadow: other levels give other outlines."""
+    low, high = (int(ndimage.binary_fill_holes(field > part * level).sum()) for part in (1 - VARIED, 1 + VARIED))
+    vague = (low - high) / int(food.sum())
+    around = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    if vague <= SHARP or low - high <= EDGE * around:
+        return ()
+    return (
+        f"{path.name}: the outline is not sharp, {vague:.0%} of the food's area may as well be background, perhaps a "
+        "shadow; light it evenly, or cut the background away",
+    )
 
 
 def _read(path: Path, content: bytes) -> tuple[Image.Image, int]:

@@ -19,6 +19,8 @@ ROUGH = 2.5
 """Unevenness of an outline that is taken for the picture's [pixels]."""
 LEVEL = 0.01
 """The same over the height."""
+FOLD = 0.03
+"""A line across may leave the food for this part of the silhouette's height and enter it again: hairs, a rough edge."""
 CURVED = 0.05
 """A middle line that leaves its axis by more than this part of the length is said to be bent."""
 ROUND = 1.02
@@ -113,7 +115,8 @@ def _flanks(
     low, high = float(points[:, 0].min()), float(points[:, 0].max())
     x = lines(low, high, at)
     found = crossings(of_polygon(points), x)
-    check_once(str(path), found, x - low, ROUGH * pixel, "line across the silhouette")
+    allowed = max(ROUGH * pixel, FOLD * float(np.ptp(points[:, 1])))
+    check_once(str(path), found, x - low, allowed, "line across the silhouette")
     return low, high, found.low, found.high
 
 

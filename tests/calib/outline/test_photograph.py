@@ -49,6 +49,27 @@ def test_noise_dust_and_highlights_do_not_move_the_outline(tmp_path):
     assert volume(found) == pytest.approx(volume(Shape("ellipsoid", 0.09, 0.06, 0.06)), rel=1e-2)
 
 
+def test_a_shadow_is_said(tmp_path):
+    """A soft one under the food makes its edge vague; the same picture without it has nothing to say."""
+    path = picture(tmp_path / "p.png", ellipse(90, 50))
+    assert OutlineFile(path, "0.5mm/px", "revolved").sizing(Sizing()).said == ()
+    image = np.asarray(Image.open(path)).astype(float)
+    z, x = np.mgrid[0:160, 0:240]
+    dark = 100 * np.exp(-((np.hypot((x - 120) / 95, (z - 95) / 55) / 0.95) ** 8))
+    shaded = np.where(image[..., :1] < 200, image, image - dark[..., None])
+    Image.fromarray(np.clip(shaded, 0, 255).astype(np.uint8)).save(path)
+    (said,) = OutlineFile(path, "0.5mm/px", "revolved").sizing(Sizing()).said
+    assert "not sharp" in said and "shadow" in said
+
+
+def test_a_rough_edge_is_no_overhang(tmp_path):
+    """A twig that hardly stands out, and a crack of three pixels, are left to the envelope."""
+    twig = picture(tmp_path / "p.png", lambda x, z: ellipse(90, 70)(x, z) | ((np.abs(x - 30) < 2) & (z > 0) & (z < 72)))
+    rough = picture(tmp_path / "r.png", lambda x, z: ellipse(90, 70)(x, z) & ~((np.abs(z - 20) < 1.4) & (x > 55)))
+    for path in (twig, rough):
+        assert volume(food(path, "revolved")) == pytest.approx(volume(Shape("ellipsoid", 0.09, 0.07, 0.07)), rel=0.02)
+
+
 def test_transparency_is_an_outline_too(tmp_path):
     """Of a picture with its background cut away the food is what is left, whatever its colour; and the scale counts."""
     path = picture(tmp_path / "p.png", ellipse(100, 60))
