@@ -154,9 +154,10 @@ def blade_warnings(shape: Shape, knife: Knife) -> list[str]:
     wide, beyond = right - left, max(right, -left) - knife.length / 2
     if beyond <= knife.length / 2 * 1e-9:
         return []
+    side = "each" if right == -left else "one"
     return [
         f"the food is {wide * 1e3:.0f} mm wide where it is cut and the blade {knife.length * 1e3:.0f} mm long: "
-        f"{beyond * 1e3:.1f} mm on each side stay uncut and hold the halves together; give --width if "
+        f"{beyond * 1e3:.1f} mm on {side} side stay uncut and hold the halves together; give --width if "
         "you measured it, or a longer knife"
     ]
 

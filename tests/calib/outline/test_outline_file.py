@@ -123,6 +123,12 @@ def test_a_bent_default_is_as_thick_as_the_food():
     assert shape.width > 1.3 * straight.width and shape.height == straight.height
 
 
+def test_a_bent_food_lies_beyond_one_end_of_the_blade():
+    """What stays uncut is on the side of the bend."""
+    (said,) = blade_warnings(Shape("bent", 0.18, 0.1, 0.05), load_knife("edc"))
+    assert "17.5 mm on one side" in said
+
+
 def test_a_document_keeps_where_an_outline_comes_from(files):
     """Name, hash and way go to the document and come back, the table does not; other shapes have no word of it."""
     sized = OutlineFile(files / "m.stl", "mm").sizing(Sizing())

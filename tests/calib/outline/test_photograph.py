@@ -49,6 +49,12 @@ def test_noise_dust_and_highlights_do_not_move_the_outline(tmp_path):
     assert volume(found) == pytest.approx(volume(Shape("ellipsoid", 0.09, 0.06, 0.06)), rel=1e-2)
 
 
+def test_a_drawing_is_its_outer_line(tmp_path):
+    """A closed line with something drawn in it is one food."""
+    path = picture(tmp_path / "p.png", lambda x, z: (np.abs(np.hypot(x, z) - 58) < 2) | ellipse(20, 20)(x, z))
+    assert volume(food(path, "revolved")) == pytest.approx(volume(Shape("sphere", 0.06, 0.06, 0.06)), rel=0.01)
+
+
 def test_a_shadow_is_said(tmp_path):
     """A soft one under the food makes its edge vague; the same picture without it has nothing to say."""
     path = picture(tmp_path / "p.png", ellipse(90, 50))

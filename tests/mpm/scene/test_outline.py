@@ -106,6 +106,8 @@ def test_a_bent_food_has_its_middle_aside_and_its_core_with_it():
     assert tip[0] < left and tip[1] < middle < right
     core = toughness(banana, FRUIT, np.array([[middle, 0, 0.015], [middle + 0.01, 0, 0.015], [middle, 0, 0.0295]]))
     assert core.tolist() == [30.0, 80.0, 500.0]
+    beside = np.array([[middle + x, 0, 0.015] for x in (-0.0085, -0.0065, 0.0065, 0.0085)])
+    assert toughness(banana, FRUIT, beside).tolist() == [80.0, 30.0, 30.0, 80.0]
     assert not inside(banana, np.array([[left - 1e-3, 0, 0.015]]))[0]
 
 
