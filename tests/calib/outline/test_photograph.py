@@ -94,6 +94,17 @@ def test_a_large_picture_is_made_smaller_with_its_scale(tmp_path):
     assert food(path, "revolved", "24px/mm").width == pytest.approx(0.06, rel=5e-3)
 
 
+def test_a_camera_that_was_held_upside_down_says_so(tmp_path):
+    """A half that lies on its back in the file, with the camera's mark of a turn by 180 degrees."""
+    path = picture(tmp_path / "p.jpg", lambda x, z: half(100, 70)(x, -z))
+    with pytest.raises(ShapeError, match="is level"):
+        food(path, "half")
+    turned = Image.Exif()
+    turned[0x0112] = 3
+    Image.open(path).save(path, exif=turned)
+    assert food(path, "half").height == pytest.approx(0.035, rel=0.01)
+
+
 def test_left_of_the_picture_is_left_of_the_blade(tmp_path):
     """A pear with its body on the left is thick at y < 0; an upright one stands on its body."""
 
