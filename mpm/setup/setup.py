@@ -208,9 +208,10 @@ class Setup:
         path = skin_path(scene.food.shape, xs, material.skin_thickness) if material.skin_thickness > 0 else 0 * xs
         out = np.empty((len(xs), column.N_SLICE))
         out[:, : column.SOFTENING] = np.transpose(outline(scene.food.shape, xs, scene.numerics.dx))
-        out[:, column.TOP_POWER :] = 1.0
+        powers = slice(column.TOP_POWER, column.STARTED)
+        out[:, powers] = 1.0
         if material.layered:
-            out[:, column.TOP_POWER :] = np.transpose(slice_powers(scene.food.shape, xs, scene.numerics.dx))
+            out[:, powers] = np.transpose(slice_powers(scene.food.shape, xs, scene.numerics.dx))
         out[:, column.STARTED] = self._started()
         out[:, column.SOFTENING], out[:, column.TOP_TOUGHNESS] = scene.edge.slip + path, self._top_toughness(material)
         return out

@@ -194,3 +194,14 @@ def test_simulate_halves_around_a_stone(tmp_path: Path, capsys):
     assert [one["ended"] for one in around["passes"]] == ["stroke"] * 3 and not around["severed"]
     assert 0.7 < around["severed_part"] < 0.95 and around["peak_N"] < 12
     assert {p.name for p in (tmp_path / "cut").iterdir()} >= {"force.csv", "force-2.csv", "force-3.csv"}
+
+
+def test_an_arm_that_stalls_on_a_stone_has_not_passed(tmp_path: Path, capsys):
+    """An arm with a stiffness stalls at its limit, and the stone is named; a food that is not cut through passes."""
+    argv = ["simulate", "--food", "cherry", "--dx", "2.4e-3", "--threads", "1", "--stone"]
+    arm = ["--arm-stiffness", "5000", "--force-limit", "8", "--stroke", "0.011"]
+    assert main([*argv, *arm, "--out", str(tmp_path / "stalled")]) == 2
+    said = capsys.readouterr()
+    assert "not severed: stone at z = " in said.out and "not passed" not in said.err
+    assert main([*argv, "--stroke", "0.003", "--out", str(tmp_path / "above")]) == 0
+    assert "not severed: " in capsys.readouterr().out

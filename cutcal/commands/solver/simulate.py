@@ -63,11 +63,8 @@ CRUSHED = (
 )
 EPILOG = """example:
   cutcal simulate --food cucumber --knife edc --out runs/cucumber
-
-Exit codes: 0 done, 1 error in input or run, 2 done, but the arm stopped at its
---force-limit with food left to cut, or the energies say that the force is not
-to be trusted: more than 10 % of the work is taken by no law, or kinetic energy
-is more than 10 % of the internal one."""
+Exit codes: 0 done, 1 error in input or run, 2 done, but --force-limit left food
+uncut, or over 10 % of the work is booked by no law or kinetic (docs/cli.md)."""
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
@@ -205,8 +202,14 @@ def run(args: argparse.Namespace) -> int:
         print(_words(food.name, scene, record, out) if done is None else f"{food.name}: {done.words()}; wrote {out}")
     if record.status != "done":
         return 1
-    parted = done.severed if done is not None else record.ended != LIMIT or record.severed
+    parted = done.severed if done is not None else not _stopped(record)
     return 2 if doubted or not parted else 0
+
+
+def _stopped(record: ForceRecord) -> bool:
+    """Whether what the arm bears, or a stone, kept the blade from parting the food."""
+    met = record.pieces is not None and record.pieces.stone_met is not None
+    return not record.severed and (met or record.ended == LIMIT)
 
 
 def _scene(args: argparse.Namespace, food: FoodSpec, shape: Shape) -> Scene:
