@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mpm.kernels.time_step import advance
 from mpm.output.record import ForceRecord
 from mpm.run import REST, CutRun
 from mpm.runtime import Runtime
@@ -12,6 +11,7 @@ from mpm.scene import Scene
 from mpm.solver import Simulation, state_of
 from mpm.state import host_transfer
 from mpm.state.state import Configuration
+from mpm.step.time_step import advance
 
 
 def simulate_together(scenes: Sequence[Scene], *, runtime: Runtime | None = None) -> list[ForceRecord]:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpm.output.record import ForceRecord
+from mpm.output.record import BOARD, LIMIT, STROKE, ForceRecord
 from mpm.output.recorder import Interval, Recorder
 from mpm.output.section import SectionRecorder
 from mpm.output.snapshot import Snapshot, SnapshotRecorder
@@ -84,6 +84,7 @@ class CutRun:
             (math.ceil(motion.retract / (speed * self.dt)), speed, 0.0),
         ]
         self._total = sum(steps for steps, _, _ in self._phases)
+        self._limited = scene.arm.rigid and scene.arm.force_limit is not None
         self._left, self._batch, self._asked = self._phases[0][0], 1, 0.0
         self._began = clock.perf_counter()
 
@@ -98,13 +99,18 @@ class CutRun:
         return pressed_home(self._scene, self._recorder.intervals)
 
     @property
+    def stopped(self) -> bool:
+        """Whether a rigid arm has stopped at its force limit."""
+        return beyond_limit(self._scene, self._recorder.intervals)
+
+    @property
     def fraction(self) -> float:
         """Part of the motion that is done [-]."""
         return 1.0 if self.home and self.status == "done" else self._recorder.steps / self._total
 
     def order(self) -> Order | None:
         """The steps to do next; None at the end, or where the run cannot go on."""
-        if self.status != "done" or self.home:
+        if self.status != "done" or self.home or self.stopped:
             return None
         while self._left == 0 and len(self._phases) > 1:
             del self._phases[0]
@@ -133,9 +139,10 @@ class CutRun:
             steps = min(self._every, self._left)
             self._left -= steps
             recorder.book(report, steps, self.dt)
-            if self.status != "done" or self.home:
+            if self.status != "done" or self.home or self.stopped:
                 break
-        if clock.perf_counter() - self._asked < PATIENCE / 2:
+        # where a limit ends the motion, the food must not go on beyond the interval in which it does
+        if clock.perf_counter() - self._asked < PATIENCE / 2 and not self._limited:
             self._batch *= 2
         if self._progress is not None and self.status == "done":
             self._progress(recorder.steps / self._total, float(recorder.force[2]))
@@ -151,7 +158,8 @@ class CutRun:
         wall = clock.perf_counter() - self._began
         pieces = topology() if self.status == "done" else None
         record = self._recorder.record(pieces, dt=self.dt, fraction=self.fraction, wall=wall)
-        return replace(record, section=self._sections.section())
+        ended = LIMIT if self.stopped else BOARD if self.home else STROKE
+        return replace(record, section=self._sections.section(), ended=ended)
 
 
 def pressed_home(scene: Scene, intervals: Sequence[Interval]) -> bool:
@@ -159,3 +167,17 @@ def pressed_home(scene: Scene, intervals: Sequence[Interval]) -> bool:
     motion, height = scene.motion, scene.food.shape.height
     down = len(intervals) > 1 and all(interval.stroke > height - ON_BOARD for interval in intervals[-2:])
     return down and motion.stroke > height and motion.retract == 0
+
+
+def beyond_limit(scene: Scene, intervals: Sequence[Interval]) -> bool:
+    """Whether the force on the knife is beyond what a rigid arm bears, its ripple over a cell of the way left out.
+
+    The force on the edge is that of the last interval: a stone makes it rise within a few of them. That on the faces
+    carries the ripple of the grid and is a mean over the last cell.
+    """
+    limit = scene.arm.force_limit
+    if limit is None or not scene.arm.rigid or not intervals:
+        return False
+    last = intervals[-1]
+    within = [one.face[2] for one in intervals if one.stroke > last.stroke - scene.numerics.dx]
+    return bool(last.edge[2] + np.mean(within) > limit)

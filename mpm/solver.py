@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from mpm.kernels.time_step import advance
 from mpm.output.record import ForceRecord
 from mpm.output.snapshot import Snapshot, SnapshotRecorder, snapshot
 from mpm.output.topology import Topology, topology
@@ -18,9 +18,11 @@ from mpm.scene.errors import SimulationError
 from mpm.scene.material import Material
 from mpm.setup.parameters import pose
 from mpm.setup.setup import Setup
+from mpm.setup.stone import half_of_stone
 from mpm.state import host_transfer
 from mpm.state.state import Configuration, State
-from mpm.state.tables import EPS0, EPSF
+from mpm.state.tables import EPS0, EPSF, STONE_MET, STONE_MIDDLE, STONE_TURN
+from mpm.step.time_step import advance
 
 KEPT = 3  # states that a process keeps: of the default cells, of coarse ones and of one scene more
 _kept: dict[tuple[int, Configuration], State] = {}
@@ -130,7 +132,21 @@ class Simulation:
             table = self.state.par.to_numpy()[self.place]
             kappa = np.maximum(now.kappa, table[EPS0])
             damage = 1 - table[EPS0] / kappa * np.exp(-(kappa - table[EPS0]) / (table[EPSF] - table[EPS0]))
-        return topology(self.setup.seeds, mirrors, half.astype(int), now.side > 0, np.linalg.det(now.F), damage)
+        stony = self.scene.food.stony(self.setup.seeds.x)
+        if stony.any():
+            half[stony] = max(half_of_stone(self.scene.food), 0)
+        swell = np.linalg.det(now.F)
+        found = topology(self.setup.seeds, mirrors, half.astype(int), now.side > 0, swell, damage, stony)
+        return found if self.scene.food.stone is None else replace(found, **self._stone())
+
+    def _stone(self) -> dict[str, Any]:
+        """Where the stone is now, and where the edge met it."""
+        table = self.state.stone_pose.to_numpy()[self.place]
+        met = float(table[STONE_MET])
+        return {
+            "stone": tuple(float(x) for x in table[STONE_MIDDLE:STONE_TURN]),
+            "stone_met": met if met >= 0 else None,
+        }
 
 
 def state_of(configuration: Configuration, serial: int) -> State:

@@ -19,6 +19,7 @@ from calib.io.wording import listed
 from calib.io.yaml_checks import Dumper, Place, check_keys, choice, data_path, mapping, read_yaml, suggest, text
 from calib.material.properties import (
     DIMENSIONS,
+    INCLUSIONS,
     LAYERS,
     OPTIONAL_KEYS,
     PROPERTIES,
@@ -64,6 +65,8 @@ class FoodSpec:
         properties: By name; a property the food has no value for (null in the file) is absent.
         calibration: Provenance of a calibrated food, or None.
         not_modelled: What a real one has and the simulated one has not, such as a stone, or None.
+        inclusions: Sizes of ``stone`` and ``cavity`` [m], as far as the food has them, by name; a cut has them where it
+            is asked for them (:func:`calib.material.inclusions.with_inclusions`).
 
     Raises:
         MaterialError: Unknown shape, a missing property, or a skin without resistance.
@@ -75,11 +78,15 @@ class FoodSpec:
     properties: Mapping[str, Property]
     calibration: Mapping[str, Any] | None = field(default=None, compare=False)
     not_modelled: str | None = None
+    inclusions: Mapping[str, Mapping[str, Property]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         here = Place("", (self.name,))
         choice(here.at("shape").at("kind"), self.shape_kind, SHAPE_KINDS)
         check_keys(here.at("shape"), self.dims, DIMENSIONS)
+        check_keys(here, self.inclusions, (), INCLUSIONS)
+        for name, sizes in self.inclusions.items():
+            check_keys(here.at(name), sizes, DIMENSIONS)
         needed = [p for p in PROPERTIES if p not in _NULLABLE]
         check_keys(here.at("properties"), self.properties, needed, _NULLABLE, SYNONYMS)
         if self.properties["skin_thickness"].value > 0.0 and "R_skin" not in self.properties:
@@ -241,7 +248,8 @@ class FoodSpec:
         have = {n: p.as_dict() for n, p in self.properties.items()}
         said = {} if self.not_modelled is None else {"not_modelled": self.not_modelled}
         named = [n for n in PROPERTIES if n in have or n not in _OF_LAYERS]
-        return {**said, "shape": shape, "properties": {n: have.get(n) for n in named}}
+        held = {n: {d: p.as_dict() for d, p in sizes.items()} for n, sizes in self.inclusions.items()}
+        return {**said, "shape": shape, **held, "properties": {n: have.get(n) for n in named}}
 
 
 def load_foods(path: Path | str | None = None) -> dict[str, FoodSpec]:
@@ -316,7 +324,7 @@ def dump_material(food: FoodSpec, path: Path | str, provenance: Mapping[str, Any
 
 def _read_food(place: Place, raw: Any) -> FoodSpec:
     food = mapping(place, raw)
-    check_keys(place, food, ("shape", "properties"), ("not_modelled",))
+    check_keys(place, food, ("shape", "properties"), ("not_modelled", *INCLUSIONS))
     said = text(place.at("not_modelled"), food["not_modelled"]) if "not_modelled" in food else None
     shape = mapping(place.at("shape"), food["shape"])
     given = mapping(place.at("properties"), food["properties"])
@@ -324,12 +332,19 @@ def _read_food(place: Place, raw: Any) -> FoodSpec:
     needed = [n for n in PROPERTIES if n not in _OF_LAYERS]
     check_keys(place.at("properties"), given, needed, _OF_LAYERS, SYNONYMS)
     dims = {n: read_property(place.at("shape"), n, shape[n]) for n in DIMENSIONS}
+    held = {n: _read_sizes(place.at(n), food[n]) for n in INCLUSIONS if n in food}
     have = [n for n in PROPERTIES if given.get(n) is not None or n not in _NULLABLE]
     properties = {n: read_property(place.at("properties"), n, given[n]) for n in have}
     try:
-        return FoodSpec(place.path[-1], shape["kind"], dims, properties, not_modelled=said)
+        return FoodSpec(place.path[-1], shape["kind"], dims, properties, not_modelled=said, inclusions=held)
     except MaterialError as e:
         raise replace(place, path=()).error(str(e)) from None
+
+
+def _read_sizes(place: Place, raw: Any) -> dict[str, Property]:
+    given = mapping(place, raw)
+    check_keys(place, given, DIMENSIONS, synonyms=SYNONYMS)
+    return {n: read_property(place, n, given[n]) for n in DIMENSIONS}
 
 
 def read_property(parent: Place, name: str, raw: Any) -> Property:

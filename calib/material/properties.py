@@ -97,6 +97,9 @@ DIMENSIONS: dict[str, Rule] = {
     "height": Rule("m", 1e-3, 1.0, "size along z, up"),
 }
 
+INCLUSIONS = ("stone", "cavity")
+"""What may lie in a food; each has a length, a width and a height."""
+
 
 @dataclass(frozen=True)
 class Source:

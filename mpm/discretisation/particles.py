@@ -9,7 +9,7 @@ import numpy as np
 
 from mpm.scene import Numerics, Scene
 from mpm.scene.errors import SceneError
-from mpm.scene.shapes import inside, surface, volume
+from mpm.scene.shapes import surface
 
 MAX_PARTICLES = 20_000_000
 JITTER = 0.25
@@ -136,9 +136,9 @@ def seed(scene: Scene) -> Seeds:
         first = counts[1] - right
         offsets[cells[:, 1] == first] = offsets[cells[:, 1] == first - 1] * [1, -1, 1]
     points = origin + (cells + 0.5 + offsets) * h
-    there = inside(shape, points)
+    there = scene.food.filled(points)
     points, cells = points[there], cells[there] - [0, counts[1] - right, 0]
-    lattice = volume(shape) / (2 if mirror_x else 1) / (2 if mirror_y else 1) / len(points)
+    lattice = scene.food.volume / (2 if mirror_x else 1) / (2 if mirror_y else 1) / len(points)
     owner, bulk = _thin(cells, num, mirror_x)
     points = np.stack([np.bincount(owner, axis) for axis in points.T], axis=1) / bulk[:, None]
     floor, roof = surface(shape, points[:, 0], points[:, 1])

@@ -12,6 +12,7 @@ from mpm.state.tables import (
     CUTTING_WORK,
     DX,
     EDGE,
+    EDGE_BAND,
     FIRST_STATION,
     INV_DX,
     LAYERED,
@@ -22,6 +23,7 @@ from mpm.state.tables import (
     ORIGIN_Z,
     SECOND_OFFSET,
     SLIP,
+    SPACING,
     TILT_COS,
     TILT_SIN,
     ZONE,
@@ -36,7 +38,7 @@ EMPTY_ZONE = 0.15  # filled less than this the zone carries no edge; at the boar
 
 @ti.func
 def apply_edge_law(s: ti.template(), cut: ti.template()):
-    """Find the edge's reaction on every slice, give it to the grid, and see how the material moves then."""
+    """Find the edge's reaction on every slice, and give it to the grid."""
     ti.loop_config(serialize=s.serial)
     for q in range(repetitions(s, cut, SLICES)):
         c, i, mine = locate_active(s, cut, q, SLICES)
@@ -52,6 +54,11 @@ def apply_edge_law(s: ti.template(), cut: ti.template()):
         c, i, mine = locate_active(s, cut, q, SLICES)
         if mine and i >= s.plane_x:
             apply_reaction(s, c, i)
+
+
+@ti.func
+def follow_slices(s: ti.template(), cut: ti.template()):
+    """See how the material moves about every slice, after the edge's reaction and what else acts on the grid."""
     ti.loop_config(serialize=s.serial)
     for q in range(repetitions(s, cut, SLICES)):
         c, i, mine = locate_active(s, cut, q, SLICES)
@@ -80,6 +87,9 @@ def find_reaction(s: ti.template(), cut, i, dt):
     if s.par[cut, LAYERED] > 0:
         part = begun ** s.top_power[cut, i] - ended ** s.floor_power[cut, i]
     width = s.par[cut, DX] * s.width[cut, i] * part
+    if ti.static(s.hollow):
+        if s.start_force[cut, i] > 0:
+            width = ti.cast(part > 0, float) * tied_width(s, cut, i)
     full = SURFACE_FILL * s.par[cut, ZONE_MASS] * width * s.par[cut, INV_DX]
     if width > 0 and mass > EMPTY_ZONE * full:
         c, t = ti.cast(s.pose[cut, TILT_COS], float), ti.cast(s.pose[cut, TILT_SIN], float)
@@ -100,6 +110,17 @@ def find_reaction(s: ti.template(), cut, i, dt):
                 s.front_drift[cut, i] = mean[2] * dt
     else:
         s.slip[cut, i] = ti.Vector.zero(float, 2)
+
+
+@ti.func
+def tied_width(s: ti.template(), cut, i):
+    """Width of flesh in slice i that the edge is cutting, by the ties that it passes [m].
+
+    Each of them stands for its part of the section, so a slice that lies half in a stone or a cavity has half of its
+    width, and what is cut in all is the flesh's area, wherever that has moved.
+    """
+    many = 2.0 / multiplicity_x(s, cut, i) if ti.static(s.mirror_x) else 1.0  # half of the middle one is modelled
+    return many * s.at_edge[cut, i][1] * s.par[cut, SPACING] ** 2 / (s.par[cut, EDGE_BAND] * s.par[cut, DX])
 
 
 @ti.func

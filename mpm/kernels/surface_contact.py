@@ -7,6 +7,7 @@ from mpm.kernels.crack import particle_half
 from mpm.kernels.signed_distance import adhesive_traction, blade_distance, rounded_blade_distance, stick_slip
 from mpm.kernels.tool import blade_velocity, book_impulse, book_knife_impulse, edge_height, under_blade
 from mpm.state.accessors import to_grid_axes, to_scene_axes, velocity_gradient
+from mpm.state.state import IN_STONE
 from mpm.state.tables import (
     ADHESION,
     ADHESION_GAP,
@@ -201,7 +202,10 @@ def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
     touching = False
     dv, lift, wide = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
     tall = s.par[cut, BLADE_HEIGHT] + 0.5 * s.par[cut, SPINE] + s.par[cut, SPACING]
-    if -s.par[cut, SPACING] < above < tall and under_blade(s, cut, at[0]):
+    meets = -s.par[cut, SPACING] < above < tall and under_blade(s, cut, at[0])
+    if ti.static(s.stone):  # a stone meets the blade as a whole (mpm.kernels.stone)
+        meets = meets and s.adhering[cut, p] != IN_STONE
+    if meets:
         sign = 1.0 if particle_half(s, cut, p) == 1 else -1.0
         gap, high = s.tool_gap[cut, p], s.par[cut, SPACING] * s.face_rise[cut, p]
         press, normal, turned, middle = press_face(s, cut, p, sign, high, at)

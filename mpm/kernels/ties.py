@@ -138,7 +138,9 @@ def pull_tie(s: ti.template(), cut, n, dt):
         tough = s.tie_toughness[cut, n]
         rest = tough * (1.0 - work_spent(s.largest_opening[cut, n], end)) if left > 0 else 0.0
         charge_edge(s, cut, at[0], weight * ti.Vector([rest, tough, 1.0]))
-        if s.par[cut, LAYERED] > 0:
+        if ti.static(s.hollow):
+            count_layer(s, cut, at[0], tough, s.tie_share[cut, n] * weight)
+        elif s.par[cut, LAYERED] > 0:
             count_layer(s, cut, at[0], tough, s.tie_share[cut, n] * weight)
 
 

@@ -17,6 +17,10 @@ ENERGIES = ("kinetic", "elastic", "plastic", "damage", "viscous", "friction", "p
 A cut with a cohesive crack has one more, :data:`COHESION`."""
 COHESION = "cohesion"
 """What the food has taken where it opened across the cut plane by itself, ahead of the edge."""
+STROKE, BOARD, LIMIT = "stroke", "board", "force_limit"
+ENDINGS = (STROKE, BOARD, LIMIT)
+"""Why a motion ends: as commanded, with the edge pressed on the board by an arm that yields, or where the force on the
+knife reached the most that a rigid arm bears."""
 LEAST_CUT = 5
 """Stroke [cells] from which the cost of parting is asked for: the new area is known to a row of cells, its fifth."""
 
@@ -69,6 +73,7 @@ class ForceRecord:
             parts it.
         cohesion: Energy that the ties of a cohesive crack have taken so far, where the food opened ahead of the edge
             [J], shape (n,); None without one.
+        ended: Why the motion ended, one of :data:`ENDINGS`; a run that broke down has its reason in ``status``.
     """
 
     stroke: np.ndarray
@@ -108,6 +113,7 @@ class ForceRecord:
     section: Section | None = None
     resistance: float = math.nan
     cohesion: np.ndarray | None = None
+    ended: str = STROKE
 
     @property
     def knife(self) -> np.ndarray:
@@ -143,6 +149,14 @@ class ForceRecord:
     def severed(self) -> bool:
         """Whether the food is in two or more pieces."""
         return self.pieces is not None and self.pieces.complete
+
+    @property
+    def severed_part(self) -> float | None:
+        """Part of the flesh's section that the edge has passed [-], None when the run broke down."""
+        if self.pieces is None:
+            return None
+        whole = self.severed_area + self.pieces.uncut_area
+        return self.severed_area / whole if whole > 0 else 1.0
 
     @property
     def work(self) -> float:
@@ -278,6 +292,10 @@ class ForceRecord:
             "components": len(self.pieces.volumes) if self.pieces is not None else None,
             "volumes_m3": list(self.pieces.volumes) if self.pieces is not None else None,
             "cut": self.pieces.words() if self.pieces is not None else None,
+            "severed_part": self.severed_part,
+            "ended": self.ended,
+            "stone_m": list(self.pieces.stone) if self.pieces is not None and self.pieces.stone is not None else None,
+            "stone_met_m": self.pieces.stone_met if self.pieces is not None else None,
             "momentum_residual": self.momentum_residual,
             "ke_over_ie": self.ke_over_ie,
             "counters": dict(self.counters),

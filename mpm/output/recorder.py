@@ -12,7 +12,6 @@ from mpm.output.record import ForceRecord
 from mpm.output.topology import Topology
 from mpm.scene.layers import mean_toughness
 from mpm.scene.material import Material
-from mpm.scene.shapes import section_area
 from mpm.setup.setup import Setup
 from mpm.state import tables as row
 from mpm.state.tables import Report, parts_of_report
@@ -163,7 +162,8 @@ class Recorder:
         """
         setup, material, scene = self._setup, self._material, self._setup.scene
         cohesive = scene.cuts and scene.numerics.contact != "nodal"
-        section = section_area(scene.food.shape)
+        food = scene.food
+        section = food.section_area
         parted = section - pieces.uncut_area if pieces is not None else 0.0
         return ForceRecord(
             stroke=self._column("stroke"),
@@ -200,6 +200,6 @@ class Recorder:
             wall=wall,
             status=self.status,
             fraction=fraction,
-            resistance=mean_toughness(scene.food.shape, material, parted / section) if cohesive else math.nan,
+            resistance=mean_toughness(food.shape, material, parted / section, food.crossed) if cohesive else math.nan,
             cohesion=np.cumsum(self._column("cohesion")) if scene.tied else None,
         )

@@ -24,6 +24,8 @@ class Topology:
         uncut_area: Area of the section that still holds [m^2].
         uncut_x: From where to where along the blade it holds [m], None when the cut is complete.
         uncut_height: Height above the board up to which it holds, in the uncut food [m].
+        stone: Middle of the food's stone now [m], (x, y, z); None where there is none.
+        stone_met: Height above the board at which the edge met the stone [m]; None where it did not.
     """
 
     volumes: tuple[float, ...]
@@ -31,6 +33,8 @@ class Topology:
     uncut_area: float
     uncut_x: tuple[float, float] | None
     uncut_height: float
+    stone: tuple[float, ...] | None = None
+    stone_met: float | None = None
 
     @property
     def complete(self) -> bool:
@@ -45,9 +49,10 @@ class Topology:
         if self.uncut_x is None:
             return "one piece: the food holds together although the edge has passed the whole section"
         a, b = (1e3 * x for x in self.uncut_x)
+        why = "" if self.stone_met is None else f"stone at z = {self.stone_met * 1e3:.1f} mm; "
         return (
-            f"not severed: {self.uncut_area * 1e6:.0f} mm^2 of the section hold, from x = {a:.0f} to {b:.0f} mm and up "
-            f"to {self.uncut_height * 1e3:.1f} mm above the board"
+            f"not severed: {why}{self.uncut_area * 1e6:.0f} mm^2 of the section hold, from x = {a:.0f} to {b:.0f} mm "
+            f"and up to {self.uncut_height * 1e3:.1f} mm above the board"
         )
 
 
@@ -58,11 +63,13 @@ def topology(
     severed: np.ndarray,
     swell: np.ndarray,
     damage: np.ndarray,
+    stony: np.ndarray | None = None,
 ) -> Topology:
     """Find the pieces.
 
     Two particles hold together when they were neighbours in the lattice of the uncut food, unless the cut went between
-    them (both sides of the plane, one of them passed by the edge) or one of them is broken by bulk damage.
+    them (both sides of the plane, one of them passed by the edge) or one of them is broken by bulk damage. A stone is
+    of one half.
 
     Args:
         seeds: The particles at rest, n of them.
@@ -71,14 +78,17 @@ def topology(
         severed: Whether the edge has passed it [-], shape (n,).
         swell: Volume over volume at rest [-], shape (n,).
         damage: Bulk damage [-], shape (n,).
+        stony: Whether it is in the stone [-], shape (n,); None where there is no stone.
 
     Returns:
         What the cut has left.
     """
+    stony = np.zeros(len(half), bool) if stony is None else stony
     cells, image, half = seeds.cells, seeds.owner, half[seeds.owner]
     if mirrors[1]:
         cells = np.concatenate([cells, cells * [1, -1, 1] - [0, 1, 0]])
-        half, image = np.concatenate([half, 1 - half]), np.concatenate([image, image])
+        half = np.concatenate([half, np.where(stony[seeds.owner], half, 1 - half)])
+        image = np.concatenate([image, image])
     if mirrors[0]:
         cells = np.concatenate([cells, cells * [-1, 1, 1] - [1, 0, 0]])
         half, image = np.concatenate([half, half]), np.concatenate([image, image])
@@ -98,7 +108,7 @@ def topology(
     _, label = connected_components(coo_matrix((np.ones(len(i)), (i, j)), shape=(len(at), len(at))), directed=False)
     volumes = np.sort(np.bincount(label, weights=seeds.volume * swell[image]))[::-1]
     big = volumes > CRUMB * volumes.sum()
-    hold = seeds.beside & ~severed
+    hold = seeds.beside & ~severed & ~stony
     area = float(hold.sum()) * seeds.spacing**2 * (2 if mirrors[0] else 1) / (1 if mirrors[1] else 2)
     x = seeds.x[hold, 0]
     low, high = (float(x.min()), float(x.max())) if len(x) else (0.0, 0.0)

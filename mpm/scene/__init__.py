@@ -1,5 +1,6 @@
 """What is simulated: food, knife, board, motion and numerics as frozen, validated data in SI units."""
 
+from mpm.scene.inclusions import Food, Inclusion, Parted
 from mpm.scene.scene import (
     BAND_CELLS,
     CONTACTS,
@@ -8,7 +9,6 @@ from mpm.scene.scene import (
     Arm,
     Board,
     EdgeLaw,
-    Food,
     Knife,
     Motion,
     Numerics,
@@ -25,9 +25,11 @@ __all__ = [
     "Board",
     "EdgeLaw",
     "Food",
+    "Inclusion",
     "Knife",
     "Motion",
     "Numerics",
+    "Parted",
     "Press",
     "Scene",
 ]

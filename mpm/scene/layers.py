@@ -7,9 +7,12 @@ about that of the flat face; in a food with parallel sides it runs along all of 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.spatial import cKDTree
 
+from mpm.scene.inclusions import Inclusion
 from mpm.scene.material import Material
 from mpm.scene.shapes import FLAT_DOWN, FLAT_TOP, PRISMS, Shape, half_width, inside, radius2
 
@@ -36,10 +39,13 @@ def toughness(shape: Shape, material: Material, points: np.ndarray) -> np.ndarra
     return out
 
 
-def layer_ties(shape: Shape, material: Material, spacing: float, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def layer_ties(
+    shape: Shape, material: Material, spacing: float, places: np.ndarray, without: Sequence[Inclusion] = ()
+) -> tuple[np.ndarray, np.ndarray]:
     """Ties across the cut plane in the layers: each stands for the part of the section that is nearest to it.
 
-    The section is sampled on a lattice finer than the ties', so a rind thinner than their spacing counts by its share.
+    The section is sampled on a lattice finer than the ties', so a rind thinner than their spacing counts by its share,
+    and a tie beside a stone or a cavity for what of it is flesh.
 
     Args:
         shape: The outline.
@@ -47,15 +53,16 @@ def layer_ties(shape: Shape, material: Material, spacing: float, places: np.ndar
         spacing: Distance of the ties [m].
         places: Where they are in the uncut food, along the blade and upwards [m], shape (k, 2); only those at x > 0
             where x = 0 is a mirror.
+        without: Stone and cavity that the blade's plane meets.
 
     Returns:
         Toughness of each, the mean of R over its part [J/m^2], and its part over a square of the spacing [-], (k,).
     """
-    if not material.layered or len(places) == 0:
+    if not (material.layered or without) or len(places) == 0:
         return np.full(len(places), float(material.R)), np.ones(len(places))
     step, mirrored = spacing / SUBSAMPLES, places[:, 0].min() > 0
     x = np.arange(0.0 if mirrored else -shape.width / 2, shape.width / 2, step) + step / 2
-    points = _section(shape, x, np.arange(0.0, shape.height, step) + step / 2)
+    points = _section(shape, x, np.arange(0.0, shape.height, step) + step / 2, without)
     _, owner = cKDTree(places).query(points[:, [0, 2]])
     count = np.bincount(owner, minlength=len(places))
     total = np.bincount(owner, toughness(shape, material, points), len(places))
@@ -63,13 +70,14 @@ def layer_ties(shape: Shape, material: Material, spacing: float, places: np.ndar
     return np.where(count > 0, total / np.maximum(count, 1), own), count / SUBSAMPLES**2
 
 
-def mean_toughness(shape: Shape, material: Material, part: float = 1.0) -> float:
+def mean_toughness(shape: Shape, material: Material, part: float = 1.0, without: Sequence[Inclusion] = ()) -> float:
     """Mean of R over the section of a cut, or over the upper part of it: what new surface costs an area.
 
     Args:
         shape: The outline.
         material: Its constants.
         part: Part of the section's area that is cut, from above [-].
+        without: Stone and cavity that the blade's plane meets.
 
     Returns:
         The mean [J/m^2].
@@ -77,16 +85,19 @@ def mean_toughness(shape: Shape, material: Material, part: float = 1.0) -> float
     if not material.layered:
         return material.R
     even = (np.arange(SECTION_SAMPLES) + 0.5) / SECTION_SAMPLES
-    points = _section(shape, (2 * even - 1) * half_width(shape, 0.0), even * shape.height)
+    points = _section(shape, (2 * even - 1) * half_width(shape, 0.0), even * shape.height, without)
     upper = points[np.argsort(-points[:, 2], kind="stable")][: max(round(part * len(points)), 1)]
     return float(toughness(shape, material, upper).mean())
 
 
-def _section(shape: Shape, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Points (n, 3) of a lattice in the plane of the cut that lie in the food."""
+def _section(shape: Shape, x: np.ndarray, z: np.ndarray, without: Sequence[Inclusion]) -> np.ndarray:
+    """Points (n, 3) of a lattice in the plane of the cut that lie in the flesh of the food."""
     along, up = (axis.ravel() for axis in np.meshgrid(x, z, indexing="ij"))
     points = np.column_stack([along, np.zeros_like(along), up])
-    return points[inside(shape, points)]
+    there = inside(shape, points)
+    for one in without:
+        there &= ~one.holds(shape, points)
+    return points[there]
 
 
 def _within(shape: Shape, points: np.ndarray, thickness: float) -> np.ndarray:

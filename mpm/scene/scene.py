@@ -11,19 +11,11 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from mpm.scene.errors import SceneError, check_number
+from mpm.scene.inclusions import Food
 from mpm.scene.material import Material
-from mpm.scene.shapes import Shape
 
 CONTACTS = ("cohesive", "nodal")
 PRECISIONS = ("f64", "f32")
-
-
-@dataclass(frozen=True)
-class Food:
-    """A shape filled with a material."""
-
-    shape: Shape
-    material: Material
 
 
 @dataclass(frozen=True)
@@ -132,8 +124,8 @@ class Motion:
 class Arm:
     """What holds the knife: a spring between its commanded and its actual height, and the most force it can give.
 
-    Attributes: stiffness [N/m], None = rigid; force_limit [N], None = none. A limit needs a stiffness, as robots have
-    (a Franka arm in impedance control: up to 3000 N/m).
+    Attributes: stiffness [N/m], None = rigid (a Franka arm in impedance control has up to 3000 N/m); force_limit [N],
+    None = none. With a stiffness the arm stalls at the limit, and a rigid one stops: the cut ends there.
     """
 
     stiffness: float | None = None
@@ -144,8 +136,6 @@ class Arm:
             check_number("arm", "stiffness", self.stiffness, 1.0, 1e9, "N/m")
         if self.force_limit is not None:
             check_number("arm", "force_limit", self.force_limit, 0.0, 1e6, "N")
-            if self.rigid:
-                raise SceneError("arm: a rigid arm has no force limit; give arm.stiffness, e.g. 3000 N/m")
 
     @property
     def rigid(self) -> bool:
@@ -269,6 +259,7 @@ class Scene:
                 f"shape: the blade at {shape.cut * 1e3:g} mm from the middle leaves a slice of {least * 1e3:.3g} mm, "
                 f"under 2 cells of {dx * 1e3:g} mm; cut nearer to the middle or use a smaller dx"
             )
+        self.food.check_cells(dx)
         self._check_motion()
         self._check_band()
 
@@ -372,8 +363,9 @@ class Scene:
         cohesive = self.numerics.contact == "cohesive"
         on = self.numerics.mirror and self.numerics.grid_turn == 0
         straight = self.motion.slice_ratio == 0 and self.motion.tilt == 0
-        even = self.food.shape.cut == 0
-        return on and straight and float(2 * sx).is_integer(), on and cohesive and even and float(sy).is_integer()
+        along, across = self.food.mirrors
+        both = on and straight and along and float(2 * sx).is_integer()
+        return both, on and cohesive and across and float(sy).is_integer()
 
     @property
     def mirrored_between(self) -> bool:
@@ -386,7 +378,11 @@ class Scene:
 
     def as_dict(self) -> dict[str, Any]:
         """All numbers of the scene as plain data, for provenance and for the key of a stored run."""
-        return asdict(self)
+        out = asdict(self)
+        for name in ("stone", "cavity", "parted"):
+            if not out["food"][name]:  # what a food has not is no part of it
+                del out["food"][name]
+        return out
 
 
 # Width of a crack band of grid-smoothed damage, in cells (docs/theory.md, "Measured choices").

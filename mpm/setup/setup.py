@@ -17,11 +17,13 @@ from mpm.scene.shapes import skin_path, slice_powers, surface
 from mpm.scene.shapes import slices as outline
 from mpm.setup.parameters import parameters, pose
 from mpm.setup.stable_step import stable_step
+from mpm.setup.stone import half_of_stone, stone_table
 from mpm.state import contents as column
 from mpm.state.contents import Contents
-from mpm.state.state import Configuration
+from mpm.state.state import IN_STONE, Configuration
 
 PARTICLES_PER_THREAD = 20_000  # for which another thread pays (docs/theory.md, "Measured choices")
+STARTED_BEFORE = 1e-9  # line force at which a cut has started that was there before [N/m]
 CLEARANCE = 0.1  # way of the blade above the food before contact, in cells
 
 
@@ -68,11 +70,15 @@ class Setup:
             branches=len(scene.food.material.prony),
             batch=batch_capacity(batch),
             ties=particle_capacity(len(self.ties())) if scene.tied else 0,
+            stone=scene.food.stone is not None,
+            hollow=scene.tied and len(scene.food.crossed + scene.food.parted) > 0,
         )
 
     def ties(self) -> np.ndarray:
-        """Particles that hold the food together across the plane of a cohesive crack, left and right, shape (k, 2)."""
-        return self.seeds.ties(self.scene.mirrors[1]) if self.scene.tied else np.zeros((0, 2), int)
+        """Particles that hold the food together across the plane of a cohesive crack, left and right, shape (k, 2); in
+        a stone there are none."""
+        ties = self.seeds.ties(self.scene.mirrors[1]) if self.scene.tied else np.zeros((0, 2), int)
+        return ties[~self.scene.food.stony(self.seeds.x[ties[:, 0]])]
 
     @property
     def gap(self) -> float:
@@ -110,17 +116,29 @@ class Setup:
             pose=pose(scene.food.shape.height + self.gap, 0.0, scene.motion.tilt),
             relaxation=self._relaxation(material),
             ties=self._ties(material),
-            half=self.seeds.x[:, 1] >= 0 if scene.tied else np.zeros(0),
+            half=self._half() if scene.tied else np.zeros(0),
+            stone=stone_table(scene.food, scene.numerics.dx),
         )
+
+    def _half(self) -> np.ndarray:
+        """Half of the food that each particle belongs to, shape (n,); a stone off the middle is of one."""
+        right: np.ndarray = self.seeds.x[:, 1] >= 0
+        half = half_of_stone(self.scene.food)
+        if half >= 0:
+            right[self.scene.food.stony(self.seeds.x)] = half > 0
+        return right
 
     def _ties(self, material: Material) -> np.ndarray:
         """The table of ties (k, N_TIE)."""
-        return np.column_stack([self.ties(), *self._layers(material)])
+        ties, (toughness, share) = self.ties(), self._layers(material)
+        open_before = self.scene.food.open(self.seeds.x[ties[:, 0]])
+        return np.column_stack([ties, toughness, np.where(open_before, 0.0, share), open_before])
 
     def _layers(self, material: Material) -> tuple[np.ndarray, np.ndarray]:
         """Toughness of each tie [J/m^2] and its part of the section over a square of the spacing [-], shape (k,)."""
         places = self.seeds.x[self.ties()[:, 0]][:, [0, 2]]
-        return layer_ties(self.scene.food.shape, material, self.seeds.spacing, places)
+        food = self.scene.food
+        return layer_ties(food.shape, material, self.seeds.spacing, places, food.crossed)
 
     def _top_toughness(self, material: Material) -> np.ndarray:
         """Toughness of the food within a cell below its upper surface, in each slice [J/m^2], shape (m,)."""
@@ -151,6 +169,7 @@ class Setup:
         out[:, column.SURFACE_VOLUME] = seeds.areas * seeds.board_gap * seeds.bottom
         out[:, column.SURFACE_VOLUME + 1] = seeds.areas * gap * outer
         out[:, column.ADHERING] = np.where(seeds.beside & (material.adhesion > 0), 0, -1)
+        out[self.scene.food.stony(seeds.x), column.ADHERING] = IN_STONE
         return out
 
     def _slices(self, material: Material) -> np.ndarray:
@@ -159,11 +178,20 @@ class Setup:
         path = skin_path(scene.food.shape, xs, material.skin_thickness) if material.skin_thickness > 0 else 0 * xs
         out = np.empty((len(xs), column.N_SLICE))
         out[:, : column.SOFTENING] = np.transpose(outline(scene.food.shape, xs, scene.numerics.dx))
-        out[:, column.TOP_POWER :] = 1.0
+        powers = slice(column.TOP_POWER, column.STARTED)
+        out[:, powers] = 1.0
         if material.layered:
-            out[:, column.TOP_POWER :] = np.transpose(slice_powers(scene.food.shape, xs, scene.numerics.dx))
+            out[:, powers] = np.transpose(slice_powers(scene.food.shape, xs, scene.numerics.dx))
+        out[:, column.STARTED] = self._started()
         out[:, column.SOFTENING], out[:, column.TOP_TOUGHNESS] = scene.edge.slip + path, self._top_toughness(material)
         return out
+
+    def _started(self) -> np.ndarray:
+        """Line force at which a cut has started before in each slice, shape (m,): next to none where an earlier cut has
+        opened the top of the food, else 0."""
+        food, x = self.scene.food, self.grid.stations
+        top = surface(food.shape, x, np.zeros_like(x))[1]
+        return np.where(food.open(np.column_stack([x, np.zeros_like(x), np.nan_to_num(top)])), STARTED_BEFORE, 0.0)
 
     def _relaxation(self, material: Material) -> np.ndarray:
         """Share of each Prony branch, and time step over its time (2, branches)."""

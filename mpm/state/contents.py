@@ -11,10 +11,12 @@ import numpy as np
 POSITION, BOARD_GAP, TOOL_GAP, VOLUME_RATIO, SURFACE_VOLUME, ADHERING = 0, 3, 4, 5, 6, 8
 N_PARTICLE = 9
 TOP_HIGH, TOP_LOW, WIDTH, FLOOR_HIGH, FLOOR_LOW, SOFTENING, TOP_TOUGHNESS, TOP_POWER, FLOOR_POWER = range(9)
-N_SLICE = 9
-# Columns of the table of ties: left and right particle, toughness, part of the section over a square of the spacing.
-LEFT, RIGHT, TOUGHNESS, SHARE = range(4)
-N_TIE = 4
+STARTED = 9
+N_SLICE = 10
+# Columns of the table of ties: left and right particle, toughness, part of the section over a square of the spacing,
+# part of the tie that was cut before.
+LEFT, RIGHT, TOUGHNESS, SHARE, CUT_BEFORE = range(5)
+N_TIE = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,16 +30,18 @@ class Contents:
             first nodes.
         particles: Table, shape (n, N_PARTICLE): position in the grid's axes, distances at which board and tool are met
             [m], volume over that of a particle beside the cut [-], reference volumes before the board and before the
-            tool [m^3], 0 for a surface that can stick and -1 for others.
+            tool [m^3], 0 for a surface that can stick, -2 in a stone and -1 for others.
         slices: Table, shape (m, N_SLICE): outline of the food in each slice [m], the slip over which the edge's
-            resistance falls [m], the toughness below its upper surface [J/m^2], and the powers with which upper and
-            lower surface are passed [-].
+            resistance falls [m], the toughness below its upper surface [J/m^2], the powers with which upper and
+            lower surface are passed [-], and the force at which a cut has started there before [N/m], 0 where none has.
         parameters: Shape (N_PARAMETERS,), rows as in :mod:`mpm.state.tables`.
         pose: Of the tool, shape (N_POSE,), rows as in :mod:`mpm.state.tables`.
         relaxation: Share of each Prony branch [-], and time step over its time [-], shape (2, branches).
         ties: Table of the ties across the cut plane, shape (k, N_TIE): left and right particle, -1 for a mirror image,
-            toughness [J/m^2], and part of the section over a square of the spacing [-]; none without a cohesive crack.
+            toughness [J/m^2], part of the section over a square of the spacing [-], and part that was cut before [-];
+            none without a cohesive crack.
         half: Half of the food that each particle belongs to, 0 left, 1 right, shape (n,); empty without ties.
+        stone: Table of the stone, shape (N_STONE,), rows as in :mod:`mpm.state.tables`; empty without one.
     """
 
     nodes: Sequence[int]
@@ -50,3 +54,4 @@ class Contents:
     relaxation: np.ndarray
     ties: np.ndarray
     half: np.ndarray
+    stone: np.ndarray

@@ -14,6 +14,7 @@ from mpm.discretisation.particles import Particles
 from mpm.state.contents import (
     ADHERING,
     BOARD_GAP,
+    CUT_BEFORE,
     FLOOR_HIGH,
     FLOOR_LOW,
     FLOOR_POWER,
@@ -25,6 +26,7 @@ from mpm.state.contents import (
     RIGHT,
     SHARE,
     SOFTENING,
+    STARTED,
     SURFACE_VOLUME,
     TOOL_GAP,
     TOP_HIGH,
@@ -42,6 +44,7 @@ from mpm.state.tables import (
     N_PARAMETERS,
     N_POSE,
     N_SIZES,
+    N_STONE,
     STATIONS,
     STRETCH,
     STRETCH_AT_REST,
@@ -83,6 +86,8 @@ def begin(state: State, cuts: Sequence[Contents]) -> None:
             _table(state, (max(sizes[:, TIE_COUNT].max(), 1), N_TIE), [cut.ties for cut in cuts]),
             _table(state, (state.n.max(),), [cut.half for cut in cuts]),
         )
+    if state.stone:
+        state.stone_pose.from_numpy(_table(state, (N_STONE,), [cut.stone for cut in cuts]))
 
 
 def _sizes(state: State, cut: Contents) -> list[int]:
@@ -166,7 +171,7 @@ def _write(
         s.zone_velocity[c, i] = ti.Vector.zero(float, 3)
         s.cut_depth[c, i] = 0.0
         s.front_drift[c, i] = 0.0
-        s.start_force[c, i] = 0.0
+        s.start_force[c, i] = row[STARTED]
         s.contact_part[c, i] = 0.0
         s.crack_front[c, i] = 1e3
     for c, k in s.sums:
@@ -188,7 +193,7 @@ def _write_ties(s: ti.template(), ties: TABLES, half: ROWS):
             for k in ti.static(range(N_TIE)):
                 row[k] = ti.cast(ties[c, n, k], float)
         s.tie_ends[c, n] = ti.Vector([ti.cast(row[LEFT], ti.i32), ti.cast(row[RIGHT], ti.i32)])
-        s.tie_toughness[c, n], s.largest_opening[c, n], s.cut_part[c, n] = row[TOUGHNESS], 0.0, 0.0
+        s.tie_toughness[c, n], s.largest_opening[c, n], s.cut_part[c, n] = row[TOUGHNESS], 0.0, row[CUT_BEFORE]
         s.tie_share[c, n] = row[SHARE]
         s.face_shear[c, n] = ti.Vector.zero(float, 2)
     for c, i in s.passing:

@@ -18,6 +18,8 @@ from mpm.state.tables import (
     N_PARTICLE_SUMS,
     N_POSE,
     N_SIZES,
+    N_STONE,
+    N_STONE_SUMS,
     N_STRESS,
     N_SUMS,
     TIE_WORK,
@@ -28,6 +30,7 @@ SECOND_FIELD_CELLS = 3  # cells on either side of the cut plane whose nodes may 
 REGISTER = 32  # bytes of a register of a CPU: as many particles as fill it have their elastic stress found at once
 SUM_COPIES = 64  # copies of a sum over particles on a GPU, where additions to one number wait for each other
 CPU_BLOCK = 512  # Taichi runs CPU loops shorter than this on one thread, so one iteration in 512 works for a thread
+IN_STONE = -2  # of State.adhering, where a particle is in a stone
 # What a loop goes over: each cut, rows of nodes in reach, lines of nodes across the mirror, parts of the particles,
 # slices along the edge, rows of nodes about what could be damaged, ties across the cut plane.
 CUTS, NODE_ROWS, NODE_LINES, PARTS, SLICES, DAMAGE_ROWS, TIES = range(7)
@@ -50,6 +53,8 @@ class Configuration:
         branches: Number of Prony branches.
         batch: Most cuts side by side; more than one on a GPU or with one thread a cut.
         ties: Most ties across the cut plane, 0 without a cohesive crack.
+        stone: There is a rigid stone in the food.
+        hollow: The cut plane meets a stone or a cavity, so that what the edge cuts is what the ties say.
     """
 
     room: int
@@ -64,6 +69,8 @@ class Configuration:
     branches: int = 0
     batch: int = 1
     ties: int = 0
+    stone: bool = False
+    hollow: bool = False
 
 
 @ti.data_oriented
@@ -101,7 +108,7 @@ class State:
         stick: Stretch of the friction's spring on board and tool [m], (cut, 2, particle).
         face_rise: Way along the face of a particle beside the cut plane from its lower end to its upper, in the scene's
             axes, over the spacing of the particles [-], (cut, particle).
-        adhering: 1 where a particle sticks to the blade, 0 where it may, -1 where not, (cut, particle).
+        adhering: 1 where a particle sticks to the blade, 0 where it may, -1 where not, -2 in a stone, (cut, particle).
         visibility: What :func:`mpm.kernels.crack.visible_columns` found in the last step, with ``IN_CONTACT`` where
             ``contact_moment`` is of this step; elsewhere it means nothing, (cut, particle).
         kappa: Largest strain that has acted on bulk damage [-], (cut, particle).
@@ -151,6 +158,8 @@ class State:
         losses, particle_sums: Sums over particles, of which different particles add to different copies,
             (cut, copy, row); ``losses`` are the rows of the table of sums from ``PLASTIC`` on.
         window: Nodes that particles can reach before it is renewed: first, last + 1, (cut, 6).
+        stone_pose, stone_sums: Of a stone, and of the nodes that move with it; rows in :mod:`mpm.state.tables`,
+            (cut, row).
         steps_left: Steps that a cut has yet to do before the next row of the report, on a GPU, (cut,).
         extents: Most places that a loop of a kind may go over in a cut. It is compiled in: to read a length a GPU needs
             a launch more, and then starts more threads than there are places.
@@ -165,6 +174,7 @@ class State:
         self.first_slice = max(self.plane_x, 0)  # that is no mirror image
         self.threads, self.nodal, self.damage, self.turned = max(own.threads, 1), own.nodal, own.damage, own.turned
         self.press, self.cuts = own.press, not (own.nodal or own.press)
+        self.stone, self.hollow = own.stone, own.hollow and self.cuts
         self.atomic = own.threads == 0
         self.serial = not self.atomic  # short loops run where the kernel was launched
         self.parts = 1 if self.threads == 1 else self.threads * CPU_BLOCK
@@ -192,6 +202,10 @@ class State:
         self._add_tables(real)
         if self.cuts:
             self._add_ties(real, max(own.ties, 1))
+        if self.stone:
+            ti.sync()  # as above
+            self.stone_pose = ti.field(ti.f64, (own.batch, N_STONE))
+            self.stone_sums = ti.field(booked, (own.batch, N_STONE_SUMS))
         ti.sync()  # lays these fields out by themselves; Taichi does not manage those of eight scenes at once
 
     def _extents(self, own: Configuration) -> dict[int, int]:

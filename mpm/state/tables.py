@@ -58,6 +58,20 @@ N_POSE = 10
 STEPS, STEPS_PER_ROW, DT, SPEED_UP, SPEED_ALONG, SPEED_TILT = range(6)
 N_ORDER = 6
 
+# Rows of the table of a stone: its middle, rotation (row by row) and half axes along x, y, z; its velocity and angular
+# velocity; by how much the nodes that move with it exceed it [m]; the half of the food that it belongs to, -1 for both;
+# impulse of the edge on it so far; height of the edge when it met the stone first, -1 before; the velocity and angular
+# velocity that it would have without the flesh of the other half.
+STONE_MIDDLE, STONE_TURN, STONE_AXES, STONE_VELOCITY, STONE_SPIN = 0, 3, 12, 15, 18
+STONE_REACH, STONE_HALF, STONE_IMPULSE, STONE_MET = range(21, 25)
+STONE_ALONE, SPIN_ALONE = 25, 28
+N_STONE = 31
+
+# Rows of the sums over the nodes that move with a stone: mass, momentum, moment of mass and moment of momentum about
+# its middle, second moments of mass (xx, yy, zz, yz, xz, xy).
+NODES_MASS, NODES_MOMENTUM, NODES_MOMENT, NODES_SPIN, NODES_INERTIA = 0, 1, 4, 7, 10
+N_STONE_SUMS = 16
+
 # Entries of a particle's stress: Kirchhoff stress (xx, yy, zz, yz, xz, xy), viscous and plastic loss per volume, and
 # the trace of the left stretch, negative where the particle must be done by itself.
 VISCOUS_LOSS, PLASTIC_LOSS, STRETCH = 6, 7, 8

@@ -155,3 +155,40 @@ def test_an_impossible_constant_is_one_line(given, word, tmp_path: Path, capsys)
     assert main(argv) == 1
     err = capsys.readouterr().err
     assert word in err and "Traceback" not in err and not (tmp_path / "cut").exists()
+
+
+def test_simulate_stops_at_a_stone(tmp_path: Path, capsys):
+    """A cherry with its stone is not parted by what its flesh takes, and the summary says why; without a limit the
+    blade is not let down on it."""
+    argv = ["simulate", "--food", "cherry", "--dx", "2.4e-3", "--threads", "1", "--stone"]
+    assert main([*argv, "--out", str(tmp_path / "none")]) == 1
+    assert "--force-limit 60" in capsys.readouterr().err
+    assert main([*argv, "--force-limit", "12", "--json", "--out", str(tmp_path / "stopped")]) == 2
+    summary = valid(json.loads(capsys.readouterr().out))
+    assert summary["ended"] == "force_limit" and summary["severed"] is False and summary["fraction"] < 0.7
+    assert summary["cut"].startswith("not severed: stone at z = ") and summary["severed_part"] < 0.5
+    assert summary["stone_size_m"] == [0.0075, 0.0105, 0.0085] and summary["cavity_size_m"] is None
+    assert 0.009 < summary["edge_m"] < summary["stone_met_m"] < 0.0145
+    assert main([*argv, "--around", "--pictures", "--out", str(tmp_path / "drawn")]) == 1
+    assert "its passes are not drawn" in capsys.readouterr().err
+
+
+def test_simulate_halves_around_a_stone(tmp_path: Path, capsys):
+    """Three passes leave too much at the corners of a triangle, which is said; each has its force in a file."""
+    argv = ["simulate", "--food", "cherry", "--dx", "2.4e-3", "--threads", "1", "--stone", "--around", "3", "--json"]
+    assert main([*argv, "--force-limit", "12", "--mach", "0.02", "--out", str(tmp_path / "cut")]) == 2
+    around = valid(json.loads(capsys.readouterr().out))["around"]
+    assert [one["ended"] for one in around["passes"]] == ["stroke"] * 3 and not around["severed"]
+    assert 0.7 < around["severed_part"] < 0.95 and around["peak_N"] < 12
+    assert {p.name for p in (tmp_path / "cut").iterdir()} >= {"force.csv", "force-2.csv", "force-3.csv"}
+
+
+def test_an_arm_that_stalls_on_a_stone_has_not_passed(tmp_path: Path, capsys):
+    """An arm with a stiffness stalls at its limit, and the stone is named; a food that is not cut through passes."""
+    argv = ["simulate", "--food", "cherry", "--dx", "2.4e-3", "--threads", "1", "--stone"]
+    arm = ["--arm-stiffness", "5000", "--force-limit", "8", "--stroke", "0.011"]
+    assert main([*argv, *arm, "--out", str(tmp_path / "stalled")]) == 2
+    said = capsys.readouterr()
+    assert "not severed: stone at z = " in said.out and "not passed" not in said.err
+    assert main([*argv, "--stroke", "0.003", "--out", str(tmp_path / "above")]) == 0
+    assert "not severed: " in capsys.readouterr().out

@@ -38,6 +38,9 @@ def run(args: argparse.Namespace) -> int:
         return 0
     size = " x ".join(f"{food.dims[n].value * 1e3:g}" for n in ("length", "width", "height"))
     print(f"{food.name}: {food.shape_kind}, {size} mm (length x width x height)")
+    for name, sizes in food.inclusions.items():
+        size = " x ".join(f"{sizes[n].value * 1e3:g}" for n in ("length", "width", "height"))
+        print(f"  {name:17s}{size} mm in a cut that asks for it (--{name})")
     for name in PROPERTIES:
         p = food.properties.get(name)
         if p is not None:

@@ -405,7 +405,7 @@ def test_unknown_key_without_a_near_one(tmp_path: Path, document: dict[str, Any]
     document["banana"]["colour"] = "yellow"
     assert (
         message(write(tmp_path, document))
-        == "materials.yaml: banana.colour: unknown key; known: shape, properties, not_modelled"
+        == "materials.yaml: banana.colour: unknown key; known: shape, properties, not_modelled, stone, cavity"
     )
 
 

@@ -12,7 +12,6 @@ from mpm.kernels.crack import ALL_VISIBLE
 from mpm.kernels.reductions import report
 from mpm.kernels.stress import elastic_block
 from mpm.kernels.surface_contact import friction_limit
-from mpm.kernels.time_step import advance
 from mpm.runtime import Runtime
 from mpm.scene import EdgeLaw, Food, Motion, Numerics, Scene
 from mpm.scene.material import Material
@@ -22,6 +21,7 @@ from mpm.solver import Simulation, state_of
 from mpm.state import tables as kn
 from mpm.state.host_transfer import TABLES, fill, of_particles, particles, set_velocity_gradients, velocity_gradients
 from mpm.state.state import Configuration, State
+from mpm.step.time_step import advance
 from tests.mpm import twins
 from tests.mpm.scenes import FLESH, PRISM, WEDGE
 

@@ -10,8 +10,8 @@ from taichi.lang import kernel_impl
 
 from mpm.kernels import constitutive
 from mpm.kernels.p2g import p2g_particle
-from mpm.kernels.time_step import time_step
 from mpm.runtime import Runtime, compiler, start
+from mpm.step.time_step import time_step
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -6,12 +6,13 @@ import numpy as np
 import taichi as ti
 
 from mpm.kernels.crack import advance_crack_fronts
-from mpm.kernels.cutting_edge import apply_edge_law
+from mpm.kernels.cutting_edge import apply_edge_law, follow_slices
 from mpm.kernels.damage import clear_damage_box, smooth_driving_strain
 from mpm.kernels.g2p import grid_to_particles
 from mpm.kernels.grid_update import clear_grid, fold_mirror_images, update_grid
 from mpm.kernels.p2g import particles_to_grid
 from mpm.kernels.reductions import find_window, report
+from mpm.kernels.stone.rigid_motion import move_stone
 from mpm.kernels.ties import hold_together
 from mpm.kernels.tool import move_tools, set_tool_velocity
 from mpm.state.host_transfer import ROWS, TABLES
@@ -33,6 +34,10 @@ def time_step(s: ti.template(), cut):
     update_grid(s, cut)
     if ti.static(s.cuts):
         apply_edge_law(s, cut)
+    if ti.static(s.stone):
+        move_stone(s, cut)
+    if ti.static(s.cuts):
+        follow_slices(s, cut)
     move_tools(s, cut)
     grid_to_particles(s, cut)  # with the contact of the particles
     if ti.static(s.cuts):
