@@ -7,11 +7,11 @@ food's own law of fracture, whoever loads it (docs/theory.md, "A crack with a la
 
 import taichi as ti
 
-from mpm.kernels.constitutive.laws import full
+from mpm.kernels.constitutive.laws import damage_of, degrade, full, left_cauchy_green, left_stretch, unit
 from mpm.kernels.crack import IN_CONTACT
 from mpm.kernels.signed_distance import passed_part
 from mpm.kernels.tool import edge_height, under_blade
-from mpm.state.accessors import step_size, to_grid_axes, to_scene_axes, velocity_gradient
+from mpm.state.accessors import deformation_gradient, step_size, to_grid_axes, to_scene_axes, velocity_gradient
 from mpm.state.loops import locate_active, repetitions
 from mpm.state.state import SLICES, TIES
 from mpm.state.tables import (
@@ -19,11 +19,15 @@ from mpm.state.tables import (
     CONTACT,
     DX,
     EDGE_BAND,
+    EPS0,
+    EPSF,
     FIRST_STATION,
     INV_DX,
+    LAM,
     LAYERED,
     MASS,
     MIRROR_SUM,
+    MU,
     SPACING,
     STATIONS,
     TIE_OPENING,
@@ -152,11 +156,29 @@ def pull_tie(s: ti.template(), cut, n, dt):
 def plane_traction(s: ti.template(), cut, p):
     """Force of the food's own stress on the face of a particle beside the cut plane, whose normal is +y, in the scene's
     axes [N]."""
+    t = elastic_stress(s, cut, p)
+    out = to_scene_axes(s, cut, full(t) @ to_grid_axes(s, cut, ti.Vector([0.0, 1.0, 0.0])))
+    return out * (s.surface_volume[cut, p][1] / s.tool_gap[cut, p])
+
+
+@ti.func
+def elastic_stress(s: ti.template(), cut, p):
+    """Kirchhoff stress of a particle without its viscous part [Pa], xx, yy, zz, yz, xz, xy.
+
+    A tie that answered the viscous stress of the last step would drive the faces, once the loss factor is large and the
+    cells are small, and make energy.
+    """
     block = p // s.lanes
     lane = p - block * s.lanes
     t = ti.Vector([s.tau[cut, block, r][lane] for r in range(6)])
-    out = to_scene_axes(s, cut, full(t) @ to_grid_axes(s, cut, ti.Vector([0.0, 1.0, 0.0])))
-    return out * (s.surface_volume[cut, p][1] / s.tool_gap[cut, p])
+    if ti.static(s.branches == 0):
+        f = deformation_gradient(s, cut, p)
+        j, b = f.determinant(), left_cauchy_green(f)
+        if j > 0:
+            t = 2 * s.par[cut, MU] * (b - left_stretch(b, j)) + s.par[cut, LAM] * j * (j - 1) * unit()
+            if ti.static(s.damage):
+                t = degrade(t, damage_of(s.kappa[cut, p], s.par[cut, EPS0], s.par[cut, EPSF]))
+    return t
 
 
 @ti.func
