@@ -91,8 +91,9 @@ class LiveCut:
 
     @property
     def uncut(self) -> float:
-        """Part of the section that the edge has not passed [-]."""
-        beside, state = self._simulation.setup.seeds.beside, self._held.state
+        """Part of the section's flesh that the edge has not passed [-]."""
+        seeds, state = self._simulation.setup.seeds, self._held.state
+        beside = seeds.beside & ~self.scene.food.stony(seeds.x)
         return float((beside & (of_particles(state, state.side) == 0)).sum() / beside.sum())
 
     @property
