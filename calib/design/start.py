@@ -110,7 +110,7 @@ def start_of_run(folder: Path) -> Start:
             "one of its traces"
         )
     result = read_result(folder)
-    if result.status != "done" or any(p.low95 is None for p in result.fitted.values()):
+    if result.status != "done" or any(p.low95 is None or p.high95 is None for p in result.fitted.values()):
         raise OutputError(
             f"--run {folder}: the calibration ended before it had intervals; run it again with --resume and more "
             "--budget"

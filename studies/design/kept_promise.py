@@ -152,9 +152,9 @@ def made_test(truth: Truth, test: DesignedTest, start: Start, folder: Path, pool
     first = first_request(truth, folder)
     if test.kind == "width":
         sizing = replace(first.sizing, width=truth.shape.width)
-        return _alone(replace(first, sizing=sizing), folder / "after", pool)
+        return _alone(replace(first, sizing=sizing), folder / f"after-{test.kind}", pool)
     if test.kind == "compression":
-        return _alone(replace(first, food=_pressed(truth, start)), folder / "after", pool)
+        return _alone(replace(first, food=_pressed(truth, start)), folder / f"after-{test.kind}", pool)
     if test.kind not in ("blade", "narrower"):
         raise OutputError(f"{test.name}: no command fits its record")
     knife = load_knife(test.name.split()[-1] if test.kind == "blade" else "kitchen")
@@ -165,13 +165,14 @@ def made_test(truth: Truth, test: DesignedTest, start: Start, folder: Path, pool
     second = replace(first, trace=folder / "next.csv", knife=knife.name, sizing=sizing)
     requests = {"first": replace(first, scaled=True), "next": replace(second, scaled=True)}
     spec = StudySpec("made up", truth.food, requests, (), SPECIMEN_PROPERTIES, (), first.budget, 0)
-    fit_together(spec, folder / "after", pool, resume=False)
-    return dict(json.loads((folder / "after" / "summary.json").read_text())["parameters"])
+    out = folder / f"after-{test.kind}"
+    fit_together(spec, out, pool, resume=out.is_dir())
+    return dict(json.loads((out / "summary.json").read_text(encoding="utf-8"))["parameters"])
 
 
 def _alone(request: Request, out: Path, pool: Workers) -> dict[str, Any]:
     """Calibrate one record."""
-    return dict(calibrate(request, out, pool, resume=False).summary["parameters"])
+    return dict(calibrate(request, out, pool, resume=out.is_dir()).summary["parameters"])
 
 
 def _pressed(truth: Truth, start: Start) -> FoodSpec:
@@ -212,32 +213,30 @@ def width_of(parameter: Parameter, low: float, high: float) -> float:
     return parameter.to_internal(high) - parameter.to_internal(low)
 
 
-def study(food: str, asked: str, seed: int, out: Path, pool: Workers) -> dict[str, Any]:
-    """Make a food up, calibrate, design, make the recommended test, and compare.
+def study(truth: Truth, asked: str, which: str | None, out: Path, pool: Workers) -> dict[str, Any]:
+    """Calibrate a made-up food, design, make a test, and compare.
 
     Args:
-        food: Its name in materials.yaml.
+        truth: The food.
         asked: The parameter that is asked for.
-        seed: Seed of the truth.
+        which: The test that is made; None for the recommended one.
         out: Output folder; a calibration and a design that are there are used again.
         pool: Where the simulations run.
 
     Returns:
         What was promised and what was found.
     """
-    out.mkdir(parents=True, exist_ok=True)
-    truth = made_up(load_food(food), seed, out, pool)
     before = _before(truth, out, pool)
     start = start_of_run(before.folder)
     found = _designed(start, asked, out, pool)
-    name = found.recommended
-    document: dict[str, Any] = {"food": food, "asked": asked, "seed": seed, "truth": dict(truth.values)}
-    document |= {"width_m": truth.shape.width, "recommended": name}
-    if name is not None:
-        test = next(t for t in found.tests if t.name == name)
+    name = which or found.recommended
+    document: dict[str, Any] = {"food": truth.food.name, "asked": asked, "truth": dict(truth.values)}
+    document |= {"width_m": truth.shape.width, "recommended": found.recommended, "made": name}
+    test = next((t for t in found.tests if t.name == name), None)
+    if test is not None:
         after = made_test(truth, test, start, out, pool)[asked]
         document |= _compared(start, found, test, asked, after)
-    write_json(out / f"promise-{asked}.json", document)
+    write_json(out / f"promise-{asked}-{test.kind if test else 'none'}.json", document)
     return document
 
 
@@ -285,12 +284,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--food", default="banana", help="food of materials.yaml (default banana)")
     parser.add_argument("--for", dest="asked", default="R", help="parameter to narrow (default R)")
+    parser.add_argument("--test", help="test that is made (default: the recommended one)")
     parser.add_argument("--seed", type=int, default=0, help="seed of the truth (default 0)")
     parser.add_argument("--out", type=Path, required=True, help="output folder")
     parser.add_argument("--workers", type=int, default=2, help="simulations at a time (default 2)")
     args = parser.parse_args()
+    args.out.mkdir(parents=True, exist_ok=True)
     with Pool(args.workers, "cpu") as pool:
-        found = study(args.food, args.asked, args.seed, args.out, pool)
+        truth = made_up(load_food(args.food), args.seed, args.out, pool)
+        found = study(truth, args.asked, args.test, args.out, pool)
     sys.stdout.write(json.dumps(found, indent=2, default=float) + "\n")
 
 
