@@ -82,16 +82,20 @@ def first_cut(start: Start, stencil: Stencil, width_sd: float) -> LinearTest:
     Returns:
         The measurement.
     """
-    return cut_measurement(start, stencil, CutTest(FIRST, start.stroke, width_sd, model=FIRST))
+    return cut_measurement(start, stencil, first_test(start, width_sd))
 
 
-def next_cut(start: Start, test: Candidate, stencil: Stencil) -> LinearTest:
-    """What a cut of another specimen would say; its skin and start are its own where one was cut before.
+def first_test(start: Start, width_sd: float) -> CutTest:
+    """How the cut that was made is measured, where the width of its specimen has this relative deviation [-]."""
+    return CutTest(FIRST, start.stroke, width_sd, model=FIRST)
+
+
+def next_cut(start: Start, test: Candidate) -> CutTest:
+    """How a cut of another specimen is measured; its skin and start are its own where one was cut before.
 
     Args:
         start: What is known.
         test: The test, a cut.
-        stencil: The cut and its neighbours.
 
     Returns:
         The measurement.
@@ -99,7 +103,7 @@ def next_cut(start: Start, test: Candidate, stencil: Stencil) -> LinearTest:
     own = () if start.run is None else tuple(n for n in SPECIMEN_PROPERTIES if n in start.parameters.names)
     assert test.scene is not None
     stroke = min(start.stroke, test.scene.motion.stroke)
-    return cut_measurement(start, stencil, CutTest(test.name, stroke, WIDTH_SD, own, FIRST if test.same_model else ""))
+    return CutTest(test.name, stroke, WIDTH_SD, own, FIRST if test.same_model else "")
 
 
 def _together(
@@ -107,7 +111,7 @@ def _together(
 ) -> list[LinearTest]:
     """All measurements that there are after a test."""
     if test.scene is not None:
-        return [*before, next_cut(start, test, about[test.name])]
+        return [*before, cut_measurement(start, about[test.name], next_cut(start, test))]
     if test.kind == "compression":
         return [*before, compression_measurement(start, z)]
     spread = {"width": WIDTH_SD, "photograph": PHOTOGRAPH_WIDTH_SD}[test.kind]

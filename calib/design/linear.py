@@ -63,6 +63,21 @@ def information(tests: Sequence[LinearTest]) -> FloatArray:
     return 0.5 * (whole + whole.T)
 
 
+def pulled(tests: Sequence[LinearTest], rows: FloatArray) -> FloatArray:
+    """What differences between record and simulation pull the parameters with, J^T V^-1 y.
+
+    Args:
+        tests: The tests, at least one.
+        rows: Record less simulation in the rows of all tests, one after the other [-], (n,).
+
+    Returns:
+        Half the negative gradient of chi-square in internal coordinates (p,).
+    """
+    slopes = np.vstack([t.slopes for t in tests])
+    out: FloatArray = slopes.T @ np.linalg.solve(_covariance(tests), rows)
+    return out
+
+
 def posterior(prior: FloatArray, said: FloatArray) -> FloatArray:
     """Covariance (p, p) after what was said, where that is more than nothing.
 

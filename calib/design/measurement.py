@@ -71,10 +71,8 @@ def cut_measurement(start: Start, stencil: Stencil, test: CutTest) -> LinearTest
     Returns:
         The measurement.
     """
-    sensor, parameters = start.sensor, start.parameters
-    grid, curve = np.linspace(0.0, test.stroke, N_STROKE), curve_of(stencil.centre, test.stroke)
-    target = Target(grid, curve, sensor.curve, sensor.curve, filter_simulated)
-    bare = Objective(target, parameters, start.errors)
+    sensor, parameters, bare = start.sensor, start.parameters, _bare(start, stencil, test)
+    grid, curve = bare.target.stroke, bare.target.curve
     sizes = {name: getattr(sensor, name) for name in ("tare", "drift", "lag", GAIN)} | {"width": test.width_sd}
     rows = {id(run): _rows(bare, curve_of(run, test.stroke)) for run in _runs(stencil)}
     noise = rows[id(stencil.again)] - rows[id(stencil.centre)]
@@ -91,6 +89,29 @@ def cut_measurement(start: Start, stencil: Stencil, test: CutTest) -> LinearTest
         columns[f"{test.name}:{name}"] = slopes[:, k] * parameters.prior_sd[k]
         slopes[:, k] = feigned[:, k] = 0.0
     return _widened(LinearTest(slopes, feigned, columns, _model_error(bare), test.model), start.widened)
+
+
+def measured_rows(start: Start, stencil: Stencil, test: CutTest, record: FloatArray) -> FloatArray:
+    """Record less simulation in the rows of :func:`cut_measurement`.
+
+    Args:
+        start: Parameters, sensor, errors of the model.
+        stencil: The cut and its neighbours.
+        test: How it is measured.
+        record: Measured force [N] on 240 equal steps of the stroke, (240,).
+
+    Returns:
+        The rows [-] (241,).
+    """
+    out: FloatArray = _rows(_bare(start, stencil, test), record) / math.sqrt(start.widened)
+    return out
+
+
+def _bare(start: Start, stencil: Stencil, test: CutTest) -> Objective:
+    """The objective of a record that is the simulation itself, and leaves nothing open."""
+    grid, curve = np.linspace(0.0, test.stroke, N_STROKE), curve_of(stencil.centre, test.stroke)
+    target = Target(grid, curve, start.sensor.curve, start.sensor.curve, filter_simulated)
+    return Objective(target, start.parameters, start.errors)
 
 
 def compression_measurement(start: Start, z: FloatArray) -> LinearTest:

@@ -94,11 +94,12 @@ def run(request: DesignRequest, out: Path, pool: Workers, *, resume: bool, say: 
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """What was expected, and the value of the quantity that was asked for."""
+    """What was expected, the value of the quantity that was asked for, and why cuts of tests are none."""
 
     expectation: Expectation
     quantity: Quantity | None
     value: float
+    broken: dict[str, str]
 
 
 @dataclass(eq=False)
@@ -115,7 +116,7 @@ class _Design:
         """Judge the tests about the present values, then about draws."""
         start = self.request.start
         random = np.random.default_rng(self.request.seed)
-        expectation, value = Expectation(), math.nan
+        expectation, value, reasons = Expectation(), math.nan, dict[str, str]()
         for draw in range(self.request.draws):
             z = start.parameters.start
             if draw > 0:
@@ -123,16 +124,18 @@ class _Design:
                 z = start.parameters.clip(z + root @ random.standard_normal(len(z)))
                 self.say(f"food {draw + 1} of {self.request.draws}, drawn from what is known")
             about = self._about(z)
-            broken = [name for name in (FIRST, ASKED) if name in about and not about[name].sound]
+            unsound = {name: one.fault for name, one in about.items() if not one.sound}
+            reasons = unsound | reasons
+            broken = [name for name in (FIRST, ASKED) if name in unsound]
             if broken and draw == 0:
-                raise OutputError(_broken(start, broken[0]))
+                raise OutputError(_broken(start, broken[0], unsound[broken[0]]))
             if broken:
                 self.say(f"left out: {broken[0]} does not cut this food")
                 continue
             expectation.foods.append(self._judged(about, z))
             if draw == 0 and self.quantity is not None:
                 value = self.quantity.value(about[ASKED].centre, self._stroke)
-        return _Found(expectation, self.quantity, value)
+        return _Found(expectation, self.quantity, value, reasons)
 
     @property
     def _stroke(self) -> float:
@@ -153,12 +156,9 @@ class _Design:
         return judge(self.request.start, self.tests, about, z, gradient)
 
 
-def _broken(start: Start, name: str) -> str:
-    which = "the cut of the calibration" if name == FIRST else f"the cut that is asked for ({name})"
-    return (
-        f"{which} is not cut on coarse cells at the present values of {start.food.name}: the food is pressed away or "
-        "breaks down; no test can be judged about it"
-    )
+def _broken(start: Start, name: str, fault: str) -> str:
+    which = "the cut of the calibration" if name == FIRST else "the cut that is asked for"
+    return f"{which} is none on coarse cells at the present values of {start.food.name}: {fault}; no test can be judged"
 
 
 def _result(
@@ -178,7 +178,7 @@ def _result(
     for test in tests:
         outlook = found.expectation.of(test.name)
         if outlook is None:
-            broken.append(LeftOut(test.name, "the food is pressed away or breaks down in this cut"))
+            broken.append(LeftOut(test.name, found.broken[test.name]))
         else:
             designed.append(_designed(request, found, test, outlook, minutes[test.kind]))
     return DesignResult(

@@ -65,6 +65,14 @@ class Stencil:
         """Whether the food is cut at the point, in both runs."""
         return self.centre.completed == 1.0 and self.again.completed == 1.0
 
+    @property
+    def fault(self) -> str:
+        """Why it is not, in words."""
+        run = self.again if self.centre.completed == 1.0 else self.centre
+        if run.ok:
+            return f"the edge takes {run.parted:.0%} of R times the new area, so the food is pressed away there"
+        return f"it breaks down at {run.fraction:.0%} of its stroke ({run.reason})"
+
 
 class Simulator:
     """Runs cuts of a design; what the store knows is not run again.
