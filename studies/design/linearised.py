@@ -176,14 +176,14 @@ def study(food: str, asked: str, seed: int, out: Path, pool: Workers) -> dict[st
         before = with_intervals(fitted, covariance)
         folder = out / f"design-{asked}"
         promised = design(DesignRequest(before, asked), folder, pool, resume=folder.is_dir(), say=_tell)
-        rows = {}
+        rows: dict[str, Any] = {}
+        truth = start.parameters.to_dict(bench.truth)
+        document = {"food": food, "asked": asked, "seed": seed, "truth": truth, "recommended": promised.recommended}
+        document |= {"now": vars(promised.known[asked]), "tests": rows}
         for test in candidates(before)[0]:
             if test.kind in ("blade", "narrower", "slicing") and any(t.name == test.name for t in promised.tests):
                 rows[test.name] = _made(bench, before, first, test, promised, asked)
-    truth = start.parameters.to_dict(bench.truth)
-    document = {"food": food, "asked": asked, "seed": seed, "truth": truth, "recommended": promised.recommended}
-    document |= {"now": vars(promised.known[asked]), "tests": rows}
-    write_json(out / f"linearised-{asked}.json", document)
+                write_json(out / f"linearised-{asked}.json", document)
     return document
 
 
