@@ -171,6 +171,18 @@ def test_asked_for_a_peak_under_another_knife(start: Start, tmp_path: Path) -> N
     assert best.asked.low95 < result.quantity.value < best.asked.high95
 
 
+def test_several_foods_are_averaged(start: Start, tmp_path: Path) -> None:
+    """Draws from what is known are judged beside the present values; what is known stays about these."""
+    one, two, again = (
+        designed(start, tmp_path / name, "R", blades=(), draws=draws, seed=seed)
+        for name, draws, seed in (("one", 1, 0), ("two", 2, 0), ("again", 2, 1))
+    )
+    parts = [next(t for t in r.tests if t.name == "cut").parameters["mu"].part for r in (one, two, again)]
+    assert len(set(parts)) == 3
+    assert {t.draws for t in two.tests} == {2} and two.simulations > one.simulations
+    assert two.known["R"].value == one.known["R"].value
+
+
 def test_a_cut_that_breaks_down_is_left_out_and_nothing_is_run_twice(cut: Start, tmp_path: Path) -> None:
     """The other tests are judged; with resume no cut is made again; the first cut must be one."""
     pool = MadeFood(breaks=lambda scene, values: scene.motion.slice_ratio > 0.0)
