@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from calib.design.candidates import Candidate, candidates, coarse_cut
+from calib.design.candidates import WIDTH_SD, Candidate, candidates, coarse_cut
 from calib.design.expectation import FIRST, first_test, next_cut
 from calib.design.linear import information, posterior, pulled
 from calib.design.measurement import CutTest, cut_measurement, measured_rows
@@ -49,6 +49,8 @@ TRUTH = 5
 """Which of the shifted grids, with its own particles, the truth has; a replicate has another one."""
 SPREAD = 0.7
 """Standard deviation of the truth about the literature's values, of the priors' [-]."""
+MADE = ("width", "blade", "narrower", "slicing")
+"""Kinds of tests that are made of the truth."""
 ROUNDS = (4, 2)
 """Gauss-Newton steps on the first record, and on both."""
 RADIUS = 0.7
@@ -180,8 +182,9 @@ def study(food: str, asked: str, seed: int, out: Path, pool: Workers) -> dict[st
         truth = start.parameters.to_dict(bench.truth)
         document = {"food": food, "asked": asked, "seed": seed, "truth": truth, "recommended": promised.recommended}
         document |= {"now": vars(promised.known[asked]), "tests": rows}
-        for test in candidates(before)[0]:
-            if test.kind in ("blade", "narrower", "slicing") and any(t.name == test.name for t in promised.tests):
+        tests = sorted(candidates(before)[0], key=lambda t: t.scene is not None)
+        for test in tests:
+            if test.kind in MADE and any(t.name == test.name for t in promised.tests):
                 rows[test.name] = _made(bench, before, first, test, promised, asked)
                 write_json(out / f"linearised-{asked}.json", document)
     return document
@@ -191,12 +194,10 @@ def _made(
     bench: Bench, before: Start, first: Record, test: Candidate, promised: DesignResult, asked: str
 ) -> dict[str, Any]:
     """Make a test of the truth, fit both records, and compare all widths."""
-    assert test.scene is not None
-    cut, how = CutScene(test.scene), next_cut(before, test)
-    curve = bench.measured(cut, how.stroke)
-    if curve is None:
-        return {"kept": None}
-    after, covariance = bench.fitted({FIRST: first, test.name: Record(cut, how, curve)}, before, ROUNDS[1])
+    records = _records(bench, before, first, test)
+    if records is None:
+        return {"cut": False}
+    after, covariance = bench.fitted(records, before, ROUNDS[1])
     sd = np.sqrt(np.diag(covariance))
     expected = next(t for t in promised.tests if t.name == test.name)
     parts = {}
@@ -206,6 +207,21 @@ def _made(
         parts[p.name] = {"promised": expected.parameters[p.name].part, "found": float(sd[k]) / wide}
     own = parts[asked]
     return {"ratio": own["found"] / own["promised"], "parts": parts}
+
+
+def _records(bench: Bench, before: Start, first: Record, test: Candidate) -> dict[str, Record] | None:
+    """All records after a test; None where its cut is none of the true food."""
+    if test.scene is None:
+        return {FIRST: replace(first, test=first_test(before, WIDTH_SD), curve=first.curve / bench.width)}
+    cut, how = CutScene(test.scene), next_cut(before, test)
+    curve = bench.measured(cut, how.stroke)
+    if curve is None:
+        return None
+    # as in a fit of several traces, each has an error of the model of its own
+    return {
+        FIRST: replace(first, test=replace(first.test, model="")),
+        test.name: Record(cut, replace(how, model=""), curve),
+    }
 
 
 def _tell(text: str) -> None:
