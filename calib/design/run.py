@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from calib.design.candidates import NONE, Candidate, LeftOut, candidates, coarse_cut, minutes_of
+from calib.design.candidates import Candidate, LeftOut, candidates, coarse_cut, minutes_of
 from calib.design.expectation import FIRST, Expectation, Judged, Outlook, judge
 from calib.design.quantity import ALL, Quantity, asked_quantity
 from calib.design.result import DesignedTest, DesignResult, Expected, Known, to_document
@@ -84,7 +84,7 @@ def run(request: DesignRequest, out: Path, pool: Workers, *, resume: bool, say: 
         with EvaluationStore(out / "evaluations.h5", header, resume=resume, say=say) as store:
             simulator = Simulator(pool, store, say)
             found = _Design(request, tests, quantity, simulator, say).expected()
-        result = _result(request, found, tests, left_out, minutes, simulator, pool.arch, began)
+        result = _result(request, found, tests, left_out, minutes, simulator, began)
         write_json(out / "design.json", to_document(result))
         from reports.calibration.design import write_figure
 
@@ -168,7 +168,6 @@ def _result(
     left_out: list[LeftOut],
     minutes: dict[str, float],
     simulator: Simulator,
-    arch: str,
     began: float,
 ) -> DesignResult:
     """The typed result."""
@@ -192,7 +191,7 @@ def _result(
         left_out=(*left_out, *broken),
         simulations=simulator.runs,
         failed_simulations=simulator.failed,
-        invocation=Invocation(request.seed, arch, request.command),
+        invocation=Invocation(request.seed, simulator.pool.arch, request.command),
         software=Software.here(),
         warnings=tuple(start.food.warnings()),
         limits=tuple(_limits(start, sd, request.draws)),
@@ -278,6 +277,3 @@ def _limits(start: Start, sd: FloatArray, draws: int) -> list[str]:
                     "approximation, so the widths after a test are of that order only; the parts hold better."
                 )
     return out
-
-
-__all__ = ["ALL", "NONE", "DesignRequest", "run"]
