@@ -41,6 +41,7 @@ COMMANDS = {
     "knives": "catalogue",
     "doctor": "catalogue",
     "prior": "calibration",
+    "design": "calibration",
     "regress": "solver",
     "scalars": "calibration",
     "schema": "catalogue",

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from calib.calibration.calibrated import Calibrated
+from calib.calibration.credibility import write_credibility
 from calib.calibration.result import SUMMARY, CalibrationResult, read_result, to_document
 from calib.calibration.summary import add_conditioning, summarise
 from calib.fit.multistart import FitResult
@@ -166,7 +167,8 @@ class _Calibration:
 
 
 def _write(done: Calibrated, out: Path, began: float) -> CalibrationResult:
-    """Write curves.csv, material.yaml, summary.json and report.pdf; returns the result, as the folder has it."""
+    """Write curves.csv, material.yaml, summary.json, credibility.json and report.pdf; returns the result, as the folder
+    has it."""
     from reports.calibration.report import write_report
 
     document = to_document(summarise(done, out, began))
@@ -175,5 +177,6 @@ def _write(done: Calibrated, out: Path, began: float) -> CalibrationResult:
     dump_material(done.food(), out / "material.yaml", provenance)
     write_json(out / SUMMARY, document)
     result = read_result(out)
+    write_credibility(result)
     write_report(result)
     return result

@@ -28,6 +28,7 @@ RUN_FILES = (
     "coverage.json",
     "coverage.jsonl",
     "prior.json",
+    "design.json",
     "regress.json",
     "scalars.json",
     "evaluate.json",
@@ -52,6 +53,7 @@ OWN_FILES: Mapping[str, tuple[str, ...]] = {
     "verify": ("verify.json", "report.pdf"),
     "coverage": ("coverage.json", "coverage.jsonl", *STORE_FILES),
     "prior": ("prior.json", *STORE_FILES),
+    "design": ("design.json", *STORE_FILES),
     "scalars": ("scalars.json", *STORE_FILES),
     "evaluate": ("evaluate.json", "evaluate.jsonl"),
 }

@@ -24,7 +24,7 @@ the search leaves them at their likely values, and they widen the intervals.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -170,18 +170,38 @@ def nuisances(
     peak = float(curve.curve.max())
     drift = min(float(np.hypot(curve.drift_N_per_s, curve.drift_sd_N_per_s)) * length / speed, LARGEST_DRIFT * peak)
     lag = float(np.hypot(curve.onset_sd_s, sensor.lag_sd)) * speed
-    slope = np.gradient(curve.curve, curve.stroke)
-    top = float(curve.stroke[int(curve.curve.argmax())]) / length
-    one = np.ones_like(curve.curve)
-    found = [
-        ("tare", "N", curve.baseline_sd_N, one, 0.0, True),
-        ("drift", "N", drift, curve.stroke / length, top, True),
-        ("lag", "m", lag, -slope, 0.0, True),
-    ]
+    sizes = {"tare": curve.baseline_sd_N, "drift": drift, "lag": lag}
     if not scaled:
-        found.append(("gain", "-", sensor.gain_sd, curve.curve, peak, False))
-        found.append(("width", "-", width_sd, curve.curve, peak, False))
-    return tuple(Nuisance(*n) for n in found if n[2] > 0.0)
+        sizes |= {"gain": sensor.gain_sd, "width": width_sd}
+    return nuisances_of_size(curve.stroke, curve.curve, sizes)
+
+
+def nuisances_of_size(stroke: FloatArray, curve: FloatArray, sizes: Mapping[str, float]) -> tuple[Nuisance, ...]:
+    """What a measurement leaves open of a curve, where its sizes are known.
+
+    Args:
+        stroke: Stroke from contact [m], shape (n,).
+        curve: Force on it [N], shape (n,).
+        sizes: Prior standard deviations [unit] of ``tare``, ``drift``, ``lag``, ``gain`` and ``width``, by name.
+
+    Returns:
+        The nuisances whose standard deviation is not zero, in the order of their sizes.
+    """
+    peak = float(curve.max())
+    top = float(stroke[int(curve.argmax())] / stroke[-1])
+    known = {
+        "tare": ("N", np.ones_like(curve), 0.0, True),
+        "drift": ("N", stroke / stroke[-1], top, True),
+        "lag": ("m", -np.gradient(curve, stroke), 0.0, True),
+        "gain": ("-", curve, peak, False),
+        "width": ("-", curve, peak, False),
+    }
+    out = []
+    for name, sd in sizes.items():
+        unit, shape, of_peak, searched = known[name]
+        if sd > 0.0:
+            out.append(Nuisance(name, unit, sd, shape, of_peak, searched))
+    return tuple(out)
 
 
 class Whitening:

@@ -14,23 +14,40 @@ from reports import ReportError
 HELP = "write report.pdf of a finished run again"
 DESCRIPTION = """Typeset report.pdf again from the files that a calibration, a study of several
 cuts, converge, verify, stress or bench wrote."""
-EPILOG = "example:\n  cutcal report runs/banana"
+EPILOG = "examples:\n  cutcal report runs/banana\n  cutcal report runs/banana --context context.yaml"
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
     p.add_argument("dir", metavar="DIR", help="folder of the run (--out)")
+    p.add_argument("--context", metavar="YAML", help="what the calibration is for, for its credibility.json")
     add_json(p)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the report."""
-    path = writer(Path(args.dir))(Path(args.dir))
+    folder = Path(args.dir)
+    write = writer(folder)
+    if args.context is not None:
+        state(folder, args.context)
+    path = write(folder)
     if args.json:
         print_json({"schema": tag("report"), "report": str(path)})
     else:
         print(f"wrote {path}")
     return 0
+
+
+def state(folder: Path, context: str) -> None:
+    """Write what a calibration is for into its ``credibility.json``.
+
+    Raises:
+        CutcalError: The file cannot be read, or the folder is of no calibration on one trace.
+    """
+    from calib.calibration.credibility import read_context, write_credibility
+    from calib.calibration.result import read_result
+
+    write_credibility(read_result(folder), read_context(context))
 
 
 def writer(folder: Path) -> Callable[[Path], Path]:

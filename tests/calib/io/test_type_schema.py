@@ -9,9 +9,11 @@ from typing import Annotated, Any, ClassVar, get_type_hints
 
 import pytest
 
+from calib.calibration.credibility import Credibility
 from calib.calibration.result import CalibrationResult, from_document, to_document
 from calib.calibration.result_parts import FixedParameter
 from calib.compression.result import CompressionResult
+from calib.design.result import DesignResult
 from calib.errors import DocumentError
 from calib.io import typed_document
 from calib.io.folder import finite
@@ -36,7 +38,8 @@ from tests.reports import sample
 RESULTS = {
     "calibrate": CalibrationResult, "predict": PredictionResult, "compress": CompressionResult,
     "scalars": ScalarFitResult, "verify": Verification, "stress": StabilityMap, "regress": RegressionResult,
-    "bench": BenchmarkResult,
+    "bench": BenchmarkResult, "design": DesignResult,
+    "credibility": Credibility,
 }  # fmt: skip
 BEYOND_TYPES = ("if", "then")
 """What no type says: which keys a benchmark has when it is complete."""

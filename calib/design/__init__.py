@@ -1,0 +1,1 @@
+"""The next experiment: which test of a food narrows what is asked of it most."""

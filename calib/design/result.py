@@ -1,0 +1,158 @@
+"""What a design ends with, as a typed value: ``design.json``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+from calib.design.candidates import CALIBRATE, NONE, RANGES, STUDY, LeftOut
+from calib.io import typed_document
+from calib.io.provenance import Invocation, Software
+from calib.io.type_schema import Count, Fraction, NotNegative, Positive, Shared, keywords, one_of
+from calib.io.typed_document import FLAT, NULL
+
+HELPS = 0.9
+"""Part of the present interval's width below which a test narrows it, as the verdicts of a fit have it [-]."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of a parameter or a quantity before the test.
+
+    Attributes:
+        value: Present value [unit].
+        unit: SI unit, - where there is none.
+        low95: Lower end of the 95 % interval in the normal approximation [unit].
+        high95: Upper end [unit].
+        reported: Ends of the calibration's own 95 % interval [unit]; left out where there is none.
+    """
+
+    value: float
+    unit: str
+    low95: float
+    high95: float
+    reported: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Expected:
+    """What would be known after the test.
+
+    Attributes:
+        low95: Lower end of the expected 95 % interval about the present value [unit].
+        high95: Upper end [unit].
+        part: Its width over the present one, in the coordinate of the fit (mostly the logarithm).
+    """
+
+    low95: float
+    high95: float
+    part: Fraction
+
+
+@dataclass(frozen=True)
+class DesignedTest:
+    """A test that could be made next.
+
+    Attributes:
+        name: Its name.
+        kind: What kind of test it is.
+        what: What is done.
+        taken_by: Command that takes its record; none: no command does yet.
+        minutes: Assumed lab work [min].
+        bits: Expected information on all parameters together [bit].
+        asked: What would be known of what was asked for; null where all parameters were.
+        parameters: What would be known of the parameters, by name.
+        draws: Foods over which it is averaged.
+    """
+
+    name: str
+    kind: Annotated[str, one_of("cut", "blade", "narrower", "slicing", "compression", "width", "photograph")]
+    what: str
+    taken_by: Annotated[str, one_of(CALIBRATE, STUDY, RANGES, NONE)]
+    minutes: Positive
+    bits: NotNegative
+    asked: Expected | None = field(metadata=NULL)
+    parameters: Mapping[str, Expected]
+    draws: Count
+
+    @property
+    def helps(self) -> bool:
+        """Whether it narrows what was asked for, and a command takes its record."""
+        narrowed = [self.asked.part] if self.asked is not None else [p.part for p in self.parameters.values()]
+        return self.taken_by != NONE and min(narrowed) <= HELPS
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DesignResult:
+    """The next test of a food.
+
+    ``design.json`` of ``cutcal design``, and what ``cutcal design --json`` prints.
+
+    Attributes:
+        food: Food of materials.yaml, or of the file given.
+        run: Folder of the calibration that it starts from; null where it starts from the literature.
+        knife: Knife of the cut that was made, or would be.
+        asked: What is to be narrowed: all, a parameter, or peak or work under a knife.
+        recommended: The first test that narrows it and whose record a command takes; null where there is none.
+        known: What is known before, by parameter.
+        quantity: What is known before of the peak or work that was asked for; left out where none was.
+        tests: The tests, the one that narrows most first.
+        left_out: Tests that are not judged.
+        simulations: Coarse simulations that were run.
+        failed_simulations: Those that broke down.
+        invocation: How it was called.
+        software: What was run.
+        warnings: What a reader of the numbers must know about the input, one sentence each.
+        limits: What the result does not show, one sentence each.
+        wall_s: Run time [s].
+    """
+
+    DOCUMENT: ClassVar[str] = "design"
+    KEYS: ClassVar[tuple[str, ...]] = (
+        *("food", "run", "knife", "asked", "recommended", "known", "quantity", "tests", "left_out", "simulations"),
+        *("failed_simulations", "invocation", "software", "warnings", "limits", "wall_s"),
+    )
+
+    food: str
+    run: str | None = field(metadata=NULL)
+    knife: str
+    asked: str
+    known: Mapping[str, Annotated[Known, keywords(description="One of them")]]
+    quantity: Known | None = None
+    tests: Annotated[tuple[DesignedTest, ...], keywords(minItems=1)]
+    left_out: tuple[LeftOut, ...]
+    simulations: Count
+    failed_simulations: Count
+    invocation: Invocation = field(metadata=FLAT)
+    software: Software = field(metadata=FLAT)
+    warnings: Annotated[tuple[str, ...], Shared("warnings")]
+    limits: Annotated[tuple[str, ...], Shared("limits")]
+    wall_s: NotNegative
+
+    @property
+    def recommended(self) -> str | None:
+        """The first test that narrows what was asked for by a tenth and whose record a command takes; null where there
+        is none."""
+        return next((t.name for t in self.tests if t.helps), None)
+
+
+def to_document(result: DesignResult) -> dict[str, Any]:
+    """The content of ``design.json``."""
+    return typed_document.to_document(result)
+
+
+def read_design(folder: Path) -> DesignResult:
+    """The finished design in a folder.
+
+    Args:
+        folder: The output folder of ``cutcal design``.
+
+    Returns:
+        The design.
+
+    Raises:
+        DocumentError: The document is missing, damaged or incomplete.
+    """
+    return typed_document.read_document(folder / "design.json", DesignResult)
