@@ -585,7 +585,9 @@ def test_half_a_layer_is_an_error(name: str) -> None:
 def test_a_skin_that_bears_tension_is_asked_for() -> None:
     """No food has one by default, and its file says nothing of it; a given one reaches the solver and comes back."""
     plain = load_food("grape")
-    assert plain.to_scene_food().material.skin_stiffness == 0.0 and "skin_stiffness" not in plain.as_dict()["properties"]
+    assert (
+        plain.to_scene_food().material.skin_stiffness == 0.0 and "skin_stiffness" not in plain.as_dict()["properties"]
+    )
     skinned = plain.with_values({"skin_stiffness": 3000.0})
     assert skinned.to_scene_food().material.skin_stiffness == 3000.0
     assert skinned.as_dict()["properties"]["skin_stiffness"]["value"] == 3000.0

@@ -250,7 +250,7 @@ def test_other_ways_to_compute_a_split_give_the_same(monkeypatch):
 
 
 def test_a_large_loss_factor_makes_no_energy():
-    """Ties answer the elastic stress of the food alone: with its viscous part they made 26 times the work of this cut."""
+    """Ties answer the elastic stress of the food alone; the viscous one made 26 times the work of this cut."""
     lossy = replace(FLESH, loss_factor=0.3)
     ball = replace(PRISM, food=Food(Shape("sphere", 0.02, 0.02, 0.02), lossy), motion=Motion(2e-3, 0.01))
     record = cut(replace(ball, edge=EdgeLaw(zone=2e-3), numerics=Numerics(dx=1.5e-3)))
