@@ -17,7 +17,7 @@ from calib.errors import OutputError
 from calib.io.folder import finite
 from calib.io.progress import Progress, ProgressBar
 from calib.io.typed_document import to_document
-from calib.io.wording import brief, speaking_of_arguments
+from calib.io.wording import brief, in_arguments, speaking_of_arguments
 from calib.material.food import FoodSpec
 from calib.material.scene import MID_LENGTH, Sizing
 from calib.multi_specimen.spec import StudySpec
@@ -243,6 +243,7 @@ class Calibration:
 
         request = self.request("" if out is None else out)
         folder = Path(f"cutcal-{request.food.name}-{request.stem}" if out is None else out)
+        say = in_arguments(say)
         with speaking_of_arguments(), script_hidden(), self._workers(say) as pool, ExitStack() as shown:
             if isinstance(progress, bool):
                 progress = shown.enter_context(ProgressBar()) if progress else None
@@ -312,7 +313,8 @@ class Study:
         Raises:
             CutcalError: Anything wrong with the file; the message names the place in it.
         """
-        return Study(read_study(path))
+        with speaking_of_arguments():
+            return Study(read_study(path))
 
     def run(
         self,
@@ -341,8 +343,8 @@ class Study:
         from calib.multi_specimen.run import run
         from calib.simulation.process_pool import Pool
 
-        with script_hidden(), Pool(workers, self.spec.first.arch) as pool:
-            result = run(self.spec, Path(out), pool, resume=resume, progress=progress, say=say)
+        with speaking_of_arguments(), script_hidden(), Pool(workers, self.spec.first.arch) as pool:
+            result = run(self.spec, Path(out), pool, resume=resume, progress=progress, say=in_arguments(say))
         return dict(finite(to_document(result)))
 
 

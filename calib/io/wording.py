@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import reprlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
@@ -65,6 +65,14 @@ def as_arguments(sentence: str) -> str:
     """
     named = OPTION.sub(lambda m: ARGUMENTS.get(m[1], m[1].replace("-", "_")), sentence)
     return re.sub(r"\boption (?=[a-z_]+\b)", "argument ", named) if named != sentence else sentence
+
+
+def in_arguments(say: Callable[[str], None] | None) -> Callable[[str], None] | None:
+    """The same listener, which hears of arguments in place of options; None for none."""
+    if say is None:
+        return None
+    heard = say
+    return lambda sentence: heard(as_arguments(sentence))
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import io
 from dataclasses import fields
 from inspect import signature
 from pathlib import Path
@@ -17,7 +18,8 @@ import pytest
 from calib.calibration.fit_report import strongest
 from calib.calibration.result import CalibrationResult
 from calib.errors import OutputError
-from calib.io.wording import as_arguments
+from calib.io.progress import Progress, ProgressBar
+from calib.io.wording import as_arguments, in_arguments
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_file import Header, StoredEvaluation, hdf5_of
 from cutcal import Calibration, Food, Trace
@@ -89,6 +91,30 @@ def test_options_become_arguments() -> None:
     """Options in a sentence, and nothing else: no dash between words, no line of a table."""
     assert as_arguments("add --resume (option --t-end)") == "add resume=True (argument t_end)"
     assert as_arguments("a -- b, force--col, option 3") == "a -- b, force--col, option 3"
+
+
+def test_stages_and_folders_speak_of_arguments(tmp_path: Path) -> None:
+    """What is said, and an error that only a run can find: a folder that is there already."""
+    heard: list[str] = []
+    listener = in_arguments(heard.append)
+    assert listener is not None and in_arguments(None) is None
+    listener("give --board-z")
+    assert heard == ["give board_z"]
+    (tmp_path / "there").write_text("a file")
+    with pytest.raises(CutcalError) as caught:
+        Calibration("banana", BANANA).run(tmp_path / "there")
+    assert "there" in str(caught.value) and "--" not in str(caught.value)
+
+
+def test_a_notebook_rewrites_its_line() -> None:
+    """A stream of ipykernel is no terminal, and gets the bar all the same; a file gets a line now and then."""
+    stream = type("OutStream", (io.StringIO,), {"__module__": "ipykernel.iostream"})()
+    plain = io.StringIO()
+    for out in (stream, plain):
+        with ProgressBar(out, interval_s=1e9) as bar:
+            for done in (1, 2):
+                bar(Progress(done, float(done), 4.0, 0, 1.0, 9.0, "search"))
+    assert stream.getvalue().count("\r[") == 2 and plain.getvalue().count("\n") == 1
 
 
 def test_a_result_tells_of_itself(result: CalibrationResult) -> None:
