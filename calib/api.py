@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -15,15 +15,17 @@ from calib.calibration.result import SUMMARY, read_result, read_summary
 from calib.calibration.result import CalibrationResult as CalibrationResult
 from calib.errors import OutputError
 from calib.io.folder import finite
-from calib.io.progress import Progress
+from calib.io.progress import Progress, ProgressBar
 from calib.io.typed_document import to_document
-from calib.io.wording import brief
+from calib.io.wording import brief, in_arguments, speaking_of_arguments
 from calib.material.food import FoodSpec
 from calib.material.scene import MID_LENGTH, Sizing
 from calib.multi_specimen.spec import StudySpec
 from calib.multi_specimen.study_file import read_study
 from calib.outline.outline_file import OutlineFile
 from calib.problem.request import Request
+from calib.problem.target import ErrorModel
+from calib.simulation.workers import Workers
 from calib.trace.baselines import BASELINES, CONSTANT
 from calib.trace.cuts import WHOLE
 from calib.trace.recorded import Reading
@@ -41,15 +43,22 @@ LIMITS: dict[str, tuple[float, float, str]] = {
     "at": (0.0, 1.0, ""),
     "dx": (1e-4, 0.02, "m"),
     "budget": (0.0, 1e6, ""),
+    "gain_sd": (0.0, 1.0, ""),
+    "lag_sd": (0.0, 1.0, "s"),
+    "discrepancy": (0.0, 1.0, ""),
 }
 """Numbers between which a value must lie, and its unit: those of the command line."""
+LOCAL_WORKERS = 2
+"""Simulations at a time on this machine, a process each."""
+READING = ("time_col", "force_col", "position_col", "depth_col", "sign", "rate")
+"""Arguments that say how files and DataFrames are read."""
 KEYS = ("food", "created", "status", "passed", "trace", "parameters", "versions")
 """What tells the summary of a calibration from that of a cut."""
 RESUME = "run it again with resume=True"
 """What to do about a folder that is not whole."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
     """What to calibrate; :meth:`run` does it. The names are those of the options of ``calibrate``.
 
@@ -71,13 +80,20 @@ class Calibration:
         dx: Cell size [m], or None.
         budget: Largest number of simulations.
         sample: Whether all plausible foods are sampled, in place of a search for one; the budget does not bound it.
-        workers: Simulations at a time.
+        workers: Simulations at a time; None for 2, of a cluster for all.
         seed: Seed of the particles and of the search.
         arch: Device of the simulations.
         columns: How files and DataFrames are read: attributes of :class:`calib.trace.recorded.Reading` by name, such as
             ``{"force_col": "Fz=N", "sign": "-", "rate": 200.0}``; None for what their names say.
         baseline: What is subtracted without an air run, one of ``calib.trace.baselines.BASELINES``.
         cut: Number of the cut in a record of several, from 1; ``whole`` for a record that is one; None for its only.
+        set: Other values of properties [SI], by name, such as ``{"E": 2e5}``.
+        time_col, force_col, position_col, depth_col, sign, rate: How files and DataFrames are read, as in ``columns``.
+        gain_sd: Relative standard deviation of the sensor's gain [-]; None for what its kind suggests.
+        lag_sd: Standard deviation of the sensor's delay [s], or None.
+        discrepancy: How far a right model may be from the trace, part of the peak [-]; None for the usual 0.03.
+        u_num: Folder of a ``converge`` study whose numerical uncertainty the fit heeds, or None.
+        scheduler: Address of a Dask cluster that runs the simulations, such as ``tcp://host:8786``, or None.
 
     Raises:
         CutcalError: An unknown food, a trace that cannot be read, or an impossible value.
@@ -102,22 +118,55 @@ class Calibration:
     dx: float | None = None
     budget: float = 100
     sample: bool = False
-    workers: int = 2
+    workers: int | None = None
     seed: int = 0
     arch: str = "cpu"
     columns: Mapping[str, Any] | None = None
     baseline: str = CONSTANT
     cut: int | str | None = None
+    set: Mapping[str, float] | None = None
+    time_col: str | None = None
+    force_col: str | None = None
+    position_col: str | None = None
+    depth_col: str | None = None
+    sign: str | int | None = None
+    rate: float | None = None
+    gain_sd: float | None = None
+    lag_sd: float | None = None
+    discrepancy: float | None = None
+    u_num: str | Path | None = None
+    scheduler: str | None = None
     _food: FoodSpec = field(init=False, repr=False)
     _records: tuple[Trace, Trace | None] = field(init=False, repr=False)
     _sizing: Sizing = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        with speaking_of_arguments():
+            self._check()
+            food = self.food if isinstance(self.food, FoodSpec) else FoodSpec.load(self.food)
+            records = self._record(self.trace), None if self.air is None else self._record(self.air)
+            object.__setattr__(self, "_food", food.with_values(self.set) if self.set else food)
+            object.__setattr__(self, "_records", records)
+            given = Sizing(self.shape, self.height, self.width, self.length, self.at)
+            file = OutlineFile(self.outline, self.scale, self.outline_as)
+            object.__setattr__(self, "_sizing", file.sizing(given))
+
+    def __repr__(self) -> str:
+        return self._call()
+
+    def _check(self) -> None:
+        """Refuse impossible values.
+
+        Raises:
+            CutcalError: There is one.
+        """
         for name, (low, high, unit) in LIMITS.items():
             if getattr(self, name) is not None:
                 check_number("Calibration", name, getattr(self, name), low, high, unit)
         for name, lowest in (("workers", 1), ("seed", 0)):
             value = getattr(self, name)
+            if name == "workers" and value is None:
+                continue
             if not isinstance(value, int) or isinstance(value, bool) or value < lowest:
                 raise CutcalError(f"Calibration: {name} = {brief(value)}; give a whole number of at least {lowest}")
         for name, options in (("shape", SHAPE_KINDS), ("arch", ARCHES)):
@@ -133,16 +182,20 @@ class Calibration:
         unknown = next((name for name in self.columns or {} if name not in names), None)
         if unknown is not None:
             raise CutcalError(f"Calibration: columns has {brief(unknown)}, which is none of {', '.join(names)}")
-        if self.columns and isinstance(self.trace, Trace):
-            raise CutcalError("Calibration: columns say how a file is read, but the trace is a Trace, which has been")
-        food = self.food if isinstance(self.food, FoodSpec) else FoodSpec.load(self.food)
-        object.__setattr__(self, "_food", food)
-        given = Sizing(self.shape, self.height, self.width, self.length, self.at)
-        file = OutlineFile(self.outline, self.scale, self.outline_as)
-        object.__setattr__(self, "_sizing", file.sizing(given))
-        object.__setattr__(
-            self, "_records", (self._record(self.trace), None if self.air is None else self._record(self.air))
+        twice = next(
+            (name for name in READING if name in (self.columns or {}) and getattr(self, name) is not None), None
         )
+        if twice is not None:
+            raise CutcalError(f"Calibration: {twice} is an argument and in columns; give it once")
+        if self._reading and isinstance(self.trace, Trace):
+            said = "columns say" if self.columns else f"{next(iter(self._reading))} says"
+            raise CutcalError(f"Calibration: {said} how a file is read, but the trace is a Trace, which has been")
+
+    @property
+    def _reading(self) -> dict[str, Any]:
+        """How files and DataFrames are read: what differs from the usual."""
+        own = {name: getattr(self, name) for name in READING if getattr(self, name) is not None}
+        return dict(self.columns or {}) | own
 
     def request(self, out: str | Path = "") -> Request:
         """The same for :func:`calib.calibration.run.run`.
@@ -166,25 +219,29 @@ class Calibration:
             dx=self.dx,
             budget=self.budget,
             sample=self.sample,
+            gain_sd=self.gain_sd,
+            lag_sd=self.lag_sd,
+            errors=ErrorModel() if self.discrepancy is None else ErrorModel(discrepancy=self.discrepancy),
+            u_num=None if self.u_num is None else Path(self.u_num),
             seed=self.seed,
             arch=self.arch,
-            command=(f"{self._call()}.run({str(out)!r})",),
+            command=(f"{self._call()}.run({str(out)!r})" if str(out) else f"{self._call()}.run()",),
         )
 
     def run(
         self,
-        out: str | Path,
+        out: str | Path | None = None,
         *,
         resume: bool = False,
-        progress: Callable[[Progress], None] | None = None,
+        progress: Callable[[Progress], None] | bool | None = None,
         say: Callable[[str], None] | None = None,
     ) -> CalibrationResult:
         """Calibrate, and write what ``calibrate`` writes.
 
         Args:
-            out: Output folder, which is made and never overwritten.
+            out: Output folder, which is made and never overwritten; None for ``cutcal-FOOD-TRACE`` in the current one.
             resume: Go on with the run in ``out``; nothing is simulated twice.
-            progress: Called after each simulation.
+            progress: Called after each simulation; True for a bar on standard error.
             say: Called with each warning and stage, as one sentence.
 
         Returns:
@@ -194,10 +251,24 @@ class Calibration:
             CutcalError: Anything wrong with the input; nothing that was computed is lost.
         """
         from calib.calibration.run import run
+
+        request = self.request("" if out is None else out)
+        folder = Path(f"cutcal-{request.food.name}-{request.stem}" if out is None else out)
+        say = in_arguments(say)
+        with speaking_of_arguments(), script_hidden(), self._workers(say) as pool, ExitStack() as shown:
+            if isinstance(progress, bool):
+                progress = shown.enter_context(ProgressBar()) if progress else None
+            return run(request, folder, pool, resume=resume, progress=progress, say=say)
+
+    def _workers(self, say: Callable[[str], None] | None) -> Workers:
+        """What runs the simulations: processes of this machine, or a cluster."""
+        if self.scheduler is not None:
+            from calib.simulation.dask_cluster import Cluster
+
+            return Cluster(self.scheduler, self.workers, self.arch, say=say or (lambda _: None))
         from calib.simulation.process_pool import Pool
 
-        with script_hidden(), Pool(self.workers, self.arch) as pool:
-            return run(self.request(out), Path(out), pool, resume=resume, progress=progress, say=say)
+        return Pool(LOCAL_WORKERS if self.workers is None else self.workers, self.arch)
 
     @staticmethod
     def load(out: str | Path) -> CalibrationResult:
@@ -220,7 +291,7 @@ class Calibration:
 
     def _record(self, given: str | Path | Trace | pd.DataFrame) -> Trace:
         """A record in any of its forms."""
-        return given if isinstance(given, Trace) else read_trace(given, **(self.columns or {}))
+        return given if isinstance(given, Trace) else read_trace(given, **self._reading)
 
     def _call(self) -> str:
         """This object as it would be written, without what is as usual."""
@@ -253,7 +324,8 @@ class Study:
         Raises:
             CutcalError: Anything wrong with the file; the message names the place in it.
         """
-        return Study(read_study(path))
+        with speaking_of_arguments():
+            return Study(read_study(path))
 
     def run(
         self,
@@ -282,8 +354,8 @@ class Study:
         from calib.multi_specimen.run import run
         from calib.simulation.process_pool import Pool
 
-        with script_hidden(), Pool(workers, self.spec.first.arch) as pool:
-            result = run(self.spec, Path(out), pool, resume=resume, progress=progress, say=say)
+        with speaking_of_arguments(), script_hidden(), Pool(workers, self.spec.first.arch) as pool:
+            result = run(self.spec, Path(out), pool, resume=resume, progress=progress, say=in_arguments(say))
         return dict(finite(to_document(result)))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
@@ -12,6 +12,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import pandas as pd
 
+from calib.calibration.fit_report import fit_report, html_table
 from calib.calibration.result_parts import (
     Agreement,
     AirSource,
@@ -34,7 +35,8 @@ from calib.io.typed_document import FLAT, NULL, renamed
 from calib.io.wording import brief
 from calib.material.food import FoodSpec, load_material_file
 from calib.material.properties import MEANINGS
-from calib.posterior.estimates import PosteriorSummary
+from calib.posterior.estimates import ModeSummary, PosteriorSummary
+from calib.simulation.evaluation_frame import evaluation_frame
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.validation.acceptance import Verdict
 from calib.validation.metrics import Metrics, compare
@@ -162,6 +164,43 @@ class CalibrationResult:
             raise OutputError(
                 f"{path}: cannot be read ({brief(str(error))}); run the calibration with resume=True"
             ) from None
+
+    @property
+    def evaluations(self) -> pd.DataFrame:
+        """All simulations of the search, a row each: outcome, grid, part of the stroke, time [s], parameters [SI].
+
+        Raises:
+            OutputError: evaluations.h5 is missing or damaged.
+        """
+        return evaluation_frame(self.folder)
+
+    @property
+    def modes(self) -> tuple[ModeSummary, ...]:
+        """Modes of the sampled posterior, the heaviest first; empty where it was not sampled."""
+        return () if self.sampled is None else self.sampled.modes
+
+    def fit_report(self) -> str:
+        """Statistics, verdicts, parameters and the strongest correlations, as text."""
+        return fit_report(self)
+
+    def plot(self, ax: Sequence[Any] | None = None) -> tuple[Any, Any]:
+        """Draw trace and simulation with the 95 % band, and the residual below.
+
+        Args:
+            ax: Two axes of matplotlib, for forces and residual; None for a new figure.
+
+        Returns:
+            The two axes.
+
+        Raises:
+            OutputError: curves.csv is missing or damaged.
+        """
+        from reports.base.interactive import fit_axes
+
+        return fit_axes(self.curves, ax, f"{self.food}: {'passed' if self.passed else 'not passed'}")
+
+    def _repr_html_(self) -> str:
+        return html_table(self)
 
     @property
     def material(self) -> FoodSpec:

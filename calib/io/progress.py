@@ -1,4 +1,4 @@
-"""One line about a running fit: on a terminal it is rewritten in place, elsewhere printed now and then."""
+"""One line about a running fit: a terminal and a notebook rewrite it in place, elsewhere it is printed now and then."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ from typing import TextIO
 
 #: Width of the bar in characters.
 BAR = 20
+
+#: Package of the streams of a notebook, which rewrite a line after a carriage return though they are no terminal.
+NOTEBOOK = "ipykernel"
 
 #: Without a terminal (log file, pipe) a line is printed at most this often [s].
 PLAIN_INTERVAL_S = 30.0
@@ -101,7 +104,7 @@ class ProgressBar:
         self._stream = sys.stderr if stream is None else stream
         self._interval = interval_s
         self._now = now
-        self._terminal = self._stream.isatty()
+        self._terminal = self._stream.isatty() or type(self._stream).__module__.startswith(NOTEBOOK)
         self._width = 0
         self._last = -math.inf
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import reprlib
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
+
+from mpm.scene.errors import CutcalError
 
 LETTERS, NAMES = 40, 8
 """Letters of a name or value, and names of a list, that an error shows."""
@@ -45,3 +49,38 @@ def listed(names: Sequence[object], letters: int = LETTERS) -> str:
         shown.pop()
     more = len(names) - len(shown)
     return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
+
+
+OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*[a-z])")
+"""An option of the command line in a sentence."""
+ARGUMENTS = {"material": "food", "config": "Study.read", "resume": "resume=True"}
+"""What an option is called in Python, where its name is another one."""
+
+
+def as_arguments(sentence: str) -> str:
+    """A sentence about options of the command line, for a reader who calls from Python.
+
+    >>> as_arguments("give --force-col, or add --resume (option --t-end)")
+    'give force_col, or add resume=True (argument t_end)'
+    """
+    named = OPTION.sub(lambda m: ARGUMENTS.get(m[1], m[1].replace("-", "_")), sentence)
+    return re.sub(r"\boption (?=[a-z_]+\b)", "argument ", named) if named != sentence else sentence
+
+
+def in_arguments(say: Callable[[str], None] | None) -> Callable[[str], None] | None:
+    """The same listener, which hears of arguments in place of options; None for none."""
+    if say is None:
+        return None
+    heard = say
+    return lambda sentence: heard(as_arguments(sentence))
+
+
+@contextmanager
+def speaking_of_arguments() -> Iterator[None]:
+    """Errors raised within name arguments of Python in place of options of the command line."""
+    try:
+        yield
+    except CutcalError as e:
+        if e.args and isinstance(e.args[0], str):
+            e.args = (as_arguments(e.args[0]), *e.args[1:])
+        raise

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import yaml
 
@@ -21,19 +21,20 @@ from calib.material.properties import (
     DIMENSIONS,
     INCLUSIONS,
     LAYERS,
-    OPTIONAL_KEYS,
     PROPERTIES,
-    REQUIRED_KEYS,
     SYNONYMS,
     Property,
     Source,
     check_override,
+    read_property,
     rule_of,
 )
 from mpm.files import write_atomic
 from mpm.scene.shapes import SHAPE_KINDS
 
 if TYPE_CHECKING:
+    import pandas
+
     from mpm.scene import Food
 
 __all__ = [
@@ -54,7 +55,10 @@ _OPTIONAL = (*LAYERS, *LAYERS.values(), "skin_stiffness")  # that a file leaves 
 _NULLABLE = ("R_skin", "tensile_strength", "fracture_energy", *_OPTIONAL)
 
 
-@dataclass(frozen=True)
+Sentences: TypeAlias = list[str]
+
+
+@dataclass(frozen=True, repr=False)
 class FoodSpec:
     """A food: outline, dimensions and properties.
 
@@ -96,6 +100,38 @@ class FoodSpec:
             if len(have) == 1:
                 other = resistance if have[0] == size else size
                 raise here.at("properties").error(f"{have[0]} needs {other}; give both, or neither")
+
+    def __repr__(self) -> str:
+        size = " x ".join(f"{1e3 * self.dims[name].value:.3g}" for name in DIMENSIONS)
+        return f"Food({self.name!r}, {self.shape_kind}, {size} mm)"
+
+    @staticmethod
+    def list() -> tuple[str, ...]:
+        """Names of the foods in ``materials.yaml``."""
+        return tuple(load_foods())
+
+    def frame(self) -> pandas.DataFrame:
+        """The properties, a row each: ``value``, ``low``, ``high`` (95 % range), ``unit`` and ``status``."""
+        import pandas
+
+        rows = {name: vars(p) for name, p in self.properties.items()}
+        kept = ["value", "low", "high", "unit", "status"]
+        return pandas.DataFrame.from_dict(rows, orient="index")[kept].rename_axis("property")
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the literature's range of each property over its value, on axes of matplotlib, or on new ones."""
+        from reports.base.interactive import range_axes
+
+        ranges = {f"{name} [{p.unit}]": (p.low, p.value, p.high) for name, p in self.properties.items()}
+        return range_axes(ranges, ax, self.name)
+
+    def save(self, path: str | Path) -> None:
+        """Write the food to a ``.yaml`` file, which :meth:`load` reads back.
+
+        Raises:
+            OutputError: The file cannot be written.
+        """
+        dump_material(self, path, self.calibration or {})
 
     @classmethod
     def load(cls, name: str | Path) -> FoodSpec:
@@ -188,7 +224,7 @@ class FoodSpec:
                 new[name] = replace(old, value=x, status=status, source=source)
         return replace(self, properties=new)
 
-    def warnings(self) -> list[str]:
+    def warnings(self) -> Sentences:
         """What a user of this food must know: what is not modelled, sources that disagree or are flagged, odd ones."""
         both = {"shape": self.dims, "properties": self.properties}
         said = [] if self.not_modelled is None else [f"{self.name}: not modelled: {self.not_modelled}"]
@@ -345,33 +381,3 @@ def _read_sizes(place: Place, raw: Any) -> dict[str, Property]:
     given = mapping(place, raw)
     check_keys(place, given, DIMENSIONS, synonyms=SYNONYMS)
     return {n: read_property(place, n, given[n]) for n in DIMENSIONS}
-
-
-def read_property(parent: Place, name: str, raw: Any) -> Property:
-    """A property in the layout of ``materials.yaml``.
-
-    Args:
-        parent: The place that it stands in, for errors.
-        name: Its name.
-        raw: What YAML has there.
-
-    Returns:
-        The property, checked.
-
-    Raises:
-        CutcalError: Of the class of ``parent``: unknown name or key, wrong unit or status, a number out of its limits.
-    """
-    place = parent.at(name)
-    given = mapping(place, raw)
-    check_keys(place, given, REQUIRED_KEYS, OPTIONAL_KEYS)
-    listed = given.get("sources", [])
-    if not isinstance(listed, list):
-        raise place.at("sources").error("must be a list of {value, source}")
-    for i, entry in enumerate(listed):
-        here = place.at("sources").at(str(i))
-        check_keys(here, mapping(here, entry), ("value", "source"))
-    sources = tuple(Source(**entry) for entry in listed)
-    try:
-        return Property(name, **{**given, "sources": sources})
-    except MaterialError as e:
-        raise parent.wrap(e) from None

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from calib.errors import MaterialError
-from calib.io.yaml_checks import Place, check_unit, choice, finite_number, suggest, text
+from calib.io.yaml_checks import Place, check_keys, check_unit, choice, finite_number, mapping, suggest, text
 from calib.table.si_numbers import si_number
 from mpm.scene.material import MAX_POISSON
 
@@ -240,3 +240,33 @@ def _check_limits(place: Place, x: float, rule: Rule) -> None:
             f"{x:g}{unit} cannot be the {rule.meaning}; "
             f"it must lie between {rule.low:g} and {rule.high:g}{unit}: {rule.why}"
         )
+
+
+def read_property(parent: Place, name: str, raw: Any) -> Property:
+    """A property in the layout of ``materials.yaml``.
+
+    Args:
+        parent: The place that it stands in, for errors.
+        name: Its name.
+        raw: What YAML has there.
+
+    Returns:
+        The property, checked.
+
+    Raises:
+        CutcalError: Of the class of ``parent``: unknown name or key, wrong unit or status, a number out of its limits.
+    """
+    place = parent.at(name)
+    given = mapping(place, raw)
+    check_keys(place, given, REQUIRED_KEYS, OPTIONAL_KEYS)
+    listed = given.get("sources", [])
+    if not isinstance(listed, list):
+        raise place.at("sources").error("must be a list of {value, source}")
+    for i, entry in enumerate(listed):
+        here = place.at("sources").at(str(i))
+        check_keys(here, mapping(here, entry), ("value", "source"))
+    sources = tuple(Source(**entry) for entry in listed)
+    try:
+        return Property(name, **{**given, "sources": sources})
+    except MaterialError as e:
+        raise parent.wrap(e) from None

@@ -13,9 +13,9 @@ from typing import Any
 
 from calib.errors import PublishedError
 from calib.io.yaml_checks import Place, check_keys, choice, finite_number, mapping, read_yaml, text
-from calib.material.food import FoodSpec, load_food, read_property
+from calib.material.food import FoodSpec, load_food
 from calib.material.knife import load_knife
-from calib.material.properties import DIMENSIONS, Rule
+from calib.material.properties import DIMENSIONS, Rule, read_property
 from calib.material.scene import LENGTH_PER_HEIGHT
 from calib.problem.food_parameters import fit_parameters
 from calib.problem.parameters import ParameterSet

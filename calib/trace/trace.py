@@ -12,7 +12,7 @@ import numpy as np
 
 from calib.errors import TraceError
 from calib.formats.reader import read_table
-from calib.io.wording import brief, quoted
+from calib.io.wording import brief, quoted, speaking_of_arguments
 from calib.table.table import MEASURED, TRACE_LABELS, Table, rows_at
 from calib.trace.recorded import MIN_SAMPLES as MIN_SAMPLES
 from calib.trace.recorded import Reading, recorded
@@ -24,7 +24,7 @@ DATA_FRAME = "DataFrame"
 """What a trace from a DataFrame is called that says nothing else."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Trace:
     """A force trace as recorded, in SI units.
 
@@ -82,6 +82,22 @@ class Trace:
         if not (np.all(np.isfinite(self.time)) and np.all(np.diff(self.time) > 0.0)):
             raise TraceError(f"{self.source}: time is not strictly increasing")
 
+    def __repr__(self) -> str:
+        return f"Trace({self.source!r}, {len(self.time)} samples, {self.time[-1] - self.time[0]:.4g} s, {self.label})"
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw force over time.
+
+        Args:
+            ax: Axes of matplotlib; None for a new figure.
+
+        Returns:
+            The axes.
+        """
+        from reports.base.interactive import trace_axes
+
+        return trace_axes(self.time, self.force, ax, f"{self.source} ({self.label})")
+
     def until(self, end: float) -> Trace:
         """The part up to a time [s].
 
@@ -133,7 +149,8 @@ class Trace:
     @classmethod
     def read(cls, path: str | Path, **columns: Any) -> Trace:
         """A trace from a file; see :func:`read_trace`."""
-        return read_trace(path, **columns)
+        with speaking_of_arguments():
+            return read_trace(path, **columns)
 
     @classmethod
     def from_frame(

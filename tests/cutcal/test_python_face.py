@@ -1,0 +1,179 @@
+"""Results, records and foods in a notebook: pictures, tables and text; and the same arguments as options."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import io
+from dataclasses import fields
+from inspect import signature
+from pathlib import Path
+from typing import Any
+
+import h5py
+import matplotlib
+import numpy as np
+import pytest
+
+from calib.calibration.fit_report import strongest
+from calib.calibration.result import CalibrationResult
+from calib.errors import OutputError
+from calib.io.progress import Progress, ProgressBar
+from calib.io.wording import as_arguments, in_arguments
+from calib.simulation.evaluation import Evaluation
+from calib.simulation.evaluation_file import Header, StoredEvaluation, hdf5_of
+from cutcal import Calibration, Food, Trace
+from cutcal.commands.calibration.calibrate import add_args
+from mpm.scene.errors import CutcalError
+from tests.data_dir import ROOT
+from tests.reports.sample import write_run
+
+BANANA = ROOT / "force_data" / "banana_reconstructed.csv"
+OTHERWISE = {"help", "json", "check", "all", "config", "material"}
+"""Options that Python says in another way: the result's summary, a Study, and a food from a file."""
+
+
+@pytest.fixture
+def result(tmp_path: Path) -> CalibrationResult:
+    """The sample calibration, with a store of two runs."""
+    matplotlib.use("Agg")
+    folder = write_run(tmp_path / "run")
+    runs = [
+        StoredEvaluation(
+            str(i),
+            "fine",
+            Evaluation(i, {"E": 1e5 * (i + 1)}, "ok", "", 1.0, np.array([0.0, 1.0]), np.array([0.0, 2.0]), {}, 0.5),
+        )
+        for i in range(2)
+    ]
+    (folder / "evaluations.h5").write_bytes(hdf5_of(Header("sha", "scene"), runs))
+    return Calibration.load(folder)
+
+
+def test_every_option_is_an_argument_of_the_same_name() -> None:
+    """None is missing on either side."""
+    parser = argparse.ArgumentParser()
+    add_args(parser)
+    options = {action.dest for action in parser._actions} - OTHERWISE
+    arguments = {item.name for item in fields(Calibration) if item.init} - {"columns"}
+    run = set(signature(Calibration.run).parameters) - {"self", "progress", "say"}
+    assert options == arguments | run
+
+
+def test_arguments_reach_the_request() -> None:
+    """The new ones; reading options turn the force round as ``columns`` does."""
+    given: dict[str, Any] = {"gain_sd": 0.05, "lag_sd": 0.01, "discrepancy": 0.04, "u_num": "study", "set": {"E": 2e5}}
+    request = Calibration("banana", BANANA, sign="-", **given).request()
+    assert (request.gain_sd, request.lag_sd, request.errors.discrepancy) == (0.05, 0.01, 0.04)
+    assert request.u_num == Path("study") and request.food.value("E") == 2e5
+    plain, turned = Calibration("banana", BANANA).request().records()[0], request.records()[0]
+    np.testing.assert_array_equal(turned.force, -plain.force)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"rate": -1.0}, "argument rate"),
+        ({"force_col": "nowhere"}, "force_col"),
+        ({"sign": "-", "columns": {"sign": "+"}}, "sign is an argument and in columns"),
+        ({"gain_sd": 2.0}, "gain_sd = 2.0"),
+        ({"set": {"Q": 1.0}}, "Q"),
+    ],
+)
+def test_errors_speak_of_arguments(change: dict[str, Any], words: str) -> None:
+    """No option of the command line is named."""
+    with pytest.raises(CutcalError) as caught:
+        Calibration("banana", BANANA, **change)
+    assert words in str(caught.value) and "--" not in str(caught.value)
+
+
+def test_options_become_arguments() -> None:
+    """Options in a sentence, and nothing else: no dash between words, no line of a table."""
+    assert as_arguments("add --resume (option --t-end)") == "add resume=True (argument t_end)"
+    assert as_arguments("a -- b, force--col, option 3") == "a -- b, force--col, option 3"
+
+
+def test_stages_and_folders_speak_of_arguments(tmp_path: Path) -> None:
+    """What is said, and an error that only a run can find: a folder that is there already."""
+    heard: list[str] = []
+    listener = in_arguments(heard.append)
+    assert listener is not None and in_arguments(None) is None
+    listener("give --board-z")
+    assert heard == ["give board_z"]
+    (tmp_path / "there").write_text("a file")
+    with pytest.raises(CutcalError) as caught:
+        Calibration("banana", BANANA).run(tmp_path / "there")
+    assert "there" in str(caught.value) and "--" not in str(caught.value)
+
+
+def test_a_notebook_rewrites_its_line() -> None:
+    """A stream of ipykernel is no terminal, and gets the bar all the same; a file gets a line now and then."""
+    stream = type("OutStream", (io.StringIO,), {"__module__": "ipykernel.iostream"})()
+    plain = io.StringIO()
+    for out in (stream, plain):
+        with ProgressBar(out, interval_s=1e9) as bar:
+            for done in (1, 2):
+                bar(Progress(done, float(done), 4.0, 0, 1.0, 9.0, "search"))
+    assert stream.getvalue().count("\r[") == 2 and plain.getvalue().count("\n") == 1
+
+
+def test_a_result_tells_of_itself(result: CalibrationResult) -> None:
+    """Text and table have each fitted parameter and verdict; runs are rows; nothing was sampled."""
+    text, table = result.fit_report(), result._repr_html_()
+    for name, p in result.fitted.items():
+        assert f"{name}:" in text and f"<td>{name}</td>" in table and f"{p.value:.4g}" in text
+    assert all(v.name in text for v in result.verdicts)
+    assert max(map(len, text.splitlines())) <= 120
+    runs = result.evaluations
+    assert list(runs["E"]) == [1e5, 2e5] and list(runs["status"]) == ["ok", "ok"] and list(runs["seconds"]) == [0.5] * 2
+    assert len(result.modes) == (0 if result.sampled is None else len(result.sampled.modes))
+
+
+def test_a_store_that_is_gone_or_damaged(result: CalibrationResult) -> None:
+    """Each is one line with the file."""
+    path = result.folder / "evaluations.h5"
+    with h5py.File(path, "a") as file:
+        del file["status"]
+    with pytest.raises(OutputError, match="evaluations.h5: cannot be read"):
+        result.evaluations  # noqa: B018
+    path.unlink()
+    with pytest.raises(OutputError, match="evaluations.h5: no such file"):
+        result.evaluations  # noqa: B018
+
+
+def test_correlations_once_and_in_order() -> None:
+    """The strongest first, no pair twice, weak and unknown ones left out."""
+    given = {"E,R": 0.5, "R,E": 0.5, "E,mu": -0.9, "R,mu": 0.01, "mu,nu": None}
+    assert strongest(given) == [("E,mu", -0.9), ("E,R", 0.5)]
+
+
+def test_pictures(result: CalibrationResult) -> None:
+    """Curves that are drawn are those of the folder; given axes are used."""
+    upper, lower = result.plot()
+    np.testing.assert_array_equal(upper.lines[0].get_ydata(), result.curves["real_N"])
+    np.testing.assert_array_equal(lower.lines[1].get_ydata(), result.curves["residual_N"])
+    trace = Trace.read(BANANA)
+    axes = trace.plot(upper)
+    assert axes is upper and len(axes.lines) == 3
+    food = Food.load("banana")
+    drawn = food.plot()
+    assert len(drawn.get_yticklabels()) == sum(p.value > 0.0 and p.low > 0.0 for p in food.properties.values())
+    matplotlib.pyplot.close("all")
+
+
+def test_foods_as_tables_and_files(tmp_path: Path) -> None:
+    """Names, rows and a file that reads back; texts of values are short."""
+    assert {"banana", "potato"} <= set(Food.list())
+    food = Food.load("banana").with_values({"E": 2e5})
+    assert food.frame().loc["E", "value"] == 2e5
+    food.save(tmp_path / "mine.yaml")
+    assert Food.load(tmp_path / "mine.yaml") == food
+    texts = (repr(food), repr(Trace.read(BANANA)), repr(Calibration("banana", BANANA)))
+    assert all(len(text) < 120 + len(str(BANANA)) and "\n" not in text for text in texts)
+
+
+@pytest.mark.parametrize("name", ["cutcal", "calib", "mpm", "reports", "fem_reference", "studies", "intsim"])
+def test_packages_say_that_they_are_typed(name: str) -> None:
+    """The mark of PEP 561 lies beside the package's first module."""
+    found = importlib.util.find_spec(name)
+    assert found is not None and found.origin is not None and (Path(found.origin).parent / "py.typed").is_file()
