@@ -149,7 +149,7 @@ def add_outline(p: Group) -> None:
     p.add_argument("--outline", metavar="FILE", help="its silhouette, radii or mesh, with --scale 0.1mm/px")
     p.add_argument("--scale", action=NamedBeside, metavar="SIZE", help="size of a pixel, or of a unit of a mesh")
     p.add_argument("--outline-as", metavar="WAY", help=f"{', '.join(WAYS)}; of a mesh its axes {POSE}")
-    for name, what in (("height", "0.045 or 45mm; so --width and --length"), ("width", WIDTH), ("length", LENGTH)):
+    for name, what in (("height", "0.045 or 45mm; so --width, --length"), ("width", WIDTH), ("length", LENGTH)):
         p.add_argument(
             f"--{name}",
             action="store" if name == "height" else NamedBeside,

@@ -385,6 +385,8 @@ class Scene:
         for name in ("stone", "cavity", "parted"):
             if not out["food"][name]:  # what a food has not is no part of it
                 del out["food"][name]
+        if not out["food"]["material"]["skin_stiffness"]:
+            del out["food"]["material"]["skin_stiffness"]
         return out
 
 

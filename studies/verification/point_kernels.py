@@ -6,7 +6,7 @@ Taichi reads the annotations of kernels, so they are no strings here.
 import numpy as np
 import taichi as ti
 
-from mpm.kernels import constitutive as law
+from mpm.kernels.constitutive import laws as law
 
 
 @ti.data_oriented

@@ -7,7 +7,7 @@ from scipy.linalg import polar
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from mpm.kernels import constitutive as law
+from mpm.kernels.constitutive import laws as law
 from mpm.runtime import Runtime, start
 from mpm.scene.material import Material
 from tests.mpm import twins

@@ -8,7 +8,7 @@ import pytest
 import taichi as ti
 from taichi.lang import kernel_impl
 
-from mpm.kernels import constitutive
+from mpm.kernels.constitutive import laws
 from mpm.kernels.p2g import p2g_particle
 from mpm.runtime import Runtime, compiler, start
 from mpm.step.time_step import time_step
@@ -108,7 +108,7 @@ def test_a_tree_is_read_anew_only_while_it_is_in_use():
     assert parse(text) is one
 
 
-@pytest.mark.parametrize("function", [p2g_particle, time_step, constitutive.unit, total, totals])
+@pytest.mark.parametrize("function", [p2g_particle, time_step, laws.unit, total, totals])
 def test_the_source_is_that_of_inspect(function):
     """Lines and number of the first, decorators included."""
     plain = inspect.unwrap(function)
