@@ -43,10 +43,7 @@ def update_particle(s: ti.template(), cut, p, thread, base, fx, dt):
     zero = ti.Vector.zero(float, 4)
     u4, cx, cy, cz = zero, zero, zero, zero
     if ti.static(s.atomic):
-        for i in ti.static(range(3)):
-            whole, py, pz = gather_plane(s, split_plane(s, cut, lowest + i * s.stride_x, i, code), w)
-            u4, cx = u4 + w[i][0] * whole, cx + i * w[i][0] * whole
-            cy, cz = cy + w[i][0] * py, cz + w[i][0] * pz
+        u4, cx, cy, cz = gather(s, cut, lowest, code, w)
     else:
         # Where the loops are unrolled LLVM does not find the vectors of four, which costs time (docs/theory.md,
         # "Measured choices"). So their end is one that LLVM cannot know, and what they find goes through memory.
@@ -74,6 +71,27 @@ def update_particle(s: ti.template(), cut, p, thread, base, fx, dt):
             s.visibility[cut, p] = code | IN_CONTACT
     s.v[cut, p] = u
     s.x[cut, p] = at
+
+
+@ti.func
+def gather(s: ti.template(), cut, lowest, code, w):
+    """Sum of the velocities of the 27 nodes of a point, and its moments, plane by plane.
+
+    Args:
+        lowest: Index of the lowest node.
+        code: Which columns of nodes the point sees.
+        w: Weights of the nodes.
+
+    Returns:
+        Sum of weight times velocity [m/s], and its moments about the lowest node along x, y and z in cells.
+    """
+    zero = ti.Vector.zero(float, 4)
+    u, cx, cy, cz = zero, zero, zero, zero
+    for i in ti.static(range(3)):
+        whole, py, pz = gather_plane(s, split_plane(s, cut, lowest + i * s.stride_x, i, code), w)
+        u, cx = u + w[i][0] * whole, cx + i * w[i][0] * whole
+        cy, cz = cy + w[i][0] * py, cz + w[i][0] * pz
+    return u, cx, cy, cz
 
 
 @ti.func

@@ -9,7 +9,7 @@ Math. 36:85).
 import taichi as ti
 
 from mpm.kernels.crack import visible_columns
-from mpm.kernels.g2p import gather_plane, split_plane
+from mpm.kernels.g2p import gather
 from mpm.kernels.p2g import scatter_split
 from mpm.state.accessors import step_size, to_grid_axes, to_scene_axes
 from mpm.state.loops import locate_active, node_box, repetitions
@@ -67,13 +67,8 @@ def move_point(s: ti.template(), cut, n, dt):
     """Move point n of the skin, and stretch and turn its two vectors."""
     base, fx = base_node(s, cut, s.skin_x[cut, n])
     if in_window(base, node_box(s, cut, NODE_ROWS)) > 0:
-        w, zero = bspline_weights(fx), ti.Vector.zero(float, 4)
         code, lowest = s.skin_visibility[cut, n], node_index(s, cut, base[0], base[1], base[2])
-        u, cx, cy, cz = zero, zero, zero, zero
-        for i in ti.static(range(3)):
-            whole, py, pz = gather_plane(s, split_plane(s, cut, lowest + i * s.stride_x, i, code), w)
-            u, cx = u + w[i][0] * whole, cx + i * w[i][0] * whole
-            cy, cz = cy + w[i][0] * py, cz + w[i][0] * pz
+        u, cx, cy, cz = gather(s, cut, lowest, code, bspline_weights(fx))
         slope = 4 * s.par[cut, INV_DX]
         cx, cy, cz = slope * (cx - fx[0] * u), slope * (cy - fx[1] * u), slope * (cz - fx[2] * u)
         for k in ti.static(range(2)):
