@@ -51,8 +51,9 @@ __all__ = [
 GIVEN_SPREAD = 10.0
 """Range of a property that has no literature and is given by the user: the value over and times this."""
 
-_OPTIONAL = (*LAYERS, *LAYERS.values(), "skin_stiffness")  # that a file leaves out where a food has none
-_NULLABLE = ("R_skin", "tensile_strength", "fracture_energy", *_OPTIONAL)
+_STRENGTHS = ("strength_ratio", "tensile_strength")  # a food has one of them at most
+_OPTIONAL = (*LAYERS, *LAYERS.values(), "skin_stiffness", *_STRENGTHS)  # that a file leaves out where a food has none
+_NULLABLE = ("R_skin", "fracture_energy", *_OPTIONAL)
 
 
 Sentences: TypeAlias = list[str]
@@ -95,6 +96,8 @@ class FoodSpec:
         check_keys(here.at("properties"), self.properties, needed, _NULLABLE, SYNONYMS)
         if self.properties["skin_thickness"].value > 0.0 and "R_skin" not in self.properties:
             raise here.at("properties").error("skin_thickness > 0 needs R_skin; give it, or skin_thickness 0")
+        if all(name in self.properties for name in _STRENGTHS):
+            raise here.at("properties").error("strength_ratio and tensile_strength are the same; give one of them")
         for size, resistance in LAYERS.items():
             have = [name for name in (size, resistance) if name in self.properties]
             if len(have) == 1:
@@ -148,7 +151,7 @@ class FoodSpec:
     def default_fit(self) -> tuple[str, ...]:
         """Names of the properties that a calibration fits unless told otherwise."""
         start = ("R_skin", "skin_thickness") if self.properties["skin_thickness"].value > 0.0 else ("R_initiation",)
-        strength = ("tensile_strength",) if "tensile_strength" in self.properties else ()
+        strength = tuple(name for name in _STRENGTHS if name in self.properties)
         return ("E", "yield_stress", *strength, "R", *self.layers, *start, "initiation_depth", "mu")
 
     @property
@@ -174,7 +177,10 @@ class FoodSpec:
         """
         rule_of(name)
         if name not in self.properties:
-            raise MaterialError(f"{self.name}: no literature range for {name}; give a value for it first")
+            other = (
+                "; or fit strength_ratio" if name == "tensile_strength" and "strength_ratio" in self.properties else ""
+            )
+            raise MaterialError(f"{self.name}: no literature range for {name}; give a value for it first{other}")
         return self.properties[name].low, self.properties[name].high
 
     def with_sizes(self, sizes: Mapping[str, float], *, status: str, source: str) -> FoodSpec:
@@ -207,7 +213,8 @@ class FoodSpec:
             source: Where the values come from.
 
         Returns:
-            The food; a property that it had no value for has a range of ``GIVEN_SPREAD`` to either side.
+            The food; a property that it had no value for has a range of ``GIVEN_SPREAD`` to either side. One of
+            ``strength_ratio`` and ``tensile_strength`` takes the place of the other.
 
         Raises:
             MaterialError: An unknown property, or a value out of its limits.
@@ -215,6 +222,8 @@ class FoodSpec:
         new = dict(self.properties)
         for name, raw in values.items():
             x = check_override(name, raw)
+            if name in _STRENGTHS:
+                new.pop(_STRENGTHS[1 - _STRENGTHS.index(name)], None)
             old = new.get(name)
             if old is None:
                 rule = PROPERTIES[name]
@@ -235,15 +244,13 @@ class FoodSpec:
             for w in item.warnings()
         ]
         if self._lacks_strength:
-            said.append(
-                f"{self.name}.properties.fracture_energy: not used, because bulk damage also needs tensile_strength"
-            )
+            said.append(f"{self.name}.properties.fracture_energy: not used, because bulk damage also needs a strength")
         return said
 
     @property
     def _lacks_strength(self) -> bool:
         """Whether bulk damage has its energy, but not the stress at which it starts."""
-        return "fracture_energy" in self.properties and "tensile_strength" not in self.properties
+        return "fracture_energy" in self.properties and not set(_STRENGTHS) & set(self.properties)
 
     def to_scene_food(
         self,

@@ -83,6 +83,10 @@ PROPERTIES: dict[str, Rule] = {
     "mu": Rule("-", 0.0, 2.0, "Coulomb friction of food on blade"),
     "loss_factor": Rule("-", 0.0, 1.0, "mechanical loss factor tan(delta) at the first axial mode"),
     "tensile_strength": Rule("Pa", 10.0, 1e9, "tension at which the flesh parts"),
+    "strength_ratio": Rule(
+        "-", 0.01, 1.0, "tension at which the flesh parts over its yield stress",
+        "a food that flows before it parts has a tensile_strength [Pa] in place of it",
+    ),
     "fracture_energy": Rule("J/m^2", 0.1, 1e6, "energy per crack area of bulk damage"),
 }  # fmt: skip
 

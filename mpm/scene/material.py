@@ -40,10 +40,12 @@ class Material:
         tensile_strength: Tension at which the food parts [Pa], or None. Across the plane of a cohesive crack the
             tension falls from there to nothing while the food opens, and the work is R; None: see :attr:`cohesion`.
             Bulk damage, where there is any, starts at it. Nothing else uses it.
-        cohesive_zone: Least length E R / strength^2 of the process zone of a food without a ``tensile_strength`` [m];
-            nothing else uses it.
+        strength_ratio: That tension over the yield stress [-], at most 1, in place of ``tensile_strength``; not used
+            where that is given.
+        cohesive_zone: Least length E R / strength^2 of the process zone of a food without one of these [m]; nothing
+            else uses it.
         fracture_energy: Energy per crack area of bulk damage [J/m^2], or None for a food without bulk damage. It needs
-            ``tensile_strength``.
+            a strength.
         loss_factor: Mechanical loss factor tan(delta) [-] at the first axial mode of the specimen, Kelvin-Voigt. Apple
             tissue loses 0.13-0.4 of the energy of a cycle (J. Texture Stud. 14:155, 1983), i.e. about 0.04-0.13.
         prony: Relaxation of the shear stiffness as pairs (share [-], time [s]); E is then the instantaneous modulus and
@@ -68,6 +70,7 @@ class Material:
     initiation_depth: float = 1e-3
     mu: float = 0.0
     tensile_strength: float | None = None
+    strength_ratio: float | None = None
     cohesive_zone: float = COHESIVE_ZONE
     fracture_energy: float | None = None
     loss_factor: float = 0.0
@@ -103,10 +106,21 @@ class Material:
                 check_number(w, name, getattr(self, name), -1e-300, 1e6, "N/m")
         if self.tensile_strength is not None:
             check_number(w, "tensile_strength", self.tensile_strength, 0.0, 1e12, "Pa")
+        if self.strength_ratio is not None:
+            if not 0.0 < self.strength_ratio <= 1.0:
+                raise SceneError(
+                    f"material: strength_ratio = {self.strength_ratio!r} must lie in (0, 1]; give a food that flows "
+                    "before it parts a tensile_strength [Pa] in place of it"
+                )
+            if self.yield_stress == math.inf:
+                raise SceneError(
+                    "material: strength_ratio is a part of yield_stress, and this food does not yield; give "
+                    "tensile_strength [Pa] in place of it"
+                )
         check_number(w, "cohesive_zone", self.cohesive_zone, 1e-6, 10.0, "m")
         if self.fracture_energy is not None:
             check_number(w, "fracture_energy", self.fracture_energy, 0.0, 1e9, "J/m^2")
-            if self.tensile_strength is None:
+            if self.strength is None:
                 raise SceneError(
                     "material: fracture_energy makes bulk damage, which starts at tensile_strength; give both, or "
                     "leave out fracture_energy"
@@ -169,15 +183,22 @@ class Material:
         return max(self.R, threshold or 0.0)
 
     @property
+    def strength(self) -> float | None:
+        """Tension at which the food parts [Pa]: ``tensile_strength``, or ``strength_ratio`` of the yield stress."""
+        if self.tensile_strength is not None or self.strength_ratio is None:
+            return self.tensile_strength
+        return self.strength_ratio * self.yield_stress
+
+    @property
     def cohesion(self) -> float:
-        """Strength of a cohesive crack [Pa]: the tensile strength; where that is None :data:`PARTS_BEFORE_IT_FLOWS` of
+        """Strength of a cohesive crack [Pa]: :attr:`strength`; where that is None :data:`PARTS_BEFORE_IT_FLOWS` of
         the yield stress, and no more than makes a process zone E R / strength^2 of :attr:`cohesive_zone`.
 
         A crack that is stronger than the yield stress flows at its tip, by which work of fracture grows (Tvergaard and
         Hutchinson 1992). Cells of 3 mm do not resolve that: at twice the yield stress they miss a quarter of the work.
         """
-        if self.tensile_strength is not None:
-            return self.tensile_strength
+        if self.strength is not None:
+            return self.strength
         return min(PARTS_BEFORE_IT_FLOWS * self.yield_stress, math.sqrt(self.E * self.R / self.cohesive_zone))
 
     def tie_strength(self, spacing: float) -> float:

@@ -343,10 +343,10 @@ class Scene:
 
     def _check_band(self) -> None:
         m = self.food.material
-        if m.tensile_strength is None or m.fracture_energy is None:
+        if m.strength is None or m.fracture_energy is None:
             return
         band = BAND_CELLS * self.numerics.dx
-        limit = 2 * m.E * m.fracture_energy / m.tensile_strength**2
+        limit = 2 * m.E * m.fracture_energy / m.strength**2
         if band >= limit:
             raise SceneError(
                 f"bulk damage would snap back (Bazant and Oh 1983): the crack band of {band * 1e3:g} mm must stay "
@@ -385,8 +385,9 @@ class Scene:
         for name in ("stone", "cavity", "parted"):
             if not out["food"][name]:  # what a food has not is no part of it
                 del out["food"][name]
-        if not out["food"]["material"]["skin_stiffness"]:
-            del out["food"]["material"]["skin_stiffness"]
+        for name in ("skin_stiffness", "strength_ratio"):
+            if not out["food"]["material"][name]:
+                del out["food"]["material"][name]
         return out
 
 

@@ -52,11 +52,11 @@ def _put_material(table: np.ndarray, scene: Scene, material: Material, seeds: Se
     table[row.MU], table[row.LAM] = material.shear, material.lame
     table[row.YIELD] = min(material.yield_stress, UNBOUNDED)
     table[row.MASS], table[row.VOLUME] = material.rho * seeds.volume, seeds.volume
-    if material.tensile_strength is not None and material.fracture_energy is not None:
-        eps0 = material.tensile_strength / material.E
+    if material.strength is not None and material.fracture_energy is not None:
+        eps0 = material.strength / material.E
         band = BAND_CELLS * scene.numerics.dx
         table[row.EPS0] = eps0
-        table[row.EPSF] = eps0 / 2 + material.fracture_energy / (material.tensile_strength * band)
+        table[row.EPSF] = eps0 / 2 + material.fracture_energy / (material.strength * band)
     beta = retardation_time(scene, material)
     table[row.ETA_S], table[row.ETA_B] = beta * material.shear, beta * (material.lame + 2 / 3 * material.shear)
     table[row.CONTACT] = contact_stiffness(scene, material, seeds.spacing)

@@ -76,6 +76,7 @@ def test_shipped_foods(foods: dict[str, FoodSpec]) -> None:
         assert set(PROPERTIES) - set(food.properties) <= {
             "R_skin",
             "tensile_strength",
+            "strength_ratio",
             "fracture_energy",
             "skin_stiffness",
             *LAYERS,
@@ -192,7 +193,7 @@ def test_default_fit_follows_the_skin(foods: dict[str, FoodSpec]) -> None:
     assert foods["cucumber"].default_fit == (
         "E",
         "yield_stress",
-        "tensile_strength",
+        "strength_ratio",
         "R",
         "R_rind",
         "rind_thickness",
@@ -204,7 +205,7 @@ def test_default_fit_follows_the_skin(foods: dict[str, FoodSpec]) -> None:
         "mu",
     )
     start = ("R_initiation", "initiation_depth", "mu")
-    assert foods["potato"].default_fit == ("E", "yield_stress", "tensile_strength", "R", *start)
+    assert foods["potato"].default_fit == ("E", "yield_stress", "strength_ratio", "R", *start)
 
 
 def test_import_is_light() -> None:
@@ -241,26 +242,41 @@ def test_fitted_value_outside_its_range(foods: dict[str, FoodSpec]) -> None:
 
 
 def test_half_of_bulk_damage(foods: dict[str, FoodSpec]) -> None:
-    """A fracture energy without a tensile strength is not used, with a warning; with both it is used."""
+    """A fracture energy without a strength is not used, with a warning; with both it is used."""
     apple = foods["apple"]
-    rest = {name: item for name, item in apple.properties.items() if name != "tensile_strength"}
+    rest = {name: item for name, item in apple.properties.items() if name != "strength_ratio"}
     half = replace(apple, properties=rest).with_values({"fracture_energy": 200.0})
     assert half.to_scene_food().material.fracture_energy is None
-    assert any("bulk damage also needs tensile_strength" in w for w in half.warnings())
+    assert any("bulk damage also needs a strength" in w for w in half.warnings())
     both = half.with_values({"tensile_strength": 3e5})
     assert both.to_scene_food().material.fracture_energy == 200.0
     assert not any("bulk damage" in w for w in both.warnings())
 
 
 @pytest.mark.parametrize("name", FOODS)
-def test_tensile_strength_is_known_and_breaks_nothing_in_bulk(name: str, foods: dict[str, FoodSpec]) -> None:
-    """Each food has one, 0.8 to 1 of its yield stress, as the one food that was measured; none has bulk
+def test_strength_is_known_and_breaks_nothing_in_bulk(name: str, foods: dict[str, FoodSpec]) -> None:
+    """Each food has that part of its yield stress at which the one food that was measured parts; none has bulk
     damage, and none says that its strength is not used."""
     food, material = foods[name], foods[name].to_scene_food().material
-    strength, flow = food.value("tensile_strength"), food.value("yield_stress")
-    assert strength is not None and flow is not None and 0.79 <= strength / flow <= 1.0
-    assert material.tensile_strength == material.cohesion == strength and not material.damaged
+    ratio, flow = food.value("strength_ratio"), food.value("yield_stress")
+    assert ratio == 0.8 and flow is not None and food.value("tensile_strength") is None
+    assert material.strength == material.cohesion == ratio * flow and not material.damaged
     assert not any("not used, because" in w for w in food.warnings())
+
+
+def test_one_strength_takes_the_place_of_the_other(foods: dict[str, FoodSpec]) -> None:
+    """Whatever was given last is the strength, and the file of such a food reads back."""
+    absolute = foods["apple"].with_values({"tensile_strength": 2e6})
+    assert absolute.to_scene_food().material.cohesion == 2e6 and "strength_ratio" not in absolute.properties
+    assert absolute.default_fit[2] == "tensile_strength"
+    again = absolute.with_values({"strength_ratio": 0.5, "yield_stress": 2e5})
+    assert again.to_scene_food().material.cohesion == 1e5
+    with pytest.raises(MaterialError, match="give one of them"):
+        replace(absolute, properties={**absolute.properties, **again.properties})
+    with pytest.raises(MaterialError, match="or fit strength_ratio"):
+        foods["apple"].prior("tensile_strength")
+    with pytest.raises(MaterialError, match="flows before it parts has a tensile_strength"):
+        foods["apple"].with_values({"strength_ratio": 1.5})
 
 
 # Values by hand -----------------------------------------------------------------------------------
@@ -272,10 +288,10 @@ def test_with_values(foods: dict[str, FoodSpec]) -> None:
     assert food.value("E") == 4e5 and food.value("mu") == 0.0 and food.value("R") == foods["banana"].value("R")
     assert food.properties["E"].status == "given" and food.prior("E") == foods["banana"].prior("E")
     assert foods["banana"].value("E") == 3e5
-    fitted = foods["banana"].with_values({"E": 4e5, "tensile_strength": 2e5}, status="fitted", source="trace 7")
-    for name in ("E", "tensile_strength"):
+    fitted = foods["banana"].with_values({"E": 4e5, "strength_ratio": 0.7}, status="fitted", source="trace 7")
+    for name in ("E", "strength_ratio"):
         assert (fitted.properties[name].status, fitted.properties[name].source) == ("fitted", "trace 7")
-    assert fitted.prior("tensile_strength") == foods["banana"].prior("tensile_strength")
+    assert fitted.prior("strength_ratio") == foods["banana"].prior("strength_ratio")
     assert foods["banana"].with_values({"fracture_energy": 200.0}).prior("fracture_energy") == (20.0, 2000.0)
     with pytest.raises(MaterialError, match="unknown property 'youngs', did you mean 'E'"):
         foods["banana"].with_values({"youngs": 4e5})

@@ -355,7 +355,7 @@ def test_value_beside_the_scene_is_recorded(play, capsys, monkeypatch):
     it is in the hash of the inputs alone.
     """
     known = load_foods()
-    properties = {name: p for name, p in known["grape"].properties.items() if name != "tensile_strength"}
+    properties = {name: p for name, p in known["grape"].properties.items() if name != "strength_ratio"}
     weak = replace(known["grape"], properties=properties)
     torn = weak.with_values({"fracture_energy": 1.0})
     monkeypatch.setattr("cutcal.commands.solver.regress.load_foods", lambda: known | {"grape": weak})

@@ -1,4 +1,4 @@
-"""The tensile strength as a parameter: its prior and a fit to a made-up cut."""
+"""The strength of a food as a parameter: its prior and a fit to a made-up cut."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from mpm.solver import Simulation
 from tests.mpm.kernels.test_ties import SHORT
 
 APPLE = load_food("apple")
-STRENGTH = "tensile_strength"
+STRENGTH = "strength_ratio"
 PEELED = replace(APPLE.to_scene_food().material, skin_thickness=0.0)
 SPLIT = replace(SHORT, food=replace(SHORT.food, material=PEELED), motion=replace(SHORT.motion, mach=0.04))
 """A short cut of peeled apple that parts by a cohesive crack, under a thick blade."""
@@ -42,19 +42,25 @@ class Cuts:
 
 
 def test_prior_is_that_of_the_literature() -> None:
-    """On a log scale, and with the stress-like: it scales with stiffness and toughness."""
+    """On a log scale, and not with the stress-like: the strength scales along with the yield stress."""
     only = fit_parameters(APPLE, (STRENGTH,))
     parameter = only[STRENGTH]
-    assert (parameter.value, parameter.prior_low, parameter.prior_high) == (2.5e5, 5e4, 5e5)
-    assert parameter.log and only.stress_like() == pytest.approx([1.0])
+    assert (parameter.value, parameter.prior_low, parameter.prior_high) == (0.8, 0.6, 1.0)
+    assert parameter.log and only.stress_like() == pytest.approx([0.0])
 
 
-@pytest.mark.parametrize("truth", [1.2e5, 2e5])
+def test_search_stays_where_the_grid_resolves_the_crack() -> None:
+    """No food of a fit is stronger than its yield stress, so that none flows at the tip of its crack."""
+    both = fit_parameters(APPLE, ("yield_stress", STRENGTH))
+    for corner in (both.lower, both.upper):
+        scene = SPLIT.with_material(**both.to_dict(corner))
+        assert not scene.flows_at_its_crack
+    assert SPLIT.with_material(tensile_strength=2e6).flows_at_its_crack
+
+
+@pytest.mark.parametrize("truth", [0.4, 0.67])
 def test_strength_of_a_made_up_cut_is_found(truth: float) -> None:
-    """Under a thick blade the force tells a weak food from a strong one of the same stiffness and toughness.
-
-    From the yield stress of 0.3 MPa on, a stronger one changes nothing.
-    """
+    """Under a thick blade the force tells a weak food from a strong one of the same stiffness and toughness."""
     cuts = Cuts(SPLIT)
     real = next(cuts.evaluate([{STRENGTH: truth}]))
     grid = np.linspace(0.0, 0.006, 60)
