@@ -20,6 +20,7 @@ class MethodConstant:
         source: Where its value is from.
         why: Why not both half and twice; empty where it is both.
         unless: Property of the food in whose place the number is taken, so that it is nothing where the food has it.
+        only: Property of the food without which it is nothing.
     """
 
     name: str
@@ -29,12 +30,14 @@ class MethodConstant:
     source: str
     why: str = ""
     unless: str = ""
+    only: str = ""
 
     def value(self, scene: Scene) -> float:
         """Its value in a scene [SI]; 0 where it has no part in it."""
-        if self.unless and getattr(scene.food.material, self.unless) is not None:
+        food = scene.food.material
+        if (self.unless and getattr(food, self.unless) is not None) or (self.only and not getattr(food, self.only)):
             return 0.0
-        part = scene.food.material if self.part == "material" else getattr(scene, self.part)
+        part = food if self.part == "material" else getattr(scene, self.part)
         return float(getattr(part, self.key))
 
     def varied(self, scene: Scene, factor: float) -> Scene:
@@ -53,7 +56,8 @@ class MethodConstant:
             scene: A scene.
             value: The value [SI].
         """
-        new = {self.key: value}
+        old = getattr(scene.food.material if self.part == "material" else getattr(scene, self.part), self.key)
+        new = {self.key: round(value) if isinstance(old, int) else value}
         if self.part == "material":
             return scene.with_material(**new)
         return replace(scene, **{self.part: replace(getattr(scene, self.part), **new)})
@@ -79,13 +83,18 @@ CONSTANTS = (
         "numerical: half a cell about the edge, one spacing of the particles",
     ),
     MethodConstant(
+        "rows of a tie", "numerics", "layer_rows", (0.5, 2.0),
+        "numerical: parts of a particle's spacing in which the toughness of a food of layers is looked up",
+        only="layered",
+    ),
+    MethodConstant(
         "least gap to a surface", "numerics", "least_gap", (0.5, 2.0),
         "numerical: keeps the centre of a particle that is squeezed flat inside the food",
     ),
     MethodConstant(
         "process zone of a food without strength", "material", "cohesive_zone", (0.5, 2.0),
-        "assumed, where the food has no tensile strength (materials.yaml has one for every food)",
-        unless="tensile_strength",
+        "assumed, where the food has no strength (materials.yaml has one for every food)",
+        unless="strength",
     ),
     MethodConstant(
         "time step", "numerics", "safety", (0.5,), "numerical: part of the stability limit",

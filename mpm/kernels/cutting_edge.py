@@ -120,7 +120,7 @@ def tied_width(s: ti.template(), cut, i):
     width, and what is cut in all is the flesh's area, wherever that has moved.
     """
     many = 2.0 / multiplicity_x(s, cut, i) if ti.static(s.mirror_x) else 1.0  # half of the middle one is modelled
-    return many * s.at_edge[cut, i][1] * s.par[cut, SPACING] ** 2 / (s.par[cut, EDGE_BAND] * s.par[cut, DX])
+    return many * s.at_edge[cut, i][2] * s.par[cut, SPACING] ** 2 / (s.par[cut, EDGE_BAND] * s.par[cut, DX])
 
 
 @ti.func

@@ -72,7 +72,7 @@ def hold_together(s: ti.template(), cut: ti.template()):
         c, i, mine = locate_active(s, cut, q, SLICES)
         if mine:
             s.passing[c, i] = ti.Vector.zero(float, 3)
-            s.at_edge[c, i] = ti.Vector.zero(float, 2)
+            s.at_edge[c, i] = ti.Vector.zero(float, 3)
     for q in range(repetitions(s, cut, TIES)):
         c, n, mine = locate_active(s, cut, q, TIES)
         if mine:
@@ -141,15 +141,15 @@ def pull_tie(s: ti.template(), cut, n, dt):
         push_face(s, cut, p, s.tool_gap[cut, p], dv)
         if ti.static(not s.mirror_y):
             push_face(s, cut, other, -s.tool_gap[cut, other], -dv)
+    if s.par[cut, LAYERED] > 0:
+        count_rows(s, cut, n, at, tip)
     weight = passing_weight(above / band)
     if weight > 0:
         tough = s.tie_toughness[cut, n]
         rest = tough * (1.0 - work_spent(s.largest_opening[cut, n], end)) if left > 0 else 0.0
         charge_edge(s, cut, at[0], weight * ti.Vector([rest, tough, 1.0]))
         if ti.static(s.hollow):
-            count_layer(s, cut, at[0], tough, s.tie_share[cut, n] * weight)
-        elif s.par[cut, LAYERED] > 0:
-            count_layer(s, cut, at[0], tough, s.tie_share[cut, n] * weight)
+            s.at_edge[cut, slice_of(s, cut, at[0])][2] += s.tie_share[cut, n] * weight
 
 
 @ti.func
@@ -204,8 +204,14 @@ def push_face(s: ti.template(), cut, p, arm, dv):
 @ti.func
 def cut_has_started(s: ti.template(), cut, place):
     """Whether the cut has started at a place along the edge: before that the edge only dents the food."""
+    return s.start_force[cut, slice_of(s, cut, place)] > 0
+
+
+@ti.func
+def slice_of(s: ti.template(), cut, place):
+    """The slice that a place along the edge lies in, or its mirror image."""
     i = ti.floor((place - s.par[cut, FIRST_STATION]) * s.par[cut, INV_DX] + 0.5, ti.i32)
-    return s.start_force[cut, ti.math.clamp(i, s.first_slice, s.size[cut, STATIONS] - 1)] > 0
+    return ti.math.clamp(i, s.first_slice, s.size[cut, STATIONS] - 1)
 
 
 @ti.func
@@ -222,12 +228,22 @@ def charge_edge(s: ti.template(), cut, place, sums):
 
 
 @ti.func
-def count_layer(s: ti.template(), cut, place, tough, weight):
-    """Count the toughness of what the edge passes for the slice it lies in, or for its mirror image.
+def count_rows(s: ti.template(), cut, n, at, tip):
+    """Count the toughness of the rows of a tie that the edge is in, for the slice it lies in or its mirror image.
 
-    A tie on the outline stands for less than its square of the section and counts by its share. Neighbouring slices
-    have no part of it: on the flank of a round food they may be of another layer.
+    A row as high as a part of the tie's spacing has a toughness of its own, so that a layer thinner than a cell is
+    there at its place and not in a mean over the ties about the edge. Between the middles of two rows the edge pays
+    for both, in proportion. A row on the outline counts by its share; neighbouring slices have no part of it, as on
+    the flank of a round food they may be of another layer.
+
+    Args:
+        n: The tie.
+        at: Where it is [m].
+        tip: Height of the edge there [m].
     """
-    i = ti.floor((place - s.par[cut, FIRST_STATION]) * s.par[cut, INV_DX] + 0.5, ti.i32)
-    i = ti.math.clamp(i, s.first_slice, s.size[cut, STATIONS] - 1)
-    s.at_edge[cut, i] += weight * ti.Vector([tough, 1.0])
+    above = (tip - at[2]) / s.par[cut, SPACING] * s.rows + 0.5 * s.rows  # the tie's lower end [rows]
+    if -1.0 < above < s.rows + 1.0:
+        i = slice_of(s, cut, at[0])
+        for k in range(s.rows):
+            weight = s.row_share[cut, n, k] * passing_weight(above - k - 0.5)
+            s.at_edge[cut, i] += weight * ti.Vector([s.row_toughness[cut, n, k], 1.0, 0.0])

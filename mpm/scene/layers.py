@@ -40,9 +40,14 @@ def toughness(shape: Shape, material: Material, points: np.ndarray) -> np.ndarra
 
 
 def layer_ties(
-    shape: Shape, material: Material, spacing: float, places: np.ndarray, without: Sequence[Inclusion] = ()
+    shape: Shape,
+    material: Material,
+    spacing: float,
+    places: np.ndarray,
+    rows: int = 1,
+    without: Sequence[Inclusion] = (),
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Ties across the cut plane in the layers: each stands for the part of the section that is nearest to it.
+    """Ties across the cut plane in the layers: each stands for the part of the section that is nearest to it, in rows.
 
     The section is sampled on a lattice finer than the ties', so a rind thinner than their spacing counts by its share,
     and a tie beside a stone or a cavity for what of it is flesh.
@@ -53,21 +58,42 @@ def layer_ties(
         spacing: Distance of the ties [m].
         places: Where they are in the uncut food, along the blade and upwards [m], shape (k, 2); only those at x > 0
             where x = 0 is a mirror.
+        rows: Rows of each, one above the other.
         without: Stone and cavity that the blade's plane meets.
 
     Returns:
-        Toughness of each, the mean of R over its part [J/m^2], and its part over a square of the spacing [-], (k,).
+        Toughness of each row from below, the mean of R over its part [J/m^2], and its part over that of a whole row
+        [-], (k, rows).
     """
     if not (material.layered or without) or len(places) == 0:
-        return np.full(len(places), float(material.R)), np.ones(len(places))
+        return np.full((len(places), rows), float(material.R)), np.ones((len(places), rows))
     step, mirrored = spacing / SUBSAMPLES, places[:, 0].min() > 0
+    rise = spacing / (rows * max(round(SUBSAMPLES / rows), 1))
     x = np.arange(0.0 if mirrored else -shape.width / 2, shape.width / 2, step) + step / 2
-    points = _section(shape, x, np.arange(0.0, shape.height, step) + step / 2, without)
+    points = _section(shape, x, np.arange(0.0, shape.height, rise) + rise / 2, without)
     _, owner = cKDTree(places).query(points[:, [0, 2]])
-    count = np.bincount(owner, minlength=len(places))
-    total = np.bincount(owner, toughness(shape, material, points), len(places))
-    own = toughness(shape, material, np.insert(places, 1, 0.0, axis=1))
-    return np.where(count > 0, total / np.maximum(count, 1), own), count / SUBSAMPLES**2
+    row = np.floor((points[:, 2] - places[owner, 1]) / spacing * rows + rows / 2).astype(int)
+    owner = owner * rows + np.clip(row, 0, rows - 1)
+    count = np.bincount(owner, minlength=len(places) * rows)
+    total = np.bincount(owner, toughness(shape, material, points), len(places) * rows)
+    own = np.repeat(toughness(shape, material, np.insert(places, 1, 0.0, axis=1)), rows)
+    found = np.where(count > 0, total / np.maximum(count, 1), own), count * rows * step * rise / spacing**2
+    return found[0].reshape(-1, rows), found[1].reshape(-1, rows)
+
+
+def in_whole(toughness: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Ties whose rows are one.
+
+    Args:
+        toughness: Of the rows of each [J/m^2], shape (k, rows).
+        share: Part of the section over that of a whole row [-], shape (k, rows).
+
+    Returns:
+        Toughness of each tie [J/m^2], and its part of the section over a square of the spacing [-], (k,).
+    """
+    total = share.sum(axis=1)
+    mean = (toughness * share).sum(axis=1) / np.where(total > 0, total, 1.0)
+    return np.where(total > 0, mean, toughness.mean(axis=1)), total / share.shape[1]
 
 
 def mean_toughness(shape: Shape, material: Material, part: float = 1.0, without: Sequence[Inclusion] = ()) -> float:

@@ -16,6 +16,7 @@ from mpm.scene.material import Material
 
 CONTACTS = ("cohesive", "nodal")
 PRECISIONS = ("f64", "f32")
+BAND_CELLS = 2.5  # width of a crack band of grid-smoothed damage [cells] (docs/theory.md, "Measured choices")
 
 
 @dataclass(frozen=True)
@@ -177,6 +178,7 @@ class Numerics:
         contact_stiffness: Stiffness of the contact's spring over that of a layer of particles [-]. Below 1.5 Nitsche's
             method is not stable in every food (docs/theory.md, "Measured choices"); stiffer asks for shorter steps.
         edge_band: Half height of what the edge is cutting, about the edge [cells].
+        layer_rows: Rows of a tie across the cut plane, each with the toughness of the layer that it lies in.
         least_gap: Least distance of a particle's centre from the food's surface that squeezing leaves [cells].
         contact: ``cohesive`` (edge law and particle contact) or ``nodal`` (the plain projection of grid velocities).
         grid_shift: Position of the grid against the scene along x, y, z [cells].
@@ -197,6 +199,7 @@ class Numerics:
     contact: str = "cohesive"
     contact_stiffness: float = 2.0
     edge_band: float = 0.5
+    layer_rows: int = 8
     least_gap: float = 0.02
     grid_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
     grid_turn: float = 0.0
@@ -223,6 +226,8 @@ class Numerics:
         check_number(w, "contact_stiffness", self.contact_stiffness, 0.1, 100.0, "of a layer's")
         check_number(w, "edge_band", self.edge_band, 0.01, 5.0, "cells")
         check_number(w, "least_gap", self.least_gap, 1e-6, 0.2, "cells")
+        if not isinstance(self.layer_rows, int) or not 1 <= self.layer_rows <= 64:
+            raise SceneError(f"numerics: layer_rows {self.layer_rows!r} must be a whole number from 1 to 64")
         check_number(w, "safety", self.safety, 0.0, 0.9001, "of the stability limit")
         check_number(w, "output", self.output, 0.0, 0.1, "m")
         if self.contact not in CONTACTS:
@@ -385,11 +390,9 @@ class Scene:
         for name in ("stone", "cavity", "parted"):
             if not out["food"][name]:  # what a food has not is no part of it
                 del out["food"][name]
+        if not self.food.material.layered:  # nothing else has a use for them
+            del out["numerics"]["layer_rows"]
         for name in ("skin_stiffness", "strength_ratio"):
             if not out["food"]["material"][name]:
                 del out["food"]["material"][name]
         return out
-
-
-# Width of a crack band of grid-smoothed damage, in cells (docs/theory.md, "Measured choices").
-BAND_CELLS = 2.5

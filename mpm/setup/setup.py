@@ -13,7 +13,7 @@ from mpm.discretisation.grid import lay_out
 from mpm.discretisation.particles import seed
 from mpm.runtime import Runtime
 from mpm.scene import Scene
-from mpm.scene.layers import layer_ties
+from mpm.scene.layers import in_whole, layer_ties
 from mpm.scene.material import Material
 from mpm.scene.shapes import skin_path, slice_powers, surface
 from mpm.scene.shapes import slices as outline
@@ -76,6 +76,7 @@ class Setup:
             skin=particle_capacity(len(self.skin)) if scene.food.material.skin_stiffness > 0 else 0,
             stone=scene.food.stone is not None,
             hollow=scene.tied and len(scene.food.crossed + scene.food.parted) > 0,
+            rows=scene.numerics.layer_rows,
         )
 
     def ties(self) -> np.ndarray:
@@ -120,6 +121,7 @@ class Setup:
             pose=pose(scene.food.shape.height + self.gap, 0.0, scene.motion.tilt),
             relaxation=self._relaxation(material),
             ties=self._ties(material),
+            tie_rows=self._rows(material),
             skin=self._skin(material),
             half=self._half() if scene.tied else np.zeros(0),
             stone=stone_table(scene.food, scene.numerics.dx),
@@ -135,7 +137,7 @@ class Setup:
 
     def _ties(self, material: Material) -> np.ndarray:
         """The table of ties (k, N_TIE)."""
-        ties, (toughness, share) = self.ties(), self._layers(material)
+        ties, (toughness, share) = self.ties(), in_whole(*self._layers(material))
         open_before = self.scene.food.open(self.seeds.x[ties[:, 0]])
         return np.column_stack([ties, toughness, np.where(open_before, 0.0, share), open_before])
 
@@ -150,11 +152,17 @@ class Setup:
             tie[beside] = cKDTree(places).query(skin.x[beside][:, [0, 2]])[1]
         return skin, tie, skin.areas / h / (1 if self.scene.mirrors[1] else 2)
 
+    def _rows(self, material: Material) -> np.ndarray:
+        """The table of the rows of ties (k, 2 rows); what was parted before has no share."""
+        toughness, share = self._layers(material)
+        open_before = self.scene.food.open(self.seeds.x[self.ties()[:, 0]])
+        return np.hstack([toughness, np.where(open_before[:, None], 0.0, share)])
+
     def _layers(self, material: Material) -> tuple[np.ndarray, np.ndarray]:
-        """Toughness of each tie [J/m^2] and its part of the section over a square of the spacing [-], shape (k,)."""
+        """Toughness of the rows of each tie [J/m^2] and their part of the section over a row [-], shape (k, rows)."""
         places = self.seeds.x[self.ties()[:, 0]][:, [0, 2]]
-        food = self.scene.food
-        return layer_ties(food.shape, material, self.seeds.spacing, places, food.crossed)
+        food, rows = self.scene.food, self.scene.numerics.layer_rows
+        return layer_ties(food.shape, material, self.seeds.spacing, places, rows, food.crossed)
 
     def _top_toughness(self, material: Material) -> np.ndarray:
         """Toughness of the food within a cell below its upper surface, in each slice [J/m^2], shape (m,)."""
@@ -165,7 +173,7 @@ class Setup:
         x, _, z = self.seeds.x[self.ties()[:, 0]].T
         depth = surface(self.scene.food.shape, x, np.zeros_like(x))[1] - z
         place = np.abs(self.grid.stations) if self.scene.mirrors[0] else self.grid.stations
-        toughness, share = self._layers(material)
+        toughness, share = in_whole(*self._layers(material))
         weight = share * np.maximum(1.0 - np.abs(place[:, None] - x) / dx, 0.0) * (depth < dx)
         total = weight.sum(axis=1)
         np.divide(weight @ toughness, total, out=out, where=total > 0)

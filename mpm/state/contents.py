@@ -44,6 +44,8 @@ class Contents:
         ties: Table of the ties across the cut plane, shape (k, N_TIE): left and right particle, -1 for a mirror image,
             toughness [J/m^2], part of the section over a square of the spacing [-], and part that was cut before [-];
             none without a cohesive crack.
+        tie_rows: Of the rows of each tie from below, toughness [J/m^2], then part of the section over that of a whole
+            row [-], shape (k, 2 rows).
         skin: Table of the skin's points, shape (m, N_SKIN): position [m] and two unit vectors in the skin [-] in the
             grid's axes, area [m^2], half of the food, 0 left, 1 right, tie that bears its tension across the cut plane,
             -1 for none, and length over which it does [m]; empty where the skin bears nothing.
@@ -60,6 +62,7 @@ class Contents:
     pose: np.ndarray
     relaxation: np.ndarray
     ties: np.ndarray
+    tie_rows: np.ndarray
     skin: np.ndarray
     half: np.ndarray
     stone: np.ndarray

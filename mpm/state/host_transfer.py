@@ -92,6 +92,7 @@ def begin(state: State, cuts: Sequence[Contents]) -> None:
         _write_ties(
             state,
             _table(state, (max(sizes[:, TIE_COUNT].max(), 1), N_TIE), [cut.ties for cut in cuts]),
+            _table(state, (max(sizes[:, TIE_COUNT].max(), 1), 2 * state.rows), [cut.tie_rows for cut in cuts]),
             _table(state, (state.n.max(),), [cut.half for cut in cuts]),
         )
     if state.membrane:
@@ -194,7 +195,7 @@ def _write(
 
 
 @ti.kernel
-def _write_ties(s: ti.template(), ties: TABLES, half: ROWS):
+def _write_ties(s: ti.template(), ties: TABLES, rows: TABLES, half: ROWS):
     """Write the ties across the cut plane, whole, and what they leave to the edge."""
     for c, p in s.half:
         s.half[c, p] = ti.cast(half[c, p], ti.i32) if p < s.size[c, COUNT] else 0
@@ -206,10 +207,14 @@ def _write_ties(s: ti.template(), ties: TABLES, half: ROWS):
         s.tie_ends[c, n] = ti.Vector([ti.cast(row[LEFT], ti.i32), ti.cast(row[RIGHT], ti.i32)])
         s.tie_toughness[c, n], s.largest_opening[c, n], s.cut_part[c, n] = row[TOUGHNESS], 0.0, row[CUT_BEFORE]
         s.tie_share[c, n] = row[SHARE]
+        for k in range(s.rows):
+            there = n < s.size[c, TIE_COUNT]
+            s.row_toughness[c, n, k] = ti.cast(rows[c, n, k], float) if there else 0.0
+            s.row_share[c, n, k] = ti.cast(rows[c, n, s.rows + k], float) if there else 0.0
         s.face_shear[c, n] = ti.Vector.zero(float, 2)
     for c, i in s.passing:
         s.passing[c, i] = ti.Vector.zero(float, 3)
-        s.at_edge[c, i] = ti.Vector.zero(float, 2)
+        s.at_edge[c, i] = ti.Vector.zero(float, 3)
         s.part_left[c, i], s.most_passed[c, i] = 1.0, 0.0
         s.passed_mean[c, i] = ti.Vector([s.top_toughness[c, i], s.top_toughness[c, i]])
         s.start_excess[c, i] = 0.0

@@ -56,6 +56,7 @@ class Configuration:
         skin: Most points of a skin that bears tension, 0 without.
         stone: There is a rigid stone in the food.
         hollow: The cut plane meets a stone or a cavity, so that what the edge cuts is what the ties say.
+        rows: Rows of a tie, each with a toughness of its own.
     """
 
     room: int
@@ -73,6 +74,7 @@ class Configuration:
     skin: int = 0
     stone: bool = False
     hollow: bool = False
+    rows: int = 1
 
 
 @ti.data_oriented
@@ -157,8 +159,10 @@ class State:
         face_shear: Half of the shear of the two faces against their centres, along the cut and upwards [m], (cut, tie).
         passing: Sums over the ties that the edge passes, with their weights: what is left of their toughness, toughness
             [J/m^2], and the weights [-], (cut, slice).
-        at_edge: Sums over the ties at the edge, with their weights, where toughness differs: toughness [J/m^2], and the
-            weights [-], (cut, slice).
+        row_toughness: Toughness of the rows of a tie, from below [J/m^2], (cut, tie, row); ``row_share`` their parts of
+            the section over those of a whole row [-].
+        at_edge: Sums over the rows that the edge is in, with their weights: toughness [J/m^2], and the weights [-]; and
+            those of the shares of the ties at the edge [-], (cut, slice).
         passed_mean: Their last means: what is left, and toughness [J/m^2], (cut, slice).
         part_left: Part of their toughness that the ties that the edge passes have left, where it differs [-],
             (cut, slice).
@@ -184,7 +188,7 @@ class State:
         self.first_slice = max(self.plane_x, 0)  # that is no mirror image
         self.threads, self.nodal, self.damage, self.turned = max(own.threads, 1), own.nodal, own.damage, own.turned
         self.press, self.cuts = own.press, not (own.nodal or own.press)
-        self.stone, self.hollow = own.stone, own.hollow and self.cuts
+        self.stone, self.hollow, self.rows = own.stone, own.hollow and self.cuts, own.rows
         self.atomic = own.threads == 0
         self.serial = not self.atomic  # short loops run where the kernel was launched
         self.parts = 1 if self.threads == 1 else self.threads * CPU_BLOCK
@@ -295,10 +299,11 @@ class State:
         self.tie_ends = ti.Vector.field(2, ti.i32, (batch, ties))
         self.tie_toughness, self.largest_opening, self.cut_part = (ti.field(real, (batch, ties)) for _ in range(3))
         self.tie_share = ti.field(real, (batch, ties))
+        self.row_toughness, self.row_share = (ti.field(real, (batch, ties, self.rows)) for _ in range(2))
         self.face_shear = vec2.field(shape=(batch, ties))
         self.passing, self.passed_mean = ti.types.vector(3, real).field(shape=slices), vec2.field(shape=slices)
         self.start_excess, self.part_left, self.most_passed = (ti.field(real, slices) for _ in range(3))
-        self.at_edge = vec2.field(shape=slices)
+        self.at_edge = ti.types.vector(3, real).field(shape=slices)
 
     def _add_tables(self, real: Any) -> None:
         """Tables of numbers that the host sets, and of what the loops go over."""

@@ -64,7 +64,7 @@ def test_simulate_says_what_was_not_cut(tmp_path: Path, capsys):
     """A cherry that parts has nothing said of it; one that yields under a narrow edge is pressed away, which is said
     and in the document."""
     argv = ["simulate", "--food", "cherry", "--knife", "edc", "--dx", "2e-3", "--threads", "1", "--json"]
-    weak = ["--set", "yield_stress=2e3"]
+    weak = ["--set", "yield_stress=2e3", "--set", "tensile_strength=2.4e4"]
     runs = (("cut", [], False), ("wide", weak, False), ("pressed", [*weak, "--constant", "bearing=0"], True))
     for name, more, pressed in runs:
         assert main([*argv, *more, "--out", str(tmp_path / name)]) == 0
@@ -153,7 +153,7 @@ def test_simulate_has_an_option_for_each_constant(tmp_path: Path, capsys):
     main([*argv, "--out", str(tmp_path / "cut")])
     constants = valid(json.loads(capsys.readouterr().out))["constants"]
     assert constants.pop("loss_factor") > 0 and constants == {
-        "edge_band": 0.4, "least_gap": 0.01, "cohesive_zone": 0.0,
+        "edge_band": 0.4, "layer_rows": 0.0, "least_gap": 0.01, "cohesive_zone": 0.0,
         "zone": 0.004, "bearing": 1.25, "slip": 0.002, "contact_stiffness": 3.0, "safety": 0.5,
     }  # fmt: skip
 

@@ -47,12 +47,6 @@ if TYPE_CHECKING:
 
 HELP = "simulate one cut"
 DESCRIPTION = "Simulate one cut and write force.csv and summary.json."
-NUMERICAL = (
-    "contact_stiffness",
-    "edge_band",
-    "least_gap",
-    "safety",
-)  # options of the numerics
 LENGTHS = ("zone", "slip", "cohesive_zone")  # constants that may be written with a unit
 VIDEO_FRAMES = 72  # of a video: five seconds
 FRAMES_PER_PAGE_FRAME = 2  # frames of a video of which a page has one

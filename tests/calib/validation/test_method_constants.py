@@ -45,7 +45,7 @@ def test_what_cannot_be_varied_says_why():
 def test_the_zone_of_a_food_without_strength_is_varied_only_there():
     """A food that has a tensile strength does not ask for it."""
     name = "process zone of a food without strength"
-    assert PRISM.food.material.tensile_strength is None
+    assert PRISM.food.material.strength is None
     assert {f"half the {name}", f"twice the {name}"} <= set(varied(PRISM))
     assert not any(name in other for other in varied(PRISM.with_material(tensile_strength=2e4)))
 
@@ -54,9 +54,19 @@ def test_the_zone_of_a_food_without_strength_is_varied_only_there():
 def test_a_constant_of_the_numerics_reaches_the_kernels(constant):
     """Each changes what the kernels read, or the time step."""
 
+    fruit = PRISM.with_material(R_rind=100.0, rind_thickness=2e-3)
+
     def read(scene: Scene) -> tuple[float, ...]:
         setup = Setup(scene, Runtime(threads=1))
-        material = scene.food.material
-        return (setup.time_step(material), *parameters(scene, material, setup.seeds, setup.grid))
+        material, rows = scene.food.material, setup.contents(scene.food.material).tie_rows
+        return (setup.time_step(material), rows.size, *parameters(scene, material, setup.seeds, setup.grid))
 
-    assert all(read(constant.varied(PRISM, factor)) != read(PRISM) for factor in constant.factors)
+    assert all(read(constant.varied(fruit, factor)) != read(fruit) for factor in constant.factors)
+
+
+def test_the_rows_of_a_tie_are_varied_only_in_layers():
+    """A food without rind and core has no use for them; where they are, they stay whole numbers."""
+    fruit = PRISM.with_material(R_rind=100.0, rind_thickness=2e-3)
+    assert not any("rows of a tie" in name for name in varied(PRISM))
+    assert varied(fruit)["half the rows of a tie"].numerics.layer_rows == 4
+    assert isinstance(varied(fruit)["twice the rows of a tie"].numerics.layer_rows, int)

@@ -262,7 +262,8 @@ def test_scenes_of_a_class_share_kernels_and_keep_their_force():
     seeds, grid = one.setup.seeds, one.setup.grid
     tight = (len(seeds.x), grid.nodes, small.mirrors, len(grid.stations))
     ties = len(one.setup.ties())
-    one.state = State(Configuration(*tight, threads=1, nodal=False, press=False, damage=False, ties=ties))
+    rows = small.numerics.layer_rows
+    one.state = State(Configuration(*tight, threads=1, nodal=False, press=False, damage=False, ties=ties, rows=rows))
     np.testing.assert_allclose(one.run().resolved, force, atol=1e-9 * force.max())
 
 

@@ -11,7 +11,7 @@ import pytest
 from mpm.discretisation.particles import seed
 from mpm.scene import Arm, EdgeLaw, Food, Inclusion, Knife, Motion, Numerics, Parted, Scene
 from mpm.scene.errors import SceneError
-from mpm.scene.layers import layer_ties, mean_toughness
+from mpm.scene.layers import in_whole, layer_ties, mean_toughness
 from mpm.scene.material import Material
 from mpm.scene.shapes import Shape
 
@@ -83,7 +83,7 @@ def test_layers_end_at_a_cavity():
     food = Food(BALL, cored, cavity=hollow)
     seeds = seed(scene(food))
     places = seeds.x[seeds.ties(True)[:, 0]][:, [0, 2]]
-    tough, share = layer_ties(BALL, cored, seeds.spacing, places, food.crossed)
+    tough, share = in_whole(*layer_ties(BALL, cored, seeds.spacing, places, 8, food.crossed))
     assert 2 * share.sum() * seeds.spacing**2 == pytest.approx(food.section_area, rel=0.01)
     assert (tough * share).sum() / share.sum() == pytest.approx(mean, rel=0.02)
 

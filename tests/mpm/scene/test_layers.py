@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mpm.scene.errors import SceneError
-from mpm.scene.layers import layer_ties, mean_toughness, toughness
+from mpm.scene.layers import in_whole, layer_ties, mean_toughness, toughness
 from mpm.scene.material import Material
 from mpm.scene.shapes import SHAPE_KINDS, Shape, section_area, slice_powers, slices
 
@@ -63,21 +63,33 @@ def test_the_whole_section_takes_the_sum_of_its_rings():
     assert mean_toughness(Shape("cylinder", 0.1, 0.04, 0.04), FRUIT, 0.02) == pytest.approx(500, rel=0.01)
 
 
-@pytest.mark.parametrize("thickness", [2e-3, 3e-4])
-def test_ties_stand_for_the_whole_section(thickness):
+@pytest.mark.parametrize(("thickness", "rows"), [(2e-3, 1), (2e-3, 8), (3e-4, 8), (2e-3, 16)])
+def test_ties_stand_for_the_whole_section(thickness, rows):
     """A rind thinner than the spacing counts with its share: the ties together take what the section takes."""
     fruit, shape, spacing = replace(FRUIT, rind_thickness=thickness), Shape("cylinder", 0.1, 0.04, 0.04), 1.5e-3
-    tough, share = layer_ties(shape, fruit, spacing, lattice(shape, spacing))
+    tough, share = in_whole(*layer_ties(shape, fruit, spacing, lattice(shape, spacing), rows))
     assert share.sum() * spacing**2 == pytest.approx(section_area(shape), rel=2e-3)
     want = mean_toughness(shape, fruit) * section_area(shape)
     assert (tough * share).sum() * spacing**2 == pytest.approx(want, rel=1e-2)
 
 
+def test_rows_of_a_tie_lie_in_their_own_layer():
+    """A block with a rind of a third of the spacing: that part of the highest ties is rind, the rest flesh."""
+    shape, spacing = Shape("block", 0.012, 0.012, 0.012), 1.5e-3
+    fruit = replace(FLESH, R_rind=500.0, rind_thickness=0.5e-3)
+    middles = np.arange(spacing / 2, 0.012, spacing)
+    places = np.stack(np.meshgrid(middles - 0.006, middles), -1).reshape(-1, 2)
+    tough, share = layer_ties(shape, fruit, spacing, places, 12)
+    middle = (places[:, 1] == places[:, 1].max()) & (np.abs(places[:, 0]) < 4e-3)
+    assert np.unique(share[middle]) == pytest.approx([1.0])
+    assert (tough[middle] == [80.0] * 8 + [500.0] * 4).all()
+
+
 def test_without_layers_every_tie_is_flesh():
     """Nothing is sampled, so that the numbers are those of a food that has no layers, to the last bit."""
     shape = Shape("cylinder", 0.1, 0.04, 0.04)
-    tough, share = layer_ties(shape, FLESH, 1.5e-3, lattice(shape, 1.5e-3))
-    assert set(tough) == {80.0} and set(share) == {1.0} and mean_toughness(shape, FLESH) == 80.0
+    tough, share = layer_ties(shape, FLESH, 1.5e-3, lattice(shape, 1.5e-3), 8)
+    assert set(tough.ravel()) == {80.0} and set(share.ravel()) == {1.0} and mean_toughness(shape, FLESH) == 80.0
 
 
 @pytest.mark.parametrize("kind", SHAPE_KINDS)
