@@ -1,16 +1,14 @@
 """What is simulated: food, knife, board, motion and numerics as frozen, validated data in SI units."""
 
 from mpm.scene.inclusions import Food, Inclusion, Parted
+from mpm.scene.motion import STEEPEST, Arm, Motion
 from mpm.scene.scene import (
     BAND_CELLS,
     CONTACTS,
     PRECISIONS,
-    STEEPEST,
-    Arm,
     Board,
     EdgeLaw,
     Knife,
-    Motion,
     Numerics,
     Press,
     Scene,

@@ -1,0 +1,71 @@
+"""How the blade is moved, and by what."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mpm.scene.errors import SceneError, check_number
+
+STEEPEST = 1.2
+"""Largest angle of the edge to the board [rad]: at 69 degrees the ends of what lies over the food are 2.6 of its widths
+apart in height."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The commanded motion of the blade: a stroke at constant speed, a pause, a retraction.
+
+    Attributes:
+        stroke: Way of the edge's middle below the food's top [m].
+        mach: Blade speed over the P-wave speed [-]. All laws are rate-independent by default, so the real speed is
+            replaced by this one (docs/theory.md, "Measured choices").
+        slice_ratio: Speed along the edge over the speed down (slice/push ratio xi) [-].
+        tilt: Angle of the edge to the board, positive when the end at +x is higher [rad].
+        dwell: Pause at the end of the stroke [s], in real time; needs ``speed``.
+        retract: Way back up after it [m].
+        speed: Real speed of the stroke [m/s]; needed by rate-dependent laws and by ``dwell``. Times of the material are
+            then shortened by simulated over real speed, so that the laws see the real duration.
+    """
+
+    stroke: float
+    mach: float = 0.01
+    slice_ratio: float = 0.0
+    tilt: float = 0.0
+    dwell: float = 0.0
+    retract: float = 0.0
+    speed: float | None = None
+
+    def __post_init__(self) -> None:
+        check_number("motion", "stroke", self.stroke, 1e-4, 1.0, "m")
+        check_number("motion", "mach", self.mach, 1e-5, 0.1, "")
+        check_number("motion", "slice_ratio", self.slice_ratio, -20.0, 20.0, "")
+        check_number("motion", "tilt", self.tilt, -STEEPEST, STEEPEST, "rad")
+        check_number("motion", "dwell", self.dwell, -1e-300, 1e5, "s")
+        check_number("motion", "retract", self.retract, -1e-300, 2.0, "m")
+        if self.speed is not None:
+            check_number("motion", "speed", self.speed, 0.0, 100.0, "m/s")
+        elif self.dwell > 0:
+            raise SceneError("motion: a dwell in seconds needs the real speed of the stroke; give motion.speed")
+
+
+@dataclass(frozen=True)
+class Arm:
+    """What holds the knife: a spring between its commanded and its actual height, and the most force it can give.
+
+    Attributes: stiffness [N/m], None = rigid (a Franka arm in impedance control has up to 3000 N/m); force_limit [N],
+    None = none. With a stiffness the arm stalls at the limit, and a rigid one stops: the cut ends there.
+    """
+
+    stiffness: float | None = None
+    force_limit: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.stiffness is not None:
+            check_number("arm", "stiffness", self.stiffness, 1.0, 1e9, "N/m")
+        if self.force_limit is not None:
+            check_number("arm", "force_limit", self.force_limit, 0.0, 1e6, "N")
+
+    @property
+    def rigid(self) -> bool:
+        """Whether the knife is where it is commanded to be."""
+        return self.stiffness is None
