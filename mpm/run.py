@@ -16,8 +16,10 @@ from mpm.output.section import SectionRecorder
 from mpm.output.snapshot import Snapshot, SnapshotRecorder
 from mpm.output.topology import Topology
 from mpm.scene import Scene
+from mpm.scene.motion import SLOWED_FROM
 from mpm.setup.setup import Setup
 
+STRETCH_ROWS = 4  # rows of the report in which a blade that slows down keeps its speed, at first
 PATIENCE = 0.1  # time after which a run comes back from the device to say how far it is and to be stopped [s]
 ON_BOARD = 1e-9  # height at which the edge is on the board [m]
 
@@ -77,9 +79,8 @@ class CutRun:
         self.dt = setup.time_step(material)
         speed = motion.mach * material.p_wave
         self._every = max(1, round(scene.numerics.output / (speed * self.dt)))
-        # steps, velocity upwards and along the blade of each phase; one step more lets the food see where the edge ends
-        self._phases = [
-            (math.ceil((motion.stroke + setup.gap) / (speed * self.dt)) + 1, -speed, speed * motion.slice_ratio),
+        self._phases = [  # steps, velocity upwards and along the blade of each
+            *self._descent(speed, setup.gap),
             (math.ceil(motion.dwell / scene.time_scale / self.dt), 0.0, 0.0),
             (math.ceil(motion.retract / (speed * self.dt)), speed, 0.0),
         ]
@@ -87,6 +88,28 @@ class CutRun:
         self._limited = scene.arm.rigid and scene.arm.force_limit is not None
         self._left, self._batch, self._asked = self._phases[0][0], 1, 0.0
         self._began = clock.perf_counter()
+
+    def _descent(self, speed: float, gap: float) -> list[tuple[int, float, float]]:
+        """Phases of the way down from a gap [m] above the food, at first at a speed [m/s].
+
+        One step more lets the food see where the edge ends. A blade that slows down does so from one to the next of
+        some stretches, each of whole rows of the report.
+        """
+        scene, motion = self._scene, self._scene.motion
+        height, way, phases = scene.food.shape.height, motion.stroke + gap, []
+        even = (1 - SLOWED_FROM) * height + gap
+        if scene.slows_down and way > even:
+            stretches = math.ceil((way - even) / (STRETCH_ROWS * scene.numerics.output))
+            length = (way - even) / stretches
+            for k in range(stretches):
+                pace = motion.pace(1 - (even - gap + (k + 0.5) * length) / height)
+                steps = self._every * max(round(length / (pace * speed * self.dt * self._every)), 1)
+                slow = length / (steps * self.dt)
+                phases.append((steps, -slow, slow * motion.slice_ratio))
+            way = even
+        phases.insert(0, (math.ceil(way / (speed * self.dt)), -speed, speed * motion.slice_ratio))
+        last = phases[-1]
+        return [*phases[:-1], (last[0] + 1, *last[1:])]
 
     @property
     def status(self) -> str:

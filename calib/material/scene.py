@@ -26,6 +26,8 @@ MACH = 0.01
 FACE_MACH = 3e-4
 """Largest speed at which the blade's faces move the food aside over that of the P-wave [-]: what decides how far a cut
 is from a slow one (docs/theory.md, "Time step and speed")."""
+END_SPEED = 0.5
+"""Part of its speed that a blade which is slow for its faces' sake keeps at the end of the stroke [-]."""
 CLEARANCE_ZONES = 1.0
 """Food that is likely left below the edge where a trace ends under load, in process zones."""
 HEIGHT_SPAN = 1.25
@@ -311,13 +313,14 @@ def cut_scene(
     cell = dx if dx is not None else CELL_PER_ZONE * zone
     zone = max(zone, cell / CELL_PER_ZONE)
     mach = quasi_static_mach(knife, shape)
+    thick = mach < MACH
     if coarse:
         cell, mach = cell / CELL_PER_ZONE, 2 * mach
     filled = food.to_scene_food()
     return Scene(
         food=type(filled)(shape, filled.material),
         knife=knife,
-        motion=Motion(min(stroke or shape.height, shape.height), mach),
+        motion=Motion(min(stroke or shape.height, shape.height), mach, end_speed=END_SPEED if thick else 1.0),
         edge=EdgeLaw(zone=zone),
         numerics=Numerics(dx=cell, far=FAR_PER_HEIGHT * shape.height, seed=seed),
     )

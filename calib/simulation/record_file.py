@@ -109,6 +109,7 @@ def _read(path: Path, key: str) -> ForceRecord | None:
             found |= {name: v.item() if isinstance(v, np.generic) else v for name, v in file.attrs.items()}
             found[SECTION_GROUP] = Section(**section) if section else None
             found.setdefault(COHESION, None)
+            found.setdefault("slowed", False)
             values = {f.name: found[f.name] for f in fields(ForceRecord)}
             values |= {name: json.loads(values[name]) for name in JSON_FIELDS}
     except UNREADABLE:

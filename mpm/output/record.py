@@ -73,6 +73,7 @@ class ForceRecord:
             parts it.
         cohesion: Energy that the ties of a cohesive crack have taken so far, where the food opened ahead of the edge
             [J], shape (n,); None without one.
+        slowed: Whether the blade slowed down on its way.
         ended: Why the motion ended, one of :data:`ENDINGS`; a run that broke down has its reason in ``status``.
     """
 
@@ -113,6 +114,7 @@ class ForceRecord:
     section: Section | None = None
     resistance: float = math.nan
     cohesion: np.ndarray | None = None
+    slowed: bool = False
     ended: str = STROKE
 
     @property
@@ -128,7 +130,12 @@ class ForceRecord:
         the period of one cell. A moving mean over exactly one cell removes it and nothing longer; on the last half
         cell, which has no such window, the curve is carried on along the last two whole ones.
         """
-        return _moving_mean(self.time * self.speed, self.face[:, 2], self.cell)
+        way = self.time * self.speed
+        if self.slowed:
+            step = np.diff(way, prepend=0.0)
+            told = np.abs(np.diff(self.command, prepend=self.command[:1] - step[:1]))
+            way = np.cumsum(np.where(told > 0.0, np.minimum(told, step), step))  # a pause counts by its time
+        return _moving_mean(way, self.face[:, 2], self.cell)
 
     @property
     def resolved(self) -> np.ndarray:

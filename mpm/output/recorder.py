@@ -202,4 +202,5 @@ class Recorder:
             fraction=fraction,
             resistance=mean_toughness(food.shape, material, parted / section, food.crossed) if cohesive else math.nan,
             cohesion=np.cumsum(self._column("cohesion")) if scene.tied else None,
+            slowed=scene.slows_down,
         )

@@ -262,6 +262,11 @@ class Scene:
         return reach * math.tan(abs(tilt))
 
     @property
+    def slows_down(self) -> bool:
+        """Whether the blade slows down towards the end of its stroke."""
+        return self.motion.end_speed < 1 and not self.food.material.rate_dependent
+
+    @property
     def time_scale(self) -> float:
         """Simulated over real speed of the knife [-]; 1 when the real speed does not matter."""
         speed = self.motion.speed
@@ -328,6 +333,8 @@ class Scene:
         for name in ("stone", "cavity", "parted"):
             if not out["food"][name]:  # what a food has not is no part of it
                 del out["food"][name]
+        if self.motion.end_speed == 1:
+            del out["motion"]["end_speed"]
         if not self.food.material.layered:  # nothing else has a use for them
             del out["numerics"]["layer_rows"]
         for name in ("skin_stiffness", "strength_ratio"):

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from mpm.output.record import ForceRecord
+from mpm.run import CutRun
 from mpm.runtime import Runtime
 from mpm.scene import Arm, Board, Food, Motion
 from mpm.scene.errors import SceneError
 from mpm.scene.shapes import Shape
+from mpm.setup.setup import Setup
 from mpm.solver import Simulation
 from tests.mpm import scenes
 from tests.mpm.scenes import WEDGE, cut
@@ -158,6 +160,42 @@ def test_dwell_relaxes_the_force_and_needs_a_speed():
     record = cut(replace(PRISM, food=food, knife=WEDGE, motion=Motion(0.015, 0.01, speed=0.05, dwell=0.4)))
     end = int(np.argmax(record.stroke >= record.stroke.max() - 1e-9))
     assert record.face[-3:, 2].mean() < 0.9 * record.face[end - 2 : end + 1, 2].mean()
+
+
+def test_a_blade_may_slow_down_towards_the_board():
+    """Below three fifths of the height its speed falls to half; it arrives where it was told to, and returns fast."""
+    steady = replace(PRISM, motion=Motion(0.02, 0.02, retract=4e-3))
+    eased = replace(steady, motion=replace(steady.motion, end_speed=0.5))
+    setup = Setup(eased, Runtime(threads=1))
+    even, slowed = (np.array(CutRun(setup, scene)._phases) for scene in (steady, eased))
+    dt, speed = CutRun(setup, eased).dt, -even[0, 1]
+    way, pace = -slowed[:-2, 0] * dt * slowed[:-2, 1], slowed[:-2, 1] / even[0, 1]
+    assert way.sum() == pytest.approx(even[0, 0] * dt * speed, abs=3 * speed * dt)
+    high = 1 - (np.cumsum(way) - way / 2 - setup.gap) / PRISM.food.shape.height
+    assert pace[0] == 1 and pace[-1] == pytest.approx(0.5, rel=0.05) and (np.diff(pace) < 1e-9).all()
+    assert pace[1:] == pytest.approx(np.clip(high[1:] / 0.6, 0.5, 1.0), rel=0.13)  # whole rows of the report
+    assert (slowed[-1] == even[-1]).all()
+
+
+def test_ripple_of_a_cell_is_taken_out_of_a_slowing_blade_too():
+    """The mean is over a cell of the way and not of the time, also where the blade has slowed down or stands."""
+    record = cut(replace(PRISM, motion=Motion(1e-3, 0.02)))
+    told = np.concatenate([np.arange(1, 161) / 160 * 0.01, 0.01 + np.arange(1, 321) / 320 * 0.01])
+    time = np.arange(1, 481) / 160 * 0.01 / record.speed
+    face = np.zeros((480, 3))
+    face[:, 2] = 5 + np.sin(2 * np.pi * told / record.cell)
+    slowed = replace(record, command=told, stroke=told, time=time, face=face, slowed=True)
+    inner = (told > record.cell) & (told < 0.02 - record.cell)
+    np.testing.assert_allclose(slowed.resolved_face[inner], 5, atol=0.03)
+    assert np.abs(replace(slowed, slowed=False).resolved_face[inner] - 5).max() > 0.5
+
+
+def test_a_rate_dependent_food_is_not_cut_more_slowly():
+    """Its stress follows the time that passes, so that the blade keeps its speed."""
+    motion = Motion(0.01, 0.02, speed=0.02, end_speed=0.5)
+    slow = replace(PRISM, motion=motion).with_material(prony=((0.5, 0.1),))
+    assert not slow.slows_down and replace(PRISM, motion=motion).slows_down
+    assert "end_speed" not in replace(PRISM, motion=Motion(0.01)).as_dict()["motion"]
 
 
 def test_sticky_faces_hold_the_knife_back():
