@@ -14,13 +14,14 @@ class MethodConstant:
 
     Attributes:
         name: What it is.
-        part: Part of a scene that holds it: ``edge``, ``numerics`` or ``material``.
-        key: Its name there.
+        part: Part of a scene that holds it: ``edge``, ``numerics``, ``board`` or ``material``.
+        key: Its name in documents and options, and there unless ``field`` says another.
         factors: By how much it is varied; a factor that cannot be simulated is left out, and ``why`` says so.
         source: Where its value is from.
         why: Why not both half and twice; empty where it is both.
         unless: Property of the food in whose place the number is taken, so that it is nothing where the food has it.
         only: Property of the food without which it is nothing.
+        field: Its name in that part of a scene; empty where it is the key.
     """
 
     name: str
@@ -31,14 +32,14 @@ class MethodConstant:
     why: str = ""
     unless: str = ""
     only: str = ""
+    field: str = ""
 
     def value(self, scene: Scene) -> float:
         """Its value in a scene [SI]; 0 where it has no part in it."""
         food = scene.food.material
         if (self.unless and getattr(food, self.unless) is not None) or (self.only and not getattr(food, self.only)):
             return 0.0
-        part = food if self.part == "material" else getattr(scene, self.part)
-        return float(getattr(part, self.key))
+        return float(getattr(self._holder(scene), self._field))
 
     def varied(self, scene: Scene, factor: float) -> Scene:
         """The scene with another value of it; the same scene where it is nothing.
@@ -56,11 +57,17 @@ class MethodConstant:
             scene: A scene.
             value: The value [SI].
         """
-        old = getattr(scene.food.material if self.part == "material" else getattr(scene, self.part), self.key)
-        new = {self.key: round(value) if isinstance(old, int) else value}
+        new = {self._field: round(value) if isinstance(getattr(self._holder(scene), self._field), int) else value}
         if self.part == "material":
             return scene.with_material(**new)
         return replace(scene, **{self.part: replace(getattr(scene, self.part), **new)})
+
+    @property
+    def _field(self) -> str:
+        return self.field or self.key
+
+    def _holder(self, scene: Scene) -> object:
+        return scene.food.material if self.part == "material" else getattr(scene, self.part)
 
 
 CONSTANTS = (
@@ -95,6 +102,10 @@ CONSTANTS = (
         "process zone of a food without strength", "material", "cohesive_zone", (0.5, 2.0),
         "assumed, where the food has no strength (materials.yaml has one for every food)",
         unless="strength",
+    ),
+    MethodConstant(
+        "friction of the board", "board", "board_friction", (0.5, 2.0),
+        "assumed: wet food on a board; the halves slide on it as a thick blade parts them", field="mu",
     ),
     MethodConstant(
         "time step", "numerics", "safety", (0.5,), "numerical: part of the stability limit",
