@@ -71,3 +71,17 @@ def test_a_cut_that_has_started_takes_the_resistance_of_its_layer():
     tough = replace(shallow, food=replace(shallow.food, material=replace(FLESH, **RIND, initiation_depth=1e-3)))
     flesh = replace(shallow, food=replace(shallow.food, material=replace(FLESH, initiation_depth=1e-3)))
     assert cut(tough).peak > 2.5 * cut(flesh).peak
+
+
+@pytest.mark.parametrize("band", [0.25, 1.0])
+def test_the_edge_pays_the_layer_that_it_is_in(band):
+    """A rind thinner than a cell is a step of the force at its lower side, whatever band of ties the edge cuts."""
+    stiff = replace(FLESH, E=5e6, tensile_strength=1e6, loss_factor=0.05, R_rind=800.0, rind_thickness=2e-3)
+    block = Food(Shape("block", 0.024, 0.024, 0.02), stiff)
+    edge = EdgeLaw(zone=3e-3, slip=0.3e-3)
+    of = replace(scene("sphere"), food=block, motion=Motion(5e-3, 0.01), edge=edge)
+    record = cut(replace(of, numerics=replace(of.numerics, edge_band=band)))
+    force = np.interp([1e-3, 1.7e-3, 2.6e-3, 4e-3], record.stroke, record.resolved)
+    flesh = 80 * 0.02 + 800 * 0.004  # the flanks are rind, too
+    assert force[:2] == pytest.approx(800 * 0.024, rel=0.03)
+    assert force[2:] == pytest.approx(flesh, rel=0.12)
