@@ -1,9 +1,11 @@
 """The band in which another measurement of the same cut would lie if the fit is right.
 
 Draws come from the normal approximation of the posterior, with the specimen's width and the sensor's gain as they were
-in this cut, and are weighted by the chi-square that the surrogate expects of them (sampling, importance resampling:
-Rubin 1988, Bayesian Statistics 3). To each curve come the standard deviation of the surrogate, an error of the size and
-correlation length that the residuals showed, and tare, drift and lag from their priors.
+in this cut, and are weighted by what the surrogate says of them (sampling, importance resampling: Rubin 1988, Bayesian
+Statistics 3). A curve that it hardly knows could be anything, so its likelihood is small, and what it could be is drawn
+given the measured curve: a normal process with the errors of the fit (Rasmussen and Williams 2006, chapter 2). To each
+curve come an error of the size and correlation length that the residuals showed, and tare, drift and lag from their
+priors.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.fit.surrogate import Surrogate
+from calib.fit.surrogate import CurveProcess, Surrogate
 from calib.problem.objective import Objective
 from calib.uncertainty.intervals import CREDIBLE_LEVEL, Uncertainty
 from mpm.arrays import FloatArray
@@ -59,7 +61,10 @@ def predictive_bands(surrogate: Surrogate, z: FloatArray, found: Uncertainty, se
         curves = []
         for point, error in zip(drawn, added, strict=True):
             curve, sd, _ = process.predict(point[case.index])
-            drawn_curve = curve + sd * float(random.standard_normal())
+            ratio = unknown(process, curve, sd) / found.widened
+            seen = goal.target.curve / goal.factor(curve)
+            expected = curve + ratio / (1.0 + ratio) * (seen - curve)
+            drawn_curve = expected + sd / math.sqrt(1.0 + ratio) * float(random.standard_normal())
             curves.append(goal.factor(drawn_curve) * drawn_curve + error)
         out.append(pointwise_band(np.array(curves), goal.target.curve))
     return tuple(out)
@@ -93,13 +98,36 @@ def posterior_draws(surrogate: Surrogate, z: FloatArray, found: Uncertainty, ran
 
     def cost(point: FloatArray) -> float:
         rows = surrogate.residual(point)
-        return float(np.sum((weights * rows[:size]) ** 2) + np.sum(rows[size:] ** 2))
+        total, first = float(np.sum(rows[size:] ** 2)), 0
+        for process, term in zip(surrogate.each, surrogate.objective.terms, strict=True):
+            own = slice(first, first + term.objective.data_rows)
+            curve, sd, _ = process.predict(point[term.index])
+            ratio = unknown(process, curve, sd) / found.widened
+            total += float(np.sum((weights[own] * rows[own]) ** 2)) / (1.0 + ratio)
+            total += term.objective.effective_points * math.log1p(ratio)
+            first = own.stop
+        return total
 
     rise = np.array([cost(p) for p in points]) - cost(z)
     log_weight = -0.5 * (rise - np.sum(normal**2, axis=1))
     weight = np.exp(log_weight - log_weight.max())
     chosen: FloatArray = points[random.choice(POSTERIOR_DRAWS, POSTERIOR_DRAWS, p=weight / weight.sum())]
     return chosen
+
+
+def unknown(process: CurveProcess, curve: FloatArray, sd: float) -> float:
+    """Variance of a curve that a process expects over that of the errors of the fit [-].
+
+    Args:
+        process: The process of a trace.
+        curve: The curve that it expects [N] (n,).
+        sd: Its standard deviation [N].
+
+    Returns:
+        The ratio.
+    """
+    added = float(process.unknown_residual(curve[None], np.array([sd]))[0])
+    return added**2 / process.objective.effective_points
 
 
 def error_draws(goal: Objective, length: float, widened: float, count: int, random: np.random.Generator) -> FloatArray:
