@@ -59,7 +59,7 @@ def scatter(values: Sequence[float] | FloatArray) -> Scatter:
     return Scatter(mean, sd, mean - half, mean + half, mean - whole, mean + whole, n)
 
 
-def area_metric(model: Sequence[float] | FloatArray, measured: Sequence[float] | FloatArray) -> float:
+def area_metric(model: float | Sequence[float] | FloatArray, measured: Sequence[float] | FloatArray) -> float:
     """Area between the distribution of a model and that of repeats (Ferson, Oberkampf and Ginzburg 2008, Comput.
     Methods Appl. Mech. Eng. 197:2408-2430), in the unit of the values.
 

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from calib.io.folder import prepare
 from calib.io.provenance import git_commit, versions
+from calib.texture.bite_path import path_of
 from calib.texture.bites import find_bites, plate_descent
+from calib.texture.law_fit import SpeedGroup
+from calib.texture.law_result import LawResult, LeftOutSpeed
+from calib.texture.left_out import INSIDE, check_gaps, law_of_direction, passes
 from calib.texture.plate_record import PlateColumns, PlateRecord, read_records
 from calib.texture.repeats import ratio_of_means, scatter
 from calib.texture.texture_profile import Remark, TextureProfile, texture_profile
@@ -27,6 +31,7 @@ from calib.texture.texture_result import (
     TextureResult,
     write_result,
 )
+from calib.validation.acceptance import Verdict
 
 SAME_SPEED = 1.4
 """Ratio of two times of descent up to which they are of one speed [-]: machines scatter by some per cent, and speeds
@@ -47,6 +52,7 @@ class TextureTest:
         columns: How their columns are found.
         trigger: Load from which the plate touches the food [N]; None for 5 % of the first peak.
         seed: Seed of the draws of the bootstrap.
+        area: Area of the specimens under the plate [m^2]; with it, a law of rate is fitted to each direction.
     """
 
     along: Sequence[str | Path]
@@ -54,6 +60,7 @@ class TextureTest:
     columns: PlateColumns
     trigger: float | None = None
     seed: int = 0
+    area: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,18 +93,23 @@ def evaluate_texture(test: TextureTest, out: Path, *, command: Sequence[str], sa
         say(f"note: {text}")
     groups = grouped(specimens)
     with prepare(out, "tpa", resume=False):
+        curves = [bite_curves(members) for members in groups]
+        laws: list[LawResult] = []
+        if test.area is not None:
+            laws, curves = _laws(groups, curves, test.area, say)
         result = TextureResult(
             command=tuple(command),
             trigger_N=math.nan if test.trigger is None else test.trigger,
             groups=tuple(_group(members) for members in groups),
             ratios=tuple(_ratios(groups, test.seed)),
+            laws=tuple(laws),
+            verdicts=tuple(_verdict(one) for law in laws for one in law.left_out),
             not_shown=(*_unshown(test, groups), *notes),
             seed=test.seed,
             files=tuple(one.record.file for one in specimens),
             versions=versions(),
             git=git_commit(),
         )
-        curves = [bite_curves(members) for members in groups]
         write_result(result, curves, out)
         from reports.press.texture import write_report
 
@@ -209,6 +221,42 @@ def bite_curves(group: Sequence[Specimen]) -> BiteCurves:
     return BiteCurves(name_of(group), time, np.array(loads))
 
 
+def _laws(
+    groups: Sequence[Sequence[Specimen]], curves: Sequence[BiteCurves], area: float, say: Say
+) -> tuple[list[LawResult], list[BiteCurves]]:
+    """The law of each direction, and the curves with what it predicts."""
+    out, told = [], {}
+    for direction in dict.fromkeys(group[0].direction for group in groups):
+        own = [(group, one) for group, one in zip(groups, curves, strict=True) if group[0].direction == direction]
+        say(f"fitting a law of rate to {len(own)} speeds, direction: {direction}")
+        speeds = [_speed_group(group, one, area) for group, one in own]
+        law, predicted = law_of_direction(direction, speeds, [[x.profile for x in group] for group, _ in own], area)
+        out.append(law)
+        for speed in speeds:
+            if speed.name in predicted:
+                told[speed.name] = (speed.path.history()[0], area * predicted[speed.name])
+    curves = [
+        replace(one, predicted=np.interp(one.time, *told[one.group])) if one.group in told else one for one in curves
+    ]
+    return out, list(curves)
+
+
+def _speed_group(group: Sequence[Specimen], curves: BiteCurves, area: float) -> SpeedGroup:
+    """The group as a law is fitted to it."""
+    records = [one.record for one in group]
+    path = path_of(records, check_gaps(records))
+    time, _ = path.history()
+    stress = np.array([np.interp(time, curves.time, load) for load in curves.loads]) / area
+    return SpeedGroup(curves.group, path, stress)
+
+
+def _verdict(one: LeftOutSpeed) -> Verdict:
+    """The line of a speed that was left out: what of it is outside the scatter of its repeats."""
+    outside = sum(not each.inside for each in one.quantities) + (one.curve_inside < INSIDE)
+    name = f"{one.group} by the law of the other speeds: outside the scatter of its repeats"
+    return Verdict(name, outside, 0, "", passes(one), one.why)
+
+
 def _unshown(test: TextureTest, groups: Sequence[Sequence[Specimen]]) -> list[str]:
     """What the result does not show, in words."""
     trigger = "5 % of the first peak" if test.trigger is None else f"{test.trigger:g} N"
@@ -220,6 +268,11 @@ def _unshown(test: TextureTest, groups: Sequence[Sequence[Specimen]]) -> list[st
     ]
     if any(len(group) == 1 for group in groups):
         out.append("a group of one repeat has no scatter and no interval")
+    if test.area is not None:
+        out.append(
+            "a law is of the whole specimen between plates that do not hold it: friction, adhesion and water that is "
+            "pressed out are in its parameters"
+        )
     if test.across:
         out.append("the ratio's interval is of the specimens that were drawn; batches are not told from directions")
     return out

@@ -13,9 +13,11 @@ from calib.io.folder import write_csv, write_json
 from calib.io.provenance import CommandLine, Commit, Seed, Versions
 from calib.io.type_schema import NumberOrNull, Positive, Shared, keywords, one_of
 from calib.io.typed_document import FLAT, to_document
+from calib.texture.law_result import LawResult
 from calib.texture.plate_record import RecordedFile
 from calib.texture.repeats import Ratio, Scatter
 from calib.texture.texture_profile import TextureProfile
+from calib.validation.acceptance import Verdict
 from mpm.arrays import FloatArray
 
 RESULT_FILE, CURVES_FILE = "tpa.json", "curves.csv"
@@ -92,6 +94,8 @@ class TextureResult:
         trigger_N: Load from which the plate touches the food [N]; null for 5 % of the first peak of each record.
         groups: Repeats by direction and speed.
         ratios: Along over across the fibres; empty where one direction was measured.
+        laws: Law of each direction, with --law; empty without.
+        verdicts: Lines of the verdict on the laws; empty without.
         not_shown: What the result does not show, one sentence each.
         seed: Seed of the draws.
         files: Files of the test.
@@ -102,18 +106,26 @@ class TextureResult:
 
     DOCUMENT: ClassVar[str] = "tpa"
     KEYS: ClassVar[tuple[str, ...]] = (
-        "command", "trigger_N", "groups", "ratios", "not_shown", "seed", "files", "versions", "git",
+        "command", "trigger_N", "groups", "ratios", "laws", "verdicts", "passed", "not_shown", "seed", "files",
+        "versions", "git",
     )  # fmt: skip
 
     command: CommandLine
     trigger_N: NumberOrNull
     groups: Annotated[tuple[Annotated[TextureGroup, ONE], ...], keywords(minItems=1)]
     ratios: tuple[Annotated[DirectionRatio, ONE], ...]
+    laws: tuple[Annotated[LawResult, ONE], ...]
+    verdicts: tuple[Annotated[Verdict, Shared("verdict")], ...]
     not_shown: Annotated[tuple[str, ...], Shared("limits")]
     seed: Seed
     files: Annotated[tuple[Annotated[RecordedFile, keywords(description="One file")], ...], keywords(minItems=1)]
     versions: Versions
     git: Commit
+
+    @property
+    def passed(self) -> bool:
+        """Whether every line passed; true where nothing is judged."""
+        return all(line.passed for line in self.verdicts)
 
     @property
     def device(self) -> str:
@@ -129,11 +141,13 @@ class BiteCurves:
         group: Name of the group.
         time: Time from the first peak [s], shape (n,).
         loads: Load of each repeat [N], shape (repeats, n).
+        predicted: Load that the law of the other speeds predicts [N], shape (n,); None without a law.
     """
 
     group: str
     time: FloatArray
     loads: FloatArray
+    predicted: FloatArray | None = None
 
 
 def write_result(result: TextureResult, curves: Sequence[BiteCurves], out: Path) -> None:
@@ -154,5 +168,8 @@ def write_result(result: TextureResult, curves: Sequence[BiteCurves], out: Path)
         "low_N": np.concatenate([one.loads.min(axis=0) for one in curves]),
         "high_N": np.concatenate([one.loads.max(axis=0) for one in curves]),
     }
+    if any(one.predicted is not None for one in curves):
+        empty = [np.full(len(one.time), np.nan) if one.predicted is None else one.predicted for one in curves]
+        columns["predicted_N"] = np.concatenate(empty)
     write_csv(out / CURVES_FILE, columns, head=["low_N and high_N: smallest and largest load of the repeats"])
     write_json(out / RESULT_FILE, to_document(result))

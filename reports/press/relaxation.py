@@ -15,7 +15,7 @@ from reports.base.format import breakable, interval, plain, quantity
 from reports.press.tables import MARKS, mean_and_sd, verdict_table
 
 if TYPE_CHECKING:
-    from calib.texture.relaxation_result import HoldCurve, RelaxationResult
+    from calib.relaxation.relaxation_result import HoldCurve, RelaxationResult
 
 ALT = "Load of each specimen over the logarithm of the time of the hold, measured and fitted"
 CRITERION = (

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 from matplotlib.figure import Figure
 
 from reports.base.brief import Brief, ReportPart, ReportTable, typeset_brief
-from reports.base.figures import HATCHED, MEASURED, svg
+from reports.base.figures import HATCHED, MEASURED, SIMULATED, svg
 from reports.base.format import breakable, interval, plain, quantity
+from reports.press.law import law_parts
 from reports.press.tables import mean_and_sd
 
 if TYPE_CHECKING:
@@ -55,12 +56,14 @@ def write_report(result: TextureResult, curves: Sequence[BiteCurves], out: Path)
     ]
     if result.ratios:
         parts.append(ReportPart("Along over across the fibres", RATIO, table=_ratios(result)))
+    if result.laws:
+        parts += law_parts(result)
     parts.append(ReportPart("The bites", picture=picture(curves), alt=ALT))
     parts.append(ReportPart("Each specimen", table=_specimens(result), apart=count > 12))
     brief = Brief(
         kind="Texture profile",
         name="Two bites",
-        passed=None,
+        passed=result.passed if result.verdicts else None,
         sentence=_sentence(result),
         facts=[
             ("Specimens", f"{count} in {len(result.groups)} groups"),
@@ -157,6 +160,8 @@ def picture(curves: Sequence[BiteCurves]) -> bytes:
             if len(one.loads) > 1:
                 axes.fill_between(one.time, one.loads.min(axis=0), one.loads.max(axis=0), label="range", **HATCHED)
             axes.plot(one.time, one.loads.mean(axis=0), label="mean of the repeats", **{**MEASURED, "lw": 1.2})
+            if one.predicted is not None:
+                axes.plot(one.time, one.predicted, label="law of the other speeds", **{**SIMULATED, "lw": 1.2})
             axes.set_title(one.group)
             axes.set_xlim(float(one.time[0]), float(one.time[-1]))
         for axes in panels[len(curves) :]:
@@ -164,6 +169,6 @@ def picture(curves: Sequence[BiteCurves]) -> bytes:
         figure.supxlabel("time from the first peak [s]", fontsize=7.5)
         figure.supylabel("load [N]", fontsize=7.5)
         handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper left", ncols=2)
+        figure.legend(handles, labels, loc="outside upper left", ncols=3)
 
     return svg(draw, 16.0 + PANEL * rows)

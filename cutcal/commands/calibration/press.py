@@ -10,10 +10,11 @@ from calib.errors import CurveError
 from calib.io.typed_document import to_document
 from cutcal.commands.calibration import compress
 from cutcal.options import add_run, number, print_json, say, whole
+from mpm.scene.shapes import Shape
 
 if TYPE_CHECKING:
+    from calib.relaxation.relaxation_result import RelaxationResult
     from calib.texture.plate_record import PlateColumns
-    from calib.texture.relaxation_result import RelaxationResult
     from calib.texture.texture_result import TextureResult
 
 HELP = "tests between two plates: modulus, relaxation, texture profile"
@@ -33,8 +34,8 @@ Exit codes: 0 passed or nothing to judge, 1 error in input or run, 2 not within
 the limits."""
 OF_MODE = {
     "nu": (COMPRESS,), "strain": (COMPRESS,), "bonded": (COMPRESS,), "bracket": (COMPRESS,), "cells": (COMPRESS,),
-    "branches": (RELAX,), "across": (TPA,), "trigger": (RELAX, TPA), "time_col": (RELAX, TPA),
-    "height": (COMPRESS, RELAX), "diameter": (COMPRESS, RELAX), "width": (COMPRESS, RELAX), "length": (COMPRESS, RELAX),
+    "branches": (RELAX,), "across": (TPA,), "law": (TPA,), "trigger": (RELAX, TPA), "time_col": (RELAX, TPA),
+    "height": (COMPRESS, RELAX),
 }  # fmt: skip
 """Modes of the options that not all have."""
 
@@ -52,6 +53,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     )
     own.add_argument("--branches", type=whole(0), metavar="N", help="of the Prony series (default: by evidence)")
     own.add_argument("--across", nargs="+", metavar="FILE", help="across the fibres; --trace is along them")
+    own.add_argument("--law", action="store_true", help="law of rate by direction, each speed by the others")
     add_run(p)
 
 
@@ -78,7 +80,7 @@ def _columns(args: argparse.Namespace) -> PlateColumns:
 
 def _relax(args: argparse.Namespace, out: Path) -> int:
     """Evaluate holds."""
-    from calib.texture.relaxation_evaluation import RelaxationTest, evaluate_relaxation
+    from calib.relaxation.relaxation_evaluation import RelaxationTest, evaluate_relaxation
 
     outline = compress.outline_of(args)
     test = RelaxationTest(args.trace, outline, _columns(args), args.height, args.branches, args.trigger)
@@ -92,15 +94,20 @@ def _relax(args: argparse.Namespace, out: Path) -> int:
 
 def _texture(args: argparse.Namespace, out: Path) -> int:
     """Evaluate two bites."""
+    from calib.compression.measured import area as area_of
     from calib.texture.texture_evaluation import TextureTest, evaluate_texture
 
-    test = TextureTest(args.trace, args.across or (), _columns(args), args.trigger, args.seed)
+    area = None
+    if args.law:
+        kind, length, width = compress.outline_of(args)
+        area = area_of(Shape(kind, length, width, length))
+    test = TextureTest(args.trace, args.across or (), _columns(args), args.trigger, args.seed, area)
     result = evaluate_texture(test, out, command=compress.command_of("press"), say=say)
     if args.json:
         print_json(to_document(result))
     else:
         print(f"{texture_table(result)}\n  wrote {out}")
-    return 0
+    return 0 if result.passed else 2
 
 
 def relaxation_table(result: RelaxationResult) -> str:
@@ -128,4 +135,8 @@ def texture_table(result: TextureResult) -> str:
         if one.descent_s != one.descent_s:  # of all speeds
             r = one.ratio
             lines.append(f"  along / across, {one.quantity}: {r.value:.3g} (95 % interval {r.low:.3g} to {r.high:.3g})")
+    for law in result.laws:
+        values = ", ".join(f"{one.name} {one.value:.3g}" for one in law.parameters)
+        lines.append(f"  law ({law.direction}): {values}")
+    lines += compress.verdict_lines(result.verdicts)
     return "\n".join(lines + [f"  note: {text}" for text in result.not_shown])

@@ -20,8 +20,8 @@ from calib.io.folder import finite
 from calib.io.schema import FOLDER, shared_part, tag
 from calib.io.type_schema import ALWAYS, Positive, Shared, document_schema, keywords, one_of
 from calib.io.typed_document import ANY, FORMER, NULL, document_key, left_out, renamed
+from calib.relaxation.relaxation_result import RelaxationResult
 from calib.scalars.result import ScalarFitResult
-from calib.texture.relaxation_result import RelaxationResult
 from calib.texture.texture_result import TextureResult
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.validation.acceptance import Verdict

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import csv
+import math
 from bisect import bisect_left
 
 import pytest
 
 from calib.texture.plate_record import PlateColumns, read_record
+from calib.texture.texture_evaluation import TextureTest, evaluate_texture
 from calib.texture.texture_profile import texture_profile
 from tests.data_dir import data_file
 
@@ -91,3 +93,27 @@ def test_each_repeat_is_what_the_definitions_say(name):
     profile, _ = texture_profile(read_record(path, PlateColumns()))
     found = (profile.hardness_N, profile.cohesiveness, profile.springiness, profile.resilience)
     assert found == pytest.approx(by_definition(path), rel=0.02)
+
+
+def test_both_directions_and_four_speeds(tmp_path):
+    """Eight groups, hardness along 0.39 of that across with an interval below 1, and a law of each direction that
+    predicts the texture of a speed it has not seen within the scatter of its repeats in 29 of 32 quantities. The
+    report names those that fail, and for those of the 2, 4 and 8 s tests across that a slower one is harder, which no
+    relaxation makes."""
+    along, across = (
+        [data_file("fungi_steak_press", name) for name in NAMES if plane in name] for plane in ("inplane", "outplane")
+    )
+    test = TextureTest(along, across, PlateColumns(), area=math.pi * 0.004**2)
+    result = evaluate_texture(test, tmp_path / "out", command=(), say=lambda _: None)
+    assert [len(group.repeats) for group in result.groups] == [6, 6, 3, 6] * 2
+    hardness = result.ratios[0]
+    assert hardness.quantity == "hardness_N" and hardness.ratio.value == pytest.approx(0.39, abs=0.01)
+    assert hardness.ratio.high < 0.6
+    speeds = [one for law in result.laws for one in law.left_out]
+    outside = {(one.group, each.quantity) for one in speeds for each in one.quantities if not each.inside}
+    assert len(speeds) == 8 and outside == {
+        ("along 0.5 s", "hardness_N"), ("along 2 s", "resilience"), ("across 0.49 s", "hardness_N")
+    }  # fmt: skip
+    failed = {one.group: one.why for one in speeds if one.why}
+    assert len(failed) == sum(not line.passed for line in result.verdicts) == 5 and not result.passed
+    assert all("the slower one is harder" in failed[name] for name in failed if name.startswith("across"))

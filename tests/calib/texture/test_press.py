@@ -7,10 +7,12 @@ import json
 import numpy as np
 import pytest
 
+from calib.texture.bite_path import BitePath
 from calib.texture.prony_series import PronySeries
+from calib.texture.quasi_linear import QuasiLinearLaw
 from cutcal.main import main
 from tests.calib.documents import valid
-from tests.calib.texture.made_bites import DEPTH, held, record, two_bites, write
+from tests.calib.texture.made_bites import DEPTH, HEIGHT, held, record, two_bites, write
 
 
 def bite(path, hardness, descent=1.0):
@@ -41,6 +43,34 @@ def test_a_texture_profile_end_to_end(tmp_path, capsys):
     assert ratio["value"] == pytest.approx(0.5, rel=1e-3) and ratio["low"] <= 0.5 <= ratio["high"]
     assert (out / "report.pdf").read_bytes().startswith(b"%PDF")
     assert len((out / "curves.csv").read_text().splitlines()) > 100
+
+
+def test_a_law_end_to_end(tmp_path, capsys):
+    """Three speeds, two specimens each of laws that differ: a law, three predictions, exit code 0, what is predicted
+    in the curves."""
+    laws = [
+        QuasiLinearLaw(f * 1e5, stiffening=4.0, equilibrium=0.1, power=p, damage=0.0)
+        for f, p in ((0.8, 0.25), (1.2, 0.35))
+    ]
+    paths = []
+    for descent in (0.5, 3.0, 20.0):
+        time, strain = BitePath(descent, 0.0, 2.2 * descent, 0.5).history()
+        fine = np.linspace(time[0] - 0.2 * descent, time[-1], 1500)
+        way = HEIGHT * np.interp(fine, time, strain)
+        for k, law in enumerate(laws):
+            load = 5e-5 * np.interp(fine, time, law.stress(time, strain))
+            paths.append(str(write(tmp_path / f"s{descent:g}_{k}.tsv", record(fine - fine[0], way, load))))
+    out = tmp_path / "out"
+    size = ["--diameter", str(np.sqrt(4 * 5e-5 / np.pi))]
+    assert main(["press", "tpa", "--trace", *paths, *size, "--law", "--out", str(out)]) == 0
+    assert "law (only): E_Pa 1" in capsys.readouterr().out
+    document = valid(json.loads((out / "tpa.json").read_text()), "tpa")
+    (found,) = document["laws"]
+    assert [one["extrapolated"] for one in found["left_out"]] == [True, False, True] and document["passed"]
+    parameters = {one["name"]: one for one in found["parameters"]}
+    assert parameters["E_Pa"]["value"] == pytest.approx(1e5, rel=0.2)
+    assert parameters["E_Pa"]["low"] < 1e5 < parameters["E_Pa"]["high"]
+    assert (out / "curves.csv").read_text().splitlines()[1].endswith("predicted_N")
 
 
 def test_a_relaxation_end_to_end(tmp_path, capsys):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from calib.errors import CurveError, TraceError
-from calib.texture.hold import find_hold
+from calib.relaxation.hold import find_hold
+from calib.relaxation.relaxation_fit import fit_relaxation
 from calib.texture.prony_series import PronySeries
-from calib.texture.relaxation_fit import fit_relaxation
 from tests.calib.texture.made_bites import DEPTH, held, record, two_bites
 
 THREE = PronySeries((0.3, 0.2, 0.1), (0.3, 3.0, 20.0))

@@ -12,10 +12,9 @@ from calib.compression.measured import area
 from calib.compression.result import SpecimenSizes
 from calib.io.folder import prepare
 from calib.io.provenance import git_commit, versions
-from calib.texture.hold import Hold, find_hold
-from calib.texture.plate_record import PlateColumns, PlateRecord, read_records
-from calib.texture.relaxation_fit import MOST_BRANCHES, RelaxationFit, common_branches, fit_relaxation
-from calib.texture.relaxation_result import (
+from calib.relaxation.hold import Hold, find_hold
+from calib.relaxation.relaxation_fit import MOST_BRANCHES, RelaxationFit, common_branches, fit_relaxation
+from calib.relaxation.relaxation_result import (
     BranchScatter,
     HoldCurve,
     RelaxationBranch,
@@ -23,6 +22,7 @@ from calib.texture.relaxation_result import (
     RelaxedSpecimen,
     write_result,
 )
+from calib.texture.plate_record import PlateColumns, PlateRecord, read_records
 from calib.texture.repeats import scatter
 from calib.validation.acceptance import Verdict
 from mpm.scene.shapes import Shape

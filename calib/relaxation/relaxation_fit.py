@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import least_squares, nnls
 
 from calib.errors import CurveError
-from calib.texture.hold import Hold
+from calib.relaxation.hold import Hold
 from calib.texture.prony_series import PronySeries, branch
 from mpm.arrays import FloatArray
 
