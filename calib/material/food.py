@@ -22,6 +22,7 @@ from calib.material.properties import (
     INCLUSIONS,
     LAYERS,
     PROPERTIES,
+    RELAXATION,
     SYNONYMS,
     Property,
     Source,
@@ -51,7 +52,7 @@ __all__ = [
 GIVEN_SPREAD = 10.0
 """Range of a property that has no literature and is given by the user: the value over and times this."""
 
-_OPTIONAL = (*LAYERS, *LAYERS.values(), "skin_stiffness")  # that a file leaves out where a food has none
+_OPTIONAL = (*LAYERS, *LAYERS.values(), "skin_stiffness", *RELAXATION)  # that a file leaves out where a food has none
 _NULLABLE = ("R_skin", "tensile_strength", "fracture_energy", *_OPTIONAL)
 
 
@@ -95,7 +96,7 @@ class FoodSpec:
         check_keys(here.at("properties"), self.properties, needed, _NULLABLE, SYNONYMS)
         if self.properties["skin_thickness"].value > 0.0 and "R_skin" not in self.properties:
             raise here.at("properties").error("skin_thickness > 0 needs R_skin; give it, or skin_thickness 0")
-        for size, resistance in LAYERS.items():
+        for size, resistance in (*LAYERS.items(), RELAXATION):
             have = [name for name in (size, resistance) if name in self.properties]
             if len(have) == 1:
                 other = resistance if have[0] == size else size
@@ -244,6 +245,11 @@ class FoodSpec:
     def _lacks_strength(self) -> bool:
         """Whether bulk damage has its energy, but not the stress at which it starts."""
         return "fracture_energy" in self.properties and "tensile_strength" not in self.properties
+
+    @property
+    def relaxes(self) -> bool:
+        """Whether a part of its stiffness relaxes, so that its force depends on the real speed."""
+        return "relaxing_share" in self.properties and self.properties["relaxing_share"].value > 0.0
 
     def to_scene_food(
         self,

@@ -337,8 +337,8 @@ class Scene:
             )
         if self.food.material.rate_dependent and m.speed is None:
             raise SceneError(
-                "material: prony makes the force depend on the real speed of the knife, and speeding the simulation up "
-                "would change it; give motion.speed [m/s]"
+                "material: relaxation makes the force depend on the real speed of the knife, and speeding the "
+                "simulation up would change it; give motion.speed [m/s] (--speed)"
             )
 
     def _check_band(self) -> None:
@@ -387,6 +387,8 @@ class Scene:
                 del out["food"][name]
         if not out["food"]["material"]["skin_stiffness"]:
             del out["food"]["material"]["skin_stiffness"]
+        if not out["food"]["material"]["relaxing_share"]:
+            del out["food"]["material"]["relaxing_share"], out["food"]["material"]["relaxation_time"]
         return out
 
 
