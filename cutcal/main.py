@@ -26,6 +26,7 @@ cutcal COMMAND --help explains a command.
 Exit codes: 0 done and passed, 1 error in input or run, 2 ran but did not pass."""
 COMMANDS = {
     "calibrate": "calibration",
+    "press": "calibration",
     "compress": "calibration",
     "converge": "solver",
     "coverage": "calibration",

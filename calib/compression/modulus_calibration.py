@@ -154,7 +154,7 @@ def _plates(bonded: bool) -> str:
 def calibrate_modulus(
     test: CompressionTest, options: PressOptions, out: Path, *, command: Sequence[str], say: Say
 ) -> CompressionResult:
-    """Calibrate and write compress.json, curves.csv and compress.svg.
+    """Calibrate and write compress.json, curves.csv, compress.svg and report.pdf.
 
     Args:
         test: What was measured.
@@ -209,8 +209,10 @@ def calibrate_modulus(
         )
         write_result(result, _curves(measured, found), out)
         from reports.calibration.compression import write_figure
+        from reports.press.compression import write_report
 
         write_figure(result, read_curves(out), out)
+        write_report(result, out)
         return result
 
 

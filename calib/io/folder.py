@@ -25,6 +25,8 @@ RUN_FILES = (
     "stress.json",
     "verify.json",
     "compress.json",
+    "relax.json",
+    "tpa.json",
     "coverage.json",
     "coverage.jsonl",
     "prior.json",

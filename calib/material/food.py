@@ -22,6 +22,7 @@ from calib.material.properties import (
     INCLUSIONS,
     LAYERS,
     PROPERTIES,
+    RELAXATION,
     SYNONYMS,
     Property,
     Source,
@@ -52,7 +53,7 @@ GIVEN_SPREAD = 10.0
 """Range of a property that has no literature and is given by the user: the value over and times this."""
 
 _STRENGTHS = ("strength_ratio", "tensile_strength")  # a food has one of them at most
-_OPTIONAL = (*LAYERS, *LAYERS.values(), "skin_stiffness", *_STRENGTHS)  # that a file leaves out where a food has none
+_OPTIONAL = (*LAYERS, *LAYERS.values(), "skin_stiffness", *RELAXATION, *_STRENGTHS)  # a file may leave these out
 _NULLABLE = ("R_skin", "fracture_energy", *_OPTIONAL)
 
 
@@ -98,7 +99,7 @@ class FoodSpec:
             raise here.at("properties").error("skin_thickness > 0 needs R_skin; give it, or skin_thickness 0")
         if all(name in self.properties for name in _STRENGTHS):
             raise here.at("properties").error("strength_ratio and tensile_strength are the same; give one of them")
-        for size, resistance in LAYERS.items():
+        for size, resistance in (*LAYERS.items(), RELAXATION):
             have = [name for name in (size, resistance) if name in self.properties]
             if len(have) == 1:
                 other = resistance if have[0] == size else size
@@ -251,6 +252,11 @@ class FoodSpec:
     def _lacks_strength(self) -> bool:
         """Whether bulk damage has its energy, but not the stress at which it starts."""
         return "fracture_energy" in self.properties and not set(_STRENGTHS) & set(self.properties)
+
+    @property
+    def relaxes(self) -> bool:
+        """Whether a part of its stiffness relaxes, so that its force depends on the real speed."""
+        return "relaxing_share" in self.properties and self.properties["relaxing_share"].value > 0.0
 
     def to_scene_food(
         self,

@@ -82,6 +82,11 @@ PROPERTIES: dict[str, Rule] = {
     "initiation_depth": Rule("m", 1e-4, 0.05, "indentation under the edge at which a cut starts"),
     "mu": Rule("-", 0.0, 2.0, "Coulomb friction of food on blade"),
     "loss_factor": Rule("-", 0.0, 1.0, "mechanical loss factor tan(delta) at the first axial mode"),
+    "relaxing_share": Rule(
+        "-", 0.0, 0.99, "part of the instantaneous shear stiffness that relaxes, 0 = none; E is then instantaneous",
+        "a solid keeps some of its stiffness",
+    ),
+    "relaxation_time": Rule("s", 1e-4, 1e6, "time in which that part relaxes to 1/e"),
     "tensile_strength": Rule("Pa", 10.0, 1e9, "tension at which the flesh parts"),
     "strength_ratio": Rule(
         "-", 0.01, 1.0, "tension at which the flesh parts over its yield stress",
@@ -89,6 +94,9 @@ PROPERTIES: dict[str, Rule] = {
     ),
     "fracture_energy": Rule("J/m^2", 0.1, 1e6, "energy per crack area of bulk damage"),
 }  # fmt: skip
+
+RELAXATION = ("relaxing_share", "relaxation_time")
+"""One branch of a Prony series of the shear stiffness. Only foods of which it is known have the two."""
 
 LAYERS = {"rind_thickness": "R_rind", "core_ratio": "R_core"}
 """The size of each layer beside the flesh and its resistance. Only foods whose anatomy has the layer have the two."""

@@ -283,7 +283,7 @@ def cut_scene(
     shape: Shape,
     knife: Knife,
     *,
-    stroke: float | None = None,
+    stroke: float | Motion | None = None,
     dx: float | None = None,
     coarse: bool = False,
     seed: int = 0,
@@ -297,7 +297,8 @@ def cut_scene(
         food: Material and its values.
         shape: Specimen.
         knife: Blade.
-        stroke: Way of the edge [m]; the whole height by default.
+        stroke: Way of the edge [m]; the whole height by default. A motion says the real speed too, which a food that
+            relaxes needs; its simulated speed is set here.
         dx: Cell [m]; by default three quarters of the process zone, which grows with larger ones: a screening version
             has the same edge.
         coarse: Screening version of the scene: one cell to the process zone, twice the speed.
@@ -317,10 +318,13 @@ def cut_scene(
     if coarse:
         cell, mach = cell / CELL_PER_ZONE, 2 * mach
     filled = food.to_scene_food()
+    motion = stroke if isinstance(stroke, Motion) else Motion(stroke or shape.height)
     return Scene(
         food=type(filled)(shape, filled.material),
         knife=knife,
-        motion=Motion(min(stroke or shape.height, shape.height), mach, end_speed=END_SPEED if thick else 1.0),
+        motion=replace(
+            motion, stroke=min(motion.stroke, shape.height), mach=mach, end_speed=END_SPEED if thick else 1.0
+        ),
         edge=EdgeLaw(zone=zone),
         numerics=Numerics(dx=cell, far=FAR_PER_HEIGHT * shape.height, seed=seed),
     )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from calib.errors import TraceError
 from calib.io.provenance import code_key, key_of
+from calib.material.food import FoodSpec
 from calib.material.knife import load_knife
 from calib.material.scene import (
     at_fitted_height,
@@ -32,7 +33,7 @@ from calib.trace.conditioning import Conditioned, condition
 from calib.trace.cuts import single_cut
 from calib.trace.filters import filter_simulated
 from calib.trace.stroke import board_stroke
-from mpm.scene import Scene
+from mpm.scene import Motion, Scene
 
 COARSE_SPEED = 2.0
 """Speed of a search's coarse simulations over that of a screening scene [-] (docs/theory.md, "Surrogate and search").
@@ -180,13 +181,19 @@ def _scenes(request: Request, curve: Conditioned, heights: Heights | None) -> tu
     food = request.food
     shape, assumed = specimen(food, curve, request.sizing)
     knife = load_knife(request.knife)
-    stroke, dx, seed = curve.stroke_length_m, request.dx, request.seed
+    stroke, dx, seed = way_of(food, curve), request.dx, request.seed
     fine, screening = (
         windowed(cut_scene(food, shape, knife, stroke=stroke, dx=dx, seed=seed, coarse=coarse), heights)
         for coarse in (False, True)
     )
     faster = replace(screening.motion, mach=COARSE_SPEED * screening.motion.mach)
     return fine, replace(screening, motion=faster), [*assumed, *blade_warnings(shape, knife)]
+
+
+def way_of(food: FoodSpec, curve: Conditioned) -> float | Motion:
+    """Way of the edge [m]; of a food that relaxes the motion with the mean speed of the trace."""
+    length = curve.stroke_length_m
+    return Motion(length, speed=length / (curve.end_s - curve.onset_s)) if food.relaxes else length
 
 
 def _objective(

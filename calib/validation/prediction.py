@@ -15,7 +15,7 @@ from calib.io.typed_document import FLAT
 from calib.material.knife import load_knife
 from calib.material.scene import blade_warnings, cut_scene, specimen, windowed
 from calib.problem.request import Request
-from calib.problem.setup import conditioned, with_height
+from calib.problem.setup import conditioned, way_of, with_height
 from calib.trace.filters import filter_simulated
 from calib.validation.metrics import Metrics, compare
 from mpm.output.record import ForceRecord
@@ -136,7 +136,7 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
     shape, assumed = specimen(request.food, curve, request.sizing)
     knife = load_knife(request.knife)
     scene = windowed(
-        cut_scene(request.food, shape, knife, stroke=curve.stroke_length_m, dx=request.dx, seed=request.seed)
+        cut_scene(request.food, shape, knife, stroke=way_of(request.food, curve), dx=request.dx, seed=request.seed)
     )
     warnings: tuple[str, ...] = (*request.food.warnings(), *curve.warnings, *assumed, *blade_warnings(shape, knife))
     held_out = _held_out(request, curve.trace.sha256)

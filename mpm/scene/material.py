@@ -50,6 +50,8 @@ class Material:
             tissue loses 0.13-0.4 of the energy of a cycle (J. Texture Stud. 14:155, 1983), i.e. about 0.04-0.13.
         prony: Relaxation of the shear stiffness as pairs (share [-], time [s]); E is then the instantaneous modulus and
             the shares add up to less than 1 (Simo 1987). Empty = rate-independent, the default.
+        relaxing_share: Share [-] of one branch beside those of ``prony``: what a fit moves. 0 = none, the default.
+        relaxation_time: Its time [s]; nothing uses it without a share.
         adhesion: Largest normal traction of the food on the blade's faces [Pa]; 0 = none, the default.
         adhesion_energy: Work of adhesion [J/m^2], needed with ``adhesion``.
     """
@@ -75,6 +77,8 @@ class Material:
     fracture_energy: float | None = None
     loss_factor: float = 0.0
     prony: tuple[tuple[float, float], ...] = ()
+    relaxing_share: float = 0.0
+    relaxation_time: float = 1.0
     adhesion: float = 0.0
     adhesion_energy: float = 0.0
 
@@ -134,11 +138,14 @@ class Material:
             raise SceneError(
                 "material: adhesion [Pa] and adhesion_energy [J/m^2] make sticky faces together; give both"
             )
-        for share, time in self.prony:
+        for share, time in self.branches:
             check_number(w, "share of a prony branch", share, 0.0, 1.0, "")
             check_number(w, "time of a prony branch", time, 0.0, 1e9, "s")
-        if sum(share for share, _ in self.prony) >= 1.0:
-            raise SceneError("material: the shares of the prony branches must add up to less than 1, or a solid flows")
+        if self.relaxing_share < 0.0 or sum(share for share, _ in self.branches) >= 1.0:
+            raise SceneError(
+                "material: the shares of the prony branches must not be below 0 and add up to less than 1, or a "
+                "solid flows"
+            )
 
     def _check_layers(self, where: str) -> None:
         """Refuse layers without a resistance, and a core as large as the food."""
@@ -228,7 +235,13 @@ class Material:
     @property
     def rate_dependent(self) -> bool:
         """Whether the force depends on the real speed of the knife."""
-        return bool(self.prony)
+        return bool(self.branches)
+
+    @property
+    def branches(self) -> tuple[tuple[float, float], ...]:
+        """Share [-] and time [s] of each branch of the relaxation."""
+        one = ((self.relaxing_share, self.relaxation_time),) if self.relaxing_share > 0.0 else ()
+        return (*self.prony, *one)
 
     @property
     def p_wave(self) -> float:

@@ -285,8 +285,8 @@ class Scene:
             )
         if self.food.material.rate_dependent and m.speed is None:
             raise SceneError(
-                "material: prony makes the force depend on the real speed of the knife, and speeding the simulation up "
-                "would change it; give motion.speed [m/s]"
+                "material: relaxation makes the force depend on the real speed of the knife, and speeding the "
+                "simulation up would change it; give motion.speed [m/s] (--speed)"
             )
 
     def _check_band(self) -> None:
@@ -340,4 +340,6 @@ class Scene:
         for name in ("skin_stiffness", "strength_ratio"):
             if not out["food"]["material"][name]:
                 del out["food"]["material"][name]
+        if not out["food"]["material"]["relaxing_share"]:
+            del out["food"]["material"]["relaxing_share"], out["food"]["material"]["relaxation_time"]
         return out

@@ -151,6 +151,25 @@ def test_prony_series_needs_the_real_speed_and_softens_a_slow_cut():
     assert work["slow"] < 0.85 * work["fast"]  # what opens ahead of the edge is a part of R and does not relax
 
 
+def test_a_stiffer_candidate_relaxes_in_the_same_real_time():
+    """A blade that is faster in a stiffer food shortens its relaxation times as much: what a step relaxes is the same
+    in a scene of its own and as another candidate of one; share and time by name are a branch like any other."""
+    soft = replace(FLESH, relaxing_share=0.6, relaxation_time=0.5)
+    scene = replace(PRISM, food=replace(PRISM.food, material=soft), motion=Motion(0.015, 0.01, speed=0.02))
+    stiff = replace(soft, E=9 * soft.E)
+    setup = Setup(scene, Runtime(threads=1))
+    own = Setup(scene.with_material(E=stiff.E), Runtime(threads=1))
+    np.testing.assert_allclose(setup.contents(stiff).relaxation, own.contents(stiff).relaxation, rtol=1e-12)
+    share, part = setup.contents(soft).relaxation
+    assert share == [0.6] and 0.0 < part[0] < 0.01
+    plain = scene.with_material(relaxing_share=0.0, prony=((0.6, 0.5),))
+    named = scene.with_material(relaxing_share=0.0)
+    np.testing.assert_array_equal(
+        Setup(plain, Runtime(threads=1)).contents(plain.food.material).relaxation, [[0.6], part]
+    )
+    assert not named.food.material.rate_dependent and "relaxing_share" not in named.as_dict()["food"]["material"]
+
+
 @pytest.mark.slow
 def test_dwell_relaxes_the_force_and_needs_a_speed():
     """Holding the blade still lets a viscoelastic food relax; a pause without a real speed is refused."""

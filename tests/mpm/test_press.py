@@ -76,6 +76,48 @@ def test_a_sliding_block_has_the_force_of_uniaxial_compression(changed):
     assert force == pytest.approx(uniaxial(0.9, SOFT) * 0.02 * 0.016, rel=0.01)
 
 
+def relaxed_part(share: float, tau: float, duration: float, nu: float, steps: int = 400) -> np.ndarray:
+    """Load of a uniaxial compression at a constant speed over that without relaxation, small strains: the deviator
+    relaxes and the pressure does not (Simo 1987)."""
+    shear, bulk = 1 / (2 * (1 + nu)), 1 / (3 * (1 - 2 * nu))
+    step = duration / steps / tau
+    decay, mean = math.exp(-step), -math.expm1(-step) / step
+    before = held = 0.0
+    out = []
+    for k in range(1, steps + 1):
+        # deviator a (along - wide) and its branch; free sides: the pressure is half the stress of the deviator
+        fixed, gain = decay * held - share * mean * before, 1 - share + share * mean
+        along, a = k / steps, 4 / 3 * shear
+        wide = (0.5 * (a * along * gain + fixed) - bulk * along) / (2 * bulk + 0.5 * a * gain)
+        now = a * (along - wide)
+        held, before = fixed + share * mean * now, now
+        out.append(1.5 * ((1 - share) * now + held))
+    return np.array(out) * steps / np.arange(1, steps + 1)
+
+
+@pytest.mark.slow
+def test_a_block_relaxes_as_linear_viscoelasticity():
+    """Between slippery plates, pressed in twice its relaxation time, a block has the closed form's part of the force
+    of one that does not relax, within 1 %; the ratio does not see the grid."""
+    numerics = Numerics(dx=4e-3, gravity=0.0, output=1e-5)
+    shape = Shape("block", 0.02, 0.02, 0.02)
+    force = {}
+    for share in (0.0, 0.6):
+        material = Material(E=1e5, nu=0.35, rho=1000.0, loss_factor=0.05, relaxing_share=share, relaxation_time=0.5)
+        motion = Motion(1e-3, 4e-3, speed=1e-3)
+        record = pressed(Scene(Food(shape, material), Press(), motion, Board(0.0), numerics=numerics))
+        middle = 0.5 * (record.stroke[1:] + record.stroke[:-1])
+        force[share] = [
+            np.polyfit(middle[near] - way, record.face[1:, 2][near], 1)[1]
+            for way in (5e-4, 7e-4, 9e-4)
+            for near in [abs(middle - way) < 1e-4]
+        ]
+    found = np.array(force[0.6]) / np.array(force[0.0])
+    want = np.interp([0.5, 0.7, 0.9], np.arange(1, 401) / 400, relaxed_part(0.6, 0.5, 1.0, 0.35))
+    assert relaxed_part(0.0, 1.0, 1.0, 0.35) == pytest.approx(1.0)
+    np.testing.assert_allclose(found, want, rtol=0.01)
+
+
 def test_the_contact_keeps_no_energy():
     """What the plate does is in the food: elastic energy is the work within 1.5 %, nothing is left in the contact."""
     food = replace(SCENE.food, material=replace(SOFT, loss_factor=0.0))

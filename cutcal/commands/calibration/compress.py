@@ -1,15 +1,17 @@
-"""``cutcal compress``: Young's modulus from a compression test between two plates."""
+"""``cutcal compress``, and ``cutcal press compress``: Young's modulus from a compression test between two plates."""
 
 from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from calib.errors import CurveError
 from calib.io.typed_document import to_document
 from cutcal.options import (
+    Group,
     add_run,
     number,
     print_json,
@@ -20,13 +22,15 @@ from mpm.scene.shapes import Shape
 
 if TYPE_CHECKING:
     from calib.compression.result import CompressionResult
+    from calib.validation.acceptance import Verdict
 
-HELP = "Young's modulus from a compression test between two plates"
+HELP = "the same as press compress: Young's modulus from a compression test"
 DESCRIPTION = """Calibrate Young's modulus on the force of a specimen that is compressed between
 two plates. One simulation at a reference modulus gives the curve; each repeat
 is fitted by scaling it. Strain is compression / height, stress force / first
 area. The first sample of a repeat is its zero; no toe is corrected. Writes
-compress.json, curves.csv and compress.svg to --out."""
+compress.json, curves.csv, compress.svg and report.pdf to --out."""
+STRAIN = 0.4  # that is fitted where none is given
 EPILOG = """examples:
   cutcal compress --trace gel.csv --height 0.03 --diameter 0.05 --nu 0.49
   cutcal compress --trace a.csv b.csv --height 0.02 --width 0.02 --length 0.02 \\
@@ -42,26 +46,35 @@ limits (curve error 5 %, modulus over 0-5 % strain 10 %, solver 3 %)."""
 
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
+    add_specimens(p)
+    add_modulus(p)
+    add_run(p)
+
+
+def add_specimens(p: argparse.ArgumentParser) -> None:
+    """Options that say what was pressed, and how its records are read."""
     p.add_argument("--trace", required=True, nargs="+", metavar="FILE", help="CSV, JSON or HDF5 files of one material")
     p.add_argument("--height", type=number(1e-3, 1.0, "m"), metavar="M", help="height of the specimen [m]")
     p.add_argument("--diameter", type=number(1e-3, 1.0, "m"), metavar="M", help="diameter of an upright cylinder [m]")
     for name in ("width", "length"):
         p.add_argument(f"--{name}", type=number(1e-3, 1.0, "m"), metavar="M", help=f"{name} of a block [m]")
+    p.add_argument("--compression-col", metavar="C", help="its column; metres without a unit")
+    p.add_argument("--force-col", metavar="C", help="column of the load; newtons without a unit")
+    p.add_argument("--sign", choices=("+", "-"), metavar="+|-", help="sign of the load that presses")
+
+
+def add_modulus(p: Group) -> None:
+    """Options of the modulus."""
     p.add_argument("--nu", type=float, metavar="NU", help="Poisson's ratio, which the test does not tell")
     p.add_argument(
         "--strain",
         type=number(0.0, 0.8, "-"),
-        default=0.4,
         metavar="E",
-        help="largest engineering strain to fit (default 0.4)",
+        help=f"largest engineering strain to fit (default {STRAIN:g})",
     )
     p.add_argument("--bonded", action="store_true", help="the food sticks to the plates (default: it slides)")
     p.add_argument("--bracket", action="store_true", help="also the modulus if the plates were the other way")
     p.add_argument("--cells", type=whole(1), metavar="N", help="cells over the height (default 10, 15 if bonded)")
-    p.add_argument("--compression-col", metavar="C", help="its column; metres without a unit")
-    p.add_argument("--force-col", metavar="C", help="column of the load; newtons without a unit")
-    p.add_argument("--sign", choices=("+", "-"), metavar="+|-", help="sign of the load that presses")
-    add_run(p)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -75,17 +88,23 @@ def run(args: argparse.Namespace) -> int:
             "for instance 0.49 for a gel or a rubber, 0.2 to 0.4 for a food with pores"
         )
     out = Path(args.out or f"cutcal-compress-{Path(args.trace[0]).stem}")
+    strain = STRAIN if args.strain is None else args.strain
     columns = (args.compression_col, args.force_col, args.sign)
-    test = CompressionTest(args.trace, shape, args.nu, args.strain, args.bonded, *columns)
+    test = CompressionTest(args.trace, shape, args.nu, strain, args.bonded, *columns)
     cells = args.cells if args.cells is not None else 15 if args.bonded else 10
     options = PressOptions(cells, args.bracket, args.seed, args.arch)
-    command = ("compress", *(a for a in sys.argv[1:] if a != "compress"))
+    command = command_of(args.command)
     result = calibrate_modulus(test, options, out, command=command, say=say)
     if args.json:
         print_json(to_document(result))
     else:
         print(f"{table(result)}\n  wrote {out}")
     return 0 if result.passed else 2
+
+
+def command_of(name: str) -> tuple[str, ...]:
+    """Words of the command line, the command's name first."""
+    return (name, *(a for a in sys.argv[1:] if a != name))
 
 
 def shape_of(args: argparse.Namespace) -> Shape:
@@ -96,18 +115,27 @@ def shape_of(args: argparse.Namespace) -> Shape:
     """
     if args.height is None:
         raise CurveError("--height is missing: strain is compression over the height of the specimen [m]")
+    return Shape(*outline_of(args), args.height)
+
+
+def outline_of(args: argparse.Namespace) -> tuple[str, float, float]:
+    """Kind, length and width of the specimen under the plate [m].
+
+    Raises:
+        CurveError: Sizes are missing, or of two shapes.
+    """
     if args.diameter is not None:
         if args.width is not None or args.length is not None:
             raise CurveError(
                 "--diameter is of an upright cylinder, --width and --length are of a block; give one shape"
             )
-        return Shape("upright_cylinder", args.diameter, args.diameter, args.height)
+        return ("upright_cylinder", args.diameter, args.diameter)
     if args.width is None or args.length is None:
         raise CurveError(
             "the area under the plate is missing: give --diameter of an upright cylinder, or --width and --length of a "
             "block [m]"
         )
-    return Shape("block", args.length, args.width, args.height)
+    return ("block", args.length, args.width)
 
 
 def table(result: CompressionResult) -> str:
@@ -131,9 +159,18 @@ def table(result: CompressionResult) -> str:
     if result.bracket is not None:
         plates = result.bracket
         lines.append(f"  with {plates.plates} plates it is E = {plates.E_Pa / 1e3:.4g} kPa {window}")
-    for line in result.verdicts:
-        word = "ok  " if line.passed else "FAIL"
-        note = f": {line.note}" if line.note else ""
-        lines.append(f"  {word} {line.value:6.1%} (limit {line.limit:.0%})  {line.name}{note}")
+    lines += verdict_lines(result.verdicts)
     lines += [f"  note: {text}" for text in result.not_shown]
     return "\n".join(lines)
+
+
+def verdict_lines(verdicts: Sequence[Verdict]) -> list[str]:
+    """The lines of a verdict as the terminal shows them."""
+    out = []
+    for line in verdicts:
+        word = "ok  " if line.passed else "FAIL"
+        note = f": {line.note}" if line.note else ""
+        value, limit = (f"{x:6.1%}" if line.unit == "fraction" else f"{x:6g}" for x in (line.value or 0.0, line.limit))
+        limit = f"{line.limit:.0%}" if line.unit == "fraction" else limit.strip()
+        out.append(f"  {word} {value} (limit {limit})  {line.name}{note}")
+    return out

@@ -38,7 +38,7 @@ from cutcal.options import (
 from mpm.output.energy import doubts, spent, unbooked
 from mpm.output.record import LIMIT, ForceRecord
 from mpm.output.snapshot import SnapshotRecorder
-from mpm.scene import CONTACTS, Arm, Inclusion, Scene
+from mpm.scene import CONTACTS, Arm, Inclusion, Motion, Scene
 from mpm.scene.errors import CutcalError
 from mpm.scene.shapes import Shape
 
@@ -64,7 +64,9 @@ uncut, or over 10 % of the work is booked by no law or kinetic (docs/cli.md)."""
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
     add_food(p)
-    p.add_argument("--speed", type=number(0, 10, "m/s"), metavar="M/S", help="real speed of the knife, for the record")
+    p.add_argument(
+        "--speed", type=number(0, 10, "m/s"), metavar="M/S", help="real speed of the knife; relaxation needs it"
+    )
     p.add_argument(
         "--stroke", type=number(1e-4, 1, "m"), metavar="M", help="way of the edge [m] (default: the whole height)"
     )
@@ -208,7 +210,8 @@ def _stopped(record: ForceRecord) -> bool:
 
 def _scene(args: argparse.Namespace, food: FoodSpec, shape: Shape) -> Scene:
     """The cut that the options ask for."""
-    scene = cut_scene(food, shape, load_knife(args.knife), stroke=args.stroke, dx=args.dx, seed=args.seed)
+    way = Motion(args.stroke or shape.height, speed=args.speed)
+    scene = cut_scene(food, shape, load_knife(args.knife), stroke=way, dx=args.dx, seed=args.seed)
     scene = with_inclusions(scene, food, args.stone, args.cavity)
     motion = replace(
         scene.motion,
@@ -216,7 +219,6 @@ def _scene(args: argparse.Namespace, food: FoodSpec, shape: Shape) -> Scene:
         slice_ratio=args.slice_ratio,
         tilt=math.radians(args.tilt),
         retract=args.retract,
-        speed=args.speed,
     )
     numerics = replace(
         scene.numerics,

@@ -229,7 +229,7 @@ def test_a_calibration_end_to_end(tmp_path, capsys):
     """Exit code 0, all keys, plain files; the same folder is refused."""
     trace = synthetic(tmp_path / "gel.csv", (5e4, 5.1e4))
     out = tmp_path / "out"
-    command = ["compress", "--trace", str(trace), *FAST, "--cells", "12", "--out", str(out)]
+    command = ["press", "compress", "--trace", str(trace), *FAST, "--cells", "12", "--out", str(out)]
     assert main([*command, "--bracket"]) == 0
     text = capsys.readouterr().out
     for word in ("kPa over 0-20% strain", "95 % interval", "modulus 0-5 %", "bonded plates", "nu = 0.4 is assumed"):
@@ -250,6 +250,7 @@ def test_a_calibration_end_to_end(tmp_path, capsys):
     assert header == "strain,measured_Pa,sd_Pa,fitted_Pa,repeat_R0_Pa,repeat_R1_Pa"
     assert first.startswith("0,")
     assert (out / "compress.svg").read_bytes().startswith(b"<?xml")
+    assert (out / "report.pdf").read_bytes().startswith(b"%PDF")
     assert main(command) == 1
     assert "never overwritten" in capsys.readouterr().err
 

@@ -20,7 +20,9 @@ from calib.io.folder import finite
 from calib.io.schema import FOLDER, shared_part, tag
 from calib.io.type_schema import ALWAYS, Positive, Shared, document_schema, keywords, one_of
 from calib.io.typed_document import ANY, FORMER, NULL, document_key, left_out, renamed
+from calib.relaxation.relaxation_result import RelaxationResult
 from calib.scalars.result import ScalarFitResult
+from calib.texture.texture_result import TextureResult
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.validation.acceptance import Verdict
 from calib.validation.metrics import IsoRating, Metrics, Russell, SpragueGeers
@@ -39,7 +41,7 @@ RESULTS = {
     "calibrate": CalibrationResult, "predict": PredictionResult, "compress": CompressionResult,
     "scalars": ScalarFitResult, "verify": Verification, "stress": StabilityMap, "regress": RegressionResult,
     "bench": BenchmarkResult, "design": DesignResult,
-    "credibility": Credibility,
+    "credibility": Credibility, "relax": RelaxationResult, "tpa": TextureResult,
 }  # fmt: skip
 BEYOND_TYPES = ("if", "then")
 """What no type says: which keys a benchmark has when it is complete."""

@@ -21,7 +21,7 @@ from calib.material.food import (
     load_foods,
     load_material_file,
 )
-from calib.material.properties import DIMENSIONS, LAYERS, PROPERTIES, Property, Source
+from calib.material.properties import DIMENSIONS, LAYERS, PROPERTIES, RELAXATION, Property, Source, check_override
 from tests.data_dir import data_file
 
 TABLE2 = {  # rho, E, nu of CulinaryCut, Table 2
@@ -79,6 +79,7 @@ def test_shipped_foods(foods: dict[str, FoodSpec]) -> None:
             "strength_ratio",
             "fracture_energy",
             "skin_stiffness",
+            *RELAXATION,
             *LAYERS,
             *LAYERS.values(),
         }
@@ -607,3 +608,18 @@ def test_a_skin_that_bears_tension_is_asked_for() -> None:
     skinned = plain.with_values({"skin_stiffness": 3000.0})
     assert skinned.to_scene_food().material.skin_stiffness == 3000.0
     assert skinned.as_dict()["properties"]["skin_stiffness"]["value"] == 3000.0
+
+
+def test_a_food_that_relaxes_is_asked_for() -> None:
+    """No food has it by default; share and time come together, reach the solver as a branch, and come back; a fit
+    moves them."""
+    plain = load_food("banana")
+    assert plain.to_scene_food().material.branches == () and "relaxing_share" not in plain.as_dict()["properties"]
+    relaxing = plain.with_values({"relaxing_share": 0.4, "relaxation_time": 0.5})
+    material = relaxing.to_scene_food().material
+    assert material.branches == ((0.4, 0.5),) and material.rate_dependent
+    assert relaxing.as_dict()["properties"]["relaxation_time"]["value"] == 0.5
+    with pytest.raises(MaterialError, match="relaxing_share needs relaxation_time; give both, or neither"):
+        plain.with_values({"relaxing_share": 0.4})
+    with pytest.raises(MaterialError, match="1 cannot be the part of the instantaneous shear stiffness"):
+        check_override("relaxing_share", 1.0)

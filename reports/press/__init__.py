@@ -1,0 +1,1 @@
+"""Reports of tests between two plates: compression, relaxation, texture profile."""
