@@ -27,6 +27,7 @@ SHAPE_LIMIT = 0.08
 MOMENTUM_BALANCE_LIMIT = 0.01
 CHANGE_LIMIT = 0.05  # of peak and work by numerical choices: as much as the peak may miss the trace
 LOSS_LIMIT = 0.05  # energy lost by the discretisation, of all work: the force is too large by about that
+CURVE_LINE = "curve error (NRMSE)"
 CONSTANTS_LINE = "constants of the method halved and doubled"
 LOST = "energy lost by the discretisation"
 PRESSED, PRESSED_LIMIT = "food pressed away, not parted", round(1.0 - FULLY_PARTED, 6)
@@ -165,7 +166,7 @@ def agreement(metrics: Metrics) -> list[Verdict]:
     """Lines of the agreement with the trace: peak, curve, shape."""
     return [
         _below("peak force error", metrics.peak_error, PEAK_LIMIT),
-        _below("curve error (NRMSE)", metrics.nrmse, FIT_NRMSE_LIMIT),
+        _below(CURVE_LINE, metrics.nrmse, FIT_NRMSE_LIMIT),
         _below("normalised-shape error", metrics.shape_error, SHAPE_LIMIT),
     ]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from calib.simulation.process_pool import Pool
 from studies.discrimination.pair_set import PAIRS
-from studies.discrimination.study import BUDGET, passed, run, told
+from studies.discrimination.study import BUDGET, passed, run, table, told
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -22,6 +22,7 @@ def main(arguments: list[str] | None = None) -> int:
     chosen = [pair for pair in PAIRS if not args.names or pair.name.startswith(tuple(args.names))]
     with Pool(args.workers, "cpu") as pool:
         found = run(chosen, args.out, pool, budget=args.budget, say=_say)
+    _say(table(found))
     refused, wrong, kept, right = told(found)
     _say(f"{refused} of {wrong} wrong pairs refused, {kept} of {right} right pairs passed")
     return 0 if passed(found) else 2

@@ -38,6 +38,7 @@ class Judged:
         error: What the input was refused for; empty where it was calibrated.
         truth: Values that were cut [SI], by name.
         fitted: Values that were fitted [SI], by name.
+        intervals: Their 95 % intervals [SI], by name.
         numbers: What the verdict rests on, by name.
         seconds: Wall time [s].
     """
@@ -48,6 +49,7 @@ class Judged:
     error: str
     truth: Mapping[str, float]
     fitted: Mapping[str, float]
+    intervals: Mapping[str, tuple[float, float]]
     numbers: Mapping[str, float | None]
     seconds: float
 
@@ -56,14 +58,22 @@ class Judged:
         """Whether the claim did not pass."""
         return bool(self.failed or self.error)
 
+    @property
+    def held(self) -> tuple[int, int]:
+        """How many intervals hold what was cut, of those that are of a property of its food."""
+        both = [name for name in self.intervals if name in self.truth]
+        ends = self.intervals
+        return sum(ends[name][0] <= self.truth[name] <= ends[name][1] for name in both), len(both)
+
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
-        return {**vars(self), "failed": {name: list(pair) for name, pair in self.failed.items()}}
+        return dict(vars(self))
 
     @classmethod
     def from_dict(cls, raw: Mapping[str, Any]) -> Judged:
         """The value that :meth:`as_dict` has written."""
-        return cls(**{**raw, "failed": {name: tuple(pair) for name, pair in raw["failed"].items()}})
+        ends = {key: {name: tuple(pair) for name, pair in raw[key].items()} for key in ("failed", "intervals")}
+        return cls(**{**raw, **ends})
 
 
 def judge_pair(pair: Pair, out: Path, store: EvaluationStore, pool: Workers, budget: float) -> Judged:
@@ -92,7 +102,7 @@ def judge_pair(pair: Pair, out: Path, store: EvaluationStore, pool: Workers, bud
     try:
         done = calibrated(set_up(request), out / f"{pair.name}.h5", store, pool)
     except CutcalError as e:
-        return Judged(pair.name, pair.kind, {}, str(e), values, {}, {}, time.monotonic() - began)
+        return Judged(pair.name, pair.kind, {}, str(e), values, {}, {}, {}, time.monotonic() - began)
     lines = verdicts_of(done)
     return Judged(
         pair.name,
@@ -101,6 +111,9 @@ def judge_pair(pair: Pair, out: Path, store: EvaluationStore, pool: Workers, bud
         "",
         values,
         dict(done.fit.best.evaluation.parameters),
+        {}
+        if done.analysis is None
+        else {i.parameter.name: (i.low95, i.high95) for i in done.analysis.uncertainty.intervals},
         {v.name: v.value for v in lines if v.passed is not None},
         time.monotonic() - began,
     )

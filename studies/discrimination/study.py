@@ -10,6 +10,7 @@ from calib.io.folder import write_json
 from calib.io.provenance import key_of
 from calib.simulation.evaluation_store import EvaluationStore, Header
 from calib.simulation.workers import Workers
+from calib.validation.acceptance import CONFLICT_LINE, CURVE_LINE, EXPLAINED_LINE
 from studies.discrimination.judged_pair import Judged, judge_pair
 from studies.discrimination.made_up_cut import SENSOR
 from studies.discrimination.pair import RIGHT, Pair
@@ -18,6 +19,9 @@ LEAST = 18
 """Pairs of twenty, wrong ones refused and right ones passed, that the verdict has to tell."""
 BUDGET = 45.0
 """Simulations of a calibration, not quite half of the default: what a search that explains its curve takes."""
+
+HEAD = ("pair", "what is wrong", "verdict", "NRMSE", "explained", "values of the food", "intervals hold", "refused by")
+"""Head of the table; *intervals hold*: how many of the 95 % intervals hold what was cut."""
 
 
 def run(
@@ -54,6 +58,19 @@ def words(one: Judged) -> str:
     """One pair in a line."""
     said = one.error or ", ".join(one.failed) or "passed"
     return f"{one.name} ({one.kind}): {'refused: ' if one.refused else ''}{said} [{one.seconds:.0f} s]"
+
+
+def table(found: Sequence[Judged]) -> str:
+    """The pairs as a table in Markdown."""
+    lines = ["| " + " | ".join(HEAD) + " |", "|" + "---|" * len(HEAD)]
+    for one in found:
+        numbers = [one.numbers.get(name) for name in (CURVE_LINE, EXPLAINED_LINE, CONFLICT_LINE)]
+        shown = ["" if x is None else f"{x:.2g}" for x in numbers]
+        held = f"{one.held[0]} of {one.held[1]}" if one.held[1] else ""
+        by = "input: " + one.error.partition(": ")[2].partition(";")[0] if one.error else ", ".join(one.failed)
+        verdict = "refused" if one.refused else "passed"
+        lines.append("| " + " | ".join([one.name, one.kind, verdict, *shown, held, by]).rstrip() + " |")
+    return "\n".join(lines)
 
 
 def told(found: Sequence[Judged]) -> tuple[int, int, int, int]:

@@ -19,7 +19,7 @@ from studies.discrimination.judged_pair import Judged, claimed
 from studies.discrimination.made_up_cut import Truth, write_record
 from studies.discrimination.pair import RIGHT, Cut, Pair, backwards
 from studies.discrimination.pair_set import CORRECT, PAIRS, WIDER, WRONG
-from studies.discrimination.study import passed, run, told, words
+from studies.discrimination.study import passed, run, table, told, words
 from tests.calib.multi_specimen.test_run import FakePool
 
 BANANA = Cut("banana")
@@ -31,7 +31,8 @@ TRUTH = Truth(SHAPE, {"R": 350.0}, Evaluation(0, {}, "ok", "", 1.0, STROKE, FORC
 
 def judged(name: str, kind: str, *failed: str) -> Judged:
     """What became of a pair."""
-    return Judged(name, kind, dict.fromkeys(failed, (1.0, 0.5)), "", {"R": 1.0}, {"R": 2.0}, {"x": None}, 3.0)
+    values, ends = {"R": 1.0, "E": 3.0}, {"R": (0.5, 2.0), "E": (4.0, 5.0), "R_skin": (0.0, 9.0)}
+    return Judged(name, kind, dict.fromkeys(failed, (1.0, 0.5)), "", values, {"R": 2.0}, ends, {"x": None}, 3.0)
 
 
 def test_there_are_twenty_of_each() -> None:
@@ -79,6 +80,11 @@ def test_a_claim_is_what_a_user_would_type(tmp_path: Path) -> None:
     assert request.knife == "edc" and request.columns["sign"] == "-"
 
 
+def test_intervals_are_counted_where_the_truth_has_the_property() -> None:
+    """One of two holds; that of a skin which the truth has not is left out."""
+    assert judged("a", RIGHT).held == (1, 2)
+
+
 def test_eighteen_of_twenty_pass_and_seventeen_do_not() -> None:
     """Both kinds are counted for themselves."""
     wrong = [judged(f"w{k}", "wrong food", "peak force error") for k in range(18)] + [judged("w", "wrong food")] * 2
@@ -87,6 +93,15 @@ def test_eighteen_of_twenty_pass_and_seventeen_do_not() -> None:
     assert told([*wrong, *right]) == (18, 20, 18, 20) and passed([*wrong, *right])
     assert not passed([*wrong[1:], judged("w", "wrong food"), *right])
     assert not passed([*wrong, *right[1:], judged("r", RIGHT, "x")])
+
+
+def test_the_table_has_a_line_for_each_pair() -> None:
+    """Its cells are those of the head; what was refused says by what, an error in short."""
+    error = replace(judged("c", "wrong sign"), error="c.csv: away from resistance; use --sign -")
+    lines = table([judged("a", RIGHT), judged("b", "wrong food", "x", "y"), error]).splitlines()
+    assert len({line.count("|") for line in lines}) == 1 and len(lines) == 5
+    assert "| passed |" in lines[2] and lines[3].endswith("| x, y |")
+    assert "refused" in lines[4] and lines[4].endswith("| input: away from resistance |")
 
 
 def test_what_a_folder_knows_is_not_judged_again(tmp_path: Path) -> None:
