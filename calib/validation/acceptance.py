@@ -193,9 +193,17 @@ def discrimination(found: PredictiveScore) -> list[Verdict]:
             limit,
             "fraction",
             found.score < limit,
-            f"best null model: {name.replace('_', ' ')}; of the peak",
+            f"best null model: {name.replace('_', ' ')}; of the peak{_seven_numbers(found)}",
         ),
     ]
+
+
+def _seven_numbers(found: PredictiveScore) -> str:
+    """Whether the description with seven numbers, fitted alike, has the better score; it decides nothing."""
+    score = found.null_scores.get("three_term")
+    if score is None:
+        return ""
+    return f"; no better than seven numbers ({score:.2f})" if score < found.score else f"; seven numbers: {score:.2f}"
 
 
 def _conflict(found: PriorConflict) -> Verdict:
