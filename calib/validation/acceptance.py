@@ -34,6 +34,7 @@ PRESSED, PRESSED_LIMIT = "food pressed away, not parted", round(1.0 - FULLY_PART
 KINETIC_LIMIT = 0.10  # explicit quasi-static practice: kinetic energy below 5 to 10 % of internal energy
 EXPLAINED_LINE, EXPLAINED_LIMIT = "curve explained by the food", round(1.0 - EXPLAINED, 6)
 CONFLICT_LINE, CONFLICT_LIMIT = "values those of the food", EXPLAINED_LIMIT
+SIZE_LINE = "specimen no larger than the food"
 BAND_LIMIT = 0.5  # a band wider than a quarter of the peak either way predicts nothing that anyone would use
 OPENING_REMARKED = 0.1  # part of the new surface that opens ahead of the edge, from which on it is said [-]
 # Ends of what is physically possible: a fit that ends there found a one-sided answer (the cut shows no friction, say),
@@ -186,6 +187,7 @@ def discrimination(found: PredictiveScore) -> list[Verdict]:
     return [
         Verdict(EXPLAINED_LINE, found.explained, EXPLAINED_LIMIT, "fraction", explained, note),
         *([] if found.conflict is None else [_conflict(found.conflict)]),
+        *([] if found.size is None else [_size(found.size)]),
         _below("width of the 95 % band", found.width, BAND_LIMIT, note="mean, of the peak"),
         Verdict(
             "interval score better than null models",
@@ -196,6 +198,12 @@ def discrimination(found: PredictiveScore) -> list[Verdict]:
             f"best null model: {name.replace('_', ' ')}; of the peak{_seven_numbers(found)}",
         ),
     ]
+
+
+def _size(probability: float) -> Verdict:
+    """The line of a specimen that is larger than the food is."""
+    note = "probability of a whole food as large as the specimen"
+    return Verdict(SIZE_LINE, probability, CONFLICT_LIMIT, "fraction", bool(probability >= CONFLICT_LIMIT), note)
 
 
 def _seven_numbers(found: PredictiveScore) -> str:

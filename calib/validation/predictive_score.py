@@ -33,6 +33,7 @@ class PredictiveScore:
         score: Mean interval score of the band over the peak [-]; less is better.
         null_scores: The same of null models in bands of their own residuals, by name.
         conflict: How far the values are from what was known of the food; None where nobody compared them.
+        size: How probably the food is as large as the specimen [-]; None where nobody compared them.
     """
 
     explained: float
@@ -40,6 +41,7 @@ class PredictiveScore:
     score: float
     null_scores: Mapping[str, float]
     conflict: PriorConflict | None = None
+    size: float | None = None
 
     @property
     def simple(self) -> tuple[str, float]:

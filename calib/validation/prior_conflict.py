@@ -18,12 +18,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
-from calib.problem.parameters import ParameterSet
+from calib.material.food import FoodSpec
+from calib.problem.parameters import Z95, ParameterSet
 from calib.uncertainty.intervals import NOT_SEEN
 from mpm.arrays import FloatArray
+from mpm.scene.shapes import Shape
 
+SIZES = ("length", "width", "height")
 HARDLY_KNOWN = 1e-9
 """Least part of a prior's variance that a trace takes away from it: below, rounding decides [-]."""
 
@@ -70,3 +73,24 @@ def prior_conflict(parameters: ParameterSet, values: FloatArray, covariance: Flo
     names: Sequence[str] = parameters.names
     probability = float(chi2.sf(size, count)) if count else 1.0
     return PriorConflict(probability, count, names[furthest], float(alone[furthest]))
+
+
+def probability_of_size(food: FoodSpec, shape: Shape) -> float:
+    """How probably a whole food of the literature is as large as a specimen.
+
+    The largest size of the one is compared with that of the other, whichever way they lie. A specimen that is smaller
+    is a piece, and says nothing.
+
+    Args:
+        food: The food, whose sizes are lognormal with the literature's 95 % ranges.
+        shape: The specimen.
+
+    Returns:
+        Probability [-]; 1 where the literature has no range.
+    """
+    known = max((food.dims[name] for name in SIZES if name in food.dims), key=lambda d: d.value or 0.0, default=None)
+    if known is None or not (known.low and known.high):
+        return 1.0
+    low, high = np.log([known.low, known.high])
+    own = np.log(max(getattr(shape, name) for name in SIZES))
+    return float(norm.sf((own - 0.5 * (low + high)) / ((high - low) / (2.0 * Z95))))

@@ -7,10 +7,12 @@ import math
 import numpy as np
 import pytest
 
+from calib.material.food import load_food
+from calib.material.scene import Sizing, specimen
 from calib.problem.parameters import Parameter, ParameterSet
-from calib.validation.acceptance import CONFLICT_LINE, discrimination
+from calib.validation.acceptance import CONFLICT_LINE, SIZE_LINE, discrimination
 from calib.validation.predictive_score import PredictiveScore
-from calib.validation.prior_conflict import PriorConflict, prior_conflict
+from calib.validation.prior_conflict import PriorConflict, prior_conflict, probability_of_size
 
 NAMES = ("E", "yield_stress", "R", "R_skin")
 FOOD = ParameterSet(tuple(Parameter(n, 1.0, 1e-4, 1e4, "Pa", 0.1, 10.0) for n in NAMES))
@@ -70,3 +72,26 @@ def test_the_verdict_has_a_line_for_it_that_fails() -> None:
 
     assert line(0.009)[0] is False and line(0.011)[0] is True
     assert "furthest: R, by 4.2 sd" in str(line(0.5)[1])
+
+
+def test_a_specimen_larger_than_the_food_conflicts_and_a_piece_does_not() -> None:
+    """A grape of 38 mm is no grape; one at the upper end of the 95 % range has 2.5 %; a piece of an apple, its half and
+    the whole fruit are apples, whichever way they lie."""
+    grape, apple = load_food("grape"), load_food("apple")
+    long = specimen(grape, None, Sizing(length=0.038))[0]
+    assert probability_of_size(grape, long) < 0.01
+    usual = specimen(grape, None, Sizing(length=grape.dims["length"].high))[0]
+    assert probability_of_size(grape, usual) == pytest.approx(0.025)
+    for height in (0.02, 0.0375):
+        assert probability_of_size(apple, specimen(apple, None, Sizing(height=height))[0]) > 0.1
+    whole = specimen(apple, None, Sizing("sphere", 0.075, 0.075, 0.075))[0]
+    assert probability_of_size(apple, whole) > 0.1
+
+
+def test_the_verdict_has_a_line_for_the_size_that_fails() -> None:
+    """Below one in a hundred."""
+    for p, passed in ((0.009, False), (0.011, True)):
+        (line,) = (
+            v for v in discrimination(PredictiveScore(0.5, 0.1, 0.1, {"ramp": 0.5}, None, p)) if v.name == SIZE_LINE
+        )
+        assert line.passed is passed
