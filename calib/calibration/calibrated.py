@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
 from scipy.stats import chi2
 
 from calib.fit.multistart import FitResult
@@ -18,6 +19,7 @@ from calib.validation.metrics import Metrics, compare
 from calib.validation.null_models import NullModel, null_models
 from calib.validation.numerical_checks import Check
 from calib.validation.predictive_score import PredictiveScore, predictive_score
+from calib.validation.prior_conflict import PriorConflict, prior_conflict, probability_of_size
 from mpm.arrays import FloatArray
 from mpm.output.record import ForceRecord
 
@@ -61,7 +63,19 @@ class Calibrated:
         if self.analysis is None:
             return None
         band = self.analysis.bands[0]
-        return predictive_score(self._explained, (band.low, band.high), self.setup.curve.curve, self.nulls)
+        score = predictive_score(self._explained, (band.low, band.high), self.setup.curve.curve, self.nulls)
+        size = probability_of_size(self.setup.request.food, self.setup.fine.food.shape)
+        return replace(score, conflict=self._conflict, size=size)
+
+    @property
+    def _conflict(self) -> PriorConflict:
+        """How far the values are from what was known of the food: those of the posterior, or the best ones."""
+        if self.posterior is not None:
+            drawn = self.posterior.z
+            spread = np.atleast_2d(np.cov(drawn, rowvar=False))  # a number where one property is fitted
+            return prior_conflict(self.fit.parameters, np.mean(drawn, axis=0), spread)
+        assert self.analysis is not None
+        return prior_conflict(self.fit.parameters, self.fit.best.z, self.analysis.uncertainty.covariance)
 
     @property
     def _explained(self) -> float:

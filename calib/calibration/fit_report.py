@@ -8,7 +8,7 @@ from typing import Protocol
 
 from calib.calibration.result_parts import Agreement, Posterior, SearchHistory, TraceSource
 from calib.uncertainty.estimates import FittedParameter
-from calib.validation.acceptance import Verdict
+from calib.validation.acceptance import Verdict, identified_words
 
 STRONG = 0.1
 """Correlations below this are left out of the text."""
@@ -67,7 +67,7 @@ def fit_report(result: Reported) -> str:
     """
     lines = [f"[[Calibration]] {_headline(result)}", "[[Fit statistics]]"]
     lines += [f"    {name:28s}= {text}" for name, text in _statistics(result)]
-    lines.append("[[Verdicts]]")
+    lines.append(f"[[Verdicts]] {identified_words(result.fitted).partition(':')[0]}")
     for v in result.verdicts:
         limit = "" if v.limit is None else f"({_relation(v)} {v.limit:.3g})"
         lines.append(f"    {STATES[v.passed]:8s}{v.name:44s}{_number(v.value):>10s}  {limit}".rstrip())

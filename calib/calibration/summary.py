@@ -40,7 +40,7 @@ from calib.trace.conditioning import Conditioned
 from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.uncertainty.intervals import Uncertainty
-from calib.validation.acceptance import Conservation, judge, limits
+from calib.validation.acceptance import Conservation, Verdict, judge, limits
 from mpm.files import write_atomic
 from mpm.output.record import ForceRecord
 from mpm.scene import Knife
@@ -62,17 +62,7 @@ def summarise(done: Calibrated, folder: Path, began: float) -> CalibrationResult
     """
     setup, fit, analysis, record = done.setup, done.fit, done.analysis, done.record
     request, curve = setup.request, setup.curve
-    fitted = _fitted(request, fit, analysis)
-    nuisances = {} if analysis is None else {e.name: FittedNuisance.of(e) for e in analysis.nuisances}
-    verdicts = judge(
-        done.metrics,
-        {name: model.metrics for name, model in done.nulls.items()},
-        conservation=Conservation(record.momentum_residual, record.ke_over_ie, record.parted, record.lost),
-        fitted=fitted,
-        checks=done.checks,
-        nuisances=nuisances,
-        predictive=done.predictive,
-    )
+    fitted, nuisances, verdicts = _fitted(request, fit, analysis), _nuisances(done), verdicts_of(done)
     stopped = fit.status == "interrupted"
     label, source, kind = curve.trace.label, curve.stroke_source, curve.baseline_kind
     scene = setup.scene(fit.best.evaluation.parameters)
@@ -106,6 +96,31 @@ def summarise(done: Calibrated, folder: Path, began: float) -> CalibrationResult
         sampled=None if done.posterior is None else summarised(done.posterior),
         wall_s=time.monotonic() - began,
     )
+
+
+def verdicts_of(done: Calibrated) -> list[Verdict]:
+    """The verdict table of what was computed.
+
+    Args:
+        done: What was computed.
+
+    Returns:
+        All lines; those with ``passed`` None were not run and decide nothing.
+    """
+    record = done.record
+    return judge(
+        done.metrics,
+        {name: model.metrics for name, model in done.nulls.items()},
+        conservation=Conservation(record.momentum_residual, record.ke_over_ie, record.parted, record.lost),
+        fitted=_fitted(done.setup.request, done.fit, done.analysis),
+        checks=done.checks,
+        nuisances=_nuisances(done),
+        predictive=done.predictive,
+    )
+
+
+def _nuisances(done: Calibrated) -> dict[str, FittedNuisance]:
+    return {} if done.analysis is None else {e.name: FittedNuisance.of(e) for e in done.analysis.nuisances}
 
 
 def _no_better(done: Calibrated) -> list[str]:

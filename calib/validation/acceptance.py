@@ -16,6 +16,7 @@ from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.validation.metrics import Metrics
 from calib.validation.numerical_checks import FINER_GRID, HALF_SPEED, VARIANTS, Check
 from calib.validation.predictive_score import PredictiveScore
+from calib.validation.prior_conflict import PriorConflict
 
 # Limits of a single in-sample calibration. Peak: the figure that published work quotes (CulinaryCut, "within 5 %").
 # Curve and shape: twice the target of a validated model (5 %), because absolute forces of the sensors that such traces
@@ -26,11 +27,14 @@ SHAPE_LIMIT = 0.08
 MOMENTUM_BALANCE_LIMIT = 0.01
 CHANGE_LIMIT = 0.05  # of peak and work by numerical choices: as much as the peak may miss the trace
 LOSS_LIMIT = 0.05  # energy lost by the discretisation, of all work: the force is too large by about that
+CURVE_LINE = "curve error (NRMSE)"
 CONSTANTS_LINE = "constants of the method halved and doubled"
 LOST = "energy lost by the discretisation"
 PRESSED, PRESSED_LIMIT = "food pressed away, not parted", round(1.0 - FULLY_PARTED, 6)
 KINETIC_LIMIT = 0.10  # explicit quasi-static practice: kinetic energy below 5 to 10 % of internal energy
 EXPLAINED_LINE, EXPLAINED_LIMIT = "curve explained by the food", round(1.0 - EXPLAINED, 6)
+CONFLICT_LINE, CONFLICT_LIMIT = "values those of the food", EXPLAINED_LIMIT
+SIZE_LINE = "specimen no larger than the food"
 BAND_LIMIT = 0.5  # a band wider than a quarter of the peak either way predicts nothing that anyone would use
 OPENING_REMARKED = 0.1  # part of the new surface that opens ahead of the edge, from which on it is said [-]
 # Ends of what is physically possible: a fit that ends there found a one-sided answer (the cut shows no friction, say),
@@ -163,7 +167,7 @@ def agreement(metrics: Metrics) -> list[Verdict]:
     """Lines of the agreement with the trace: peak, curve, shape."""
     return [
         _below("peak force error", metrics.peak_error, PEAK_LIMIT),
-        _below("curve error (NRMSE)", metrics.nrmse, FIT_NRMSE_LIMIT),
+        _below(CURVE_LINE, metrics.nrmse, FIT_NRMSE_LIMIT),
         _below("normalised-shape error", metrics.shape_error, SHAPE_LIMIT),
     ]
 
@@ -182,6 +186,8 @@ def discrimination(found: PredictiveScore) -> list[Verdict]:
     note = "probability that the right food would leave a larger misfit"
     return [
         Verdict(EXPLAINED_LINE, found.explained, EXPLAINED_LIMIT, "fraction", explained, note),
+        *([] if found.conflict is None else [_conflict(found.conflict)]),
+        *([] if found.size is None else [_size(found.size)]),
         _below("width of the 95 % band", found.width, BAND_LIMIT, note="mean, of the peak"),
         Verdict(
             "interval score better than null models",
@@ -189,9 +195,32 @@ def discrimination(found: PredictiveScore) -> list[Verdict]:
             limit,
             "fraction",
             found.score < limit,
-            f"best null model: {name.replace('_', ' ')}; of the peak",
+            f"best null model: {name.replace('_', ' ')}; of the peak{_seven_numbers(found)}",
         ),
     ]
+
+
+def _size(probability: float) -> Verdict:
+    """The line of a specimen that is larger than the food is."""
+    note = "probability of a whole food as large as the specimen"
+    return Verdict(SIZE_LINE, probability, CONFLICT_LIMIT, "fraction", bool(probability >= CONFLICT_LIMIT), note)
+
+
+def _seven_numbers(found: PredictiveScore) -> str:
+    """Whether the description with seven numbers, fitted alike, has the better score; it decides nothing."""
+    score = found.null_scores.get("three_term")
+    if score is None:
+        return ""
+    return f"; no better than seven numbers ({score:.2f})" if score < found.score else f"; seven numbers: {score:.2f}"
+
+
+def _conflict(found: PriorConflict) -> Verdict:
+    """The line of values that the literature does not expect of the food."""
+    note = "probability of values as far from the food's literature"
+    if found.furthest:
+        note += f"; furthest: {found.furthest}, by {abs(found.distance):.1f} sd"
+    passed = bool(found.probability >= CONFLICT_LIMIT)
+    return Verdict(CONFLICT_LINE, found.probability, CONFLICT_LIMIT, "fraction", passed, note)
 
 
 def _at_natural_limit(name: str, p: FittedParameter) -> bool:

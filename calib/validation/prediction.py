@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
@@ -12,6 +12,7 @@ from calib.io.folder import prepare, write_csv, write_json
 from calib.io.provenance import Invocation, Software
 from calib.io.type_schema import NotNegative, Positive, Shared, one_of
 from calib.io.typed_document import FLAT
+from calib.material.food import FoodSpec
 from calib.material.knife import load_knife
 from calib.material.scene import blade_warnings, cut_scene, specimen, windowed
 from calib.problem.request import Request
@@ -139,8 +140,8 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
         cut_scene(request.food, shape, knife, stroke=way_of(request.food, curve), dx=request.dx, seed=request.seed)
     )
     warnings: tuple[str, ...] = (*request.food.warnings(), *curve.warnings, *assumed, *blade_warnings(shape, knife))
-    held_out = _held_out(request, curve.trace.sha256)
-    if not held_out:
+    unseen = held_out(request.food, curve.trace.sha256)
+    if not unseen:
         said = "in-sample: the values were fitted to this very trace (equal SHA-256), so the agreement predicts nothing"
         warnings = (*warnings, said)
     for text in warnings:
@@ -165,7 +166,7 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
             food=request.food.name,
             trace=curve.trace.label,
             trace_sha256=curve.trace.sha256,
-            held_out=held_out,
+            held_out=unseen,
             passed=PredictionLimits().hold(metrics),
             width_scale=factor if scale_width else None,
             width_m=factor * shape.width,
@@ -184,10 +185,20 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
         return result
 
 
-def _held_out(request: Request, sha256: str) -> bool:
-    """Whether the food's values were not fitted to the trace of this SHA-256, as far as its file says."""
-    provenance = request.food.calibration or {}
-    return provenance.get("trace_sha256") != sha256
+def held_out(food: FoodSpec, sha256: str) -> bool:
+    """Whether a food's values were not fitted to a trace, as far as its file says.
+
+    Args:
+        food: The food, with the provenance of a calibration on one trace or of a study on several.
+        sha256: SHA-256 of the trace.
+
+    Returns:
+        False where the trace is among those that were fitted.
+    """
+    provenance = food.calibration or {}
+    several = provenance.get("traces")
+    fitted = [*(several.values() if isinstance(several, Mapping) else ()), provenance.get("trace_sha256")]
+    return sha256 not in fitted
 
 
 def _simulated(scene: Scene, arch: str) -> ForceRecord:

@@ -14,6 +14,7 @@ import numpy as np
 
 from calib.problem.parameters import Z95
 from calib.validation.null_models import NullModel
+from calib.validation.prior_conflict import PriorConflict
 from mpm.arrays import FloatArray
 
 OUTSIDE = 0.05
@@ -31,12 +32,16 @@ class PredictiveScore:
         width: Mean width of the 95 % band over the measured peak [-].
         score: Mean interval score of the band over the peak [-]; less is better.
         null_scores: The same of null models in bands of their own residuals, by name.
+        conflict: How far the values are from what was known of the food; None where nobody compared them.
+        size: How probably the food is as large as the specimen [-]; None where nobody compared them.
     """
 
     explained: float
     width: float
     score: float
     null_scores: Mapping[str, float]
+    conflict: PriorConflict | None = None
+    size: float | None = None
 
     @property
     def simple(self) -> tuple[str, float]:

@@ -16,6 +16,7 @@ from reports.base.format import breakable, count, listed, plain, publish, quanti
 from reports.base.labels import capital, in_words, shown
 from reports.base.run_folder import Data, Finished, read_finished
 from reports.calibration import (
+    credibility_page,
     cut_figure,
     failures,
     measurement,
@@ -169,6 +170,7 @@ def _content(done: Finished) -> Data:
         "numerics": numerics_page.numerics(result),
         "broke_down": failures.sentence(done.runs, broken),
         "failures": numerics_page.failures(result.history.failures),
+        "credibility": credibility_page.credibility(result.folder),
         "provenance": numerics_page.provenance(result),
         "limits": [capital(text) for text in result.limits],
         "warnings": [capital(text) for text in result.warnings],

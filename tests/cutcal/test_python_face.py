@@ -123,6 +123,8 @@ def test_a_result_tells_of_itself(result: CalibrationResult) -> None:
     for name, p in result.fitted.items():
         assert f"{name}:" in text and f"<td>{name}</td>" in table and f"{p.value:.4g}" in text
     assert all(v.name in text for v in result.verdicts)
+    known = sum(p.verdict == "identified" for p in result.fitted.values())
+    assert f"[[Verdicts]] {known} of {len(result.fitted)} parameters identified\n" in text
     assert max(map(len, text.splitlines())) <= 120
     runs = result.evaluations
     assert list(runs["E"]) == [1e5, 2e5] and list(runs["status"]) == ["ok", "ok"] and list(runs["seconds"]) == [0.5] * 2

@@ -23,6 +23,7 @@ from calib.validation.metrics import compare
 from calib.validation.null_models import null_models
 from calib.validation.numerical_checks import VARIANTS, Check
 from calib.validation.predictive_score import PredictiveScore
+from calib.validation.prior_conflict import PriorConflict
 from cutcal.main import COMMANDS, parser
 from tests.data_dir import ROOT
 
@@ -134,7 +135,7 @@ def lines_of_a_report() -> list[Verdict]:
         fitted={},
         checks=[Check(name, None, 0.0, 0.0, 0.0) for name in (*VARIANTS, "twice the process zone")],
         nuisances=dict.fromkeys(NUISANCE_LINES, nuisance),
-        predictive=PredictiveScore(0.5, 0.1, 0.1, {"ramp": 0.5}),
+        predictive=PredictiveScore(0.5, 0.1, 0.1, {"ramp": 0.5}, PriorConflict(0.5, 1, "R", 0.1), 0.5),
     )
 
 

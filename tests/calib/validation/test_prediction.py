@@ -13,7 +13,7 @@ import pytest
 
 from calib.io.folder import finite
 from calib.material.food import dump_material, load_food
-from calib.validation.prediction import read_prediction, to_document
+from calib.validation.prediction import held_out, read_prediction, to_document
 from cutcal.main import main
 from mpm.solver import Simulation
 from tests.calib.documents import valid
@@ -62,6 +62,22 @@ def test_a_trace_that_was_fitted_is_not_held_out(tmp_path, capsys):
     assert summary["held_out"] is False and any("in-sample" in text for text in summary["warnings"])
     said = capsys.readouterr().out
     assert "in-sample, fitted to this trace" in said and "predicted without fitting" not in said
+
+
+@pytest.mark.parametrize(
+    ("provenance", "unseen"),
+    [
+        ({"trace_sha256": "a"}, False),
+        ({"traces": {"cut1": "b", "cut2": "a"}}, False),
+        ({"trace_sha256": "b", "trace": "measured"}, True),
+        ({"traces": {"cut1": "b"}}, True),
+        (None, True),
+    ],
+    ids=["one trace", "a study", "another trace", "another study", "never fitted"],
+)
+def test_in_sample_is_told_by_hash(provenance, unseen):
+    """The trace that was fitted, and each one of a study that was, is known again."""
+    assert held_out(replace(load_food("banana"), calibration=provenance), "a") is unseen
 
 
 def test_a_void_phase_is_said_beside_the_rating(material, tmp_path, capsys, monkeypatch):

@@ -10,7 +10,7 @@ import pytest
 from calib.uncertainty.estimates import FittedParameter
 from calib.validation.acceptance import discrimination, identified_words
 from calib.validation.null_models import null_models
-from calib.validation.predictive_score import interval_score, predictive_score
+from calib.validation.predictive_score import PredictiveScore, interval_score, predictive_score
 from tests.calib.fake import GRID, STROKE, three_terms
 
 TRUTH = {"E": 6e5, "yield_stress": 6e4, "R": 400.0, "R_skin": 250.0, "mu": 0.25}
@@ -57,6 +57,16 @@ def test_a_misfit_that_the_right_food_would_not_leave_fails() -> None:
     """A p-value below one in a hundred."""
     assert lines(0.05, explained=0.009)["curve explained by the food"] is False
     assert lines(0.05, explained=0.011)["curve explained by the food"] is True
+
+
+@pytest.mark.parametrize(
+    ("score", "said"), [(0.2, "no better than seven numbers (0.20)"), (0.4, "seven numbers: 0.40")]
+)
+def test_it_is_said_whether_seven_numbers_do_as_well(score: float, said: str) -> None:
+    """A description with seven numbers decides nothing, and is named where it has the better score."""
+    found = discrimination(PredictiveScore(0.5, 0.1, 0.3, {"ramp": 0.5, "three_term": score}))
+    (line,) = (v for v in found if v.name == "interval score better than null models")
+    assert line.passed is True and str(line.note).endswith(said)
 
 
 def test_it_is_said_how_many_parameters_are_identified() -> None:
