@@ -31,6 +31,7 @@ from calib.calibration.result_parts import (
 from calib.errors import OutputError
 from calib.fit.multistart import FitResult
 from calib.io.provenance import Invocation, Software
+from calib.material.scene import blade_warnings
 from calib.posterior.estimates import summarised
 from calib.problem.parameters import STRESS_LIKE, property_of
 from calib.problem.request import Request
@@ -77,7 +78,9 @@ def summarise(done: Calibrated, folder: Path, began: float) -> CalibrationResult
     stopped = fit.status == "interrupted"
     label, source, kind = curve.trace.label, curve.stroke_source, curve.baseline_kind
     scene = setup.scene(fit.best.evaluation.parameters)
-    assumed = [*setup.assumed, *doubts_of_the_crack(scene)]
+    assert isinstance(scene.knife, Knife)  # a press has no trace of a cut
+    narrow = blade_warnings(scene.food.shape, scene.knife)
+    assumed = [*dict.fromkeys([*setup.assumed, *narrow]), *doubts_of_the_crack(scene)]
     said = [*limits(label, source, kind, verdicts, fitted, assumed, record.fracture), *_no_better(done)]
     nulls = {name: NullRating.of(model.metrics) for name, model in done.nulls.items()}
     return CalibrationResult(

@@ -82,10 +82,10 @@ def specimen(
 ) -> tuple[Shape, list[str]]:
     """Shape of the specimen, and what had to be assumed about it.
 
-    Real traces rarely come with the specimen's size. Where the trace has a position and ends released, the height is
-    the stroke; where it ends under load it lies in :func:`height_range`. Width and length that are not given keep the
-    food's proportions. The force is proportional to the width, so only the product of resistance and width is seen by
-    one trace.
+    Real traces rarely come with the specimen's size. Where the trace has a position and ends released or on the board,
+    the height is the stroke; where it ends under load it lies in :func:`height_range`. Width and length that are not
+    given keep the food's proportions. The force is proportional to the width, so only the product of resistance and
+    width is seen by one trace.
 
     Args:
         food: The food with its usual sizes.
@@ -108,9 +108,10 @@ def specimen(
         free = height_range(food, trace, sizing)
         if free is None:
             height = trace.stroke_length_m
+            why = "the edge comes to the board there" if trace.at_board else "the trace ends released"
             said.append(
-                f"the specimen's height is not known: {height * 1e3:.1f} mm is the stroke, because the trace ends "
-                "released; give --height if you measured it"
+                f"the specimen's height is not known: {height * 1e3:.1f} mm is the stroke, because {why}; give "
+                "--height if you measured it"
             )
         else:
             low, height, high = free
@@ -194,7 +195,7 @@ def height_range(food: FoodSpec, trace: Conditioned, sizing: Sizing) -> tuple[fl
     """
     late = trace.curve[int(trace.curve.argmax()) :]
     loaded = trace.curve[-1] > UNDER_LOAD * float(sorted(late)[len(late) // 2])
-    if sizing.height is not None or trace.stroke_source == "height" or not loaded:
+    if sizing.height is not None or trace.stroke_source == "height" or trace.at_board or not loaded:
         return None
     known = food.dims["height"]
     low = trace.stroke_length_m

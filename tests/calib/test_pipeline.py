@@ -157,6 +157,22 @@ def test_fitted_height_takes_the_other_sizes_along():
     assert of_specimen(scene, {"E": 1e6}) == (scene, {"E": 1e6})
 
 
+def test_a_cut_may_end_on_the_board_or_just_above_it():
+    """Where the trace shows the board its stroke is the height; where it ends under load, every height from the stroke
+    on is possible, and 1 mm more than it, measured, is no fault."""
+    cut = condition(recorded(loaded=True))
+    found = height_range(load_food("cucumber"), cut, Sizing())
+    assert found is not None and found[0] == cut.stroke_length_m
+    above, _ = specimen(load_food("cucumber"), cut, Sizing(height=cut.stroke_length_m + 1e-3))
+    scene = cut_scene(load_food("cucumber"), above, load_knife("kitchen"), stroke=cut.stroke_length_m)
+    assert scene.motion.stroke == pytest.approx(above.height - 1e-3)
+    on_board = replace(cut, at_board=True)
+    assert height_range(load_food("cucumber"), on_board, Sizing()) is None
+    shape, said = specimen(load_food("cucumber"), on_board, Sizing())
+    assert shape.height == cut.stroke_length_m
+    assert any("is the stroke, because the edge comes to the board there" in text for text in said)
+
+
 def test_the_mean_over_a_cell_has_its_whole_window_up_to_the_end_of_the_trace(tmp_path):
     """Half a cell more is simulated than a trace that ends under load shows, at every height that is possible; one that
     cut through has the food's whole height."""
