@@ -133,8 +133,9 @@ def _sizes(start: Start, found: list[Candidate], out: list[LeftOut]) -> None:
         found.append(Candidate("width", "width", what, CALIBRATE))
     else:
         out.append(LeftOut("width", "the width of the specimen that was cut was given to the calibration"))
+    together = " and ".join([", ".join(["width", *fitted[:-1]]), *fitted[-1:]])
     if start.width_sd > 0.0 or fitted:
-        what = f"photograph the specimen that was cut beside a scale, for its {' and '.join(['width', *fitted])}"
+        what = f"photograph the specimen that was cut beside a scale, for its {together}"
         found.append(Candidate("photograph", "photograph", what, CALIBRATE))
     else:
         out.append(LeftOut("photograph", "width, height and shape of the specimen that was cut are known"))

@@ -78,8 +78,8 @@ class Interval:
             "unit": p.unit,
             "low95": self.low95,
             "high95": self.high95,
-            "prior_low": p.prior_low,
-            "prior_high": p.prior_high,
+            "prior_low": p.prior_range[0],
+            "prior_high": p.prior_range[1],
             "verdict": self.verdict,
         }
 

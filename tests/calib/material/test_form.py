@@ -62,6 +62,7 @@ def test_any_roundness_is_as_likely_at_first() -> None:
     """The prior has the spread of a uniform one over the food's range, which bounds it."""
     p = fit_parameters(load_food("apple"), ("R", "roundness"))["roundness"]
     assert (p.low, p.high, p.log) == (0.5, 1.0, False)
+    assert p.prior_range == (0.5, 1.0) and p.prior_low < 0.5 and p.prior_high > 1.0
     assert p.prior_mean == pytest.approx(0.75) and p.prior_sd == pytest.approx(0.5 / 12**0.5)
 
 
