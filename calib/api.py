@@ -70,7 +70,7 @@ class Calibration:
         speed: Knife speed [m/s], where the trace has no position.
         board_z: What the trace's height, or depth, reads with the edge on the board [m]: it says how high the food is.
         t_end: Time after which the record is ignored [s], or None.
-        shape: Outline of the specimen, one of ``mpm.scene.shapes.SHAPE_KINDS``; None for the food's.
+        shape: Outline of the specimen, as ``mpm.scene.shapes.named`` reads it; None for the food's.
         height, width, length: Sizes of the specimen [m], None where they were not measured.
         at: Where the blade cuts, as the part of the length on one side [-].
         outline: Picture, radii or mesh of the specimen, in place of ``shape``; None without one.
@@ -169,9 +169,11 @@ class Calibration:
                 continue
             if not isinstance(value, int) or isinstance(value, bool) or value < lowest:
                 raise CutcalError(f"Calibration: {name} = {brief(value)}; give a whole number of at least {lowest}")
-        for name, options in (("shape", SHAPE_KINDS), ("arch", ARCHES)):
-            if getattr(self, name) not in (*options, *((None,) if name == "shape" else ())):
-                raise CutcalError(f"Calibration: {name} = {brief(getattr(self, name))} is none of {', '.join(options)}")
+        kind = self.shape.partition(":")[0] if isinstance(self.shape, str) else self.shape
+        for name, value, options in (("shape", kind, (None, *SHAPE_KINDS)), ("arch", self.arch, ARCHES)):
+            if value not in options:
+                listed = ", ".join(one for one in options if one)
+                raise CutcalError(f"Calibration: {name} = {brief(getattr(self, name))} is none of {listed}")
         if isinstance(self.fit, str):
             raise CutcalError(f"Calibration: fit = {brief(self.fit)} is text; give a list of names, such as ['E', 'R']")
         if self.baseline not in BASELINES:

@@ -11,6 +11,7 @@ from dataclasses import fields
 from typing import Any, TypeAlias
 
 from calib.io.folder import finite
+from calib.io.yaml_checks import suggest
 from calib.material.food import FoodSpec, check_override, load_food, load_material_file
 from calib.material.scene import MID_LENGTH, Sizing
 from calib.outline.outline_file import POSE, OutlineFile
@@ -21,8 +22,8 @@ from calib.simulation.workers import Workers
 from calib.table.si_numbers import si_number
 from cutcal.parsing import NamedBeside
 from mpm.runtime import ARCHES
-from mpm.scene.errors import CutcalError
-from mpm.scene.shapes import SHAPE_KINDS
+from mpm.scene.errors import CutcalError, SceneError
+from mpm.scene.shapes import SHAPE_KINDS, named
 
 Group: TypeAlias = argparse._ActionsContainer
 """A parser, or a group of its options."""
@@ -143,9 +144,7 @@ def add_food(p: Group, *, cell: bool = True, required: bool = True) -> None:
 
 def add_outline(p: Group) -> None:
     """Options that say what the specimen looks like: a kind of shape or a file, and its sizes."""
-    p.add_argument(
-        "--shape", choices=SHAPE_KINDS, metavar="KIND", help="outline of the specimen, such as half_cylinder"
-    )
+    p.add_argument("--shape", type=shape_kind, metavar="KIND", help="outline of the specimen, such as half_cylinder")
     p.add_argument("--outline", metavar="FILE", help="its silhouette, radii or mesh, with --scale 0.1mm/px")
     p.add_argument("--scale", action=NamedBeside, metavar="SIZE", help="size of a pixel, or of a unit of a mesh")
     p.add_argument("--outline-as", metavar="WAY", help=f"{', '.join(WAYS)}; of a mesh its axes {POSE}")
@@ -157,6 +156,22 @@ def add_outline(p: Group) -> None:
             metavar="M",
             help=f"of the specimen, {what}",
         )
+
+
+def shape_kind(text: str) -> str:
+    """A kind of shape, with its roundness where it has one.
+
+    Raises:
+        argparse.ArgumentTypeError: There is no such shape.
+    """
+    try:
+        named(text)
+    except SceneError as e:
+        kind = text.partition(":")[0]
+        unknown = f"unknown kind {kind!r}{suggest(kind, SHAPE_KINDS)}"
+        said = str(e).removeprefix("shape: ") if kind in SHAPE_KINDS else unknown
+        raise argparse.ArgumentTypeError(said) from None
+    return text
 
 
 def add_run(p: Group) -> None:

@@ -10,6 +10,7 @@ from scipy.stats import chi2
 
 from calib.fit.multistart import FitResult
 from calib.material.food import FoodSpec
+from calib.material.form import ROUNDNESS, with_roundness
 from calib.posterior.posterior import SampledPosterior
 from calib.problem.setup import Setup
 from calib.trace.filters import filter_simulated
@@ -29,7 +30,7 @@ class Calibrated:
     """What a calibration has found, before it is written.
 
     Attributes:
-        setup: What was decided before; its fine cut has the fitted height.
+        setup: What was decided before; its fine cut has the fitted height and roundness.
         fit: The search and its best run.
         analysis: Its uncertainty; None where it ended too early for that.
         record: Whole record of the best values.
@@ -106,11 +107,13 @@ class Calibrated:
         return columns
 
     def food(self) -> FoodSpec:
-        """The food with the fitted values, and the specimen's sizes that were fitted with its height."""
+        """The food with the fitted values, and the specimen's sizes and roundness where these were fitted."""
         setup, values = self.setup, dict(self.fit.best.evaluation.parameters)
         fitted = {"status": "fitted", "source": f"fitted to {setup.curve.trace.source}"}
-        height = values.pop("height", None)
+        height, roundness = values.pop("height", None), values.pop(ROUNDNESS, None)
         food = setup.request.food.with_values(values, **fitted)
+        if roundness is not None:
+            food = with_roundness(food, roundness, **fitted)
         if height is None:
             return food
         shape = setup.fine.food.shape

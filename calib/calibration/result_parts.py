@@ -202,6 +202,8 @@ class Posterior:
             early.
         predictive_inside: Part of the measured points within the 95 % band; null where the fit ended too early.
         correlations: Posterior correlation of two parameters, by "one,other".
+        R_if_known: Width of the interval of R over what it is [-], if one thing more of specimen or sensor was known,
+            by its name; missing where R was not fitted or the fit ended too early.
     """
 
     profiles: Mapping[str, ProfileCurve] = field(default_factory=dict)
@@ -209,6 +211,7 @@ class Posterior:
     correlation_length_m: float | None = field(default=None, metadata=NULL)
     predictive_inside: Fraction | None = field(default=None, metadata=NULL)
     correlations: Mapping[str, Annotated[float | None, keywords(minimum=-1, maximum=1), ALWAYS]]
+    R_if_known: Mapping[str, float] | None = None
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ from calib.calibration.result_parts import (
 from calib.errors import OutputError
 from calib.fit.multistart import FitResult
 from calib.io.provenance import Invocation, Software
+from calib.material.scene import blade_warnings
 from calib.posterior.estimates import summarised
 from calib.problem.parameters import STRESS_LIKE, property_of
 from calib.problem.request import Request
@@ -40,6 +41,7 @@ from calib.trace.conditioning import Conditioned
 from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.uncertainty.intervals import Uncertainty
+from calib.uncertainty.limiting import limiting
 from calib.validation.acceptance import Conservation, Verdict, judge, limits
 from mpm.files import write_atomic
 from mpm.output.record import ForceRecord
@@ -66,7 +68,9 @@ def summarise(done: Calibrated, folder: Path, began: float) -> CalibrationResult
     stopped = fit.status == "interrupted"
     label, source, kind = curve.trace.label, curve.stroke_source, curve.baseline_kind
     scene = setup.scene(fit.best.evaluation.parameters)
-    assumed = [*setup.assumed, *doubts_of_the_crack(scene)]
+    assert isinstance(scene.knife, Knife)  # a press has no trace of a cut
+    narrow = blade_warnings(scene.food.shape, scene.knife)
+    assumed = [*dict.fromkeys([*setup.assumed, *narrow]), *doubts_of_the_crack(scene)]
     said = [*limits(label, source, kind, verdicts, fitted, assumed, record.fracture), *_no_better(done)]
     nulls = {name: NullRating.of(model.metrics) for name, model in done.nulls.items()}
     return CalibrationResult(
@@ -91,7 +95,7 @@ def summarise(done: Calibrated, folder: Path, began: float) -> CalibrationResult
         invocation=Invocation(request.seed, request.arch, tuple(request.command)),
         numerical_checks=tuple(done.checks),
         warnings=tuple(setup.warnings),
-        limits=(*(() if analysis is None else analysis.remarks), *said),
+        limits=(*(() if analysis is None else analysis.remarks), *_limiting(setup, analysis), *said),
         sensitivity=_sensitivity(done),
         sampled=None if done.posterior is None else summarised(done.posterior),
         wall_s=time.monotonic() - began,
@@ -132,6 +136,13 @@ def _no_better(done: Calibrated) -> list[str]:
     return [f"In interval score the simulation is no better than what it should be better than: {named}, fitted alike."]
 
 
+def _limiting(setup: Setup, analysis: UncertaintyAnalysis | None) -> list[str]:
+    """A sentence on what widens the interval of R most of what nobody measured."""
+    found = None if analysis is None else limiting(setup.objective, analysis.uncertainty)
+    said = None if found is None else found.sentence
+    return [] if said is None else [said]
+
+
 def _sensitivity(done: Calibrated) -> dict[str, dict[str, SobolIndices]]:
     return {
         quantity: {name: SobolIndices(**row) for name, row in rows.items()}
@@ -167,7 +178,7 @@ def _fitted(request: Request, fit: FitResult, analysis: UncertaintyAnalysis | No
     products = set() if found is None else _products(found)
     out = {}
     for k, p in enumerate(fit.parameters):
-        known = (request.food.dims if p.name == "height" else request.food.properties)[p.name]
+        known = {**request.food.properties, **request.food.sizes}[p.name]
         one = FittedParameter.of(p if found is None else found.intervals[k], known, sampled.get(p.name))
         product = p.name in products and one.verdict in ("identified", "weak")
         out[p.name] = replace(one, verdict="only_as_product") if product else one
@@ -194,6 +205,7 @@ def _posterior(setup: Setup, fit: FitResult, analysis: UncertaintyAnalysis | Non
         )
         for p in analysis.profiles
     }
+    open_ended = limiting(setup.objective, found)
     pairs = [(i, j) for i in range(len(names)) for j in range(i)]
     return Posterior(
         profiles=profiles,
@@ -201,6 +213,7 @@ def _posterior(setup: Setup, fit: FitResult, analysis: UncertaintyAnalysis | Non
         correlation_length_m=found.data.lengths[0] * setup.curve.stroke_length_m,
         predictive_inside=analysis.bands[0].inside,
         correlations={f"{names[i]},{names[j]}": float(found.correlation[i, j]) for i, j in pairs},
+        R_if_known=None if open_ended is None else open_ended.parts,
     )
 
 

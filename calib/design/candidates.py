@@ -32,9 +32,10 @@ NARROWER = 0.6
 """Width of a narrower piece over that of the first [-]."""
 SLICE_RATIO = 1.0
 """Speed along the edge over the speed down of a slicing cut [-]."""
-WIDTH_SD, PHOTOGRAPH_WIDTH_SD, PHOTOGRAPH_HEIGHT_SD = 0.02, 0.05, 0.03
-"""Relative standard deviations of a width by caliper or weight, and of width and height by a photograph with a scale
-[-]. Assumed."""
+WIDTH_SD, PHOTOGRAPH_WIDTH_SD = 0.02, 0.05
+"""Relative standard deviations of a width by caliper or weight, and by a photograph with a scale [-]. Assumed."""
+PHOTOGRAPH_SIZES_SD: Mapping[str, float] = {"height": 0.03, "roundness": 0.05}
+"""The same by a photograph, of the height (relative) and of the roundness of an outline [-]. Assumed."""
 CALIBRATE, STUDY, RANGES, NONE = "calibrate", "calibrate --config", "calibrate --material", "none"
 """What takes the record of a test: a calibration, a fit of several traces, a food with narrower ranges, nothing yet."""
 
@@ -125,17 +126,19 @@ def _sizes(start: Start, found: list[Candidate], out: list[LeftOut]) -> None:
         out.append(LeftOut("width", "nothing was cut yet; every cut here is of a specimen of measured width"))
         out.append(LeftOut("photograph", "nothing was cut yet; every cut here is of a specimen of known shape"))
         return
-    height = "height" in start.parameters.names
+    names = {"height": "height", "roundness": "shape"}
+    fitted = [word for name, word in names.items() if name in start.parameters.names]
     if start.width_sd > 0.0:
         what = "measure the width of the specimen that was cut, by caliper or by weight"
         found.append(Candidate("width", "width", what, CALIBRATE))
     else:
         out.append(LeftOut("width", "the width of the specimen that was cut was given to the calibration"))
-    if start.width_sd > 0.0 or height:
-        what = "photograph the specimen that was cut beside a scale, for its width and height"
+    together = " and ".join([", ".join(["width", *fitted[:-1]]), *fitted[-1:]])
+    if start.width_sd > 0.0 or fitted:
+        what = f"photograph the specimen that was cut beside a scale, for its {together}"
         found.append(Candidate("photograph", "photograph", what, CALIBRATE))
     else:
-        out.append(LeftOut("photograph", "width and height of the specimen that was cut are known"))
+        out.append(LeftOut("photograph", "width, height and shape of the specimen that was cut are known"))
 
 
 def _blades(start: Start, out: list[LeftOut]) -> list[Knife]:

@@ -8,13 +8,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from calib.design.candidates import (
-    PHOTOGRAPH_HEIGHT_SD,
+    PHOTOGRAPH_SIZES_SD,
     PHOTOGRAPH_WIDTH_SD,
     WIDTH_SD,
     Candidate,
 )
 from calib.design.linear import LinearTest, gained_bits, information, posterior
-from calib.design.measurement import CutTest, compression_measurement, cut_measurement, height_measurement
+from calib.design.measurement import CutTest, compression_measurement, cut_measurement, sizes_measurement
 from calib.design.start import Start
 from calib.design.stencil import Stencil
 from calib.multi_specimen.spec import SPECIMEN_PROPERTIES
@@ -116,7 +116,7 @@ def _together(
         return [*before, compression_measurement(start, z)]
     spread = {"width": WIDTH_SD, "photograph": PHOTOGRAPH_WIDTH_SD}[test.kind]
     width = start.width_sd * spread / np.hypot(start.width_sd, spread) if start.width_sd > 0.0 else 0.0
-    seen = height_measurement(start.parameters, z, PHOTOGRAPH_HEIGHT_SD) if test.kind == "photograph" else None
+    seen = sizes_measurement(start.parameters, z, PHOTOGRAPH_SIZES_SD) if test.kind == "photograph" else None
     return [first_cut(start, about[FIRST], float(width)), *([] if seen is None else [seen])]
 
 

@@ -159,23 +159,26 @@ def compression_measurement(start: Start, z: FloatArray) -> LinearTest:
     return LinearTest(slopes, np.zeros_like(slopes), columns, np.zeros(len(slopes)))
 
 
-def height_measurement(parameters: ParameterSet, z: FloatArray, relative_sd: float) -> LinearTest | None:
-    """What a measured height says.
+def sizes_measurement(parameters: ParameterSet, z: FloatArray, sd: Mapping[str, float]) -> LinearTest | None:
+    """What measured sizes of a specimen say.
 
     Args:
         parameters: The parameters.
         z: Internal coordinates of the point [-], (p,).
-        relative_sd: Relative standard deviation of the height [-].
+        sd: Standard deviations of ``height``, relative [-], and of ``roundness`` [-].
 
     Returns:
-        The measurement; None where the height is no parameter.
+        The measurement; None where none of them is a parameter.
     """
-    if "height" not in parameters.names:
+    known = [name for name in sd if name in parameters.names]
+    if not known:
         return None
-    k = parameters.names.index("height")
-    size = relative_sd * (1.0 if parameters["height"].log else abs(float(z[k])))
-    slopes = np.eye(len(parameters))[k : k + 1] / size
-    return LinearTest(slopes, np.zeros_like(slopes), {}, np.zeros(1))
+    slopes = np.zeros((len(known), len(parameters)))
+    for row, name in enumerate(known):
+        k = parameters.names.index(name)
+        absolute = name != "height" or parameters[name].log
+        slopes[row, k] = 1.0 / (sd[name] * (1.0 if absolute else abs(float(z[k]))))
+    return LinearTest(slopes, np.zeros_like(slopes), {}, np.zeros(len(known)))
 
 
 def pressed_stress(modulus: float, nu: float, yield_stress: float, strain: FloatArray) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from calib.io.progress import Countdown
 from calib.io.provenance import code_key
-from calib.material.scene import at_fitted_height, with_other_particles
+from calib.material.scene import FITTED_SIZES, of_specimen, with_other_particles
 from calib.problem.parameters import LOG_STEP, ParameterSet
 from calib.problem.setup import REPLICATE
 from calib.simulation.evaluation import Evaluation
@@ -31,19 +31,20 @@ class CutScene:
 
     Attributes:
         scene: The cut at any values.
-        fitted_height: Whether its height is the fitted one; else the height is known and no parameter of it.
+        fitted: Whether its specimen is the one whose height and roundness are fitted; else both are known and no
+            parameters of it.
         kept: Sizes that do not follow a fitted height.
     """
 
     scene: Scene
-    fitted_height: bool = False
+    fitted: bool = False
     kept: tuple[str, ...] = ()
 
     def at(self, values: Mapping[str, float]) -> tuple[Scene, dict[str, float]]:
         """The scene and the material's values, at values of all parameters."""
-        if self.fitted_height:
-            return at_fitted_height(self.scene, values, self.kept)
-        return self.scene, {name: x for name, x in values.items() if name != "height"}
+        if self.fitted:
+            return of_specimen(self.scene, values, self.kept)
+        return self.scene, {name: x for name, x in values.items() if name not in FITTED_SIZES}
 
 
 @dataclass(eq=False)

@@ -19,6 +19,7 @@ from calib.io.wording import listed
 from calib.io.yaml_checks import Dumper, Place, check_keys, choice, data_path, mapping, read_yaml, suggest, text
 from calib.material.properties import (
     DIMENSIONS,
+    FORM,
     INCLUSIONS,
     LAYERS,
     PROPERTIES,
@@ -31,6 +32,7 @@ from calib.material.properties import (
     rule_of,
 )
 from mpm.files import write_atomic
+from mpm.scene.profiles import BARRELS, FAMILY
 from mpm.scene.shapes import SHAPE_KINDS
 
 if TYPE_CHECKING:
@@ -71,6 +73,8 @@ class FoodSpec:
         properties: By name; a property the food has no value for (null in the file) is absent.
         calibration: Provenance of a calibrated food, or None.
         not_modelled: What a real one has and the simulated one has not, such as a stone, or None.
+        roundness: Of a food whose anatomy leaves it open how much of a cylinder it is and how much of an ellipsoid;
+            None for the others. A cut draws it where its shape is a barrel.
         inclusions: Sizes of ``stone`` and ``cavity`` [m], as far as the food has them, by name; a cut has them where it
             is asked for them (:func:`calib.material.inclusions.with_inclusions`).
 
@@ -85,6 +89,7 @@ class FoodSpec:
     calibration: Mapping[str, Any] | None = field(default=None, compare=False)
     not_modelled: str | None = None
     inclusions: Mapping[str, Mapping[str, Property]] = field(default_factory=dict)
+    roundness: Property | None = None
 
     def __post_init__(self) -> None:
         here = Place("", (self.name,))
@@ -93,6 +98,8 @@ class FoodSpec:
         check_keys(here, self.inclusions, (), INCLUSIONS)
         for name, sizes in self.inclusions.items():
             check_keys(here.at(name), sizes, DIMENSIONS)
+        if self.roundness is not None and self.shape_kind not in FAMILY:
+            raise here.at("shape").error(f"a {self.shape_kind} has no roundness; {listed(list(FAMILY))} have one")
         needed = [p for p in PROPERTIES if p not in _NULLABLE]
         check_keys(here.at("properties"), self.properties, needed, _NULLABLE, SYNONYMS)
         if self.properties["skin_thickness"].value > 0.0 and "R_skin" not in self.properties:
@@ -236,7 +243,7 @@ class FoodSpec:
 
     def warnings(self) -> Sentences:
         """What a user of this food must know: what is not modelled, sources that disagree or are flagged, odd ones."""
-        both = {"shape": self.dims, "properties": self.properties}
+        both = {"shape": self.sizes, "properties": self.properties}
         said = [] if self.not_modelled is None else [f"{self.name}: not modelled: {self.not_modelled}"]
         said += [
             f"{self.name}.{group}.{name}: {w}"
@@ -247,6 +254,11 @@ class FoodSpec:
         if self._lacks_strength:
             said.append(f"{self.name}.properties.fracture_energy: not used, because bulk damage also needs a strength")
         return said
+
+    @property
+    def sizes(self) -> dict[str, Property]:
+        """Its dimensions, and its roundness where its shape is open."""
+        return {**self.dims, **({} if self.roundness is None else {"roundness": self.roundness})}
 
     @property
     def _lacks_strength(self) -> bool:
@@ -272,7 +284,7 @@ class FoodSpec:
             height: Another height [m].
             width: Another width along the blade [m].
             length: Another length across the blade [m].
-            shape: Another outline.
+            shape: Another outline, as ``mpm.scene.shapes.named`` reads it.
 
         Returns:
             The food; bulk damage is left out where there is no tensile strength at which it starts.
@@ -282,18 +294,22 @@ class FoodSpec:
         """
         from mpm.scene import Food
         from mpm.scene.material import Material
-        from mpm.scene.shapes import Shape
+        from mpm.scene.shapes import Shape, named
 
         sizes = {"length": length, "width": width, "height": height}
         size: dict[str, Any] = {n: self.dims[n].value if given is None else given for n, given in sizes.items()}
         values: dict[str, Any] = {n: p.value for n, p in self.properties.items()}
         if self._lacks_strength:
             del values["fracture_energy"]
-        return Food(Shape(shape or self.shape_kind, **size), Material(**values))
+        kind, roundness = named(shape or self.shape_kind)
+        if shape is None and kind in BARRELS and self.roundness is not None:
+            roundness = self.roundness.value
+        return Food(Shape(kind, **size, roundness=roundness), Material(**values))
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data in the layout of ``materials.yaml``."""
-        shape = {"kind": self.shape_kind} | {n: self.dims[n].as_dict() for n in DIMENSIONS}
+        sizes = self.sizes
+        shape = {"kind": self.shape_kind} | {n: sizes[n].as_dict() for n in (*DIMENSIONS, *FORM) if n in sizes}
         have = {n: p.as_dict() for n, p in self.properties.items()}
         said = {} if self.not_modelled is None else {"not_modelled": self.not_modelled}
         named = [n for n in PROPERTIES if n in have or n not in _OPTIONAL]
@@ -377,15 +393,16 @@ def _read_food(place: Place, raw: Any) -> FoodSpec:
     said = text(place.at("not_modelled"), food["not_modelled"]) if "not_modelled" in food else None
     shape = mapping(place.at("shape"), food["shape"])
     given = mapping(place.at("properties"), food["properties"])
-    check_keys(place.at("shape"), shape, ("kind", *DIMENSIONS), synonyms=SYNONYMS)
+    check_keys(place.at("shape"), shape, ("kind", *DIMENSIONS), tuple(FORM), SYNONYMS)
     needed = [n for n in PROPERTIES if n not in _OPTIONAL]
     check_keys(place.at("properties"), given, needed, _OPTIONAL, SYNONYMS)
     dims = {n: read_property(place.at("shape"), n, shape[n]) for n in DIMENSIONS}
+    form = {n: read_property(place.at("shape"), n, shape[n]) for n in FORM if n in shape}
     held = {n: _read_sizes(place.at(n), food[n]) for n in INCLUSIONS if n in food}
     have = [n for n in PROPERTIES if given.get(n) is not None or n not in _NULLABLE]
     properties = {n: read_property(place.at("properties"), n, given[n]) for n in have}
     try:
-        return FoodSpec(place.path[-1], shape["kind"], dims, properties, not_modelled=said, inclusions=held)
+        return FoodSpec(place.path[-1], shape["kind"], dims, properties, None, said, held, **form)
     except MaterialError as e:
         raise replace(place, path=()).error(str(e)) from None
 

@@ -101,14 +101,17 @@ RELAXATION = ("relaxing_share", "relaxation_time")
 LAYERS = {"rind_thickness": "R_rind", "core_ratio": "R_core"}
 """The size of each layer beside the flesh and its resistance. Only foods whose anatomy has the layer have the two."""
 
-MEANINGS = {name: rule.meaning for name, rule in PROPERTIES.items()}
-"""What each property is, in words."""
-
 DIMENSIONS: dict[str, Rule] = {
     "length": Rule("m", 1e-3, 1.0, "size along y, across the blade"),
     "width": Rule("m", 1e-3, 1.0, "size along x, along the blade"),
     "height": Rule("m", 1e-3, 1.0, "size along z, up"),
 }
+
+FORM: dict[str, Rule] = {"roundness": Rule("-", 0.0, 1.0, "roundness along y, 0 a cylinder and 1 an ellipsoid")}
+"""What a shape has beside its size, where the food's anatomy leaves it open."""
+
+MEANINGS = {name: rule.meaning for name, rule in {**PROPERTIES, **FORM}.items()}
+"""What each property is, in words, and what else may be fitted."""
 
 INCLUSIONS = ("stone", "cavity")
 """What may lie in a food; each has a length, a width and a height."""
@@ -160,7 +163,7 @@ class Property:
 
     def __post_init__(self) -> None:
         here = Place("", (self.name,))
-        rule = rule_of(self.name, PROPERTIES | DIMENSIONS)
+        rule = rule_of(self.name, PROPERTIES | DIMENSIONS | FORM)
         for key in ("value", "low", "high"):
             object.__setattr__(self, key, finite_number(here.at(key), getattr(self, key)))
         check_unit(here, self.unit, rule.unit, self.value)

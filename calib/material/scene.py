@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib.material.food import FoodSpec
+from calib.material.form import open_shape
 from calib.trace.conditioning import Conditioned
 from mpm.scene import EdgeLaw, Knife, Motion, Numerics, Scene
 from mpm.scene.outline import Outline
@@ -41,6 +42,8 @@ LENGTH_PER_HEIGHT = 4.0
 """Largest simulated length across the blade of a food with parallel sides, over its height. The blade bends its halves
 apart like the arms of a double cantilever beam (Gurney and Hunt 1967), so the force on its faces grows with the length
 (docs/theory.md, "Measured choices")."""
+FITTED_SIZES = ("height", "roundness")
+"""What may be fitted of a specimen beside its material."""
 MID_LENGTH = 0.5
 """Where the blade cuts when nothing else is said, in parts of the length."""
 FAR_PER_HEIGHT = 0.25
@@ -53,7 +56,7 @@ class Sizing:
     """Sizes of the specimen, each given by the user or None, and where along its length it is cut.
 
     Attributes:
-        shape: Kind of its outline, one of ``mpm.scene.shapes.SHAPE_KINDS``.
+        shape: Kind of its outline, as ``mpm.scene.shapes.named`` reads it.
         height: Height [m].
         width: Width along the blade [m].
         length: Length across the blade [m].
@@ -76,18 +79,21 @@ class Sizing:
         return tuple(name for name in ("width", "length") if getattr(self, name) is not None)
 
 
-def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple[Shape, list[str]]:
+def specimen(
+    food: FoodSpec, trace: Conditioned | None, sizing: Sizing, *, open_form: bool = False
+) -> tuple[Shape, list[str]]:
     """Shape of the specimen, and what had to be assumed about it.
 
-    Real traces rarely come with the specimen's size. Where the trace has a position and ends released, the height is
-    the stroke; where it ends under load it lies in :func:`height_range`. Width and length that are not given keep the
-    food's proportions. The force is proportional to the width, so only the product of resistance and width is seen by
-    one trace.
+    Real traces rarely come with the specimen's size. Where the trace has a position and ends released or on the board,
+    the height is the stroke; where it ends under load it lies in :func:`height_range`. Width and length that are not
+    given keep the food's proportions. The force is proportional to the width, so only the product of resistance and
+    width is seen by one trace.
 
     Args:
         food: The food with its usual sizes.
         trace: The measured cut, None where there is none: then a height that is not given is the usual one.
         sizing: What is known of the specimen.
+        open_form: Whether its form is fitted (:func:`form_is_open`).
 
     Returns:
         The shape, and what had to be assumed, one sentence each.
@@ -96,7 +102,7 @@ def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple
         SceneError: A shape or size that cannot be simulated.
     """
     said = list(sizing.said)
-    default = food.to_scene_food(shape=sizing.shape).shape
+    default = food.to_scene_food(shape=open_shape(food) if open_form else sizing.shape).shape
     if sizing.outline is not None:
         default = replace(default, kind=OUTLINE, outline=sizing.outline)
     height = sizing.height
@@ -104,9 +110,10 @@ def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple
         free = height_range(food, trace, sizing)
         if free is None:
             height = trace.stroke_length_m
+            why = "the edge comes to the board there" if trace.at_board else "the trace ends released"
             said.append(
-                f"the specimen's height is not known: {height * 1e3:.1f} mm is the stroke, because the trace ends "
-                "released; give --height if you measured it"
+                f"the specimen's height is not known: {height * 1e3:.1f} mm is the stroke, because {why}; give "
+                "--height if you measured it"
             )
         else:
             low, height, high = free
@@ -115,9 +122,14 @@ def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple
                 f"above it, and {low * 1e3:.0f} to {high * 1e3:.0f} mm are possible; give --height if you measured it"
             )
     height = default.height if height is None else height
-    if sizing.shape is None and sizing.outline is None:
+    if open_form:
         said.append(
-            f"the specimen's shape is not known: it is taken for the food's, {default.kind}; another one has another "
+            "the specimen's shape is not known: its roundness, from a cylinder (0) to an ellipsoid (1) along its "
+            "length, is fitted; give --outline if you have a picture of it, or --shape"
+        )
+    elif sizing.shape is None and sizing.outline is None:
+        said.append(
+            f"the specimen's shape is not known: it is taken for the food's, {default.words}; another one has another "
             "stiffness and resistance at the same force; give --outline if you have a picture of it, or --shape"
         )
     width = sizing.width
@@ -139,7 +151,12 @@ def specimen(food: FoodSpec, trace: Conditioned | None, sizing: Sizing) -> tuple
             f"the specimen's length across the blade is not known: {length * 1e3:.0f} mm keep the proportions of the "
             "food; the blade bends longer halves apart with more force; give --length if you measured it"
         )
-    return Shape(default.kind, length, width, height, (left - right) / 2, default.outline), said
+    return replace(default, length=length, width=width, height=height, cut=(left - right) / 2), said
+
+
+def form_is_open(food: FoodSpec, sizing: Sizing) -> bool:
+    """Whether nobody said the form of a specimen, and the food's anatomy leaves it open."""
+    return food.roundness is not None and sizing.shape is None and sizing.outline is None
 
 
 def blade_warnings(shape: Shape, knife: Knife) -> list[str]:
@@ -180,7 +197,7 @@ def height_range(food: FoodSpec, trace: Conditioned, sizing: Sizing) -> tuple[fl
     """
     late = trace.curve[int(trace.curve.argmax()) :]
     loaded = trace.curve[-1] > UNDER_LOAD * float(sorted(late)[len(late) // 2])
-    if sizing.height is not None or trace.stroke_source == "height" or not loaded:
+    if sizing.height is not None or trace.stroke_source == "height" or trace.at_board or not loaded:
         return None
     known = food.dims["height"]
     low = trace.stroke_length_m
@@ -190,10 +207,10 @@ def height_range(food: FoodSpec, trace: Conditioned, sizing: Sizing) -> tuple[fl
     return low, max(likely, clear), high
 
 
-def at_fitted_height(
+def of_specimen(
     scene: Scene, values: Mapping[str, float], kept: Collection[str] = ()
 ) -> tuple[Scene, dict[str, float]]:
-    """The scene at a fitted height, and the values that are left: those of the material.
+    """The scene at a fitted height and roundness, and the values that are left: those of the material.
 
     The cell grows with the height, so that every height has the same particles and nodes: on a fixed cell each height
     would draw other particles, and the force would jump by several per cent from one to the next. The stroke ends at
@@ -201,13 +218,16 @@ def at_fitted_height(
 
     Args:
         scene: The scene with any height.
-        values: Fitted values by name, ``height`` [m] among them or not.
+        values: Fitted values by name, ``height`` [m] and ``roundness`` [-] among them or not.
         kept: Which of ``width`` and ``length`` do not grow with the height, because they were measured.
 
     Returns:
-        The scene, and the values without ``height``.
+        The scene, and the values without both.
     """
     rest = dict(values)
+    roundness = rest.pop("roundness", None)
+    if roundness is not None:
+        scene = replace(scene, food=replace(scene.food, shape=replace(scene.food.shape, roundness=roundness)))
     height = rest.pop("height", None)
     if height is None:
         return scene, rest

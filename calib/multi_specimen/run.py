@@ -130,8 +130,7 @@ class Finished:
         out = {}
         for k, p in enumerate(self.fit.result.parameters):
             found = p if analysis is None else analysis.uncertainty.intervals[k]
-            name = property_of(p.name)
-            known = food.dims[name] if name == "height" else food.properties[name]
+            known = {**food.properties, **food.sizes}[property_of(p.name)]
             out[p.name] = StudyParameter.of_study(found, known, shared=is_shared(p.name))
         return out
 
@@ -173,9 +172,10 @@ class Finished:
 
     def food(self) -> FoodSpec:
         """The food with the flesh of the fit."""
-        flesh = {n: x for n, x in self.fit.shared_values().items() if n != "height"}
+        food = self.study.food
+        flesh = {n: x for n, x in self.fit.shared_values().items() if n in food.properties}
         source = f"fitted to {', '.join(self.fit.names)} of {self.study.source}"
-        return self.study.food.with_values(flesh, status="fitted", source=source)
+        return food.with_values(flesh, status="fitted", source=source)
 
 
 def _write(done: Finished, out: Path, began: float) -> StudyResult:

@@ -14,9 +14,9 @@ from calib.trace.mending import mended
 
 CUT, COMPRESSION = "cut", "compression"
 """Kinds of traces."""
-SPECIMEN_PROPERTIES = ("R_skin", "skin_thickness", "initiation_depth", "height")
-"""What each specimen has of its own unless the study says otherwise: its skin, how its surface gives way, its size. The
-rest is flesh and blade, which are the same."""
+SPECIMEN_PROPERTIES = ("R_skin", "skin_thickness", "initiation_depth", "height", "roundness")
+"""What each specimen has of its own unless the study says otherwise: its skin, how its surface gives way, its size and
+form. The rest is flesh and blade, which are the same."""
 SCATTER = 0.25
 """Standard deviation of the logarithm of each stiffness, strength and resistance of flesh among specimens [-]
 (docs/theory.md, "Measured choices"). What all of them have in common is in the specimen's own factor."""

@@ -6,6 +6,7 @@ import math
 
 from calib.errors import MaterialError
 from calib.material.food import FoodSpec
+from calib.material.form import ROUNDNESS, open_shape
 from calib.material.properties import rule_of
 from calib.problem.parameters import Z95, Parameter, ParameterSet
 
@@ -22,14 +23,15 @@ def fit_parameters(food: FoodSpec, names: tuple[str, ...], heights: Heights | No
 
     Args:
         food: The food.
-        names: Properties, and ``height`` for the specimen's.
+        names: Properties, and ``height`` and ``roundness`` for the specimen's.
         heights: Lowest, likely and largest height of the specimen [m]; None where it is known.
 
     Returns:
         The parameters, in the order of their names.
 
     Raises:
-        MaterialError: An unknown or repeated name, a property without a literature range, or a height that is known.
+        MaterialError: An unknown or repeated name, a property without a literature range, a height that is known, or
+            a roundness that the food does not leave open.
     """
     chosen = []
     for name in names:
@@ -40,6 +42,9 @@ def fit_parameters(food: FoodSpec, names: tuple[str, ...], heights: Heights | No
                 )
             low, likely, high = heights
             chosen.append(Parameter(name, likely, low, high, "m", low, high))
+            continue
+        if name == ROUNDNESS:
+            chosen.append(_roundness(food))
             continue
         rule, (low, high) = rule_of(name), food.prior(name)
         value = food.value(name)
@@ -53,6 +58,20 @@ def fit_parameters(food: FoodSpec, names: tuple[str, ...], heights: Heights | No
         bottom, top = max(rule.low, low / BOUND_FACTOR), min(rule.high, high * BOUND_FACTOR)
         chosen.append(Parameter(name, value, bottom, top, rule.unit, low, high))
     return ParameterSet(tuple(chosen))
+
+
+def _roundness(food: FoodSpec) -> Parameter:
+    """The roundness of a specimen whose shape is open: any in the food's range is as likely.
+
+    A prior is normal here; this one has the standard deviation of the uniform one, the range over the root of 12.
+    """
+    open_shape(food)
+    known = food.roundness
+    assert known is not None  # or its shape is not open
+    middle, reach = (known.low + known.high) / 2.0, Z95 * (known.high - known.low) / math.sqrt(12.0)
+    return Parameter(
+        ROUNDNESS, known.value, known.low, known.high, known.unit, middle - reach, middle + reach, scale="linear"
+    )
 
 
 def size_relative_sd(food: FoodSpec, size: str) -> float:

@@ -137,6 +137,11 @@ class Parameter:
         return self.from_internal(self.prior_mean)
 
     @property
+    def prior_range(self) -> tuple[float, float]:
+        """The prior's 95 % range [unit] as far as it lies within the hard bounds."""
+        return max(self.prior_low, self.low), min(self.prior_high, self.high)
+
+    @property
     def step(self) -> float:
         """Width of a finite difference in the internal coordinate."""
         return LOG_STEP if self.log else LINEAR_STEP * (self.prior_high - self.prior_low)

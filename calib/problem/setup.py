@@ -6,15 +6,17 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from calib.errors import TraceError
+from calib.errors import MaterialError, TraceError
 from calib.io.provenance import code_key, key_of
 from calib.material.food import FoodSpec
+from calib.material.form import ROUNDNESS
 from calib.material.knife import load_knife
 from calib.material.scene import (
-    at_fitted_height,
     blade_warnings,
     cut_scene,
+    form_is_open,
     height_range,
+    of_specimen,
     specimen,
     windowed,
     with_other_particles,
@@ -87,13 +89,13 @@ class Setup:
         return Header(self.curve.trace.sha256, key_of(self.fine.as_dict()))
 
     def sized(self, values: Mapping[str, float]) -> Setup:
-        """The set-up with the specimen of its fine cut as high as ``values`` say, where its height is among them."""
-        scene, _ = at_fitted_height(self.fine, values, self.kept)
+        """The set-up with the specimen of its fine cut as high and as round as ``values`` say, if they do."""
+        scene, _ = of_specimen(self.fine, values, self.kept)
         return replace(self, fine=scene)
 
     def scene(self, values: Mapping[str, float]) -> Scene:
-        """The fine cut at some values [SI] by name: the material's, and the specimen's height where that is fitted."""
-        scene, material = at_fitted_height(self.fine, values, self.kept)
+        """The fine cut at some values [SI] by name: the material's, and the specimen's where that is fitted."""
+        scene, material = of_specimen(self.fine, values, self.kept)
         return scene.with_material(**material)
 
     def evaluators(self, pool: Workers, store: EvaluationStore, label: str = "") -> Evaluators:
@@ -179,7 +181,7 @@ def with_height(request: Request, curve: Conditioned) -> Request:
 def _scenes(request: Request, curve: Conditioned, heights: Heights | None) -> tuple[Scene, Scene, list[str]]:
     """The fine and the coarse cut of a request, and what was assumed of the specimen."""
     food = request.food
-    shape, assumed = specimen(food, curve, request.sizing)
+    shape, assumed = specimen(food, curve, request.sizing, open_form=ROUNDNESS in _names(request, heights))
     knife = load_knife(request.knife)
     stroke, dx, seed = way_of(food, curve), request.dx, request.seed
     fine, screening = (
@@ -196,6 +198,22 @@ def way_of(food: FoodSpec, curve: Conditioned) -> float | Motion:
     return Motion(length, speed=length / (curve.end_s - curve.onset_s)) if food.relaxes else length
 
 
+def _names(request: Request, heights: Heights | None) -> tuple[str, ...]:
+    """Names of what is fitted: what was asked for, else the food's, and of its specimen what nobody said.
+
+    Raises:
+        MaterialError: The roundness of a specimen whose shape is said.
+    """
+    food, sizing = request.food, request.sizing
+    if request.fit is not None:
+        said = sizing.shape is not None or sizing.outline is not None
+        if ROUNDNESS in request.fit and said:
+            raise MaterialError("--fit roundness beside --shape or --outline, which says it; leave one of both out")
+        return request.fit
+    height = () if heights is None else ("height",)
+    return (*food.default_fit, *height, *((ROUNDNESS,) if form_is_open(food, sizing) else ()))
+
+
 def _objective(
     request: Request, curve: Conditioned, scene: Scene, sensor: Sensor, heights: Heights | None
 ) -> Objective:
@@ -204,8 +222,7 @@ def _objective(
     width_sd = 0.0 if request.sizing.width is not None else size_relative_sd(food, "width")
     u_num = 0.0 if request.u_num is None else numerical_uncertainty(request.u_num, food.name, scene, curve)
     target = Target(curve.stroke, curve.curve, curve.curve_noise_sd_N, curve.peak_sd_N, filter_simulated, u_num)
-    names = request.fit or (food.default_fit if heights is None else (*food.default_fit, "height"))
-    parameters = fit_parameters(food, names, heights)
+    parameters = fit_parameters(food, _names(request, heights), heights)
     guess = layer_guess(scene, parameters, curve.stroke, curve.curve)
     return Objective(
         target,

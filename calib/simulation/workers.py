@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from calib.material.scene import at_fitted_height
+from calib.material.scene import of_specimen
 from calib.simulation.evaluation import Evaluation
 from mpm.output.record import ForceRecord
 from mpm.scene import Scene
@@ -254,5 +254,5 @@ class SceneEvaluator:
 
     def evaluate(self, batch: Sequence[Mapping[str, float]]) -> Iterator[Evaluation]:
         """Run each candidate; yields in order of completion, ``index`` is the place in the batch."""
-        for evaluation in self.workers.run([at_fitted_height(self.scene, values, self.kept) for values in batch]):
+        for evaluation in self.workers.run([of_specimen(self.scene, values, self.kept) for values in batch]):
             yield replace(evaluation, parameters=dict(batch[evaluation.index]))

@@ -78,6 +78,7 @@ class Conditioned:
         drift_N_per_s: Drift of the force in the baseline window [N/s].
         drift_sd_N_per_s: Its standard uncertainty; where the drift was removed, that of the removed one [N/s].
         warnings: What a reader should know, one sentence each.
+        at_board: Whether the stroke ends where the force says that the edge is on the board.
     """
 
     trace: Trace
@@ -101,6 +102,7 @@ class Conditioned:
     drift_N_per_s: float
     drift_sd_N_per_s: float
     warnings: tuple[str, ...]
+    at_board: bool = False
 
     def __post_init__(self) -> None:
         if self.stroke.shape != self.curve.shape or not np.all(np.isfinite(self.curve)):
@@ -191,6 +193,7 @@ def condition(
         peak_sd_N=_root_sum(noise, level_sd, drift_sd, behind_sd, held.peak_sd, held.step_sd),
         drift_N_per_s=level.slope if drift is None else 0.0,
         drift_sd_N_per_s=level.slope_sd if drift is None else drift.slope_sd,
+        at_board=axis.at_board,
         warnings=(
             *_record_warnings(trace),
             *said,

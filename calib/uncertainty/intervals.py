@@ -78,8 +78,8 @@ class Interval:
             "unit": p.unit,
             "low95": self.low95,
             "high95": self.high95,
-            "prior_low": p.prior_low,
-            "prior_high": p.prior_high,
+            "prior_low": p.prior_range[0],
+            "prior_high": p.prior_range[1],
             "verdict": self.verdict,
         }
 
@@ -264,7 +264,7 @@ def uncertainty(parameters: ParameterSet, data: LinearisedLikelihood) -> Uncerta
     size = max(1.0, reduced)
     tails = float(student.ppf(0.5 + 0.5 * CREDIBLE_LEVEL, freedom)) / Z95 if reduced > 1.0 else 1.0
     widened = size * tails**2
-    marginal = _marginal(data.jacobian, data.unsearched, widened)
+    marginal = marginal_information(data.jacobian, data.unsearched, widened)
     covariance: FloatArray = np.asarray(np.linalg.inv(marginal + own), dtype=np.float64)
     sd = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(sd, sd)
@@ -295,8 +295,17 @@ def _beside(
     return tuple((float(m), float(d)) for m, d in zip(mean[len(pull) :], sd[len(pull) :], strict=True))
 
 
-def _marginal(jacobian: FloatArray, unsearched: FloatArray, size: float) -> FloatArray:
-    """Information (p, p) of rows with ``size`` times the stated variance, the unsearched nuisances integrated out."""
+def marginal_information(jacobian: FloatArray, unsearched: FloatArray, size: float) -> FloatArray:
+    """Information of rows where some nuisances are integrated out.
+
+    Args:
+        jacobian: Slopes of the rows by internal coordinates [-], (k, p).
+        unsearched: Rows by one prior standard deviation of each nuisance [-], (k, m).
+        size: Factor on the stated variance of the rows [-].
+
+    Returns:
+        The information in internal coordinates (p, p).
+    """
     cross = unsearched.T @ jacobian / size
     inner = unsearched.T @ unsearched / size + np.eye(unsearched.shape[1])
     out: FloatArray = jacobian.T @ jacobian / size - cross.T @ np.linalg.solve(inner, cross)

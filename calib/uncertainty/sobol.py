@@ -45,7 +45,7 @@ def sensitivity(objective: Objective, result: FitResult, *, seed: int = 0) -> In
     def model(points: FloatArray) -> dict[str, FloatArray]:
         return quantities(stroke, np.array([process.predict(z)[0] for z in points]))
 
-    ends = [[p.to_internal(x) for x in (p.prior_low, p.prior_high)] for p in chosen]
+    ends = [[p.to_internal(x) for x in p.prior_range] for p in chosen]
     box = np.clip(np.array(ends).T, chosen.lower, chosen.upper)
     return indices(chosen.names, box, model, seed=seed)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from calib.io.typed_document import ANY, FORMER, to_document
+from calib.material.scene import FITTED_SIZES
 from calib.problem.nuisance import OUTSIDE
 from calib.problem.objective import EXPLAINED
 from calib.problem.parameters import property_of
@@ -40,7 +41,6 @@ OPENING_REMARKED = 0.1  # part of the new surface that opens ahead of the edge, 
 # Ends of what is physically possible: a fit that ends there found a one-sided answer (the cut shows no friction, say),
 # whereas one that ends on a bound of ours asks for a value that it was not allowed.
 NATURAL_LIMITS = {"mu": 0.0}
-SIZE = "height"  # the specimen's, bounded by what is possible: a bound that is reached is a result
 NUISANCE_LINES = {"lag": "delay of the trace within its uncertainty", "gain": "sensor's gain within its uncertainty"}
 """Nuisances that the validation hangs on, and their lines: a trace that asks for more of one than its sensor leaves
 open fails."""
@@ -284,7 +284,8 @@ def _against_nulls(metrics: Metrics, nulls: Mapping[str, Metrics]) -> Verdict:
 def _bounds(fitted: Mapping[str, FittedParameter]) -> Verdict:
     """The line of parameters that ran into a bound of ours."""
     on = [n for n, p in fitted.items() if p.verdict == "at_bound"]
-    stuck = [n for n in on if n != SIZE and not _at_natural_limit(n, fitted[n])]
+    # what is bounded by what is possible may reach its bound
+    stuck = [n for n in on if n not in FITTED_SIZES and not _at_natural_limit(n, fitted[n])]
     note = ", ".join(stuck + [f"{n} at its natural limit" for n in on if n not in stuck])
     return Verdict("parameters at a bound", len(stuck), 0, "", not stuck, note)
 

@@ -22,20 +22,60 @@ SLENDER = 0.22
 """Its largest diameter over its length."""
 TAPER = 0.55
 """Part of its half length at each end over which it tapers."""
-FULL = 4
-"""Exponent of a barrel along its axis: 2 is an ellipsoid, and a cylinder has no end to it."""
-TABLES = ("pear", "cone", "bent", "barrel", "half_barrel")
+ROUNDNESS = 0.5
+"""Roundness of a barrel of which nothing else is said (:func:`barrel_radius`)."""
+BARRELS = ("barrel", "half_barrel")
+"""Kinds between a cylinder and an ellipsoid."""
+FAMILY = {
+    "cylinder": "barrel",
+    "ellipsoid": "barrel",
+    "sphere": "barrel",
+    "half_cylinder": "half_barrel",
+    "hemisphere": "half_barrel",
+    **{kind: kind for kind in BARRELS},
+}
+"""The barrel that stands for a kind of whatever roundness."""
+KEPT = 32
+"""Tables that are kept: a fit of the roundness asks for one after the other."""
+TABLES = ("pear", "cone", "bent", *BARRELS)
 """Kinds of shapes that are made here."""
 
 
-@lru_cache(maxsize=len(TABLES))
-def profile(kind: str) -> Sections:
-    """The table of a kind, one of :data:`TABLES`."""
+@lru_cache(maxsize=KEPT)
+def profile(kind: str, roundness: float | None = None) -> Sections:
+    """The table of a kind.
+
+    Args:
+        kind: One of :data:`TABLES`.
+        roundness: How round a barrel is along its axis [-], from 0 to 1; None for :data:`ROUNDNESS`.
+
+    Returns:
+        The table.
+    """
     if kind == "bent":
         return _banana()
-    if kind in ("barrel", "half_barrel"):
-        return revolved((1 - np.abs(places(ALONG)) ** FULL) ** (1 / FULL), halved=kind == "half_barrel")
+    if kind in BARRELS:
+        radius = barrel_radius(ROUNDNESS if roundness is None else roundness, places(ALONG))
+        return revolved(radius, halved=kind == "half_barrel")
     return revolved(_radius(*(PEAR if kind == "pear" else CONE)))
+
+
+def barrel_radius(roundness: float, v: np.ndarray) -> np.ndarray:
+    """Radius of a barrel over its largest, along its axis: between a cylinder and an ellipsoid.
+
+    With the radius r and the place v it is r^n + |v|^n = 1 (a superellipse), n = 2 / roundness.
+
+    Args:
+        roundness: 0 is a cylinder, 1 an ellipsoid, 0.5 has the exponent 4 [-].
+        v: Places over the half length [-], any shape.
+
+    Returns:
+        The radius [-], same shape.
+    """
+    if roundness == 0.0:
+        return np.ones_like(v)
+    n = 2.0 / roundness
+    return np.asarray((1.0 - np.abs(v) ** n) ** (1.0 / n))
 
 
 def spread(kind: str) -> float:

@@ -330,6 +330,8 @@ class Scene:
         del out["food"]["shape"]["outline"]
         if outline is not None:
             out["food"]["shape"]["outline"] = outline.as_dict()
+        if out["food"]["shape"]["roundness"] is None:
+            del out["food"]["shape"]["roundness"]
         for name in ("stone", "cavity", "parted"):
             if not out["food"][name]:  # what a food has not is no part of it
                 del out["food"][name]

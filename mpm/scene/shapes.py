@@ -9,7 +9,7 @@ import numpy as np
 
 from mpm.scene.errors import SceneError, check_number
 from mpm.scene.outline import Outline, Sections
-from mpm.scene.profiles import TABLES, profile
+from mpm.scene.profiles import BARRELS, ROUNDNESS, TABLES, profile
 from mpm.scene.surface_distance import surface_distance
 
 SHAPE_KINDS = (
@@ -42,6 +42,8 @@ class Shape:
         height: Along z [m].
         cut: Place of the blade along y from the food's middle [m].
         outline: What was measured, None for the other kinds.
+        roundness: Of a barrel, 0 for a cylinder to 1 for an ellipsoid along its length [-]; None for
+            ``mpm.scene.profiles.ROUNDNESS``.
     """
 
     kind: str
@@ -50,6 +52,7 @@ class Shape:
     height: float
     cut: float = 0.0
     outline: Outline | None = None
+    roundness: float | None = None
 
     def __post_init__(self) -> None:
         if (self.kind == OUTLINE) != (self.outline is not None):
@@ -58,6 +61,11 @@ class Shape:
             raise SceneError(f"shape: unknown kind {self.kind!r}; one of {', '.join(SHAPE_KINDS)}")
         for name in ("length", "width", "height"):
             check_number("shape", name, getattr(self, name), 1e-3, 1.0, "m")
+        if self.roundness is not None:
+            if self.kind not in BARRELS:
+                raise SceneError(f"shape: a {self.kind} has no roundness; {' and '.join(BARRELS)} have one")
+            if not 0.0 <= self.roundness <= 1.0:
+                raise SceneError(f"shape: roundness {self.roundness:g}; it goes from 0 (cylinder) to 1 (ellipsoid)")
         if not abs(self.cut) < self.length / 2:
             raise SceneError(
                 f"shape: the blade at {self.cut * 1e3:g} mm from the middle misses a food {self.length * 1e3:g} mm long"
@@ -73,7 +81,7 @@ class Shape:
         """Its tabulated sections, None where it has a closed form."""
         if self.outline is not None:
             return self.outline.sections
-        return profile(self.kind) if self.kind in TABLES else None
+        return profile(self.kind, self.roundness) if self.kind in TABLES else None
 
     @property
     def symmetric(self) -> tuple[bool, bool]:
@@ -84,7 +92,9 @@ class Shape:
 
     @property
     def words(self) -> str:
-        """What it is called: its kind, or the file of a measured outline and how that was read."""
+        """What it is called: its kind and roundness, or the file of a measured outline and how that was read."""
+        if self.roundness is not None:
+            return f"{self.kind} of roundness {self.roundness:.2g}"
         return self.kind if self.outline is None else f"{self.kind} of {self.outline.source} ({self.outline.how})"
 
     @property
@@ -96,6 +106,38 @@ class Shape:
     def walled(self) -> bool:
         """Whether its flanks are upright."""
         return self.kind in FLAT_TOP if self.table is None else self.table.walled
+
+
+def named(text: str) -> tuple[str, float | None]:
+    """The kind that a text names, and its roundness where it says one.
+
+    >>> named("sphere"), named("half_barrel:0.3")
+    (('sphere', None), ('half_barrel', 0.3))
+
+    Args:
+        text: One of :data:`SHAPE_KINDS`; a barrel may have its roundness after a colon.
+
+    Returns:
+        Kind and roundness [-].
+
+    Raises:
+        SceneError: There is no such kind, or no such roundness.
+    """
+    kind, colon, part = text.partition(":")
+    if kind not in SHAPE_KINDS:
+        raise SceneError(f"shape: unknown kind {kind!r}; one of {', '.join(SHAPE_KINDS)}")
+    if not colon:
+        return kind, None
+    try:
+        roundness = float(part)
+    except ValueError:
+        roundness = math.nan
+    if kind not in BARRELS or not 0.0 <= roundness <= 1.0:
+        raise SceneError(
+            f"shape: {text!r}; only {' and '.join(BARRELS)} have a roundness, from 0 (cylinder) to 1 (ellipsoid), such "
+            f"as half_barrel:{ROUNDNESS:g}"
+        )
+    return kind, roundness
 
 
 def radius2(shape: Shape, x: np.ndarray, y: np.ndarray, thinner: float = 0.0) -> np.ndarray:

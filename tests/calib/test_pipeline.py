@@ -26,10 +26,10 @@ from calib.material.food import load_food, load_foods
 from calib.material.knife import load_knife
 from calib.material.scene import (
     Sizing,
-    at_fitted_height,
     blade_warnings,
     cut_scene,
     height_range,
+    of_specimen,
     specimen,
     windowed,
     with_other_particles,
@@ -135,7 +135,7 @@ def test_a_food_is_cut_where_it_is_asked_for():
     measured, _ = specimen(cucumber, None, Sizing(length=0.4, at=0.75))
     assert (measured.length, measured.cut) == pytest.approx((0.4, 0.1))
     scene = cut_scene(strawberry, berry, load_knife("kitchen"))
-    higher, _ = at_fitted_height(scene, {"height": 1.1 * berry.height})
+    higher, _ = of_specimen(scene, {"height": 1.1 * berry.height})
     assert higher.food.shape.cut == pytest.approx(1.1 * berry.cut)
 
 
@@ -144,7 +144,7 @@ def test_fitted_height_takes_the_other_sizes_along():
     food = load_food("cucumber")
     shape, _ = specimen(food, None, Sizing())
     scene = cut_scene(food, shape, load_knife("kitchen"), stroke=0.02)
-    higher, values = at_fitted_height(scene, {"E": 1e6, "height": 1.2 * shape.height}, kept=("width",))
+    higher, values = of_specimen(scene, {"E": 1e6, "height": 1.2 * shape.height}, kept=("width",))
     grown = higher.food.shape
     assert values == {"E": 1e6}
     assert (grown.height, grown.length) == pytest.approx((1.2 * shape.height, 1.2 * shape.length))
@@ -152,9 +152,25 @@ def test_fitted_height_takes_the_other_sizes_along():
     assert scene.numerics.far is not None
     assert higher.numerics == replace(scene.numerics, dx=1.2 * scene.numerics.dx, far=1.2 * scene.numerics.far)
     assert (higher.motion, higher.edge) == (scene.motion, scene.edge)
-    free, _ = at_fitted_height(scene, {"height": 1.2 * shape.height})
+    free, _ = of_specimen(scene, {"height": 1.2 * shape.height})
     assert len(seed(free).x) == len(seed(scene).x)
-    assert at_fitted_height(scene, {"E": 1e6}) == (scene, {"E": 1e6})
+    assert of_specimen(scene, {"E": 1e6}) == (scene, {"E": 1e6})
+
+
+def test_a_cut_may_end_on_the_board_or_just_above_it():
+    """Where the trace shows the board its stroke is the height; where it ends under load, every height from the stroke
+    on is possible, and 1 mm more than it, measured, is no fault."""
+    cut = condition(recorded(loaded=True))
+    found = height_range(load_food("cucumber"), cut, Sizing())
+    assert found is not None and found[0] == cut.stroke_length_m
+    above, _ = specimen(load_food("cucumber"), cut, Sizing(height=cut.stroke_length_m + 1e-3))
+    scene = cut_scene(load_food("cucumber"), above, load_knife("kitchen"), stroke=cut.stroke_length_m)
+    assert scene.motion.stroke == pytest.approx(above.height - 1e-3)
+    on_board = replace(cut, at_board=True)
+    assert height_range(load_food("cucumber"), on_board, Sizing()) is None
+    shape, said = specimen(load_food("cucumber"), on_board, Sizing())
+    assert shape.height == cut.stroke_length_m
+    assert any("is the stroke, because the edge comes to the board there" in text for text in said)
 
 
 def test_the_mean_over_a_cell_has_its_whole_window_up_to_the_end_of_the_trace(tmp_path):
@@ -166,7 +182,7 @@ def test_the_mean_over_a_cell_has_its_whole_window_up_to_the_end_of_the_trace(tm
     length, heights = setup.curve.stroke_length_m, setup.objective.parameters["height"]
     for scene in (setup.fine, setup.coarse):
         for height in (heights.low, heights.value, heights.high):
-            placed, _ = at_fitted_height(scene, {"height": height})
+            placed, _ = of_specimen(scene, {"height": height})
             assert min(length + 0.5 * placed.numerics.dx, height) <= placed.motion.stroke * (1 + 1e-9)
             assert placed.motion.stroke <= height * (1 + 1e-9)
     measured = set_up(Calibration("cucumber", path, height=length + 1e-4).request())

@@ -6,7 +6,7 @@ import argparse
 
 from calib.io.schema import tag
 from calib.material.food import load_food, load_foods
-from calib.material.properties import PROPERTIES
+from calib.material.properties import FORM, PROPERTIES
 from cutcal.options import add_json, print_json
 
 HELP = "list the foods, or the values of one with their sources"
@@ -41,8 +41,8 @@ def run(args: argparse.Namespace) -> int:
     for name, sizes in food.inclusions.items():
         size = " x ".join(f"{sizes[n].value * 1e3:g}" for n in ("length", "width", "height"))
         print(f"  {name:17s}{size} mm in a cut that asks for it (--{name})")
-    for name in PROPERTIES:
-        p = food.properties.get(name)
+    for name in (*FORM, *PROPERTIES):
+        p = food.roundness if name in FORM else food.properties.get(name)
         if p is not None:
             text = f"{p.value:g} {p.unit}"
             print(f"  {name:17s}{text:16s} {p.low:g} to {p.high:g}, {p.status}: {p.source}")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from calib.io.typed_document import to_document
 from calib.material.knife import load_knife
-from calib.material.scene import cut_scene, specimen
+from calib.material.scene import blade_warnings, cut_scene, specimen
 from cutcal.options import (
     RESUME_HELP,
     RUN,
@@ -99,6 +99,7 @@ def run(args: argparse.Namespace) -> int:
 
     food, knife = food_of(args), load_knife(args.knife)
     shape, assumed = specimen(food, None, sizing_of(args))
+    assumed += blade_warnings(shape, knife)
     scene = cut_scene(food, shape, knife, stroke=args.stroke, dx=max(args.dx) if args.dx else None, seed=args.seed)
     default = cut_scene(food, shape, knife)
     zone, cell = default.edge.zone, default.numerics.dx

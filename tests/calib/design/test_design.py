@@ -20,6 +20,7 @@ from calib.design.stencil import CutScene, Simulator, stencils, steps_of
 from calib.errors import MaterialError, OutputError
 from calib.material.food import load_food
 from calib.material.knife import load_knife
+from calib.problem.food_parameters import fit_parameters
 from calib.simulation.evaluation_store import EvaluationStore, Header
 from mpm.scene.errors import CutcalError
 from tests.calib.documents import valid
@@ -160,6 +161,20 @@ def test_the_design_of_a_cut_food(cut: Start, tmp_path: Path) -> None:
     assert valid(document, "design")["recommended"] == result.recommended
     assert read_design(tmp_path / "out").tests == result.tests
     assert b"<svg" in (tmp_path / "out" / "design.svg").read_bytes()
+
+
+def test_a_photograph_tells_the_shape(cut: Start, tmp_path: Path) -> None:
+    """Where roundness is fitted, a photograph narrows it and calliper and compression don't; each needs a first cut."""
+    names = (*cut.parameters.names, "roundness")
+    form = replace(cut.shape, kind="half_barrel", roundness=0.5)
+    round_one = replace(cut, shape=form, parameters=fit_parameters(cut.food, names), width_sd=0.0, reported={})
+    result = designed(round_one, tmp_path / "out")
+    (photo,) = (t for t in result.tests if t.kind == "photograph")
+    assert photo.what.endswith("for its width and shape")
+    assert photo.parameters["roundness"].part < 0.3
+    assert next(t for t in result.tests if t.kind == "compression").parameters["roundness"].part > 0.99
+    known = designed(replace(cut, width_sd=0.0), tmp_path / "known")
+    assert "photograph" in {one.name for one in known.left_out}
 
 
 def test_asked_for_a_peak_under_another_knife(start: Start, tmp_path: Path) -> None:

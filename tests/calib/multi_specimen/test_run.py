@@ -18,7 +18,7 @@ from calib.errors import DocumentError
 from calib.io.folder import finite
 from calib.io.typed_document import to_document
 from calib.material.food import load_material_file
-from calib.material.scene import at_fitted_height
+from calib.material.scene import of_specimen
 from calib.multi_specimen.result import read_result
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.workers import Errand, Workers
@@ -281,6 +281,6 @@ def test_a_fake_scene_is_a_real_one() -> None:
 
     food = load_food("banana")
     scene = cut_scene(food, specimen(food, None, Sizing())[0], Knife("k", 2e-3, 0.2, 0.02, 0.1))
-    taller, rest = at_fitted_height(scene, {"height": 0.04, "R": 300.0})
+    taller, rest = of_specimen(scene, {"height": 0.04, "R": 300.0})
     assert rest == {"R": 300.0} and taller.food.shape.height == 0.04
     assert replace(scene, food=taller.food) != scene

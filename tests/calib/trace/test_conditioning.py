@@ -577,6 +577,18 @@ def test_the_edge_is_through_where_the_force_falls_to_little() -> None:
     assert cut.curve[-1] < 0.1 * cut.peak_N
 
 
+def test_the_edge_is_through_before_it_comes_to_the_board() -> None:
+    """A fall, two millimetres of nothing and the board: the height is where the force fell."""
+    cut = falling(0.002)
+    stroke = 0.08 - cut.position if cut.position is not None else np.zeros(0)
+    board = np.clip(55e3 * (stroke - 0.0422), 0.0, None)
+    seen = condition(replace(cut, force=cut.force + board))
+    assert seen.stroke_length_m == pytest.approx(0.040, abs=4e-4) and not seen.at_board
+    assert any("edge is through" in text for text in seen.warnings)
+    told = condition(replace(cut, force=cut.force + board), board=0.0395)
+    assert told.stroke_length_m == pytest.approx(0.0395)
+
+
 @pytest.mark.parametrize(("fall", "rest"), [(0.02, 0.003), (0.002, 0.0005)])
 def test_a_fall_that_says_nothing_of_the_board_is_left_in(fall: float, rest: float) -> None:
     """A force that falls with the chord, or at the very end, leaves the stroke as it is."""

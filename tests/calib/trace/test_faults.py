@@ -240,11 +240,24 @@ def test_coarse_steps_grow_the_uncertainty() -> None:
 
 
 def test_a_board_at_the_end_is_said() -> None:
-    """A force that shoots up over the last millimetre may be the board's."""
+    """A force that rises steeply over the last millimetres may be the board's; as stiff as an arm on it, it is, and the
+    cut ends there."""
     depth = 0.02 * (CUT.time - 1.0)
-    hit = np.where((depth > 0.0315) & (CUT.time <= 2.6), 30.0 * (depth - 0.0315) / 5e-4, 0.0)
-    noted(condition(CUT.but(force=CUT.force + hit).trace()), "the edge may be on the board; end the cut before it")
-    assert not any("board" in note for note in TRUE.warnings)
+
+    def hit(at: float, stiffness: float) -> Conditioned:
+        """The cut with a board at a depth [m], as stiff as that [N/m]."""
+        on = np.where((depth > at) & (CUT.time <= 2.6), stiffness * (depth - at), 0.0)
+        return condition(CUT.but(force=CUT.force + on).trace())
+
+    soft = hit(0.0305, 2.6e3)
+    noted(soft, "the edge may be on the board; end the cut before it")
+    assert not soft.at_board and soft.stroke_length_m == pytest.approx(TRUE.stroke_length_m, abs=1e-5)
+    hard = hit(0.0312, 55e3)
+    noted(hard, "the force shoots up at 3[01]\\.[0-9] mm of the stroke of 32.0 mm, as on a board: the edge is on it")
+    assert hard.at_board and hard.stroke_length_m == pytest.approx(0.0312, abs=4e-4)
+    assert not any("may be on the board" in note for note in hard.warnings)
+    assert hard.peak_N == pytest.approx(TRUE.peak_N, rel=0.01)
+    assert not any("board" in note for note in TRUE.warnings) and not TRUE.at_board
 
 
 def drifting(cut: Cut = CUT, rate: float = 0.8) -> Trace:

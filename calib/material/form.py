@@ -1,0 +1,50 @@
+"""The form of a specimen where nobody says it: how much of a cylinder it is, and how much of an ellipsoid.
+
+A food whose anatomy leaves that open has a ``roundness`` with a range in ``materials.yaml``. Its form is one number
+between two that are drawn everywhere (:func:`mpm.scene.profiles.barrel_radius`), so that a fit can ask for it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from calib.errors import MaterialError
+from calib.material.food import FoodSpec
+from mpm.scene.profiles import FAMILY
+
+ROUNDNESS = "roundness"
+"""Name of the parameter."""
+
+
+def open_shape(food: FoodSpec) -> str:
+    """The food's shape at its roundness, as ``mpm.scene.shapes.named`` reads it.
+
+    Raises:
+        MaterialError: The food does not leave its shape open.
+    """
+    if food.roundness is None:
+        raise MaterialError(
+            f"--fit {ROUNDNESS}: the shape of {food.name} is not open; leave it out, or give the shape a {ROUNDNESS} "
+            "in a file of the food"
+        )
+    return f"{FAMILY[food.shape_kind]}:{food.roundness.value!r}"
+
+
+def with_roundness(food: FoodSpec, value: float, *, status: str, source: str) -> FoodSpec:
+    """The food as a barrel of another roundness; the range stays.
+
+    Args:
+        food: The food.
+        value: The roundness [-].
+        status: ``given`` or ``fitted``.
+        source: Where it comes from.
+
+    Returns:
+        The food.
+
+    Raises:
+        MaterialError: The food does not leave its shape open, or an impossible value.
+    """
+    kind, _, _ = open_shape(food).partition(":")
+    assert food.roundness is not None  # or its shape is not open
+    return replace(food, shape_kind=kind, roundness=replace(food.roundness, value=value, status=status, source=source))
