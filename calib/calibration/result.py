@@ -146,6 +146,19 @@ class CalibrationResult:
         return dict(finite(to_document(self)))
 
     @property
+    def peak_sd_N(self) -> float:
+        """Standard uncertainty of the measured peak [N]: of the curve (noise, baseline), the gain and the drift."""
+        curve, gain, drift = self.peak_parts_N
+        return math.hypot(curve, gain, drift)
+
+    @property
+    def peak_parts_N(self) -> tuple[float, float, float]:
+        """Parts of the standard uncertainty of the measured peak [N]: curve, gain of the sensor, drift."""
+        sd = {name: n.prior_sd for name, n in self.nuisances.items()}
+        gain = sd.get("gain", 0.0) * self.agreement.peak_real_N
+        return self.agreement.peak_real_sd_N or 0.0, gain, sd.get("drift", 0.0)
+
+    @property
     def parameters(self) -> pd.DataFrame:
         """Fitted values by name: value, unit, 95 % interval, literature range, verdict, status, source."""
         return pd.DataFrame.from_dict(self.summary["parameters"], orient="index")

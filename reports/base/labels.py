@@ -16,6 +16,7 @@ WORDS = {
     "only_as_product": "only as a product with the width",
     "not_seen": "not seen",
     "at_bound": "at its bound",
+    "at_limit": "at its natural limit",
     "unknown": "not determined",
     "paper_table2": "paper, Table 2",
 }

@@ -29,7 +29,8 @@ IDENTIFIABILITY = {
     "one_sided": "the trace bounds one side; the other is the literature's, or what is possible",
     "only_as_product": "known times the width of the specimen and the gain of the sensor, or times another parameter",
     "not_seen": "the trace bounds neither side: the value is the literature's",
-    "at_bound": "the fit ran into the end of what was allowed",
+    "at_bound": "the fit ran into the end of what was allowed, and fails for it",
+    "at_limit": "the best value is the end of what is possible, such as no friction: a result, no failure",
 }
 #: What the sensitivity is of, and the part of the variance from which on a parameter is named.
 QUANTITIES = {"peak": "peak", "work": "work", "initial_slope": "initial slope"}

@@ -312,17 +312,17 @@ def test_verdicts_fail_what_fails():
     notes = {v.name: (v.value, v.note) for v in lines}
     assert notes["food pressed away, not parted"] == (
         pytest.approx(0.3),
-        "edge and opening took 70% of R times the new area",
+        "edge and opening took 70.0\xa0% of R times the new area",
     )
     assert [(v.name, v.passed) for v in balances(Conservation(0.0, 0.0, 1.2))][0] == (
         "food pressed away, not parted",
         True,
     )
     assert len(balances(Conservation(0.0, 0.0))) == 2  # nothing was to be parted
-    assert notes["half the simulated speed"] == (0.06, "peak +2.0%, work -6.0%, extrapolated to rest")
+    assert notes["half the simulated speed"] == (0.06, "peak +2.0\xa0%, work −6.0\xa0%, extrapolated to rest")
     assert notes["constants of the method halved and doubled"] == (
         0.07,
-        "most by twice the process zone: peak +2.0%, work -7.0%",
+        "most by twice the process zone: peak +2.0\xa0%, work −7.0\xa0%",
     )
     assert notes["energy lost by the discretisation"] == (0.09, "of the work")
     assert notes["grid and particles elsewhere"] == (None, "broke down: inverted")
@@ -339,7 +339,7 @@ def test_verdicts_fail_what_fails():
         "constant baseline",
         "The width is assumed.",
         "in-sample",
-        "of R 40% went there",
+        "of R 40.0\xa0% went there",
     ):
         assert any(word in text for text in said)
     small = limits("measured", "speed", "constant", lines, parameters, [], {**fracture, "opening_J_m2": 4.0})

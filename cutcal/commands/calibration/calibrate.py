@@ -256,7 +256,7 @@ def fit_study(args: argparse.Namespace, study: StudySpec, out: Path) -> int:
 
 def study_text(result: StudyResult, out: Path) -> str:
     """What the terminal shows at the end of a study."""
-    lines = [f"  {'':24s}{'peak':>8s}{'NRMSE':>8s}{'shape':>8s}{'R':>7s}{'in band':>9s}{'factor':>8s}"]
+    lines = [f"  {'':24s}{'peak':>8s}{'NRMSE':>8s}{'shape':>8s}{'ISO':>7s}{'in band':>9s}{'factor':>8s}"]
     rows: list[tuple[str, InSampleCut | HeldOutCut]] = [(f"{n}, in-sample", cut) for n, cut in result.traces.items()]
     rows += [(f"{n}, held out", cut) for n, cut in result.hold_out.items()]
     for name, cut in rows:

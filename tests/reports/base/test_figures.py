@@ -31,9 +31,9 @@ def test_figures_are_stable_and_need_no_font() -> None:
 
 def test_figures_do_not_change_the_users_style() -> None:
     """Drawing leaves matplotlib's settings as they were, and the user's settings do not reach the report."""
-    plain = figures.null_models(sample.curves(), "measured")
+    plain = figures.null_models(sample.curves(), "measured", {})
     with matplotlib.rc_context({"axes.facecolor": "red", "lines.linewidth": 9.0}):
-        assert figures.null_models(sample.curves(), "measured") == plain
+        assert figures.null_models(sample.curves(), "measured", {}) == plain
         assert matplotlib.rcParams["lines.linewidth"] == 9.0
 
 

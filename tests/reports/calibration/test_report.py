@@ -248,11 +248,11 @@ def test_null_model_that_is_closer_is_named(content: Content) -> None:
     for model in nulls.values():
         model |= {"nrmse": 0.4, "shape_error": 0.4, "R": 0.2}
     (said,) = content(null_models=nulls)["null_sentences"]
-    assert said.startswith("No null model is closer") and said.endswith("NRMSE, shape error and rating R.")
+    assert said.startswith("No null model is closer") and said.endswith("NRMSE, shape error and ISO rating.")
     nulls["ramp"]["R"] = 0.99
     (said,) = content(null_models=nulls)["null_sentences"]
     assert said.startswith("The straight ramp (1 number) is closer to the trace than the simulation in ")
-    assert said.endswith(" in rating R (0.990 against 0.977).")
+    assert said.endswith(" in ISO rating (0.990 against 0.977).")
 
 
 def test_parameters_outside_the_literature_and_strong_correlations_are_said(content: Content) -> None:
