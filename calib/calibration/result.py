@@ -35,6 +35,7 @@ from calib.io.typed_document import FLAT, NULL, renamed
 from calib.io.wording import brief
 from calib.material.food import FoodSpec, load_material_file
 from calib.material.properties import MEANINGS
+from calib.material.references import cited
 from calib.posterior.estimates import ModeSummary, PosteriorSummary
 from calib.simulation.evaluation_frame import evaluation_frame
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
@@ -228,6 +229,11 @@ class CalibrationResult:
     def report(self) -> Path:
         """Path of the report."""
         return self.folder / "report.pdf"
+
+    @property
+    def references(self) -> dict[str, str]:
+        """What the sources of the values name, in full, by short name."""
+        return cited(p.source for p in (*self.fitted.values(), *self.fixed_parameters.values()))
 
     def meaning(self, name: str) -> str:
         """What a property is, in words; empty where the name is none of the material."""

@@ -19,6 +19,7 @@ from reports.calibration import (
     cut_figure,
     failures,
     measurement,
+    model_page,
     numerics_page,
     parameter_figures,
     parameter_page,
@@ -86,10 +87,14 @@ def _pictures(done: Finished) -> dict[str, bytes]:
         "forces.svg": figures.forces(curves, real, simulated, _room(result), _inside(result), look),
         "conditioning.svg": figures.conditioning(_record(done), curves),
         "fit.svg": figures.fit(curves, result.conditioning.noise_sd_N, trace),
+        "sketch.svg": model_page.sketch(result),
         "nulls.svg": figures.null_models(curves, trace, _null_peaks(result)),
     }
     if done.section is not None:
-        found["cut.svg"] = cut_figure.cut(*of_cut)
+        found |= {f"cut{k}.svg": look for k, look in enumerate(cut_figure.cut(*of_cut))}
+    names, matrix = parameter_page.correlation_matrix(result.posterior.correlations, list(fitted))
+    if len(names) > 1:
+        found["correlations.svg"] = parameter_figures.correlations(names, matrix)
     ranges = [parameter_page.parameter_range(name, p) for name, p in fitted.items()]
     if ranges:
         found["parameters.svg"] = parameter_figures.ranges(ranges)
@@ -180,6 +185,7 @@ def _content(done: Finished) -> Data:
         "broke_down": failures.sentence(done.runs, broken),
         "failures": numerics_page.failures(result.history.failures),
         "provenance": numerics_page.provenance(result),
+        "model": model_page.model(result),
         "limits": [capital(text) for text in result.limits],
         "warnings": [capital(text) for text in result.warnings],
     }

@@ -364,7 +364,7 @@ def test_a_force_that_hangs_on_the_cells_says_what_to_do(change):
 def test_where_the_work_went_is_said_largest_first():
     """Parts above half a per cent by name; the part that no law took apart, and none where older results lack it."""
     energy = {**dict.fromkeys(ENERGIES, 0.0), "parting": 0.7, "friction": 0.2, "damage": 0.004, "unbooked": 0.096}
-    assert spent(energy) == "parting the food 70%, friction 20%"
+    assert spent(energy) == "parting the food 70\xa0%, friction 20\xa0%"
     assert unbooked(energy) == pytest.approx(0.096)
     assert unbooked({"parting": 1.0}) is None and unbooked({}) is None
 
