@@ -233,7 +233,8 @@ class CalibrationResult:
     @property
     def references(self) -> dict[str, str]:
         """What the sources of the values name, in full, by short name."""
-        return cited(p.source for p in (*self.fitted.values(), *self.fixed_parameters.values()))
+        fitted, fixed = self.fitted.values(), self.fixed_parameters.values()
+        return cited([*(p.source for p in fitted), *(p.source for p in fixed)])
 
     def meaning(self, name: str) -> str:
         """What a property is, in words; empty where the name is none of the material."""

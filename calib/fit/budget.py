@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -26,11 +27,13 @@ def longest_time_left(runs: Sequence[ScoredRun], rest: float, options: FitOption
         options: How many simulations run at a time.
 
     Returns:
-        The time [s].
+        The time [s]; NaN before there is a run that did not compile its kernels, which the first of each worker do.
     """
     default = [t.evaluation.seconds for t in runs if not t.coarse]
     each = default or [t.evaluation.seconds / COARSE_TIME for t in runs]
-    return rest * math.fsum(each) / len(each) / options.batch
+    if not default and len(each) <= options.batch:
+        return math.nan
+    return rest * statistics.median(each) / options.batch
 
 
 def progress_of_all(

@@ -7,6 +7,7 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -197,7 +198,7 @@ def run(args: argparse.Namespace) -> int:
     out = Path(args.out or f"cutcal-{request.food.name}-{request.stem}")
 
     with workers_of(args, note) as pool, ProgressBar() as bar:
-        result = calibrate(request, out, pool, resume=args.resume, progress=bar, say=note)
+        result = calibrate(request, out, pool, resume=args.resume, progress=bar, say=partial(bar.note, note))
     if args.json:
         print_json(to_document(result))
     else:
