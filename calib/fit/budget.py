@@ -19,7 +19,8 @@ more (``FitOptions.coarse_cost``)."""
 def longest_time_left(runs: Sequence[ScoredRun], rest: float, options: FitOptions) -> float:
     """Time that the rest of a budget takes at most: were it all spent on default runs.
 
-    Before there is a default run, that is told from what coarse ones take (:data:`COARSE_TIME`).
+    Before there is a default run, that is told from what coarse ones take (:data:`COARSE_TIME`), by their lower
+    quartile: some of the first compile.
 
     Args:
         runs: The runs so far, one at least.
@@ -33,7 +34,8 @@ def longest_time_left(runs: Sequence[ScoredRun], rest: float, options: FitOption
     each = default or [t.evaluation.seconds / COARSE_TIME for t in runs]
     if not default and len(each) <= options.batch:
         return math.nan
-    return rest * statistics.median(each) / options.batch
+    usual = statistics.median(default) if default else sorted(each)[len(each) // 4]
+    return rest * usual / options.batch
 
 
 def progress_of_all(

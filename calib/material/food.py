@@ -17,6 +17,7 @@ import yaml
 from calib.errors import MaterialError, OutputError
 from calib.io.wording import listed
 from calib.io.yaml_checks import Dumper, Place, check_keys, choice, data_path, mapping, read_yaml, suggest, text
+from calib.material.own_food import OPTIONAL_HERE, filled
 from calib.material.properties import (
     DIMENSIONS,
     INCLUSIONS,
@@ -51,6 +52,8 @@ __all__ = [
 GIVEN_SPREAD = 10.0
 """Range of a property that has no literature and is given by the user: the value over and times this."""
 
+FILES = (".yaml", ".yml")
+"""How the name of a food's file ends."""
 _OPTIONAL = (*LAYERS, *LAYERS.values(), "skin_stiffness")  # that a file leaves out where a food has none
 _NULLABLE = ("R_skin", "tensile_strength", "fracture_energy", *_OPTIONAL)
 
@@ -140,7 +143,7 @@ class FoodSpec:
         Raises:
             MaterialError: There is no such food, or something is wrong with the file.
         """
-        if isinstance(name, Path) or str(name).endswith((".yaml", ".yml")):
+        if isinstance(name, Path) or str(name).endswith(FILES):
             return load_material_file(name)
         return load_food(name)
 
@@ -305,17 +308,20 @@ def load_food(name: str, path: Path | str | None = None) -> FoodSpec:
     """One food of a materials file.
 
     Args:
-        name: Lower case with underscores.
+        name: Lower case with underscores; or, where no other file is named, the YAML file of one food.
         path: As in :func:`load_foods`.
 
     Raises:
         MaterialError: As :func:`load_foods`, or an unknown food (with the nearest known one and the list).
     """
+    if path is None and name.endswith(FILES):
+        return load_material_file(name)
     foods = load_foods(path)
     if name not in foods:
         near = suggest(name, foods)
         listing = "" if near.startswith(";") else f"; known: {', '.join(foods)}"
-        raise MaterialError(f"unknown food {name!r}{near}{listing}")
+        begin = "" if path is not None else "; a food of your own is a file that cutcal foods --template begins"
+        raise MaterialError(f"unknown food {name!r}{near}{listing}{begin}")
     return foods[name]
 
 
@@ -331,7 +337,7 @@ def load_material_file(path: Path | str) -> FoodSpec:
         raise top.error(f"has {len(content)} foods, but one is needed; leave one of: {listed(list(content))}")
     name, raw = next(iter(content.items()))
     kept = None if provenance is None else mapping(top.at("calibration"), provenance)
-    return replace(_read_food(top.at(name), raw), calibration=kept)
+    return replace(_read_food(top.at(name), raw, own=True), calibration=kept)
 
 
 def dump_material(food: FoodSpec, path: Path | str, provenance: Mapping[str, Any]) -> None:
@@ -358,19 +364,24 @@ def dump_material(food: FoodSpec, path: Path | str, provenance: Mapping[str, Any
         raise OutputError(f"{path}: cannot be written ({e.strerror}); choose another folder") from None
 
 
-def _read_food(place: Place, raw: Any) -> FoodSpec:
+def _read_food(place: Place, raw: Any, own: bool = False) -> FoodSpec:
+    """A food as a file has it; what a file of one's own leaves out has a default."""
     food = mapping(place, raw)
     check_keys(place, food, ("shape", "properties"), ("not_modelled", *INCLUSIONS))
     said = text(place.at("not_modelled"), food["not_modelled"]) if "not_modelled" in food else None
     shape = mapping(place.at("shape"), food["shape"])
     given = mapping(place.at("properties"), food["properties"])
     check_keys(place.at("shape"), shape, ("kind", *DIMENSIONS), synonyms=SYNONYMS)
-    needed = [n for n in PROPERTIES if n not in _OPTIONAL]
-    check_keys(place.at("properties"), given, needed, _OPTIONAL, SYNONYMS)
+    needed = [] if own else [n for n in PROPERTIES if n not in _OPTIONAL]
+    optional = [n for n in PROPERTIES if n not in needed]
+    check_keys(place.at("properties"), given, needed, optional, SYNONYMS)
     dims = {n: read_property(place.at("shape"), n, shape[n]) for n in DIMENSIONS}
     held = {n: _read_sizes(place.at(n), food[n]) for n in INCLUSIONS if n in food}
-    have = [n for n in PROPERTIES if given.get(n) is not None or n not in _NULLABLE]
+    have = [n for n in PROPERTIES if given.get(n) is not None or (n in given and n not in _NULLABLE)]
     properties = {n: read_property(place.at("properties"), n, given[n]) for n in have}
+    if own and any(name not in given for name in OPTIONAL_HERE):
+        absent = [name for name in given if given[name] is None]
+        properties = filled(properties, [food.properties for food in load_foods().values()], absent)
     try:
         return FoodSpec(place.path[-1], shape["kind"], dims, properties, not_modelled=said, inclusions=held)
     except MaterialError as e:

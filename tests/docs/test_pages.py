@@ -91,7 +91,7 @@ def commands(text: str) -> list[str]:
     blocks = re.findall(r"^```bash\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
     lines = "\n".join(blocks).replace("\\\n", " ").splitlines()
     lines = [line.removeprefix(".venv/bin/") for line in lines]
-    return [line.partition(" #")[0] for line in lines if re.match(r"(cutcal|calibrate) ", line)]
+    return [line.partition(" #")[0].partition(" > ")[0] for line in lines if re.match(r"(cutcal|calibrate) ", line)]
 
 
 @pytest.mark.parametrize("path", [p for p in TEXTS if commands(read(p))], ids=name_of)

@@ -34,5 +34,5 @@ def test_time_left_is_that_of_default_runs() -> None:
     ]
     options = FitOptions(budget=80.0, batch=2)
     assert longest_time_left(runs, 10.0, options) == pytest.approx(35.0)  # type: ignore[arg-type]
-    assert longest_time_left(runs[:3], 10.0, options) == pytest.approx(3.5 / COARSE_TIME)  # type: ignore[arg-type]
+    assert longest_time_left(runs[:3], 10.0, options) == pytest.approx(2.5 / COARSE_TIME)  # type: ignore[arg-type]
     assert math.isnan(longest_time_left(runs[:2], 10.0, options))  # type: ignore[arg-type]
