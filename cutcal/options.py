@@ -122,7 +122,7 @@ def add_food(p: Group, *, cell: bool = True, required: bool = True) -> None:
         required: Whether ``--food`` must be given.
     """
     p = p.add_argument_group("food and knife")
-    p.add_argument("--food", required=required, metavar="NAME", help="food of materials.yaml (cutcal foods lists them)")
+    p.add_argument("--food", required=required, metavar="NAME", help="food that cutcal foods lists, or its YAML file")
     p.add_argument("--material", metavar="YAML", help="take the food from this file: a material.yaml")
     p.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE", help="give a property a value [SI, or its unit]"

@@ -125,13 +125,12 @@ def credibility(result: CalibrationResult, context: Context = Context()) -> Cred
     m = result.agreement.metrics
     sd = {name: n.prior_sd for name, n in result.nuisances.items()}
     stroke, gain = result.conditioning.stroke_m, sd.get("gain", 0.0)
-    of_peak = (result.agreement.peak_real_sd_N or 0.0, gain * m.peak_real_N, sd.get("drift", 0.0))
     of_work = (gain * m.work_real_J, sd.get("tare", 0.0) * stroke, sd.get("drift", 0.0) * stroke / 2.0)
     width = sd.get("width", 0.0)
     return Credibility(
         food=result.food,
         trace_sha256=result.trace_sha256,
-        peak=_error(m.peak_sim_N, m.peak_real_N, "N", (_numerics(result, "peak_change"), width, math.hypot(*of_peak))),
+        peak=_error(m.peak_sim_N, m.peak_real_N, "N", (_numerics(result, "peak_change"), width, result.peak_sd_N)),
         work=_error(m.work_sim_J, m.work_real_J, "J", (_numerics(result, "work_change"), width, math.hypot(*of_work))),
         context=context,
     )

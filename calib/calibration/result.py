@@ -35,6 +35,7 @@ from calib.io.typed_document import FLAT, NULL, renamed
 from calib.io.wording import brief
 from calib.material.food import FoodSpec, load_material_file
 from calib.material.properties import MEANINGS
+from calib.material.references import cited
 from calib.posterior.estimates import ModeSummary, PosteriorSummary
 from calib.simulation.evaluation_frame import evaluation_frame
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
@@ -146,6 +147,19 @@ class CalibrationResult:
         return dict(finite(to_document(self)))
 
     @property
+    def peak_sd_N(self) -> float:
+        """Standard uncertainty of the measured peak [N]: of the curve (noise, baseline), the gain and the drift."""
+        curve, gain, drift = self.peak_parts_N
+        return math.hypot(curve, gain, drift)
+
+    @property
+    def peak_parts_N(self) -> tuple[float, float, float]:
+        """Parts of the standard uncertainty of the measured peak [N]: curve, gain of the sensor, drift."""
+        sd = {name: n.prior_sd for name, n in self.nuisances.items()}
+        gain = sd.get("gain", 0.0) * self.agreement.peak_real_N
+        return self.agreement.peak_real_sd_N or 0.0, gain, sd.get("drift", 0.0)
+
+    @property
     def parameters(self) -> pd.DataFrame:
         """Fitted values by name: value, unit, 95 % interval, literature range, verdict, status, source."""
         return pd.DataFrame.from_dict(self.summary["parameters"], orient="index")
@@ -215,6 +229,12 @@ class CalibrationResult:
     def report(self) -> Path:
         """Path of the report."""
         return self.folder / "report.pdf"
+
+    @property
+    def references(self) -> dict[str, str]:
+        """What the sources of the values name, in full, by short name."""
+        fitted, fixed = self.fitted.values(), self.fixed_parameters.values()
+        return cited([*(p.source for p in fitted), *(p.source for p in fixed)])
 
     def meaning(self, name: str) -> str:
         """What a property is, in words; empty where the name is none of the material."""

@@ -251,6 +251,19 @@ class BrokenRun:
         return {name: PROPERTIES[name].unit if name in PROPERTIES else "-" for name in self.parameters}
 
 
+@dataclass(frozen=True)
+class Tally:
+    """Simulations of one kind.
+
+    Attributes:
+        simulations: How many there are.
+        failed: How many of them broke down.
+    """
+
+    simulations: Count
+    failed: Count
+
+
 @dataclass(frozen=True, kw_only=True)
 class SearchHistory:
     """The simulations of the search.
@@ -265,6 +278,8 @@ class SearchHistory:
             and misfit.
         repeatability: Noise of a simulated curve as the fit sees it, part of the peak; null where the fit ended too
             early.
+        kept: All simulations that evaluations.h5 holds, those of intervals and checks too, by fidelity: coarse, fine,
+            again (half the speed, other particles), check.
     """
 
     simulations: Count
@@ -274,6 +289,7 @@ class SearchHistory:
     failures: tuple[Annotated[BrokenRun, keywords(description="One of them")], ...]
     misfit_history: tuple[tuple[Annotated[int, keywords(minimum=1)], float], ...]
     repeatability: float | None = field(default=None, metadata=NULL)
+    kept: Mapping[str, Tally] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

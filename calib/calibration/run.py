@@ -7,23 +7,26 @@ numerical checks, judges, and writes.
 
 from __future__ import annotations
 
+import itertools
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from calib.calibration.calibrated import Calibrated
 from calib.calibration.credibility import write_credibility
 from calib.calibration.result import SUMMARY, CalibrationResult, read_result, to_document
+from calib.calibration.run_clock import RunClock, earlier_runs
 from calib.calibration.summary import add_conditioning, summarise
 from calib.fit.multistart import FitResult
 from calib.fit.options import FitOptions
 from calib.io.folder import prepare, write_csv, write_json
 from calib.io.progress import Progress
-from calib.material.food import dump_material
+from calib.material.food_file import dump_material
 from calib.posterior.answer import sampled_answer
 from calib.posterior.posterior import SampledPosterior
 from calib.posterior.sampling import check_installed
@@ -82,8 +85,9 @@ def run(
         options.check(len(setup.objective.parameters))
     with prepare(out, "calibrate", resume=resume):
         with EvaluationStore(out / STORE, setup.header, resume=resume, say=say) as store:
-            work = _Calibration(setup, pool, store, out, say)
-            found = work.fitted(options, progress)
+            clock = RunClock(progress, earlier_runs(out, pool.batch) if progress else [])
+            work = _Calibration(setup, pool, store, out, say, clock)
+            found = work.fitted(options)
             calibrated = work.repeated(found)
         add_conditioning(out / STORE, setup.curve)
         return _write(calibrated, out, began)
@@ -103,7 +107,7 @@ class _Calibration:
     """A calibration while its simulations run.
 
     Attributes: what was decided; where the simulations run and where they are kept; the output folder; and who is told
-    of each stage.
+    of each stage, in words and as a part of all.
     """
 
     setup: Setup
@@ -111,15 +115,21 @@ class _Calibration:
     store: EvaluationStore
     out: Path
     say: Callable[[str], None]
+    clock: RunClock
 
-    def fitted(self, options: FitOptions, progress: Callable[[Progress], None] | None) -> _Found:
+    def fitted(self, options: FitOptions) -> _Found:
         """The fit, and its uncertainty."""
         setup = self.setup
         evaluators = setup.evaluators(self.pool, self.store)
         if setup.request.sample:
             return self._sampled(evaluators)
-        listener = Listener(progress, self.say, self._begin_longest_check)
+        listener = Listener(self.clock.search, self._said, self._begin_longest_check)
         return _Found(*fit_with_uncertainty(setup.objective, evaluators, options, listener))
+
+    def _said(self, text: str) -> None:
+        """A stage of the intervals, told to both listeners."""
+        self.say(text)
+        self.clock.stage(text.partition(":")[0])
 
     def _sampled(self, evaluators: Evaluators) -> _Found:
         """The best food of the sampled posterior, and what is uncertain."""
@@ -143,11 +153,26 @@ class _Calibration:
             errands += [*check_errands(scene, self.store), *self._start_errands()]
         if errands:
             self.say(f"simulating the best values once more: {'whole, and ' + VARIED if ended else 'whole'}")
-            self.pool.errands(errands)
+            self.pool.errands(self._counted(errands))
         record = read_record(scene, path)
         checks = check(scene, best, self.store, setup.curve.stroke_length_m) if ended else []
         start = self._start_curve() if ended else np.full_like(setup.curve.stroke, np.nan)
         return Calibrated(setup.sized(best.parameters), fit, found.analysis, record, checks, start, found.posterior)
+
+    def _counted(self, errands: Sequence[Errand]) -> list[Errand]:
+        """The same errands, each of which tells when it is made."""
+        numbers, whole = itertools.count(1), len(errands)
+        self.clock.stage("last simulations", 0, whole)
+
+        def counted(errand: Errand) -> Errand:
+            def keep(made: Any) -> None:
+                errand.keep(made)
+                number = next(numbers)
+                self.clock.stage(f"last simulations, {number} of {whole}", number, whole)
+
+            return replace(errand, keep=keep)
+
+        return [counted(errand) for errand in errands]
 
     @cached_property
     def _fine(self) -> CachedEvaluator:

@@ -26,6 +26,7 @@ from calib.calibration.result_parts import (
     SearchHistory,
     SimulatedCut,
     SobolIndices,
+    Tally,
     TraceSource,
 )
 from calib.errors import OutputError
@@ -37,12 +38,13 @@ from calib.problem.parameters import STRESS_LIKE, property_of
 from calib.problem.request import Request
 from calib.problem.setup import Setup
 from calib.simulation.evaluation import doubts_of_the_crack
+from calib.simulation.evaluation_frame import evaluation_frame
 from calib.trace.conditioning import Conditioned
 from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.uncertainty.intervals import Uncertainty
 from calib.uncertainty.limiting import limiting
-from calib.validation.acceptance import Conservation, Verdict, judge, limits
+from calib.validation.acceptance import Conservation, Verdict, bound_word, judge, limits
 from mpm.files import write_atomic
 from mpm.output.record import ForceRecord
 from mpm.scene import Knife
@@ -89,7 +91,7 @@ def summarise(done: Calibrated, folder: Path, began: float) -> CalibrationResult
         nuisances=nuisances,
         posterior=_posterior(setup, fit, analysis),
         fixed_parameters=_fixed(request, fitted),
-        history=_history(fit),
+        history=_history(fit, _kept(folder)),
         cut=_cut(setup, record),
         software=Software.here(),
         invocation=Invocation(request.seed, request.arch, tuple(request.command)),
@@ -181,7 +183,7 @@ def _fitted(request: Request, fit: FitResult, analysis: UncertaintyAnalysis | No
         known = {**request.food.properties, **request.food.sizes}[p.name]
         one = FittedParameter.of(p if found is None else found.intervals[k], known, sampled.get(p.name))
         product = p.name in products and one.verdict in ("identified", "weak")
-        out[p.name] = replace(one, verdict="only_as_product") if product else one
+        out[p.name] = replace(one, verdict="only_as_product" if product else bound_word(p.name, one))
     return out
 
 
@@ -225,7 +227,7 @@ def _fixed(request: Request, fitted: Mapping[str, FittedParameter]) -> dict[str,
     }
 
 
-def _history(fit: FitResult) -> SearchHistory:
+def _history(fit: FitResult, kept: Mapping[str, Tally]) -> SearchHistory:
     history, best = [], math.inf
     for number, trial in enumerate(fit.history, 1):
         if trial.ok and not trial.coarse and trial.misfit < best:
@@ -241,7 +243,15 @@ def _history(fit: FitResult) -> SearchHistory:
         failures=tuple(BrokenRun(e.reason, e.fraction, e.parameters) for e in failed),
         misfit_history=tuple(history),
         repeatability=None if math.isnan(fit.repeatability) else fit.repeatability,
+        kept=kept,
     )
+
+
+def _kept(folder: Path) -> dict[str, Tally]:
+    """How many simulations the store of a run holds, by what they were made for, and how many of them failed."""
+    table = evaluation_frame(folder)
+    groups = table["status"].groupby(table["fidelity"])
+    return {str(kind): Tally(len(status), int((status != "ok").sum())) for kind, status in groups}
 
 
 def _cut(setup: Setup, record: ForceRecord) -> SimulatedCut:

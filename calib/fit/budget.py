@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -18,7 +19,8 @@ more (``FitOptions.coarse_cost``)."""
 def longest_time_left(runs: Sequence[ScoredRun], rest: float, options: FitOptions) -> float:
     """Time that the rest of a budget takes at most: were it all spent on default runs.
 
-    Before there is a default run, that is told from what coarse ones take (:data:`COARSE_TIME`).
+    Before there is a default run, that is told from what coarse ones take (:data:`COARSE_TIME`), by their lower
+    quartile: some of the first compile.
 
     Args:
         runs: The runs so far, one at least.
@@ -26,11 +28,14 @@ def longest_time_left(runs: Sequence[ScoredRun], rest: float, options: FitOption
         options: How many simulations run at a time.
 
     Returns:
-        The time [s].
+        The time [s]; NaN before there is a run that did not compile its kernels, which the first of each worker do.
     """
     default = [t.evaluation.seconds for t in runs if not t.coarse]
     each = default or [t.evaluation.seconds / COARSE_TIME for t in runs]
-    return rest * math.fsum(each) / len(each) / options.batch
+    if not default and len(each) <= options.batch:
+        return math.nan
+    usual = statistics.median(default) if default else sorted(each)[len(each) // 4]
+    return rest * usual / options.batch
 
 
 def progress_of_all(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 import time
 from collections.abc import Callable
@@ -15,6 +16,9 @@ BAR = 20
 
 #: Package of the streams of a notebook, which rewrite a line after a carriage return though they are no terminal.
 NOTEBOOK = "ipykernel"
+
+#: Kind of terminal (TERM) that cannot rewrite a line, as in an editor.
+DUMB = "dumb"
 
 #: Without a terminal (log file, pipe) a line is printed at most this often [s].
 PLAIN_INTERVAL_S = 30.0
@@ -32,6 +36,8 @@ class Progress:
         misfit: Smallest chi-square of a finished run so far [-]; infinite while there is none.
         eta_s: Time that the rest of the budget takes at most [s]; a fit that converges ends earlier.
         stage: What the last simulation was run for.
+        typical_s: Time that is left in a typical run [s]; NaN where that is not known.
+        part: Part of all the work that is done [-]; None where only the budget tells it.
     """
 
     done: int
@@ -41,6 +47,8 @@ class Progress:
     misfit: float
     eta_s: float
     stage: str
+    typical_s: float = math.nan
+    part: float | None = None
 
     def line(self) -> str:
         """One line of plain text without bar, such as ``12 simulations of 80, ...``."""
@@ -48,9 +56,16 @@ class Progress:
         if self.failed:
             parts.append(f"{self.failed} failed")
         parts.append(f"chi2 {self.misfit:.4g}" if math.isfinite(self.misfit) else "chi2 -")
-        parts.append(f"at most {clock(self.eta_s)} left")
+        parts += self._left()
         parts.append(self.stage)
         return ", ".join(parts)
+
+    def _left(self) -> list[str]:
+        """What is known of the time left, in words."""
+        most = f"at most {clock(self.eta_s)}"
+        if not math.isfinite(self.eta_s):
+            return []
+        return [f"about {clock(self.typical_s)} left, {most}" if math.isfinite(self.typical_s) else f"{most} left"]
 
 
 def clock(seconds: float) -> str:
@@ -104,7 +119,8 @@ class ProgressBar:
         self._stream = sys.stderr if stream is None else stream
         self._interval = interval_s
         self._now = now
-        self._terminal = self._stream.isatty() or type(self._stream).__module__.startswith(NOTEBOOK)
+        notebook = type(self._stream).__module__.startswith(NOTEBOOK)
+        self._terminal = notebook or (self._stream.isatty() and os.environ.get("TERM") != DUMB)
         self._width = 0
         self._last = -math.inf
 
@@ -118,10 +134,18 @@ class ProgressBar:
 
     def _rewrite(self, progress: Progress) -> None:
         """Replace the line on the terminal."""
-        full = min(BAR, int(BAR * progress.spent / progress.budget))
+        part = progress.spent / progress.budget if progress.part is None else progress.part
+        full = min(BAR, int(BAR * part))
         text = f"[{'#' * full}{'.' * (BAR - full)}] {progress.line()}"
         print("\r" + text.ljust(self._width), end="", file=self._stream, flush=True)
         self._width = len(text)
+
+    def note(self, say: Callable[[str], None], text: str) -> None:
+        """Say something on a line of its own: the bar is wiped before, and comes back with what is told next."""
+        if self._width:
+            print("\r" + " " * self._width + "\r", end="", file=self._stream, flush=True)
+            self._width = 0
+        say(text)
 
     def __enter__(self) -> ProgressBar:
         return self

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-import yaml
-
-from calib.errors import MaterialError, OutputError
+from calib.errors import MaterialError
 from calib.io.wording import listed
-from calib.io.yaml_checks import Dumper, Place, check_keys, choice, data_path, mapping, read_yaml, suggest, text
+from calib.io.yaml_checks import Place, check_keys, choice, data_path, mapping, read_yaml, suggest, text
+from calib.material.food_file import dump_material
+from calib.material.own_food import OPTIONAL_HERE, filled
 from calib.material.properties import (
     DIMENSIONS,
     FORM,
@@ -31,7 +31,6 @@ from calib.material.properties import (
     read_property,
     rule_of,
 )
-from mpm.files import write_atomic
 from mpm.scene.profiles import BARRELS, FAMILY
 from mpm.scene.shapes import SHAPE_KINDS
 
@@ -45,7 +44,6 @@ __all__ = [
     "Property",
     "Source",
     "check_override",
-    "dump_material",
     "load_food",
     "load_foods",
     "load_material_file",
@@ -54,6 +52,8 @@ __all__ = [
 GIVEN_SPREAD = 10.0
 """Range of a property that has no literature and is given by the user: the value over and times this."""
 
+FILES = (".yaml", ".yml")
+"""How the name of a food's file ends."""
 _STRENGTHS = ("strength_ratio", "tensile_strength")  # a food has one of them at most
 _OPTIONAL = (*LAYERS, *LAYERS.values(), "skin_stiffness", *RELAXATION, *_STRENGTHS)  # a file may leave these out
 _NULLABLE = ("R_skin", "fracture_energy", *_OPTIONAL)
@@ -151,7 +151,7 @@ class FoodSpec:
         Raises:
             MaterialError: There is no such food, or something is wrong with the file.
         """
-        if isinstance(name, Path) or str(name).endswith((".yaml", ".yml")):
+        if isinstance(name, Path) or str(name).endswith(FILES):
             return load_material_file(name)
         return load_food(name)
 
@@ -334,17 +334,20 @@ def load_food(name: str, path: Path | str | None = None) -> FoodSpec:
     """One food of a materials file.
 
     Args:
-        name: Lower case with underscores.
+        name: Lower case with underscores; or, where no other file is named, the YAML file of one food.
         path: As in :func:`load_foods`.
 
     Raises:
         MaterialError: As :func:`load_foods`, or an unknown food (with the nearest known one and the list).
     """
+    if path is None and name.endswith(FILES):
+        return load_material_file(name)
     foods = load_foods(path)
     if name not in foods:
         near = suggest(name, foods)
         listing = "" if near.startswith(";") else f"; known: {', '.join(foods)}"
-        raise MaterialError(f"unknown food {name!r}{near}{listing}")
+        begin = "" if path is not None else "; a food of your own is a file that cutcal foods --template begins"
+        raise MaterialError(f"unknown food {name!r}{near}{listing}{begin}")
     return foods[name]
 
 
@@ -360,47 +363,28 @@ def load_material_file(path: Path | str) -> FoodSpec:
         raise top.error(f"has {len(content)} foods, but one is needed; leave one of: {listed(list(content))}")
     name, raw = next(iter(content.items()))
     kept = None if provenance is None else mapping(top.at("calibration"), provenance)
-    return replace(_read_food(top.at(name), raw), calibration=kept)
+    return replace(_read_food(top.at(name), raw, own=True), calibration=kept)
 
 
-def dump_material(food: FoodSpec, path: Path | str, provenance: Mapping[str, Any]) -> None:
-    """Write a food and where its values come from; :func:`load_material_file` reads it back unchanged.
-
-    Args:
-        food: The calibrated food.
-        path: The file to write; an existing one is replaced as a whole or not at all.
-        provenance: Plain data (text, numbers, lists, mappings), for instance trace hash, versions, intervals.
-
-    Raises:
-        OutputError: The file cannot be written, or ``provenance`` holds something that is not plain data.
-    """
-    path = Path(path)
-    document = {food.name: food.as_dict(), "calibration": dict(provenance)}
-    try:
-        body = yaml.dump(document, Dumper=Dumper, sort_keys=False, allow_unicode=True, width=110)
-    except yaml.representer.RepresenterError as e:
-        raise OutputError(f"{path}: the provenance holds {e.args[-1]!r}; give plain data only") from None
-    head = "# One calibrated food in the layout of materials.yaml. All values in SI units.\n"
-    try:
-        write_atomic(path, head + body)
-    except OSError as e:
-        raise OutputError(f"{path}: cannot be written ({e.strerror}); choose another folder") from None
-
-
-def _read_food(place: Place, raw: Any) -> FoodSpec:
+def _read_food(place: Place, raw: Any, own: bool = False) -> FoodSpec:
+    """A food as a file has it; what a file of one's own leaves out has a default."""
     food = mapping(place, raw)
     check_keys(place, food, ("shape", "properties"), ("not_modelled", *INCLUSIONS))
     said = text(place.at("not_modelled"), food["not_modelled"]) if "not_modelled" in food else None
     shape = mapping(place.at("shape"), food["shape"])
     given = mapping(place.at("properties"), food["properties"])
     check_keys(place.at("shape"), shape, ("kind", *DIMENSIONS), tuple(FORM), SYNONYMS)
-    needed = [n for n in PROPERTIES if n not in _OPTIONAL]
-    check_keys(place.at("properties"), given, needed, _OPTIONAL, SYNONYMS)
+    needed = [] if own else [n for n in PROPERTIES if n not in _OPTIONAL]
+    optional = [n for n in PROPERTIES if n not in needed]
+    check_keys(place.at("properties"), given, needed, optional, SYNONYMS)
     dims = {n: read_property(place.at("shape"), n, shape[n]) for n in DIMENSIONS}
     form = {n: read_property(place.at("shape"), n, shape[n]) for n in FORM if n in shape}
     held = {n: _read_sizes(place.at(n), food[n]) for n in INCLUSIONS if n in food}
-    have = [n for n in PROPERTIES if given.get(n) is not None or n not in _NULLABLE]
+    have = [n for n in PROPERTIES if given.get(n) is not None or (n in given and n not in _NULLABLE)]
     properties = {n: read_property(place.at("properties"), n, given[n]) for n in have}
+    if own and any(name not in given for name in OPTIONAL_HERE):
+        absent = [name for name in given if given[name] is None]
+        properties = filled(properties, [food.properties for food in load_foods().values()], absent)
     try:
         return FoodSpec(place.path[-1], shape["kind"], dims, properties, None, said, held, **form)
     except MaterialError as e:

@@ -9,6 +9,7 @@ from typing import Any
 from calib.errors import MaterialError
 from calib.io.yaml_checks import Place, check_keys, check_unit, choice, finite_number, mapping, suggest, text
 from calib.table.si_numbers import si_number
+from mpm.output.number_text import interval
 from mpm.scene.material import MAX_POISSON
 
 #: Where a literature value comes from: measured on this food; Table 2 of the CulinaryCut paper; another food,
@@ -193,7 +194,7 @@ class Property:
         values = [s.value for s in self.sources] + ([self.value] if self.status in LITERATURE_STATUSES else [])
         if min(values, default=0.0) > 0.0 and max(values) > DISAGREEMENT * min(values):
             said.append(
-                f"published values go from {min(values):.3g} to {max(values):.3g} {self.unit}, "
+                f"published values go from {interval(min(values), max(values), self.unit)}, "
                 f"{max(values) / min(values):.3g} times"
             )
         if self.flag:

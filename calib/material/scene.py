@@ -105,7 +105,7 @@ def specimen(
     default = food.to_scene_food(shape=open_shape(food) if open_form else sizing.shape).shape
     if sizing.outline is not None:
         default = replace(default, kind=OUTLINE, outline=sizing.outline)
-    height = sizing.height
+    height, fits_height = sizing.height, False
     if height is None and trace is not None and trace.stroke_source != "height":
         free = height_range(food, trace, sizing)
         if free is None:
@@ -116,7 +116,7 @@ def specimen(
                 "--height if you measured it"
             )
         else:
-            low, height, high = free
+            (low, height, high), fits_height = free, True
             said.append(
                 "the specimen's height is not known: the trace ends under load, so the edge stopped on the board or "
                 f"above it, and {low * 1e3:.0f} to {high * 1e3:.0f} mm are possible; give --height if you measured it"
@@ -147,8 +147,10 @@ def specimen(
     left, right = min(sizing.at * whole, most), min((1 - sizing.at) * whole, most)
     length = left + right
     if sizing.length is None:
+        # a height that is fitted takes the length along: a number would be that of the start
+        size = f"{length / height:.3g} heights" if fits_height else f"{length * 1e3:.0f} mm"
         said.append(
-            f"the specimen's length across the blade is not known: {length * 1e3:.0f} mm keep the proportions of the "
+            f"the specimen's length across the blade is not known: {size} keep the proportions of the "
             "food; the blade bends longer halves apart with more force; give --length if you measured it"
         )
     return replace(default, length=length, width=width, height=height, cut=(left - right) / 2), said

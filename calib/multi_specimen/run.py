@@ -16,7 +16,8 @@ from pathlib import Path
 from calib.io.folder import prepare, write_csv
 from calib.io.progress import Progress
 from calib.io.provenance import Invocation, Software, key_of
-from calib.material.food import FoodSpec, dump_material
+from calib.material.food import FoodSpec
+from calib.material.food_file import dump_material
 from calib.material.properties import MEANINGS
 from calib.multi_specimen.compression_modulus import CompressionModulus, compression_modulus
 from calib.multi_specimen.fitted_cuts import FittedCut, fitted_cuts

@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from mpm.arrays import FloatArray
+from mpm.output.number_text import quantity
 from mpm.scene import Scene
 
 FULLY_PARTED, NOT_PARTED = 0.8, 0.5
@@ -44,16 +45,16 @@ def doubts_of_the_crack(scene: Scene) -> list[str]:
         (docs/theory.md, "Constants of the method").
     """
     material = scene.food.material
-    used, cell = scene.tie_strength, f"{scene.numerics.dx * 1e3:.3g} mm"
+    used, cell = quantity(scene.tie_strength, "Pa"), quantity(scene.numerics.dx, "m")
     out = []
     if scene.weakened:
         out.append(
-            f"the tensile strength of {material.cohesion / 1e3:.3g} kPa is more than cells of {cell} resolve; "
-            f"{used / 1e3:.3g} kPa was used, R is the same; a smaller cell (--dx) resolves more"
+            f"the tensile strength of {quantity(material.cohesion, 'Pa')} is more than cells of {cell} resolve; "
+            f"{used} was used, R is the same; a smaller cell (--dx) resolves more"
         )
     if scene.flows_at_its_crack:
         out.append(
-            f"the food parts at {used / 1e3:.3g} kPa and yields at {material.yield_stress / 1e3:.3g} kPa, so it flows "
+            f"the food parts at {used} and yields at {quantity(material.yield_stress, 'Pa')}, so it flows "
             f"at the tip of its crack, which cells of {cell} hardly resolve: finer ones need up to a quarter more; "
             "give it a tensile_strength below its yield_stress, or look at smaller cells (--dx)"
         )

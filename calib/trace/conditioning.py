@@ -48,6 +48,8 @@ DRIFT_ROUNDS = 2
 PEAK_RANGE_N = (0.05, 5e3)
 """Peak forces outside are taken for a unit mix-up [N]."""
 NOTHING_N = 1e-6
+#: A standard deviation below this part of the peak is that of rounding: a digitised trace has no noise [-].
+ROUNDING = 1e-9
 """Variation of a force below which there is nothing in it but rounding [N]."""
 
 
@@ -167,6 +169,7 @@ def condition(
     behind_sd, behind = level_behind(trace, tared, out, peak, level.noise_sd)
     end_s = float(trace.time[int(np.argmax(axis.stroke >= length * (1 - 1e-9)))])
     level_sd = _root_sum(level.level_sd, mend.level_sd, 0.0 if air_mend is None else air_mend.level_sd)
+    level_sd, noise_sd = (sd if sd > ROUNDING * peak else 0.0 for sd in (level_sd, level.noise_sd))
     at_peak = contact.onset + (end_s - contact.onset) * float(grid[int(np.argmax(curve))]) / length
     drift_sd = 0.0 if drift is None else drift.sd(at_peak)
     said = (*approach, *mend.notes, *(() if air_mend is None else air_mend.notes), *sudden, *behind, *held.notes)
@@ -186,7 +189,7 @@ def condition(
         curve=curve,
         stroke_source=axis.source,
         stroke_length_m=length,
-        noise_sd_N=level.noise_sd,
+        noise_sd_N=noise_sd,
         curve_noise_sd_N=_root_sum(noise, held.step_sd),
         filter_sd_m=FILTER_SD_M,
         peak_N=peak,
@@ -281,8 +284,8 @@ def _baseline_warnings(
         found = _air_warnings(trace, air, contact.onset)
     if contact.baseline.noise_sd < FLOOR_FRACTION * contact.peak:
         found.append(
-            f"the force before contact hardly varies ({contact.baseline.noise_sd:.2g} N): digitised, "
-            "smoothed or clipped data; the noise and every uncertainty that follows from it are too small"
+            "the force before contact hardly varies: digitised, smoothed or clipped "
+            "data; the noise and every uncertainty that follows from it are too small"
         )
     return found
 

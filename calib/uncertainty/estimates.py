@@ -25,7 +25,7 @@ class FittedParameter:
         prior_low: Lower end of the literature's 95 % range [unit].
         prior_high: Upper end of the literature's 95 % range [unit].
         verdict: Its identifiability (:data:`calib.uncertainty.intervals.Identifiability`), ``only_as_product`` or
-            :data:`UNKNOWN`.
+            :data:`UNKNOWN`; ``at_limit`` where the bound is the end of what is possible.
         status: How far the value at the start can be trusted, as in ``materials.yaml``.
         source: Where the value at the start and the range come from.
         sampled95: Ends of the 95 % interval of a sample of the posterior [unit], where one was drawn.

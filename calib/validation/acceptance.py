@@ -18,6 +18,7 @@ from calib.validation.metrics import Metrics
 from calib.validation.numerical_checks import FINER_GRID, HALF_SPEED, VARIANTS, Check
 from calib.validation.predictive_score import PredictiveScore
 from calib.validation.prior_conflict import PriorConflict
+from mpm.output.number_text import listed, quantity, uncertain
 
 # Limits of a single in-sample calibration. Peak: the figure that published work quotes (CulinaryCut, "within 5 %").
 # Curve and shape: twice the target of a validated model (5 %), because absolute forces of the sensors that such traces
@@ -27,6 +28,7 @@ FIT_NRMSE_LIMIT = 0.08
 SHAPE_LIMIT = 0.08
 MOMENTUM_BALANCE_LIMIT = 0.01
 CHANGE_LIMIT = 0.05  # of peak and work by numerical choices: as much as the peak may miss the trace
+CHANGE_DIGITS = 2  # significant digits of such a change
 LOSS_LIMIT = 0.05  # energy lost by the discretisation, of all work: the force is too large by about that
 CURVE_LINE = "curve error (NRMSE)"
 CONSTANTS_LINE = "constants of the method halved and doubled"
@@ -40,7 +42,8 @@ BAND_LIMIT = 0.5  # a band wider than a quarter of the peak either way predicts 
 OPENING_REMARKED = 0.1  # part of the new surface that opens ahead of the edge, from which on it is said [-]
 # Ends of what is physically possible: a fit that ends there found a one-sided answer (the cut shows no friction, say),
 # whereas one that ends on a bound of ours asks for a value that it was not allowed.
-NATURAL_LIMITS = {"mu": 0.0}
+NATURAL_LIMITS = {"mu": 0.0, "strength_ratio": 1.0}
+AT_BOUND, AT_LIMIT = "at_bound", "at_limit"
 NUISANCE_LINES = {"lag": "delay of the trace within its uncertainty", "gain": "sensor's gain within its uncertainty"}
 """Nuisances that the validation hangs on, and their lines: a trace that asks for more of one than its sensor leaves
 open fails."""
@@ -119,8 +122,13 @@ def _change(check: Check) -> Verdict:
     factor, rest = (2.0, ", extrapolated to rest") if check.name == HALF_SPEED else (1.0, "")
     peak, work = factor * check.peak_change, factor * check.work_change
     change = max(abs(peak), abs(work))
-    note = f"peak {peak:+.1%}, work {work:+.1%}{rest}"
-    return Verdict(check.name, change, CHANGE_LIMIT, "fraction", change <= CHANGE_LIMIT, note)
+    return Verdict(check.name, change, CHANGE_LIMIT, "fraction", change <= CHANGE_LIMIT, _changed(peak, work) + rest)
+
+
+def _changed(peak: float | None, work: float | None) -> str:
+    """What a numerical choice changes, in words."""
+    peak_text, work_text = (quantity(x, "fraction", digits=CHANGE_DIGITS, signed=True) for x in (peak, work))
+    return f"peak {peak_text}, work {work_text}"
 
 
 def _constants(checks: Sequence[Check]) -> Verdict:
@@ -131,14 +139,14 @@ def _constants(checks: Sequence[Check]) -> Verdict:
         return Verdict(CONSTANTS_LINE, None, CHANGE_LIMIT, "fraction", False, note)
     worst = max(checks, key=lambda c: c.change or 0.0)
     size = worst.change or 0.0
-    note = f"most by {worst.name}: peak {worst.peak_change:+.1%}, work {worst.work_change:+.1%}"
+    note = f"most by {worst.name}: {_changed(worst.peak_change, worst.work_change)}"
     return Verdict(CONSTANTS_LINE, size, CHANGE_LIMIT, "fraction", size <= CHANGE_LIMIT, note)
 
 
 def _nuisance(name: str, n: FittedNuisance) -> Verdict:
     size = abs(n.value) / n.prior_sd
-    unit = "" if n.unit == "-" else f" {n.unit}"
-    note = f"{name} {n.value:+.2g} ± {n.sd:.1g}{unit}, expected 0 ± {n.prior_sd:.1g}{unit}"
+    unit = "fraction" if n.unit == "-" else n.unit
+    note = f"{name} {uncertain(n.value, n.sd, unit)}, expected 0 ± {quantity(n.prior_sd, unit, digits=2)}"
     return Verdict(NUISANCE_LINES[name], size, OUTSIDE, "sd", not n.outside, note)
 
 
@@ -151,7 +159,7 @@ def balances(kept: Conservation) -> list[Verdict]:
     Returns:
         The lines.
     """
-    note = f"edge and opening took {kept.parted:.0%} of R times the new area"
+    note = f"edge and opening took {quantity(kept.parted, 'fraction')} of R times the new area"
     cut = [] if math.isnan(kept.parted) else [_below(PRESSED, max(0.0, 1.0 - kept.parted), PRESSED_LIMIT, note=note)]
     lost = [] if math.isnan(kept.unbooked) else [_below(LOST, kept.unbooked, LOSS_LIMIT, note="of the work")]
     momentum = kept.momentum_residual
@@ -226,10 +234,24 @@ def _conflict(found: PriorConflict) -> Verdict:
 def _at_natural_limit(name: str, p: FittedParameter) -> bool:
     """Whether a parameter at a bound is at the end of what is possible: its interval reaches there, and its value is
     nearer to that end than to the other."""
-    limit = NATURAL_LIMITS.get(name, -math.inf)
-    if p.low95 is None or p.high95 is None:
+    limit = NATURAL_LIMITS.get(name)
+    if limit is None or p.low95 is None or p.high95 is None:
         return False
-    return bool(p.low95 <= limit and p.value - limit < p.high95 - p.value)
+    within = p.low95 * (1 - 1e-9) <= limit <= p.high95 * (1 + 1e-9)
+    return within and abs(p.value - limit) < max(p.value - p.low95, p.high95 - p.value)
+
+
+def bound_word(name: str, p: FittedParameter) -> str:
+    """The verdict on a fitted parameter, where a bound that is the end of what is possible has a word of its own.
+
+    Args:
+        name: The parameter.
+        p: What the fit says of it.
+
+    Returns:
+        :data:`AT_LIMIT` for :data:`AT_BOUND` at the end of what is possible, else the verdict as it is.
+    """
+    return AT_LIMIT if p.verdict == AT_BOUND and (name in FITTED_SIZES or _at_natural_limit(name, p)) else p.verdict
 
 
 def judge(
@@ -283,9 +305,8 @@ def _against_nulls(metrics: Metrics, nulls: Mapping[str, Metrics]) -> Verdict:
 
 def _bounds(fitted: Mapping[str, FittedParameter]) -> Verdict:
     """The line of parameters that ran into a bound of ours."""
-    on = [n for n, p in fitted.items() if p.verdict == "at_bound"]
-    # what is bounded by what is possible may reach its bound
-    stuck = [n for n in on if n not in FITTED_SIZES and not _at_natural_limit(n, fitted[n])]
+    on = [n for n, p in fitted.items() if p.verdict in (AT_BOUND, AT_LIMIT)]
+    stuck = [n for n in on if bound_word(n, fitted[n]) == AT_BOUND]
     note = ", ".join(stuck + [f"{n} at its natural limit" for n in on if n not in stuck])
     return Verdict("parameters at a bound", len(stuck), 0, "", not stuck, note)
 
@@ -335,7 +356,7 @@ def _limits_of_parameters(fitted: Mapping[str, FittedParameter]) -> list[str]:
         )
     weak = [n for n, p in fitted.items() if p.verdict == "weak" and property_of(n) in HELD_WEAK]
     if weak:
-        held = ", ".join(f"{HELD_WEAK[property_of(n)]:.0%} for {n}" for n in weak)
+        held = listed([f"{quantity(HELD_WEAK[property_of(n)], 'fraction')} for {n}" for n in weak])
         said.append(f"Weak intervals hold the truth less often than in 95 %: of 100 made-up banana cuts in {held}.")
     return said
 
@@ -361,8 +382,9 @@ def _limits_of_simulation(fracture: Mapping[str, float] | None) -> list[str]:
     if fracture is not None and "opening_J_m2" in fracture:
         edge, opening = fracture["edge_J_m2"], fracture["opening_J_m2"]
         if opening > OPENING_REMARKED * (edge + opening):
+            part = quantity(opening / (edge + opening), "fraction")
             said.append(
-                f"The blade opens the food ahead of its edge: of R {opening / (edge + opening):.0%} went there, "
+                f"The blade opens the food ahead of its edge: of R {part} went there, "
                 "against the tensile strength, which then trades with R and the yield stress."
             )
     return [

@@ -85,12 +85,12 @@ class IsoRating:
 
     @property
     def caveat(self) -> str:
-        """What has to be said beside R, as a clause; empty where there is nothing."""
+        """What has to be said beside the ISO rating, as a clause; empty where there is nothing."""
         if self.without_phase is None:
             return ""
         return (
-            "the phase search of R ran to its bound, where its phase part is 0 whatever the model; "
-            f"without it R is {self.without_phase:.3f}"
+            "the phase search of the ISO rating ran to its end, where its phase part is 0 whatever the model; "
+            f"without it the ISO rating is {self.without_phase:.3f}"
         )
 
 

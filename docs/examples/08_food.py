@@ -1,6 +1,6 @@
 """A food of one's own from one that is there: other values, written and read back."""
 
-from calib.material.food import dump_material
+from calib.material.food_file import dump_material
 from cutcal import Food
 
 potato = Food.load("potato")

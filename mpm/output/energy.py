@@ -35,7 +35,7 @@ def spent(energy: Mapping[str, float]) -> str:
     total = sum(energy.values())
     parts = {words: energy.get(name, 0.0) / total for name, words in SPENT.items()} if total > 0 else {}
     large = sorted((part, words) for words, part in parts.items() if part >= LEAST)
-    return ", ".join(f"{words} {part:.0%}" for part, words in reversed(large))
+    return ", ".join(f"{words} {100 * part:.0f}\u00a0%" for part, words in reversed(large))
 
 
 def unbooked(energy: Mapping[str, float]) -> float | None:

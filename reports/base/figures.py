@@ -218,8 +218,17 @@ def fit(curves: Curves, noise_sd: float, trace: str) -> bytes:
     return svg(draw, 76.0)
 
 
-def null_models(curves: Curves, trace: str) -> bytes:
-    """Real and simulated force with the null models and the simulation before the fit."""
+def null_models(curves: Curves, trace: str, peaks: Mapping[str, str]) -> bytes:
+    """Real and simulated force with the null models and the simulation before the fit.
+
+    Args:
+        curves: Columns of ``curves.csv``.
+        trace: What the real curve is called: measured or reconstructed.
+        peaks: Peak of each null model as text, by column: named where the curve leaves the axis.
+
+    Returns:
+        An SVG document.
+    """
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
@@ -234,7 +243,8 @@ def null_models(curves: Curves, trace: str) -> bytes:
             if np.all(np.isnan(y)):
                 continue
             peak = float(np.nanmax(y))
-            cut = {"label": f"{look['label']} (leaves the axis, peak {peak:.3g} N)"} if peak > top else {}
+            named = f", peak {peaks[column]}" if column in peaks else ""
+            cut = {"label": f"{look['label']} (leaves the axis{named})"} if peak > top else {}
             axes.plot(x, y, **{**look, **cut})
             highest = max(highest, min(peak, top))
         highest = max(highest, top / 1.5)

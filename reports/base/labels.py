@@ -15,7 +15,8 @@ WORDS = {
     "one_sided": "one-sided",
     "only_as_product": "only as a product with the width",
     "not_seen": "not seen",
-    "at_bound": "at a bound",
+    "at_bound": "at its bound",
+    "at_limit": "at its natural limit",
     "unknown": "not determined",
     "paper_table2": "paper, Table 2",
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -27,7 +28,7 @@ ABOUT = 0.8  # distance from the blade to which a glance goes, in heights of the
 MARGIN = 0.12  # room around the food, of its height
 FILLING = 1.2  # of a particle's square, so that there are no gaps where the food is stretched
 TALLEST = 52.0  # of one picture [mm]
-BESIDE = 26.0  # axes, labels and the scale of colours, of the figure's height [mm]
+LAST = 30.0  # axes, labels and the scale of colours, of the last picture's height [mm]
 
 
 Glance = Callable[[Axes], None]
@@ -53,8 +54,8 @@ def moments(section: Section, stroke: np.ndarray, force: np.ndarray) -> list[tup
     return sorted(found.items())
 
 
-def cut(section: Section, knife: Knife, height: float, stroke: np.ndarray, force: np.ndarray) -> bytes:
-    """Pictures of the food under the blade, coloured by its von Mises stress.
+def cut(section: Section, knife: Knife, height: float, stroke: np.ndarray, force: np.ndarray) -> list[bytes]:
+    """Pictures of the food under the blade, coloured by its von Mises stress: one for each look, in one scale.
 
     Args:
         section: The food across the blade's middle.
@@ -64,31 +65,36 @@ def cut(section: Section, knife: Knife, height: float, stroke: np.ndarray, force
         force: Its forces [N], shape (n,).
 
     Returns:
-        An SVG document.
+        SVG documents; the last one has the scale of the colours.
     """
     shown = moments(section, stroke, force)
     half = float(np.abs(section.y[[k for k, _ in shown]]).max()) + MARGIN * height
     top = height * (1 + 3 * MARGIN)
     tall = min((WIDTH - 14.0) * (top + MARGIN * height) / (2 * half), TALLEST)
     most = float(np.percentile(section.mises[[k for k, _ in shown]], BRIGHT)) or 1.0
+    colour = ScalarMappable(Normalize(0.0, most / 1e3), COLOURS)
 
-    def draw(figure: Figure) -> None:
-        grid = figure.subplots(len(shown), squeeze=False, sharex=True).ravel()
-        colour = ScalarMappable(Normalize(0.0, most / 1e3), COLOURS)
-        for axes, (k, name) in zip(grid, shown, strict=True):
-            _food(axes, section, k, colour)
-            _tools(axes, knife, height - float(section.stroke[k]), top, half)
-            at = 1e3 * float(section.stroke[k])
-            axes.set_title(f"{at:.1f} mm deep" + (f", {name}" if name else ""))
-            axes.set(xlim=(-1e3 * half, 1e3 * half), ylim=(-1e3 * MARGIN * height, 1e3 * top), aspect="equal")
-            axes.grid(visible=False)
-            axes.set_ylabel("height [mm]")
-        grid[-1].set_xlabel("across the blade [mm]")
-        figure.colorbar(
-            colour, ax=grid, location="bottom", shrink=0.5, aspect=40, extend="max", label="von Mises stress [kPa]"
-        )
+    def draw(figure: Figure, k: int, name: str, last: bool) -> None:
+        axes = figure.subplots()
+        _food(axes, section, k, colour)
+        _tools(axes, knife, height - float(section.stroke[k]), top, half)
+        at = 1e3 * float(section.stroke[k])
+        axes.set_title(f"{at:.1f} mm deep" + (f", {name}" if name else ""))
+        axes.set(xlim=(-1e3 * half, 1e3 * half), ylim=(-1e3 * MARGIN * height, 1e3 * top), aspect="equal")
+        axes.grid(visible=False)
+        axes.set_ylabel("height [mm]")
+        if last:
+            axes.set_xlabel("across the blade [mm]")
+            figure.colorbar(
+                colour, ax=axes, location="bottom", shrink=0.5, aspect=40, extend="max", label="von Mises stress [kPa]"
+            )
 
-    return svg(draw, len(shown) * (tall + 9.0) + BESIDE)
+    made = []
+    for n, (k, name) in enumerate(shown, 1):
+        last = n == len(shown)
+        height_mm = tall + (LAST if last else 9.0)
+        made.append(svg(partial(draw, k=k, name=name, last=last), height_mm))
+    return made
 
 
 def glance(section: Section, knife: Knife, height: float, stroke: np.ndarray, force: np.ndarray) -> Glance:

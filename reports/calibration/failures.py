@@ -106,7 +106,7 @@ def picture(runs: Runs, found: list[Split]) -> bytes:
         x, y = _shown(found[0]), _shown(found[1]) if len(found) > 1 else np.zeros(len(runs.failed))
         for name, which, look in (("finished", ~runs.failed, FINISHED), ("failed", runs.failed, FAILED)):
             n = int(np.count_nonzero(which & np.isfinite(x + y)))
-            axes.plot(x[which], y[which], ls="none", label=f"{name} ({n})", **look)
+            axes.plot(x[which], y[which], ls="none", label=f"{name} ({n} with values of their own)", **look)
         _axis(axes, "x", found[0], x)
         if len(found) > 1:
             _axis(axes, "y", found[1], y)

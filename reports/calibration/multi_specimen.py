@@ -236,7 +236,7 @@ def _line(name: str, t: Data) -> Data:
         "name": breakable(name),
         "cells": [
             quantity(m["nrmse"], "fraction"),
-            quantity(m["shape_error"], "-"),
+            quantity(m["shape_error"], "fraction"),
             quantity(m["iso18571"]["R"], "-"),
             quantity(m["peak_error"], "fraction", signed=True),
             quantity(m["work_error"], "fraction", signed=True),
@@ -252,7 +252,7 @@ def _limits(hold_out: Data) -> str:
     found: Data = next((p["limits"] for p in hold_out.values()), {})
     texts = {
         "nrmse": ("NRMSE ≤ ", "fraction"),
-        "rating": ("R ≥ ", "-"),
+        "rating": ("ISO rating ≥ ", "-"),
         "inside": ("in band ≥ ", "fraction"),
     }
     return listed([start + quantity(found[k], unit, digits=None) for k, (start, unit) in texts.items() if k in found])

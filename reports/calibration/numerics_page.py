@@ -7,13 +7,21 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mpm.output.energy import spent, unbooked
-from reports.base.format import breakable, count, duration, interval, plain, quantity
+from reports.base.format import breakable, count, duration, interval, listed, plain, quantity
 from reports.base.labels import in_words, shown
 from reports.base.run_folder import Data
 
 if TYPE_CHECKING:
     from calib.calibration.result import CalibrationResult
-    from calib.calibration.result_parts import BrokenRun
+    from calib.calibration.result_parts import BrokenRun, SearchHistory
+
+#: Fidelities of the store in words.
+KINDS = {
+    "coarse": "on the screening grid",
+    "fine": "on the grid that counts",
+    "again": "of these once more, slower and with other particles",
+    "check": "as checks of the numerics",
+}
 
 
 def numerics(result: CalibrationResult) -> Data:
@@ -30,10 +38,25 @@ def numerics(result: CalibrationResult) -> Data:
         "kinetic": quantity(cut.ke_over_ie, "fraction"), "ripple": quantity(ripple, "N"),
         "ripple_part": quantity(part, "fraction", digits=2), "wall": duration(result.wall_s),
         **_energy(cut.energy_J or {}, cut.fracture),
-        "simulations": count(history.simulations), "failed": count(history.failed_simulations),
-        "coarse": count(history.coarse_simulations) if history.coarse_simulations else None,
+        **_simulations(history),
         "counters": cut.counters,
     }  # fmt: skip
+
+
+def _simulations(history: SearchHistory) -> Data:
+    """How many simulations there are and failed, and of which kinds; of older runs those of the search alone."""
+    kept = history.kept
+    known = {kind: kept[kind] for kind in KINDS if kind in kept} | {k: t for k, t in kept.items() if k not in KINDS}
+    kinds = [f"{count(t.simulations)} {KINDS.get(kind, kind)}" for kind, t in known.items()]
+    every = sum(t.simulations for t in kept.values()) if kept else history.simulations
+    failed = sum(t.failed for t in kept.values()) if kept else history.failed_simulations
+    of_search = f"the search made {count(history.simulations)} of them"
+    return {
+        "simulations": count(every),
+        "failed": count(failed),
+        "kinds": f"{listed(kinds)}; {of_search}" if kept else "those of the search",
+        "elsewhere": count(failed - len(history.failures)) if failed > len(history.failures) else None,
+    }
 
 
 def _far(scene: Mapping[str, Any]) -> str | None:

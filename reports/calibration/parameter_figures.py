@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 LARGEST_FACTOR = 1e3
 #: Rise of chi-square at the ends of a 95 % interval, and where the axis of the profiles ends.
 RISE, TOP = 3.84, 8.0
+#: Correlations from here on are bold: an interval is 2.3 times as wide as it would be if the other one were known.
+STRONG_PAIR = 0.9
 #: Panels side by side.
 ACROSS = 4
 #: A log axis that spans less than this factor has the ticks of a linear one.
@@ -180,6 +182,37 @@ def influence(found: Mapping[str, Mapping[str, SobolIndices]], labels: Mapping[s
         figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
 
     return svg(draw, 24.0 + 5.0 * len(names))
+
+
+def correlations(names: Sequence[str], matrix: np.ndarray) -> bytes:
+    """Posterior correlations of the parameters: the lower half of their matrix, with numbers.
+
+    Args:
+        names: The parameters.
+        matrix: Their correlations (k, k), NaN where one is not known.
+
+    Returns:
+        An SVG document.
+    """
+    size = len(names)
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        shown = np.where(np.tri(size, k=-1, dtype=bool), matrix, np.nan)[1:, :-1]
+        axes.imshow(shown, cmap="PuOr", vmin=-1.5, vmax=1.5, aspect="auto")
+        for (i, j), r in np.ndenumerate(shown):
+            if np.isfinite(r):
+                strong = abs(r) >= STRONG_PAIR
+                axes.text(j, i, f"{r:+.2f}".replace("-", "\u2212"), ha="center", va="center",
+                          fontweight="bold" if strong else "normal")  # fmt: skip
+        axes.set_yticks(range(size - 1), names[1:])
+        axes.set_xticks(range(size - 1), names[:-1])
+        axes.tick_params(length=0)
+        axes.grid(visible=False)
+        for spine in axes.spines.values():
+            spine.set_visible(False)
+
+    return svg(draw, 8.0 + 5.0 * size)
 
 
 def _number(row: SobolIndices | None, key: str) -> float:

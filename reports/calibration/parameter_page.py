@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,7 +29,8 @@ IDENTIFIABILITY = {
     "one_sided": "the trace bounds one side; the other is the literature's, or what is possible",
     "only_as_product": "known times the width of the specimen and the gain of the sensor, or times another parameter",
     "not_seen": "the trace bounds neither side: the value is the literature's",
-    "at_bound": "the fit ran into the end of what was allowed",
+    "at_bound": "the fit ran into the end of what was allowed, and fails for it",
+    "at_limit": "the best value is the end of what is possible, such as no friction: a result, no failure",
 }
 #: What the sensitivity is of, and the part of the variance from which on a parameter is named.
 QUANTITIES = {"peak": "peak", "work": "work", "initial_slope": "initial slope"}
@@ -98,6 +99,22 @@ def correlations(correlations: Mapping[str, float | None]) -> list[str]:
     means = {True: "raising both together", False: "raising one and lowering the other"}
     return [f"{listed(names.split(','))}, r = {plain(r, 2)}: {means[r > 0.0]} hardly changes the force."
             for names, r in sorted(strong, key=lambda item: -abs(item[1]))]  # fmt: skip
+
+
+def correlation_matrix(correlations: Mapping[str, float | None], names: Sequence[str]) -> tuple[list[str], np.ndarray]:
+    """The correlations of the fitted parameters as a matrix.
+
+    Args:
+        correlations: By "one,other"; each pair in one order or in both.
+        names: The parameters.
+
+    Returns:
+        Names of those that have a correlation with another one, and the matrix (k, k), NaN where a pair is not known.
+    """
+    known = {frozenset(pair.split(",")): c for pair, c in correlations.items() if c is not None}
+    seen = [name for name in names if any(name in pair for pair in known)]
+    rows = [[1.0 if a == b else known.get(frozenset((a, b)), np.nan) for b in seen] for a in seen]
+    return seen, np.array(rows, dtype=float).reshape(len(seen), len(seen))
 
 
 def legend(fitted: Mapping[str, FittedParameter]) -> list[list[str]]:

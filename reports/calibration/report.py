@@ -20,6 +20,7 @@ from reports.calibration import (
     cut_figure,
     failures,
     measurement,
+    model_page,
     numerics_page,
     parameter_figures,
     parameter_page,
@@ -41,9 +42,11 @@ FIGURE_HEIGHT = (60.0, 125.0)
 #: What the null models are compared in: key, label, unit, and whether more is better.
 MEASURES = (
     ("nrmse", "NRMSE", "fraction", False),
-    ("shape_error", "shape error", "-", False),
-    ("R", "rating R", "-", True),
+    ("shape_error", "shape error", "fraction", False),
+    ("R", "ISO rating", "-", True),
 )
+#: Noise below this part of the peak is that of digitised, smoothed or clipped data [-].
+NO_NOISE = 1e-3
 RELATIONS = {"<=": "≤ ", ">=": "≥ "}
 
 
@@ -74,7 +77,7 @@ def _pictures(done: Finished) -> dict[str, bytes]:
     result, curves = done.result, done.curves
     agreement, fitted = result.agreement, result.fitted
     trace = result.trace.label
-    real = f"{trace}, peak {uncertain(agreement.peak_real_N, agreement.peak_real_sd_N, 'N')}"
+    real = f"{trace}, peak {uncertain(agreement.peak_real_N, result.peak_sd_N, 'N')}"
     simulated = f"simulated, peak {quantity(agreement.peak_sim_N, 'N')}"
     look = None
     if done.section is not None:
@@ -85,10 +88,14 @@ def _pictures(done: Finished) -> dict[str, bytes]:
         "forces.svg": figures.forces(curves, real, simulated, _room(result), _inside(result), look),
         "conditioning.svg": figures.conditioning(_record(done), curves),
         "fit.svg": figures.fit(curves, result.conditioning.noise_sd_N, trace),
-        "nulls.svg": figures.null_models(curves, trace),
+        "sketch.svg": model_page.sketch(result),
+        "nulls.svg": figures.null_models(curves, trace, _null_peaks(result)),
     }
     if done.section is not None:
-        found["cut.svg"] = cut_figure.cut(*of_cut)
+        found |= {f"cut{k}.svg": look for k, look in enumerate(cut_figure.cut(*of_cut))}
+    names, matrix = parameter_page.correlation_matrix(result.posterior.correlations, list(fitted))
+    if len(names) > 1:
+        found["correlations.svg"] = parameter_figures.correlations(names, matrix)
     ranges = [parameter_page.parameter_range(name, p) for name, p in fitted.items()]
     if ranges:
         found["parameters.svg"] = parameter_figures.ranges(ranges)
@@ -103,6 +110,14 @@ def _pictures(done: Finished) -> dict[str, bytes]:
     if result.history.misfit_history:
         found["misfit.svg"] = figures.misfit(result.history.misfit_history)
     return found
+
+
+def _null_peaks(result: CalibrationResult) -> dict[str, str]:
+    """Peaks of the null models as the table has them, by column of ``curves.csv``."""
+    agreement = result.agreement
+    models = {**agreement.null_models, **({"start": result.at_literature} if result.at_literature else {})}
+    peaks = {name: agreement.peak_real_N * (1.0 + (m.peak_error or 0.0)) for name, m in models.items()}
+    return {f"{name}_N": quantity(peak, "N") for name, peak in peaks.items()}
 
 
 def _inside(result: CalibrationResult) -> str:
@@ -134,7 +149,7 @@ def _record(done: Finished) -> figures.ConditioningRecord:
         window=c.baseline_window_s,
         baseline_kind=c.baseline_kind,
         peak=agreement.peak_real_N,
-        peak_sd=agreement.peak_real_sd_N,
+        peak_sd=done.result.peak_sd_N,
     )
 
 
@@ -172,6 +187,7 @@ def _content(done: Finished) -> Data:
         "failures": numerics_page.failures(result.history.failures),
         "credibility": credibility_page.credibility(result.folder),
         "provenance": numerics_page.provenance(result),
+        "model": model_page.model(result),
         "limits": [capital(text) for text in result.limits],
         "warnings": [capital(text) for text in result.warnings],
     }
@@ -206,9 +222,11 @@ def _conditioning(done: Finished) -> Data:
     c, agreement = done.result.conditioning, done.result.agreement
     sd, seconds = c.onset_sd_s, c.end_s - c.onset_s
     speed = c.stroke_m / seconds if seconds > 0.0 else None
+    noisy = c.noise_sd_N > NO_NOISE * agreement.peak_real_N
     return {
         "baseline": uncertain(c.baseline_N, c.baseline_sd_N, "N"),
-        "noise": quantity(c.noise_sd_N, "N", digits=2),
+        "noise": quantity(c.noise_sd_N, "N", digits=2) if noisy else "none",
+        "noisy": noisy,
         "filter": quantity(c.filter_sd_m, "m", digits=None),
         "onset": uncertain(c.onset_s, sd, "s"),
         "onset_stroke": quantity(sd * speed, "m", digits=2) if sd and speed else None,
@@ -217,8 +235,16 @@ def _conditioning(done: Finished) -> Data:
         "stroke": quantity(c.stroke_m, "m"),
         "stroke_source": c.stroke_source,
         "steps": count(len(done.curves["stroke_m"])),
-        "peak": uncertain(agreement.peak_real_N, agreement.peak_real_sd_N, "N"),
+        "peak": uncertain(agreement.peak_real_N, done.result.peak_sd_N, "N"),
+        "peak_parts": _peak_parts(done.result),
     }
+
+
+def _peak_parts(result: CalibrationResult) -> str:
+    """What the standard uncertainty of the measured peak is made of."""
+    names = ("noise and baseline", "gain of the sensor", "drift")
+    parts = [f"{name} {quantity(sd, 'N', digits=2)}" for name, sd in zip(names, result.peak_parts_N, strict=True) if sd]
+    return f"± of {listed(parts)}" if parts else "no uncertainty is known"
 
 
 def _sentence(result: CalibrationResult) -> str:
@@ -292,8 +318,8 @@ def _null_sentences(agreement: Agreement) -> list[str]:
 def _metrics(agreement: Agreement) -> Data:
     """The figures of the comparison by name; the template labels them."""
     m, g, iso = agreement.metrics, agreement.sprague_geers, agreement.iso18571
-    units = {"peak_sim_N": "N", "work_sim_J": "J", "work_real_J": "J", "shape_ramp": "-", "shape_peak": "-",
-             "shape_release": "-", "best_scale": "-", "relative_l2": "fraction",
+    units = {"peak_sim_N": "N", "work_sim_J": "J", "work_real_J": "J", "shape_ramp": "fraction",
+             "shape_peak": "fraction", "shape_release": "fraction", "best_scale": "-", "relative_l2": "fraction",
              "best_scale_residual": "fraction"}  # fmt: skip
     signed = ("peak_error", "peak_position_error", "work_error", "stiffness_error")
     return {

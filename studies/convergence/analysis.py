@@ -25,8 +25,9 @@ from studies.convergence.result import (
     RunResult,
 )
 
-LIMITS_OF_CHANGE = ConvergenceLimits(work=0.02, peak=0.03)
-"""Largest change between the two finest grids that counts as converged [-]."""
+CONVERGED = ConvergenceLimits(work=0.02, peak=0.03, gci=0.05)
+"""What counts as converged: changes between the two finest grids, and the index that says how far the finest may still
+be from the end: as much as a calibration's peak may be off."""
 
 
 def analyse(
@@ -70,7 +71,7 @@ def analyse(
         command=tuple(cut.command),
         warnings=(*cut.warnings, *([] if least is None else [pressed_away(least)])),
         grids=tuple(_run_result("dx", run.value, done) for run, done in grids),
-        limits=LIMITS_OF_CHANGE,
+        limits=CONVERGED,
         peak=peak,
         work=work,
         order_curve=curve.order,

@@ -103,10 +103,18 @@ class ConstantResult(AxisResult):
 
 @dataclass(frozen=True)
 class ConvergenceLimits:
-    """Largest changes between the two finest grids that count as converged, of work and peak [-]."""
+    """What counts as converged.
+
+    Attributes:
+        work: Largest change of the work between the two finest grids [-].
+        peak: Largest change of the peak between them [-].
+        gci: Largest grid convergence index of either on the finest grid [-]; None in documents of versions that did not
+            ask for it.
+    """
 
     work: float
     peak: float
+    gci: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -193,8 +201,11 @@ class ConvergenceResult:
 
     @property
     def converged(self) -> bool:
-        """Whether work and peak change by no more than the limits between the two finest grids."""
-        return abs(self.work.change) <= self.limits.work and abs(self.peak.change) <= self.limits.peak
+        """Whether work and peak change by no more than the limits between the two finest grids, and their grid
+        convergence indices are within theirs.
+        """
+        near = abs(self.work.change) <= self.limits.work and abs(self.peak.change) <= self.limits.peak
+        return near and (self.limits.gci is None or max(self.gci_work, self.gci_peak) <= self.limits.gci)
 
     def axis(self, name: str) -> AxisResult | None:
         """What a thing changes that was varied apart; None where it was not, or fewer than two runs ended."""

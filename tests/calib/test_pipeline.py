@@ -328,17 +328,17 @@ def test_verdicts_fail_what_fails():
     notes = {v.name: (v.value, v.note) for v in lines}
     assert notes["food pressed away, not parted"] == (
         pytest.approx(0.3),
-        "edge and opening took 70% of R times the new area",
+        "edge and opening took 70.0\xa0% of R times the new area",
     )
     assert [(v.name, v.passed) for v in balances(Conservation(0.0, 0.0, 1.2))][0] == (
         "food pressed away, not parted",
         True,
     )
     assert len(balances(Conservation(0.0, 0.0))) == 2  # nothing was to be parted
-    assert notes["half the simulated speed"] == (0.06, "peak +2.0%, work -6.0%, extrapolated to rest")
+    assert notes["half the simulated speed"] == (0.06, "peak +2.0\xa0%, work −6.0\xa0%, extrapolated to rest")
     assert notes["constants of the method halved and doubled"] == (
         0.07,
-        "most by twice the process zone: peak +2.0%, work -7.0%",
+        "most by twice the process zone: peak +2.0\xa0%, work −7.0\xa0%",
     )
     assert notes["energy lost by the discretisation"] == (0.09, "of the work")
     assert notes["grid and particles elsewhere"] == (None, "broke down: inverted")
@@ -355,7 +355,7 @@ def test_verdicts_fail_what_fails():
         "constant baseline",
         "The width is assumed.",
         "in-sample",
-        "of R 40% went there",
+        "of R 40.0\xa0% went there",
     ):
         assert any(word in text for text in said)
     small = limits("measured", "speed", "constant", lines, parameters, [], {**fracture, "opening_J_m2": 4.0})
@@ -380,7 +380,7 @@ def test_a_force_that_hangs_on_the_cells_says_what_to_do(change):
 def test_where_the_work_went_is_said_largest_first():
     """Parts above half a per cent by name; the part that no law took apart, and none where older results lack it."""
     energy = {**dict.fromkeys(ENERGIES, 0.0), "parting": 0.7, "friction": 0.2, "damage": 0.004, "unbooked": 0.096}
-    assert spent(energy) == "parting the food 70%, friction 20%"
+    assert spent(energy) == "parting the food 70\xa0%, friction 20\xa0%"
     assert unbooked(energy) == pytest.approx(0.096)
     assert unbooked({"parting": 1.0}) is None and unbooked({}) is None
 

@@ -91,7 +91,8 @@ def commands(text: str) -> list[str]:
     """Lines of a text's shell blocks that call cutcal or calibrate."""
     blocks = re.findall(r"^```bash\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
     lines = "\n".join(blocks).replace("\\\n", " ").splitlines()
-    return [line.partition(" #")[0] for line in lines if re.match(r"(cutcal|calibrate) ", line)]
+    lines = [line.removeprefix(".venv/bin/") for line in lines]
+    return [line.partition(" #")[0].partition(" > ")[0] for line in lines if re.match(r"(cutcal|calibrate) ", line)]
 
 
 @pytest.mark.parametrize("path", [p for p in TEXTS if commands(read(p))], ids=name_of)
@@ -162,3 +163,46 @@ def test_own_files_can_be_read(tmp_path: Path) -> None:
     assert load_material_file(food).to_scene_food().material.E == 5e4
     assert load_knife(food.with_name(knife.name)).spine == 1.8e-3
     assert read_study(study).hold_out == ("first", "second")
+
+
+README = ROOT / "README.md"
+MOST_LINES, MOST_WORDS, MOST_IN_A_SENTENCE = 120, 1000, 30
+
+
+def sentences(text: str) -> list[str]:
+    """Sentences of a page: without code, tables and pictures; a link counts by its words."""
+    plain = re.sub(r"^```.*?^```|^\|.*?$|^!\[.*?$|<!--.*?-->|^#.*?$", "", text, flags=re.MULTILINE | re.DOTALL)
+    plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", plain)
+    parts = re.split(r"\n\s*\n|\n- |(?<=[.:;?!])\s+(?=[A-Z*`])", plain)
+    return [" ".join(part.split()) for part in parts if part.strip()]
+
+
+def test_the_readme_is_short() -> None:
+    """At most 120 lines and 1,000 words, and no sentence of more than 30 words."""
+    text = read(README)
+    assert len(text.splitlines()) <= MOST_LINES and len(text.split()) <= MOST_WORDS
+    long = [s for s in sentences(text) if len(s.split()) > MOST_IN_A_SENTENCE and "·" not in s]
+    assert long == []
+
+
+def test_a_long_sentence_would_be_found() -> None:
+    """The measure of sentences sees one of 31 words, also over two lines, and does not add up two short ones."""
+    words = "word " * 29
+    assert [len(s.split()) for s in sentences(f"It {words}\nends. Then more.")] == [31, 2]
+
+
+def test_what_the_readme_shows_in_python_can_be_called() -> None:
+    """The snippet compiles, and what it takes from the package is there."""
+    blocks = re.findall(r"^```python\n(.*?)^```", read(README), flags=re.MULTILINE | re.DOTALL)
+    assert len(blocks) == 1
+    compile(blocks[0], "README.md", "exec")
+    for module, names in re.findall(r"^from (\w+) import (.+)$", blocks[0], flags=re.MULTILINE):
+        assert all(hasattr(importlib.import_module(module), name.strip()) for name in names.split(","))
+
+
+@pytest.mark.parametrize("path", TEXTS, ids=name_of)
+def test_terms_lead_into_the_glossary(path: Path) -> None:
+    """A link to a term of the glossary leads to one."""
+    headings = re.findall(r"^#+ (.+)$", read(DOCS / "glossary.md"), flags=re.MULTILINE)
+    terms = {re.sub(r"[^a-z0-9 -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+    assert set(re.findall(r"glossary\.md#([\w-]+)\)", read(path))) <= terms

@@ -14,7 +14,8 @@ import pytest
 
 from calib.errors import OutputError
 from calib.io.typed_document import read_document
-from calib.material.food import dump_material, load_food
+from calib.material.food import load_food
+from calib.material.food_file import dump_material
 from cutcal.main import main
 from intsim.evaluate import RESULT_FILE, PolicyEvaluation, evaluate, roll_out, run_episode
 from intsim.outcomes import EvaluationResult, expected_place_rate

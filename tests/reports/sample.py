@@ -73,6 +73,9 @@ def summary(kind: str = "good") -> dict[str, Any]:
     changes = {"reconstructed": _reconstruct, "failed": _fail, "interrupted": _interrupt}
     if kind != "good":
         changes[kind](data)
+    coarse, failed = 9, data["failed_simulations"]
+    fine = data["simulations"] - coarse
+    data["kept"] = {"coarse": {"simulations": coarse, "failed": 0}, "fine": {"simulations": fine, "failed": failed}}
     data["profiles"] = {} if kind == "interrupted" else profiles(data["parameters"])
     return data
 

@@ -7,6 +7,7 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -197,7 +198,7 @@ def run(args: argparse.Namespace) -> int:
     out = Path(args.out or f"cutcal-{request.food.name}-{request.stem}")
 
     with workers_of(args, note) as pool, ProgressBar() as bar:
-        result = calibrate(request, out, pool, resume=args.resume, progress=bar, say=note)
+        result = calibrate(request, out, pool, resume=args.resume, progress=bar, say=partial(bar.note, note))
     if args.json:
         print_json(to_document(result))
     else:
@@ -256,7 +257,7 @@ def fit_study(args: argparse.Namespace, study: StudySpec, out: Path) -> int:
 
 def study_text(result: StudyResult, out: Path) -> str:
     """What the terminal shows at the end of a study."""
-    lines = [f"  {'':24s}{'peak':>8s}{'NRMSE':>8s}{'shape':>8s}{'R':>7s}{'in band':>9s}{'factor':>8s}"]
+    lines = [f"  {'':24s}{'peak':>8s}{'NRMSE':>8s}{'shape':>8s}{'ISO':>7s}{'in band':>9s}{'factor':>8s}"]
     rows: list[tuple[str, InSampleCut | HeldOutCut]] = [(f"{n}, in-sample", cut) for n, cut in result.traces.items()]
     rows += [(f"{n}, held out", cut) for n, cut in result.hold_out.items()]
     for name, cut in rows:

@@ -21,7 +21,7 @@ EPILOG = """example:
   cutcal predict --food potato --material runs/cut1/material.yaml \\
       --trace cut2.csv --air air.csv --scale-width --out runs/cut2
 
-Exit codes: 0 NRMSE at most 0.10 and rating R at least 0.80, 1 error, 2 worse."""
+Exit codes: 0 NRMSE at most 0.10 and ISO rating at least 0.80, 1 error, 2 worse."""
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
@@ -63,7 +63,7 @@ def agreement_text(result: PredictionResult) -> str:
     lines = [
         f"{result.food}: {'passed' if result.passed else 'not passed'}, {how}",
         f"  peak {m.peak_sim_N:.2f} N against {m.peak_real_N:.2f} N ({m.peak_error:+.1%}), "
-        f"NRMSE {m.nrmse:.3f} (limit {limits.nrmse:.2f}), R {m.iso18571.R:.3f} (limit {limits.rating:.2f}), "
+        f"NRMSE {m.nrmse:.3f} (limit {limits.nrmse:.2f}), ISO rating {m.iso18571.R:.3f} (limit {limits.rating:.2f}), "
         f"shape {m.shape_error:.3f}, work {m.work_error:+.1%}",
     ]
     return "\n".join([*lines, *([f"  {m.iso18571.caveat}"] if m.iso18571.caveat else [])])

@@ -3,41 +3,62 @@
 from __future__ import annotations
 
 import argparse
+import re
 
 from calib.io.schema import tag
-from calib.material.food import load_food, load_foods
+from calib.material.food import FoodSpec, load_food, load_foods
+from calib.material.own_food import template
 from calib.material.properties import FORM, PROPERTIES
 from cutcal.options import add_json, print_json
 
+NAME = re.compile(r"[a-z][a-z0-9_]*")
 HELP = "list the foods, or the values of one with their sources"
 DESCRIPTION = """List the foods of materials.yaml, or every value of one with range, status and
-source."""
+source. A YAML file of your own does in place of a name, here and for --food."""
 EPILOG = """examples:
   cutcal foods
-  cutcal foods banana"""
+  cutcal foods banana
+  cutcal foods --template tofu > tofu.yaml
+  cutcal foods tofu.yaml"""
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
     p.add_argument("name", nargs="?", metavar="FOOD", help="show one food")
+    p.add_argument("--template", metavar="NAME", type=food_name, help="print a file to begin a food of your own with")
     add_json(p)
 
 
+def food_name(text: str) -> str:
+    """Type of an option that names a new food."""
+    if not NAME.fullmatch(text) or text in load_foods():
+        raise argparse.ArgumentTypeError(f"{text!r} is no name for a new food: lower case with _, and not a known one")
+    return text
+
+
+def _outline(food: FoodSpec) -> str:
+    """Shape and sizes."""
+    size = " x ".join(f"{food.dims[n].value * 1e3:g}" for n in ("length", "width", "height"))
+    return f"{food.shape_kind}, {size} mm"
+
+
 def run(args: argparse.Namespace) -> int:
-    """Print the list or one food."""
+    """Print the list, one food, or a file to begin one with."""
+    if args.template is not None:
+        print(template(args.template, [food.properties for food in load_foods().values()]), end="")
+        return 0
     if args.name is None:
         names = list(load_foods())
         if args.json:
             print_json(names)
         else:
-            print("\n".join(names))
+            print("\n".join(f"{name:15s}{_outline(food)}" for name, food in load_foods().items()))
         return 0
     food = load_food(args.name)
     if args.json:
         print_json({"schema": tag("food"), food.name: food.as_dict(), "warnings": food.warnings()})
         return 0
-    size = " x ".join(f"{food.dims[n].value * 1e3:g}" for n in ("length", "width", "height"))
-    print(f"{food.name}: {food.shape_kind}, {size} mm (length x width x height)")
+    print(f"{food.name}: {_outline(food)} (length x width x height)")
     for name, sizes in food.inclusions.items():
         size = " x ".join(f"{sizes[n].value * 1e3:g}" for n in ("length", "width", "height"))
         print(f"  {name:17s}{size} mm in a cut that asks for it (--{name})")

@@ -44,7 +44,8 @@ EPILOG = """examples:
 
 Ctrl-C keeps what was computed; the same command with --resume goes on.
 Exit codes: 0 converged (work within 2 %, peak within 3 % between the two
-finest grids), 1 error in input or run, 2 ran but did not converge."""
+finest grids, grid convergence index of both at most 5 %), 1 error in input
+or run, 2 ran but did not converge."""
 AXIS_NAMES = {"safety": "time step", "mach": "speed", "ppc": "particles", "offset": "offset", "repeat": "repeats"}
 REFINED = (1.0, 2 / 3, 1 / 2, 1 / 3)  # default cells over the scene's own one, which comes first
 

@@ -13,7 +13,8 @@ from calib.design.start import start_of_run
 from calib.errors import OutputError
 from calib.io.folder import write_json
 from calib.io.schema import tag
-from calib.material.food import dump_material, load_food
+from calib.material.food import load_food
+from calib.material.food_file import dump_material
 from calib.problem.parameters import Z95
 from cutcal.commands.calibration.design import table
 from cutcal.main import main

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 
 import pytest
@@ -26,11 +27,12 @@ def test_another_search_is_told_as_part_of_all() -> None:
 
 def test_time_left_is_that_of_default_runs() -> None:
     """Coarse runs take less of the time than of the budget, and the rest may be spent on default ones; with no such run
-    yet they tell."""
+    yet they tell, but for the first of each worker, which compile."""
     runs = [
         SimpleNamespace(coarse=coarse, evaluation=SimpleNamespace(seconds=s))
-        for coarse, s in ((True, 0.5), (True, 0.7), (False, 6.0), (False, 8.0))
+        for coarse, s in ((True, 9.0), (True, 0.5), (True, 0.7), (False, 6.0), (False, 8.0))
     ]
     options = FitOptions(budget=80.0, batch=2)
     assert longest_time_left(runs, 10.0, options) == pytest.approx(35.0)  # type: ignore[arg-type]
-    assert longest_time_left(runs[:2], 10.0, options) == pytest.approx(3.0 / COARSE_TIME)  # type: ignore[arg-type]
+    assert longest_time_left(runs[:3], 10.0, options) == pytest.approx(2.5 / COARSE_TIME)  # type: ignore[arg-type]
+    assert math.isnan(longest_time_left(runs[:2], 10.0, options))  # type: ignore[arg-type]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -90,3 +91,39 @@ def test_default_is_standard_error(capsys: pytest.CaptureFixture[str]) -> None:
     ProgressBar()(progress(3))
     captured = capsys.readouterr()
     assert captured.out == "" and captured.err.startswith("3 simulations")
+
+
+def test_typical_and_longest_time_are_told_apart() -> None:
+    """A typical run's time stands before the longest; where no time is known none is said."""
+    known = replace(progress(12), typical_s=40.0)
+    assert "about 0:40 left, at most 1:15, round" in known.line()
+    assert "left" not in replace(progress(1), eta_s=math.nan).line()
+
+
+def test_bar_follows_the_part_of_all_stages() -> None:
+    """Where the part of all the work is known, the bar has it, and not that of the budget."""
+    stream = Terminal()
+    ProgressBar(stream)(replace(progress(60), part=0.5))
+    assert "[##########..........]" in stream.getvalue()
+
+
+def test_a_dumb_terminal_gets_plain_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A terminal that cannot rewrite a line gets whole lines; nothing is coloured, NO_COLOR or not."""
+    monkeypatch.setenv("TERM", "dumb")
+    stream = Terminal()
+    ProgressBar(stream)(progress(3))
+    assert stream.getvalue().startswith("3 simulations") and "\r" not in stream.getvalue()
+    monkeypatch.setenv("TERM", "xterm")
+    ProgressBar(stream)(progress(4))
+    assert "\x1b" not in stream.getvalue()
+
+
+def test_a_note_does_not_stand_in_the_bar() -> None:
+    """What is said while the bar is shown has a line of its own; the bar is drawn again after it."""
+    stream = Terminal()
+    with ProgressBar(stream) as bar:
+        bar(progress(40))
+        bar.note(lambda text: print(text, file=stream), "note: something")
+        bar(progress(41))
+    shown = [line.split("\r")[-1] for line in stream.getvalue().split("\n")]
+    assert shown[0] == "note: something" and "41 simulations" in shown[1]

@@ -99,7 +99,7 @@ def test_words_are_those_of_the_code():
     parts = common()["$defs"]
     of = {name: part["enum"] for name, part in parts.items() if "enum" in part}
     assert set(of["intervalWord"]) == set(get_args(intervals.Identifiability))
-    assert set(of["verdictWord"]) == set(of["intervalWord"]) | {"only_as_product", estimates.UNKNOWN}
+    assert set(of["verdictWord"]) == set(of["intervalWord"]) | {"only_as_product", "at_limit", estimates.UNKNOWN}
     assert (of["shapeKind"], of["device"]) == (list(SHAPE_KINDS), list(ARCHES))
     assert set(of["status"]) == {*properties.LITERATURE_STATUSES, *properties.OTHER_STATUSES}
     assert list(parts["energy"]["properties"]) == [*ENERGIES[:-1], COHESION, ENERGIES[-1]]

@@ -16,11 +16,11 @@ from calib.io.yaml_checks import data_path
 from calib.material.food import (
     FoodSpec,
     check_override,
-    dump_material,
     load_food,
     load_foods,
     load_material_file,
 )
+from calib.material.food_file import dump_material
 from calib.material.properties import DIMENSIONS, LAYERS, PROPERTIES, RELAXATION, Property, Source, check_override
 from tests.data_dir import data_file
 

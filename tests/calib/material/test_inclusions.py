@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from calib.errors import MaterialError
-from calib.material.food import dump_material, load_food, load_foods, load_material_file
+from calib.material.food import load_food, load_foods, load_material_file
+from calib.material.food_file import dump_material
 from calib.material.inclusions import STONE_MACH, check_limit, sizes_of, with_inclusions
 from calib.material.knife import load_knife
 from calib.material.scene import Sizing, cut_scene, specimen

@@ -247,7 +247,7 @@ def test_a_void_phase_is_said_and_does_not_pass(
     code, summary = ran(study, tmp_path / "out")
     held = summary["hold_out"]["b"]
     rating = held["metrics"]["iso18571"]
-    said = f"without it R is {rating['without_phase']:.3f}"
+    said = f"without it the ISO rating is {rating['without_phase']:.3f}"
     assert code == 2 and not held["passed"] and rating["R"] < 0.8 < rating["without_phase"]
     assert said in capsys.readouterr().out
     assert any(text.startswith("b: ") and said in text for text in summary["limits"])

@@ -210,7 +210,7 @@ def test_iso_phase_of_a_ramp_says_that_it_says_nothing(monkeypatch: pytest.Monke
     assert rating.at_bound
     assert rating.EP == 0.0
     assert rating.without_phase is not None and rating.without_phase < 0.3  # a curve that is far off stays so
-    assert f"without it R is {rating.without_phase:.3f}" in rating.caveat
+    assert f"without it the ISO rating is {rating.without_phase:.3f}" in rating.caveat
     assert iso18571(x, x, x).without_phase is None and iso18571(x, x, x).caveat == ""
     monkeypatch.setattr("calib.validation.metrics._best_shift", lambda *_: 0)
     unshifted = iso18571(x, 1.0 - np.exp(-4.0 * x), 0.8 * x**1.2)

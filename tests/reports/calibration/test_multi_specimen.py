@@ -29,7 +29,7 @@ def test_held_out_and_in_sample_are_apart(tmp_path: Path) -> None:
     m = sample.summary()["hold_out"]["third"]["metrics"]
     assert spaced(got["held"][0]["cells"][0]) == f"{100 * m['nrmse']:.2f} %"
     assert spaced(got["held"][0]["cells"][5]) == "100 %" and got["held"][0]["cells"][6] == "0.910"
-    assert spaced(got["held_limits"]) == "NRMSE ≤ 10 %, R ≥ 0.8 and in band ≥ 90 %"
+    assert spaced(got["held_limits"]) == "NRMSE ≤ 10 %, ISO rating ≥ 0.8 and in band ≥ 90 %"
     assert "flesh of first and second" in got["captions"][0] and "R_skin" in got["captions"][0]
 
 

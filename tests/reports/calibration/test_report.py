@@ -46,9 +46,9 @@ def content(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Content:
 # ---- the document
 
 
-@pytest.mark.parametrize(("kind", "count"), [("good", 6), ("reconstructed", 6), ("failed", 7), ("interrupted", 5)])
+@pytest.mark.parametrize(("kind", "count"), [("good", 8), ("reconstructed", 8), ("failed", 9), ("interrupted", 6)])
 def test_every_outcome_gives_a_pdf_of_the_planned_length(tmp_path: Path, kind: str, count: int) -> None:
-    """Each section keeps to its page; the parameters to two, and the failed run's twelve warnings need one more."""
+    """Sections follow one another without empty pages; the failed run's twelve warnings need one more."""
     path = write_report(sample.write_run(tmp_path, kind))
     pdf = path.read_bytes()
     assert path == tmp_path / "report.pdf"
@@ -101,7 +101,7 @@ def test_long_names_and_markup_are_only_text(tmp_path: Path) -> None:
 
 
 def test_unknown_numbers_and_empty_lists_leave_no_hole(tmp_path: Path) -> None:
-    """A report is made where everything that may be unknown is, and it has its five pages."""
+    """A report is made where everything that may be unknown is, and it has its pages."""
     s = sample.summary()
     unknown = ("baseline_sd_N", "onset_sd_s", "peak_real_sd_N", "peak_error", "shape_error", "nrmse",
                "work_error", "wall_s", "particles", "mach", "momentum_residual", "ke_over_ie", "ripple_N",
@@ -124,11 +124,11 @@ def test_missing_parts_of_a_simulation_are_not_drawn(tmp_path: Path) -> None:
     blank = [header.index(name) for name in ("edge_N", "start_N")]
     rows = [["" if i in blank else x for i, x in enumerate(line.split(","))] for line in lines[1:]]
     (run / "curves.csv").write_text("\n".join([lines[0], *(",".join(row) for row in rows)]))
-    assert pages(write_report(run).read_bytes()) == 6
+    assert pages(write_report(run).read_bytes()) == 8
 
 
 def test_an_older_folder_still_gives_a_report(tmp_path: Path) -> None:
-    """Without band, table of simulations and what later versions compute, the report has its five pages."""
+    """Without band, table of simulations and what later versions compute, the report has its six pages."""
     run = sample.write_run(tmp_path, "interrupted")
     data = json.loads((run / "summary.json").read_text())
     for key in ("nuisances", "profiles", "sensitivity", "reduced_chi2", "correlation_length_m", "predictive_inside"):
@@ -136,7 +136,7 @@ def test_an_older_folder_still_gives_a_report(tmp_path: Path) -> None:
     (run / "summary.json").write_text(json.dumps(data))
     with h5py.File(run / "evaluations.h5", "a") as store:
         del store["status"]
-    assert pages(write_report(run).read_bytes()) == 5
+    assert pages(write_report(run).read_bytes()) == 6
 
 
 def test_a_long_table_keeps_the_figure_on_the_first_page(tmp_path: Path) -> None:
@@ -146,7 +146,7 @@ def test_a_long_table_keeps_the_figure_on_the_first_page(tmp_path: Path) -> None
     verdicts += [{**verdicts[0], "name": f"{i} a name that is longer than its own column"} for i in range(3)]
     verdicts += [{**verdicts[0], "note": "lag +0.00018 ± 0.0001 m, expected 0 ± 0.0003 m"} for _ in range(4)]
     run = sample.write_run(tmp_path, "reconstructed", verdicts=verdicts)
-    assert pages(write_report(run).read_bytes()) == 6
+    assert pages(write_report(run).read_bytes()) == 8
 
 
 # ---- what it says
@@ -248,11 +248,11 @@ def test_null_model_that_is_closer_is_named(content: Content) -> None:
     for model in nulls.values():
         model |= {"nrmse": 0.4, "shape_error": 0.4, "R": 0.2}
     (said,) = content(null_models=nulls)["null_sentences"]
-    assert said.startswith("No null model is closer") and said.endswith("NRMSE, shape error and rating R.")
+    assert said.startswith("No null model is closer") and said.endswith("NRMSE, shape error and ISO rating.")
     nulls["ramp"]["R"] = 0.99
     (said,) = content(null_models=nulls)["null_sentences"]
     assert said.startswith("The straight ramp (1 number) is closer to the trace than the simulation in ")
-    assert said.endswith(" in rating R (0.990 against 0.977).")
+    assert said.endswith(" in ISO rating (0.990 against 0.977).")
 
 
 def test_parameters_outside_the_literature_and_strong_correlations_are_said(content: Content) -> None:

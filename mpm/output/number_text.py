@@ -1,0 +1,203 @@
+"""Numbers written for people: SI values become text.
+
+Every number of a report and of a verdict passes through :func:`quantity` or one of its neighbours, so that one
+quantity has one unit and one precision everywhere.
+"""
+
+from __future__ import annotations
+
+import math
+
+NBSP = "\u00a0"
+MINUS = "\u2212"
+DASH = "\u2013"
+
+#: SI unit -> rungs (value from which it is used, factor, text), smallest first: the units that people use.
+LADDERS: dict[str, tuple[tuple[float, float, str], ...]] = {
+    "Pa": ((0.0, 1.0, "Pa"), (1e3, 1e3, "kPa"), (1e6, 1e6, "MPa"), (1e9, 1e9, "GPa")),
+    "m": ((0.0, 1e-6, "µm"), (1e-4, 1e-3, "mm"), (1.0, 1.0, "m")),
+    "N": ((0.0, 1.0, "N"), (1e4, 1e3, "kN")),
+    "J": ((0.0, 1e-3, "mJ"), (1.0, 1.0, "J")),
+    "J/m^2": ((0.0, 1.0, "J/m²"), (1e4, 1e3, "kJ/m²")),
+    "N/m": ((0.0, 1.0, "N/m"), (1e4, 1e3, "kN/m")),
+    "m/s": ((0.0, 1e-3, "mm/s"), (1.0, 1.0, "m/s")),
+    "Hz": ((0.0, 1.0, "Hz"), (1e3, 1e3, "kHz")),
+    "kg/m^3": ((0.0, 1.0, "kg/m³"),),
+    "rad": ((0.0, math.pi / 180.0, "°"),),
+    "fraction": ((0.0, 1e-2, "%"),),
+    "-": ((0.0, 1.0, ""),),
+    "": ((0.0, 1.0, ""),),
+}
+#: Decimals of a per cent that are worth printing.
+PERCENT_PLACES = 2
+#: A range whose lower end is below this part of its unit gets a unit for each end: 50 kPa to 2 MPa.
+SMALL_END = 0.1
+#: A value this close to the next unit counts as reaching it: 1e-3 m is 1 mm whatever the last bit says.
+ROUNDING = 1e-9
+#: Outside this range a number is written with a power of ten.
+PLAIN_RANGE = (1e-4, 1e6)
+#: Numbers from here on have their thousands set apart.
+GROUP_FROM = 1e4
+
+#: With more decimals than this, a value and its much smaller uncertainty are written apart.
+MOST_PLACES = 6
+
+_SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+
+
+def plain(x: float, digits: int | None = 3) -> str:
+    """A number with ``digits`` significant digits, or the shortest text that has three for None.
+
+    >>> plain(-0.12345), plain(5.0, None), plain(1234567.0)
+    ('−0.123', '5', '1.23 × 10⁶')
+    """
+    if x == 0.0:
+        return "0"
+    if not PLAIN_RANGE[0] <= abs(x) < PLAIN_RANGE[1]:
+        mantissa, exponent = f"{x:.{(digits or 3) - 1}e}".split("e")
+        mantissa = f"{float(mantissa):g}" if digits is None else mantissa
+        return f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}".replace("-", MINUS)
+    if digits is None:
+        return f"{_three(x):.6g}".replace("-", MINUS)
+    rounded = float(f"{x:.{digits - 1}e}")
+    return _grouped(rounded, max(0, digits - 1 - math.floor(math.log10(abs(rounded)))))
+
+
+def count(n: float | None) -> str:
+    """A whole number, thousands set apart from ten thousand on; a dash where there is none.
+
+    >>> count(1234567).replace(NBSP, " "), count(1234)
+    ('1 234 567', '1234')
+    """
+    return DASH if n is None else _grouped(n, 0)
+
+
+def quantity(value: float | None, unit: str, *, digits: int | None = 3, signed: bool = False) -> str:
+    """A value in the unit people use for it; a dash where there is none.
+
+    Args:
+        value: In the SI unit; None or not finite means there is none.
+        unit: SI unit as in ``materials.yaml``; ``fraction`` is shown in per cent, with two decimals at most;
+            an unknown unit is kept.
+        digits: Significant digits; None for the shortest text (limits, settings).
+        signed: Whether a positive value gets its sign.
+
+    Returns:
+        Number and unit.
+
+    >>> quantity(3.2e5, "Pa").replace(NBSP, " "), quantity(0.033, "m").replace(NBSP, " ")
+    ('320 kPa', '33.0 mm')
+    """
+    if value is None or not math.isfinite(value):
+        return DASH
+    factor, name = rung(unit, abs(value))
+    x = value / factor
+    few = name == "%" and digits is not None and 0.0 < abs(x) < 10.0 ** (digits - PERCENT_PLACES)
+    text = _grouped(x, PERCENT_PLACES) if few else plain(x, digits)
+    return _with_unit(("+" if signed and text.strip("0.") and x > 0.0 else "") + text, name)
+
+
+def interval(low: float | None, high: float | None, unit: str) -> str:
+    """A range to three digits; a bound if one end is not known, a dash if neither is.
+
+    Args:
+        low: Lower end in the SI unit, or None.
+        high: Upper end in the SI unit, or None.
+        unit: SI unit, as of :func:`quantity`.
+
+    Returns:
+        Both numbers with one unit, or each with its own where they lie far apart.
+
+    >>> interval(0.8e6, 2e6, "Pa").replace(NBSP, " "), interval(5e4, 2e6, "Pa").replace(NBSP, " ")
+    ('0.8 to 2 MPa', '50 kPa to 2 MPa')
+    """
+    ends = [x if x is not None and math.isfinite(x) else None for x in (low, high)]
+    known = [abs(x) for x in ends if x is not None]
+    if not known:
+        return DASH
+    own = ["" if x is None else quantity(x, unit, digits=None) for x in ends]
+    if not all(own):
+        return f"above {own[0]}" if own[0] else f"below {own[1]}"
+    factor, name = rung(unit, max(known))
+    if 0.0 < min(known) < SMALL_END * factor and rung(unit, min(known))[1] != name:
+        return f"{own[0]} to {own[1]}"
+    texts = [plain(x / factor, None) for x in ends if x is not None]
+    return _with_unit(" to ".join(texts if texts[0] != texts[1] else texts[:1]), name)
+
+
+def uncertain(value: float | None, sd: float | None, unit: str) -> str:
+    """A value with its standard uncertainty, both to the second digit of the uncertainty.
+
+    Args:
+        value: In the SI unit, or None.
+        sd: Its standard uncertainty in the SI unit, or None.
+        unit: SI unit, as of :func:`quantity`.
+
+    Returns:
+        Both with one unit; the value alone where there is no uncertainty.
+
+    >>> uncertain(12.5271, 0.112, "N").replace(NBSP, " ")
+    '12.53 ± 0.11 N'
+    """
+    if value is None or sd is None or not (math.isfinite(value) and math.isfinite(sd) and sd > 0.0):
+        return quantity(value, unit)
+    factor, name = rung(unit, max(abs(value), sd))
+    x, s = value / factor, sd / factor
+    places = max(0, 1 - math.floor(math.log10(s)))
+    if places > MOST_PLACES:
+        return f"{quantity(value, unit)}{NBSP}±{NBSP}{quantity(sd, unit, digits=2)}"
+    text = f"{_grouped(x, places)}{NBSP}±{NBSP}{_grouped(s, places)}"
+    return _with_unit(f"({text})" if name in ("%", "°") else text, name)
+
+
+def rung(unit: str, size: float) -> tuple[float, str]:
+    """Factor and text of the unit for a value of this size [SI unit].
+
+    >>> rung("Pa", 3.2e5)
+    (1000.0, 'kPa')
+    """
+    ladder = LADDERS.get(unit, ((0.0, 1.0, unit.replace("^2", "²").replace("^3", "³")),))
+    if size == 0.0:
+        return next(((factor, name) for _, factor, name in ladder if factor == 1.0), ladder[0][1:])
+    size = _three(size)
+    return [(factor, name) for start, factor, name in ladder if size >= start * (1.0 - ROUNDING)][-1]
+
+
+def duration(seconds: float | None) -> str:
+    """A wall time.
+
+    >>> duration(3725.0).replace(NBSP, " "), duration(42.31).replace(NBSP, " ")
+    ('1 h 02 min', '42.3 s')
+    """
+    if seconds is None or not math.isfinite(seconds):
+        return DASH
+    if seconds < 120.0:
+        return quantity(seconds, "s")
+    minutes = round(seconds / 60.0)
+    if minutes < 60:
+        return f"{minutes}{NBSP}min"
+    return f"{minutes // 60}{NBSP}h{NBSP}{minutes % 60:02d}{NBSP}min"
+
+
+def listed(names: list[str]) -> str:
+    """Names as a list in a sentence.
+
+    >>> listed(["a", "b", "c"])
+    'a, b and c'
+    """
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def _three(x: float) -> float:
+    """The number rounded to three significant digits."""
+    return float(f"{x:.2e}")
+
+
+def _grouped(x: float, places: int) -> str:
+    text = f"{x:,.{places}f}" if abs(x) >= GROUP_FROM else f"{x:.{places}f}"
+    text = text.replace(",", NBSP)
+    return text.replace("-", MINUS if text.strip("-0.") else "")
+
+
+def _with_unit(text: str, name: str) -> str:
+    return text + (name if name in ("", "°") else NBSP + name)

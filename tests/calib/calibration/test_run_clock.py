@@ -1,0 +1,79 @@
+"""The time that a calibration is said to take: from earlier ones, over all its stages."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from pathlib import Path
+
+import h5py
+import pytest
+
+from calib.calibration.run_clock import FIRST_GUESS, LAST_RUNS, RunClock, earlier_runs
+from calib.io.progress import Progress
+
+TEXT = h5py.string_dtype()
+
+
+def finished(folder: Path, wall: float, seconds: float, status: str = "done") -> None:
+    """A calibration that has taken this long [s], with two default runs of this time [s] and a coarse one."""
+    folder.mkdir()
+    (folder / "summary.json").write_text(json.dumps({"status": status, "wall_s": wall}))
+    with h5py.File(folder / "evaluations.h5", "w") as store:
+        store["seconds"], store["fraction"] = [seconds, seconds, 0.1], [1.0, 1.0, 1.0]
+        for name, values in (("status", ["ok"] * 3), ("reason", [""] * 3), ("fidelity", ["fine", "fine", "coarse"])):
+            store.create_dataset(name, data=values, dtype=TEXT)
+        store.create_group("parameters")
+
+
+def test_earlier_runs_beside_the_folder_tell(tmp_path: Path) -> None:
+    """60 s with default runs of 2 s on two workers are 60; interrupted, damaged and own folders are left out."""
+    finished(tmp_path / "a", 60.0, 2.0)
+    finished(tmp_path / "stopped", 5.0, 2.0, "interrupted")
+    finished(tmp_path / "own", 600.0, 2.0)
+    (tmp_path / "damaged").mkdir()
+    (tmp_path / "damaged" / "summary.json").write_text("{")
+    assert earlier_runs(tmp_path / "own", 2) == [pytest.approx(60.0)]
+    assert earlier_runs(tmp_path / "none" / "own", 2) == []
+
+
+def test_only_the_newest_are_read(tmp_path: Path) -> None:
+    """Nine earlier runs: the oldest is left out."""
+    for k in range(9):
+        finished(tmp_path / f"run{k}", 10.0 + k, 1.0)
+        os.utime(tmp_path / f"run{k}" / "summary.json", (k, k))
+    assert earlier_runs(tmp_path / "own", 1) == [pytest.approx(18.0 - k) for k in range(8)]
+
+
+def test_one_bar_from_the_first_simulation_to_the_last() -> None:
+    """A default run of 2 s for a worker: 160 s in all as before, the longest is the budget and the last runs; the part
+    never falls and is not whole before the end."""
+    seen: list[Progress] = []
+    now = [0.0]
+    clock = RunClock(seen.append, [80.0, 70.0, 90.0], lambda: now[0])
+    for k in range(1, 31):
+        now[0] = 2.0 * k
+        clock.search(Progress(k, float(k), 100.0, 0, 9.0, 2.0 * (100.0 - k), "round"))
+    assert seen[-1].typical_s == pytest.approx(160.0 - 60.0)
+    assert seen[-1].eta_s == pytest.approx(2.0 * (70.0 + LAST_RUNS))
+    clock.stage("intervals")
+    for k in range(1, 5):
+        now[0] += 20.0
+        clock.stage(f"last simulations, {k} of 4", k, 4)
+    parts = [p.part for p in seen]
+    assert all(a <= b for a, b in zip(parts, parts[1:], strict=False))  # type: ignore[operator]
+    assert parts[-1] == pytest.approx(0.99) and seen[-1].eta_s == 0.0
+    assert seen[-1].stage == "last simulations, 4 of 4"
+
+
+def test_nothing_is_said_of_a_time_that_is_not_known() -> None:
+    """While workers compile, no time is told; without earlier runs a first guess serves; with no listener nothing
+    happens."""
+    seen: list[Progress] = []
+    clock = RunClock(seen.append, [], lambda: 0.0)
+    clock.search(Progress(1, 0.25, 100.0, 0, math.inf, math.nan, "design"))
+    assert math.isnan(seen[-1].eta_s) and "left" not in seen[-1].line()
+    clock.search(Progress(2, 1.0, 100.0, 0, math.inf, 99.0, "design"))
+    assert seen[-1].typical_s == pytest.approx(FIRST_GUESS)
+    RunClock(None, []).search(seen[-1])

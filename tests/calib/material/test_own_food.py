@@ -1,0 +1,73 @@
+"""A food of one's own: a file may be short, what it leaves out is said, and a template begins it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from calib.errors import MaterialError
+from calib.material.food import FoodSpec, load_food, load_foods
+from calib.material.own_food import OPTIONAL_HERE, template
+from cutcal.main import main
+
+SIZES = "".join(
+    f"    {name}: {{value: {x}, low: {x}, high: {x}, unit: m, status: measured, source: mould}}\n"
+    for name, x in (("length", 0.05), ("width", 0.03), ("height", 0.03))
+)
+
+
+def written(folder: Path, properties: str) -> str:
+    """Path of a file of a gel with these properties."""
+    path = folder / "gel.yaml"
+    path.write_text(f"gel:\n  shape:\n    kind: block\n{SIZES}  properties: {properties}\n", encoding="utf-8")
+    return str(path)
+
+
+def test_a_template_is_a_food(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What the command prints is read back as a food, with all its properties given and none flagged."""
+    assert main(["foods", "--template", "tofu"]) == 0
+    path = tmp_path / "tofu.yaml"
+    path.write_text(capsys.readouterr().out, encoding="utf-8")
+    food = load_food(str(path))
+    assert (food.name, food.shape_kind) == ("tofu", "block")
+    assert set(OPTIONAL_HERE) <= set(food.properties) and food.warnings() == []
+    assert main(["foods", str(path)]) == 0 and "tofu: block" in capsys.readouterr().out
+
+
+def test_what_a_file_leaves_out_is_wide_and_said(tmp_path: Path) -> None:
+    """Defaults follow the documented rules, reach over all foods, are assumed, and each is flagged."""
+    given = "{E: {value: 5.0e+4, low: 4.0e+4, high: 6.0e+4, unit: Pa, status: measured, source: ours}}"
+    food = load_food(written(tmp_path, given))
+    p = food.properties
+    assert (p["E"].value, p["E"].flag) == (5e4, None)
+    assert (p["yield_stress"].value, p["yield_stress"].low, p["yield_stress"].high) == (5e3, 400.0, 6e4)
+    assert p["tensile_strength"].value == pytest.approx(0.8 * 5e3)
+    foods = [one.properties for one in load_foods().values()]
+    assert p["R"].low == min(one["R"].low for one in foods) and p["R"].high == max(one["R"].high for one in foods)
+    assert p["R_initiation"].value == pytest.approx(1.5 * p["R"].value, rel=5e-3)
+    assert p["skin_thickness"].value == 0.0 and "R_skin" not in p
+    said = food.warnings()
+    assert len(said) == len(OPTIONAL_HERE) - 1 and all("not given" in text for text in said)
+    assert FoodSpec.load(written(tmp_path, given)).properties == p
+
+
+def test_null_is_an_answer(tmp_path: Path) -> None:
+    """A food whose file says that it has no tensile strength of its own gets none."""
+    assert "tensile_strength" not in load_food(written(tmp_path, "{tensile_strength: null}")).properties
+
+
+def test_a_list_of_foods_has_no_defaults(tmp_path: Path) -> None:
+    """A file in the layout of the bundled one must say all: a slip there would go unseen."""
+    with pytest.raises(MaterialError, match="rho"):
+        load_foods(written(tmp_path, "{}"))
+
+
+def test_an_unknown_food_names_the_template(capsys: pytest.CaptureFixture[str]) -> None:
+    """Who asks for a food that is not there learns how to make one; a known or odd name begins none."""
+    with pytest.raises(MaterialError, match="cutcal foods --template"):
+        load_food("tofoo")
+    for name in ("banana", "To fu"):
+        assert main(["foods", "--template", name]) == 1
+    assert "no name for a new food" in capsys.readouterr().err
+    assert template("tofu", [f.properties for f in load_foods().values()]).startswith("# A food of your own")
