@@ -44,7 +44,8 @@ from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.uncertainty.intervals import Uncertainty
 from calib.uncertainty.limiting import limiting
-from calib.validation.acceptance import Conservation, Verdict, bound_word, judge, limits
+from calib.validation.acceptance import Conservation, Verdict, judge, limits
+from calib.validation.bounds import bound_word
 from mpm.files import write_atomic
 from mpm.output.record import ForceRecord
 from mpm.scene import Knife

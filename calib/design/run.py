@@ -86,7 +86,7 @@ def run(request: DesignRequest, out: Path, pool: Workers, *, resume: bool, say: 
             found = _Design(request, tests, quantity, simulator, say).expected()
         result = _result(request, found, tests, left_out, minutes, simulator, began)
         write_json(out / "design.json", to_document(result))
-        from reports.calibration.design import write_figure
+        from reports.studies.design import write_figure
 
         write_figure(result, out)
         return result

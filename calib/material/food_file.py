@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import yaml
 
@@ -12,11 +12,19 @@ from calib.errors import OutputError
 from calib.io.yaml_checks import Dumper
 from mpm.files import write_atomic
 
-if TYPE_CHECKING:
-    from calib.material.food import FoodSpec
+
+class Written(Protocol):
+    """What a file is made of: a :class:`calib.material.food.FoodSpec`."""
+
+    @property
+    def name(self) -> str:
+        """Name of the food."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data in the layout of ``materials.yaml``."""
 
 
-def dump_material(food: FoodSpec, path: Path | str, provenance: Mapping[str, Any]) -> None:
+def dump_material(food: Written, path: Path | str, provenance: Mapping[str, Any]) -> None:
     """Write a food and where its values come from; :func:`calib.material.food.load_material_file` reads it back.
 
     Args:

@@ -8,11 +8,10 @@ from collections.abc import Collection, Mapping
 from calib.material.properties import MEANINGS, PROPERTIES, Property
 
 OPTIONAL_HERE = ("rho", "E", "nu", "yield_stress", "R", "R_initiation", "initiation_depth", "mu", "loss_factor",
-                 "tensile_strength")  # fmt: skip
+                 "strength_ratio")  # fmt: skip
 """Properties that a food's own file may leave out; without skin_thickness it has no skin."""
 OF_ANOTHER = {
     "yield_stress": ("E", 0.1, 0.01, 1.0, "a tenth of E, from a hundredth of it to all"),
-    "tensile_strength": ("yield_stress", 0.8, 0.16, 4.0, "0.8 of the yield stress, from a fifth of that to five times"),
     "R_initiation": ("R", 1.5, 1.0, 3.0, "1.5 R, up to three times the highest R"),
 }
 """Defaults that follow another property: its name, factors on value, low and high, and the words of the source."""
@@ -48,8 +47,9 @@ def filled(
     have = dict(given)
     if "skin_thickness" not in have:
         have["skin_thickness"] = Property("skin_thickness", 0.0, 0.0, 0.0, "m", "no skin was given", "assumed")
-    for name in sorted(OPTIONAL_HERE, key=lambda name: name in OF_ANOTHER):
-        if name not in have and name not in OF_ANOTHER:
+    has_strength = "tensile_strength" in have or "tensile_strength" in none
+    for name in OPTIONAL_HERE:
+        if name not in have and name not in OF_ANOTHER and not (name == "strength_ratio" and has_strength):
             have[name] = _over_all(name, [food[name] for food in foods if name in food])
     for name, (other, *factors, words) in OF_ANOTHER.items():
         if name not in have and name not in none:

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from calib.io.typed_document import ANY, FORMER, to_document
-from calib.material.scene import FITTED_SIZES
 from calib.problem.nuisance import OUTSIDE
 from calib.problem.objective import EXPLAINED
 from calib.problem.parameters import property_of
 from calib.simulation.evaluation import FULLY_PARTED, Evaluation
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
+from calib.validation.bounds import AT_BOUND, AT_LIMIT, bound_word
 from calib.validation.metrics import Metrics
 from calib.validation.numerical_checks import FINER_GRID, HALF_SPEED, VARIANTS, Check
 from calib.validation.predictive_score import PredictiveScore
@@ -40,10 +40,6 @@ CONFLICT_LINE, CONFLICT_LIMIT = "values those of the food", EXPLAINED_LIMIT
 SIZE_LINE = "specimen no larger than the food"
 BAND_LIMIT = 0.5  # a band wider than a quarter of the peak either way predicts nothing that anyone would use
 OPENING_REMARKED = 0.1  # part of the new surface that opens ahead of the edge, from which on it is said [-]
-# Ends of what is physically possible: a fit that ends there found a one-sided answer (the cut shows no friction, say),
-# whereas one that ends on a bound of ours asks for a value that it was not allowed.
-NATURAL_LIMITS = {"mu": 0.0, "strength_ratio": 1.0}
-AT_BOUND, AT_LIMIT = "at_bound", "at_limit"
 NUISANCE_LINES = {"lag": "delay of the trace within its uncertainty", "gain": "sensor's gain within its uncertainty"}
 """Nuisances that the validation hangs on, and their lines: a trace that asks for more of one than its sensor leaves
 open fails."""
@@ -229,29 +225,6 @@ def _conflict(found: PriorConflict) -> Verdict:
         note += f"; furthest: {found.furthest}, by {abs(found.distance):.1f} sd"
     passed = bool(found.probability >= CONFLICT_LIMIT)
     return Verdict(CONFLICT_LINE, found.probability, CONFLICT_LIMIT, "fraction", passed, note)
-
-
-def _at_natural_limit(name: str, p: FittedParameter) -> bool:
-    """Whether a parameter at a bound is at the end of what is possible: its interval reaches there, and its value is
-    nearer to that end than to the other."""
-    limit = NATURAL_LIMITS.get(name)
-    if limit is None or p.low95 is None or p.high95 is None:
-        return False
-    within = p.low95 * (1 - 1e-9) <= limit <= p.high95 * (1 + 1e-9)
-    return within and abs(p.value - limit) < max(p.value - p.low95, p.high95 - p.value)
-
-
-def bound_word(name: str, p: FittedParameter) -> str:
-    """The verdict on a fitted parameter, where a bound that is the end of what is possible has a word of its own.
-
-    Args:
-        name: The parameter.
-        p: What the fit says of it.
-
-    Returns:
-        :data:`AT_LIMIT` for :data:`AT_BOUND` at the end of what is possible, else the verdict as it is.
-    """
-    return AT_LIMIT if p.verdict == AT_BOUND and (name in FITTED_SIZES or _at_natural_limit(name, p)) else p.verdict
 
 
 def judge(

@@ -31,7 +31,7 @@ from tests.calib.made_food import MadeFood
 def undrawn(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """A figure takes longer than the rest: one test draws it."""
     if "a_cut_food" not in request.node.name:
-        monkeypatch.setattr("reports.calibration.design.write_figure", lambda result, out: None)
+        monkeypatch.setattr("reports.studies.design.write_figure", lambda result, out: None)
 
 
 def quiet(text: str) -> None:

@@ -14,7 +14,8 @@ from pypdf import PdfReader
 from calib.calibration.result import CalibrationResult, read_result
 from calib.material.references import cited, references
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
-from calib.validation.acceptance import Conservation, bound_word, judge
+from calib.validation.acceptance import Conservation, judge
+from calib.validation.bounds import bound_word
 from calib.validation.metrics import compare
 from calib.validation.null_models import null_models
 from mpm.output.section import Section

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pypdf import PdfReader
 
 from calib.calibration.credibility import Context, Credibility, ModelError, to_document
 from calib.calibration.report import write_report
@@ -14,7 +15,6 @@ from calib.io.folder import finite
 from reports import ReportError
 from reports.calibration.credibility_page import FILE, credibility
 from tests.reports import sample
-from tests.reports.sample import pages
 
 PEAK = ModelError(19.4, 20.0, "N", -0.6, 0.2, 0.3, 0.6, 0.7, -2.0, 0.8)
 WORK = ModelError(0.50, 0.40, "J", 0.10, 0.01, 0.0, 0.01, 0.0141, 0.072, 0.128)
@@ -56,9 +56,16 @@ def test_a_folder_without_the_file_has_no_page_and_a_damaged_one_is_an_error(tmp
         credibility(tmp_path)
 
 
-def test_the_report_has_one_page_more(tmp_path: Path) -> None:
-    """The page stands by itself."""
+def test_the_report_has_the_section_where_there_is_the_file(tmp_path: Path) -> None:
+    """Its heading and the words of its answer, once; without the file neither."""
     folder = sample.write_run(tmp_path)
-    without = pages(write_report(folder).read_bytes())
+    heading, answer = "In the words of verification and validation", "an error of the model is shown"
+    assert heading not in text(write_report(folder))
     write(tmp_path)
-    assert pages(write_report(folder).read_bytes()) == without + 1
+    found = text(write_report(folder))
+    assert found.count(heading) == 1 and answer in found
+
+
+def text(report: Path) -> str:
+    """All words of a PDF."""
+    return " ".join(" ".join(page.extract_text() for page in PdfReader(report).pages).split())

@@ -13,7 +13,7 @@ from tests.calib.made_food import MadeFood
 
 def test_promises_are_kept_by_records_of_the_truth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The recommended test and the other blade leave R an interval of the promised width within 30 %."""
-    monkeypatch.setattr("reports.calibration.design.write_figure", lambda result, out: None)
+    monkeypatch.setattr("reports.studies.design.write_figure", lambda result, out: None)
     monkeypatch.setattr("studies.design.linearised.MADE", ("width", "blade"))
     found = study("potato", "R", 0, tmp_path, MadeFood(0.003))
     assert found["recommended"] is not None
