@@ -17,6 +17,7 @@ import numpy as np
 
 from calib.fit.multistart import FitResult, multistart_search
 from calib.fit.options import FitOptions
+from calib.material.scene import of_specimen
 from calib.multi_specimen.specimens import JointFit, Specimens
 from calib.problem.objective import Objective
 from calib.problem.parameters import ParameterSet, is_shared
@@ -150,8 +151,11 @@ def _own_fit(specimens: Specimens, shared: Mapping[str, float], name: str) -> _O
         return None
     objective = replace(setup.objective, parameters=ParameterSet(chosen))
     fine, coarse = (
-        specimens.evaluator(scene.with_material(**shared), name, fidelity)
-        for scene, fidelity in ((setup.fine, FINE), (setup.coarse, COARSE))
+        specimens.evaluator(sized.with_material(**flesh), name, fidelity)
+        for (sized, flesh), fidelity in (
+            (of_specimen(setup.fine, shared, setup.kept), FINE),
+            (of_specimen(setup.coarse, shared, setup.kept), COARSE),
+        )
     )
     options = FitOptions(
         budget=SPECIMEN_BUDGET, batch=specimens.pool.batch, design=SPECIMEN_DESIGN, seed=specimens.study.seed

@@ -12,8 +12,12 @@ import pytest
 import calib.multi_specimen.held_out
 from calib.fit.multistart import multistart_search
 from calib.fit.options import FitOptions
-from calib.multi_specimen.held_out import _adapted, _drawn, _OwnFit
+from calib.material.food import load_food
+from calib.material.knife import load_knife
+from calib.material.scene import Sizing, cut_scene, specimen
+from calib.multi_specimen.held_out import _adapted, _drawn, _own_fit, _OwnFit
 from calib.problem.parameters import ParameterSet
+from mpm.scene import Scene
 from tests.calib.fake import FIVE, Fake, goal, three_terms
 
 FLESH = {"E": 4e5, "yield_stress": 5e4, "R": 350.0, "mu": 0.25}
@@ -90,3 +94,26 @@ def test_the_specimens_own_values_are_fitted_to_each_flesh(monkeypatch: pytest.M
         assert np.log(own["R_skin"] / best["R_skin"]) == pytest.approx(way, abs=0.6 * abs(way) + 0.005)
     assert found[-1]["R_skin"] == pytest.approx(best["R_skin"], rel=1e-6)
     assert _adapted(specimens, None, FLESH, others, "b") == [{}] * len(others)
+
+
+def test_a_size_that_a_study_shares_is_no_property_of_the_flesh(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Height and roundness shape the cut of the held-out specimen, where each has none of its own."""
+    food = load_food("potato")
+    shape, _ = specimen(food, None, Sizing(), open_form=True)
+    scene = cut_scene(food, shape, load_knife("kitchen"))
+    done = SimpleNamespace(status="done")
+    monkeypatch.setattr(calib.multi_specimen.held_out, "multistart_search", lambda *given, **options: done)
+    cut: list[Scene] = []
+    objective = goal(FLESH | {"R_skin": SKIN}, ParameterSet((FIVE.items[3],)))
+    specimens: Any = SimpleNamespace(
+        setups={"c": SimpleNamespace(objective=objective, fine=scene, coarse=scene, kept=())},
+        own_parameters=lambda name: (FIVE.items[3],),
+        evaluator=lambda scene, name, fidelity: cut.append(scene),
+        pool=SimpleNamespace(batch=1),
+        study=SimpleNamespace(seed=0),
+        staged=lambda stage: None,
+    )
+    assert _own_fit(specimens, {"R": 300.0, "height": 0.06, "roundness": 0.2}, "c") is not None
+    for one in cut:
+        assert one.food.material.R == 300.0
+        assert (one.food.shape.height, one.food.shape.roundness) == (0.06, 0.2)
