@@ -171,7 +171,7 @@ def _conditions(result: CalibrationResult) -> list[list[str]]:
     mach, real = quantity(cut.mach, "-"), cut.speed_real_m_s
     speed = "" if real is None else f" (the real one: {quantity(real, 'm/s')})"
     gravity = _part(result, "numerics", "gravity")
-    weight = "" if gravity is None else f", weight of {quantity(gravity, '-')} m/s²"
+    weight = "" if gravity is None else f", gravity of {quantity(gravity, '-')} m/s²"
     rows = [
         ["A", f"blade: rigid, goes down at one speed, {mach} of that of pressure waves in the food{speed}"],
         ["B", "faces of the blade: contact and friction; their force is the *face part*"],

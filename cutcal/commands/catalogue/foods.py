@@ -18,7 +18,7 @@ source. A YAML file of your own does in place of a name, here and for --food."""
 EPILOG = """examples:
   cutcal foods
   cutcal foods banana
-  cutcal foods --template tofu > tofu.yaml
+  cutcal foods --template tofu
   cutcal foods tofu.yaml"""
 
 
