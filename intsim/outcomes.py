@@ -204,9 +204,10 @@ class SuiteResult:
         strict: The same, to 5 mm above the table, and equal pieces.
         criteria: Each criterion alone.
         clipped_steps: Steps in which a command was beyond the arm's limits.
-        severing: Simulated cuts that are in pieces; None where none was simulated, as the next two.
-        not_simulated: Cuts that the solver cannot make or did not end; they count in no rate.
-        published_and_severed: Simulated cuts that are in pieces and meet the published criteria.
+        severing: Episodes whose food is in pieces in the solver; None where none was simulated, as the next two.
+        not_simulated: Those of them that the solver cannot make or did not end: they are in every denominator, and
+            no success.
+        published_and_severed: Episodes that are in pieces and meet the published criteria.
         expected_place: Rate of the place criterion that the noisy oracle's closed form gives; None for others.
     """
 
@@ -229,7 +230,6 @@ class SuiteResult:
             sigma: Standard deviation of the noisy oracle [m]; None for others.
         """
         cuts = [(row.published, row.severing.severed) for row in rows if row.severing is not None]
-        ended = [(published, severed) for published, severed in cuts if severed is not None]
         single = sigma is not None and bool(rows) and not any(row.pieces for row in rows)
         return SuiteResult(
             what=SUITES[rows[0].suite].what if rows else "",
@@ -241,9 +241,11 @@ class SuiteResult:
                 if any(name in row.criteria for row in rows)
             },
             clipped_steps=sum(row.clipped for row in rows),
-            severing=SuccessRate.of([severed for _, severed in ended]) if cuts else None,
-            not_simulated=len(cuts) - len(ended) if cuts else None,
-            published_and_severed=SuccessRate.of([all(both) for both in ended]) if cuts else None,
+            severing=SuccessRate.of([bool(severed) for _, severed in cuts]) if cuts else None,
+            not_simulated=sum(severed is None for _, severed in cuts) if cuts else None,
+            published_and_severed=SuccessRate.of([published and bool(severed) for published, severed in cuts])
+            if cuts
+            else None,
             expected_place=_mean_place_rate(rows, sigma) if single and sigma is not None else None,
         )
 

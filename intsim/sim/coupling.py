@@ -10,6 +10,7 @@ import numpy as np
 from calib.material.food import FoodSpec
 from intsim.sim.severing import cut_scene_at
 from intsim.task.kinematic_table import axis_crossing
+from intsim.task.motion import RELEASE_CLEARANCE
 from intsim.task.planner import DESCENT_SPEED
 from intsim.task.targets import Item
 from mpm.live import LiveCut
@@ -24,7 +25,7 @@ STALL_SPEED = 1e-3
 
 It stands above the board where one end of the blade, say, is on the board and the middle hangs.
 """
-READY_CLEARANCE = 0.01  # height of the edge above the food at which its cut is made ready [m]
+READY_CLEARANCE = RELEASE_CLEARANCE  # height of the edge above the food at which its cut is made ready [m]
 TOUCH_FORCE = 1e-3  # force from which on the knife touches the food, over the weight of the food [-]
 MAX_CELLS = 14
 """Cells over height and width of a food at most: large foods have larger cells, which save much time.
@@ -115,6 +116,17 @@ class Coupling:
     def severed(self) -> bool:
         """Whether every cut so far has left pieces, and there was one."""
         return bool(self.done) and all(d.severed for d in self.done)
+
+    @property
+    def broken(self) -> str:
+        """Why a cut was not simulated to its end, in words; empty where all were."""
+        return next((d.why for d in self.done if d.severed is None), "")
+
+    def count(self) -> int:
+        """Pieces of the first food, as it lies there now: those of a cut that goes on as soon as nothing holds."""
+        here = self.live if self.live is not None and self._which == 0 and self.live.begun else None
+        parted = here is not None and here.status == "done" and here.uncut == 0 and here.pieces().complete
+        return len(self.items[0].pieces) + parted
 
     def move(self, pose: np.ndarray, span: float) -> np.ndarray:
         """The knife has moved to a pose in a span of time.

@@ -56,8 +56,9 @@ def judge_geometry(spec: CutSpec, item: Item, rollout: Rollout, after: Item) -> 
     """Judge an episode by geometry.
 
     The published criteria are read so that each fails by itself: the tip's error is its height above the table, the
-    region is the food, the place is along its axis. A tip within 50 mm of the table says nothing of a grape 25 mm high:
-    ``strict_tip`` asks for 5 mm. For equal pieces every cut counts against the piece that was there: the worst angle
+    region is the food, into which the edge has to go, the place is along its axis. A tip within 50 mm of the table says
+    nothing of a grape 25 mm high: a knife that has not touched it has not met the region, and ``strict_tip`` asks for
+    5 mm. For equal pieces every cut counts against the piece that was there: the worst angle
     and place.
 
     Args:
@@ -88,7 +89,7 @@ def judge_geometry(spec: CutSpec, item: Item, rollout: Rollout, after: Item) -> 
     even = coefficient_of_variation(lengths) if len(lengths) > 1 else math.nan
     criteria = {
         "tip": height < TIP_HEIGHT,
-        "region": bool(tries),
+        "region": bool(tries) and (bool(spec.pieces) or height < item.top(tries[0][1])),
         "angle": angle <= ANGLE_TOLERANCE,
         "place": abs(offset) <= PLACE_TOLERANCE,
         "strict_tip": height < STRICT_TIP_HEIGHT,

@@ -196,7 +196,7 @@ def table(result: EvaluationResult) -> str:
         if found.expected_place is not None:
             lines.append(f"      place expected of its error: {found.expected_place:.0%}")
         if found.not_simulated:
-            lines.append(f"      {found.not_simulated} cuts could not be simulated: see evaluate.jsonl")
+            lines.append(f"      {found.not_simulated} cuts were not simulated and count as whole: see evaluate.jsonl")
     return "\n".join(lines)
 
 

@@ -28,6 +28,7 @@ from intsim.policy.oracles import make_policy
 from intsim.sim import environment as robot_environment
 from intsim.sim.closed_loop import make_environment, roll_out_closed_loop
 from intsim.sim.world import World
+from intsim.task.motion import MotionEnd
 from intsim.task.planner import GRIPPER_CLOSED, PHASES, BladeDescent, plan_cut
 from intsim.task.suites import sample_episode
 from intsim.task.targets import target
@@ -58,7 +59,7 @@ def made(**how):
 
 
 def cut(env, seed: int, depth: float = 0.0, hold: float = 0.0) -> dict[str, float]:
-    """One planned cut by joint targets: what came of it."""
+    """One planned cut by joint targets: what came of it; nothing succeeds before the motion is over."""
     env.reset(seed=seed)
     episode = env.episode
     path = plan_cut(
@@ -68,10 +69,11 @@ def cut(env, seed: int, depth: float = 0.0, hold: float = 0.0) -> dict[str, floa
     info = {}
     for pose in path.pose:
         joints, off = env.kinematics.joints(pose, joints)
-        _, _, _, _, info = env.step(np.array([*joints[:7], GRIPPER_CLOSED], np.float32))
+        _, _, over, _, info = env.step(np.array([*joints[:7], GRIPPER_CLOSED], np.float32))
+        assert bool(over) == bool(info["success"]) <= bool(info["over"])
         worst, peak = max(worst, off), max(peak, float(env.forces[:, 2].max()))
         low = min(low, float(env.pose[2]))
-    flags = {name: float(info[name].item()) for name in ("success", "severed", "uncut")}
+    flags = {name: float(info[name].item()) for name in ("success", "published", "severed", "uncut")}
     return {"off": worst, "peak": peak, "low": low, **flags}
 
 
@@ -100,10 +102,70 @@ def test_the_food_stops_the_arm_and_geometry_does_not_see_it():
     free.close()
     assert max(short["off"], alone["off"]) < 1e-4
     assert alone["peak"] == 0 and alone["low"] < short["low"] - 1e-3
-    assert short["success"] and alone["success"]
+    assert short["published"] and not short["success"] and alone["success"] and deep["success"]
     assert not short["severed"] and short["uncut"] > 0
     assert deep["severed"] and deep["uncut"] < 0.02 < short["uncut"]
     assert deep["peak"] == pytest.approx(short["peak"], rel=0.1)
+
+
+@pytest.mark.parametrize("criterion", ["severed", "published"])
+def test_nothing_succeeds_before_contact(criterion):
+    """A grape 22 mm high, the edge in the right place 43 mm above the board and a millimetre above the grape, until the
+    time is out: no success, no reward of one, and the episode goes on to its end.
+    """
+    env = made(foods={"grape": load_food("grape")}, criterion=criterion, coupled=criterion == "severed")
+    env.reset(seed=SEED)
+    item = env.episode.item
+    assert item.shape.height < 0.025
+    goal = np.array([*item.at(target(env.episode.spec, item)), 0.0431, item.yaw - np.pi / 2, 0.0])
+    env.motion = MotionEnd(50)
+    joints = env.agent.robot.get_qpos()[0].numpy().astype(float)
+    for step in range(50):
+        if step == 30:
+            goal[2] = item.shape.height + 1e-3
+        joints, _ = env.kinematics.joints(goal, joints)
+        _, reward, over, _, info = env.step(np.array([*joints[:7], GRIPPER_CLOSED], np.float32))
+        assert not over and not info["success"] and not info["published"] and reward == 0
+    env.close()
+    assert abs(env.pose[2] - goal[2]) < 1e-3 and np.linalg.norm(env.pose[:2] - goal[:2]) < 2e-3
+    assert env.motion.why == "time" and bool(info["over"])
+
+
+def test_states_have_the_food_and_the_dense_reward_sees_the_cut():
+    """Eleven numbers of the food beside the edge's five; the reward grows to 1 at the release, and the guardrail has
+    nothing to log of a plan."""
+    env = made(foods={"grape": load_food("grape")}, reward_mode="normalized_dense", obs_mode="state_dict")
+    obs, _ = env.reset(seed=SEED)
+    item = env.episode.item
+    assert obs["extra"]["food"].shape == (1, 11)
+    assert obs["extra"]["food"][0, [0, 1, 4, 9]].numpy() == pytest.approx(
+        [item.x, item.y, item.shape.length, item.at(target(env.episode.spec, item))[0]], abs=1e-6
+    )
+    path = plan_cut(item, target(env.episode.spec, item), BladeDescent(depth=-0.03, hold=0.5), start=env.pose).pose
+    joints, rewards = env.agent.robot.get_qpos()[0].numpy().astype(float), []
+    for pose in path:
+        joints, _ = env.kinematics.joints(pose, joints)
+        obs, reward, over, _, _ = env.step(np.array([*joints[:7], GRIPPER_CLOSED], np.float32))
+        rewards.append(float(reward))
+        if over:
+            break
+    env.close()
+    assert rewards[-1] == 1.0 and max(rewards[:-1]) <= 0.91 and rewards[0] < 0.3
+    assert float(obs["extra"]["food"][0, 7]) == 2 and env.motion.why == "released"
+    assert env.guardrail.log == []
+
+
+def test_the_guardrail_is_in_the_environment_and_logged():
+    """A joint sent a radian away goes at its speed, in info and in the log; without the guardrail it is sent there."""
+    for guardrail in (True, False):
+        env = made(guardrail=guardrail)
+        env.reset(seed=SEED)
+        goal = env.agent.robot.get_qpos()[0, :7].numpy() + [1.0, 0, 0, 0, 0, 0, 0]
+        info = env.step(np.array([*goal, GRIPPER_CLOSED], np.float32))[4]
+        sent = float(env.agent.controller.controllers["arm"]._target_qpos[0, 0])
+        env.close()
+        assert bool(info["clipped"]) == guardrail == bool(env.guardrail.log)
+        assert sent == pytest.approx(goal[0] - 1 + 2.175 / 20 if guardrail else goal[0], abs=1e-5)
 
 
 def test_a_stiffer_arm_comes_nearer_to_the_board():
@@ -206,6 +268,8 @@ def test_a_criterion_that_is_none_is_an_error():
     """And a background that does not exist."""
     with pytest.raises(CutcalError, match="criterion"):
         made(criterion="perfect")
+    with pytest.raises(CutcalError, match="does not resist"):
+        made(criterion="severed", coupled=False)
     with pytest.raises(CutcalError, match="scenery"):
         made(scenery=99)
 
