@@ -8,9 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib.material.food import FoodSpec
+from intsim.sim.piece_mesh import Ends, Mesh, item_mesh
 from intsim.sim.severing import cut_scene_at
 from intsim.task.kinematic_table import axis_crossing
 from intsim.task.motion import RELEASE_CLEARANCE
+from intsim.task.pieces import cut_ends, piece_shape
 from intsim.task.planner import DESCENT_SPEED
 from intsim.task.targets import Item
 from mpm.live import LiveCut
@@ -110,6 +112,8 @@ class Coupling:
         self.force, self.torque, self.impulse, self.touching = np.zeros(3), np.zeros(3), np.zeros(3), False
         self.aside = self.pitch = 0.0
         self._which, self._along, self._begin = 0, 0.0, np.zeros(5)
+        self._ends: Ends | None = None
+        self._others = Mesh.of([])
         self._ready: set[int] = set()  # foods that the edge has been above since it was last down
 
     @property
@@ -159,7 +163,10 @@ class Coupling:
         return np.array([*(pose[:2] + off * np.cos(tilt) * edge), pose[2] + off * np.sin(tilt)])
 
     def mesh(self) -> tuple[int, np.ndarray, np.ndarray, np.ndarray] | None:
-        """The food under the knife; None while no cut goes on.
+        """The food under the knife, all of it; None while no cut goes on.
+
+        Beside what is simulated these are the ends of a long piece, which go with the simulated part, and the other
+        pieces, which lie still.
 
         Returns:
             Its place in ``items``, vertices in the world [m] (m, 3), triangles (t, 3), and which vertices lie on the
@@ -167,8 +174,23 @@ class Coupling:
         """
         if self.live is None or not self.live.begun:
             return None
-        points, triangles, flesh = self.live.surface()
-        return self._which, self.items[self._which].placed(points, self._along), triangles, flesh
+        item = self.items[self._which]
+        own = Mesh(*self.live.surface())
+        if self._ends is None:
+            self._ends, self._others = self._beside(item)
+        parts = [own, *self._ends.now(own.points)]
+        whole = Mesh.of([*(replace(m, points=item.placed(m.points, self._along)) for m in parts), self._others])
+        return self._which, whole.points, whole.triangles, whole.flesh
+
+    def _beside(self, item: Item) -> tuple[Ends, Mesh]:
+        """What is drawn beside the simulated part of the piece that is cut."""
+        assert self.live is not None
+        which = item.piece_at(self._along)
+        assert which is not None
+        place = self._along - item.pieces[which].shift
+        faces = cut_ends(item, which)
+        own = self.live.scene.food.shape
+        return Ends(own, piece_shape(item, which, place), faces, self.live.rest), item_mesh(item, which)
 
     def uncut(self) -> float:
         """Part of the section of the present cut that still holds [-], 1 where there is none."""
@@ -207,7 +229,7 @@ class Coupling:
         if met:
             self._which, self._along = met[0]
             self._ready.discard(self._which)
-            self._begin, self.aside, self.pitch = np.array(pose, float), 0.0, 0.0
+            self._begin, self.aside, self.pitch, self._ends = np.array(pose, float), 0.0, 0.0, None
             item = self.items[self._which]
             try:
                 self.live = LiveCut(self._scene(item, self._along))

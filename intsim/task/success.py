@@ -32,6 +32,9 @@ class GeometricOutcome:
         pieces: Pieces of the food at the end, in plain geometry.
         length_variation: Standard deviation of the lengths of the pieces over their mean; NaN for one piece.
         criteria: Which of :data:`CRITERIA` are met; ``count`` and ``even`` for equal pieces alone.
+        offsets: Of every cut in order, the error of its place over the length of what was cut [-].
+        volume_variation: Standard deviation of the volumes of the pieces over their mean: 0 for equal ones, NaN for one
+            piece. The published measure of a split is the number and uniformity of its pieces, without a formula.
     """
 
     height: float
@@ -40,6 +43,8 @@ class GeometricOutcome:
     pieces: int
     length_variation: float
     criteria: Mapping[str, bool]
+    offsets: tuple[float, ...] = ()
+    volume_variation: float = math.nan
 
     @property
     def published(self) -> bool:
@@ -96,7 +101,8 @@ def judge_geometry(spec: CutSpec, item: Item, rollout: Rollout, after: Item) -> 
     }
     if spec.pieces:
         criteria |= {"count": len(lengths) == spec.pieces, "even": even <= LENGTH_VARIATION_LIMIT}
-    return GeometricOutcome(height, angle, offset, len(lengths), even, criteria)
+    uneven = coefficient_of_variation(after.volumes()) if len(lengths) > 1 else math.nan
+    return GeometricOutcome(height, angle, offset, len(lengths), even, criteria, tuple(errors), uneven)
 
 
 def _offset(spec: CutSpec, was: Item, along: float) -> float:
