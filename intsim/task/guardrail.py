@@ -11,16 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from intsim.task.gym_action import PLACE_SCALE
 from intsim.task.kinematic_table import limit_command
 from intsim.task.planner import CONTROL_RATE
 
 MAX_JOINT_SPEEDS = np.array([2.175] * 4 + [2.61] * 3)
 """Speeds of a Franka arm's joints at most [rad/s] (Franka control interface)."""
-EE_ACTION_SCALE = 0.1
-"""Change of pose [m, rad] that an action of 1 stands for in ``pd_ee_delta_pose`` and ``pd_ee_target_delta_pose``.
-
-ManiSkill's Panda maps -1 to 1 onto -0.1 to 0.1 of either.
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,9 +91,9 @@ class Guardrail:
             return np.array([*self._joints, *action[7:]]), ("joint",) * clipped
         if self.mode in ("pd_ee_delta_pose", "pd_ee_target_delta_pose"):
             inside = np.clip(action[:6], -1.0, 1.0)  # as the controller does
-            kept = limit_command(EE_ACTION_SCALE * inside, self._velocity)
+            kept = limit_command(PLACE_SCALE * inside, self._velocity)
             self._velocity = kept.delta[:3] * CONTROL_RATE
-            return np.array([*kept.delta / EE_ACTION_SCALE, *action[6:]]), kept.clipped
+            return np.array([*kept.delta / PLACE_SCALE, *action[6:]]), kept.clipped
         if self.mode == "pd_ee_pose":
             change = action[:6] - self._place
             change[3:] = (change[3:] + np.pi) % (2 * np.pi) - np.pi

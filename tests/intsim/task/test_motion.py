@@ -7,7 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from intsim.task.guardrail import EE_ACTION_SCALE, MAX_JOINT_SPEEDS, Guardrail
+from intsim.task.guardrail import MAX_JOINT_SPEEDS, Guardrail
+from intsim.task.gym_action import PLACE_SCALE, from_gym_action, to_gym_action
 from intsim.task.kinematic_table import MAX_SPEED
 from intsim.task.motion import RELEASE_CLEARANCE, STALL_STEPS, MotionEnd
 from intsim.task.planner import CONTROL_RATE, plan_cut
@@ -84,8 +85,17 @@ def test_the_guardrail_clips_and_logs_what_is_beyond_them():
     rail = Guardrail("pd_ee_delta_pose", np.zeros(7), np.zeros(6))
     way = [rail.clip(np.array([1.0, 0, 0, 0, 0, 0, -1.0])) for _ in range(10)]
     assert rail.log[0].limits == ("speed", "acceleration") and way[0][6] == -1.0
-    assert way[-1][0] * EE_ACTION_SCALE * CONTROL_RATE == pytest.approx(MAX_SPEED)
+    assert way[-1][0] * PLACE_SCALE * CONTROL_RATE == pytest.approx(MAX_SPEED)
     rail = Guardrail("pd_ee_pose", np.zeros(7), np.array([0.4, 0, 0.3, np.pi - 0.01, 0, 0]))
     assert rail.clip(np.array([0.4, 0, 0.3, -np.pi + 0.01, 0, 0, -1.0]))[3] == -np.pi + 0.01 and not rail.log
     rail.clip(np.array([0.9, 0, 0.3, -np.pi + 0.01, 0, 0, -1.0]))
     assert "acceleration" in rail.last
+
+
+def test_a_gym_action_and_back():
+    """A tenth of a metre is 1; raising the end of an edge along x turns it about -y, of one along y about x."""
+    lift = np.array([0.1, -0.05, 0.02, 0.0, 0.03, 0.0, -1.0])
+    assert to_gym_action(lift, 0.0) == pytest.approx([1.0, -0.5, 0.2, 0.0, 0.3, 0.0, -1.0])
+    assert to_gym_action(lift, np.pi / 2) == pytest.approx([1.0, -0.5, 0.2, -0.3, 0.0, 0.0, -1.0])
+    some, yaw = np.random.default_rng(0).uniform(-0.05, 0.05, (5, 7)), np.linspace(-1.5, 1.5, 5)
+    assert from_gym_action(to_gym_action(some, yaw), yaw) == pytest.approx(some)
