@@ -39,7 +39,7 @@ class WorldSettings:
 
     Attributes:
         coupled: Whether the food resists.
-        stiffness: Of the arm's joints [N m/rad]; None for ManiSkill's own.
+        stiffness: Of all the arm's joints [N m/rad]; None for libfranka's example gains.
     """
 
     coupled: bool

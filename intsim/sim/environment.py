@@ -24,7 +24,15 @@ from scipy.spatial.transform import Rotation
 from calib.material.food import FoodSpec, load_food
 from intsim.sim.background import Background
 from intsim.sim.coupling import Coupling
-from intsim.sim.panda import BASE_POSITION, BLADE_LINK, EDGE_LINK, Kinematics, PandaKnife, edge_pose
+from intsim.sim.panda import (
+    BASE_POSITION,
+    BLADE_LINK,
+    EDGE_LINK,
+    MANISKILL_DAMPING,
+    Kinematics,
+    PandaKnife,
+    edge_pose,
+)
 from intsim.sim.scenery import Scenery
 from intsim.sim.world import ENV_ID, EPISODE_STEPS
 from intsim.task.guardrail import Guardrail
@@ -62,7 +70,9 @@ class CutFoodEnv(BaseEnv):
         coupled: Whether the food resists; without it the knife passes through, as in geometry alone.
         coarse: Cells of a screening run.
         draws: Whether the knife is drawn along its edge and tilted in the solver as well.
-        stiffness, damping: Of the arm's joints [N m/rad, N m s/rad]; ManiSkill's own without it.
+        stiffness, damping: Of all the arm's joints [N m/rad, N m s/rad]; without them joint impedance with libfranka's
+            example gains. The torques are limited to those of the real arm. A stiffness without a damping has
+            ManiSkill's, 100.
         criterion: What ``info["success"]`` is once the motion is over: ``severed`` for the published criteria and
             pieces in the solver, ``published`` for the published criteria alone. ``severed`` where the food resists.
         guardrail: Whether commands beyond the arm's speeds are clipped, as they are in every published evaluation.
@@ -106,6 +116,8 @@ class CutFoodEnv(BaseEnv):
         self.criterion, self.pixels, self._guarded = criterion, pixels, guardrail
         self.scenery = Scenery(Background.of(scenery))
         self.solver_s = 0.0
+        if stiffness is not None and damping is None:
+            damping = MANISKILL_DAMPING
         self._gains = {k: v for k, v in (("arm_stiffness", stiffness), ("arm_damping", damping)) if v is not None}
         self.episode: Episode | None = None
         kwargs.setdefault("robot_uids", PandaKnife.uid)

@@ -58,7 +58,10 @@ def add_args(p: Group) -> None:
         "--world", choices=WORLDS, default="table", metavar="NAME", help="table, intsim, or kinematic (no resistance)"
     )
     p.add_argument(
-        "--stiffness", type=number(1, 1e6, "N m/rad"), metavar="K", help="of intsim's joints [N m/rad] (default 1000)"
+        "--stiffness",
+        type=number(1, 1e6, "N m/rad"),
+        metavar="K",
+        help="of intsim's joints [N m/rad] (default: Franka)",
     )
     p.add_argument("--pixels", type=whole(0), default=0, metavar="N", help="of intsim's pictures (default 0: none)")
     add_workers(p, "episodes of intsim")
