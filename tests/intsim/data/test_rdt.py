@@ -24,11 +24,16 @@ Image = pytest.importorskip("PIL.Image", reason="the extra [data] is not install
 
 @pytest.fixture
 def exported(tmp_path, monkeypatch):
-    """Made-up trajectories of two foods before two backgrounds."""
+    """Made-up trajectories of two foods before two backgrounds, the hand closed throughout as it is in real ones."""
     monkeypatch.setattr(g, "require_simulator", lambda: None)
     g.generate(
         DatasetSpec(Manifest(trajectories=10, foods=("plum", "kiwi"), suites=("flips",))), tmp_path / "set", Inline()
     )
+    for path in (tmp_path / "set").glob("*.h5"):
+        with h5py.File(path, "r+") as file:
+            for group in file.values():
+                group["obs/agent/qpos"][:, 7:] = 0.0
+                group["actions"][:, 7] = -1.0
     paint_with(Painter, monkeypatch)
     tasks = export_rdt(tmp_path / "set", tmp_path / "rdt", backgrounds=[0, 2], pixels=PIXELS, pool=Here())
     return tmp_path / "set", tmp_path / "rdt", tasks
