@@ -39,7 +39,7 @@ class WorldSettings:
 
     Attributes:
         coupled: Whether the food resists.
-        stiffness: Of the arm's joints [N m/rad]; None for ManiSkill's own.
+        stiffness: Of all the arm's joints [N m/rad]; None for libfranka's example gains.
     """
 
     coupled: bool
@@ -91,6 +91,9 @@ class EpisodeOutcome:
         angle_rad: Between the edge and across the food [rad]; NaN where the food was not met.
         offset: Place of the cut less the one asked for, over the food's length [-]; NaN where it was not met.
         criteria: Which criteria are met.
+        pieces_made: Pieces of the food at the end, in plain geometry.
+        offsets: Of every cut in order, the error of its place over the length of what was cut [-].
+        volume_variation: Standard deviation of the volumes of the pieces over their mean [-]; NaN for one piece.
         published: Whether the four published criteria are.
         strict: Whether the stricter ones are.
         severing: What the solver has found; None where it was not asked.
@@ -110,6 +113,9 @@ class EpisodeOutcome:
     angle_rad: float
     offset: float
     criteria: Mapping[str, bool]
+    pieces_made: int
+    offsets: Sequence[float]
+    volume_variation: float
     published: bool
     strict: bool
     severing: SeveringOutcome | None = None
@@ -147,6 +153,9 @@ class EpisodeOutcome:
             angle_rad=judged.angle,
             offset=judged.offset,
             criteria=dict(judged.criteria),
+            pieces_made=judged.pieces,
+            offsets=judged.offsets,
+            volume_variation=judged.volume_variation,
             published=judged.published,
             strict=judged.strict,
             severing=severing,
@@ -204,9 +213,14 @@ class SuiteResult:
         strict: The same, to 5 mm above the table, and equal pieces.
         criteria: Each criterion alone.
         clipped_steps: Steps in which a command was beyond the arm's limits.
-        severing: Simulated cuts that are in pieces; None where none was simulated, as the next two.
-        not_simulated: Cuts that the solver cannot make or did not end; they count in no rate.
-        published_and_severed: Simulated cuts that are in pieces and meet the published criteria.
+        severing: Episodes whose food is in pieces in the solver; None where none was simulated, as the next two.
+        not_simulated: Those of them that the solver cannot make or did not end: they are in every denominator, and
+            no success.
+        published_and_severed: Episodes that are in pieces and meet the published criteria.
+        steps: Of equal pieces, how often the k-th cut was where it had to be, to a tenth of the piece that was cut, by
+            pieces and cut, such as ``1/5, cut 3``; a cut that was not made missed. None without equal pieces.
+        volume_variation: Mean over the splits that left pieces of the standard deviation of their volumes over the
+            mean [-]: 0 for equal pieces. None without any.
         expected_place: Rate of the place criterion that the noisy oracle's closed form gives; None for others.
     """
 
@@ -218,6 +232,8 @@ class SuiteResult:
     severing: SuccessRate | None = None
     not_simulated: int | None = None
     published_and_severed: SuccessRate | None = None
+    steps: Mapping[str, SuccessRate] | None = None
+    volume_variation: float | None = None
     expected_place: float | None = None
 
     @staticmethod
@@ -229,7 +245,6 @@ class SuiteResult:
             sigma: Standard deviation of the noisy oracle [m]; None for others.
         """
         cuts = [(row.published, row.severing.severed) for row in rows if row.severing is not None]
-        ended = [(published, severed) for published, severed in cuts if severed is not None]
         single = sigma is not None and bool(rows) and not any(row.pieces for row in rows)
         return SuiteResult(
             what=SUITES[rows[0].suite].what if rows else "",
@@ -241,11 +256,32 @@ class SuiteResult:
                 if any(name in row.criteria for row in rows)
             },
             clipped_steps=sum(row.clipped for row in rows),
-            severing=SuccessRate.of([severed for _, severed in ended]) if cuts else None,
-            not_simulated=len(cuts) - len(ended) if cuts else None,
-            published_and_severed=SuccessRate.of([all(both) for both in ended]) if cuts else None,
+            severing=SuccessRate.of([bool(severed) for _, severed in cuts]) if cuts else None,
+            not_simulated=sum(severed is None for _, severed in cuts) if cuts else None,
+            published_and_severed=SuccessRate.of([published and bool(severed) for published, severed in cuts])
+            if cuts
+            else None,
+            steps=_step_rates(rows),
+            volume_variation=_mean_variation(rows),
             expected_place=_mean_place_rate(rows, sigma) if single and sigma is not None else None,
         )
+
+
+def _step_rates(rows: Sequence[EpisodeOutcome]) -> dict[str, SuccessRate] | None:
+    """How often each cut of a split was where it had to be."""
+    out = {}
+    for pieces in sorted({row.pieces for row in rows if row.pieces}):
+        asked = [row.offsets for row in rows if row.pieces == pieces]
+        for k in range(pieces - 1):
+            found = [len(offsets) > k and abs(offsets[k]) <= PLACE_TOLERANCE for offsets in asked]
+            out[f"1/{pieces}, cut {k + 1}"] = SuccessRate.of(found)
+    return out or None
+
+
+def _mean_variation(rows: Sequence[EpisodeOutcome]) -> float | None:
+    """Mean of how uneven the pieces of splits are; None without any."""
+    found = [row.volume_variation for row in rows if row.pieces and row.pieces_made > 1]
+    return sum(found) / len(found) if found else None
 
 
 def expected_place_rate(length: float, sigma: float) -> float:

@@ -191,10 +191,20 @@ class LiveCut:
     def surface(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The food's surface now: vertices [m] (m, 3) in the scene's axes, triangles (t, 3), and whether each vertex is
         flesh (m,): of the face of the cut."""
+        own = self._drawn
+        return own.points(self.snapshot()), own.triangles, np.abs(own.rest[:, 1]) < ON_FACE
+
+    @property
+    def rest(self) -> np.ndarray:
+        """Vertices of :meth:`surface` before the cut [m], shape (m, 3)."""
+        return self._drawn.rest
+
+    @property
+    def _drawn(self) -> Surface:
+        """What is drawn of the food; made when it is first asked for."""
         if self._surface is None:
             self._surface = Surface(self.scene.food.shape, self._simulation.setup.seeds, self.scene.mirrors)
-        flesh = np.abs(self._surface.rest[:, 1]) < ON_FACE
-        return self._surface.points(self.snapshot()), self._surface.triangles, flesh
+        return self._surface
 
     def record(self) -> ForceRecord:
         """The cut so far, a row for each move that was simulated.

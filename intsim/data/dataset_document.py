@@ -32,7 +32,7 @@ class DatasetSpec:
         manifest: Which trajectories there are.
         demos: Kind of demonstration, in :data:`DEMONSTRATION_KINDS`.
         knife: Name of the knife.
-        stiffness: Of the arm's joints [N m/rad]; None for ManiSkill's own.
+        stiffness: Of all the arm's joints [N m/rad]; None for libfranka's example gains.
         shard: Trajectories of a file.
 
     Raises:

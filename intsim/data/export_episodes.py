@@ -13,7 +13,7 @@ from calib.errors import OutputError
 from calib.io.progress import Countdown
 from calib.simulation.workers import Workers
 from intsim.data.pictures import check_backgrounds, load_pictures, render_dataset
-from intsim.data.shards import StoredTrajectory, trajectories
+from intsim.data.shards import StoredTrajectory, is_kept, trajectories
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +23,7 @@ class ExportEpisode:
     Attributes:
         stored: The trajectory.
         background: Number of the background; None without pictures.
-        sentence: What was asked for, in words.
+        sentence: What was asked for, in words; another of its sentences before each background.
         pictures: By camera, 8 bits, shape (T, h, w, 3) each; empty without pictures.
     """
 
@@ -31,6 +31,13 @@ class ExportEpisode:
     background: int | None
     sentence: str
     pictures: dict[str, np.ndarray]
+
+    @property
+    def sentences(self) -> list[str]:
+        """All sentences that ask for the same, that of this episode first."""
+        own = list(self.stored.entry["instructions"])
+        k = own.index(self.sentence)
+        return own[k:] + own[:k]
 
 
 def check_pictured_target(out: Path, backgrounds: Sequence[int], kind: str, *packages: str) -> None:
@@ -70,6 +77,7 @@ def export_episodes(
     pixels: int,
     pool: Workers | None = None,
     say: Callable[[str], None] = lambda text: None,
+    keep: str = "all",
 ) -> Iterator[ExportEpisode]:
     """Each trajectory for each background; its sentences come in turn. What has to be rendered is, before this returns.
 
@@ -79,23 +87,32 @@ def export_episodes(
         pixels: Width and height of the pictures.
         pool: Where those are rendered that are not in the folder yet; they are kept there.
         say: Called with a line after each.
+        keep: Which trajectories, in :data:`intsim.data.shards.KEEP_KINDS`.
 
     Returns:
         The episodes, one background after the other.
 
     Raises:
-        CutcalError: There is no renderer, or the folder holds no dataset, or not the pictures and there is no pool.
+        CutcalError: There is no renderer, or the folder holds no dataset, none that is kept, or not the
+            pictures and there is no pool.
     """
+    if not any(is_kept(stored.entry, keep) for stored in trajectories(folder)):
+        raise OutputError(f"dataset export: no trajectory of {folder} is kept ({keep}); make more, or keep others")
     if backgrounds and pool is not None:
         render_dataset(folder, backgrounds, pixels, pool, say)
-    return _each(folder, backgrounds, pixels, say)
+    return _each(folder, backgrounds, pixels, say, keep)
 
 
-def _each(folder: Path, backgrounds: Sequence[int], pixels: int, say: Callable[[str], None]) -> Iterator[ExportEpisode]:
-    total = sum(1 for _ in trajectories(folder)) * max(len(backgrounds), 1)
+def _each(
+    folder: Path, backgrounds: Sequence[int], pixels: int, say: Callable[[str], None], keep: str
+) -> Iterator[ExportEpisode]:
+    kept = sum(is_kept(stored.entry, keep) for stored in trajectories(folder))
+    total = kept * max(len(backgrounds), 1)
     rest, done = Countdown(max(total, 1)), 0
     for turn, background in enumerate(backgrounds or [None]):
         for k, stored in enumerate(trajectories(folder)):
+            if not is_kept(stored.entry, keep):
+                continue
             sentences = stored.entry["instructions"]
             pictures = {} if background is None else load_pictures(folder, stored, background, pixels)
             yield ExportEpisode(stored, background, sentences[(k + turn) % len(sentences)], pictures)

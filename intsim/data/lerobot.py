@@ -18,6 +18,7 @@ from calib.simulation.workers import Workers
 from intsim.data.cameras import CAMERA_NAMES
 from intsim.data.export_episodes import ExportEpisode, check_target, export_episodes
 from intsim.data.shards import StoredTrajectory
+from intsim.task.gym_action import to_gym_action
 from intsim.task.planner import CONTROL_RATE, GRIPPER_CLOSED
 
 CODEBASE_VERSION = "v3.0"
@@ -63,7 +64,7 @@ def episode_columns(stored: StoredTrajectory) -> dict[str, np.ndarray]:
     state = np.column_stack([edge[:, :3], zero, edge[:, 4], edge[:, 3], zero, gripper])
     return {
         "observation.state": state.astype(np.float32),
-        "action": g["control/delta"][()],
+        "action": to_gym_action(g["control/delta"][()], edge[:, 3]).astype(np.float32),
         "extra.qpos": g["obs/agent/qpos"][()][:n],
         "extra.joint_target": g["actions"][()],
         "contact.force": g["mpm/force_control"][()],
@@ -124,11 +125,13 @@ def export_lerobot(
     pixels: int = 128,
     pool: Workers | None = None,
     say: Callable[[str], None] = lambda text: None,
+    keep: str = "all",
 ) -> dict[str, Any]:
     """Write a LeRobotDataset v3.0.
 
-    Each trajectory is an episode for each background, with one of its sentences in turn; all of its sentences, its
-    task, material and seed are in ``meta/culinary.parquet``.
+    Each trajectory is an episode for each background and each of its sentences: those of one background have the same
+    video. Its task, material and seed are in ``meta/culinary.parquet``. An action is one of ``pd_ee_delta_pose``
+    (:mod:`intsim.task.gym_action`).
 
     Args:
         folder: A dataset of :func:`intsim.data.generate.generate`.
@@ -137,6 +140,7 @@ def export_lerobot(
         pixels: Width and height of the pictures.
         pool: Where pictures are rendered that the dataset does not have yet.
         say: Called with a line after each episode.
+        keep: Which trajectories, in :data:`intsim.data.shards.KEEP_KINDS`.
 
     Returns:
         The content of meta/info.json.
@@ -151,7 +155,7 @@ def export_lerobot(
         raise OutputError(f"dataset export: {e.name} is not installed; pip install 'cutcal[data]'") from None
     check_target(out, backgrounds)
     writer = _Writer(out, pixels if backgrounds else 0)
-    for episode in export_episodes(folder, backgrounds, pixels, pool, say):
+    for episode in export_episodes(folder, backgrounds, pixels, pool, say, keep):
         writer.add(episode)
     return writer.close()
 
@@ -171,26 +175,46 @@ class _Writer:
         self.side: list[dict[str, Any]] = []
         self.parts: dict[str, list[dict[str, list[Any]]]] = {}
         self.rows: list[dict[str, np.ndarray]] = []
-        self.frames, self.file, self.in_file = 0, 0, 0
+        self.frames, self.file, self.in_file, self.shown = 0, 0, 0, 0  # shown: pictures of a camera in this file
         self.videos: dict[str, _Video] = {}
 
     def add(self, episode: ExportEpisode) -> None:
-        """Add an episode."""
+        """Add a trajectory before a background: an episode for each sentence, all with the same pictures."""
         found = episode_columns(episode.stored)
-        n = len(found["timestamp"])
-        if self.in_file and self.in_file + n > FILE_FRAMES:
+        n, sentences = len(found["timestamp"]), episode.sentences
+        if self.in_file and self.in_file + len(sentences) * n > FILE_FRAMES:
             self._roll()
-        number, task = len(self.episodes), self.tasks.setdefault(episode.sentence, len(self.tasks))
-        found |= {
+        videos: dict[str, Any] = {}
+        shown: dict[str, dict[str, list[Any]]] = {}
+        for camera, frames in episode.pictures.items():
+            key = f"observation.images.{camera}"
+            videos |= self._add_frames(key, frames)
+            shown[key] = picture_statistics(frames)
+        if episode.pictures:
+            self.shown += n
+        for sentence in sentences:
+            self._add_told(episode, found, sentence, videos, shown)
+
+    def _add_told(
+        self,
+        episode: ExportEpisode,
+        columns: dict[str, np.ndarray],
+        sentence: str,
+        videos: dict[str, Any],
+        shown: dict[str, dict[str, list[Any]]],
+    ) -> None:
+        """Add the episode of one sentence, whose pictures are in the video."""
+        n, number = len(columns["timestamp"]), len(self.episodes)
+        found = columns | {
             "episode_index": np.full(n, number),
             "index": self.frames + np.arange(n),
-            "task_index": np.full(n, task),
+            "task_index": np.full(n, self.tasks.setdefault(sentence, len(self.tasks))),
         }
         self.rows.append(found)
-        own = {name: statistics(values) for name, values in found.items()}
+        own = {name: statistics(values) for name, values in found.items()} | shown
         row: dict[str, Any] = {
             "episode_index": number,
-            "tasks": [episode.sentence],
+            "tasks": [sentence],
             "length": n,
             "data/chunk_index": 0,
             "data/file_index": self.file,
@@ -198,11 +222,8 @@ class _Writer:
             "dataset_to_index": self.frames + n,
             "meta/episodes/chunk_index": 0,
             "meta/episodes/file_index": 0,
+            **videos,
         }
-        for camera, frames in episode.pictures.items():
-            key = f"observation.images.{camera}"
-            row |= self._add_frames(key, frames)
-            own[key] = picture_statistics(frames)
         for name, values in own.items():
             self.parts.setdefault(name, []).append(values)
             row |= {f"stats/{name}/{kind}": v for kind, v in values.items()}
@@ -218,8 +239,8 @@ class _Writer:
         return {
             f"videos/{key}/chunk_index": 0,
             f"videos/{key}/file_index": self.file,
-            f"videos/{key}/from_timestamp": self.in_file / CONTROL_RATE,
-            f"videos/{key}/to_timestamp": (self.in_file + len(frames)) / CONTROL_RATE,
+            f"videos/{key}/from_timestamp": self.shown / CONTROL_RATE,
+            f"videos/{key}/to_timestamp": (self.shown + len(frames)) / CONTROL_RATE,
         }
 
     def close(self) -> dict[str, Any]:
@@ -292,7 +313,7 @@ class _Writer:
         for video in self.videos.values():
             video.close()
         self.rows, self.videos = [], {}
-        self.file, self.in_file = self.file + 1, 0
+        self.file, self.in_file, self.shown = self.file + 1, 0, 0
 
 
 def _side_row(episode: ExportEpisode, number: int) -> dict[str, Any]:

@@ -5,8 +5,9 @@
 
 That loader knows one sentence for a task, which stands in its own source. A task here is one instruction's meaning,
 such as ``orange-0_25-left``, and ``tasks.json`` has the sentence and the number of episodes of each. The loader scales
-by the range of each joint and action, and the gripper, closed on the knife throughout, has none. ``statistics.json``
-therefore has the ranges that were found, and for the gripper that of the mechanism. The force is not in it.
+by the range of each joint and action that it finds, and the gripper, closed on the knife throughout, has none: 0 / 0.
+The first row of each trajectory therefore has an open hand, joints and action, as before it closed on the handle; the
+gripper moves nothing here. ``statistics.json`` has the ranges that the loader finds. The force is not in it.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ import numpy as np
 from calib.errors import OutputError
 from calib.simulation.workers import Workers
 from intsim.data.export_episodes import ExportEpisode, check_pictured_target, export_episodes
-from intsim.data.shards import trajectories
+from intsim.data.shards import is_kept, trajectories
 
 CAMERA_NAME = "front"
 STATE_SIZE = 8  # of the state that RDT is given: the second finger does what the first does
@@ -41,6 +42,7 @@ def export_rdt(
     pixels: int = 128,
     pool: Workers | None = None,
     say: Callable[[str], None] = lambda text: None,
+    keep: str = "all",
 ) -> dict[str, Any]:
     """Write a folder for each task, tasks.json and statistics.json.
 
@@ -51,6 +53,7 @@ def export_rdt(
         pixels: Width and height of the pictures.
         pool: Where pictures are rendered that the dataset does not have yet.
         say: Called with a line after each episode.
+        keep: Which trajectories, in :data:`intsim.data.shards.KEEP_KINDS`.
 
     Returns:
         The content of tasks.json: by task its ``instruction``, all sentences for it in ``instructions``, and how many
@@ -64,7 +67,7 @@ def export_rdt(
     from PIL import Image
 
     tasks: dict[str, dict[str, Any]] = {}
-    for episode in export_episodes(folder, backgrounds, pixels, pool, say):
+    for episode in export_episodes(folder, backgrounds, pixels, pool, say, keep):
         name = task_name(episode.stored.entry["food"], episode.stored.entry["task"])
         home = out / name / "motionplanning"
         known = tasks.setdefault(name, {"instruction": episode.sentence, "instructions": [], "episodes": 0})
@@ -81,7 +84,7 @@ def export_rdt(
         except OSError as e:
             raise OutputError(f"{home}: cannot be written ({e}); free some space and export again elsewhere") from None
         known["episodes"] = k + 1
-    (out / STATISTICS_FILE).write_text(json.dumps(_statistics(folder), indent=1) + "\n", encoding="utf-8")
+    (out / STATISTICS_FILE).write_text(json.dumps(_statistics(folder, keep), indent=1) + "\n", encoding="utf-8")
     (out / TASKS_FILE).write_text(json.dumps(tasks, indent=1) + "\n", encoding="utf-8")
     return tasks
 
@@ -91,15 +94,23 @@ def _trajectory(path: Path, k: int, episode: ExportEpisode) -> None:
     stored = episode.stored.group
     with h5py.File(path, "a") as file:
         group = file.create_group(f"traj_{k}")
-        for name in ("actions", "obs/agent/qpos"):
-            group.create_dataset(name, data=stored[name][()], compression="gzip", shuffle=True)
+        for name, values in zip(("actions", "obs/agent/qpos"), _opened(stored), strict=True):
+            group.create_dataset(name, data=values, compression="gzip", shuffle=True)
         group.attrs["scene"], group.attrs["sentence"] = episode.background, episode.sentence
 
 
-def _statistics(folder: Path) -> dict[str, list[float]]:
-    """Smallest and largest state and action of all trajectories, the gripper's of its mechanism."""
+def _opened(stored: h5py.Group) -> tuple[np.ndarray, np.ndarray]:
+    """Actions (T, 8) and joints (T + 1, 9), with an open hand in the first row."""
+    actions, joints = stored["actions"][()], stored["obs/agent/qpos"][()]
+    actions[0, 7] = GRIPPER_RANGE["action_max"]
+    joints[0, 7:] = GRIPPER_RANGE["state_max"]
+    return actions, joints
+
+
+def _statistics(folder: Path, keep: str) -> dict[str, list[float]]:
+    """Smallest and largest state and action of the trajectories, the gripper's of its mechanism."""
     ends: dict[str, list[float]] = {}
-    for stored in trajectories(folder):
+    for stored in (one for one in trajectories(folder) if is_kept(one.entry, keep)):
         for kind, name in (("state", "obs/agent/qpos"), ("action", "actions")):
             values = stored.group[name][()][:, :STATE_SIZE]
             for end, pick in (("min", np.min), ("max", np.max)):

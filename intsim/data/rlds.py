@@ -19,11 +19,14 @@ from calib.simulation.workers import Workers
 from intsim.data.cameras import CAMERA_NAMES
 from intsim.data.export_episodes import ExportEpisode, check_pictured_target, export_episodes
 from intsim.data.lerobot import episode_columns
+from intsim.task.language import SENTENCES_PER_TASK
 
 DATASET_NAME, DATASET_VERSION = "cutcal", "1.0.0"
 VALIDATION_STRIDE = 20  # every so many-th trajectory is kept for validation
 JPEG_QUALITY = 95  # of the JPEG pictures
 CRC_MASK = 0xA282EAD8  # of TFRecord's checksums
+LANGUAGE_KEYS = ("language_instruction", *(f"language_instruction_{k}" for k in range(2, SENTENCES_PER_TASK + 1)))
+"""Names of the sentences of a step."""
 FEATURE_CLASS = "tensorflow_datasets.core.features."
 
 
@@ -35,12 +38,15 @@ def export_rlds(
     pixels: int = 128,
     pool: Workers | None = None,
     say: Callable[[str], None] = lambda text: None,
+    keep: str = "all",
 ) -> dict[str, Any]:
     """Write ``cutcal/1.0.0`` with the splits train and val.
 
-    Each step has the observation, the action (change of pose [m, rad] and gripper), reward, discount, the flags of its
-    place, and the sentence. The observation is the pictures ``image``, ``side_image`` and ``wrist_image``, and
-    ``state``: x y z roll pitch yaw pad gripper. ``val`` are whole trajectories, before every background.
+    Each step has the observation, the action (one of ``pd_ee_delta_pose``, :mod:`intsim.task.gym_action`), reward,
+    discount, the flags of its place, and the sentence, with the others that ask for the same beside it
+    (``language_instruction_2`` to ``_5``): a loader of Octo draws one of ``language_instruction*``. The observation is
+    the pictures ``image``, ``side_image`` and ``wrist_image``, and ``state``: x y z roll pitch yaw pad gripper. ``val``
+    are whole trajectories, before every background.
 
     Args:
         folder: A dataset of :func:`intsim.data.generate.generate`.
@@ -49,6 +55,7 @@ def export_rlds(
         pixels: Width and height of the pictures.
         pool: Where pictures are rendered that the dataset does not have yet.
         say: Called with a line after each episode.
+        keep: Which trajectories, in :data:`intsim.data.shards.KEEP_KINDS`.
 
     Returns:
         The content of dataset_info.json.
@@ -58,7 +65,7 @@ def export_rlds(
             dataset.
     """
     check_pictured_target(out, backgrounds, "RLDS", "google_crc32c", "PIL")
-    shown = export_episodes(folder, backgrounds, pixels, pool, say)
+    shown = export_episodes(folder, backgrounds, pixels, pool, say, keep)
     home = out / DATASET_NAME / DATASET_VERSION
     home.mkdir(parents=True)
     counts, sizes = {"train": 0, "val": 0}, {"train": 0, "val": 0}
@@ -122,9 +129,15 @@ def episode_lists(episode: ExportEpisode) -> dict[str, list[bytes] | np.ndarray]
         "steps/is_first": step == 0,
         "steps/is_last": step == n - 1,
         "steps/is_terminal": done,
-        "steps/language_instruction": [episode.sentence.encode()] * n,
+        **{f"steps/{key}": [text.encode()] * n for key, text in zip(LANGUAGE_KEYS, _told(episode), strict=True)},
         "episode_metadata/file_path": [f"trajectory {index}, background {episode.background}".encode()],
     }
+
+
+def _told(episode: ExportEpisode) -> list[str]:
+    """As many sentences as there are keys, the first again where a task has fewer."""
+    own = episode.sentences
+    return [own[k % len(own)] for k in range(SENTENCES_PER_TASK)]
 
 
 def _jpeg(picture: np.ndarray) -> bytes:
@@ -192,7 +205,7 @@ def features(pixels: int) -> dict[str, Any]:
         "reward": _tensor("float32"),
         "discount": _tensor("float32"),
         **flags,
-        "language_instruction": text,
+        **dict.fromkeys(LANGUAGE_KEYS, text),
     }
     sequence = {"feature": _dictionary(steps), "length": "-1"}
     dataset = {"pythonClassName": FEATURE_CLASS + "dataset_feature.Dataset", "sequence": sequence}

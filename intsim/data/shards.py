@@ -47,6 +47,8 @@ from mpm.scene.shapes import Shape
 
 SHARD_NAME = "shard-{:04d}"
 EPISODE_PART = "part-{:06d}.h5"  # an episode whose shard is not complete
+KEEP_KINDS = ("severed", "published", "all")
+"""Which trajectories are learnt from: in pieces and by the published criteria, by these criteria, or all."""
 ENTRY_ATTRIBUTE = "about"  # attribute of such a file: the entry in the JSON file
 
 
@@ -260,3 +262,20 @@ def stored_item(listed: dict[str, Any]) -> Item:
     """A food as a dataset lists it."""
     shape = {name: value for name, value in listed.items() if name not in ("name", "x", "y", "yaw")}
     return Item(listed["name"], Shape(**shape), listed["x"], listed["y"], listed["yaw"])
+
+
+def is_kept(entry: Mapping[str, Any], keep: str) -> bool:
+    """Whether a trajectory is one of a kind.
+
+    Args:
+        entry: What its shard's JSON file says of it.
+        keep: In :data:`KEEP_KINDS`. A trajectory whose simulation broke down is in none but ``all``.
+
+    Raises:
+        OutputError: There is no such kind.
+    """
+    if keep not in KEEP_KINDS:
+        raise OutputError(f"keep {keep!r}: none of {', '.join(KEEP_KINDS)}")
+    if keep == "all":
+        return True
+    return bool(entry["status"] == "done" and entry["published"] and (keep == "published" or entry["severed"]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ SHALLOW_HEIGHT = 7e-3
 
 It is what 12.5 N, the paper's banana, leave of a cut under ManiSkill's arm, which gives way by 0.57 mm per N.
 """
+HOVER_HEIGHT = 1e-3  # height above the food at which the hovering oracle turns back [m]
+STUCK_STEPS = 40  # control steps of the policy that is stuck: longer than what counts as at rest
 
 
 class Oracle:
@@ -29,6 +32,7 @@ class Oracle:
         wrong_item: Cut another food where there is one.
         boxed: Know the food's bounding box alone, as the published planner does.
         descent: How it brings the blade down.
+        hover: Height above the food at which it turns back [m]; without it, it comes down.
     """
 
     def __init__(
@@ -39,9 +43,10 @@ class Oracle:
         wrong_item: bool = False,
         boxed: bool = False,
         descent: BladeDescent = PRESS,
+        hover: float | None = None,
     ) -> None:
         self.sigma, self.wrong_side, self.wrong_item, self.boxed = sigma, wrong_side, wrong_item, boxed
-        self.descent = descent
+        self.descent, self.hover = descent, hover
         self.reset(0)
 
     def reset(self, seed: int) -> None:
@@ -75,7 +80,10 @@ class Oracle:
         if self.wrong_side and not self._spec.pieces:
             along = -along
         along += self.sigma * float(self._rng.standard_normal())
-        planned = plan_cut(item, along, self.descent, start=obs["pose"], yaw=yaw, place=place)
+        descent = self.descent
+        if self.hover is not None:
+            descent = replace(descent, depth=item.shape.height + self.hover)
+        planned = plan_cut(item, along, descent, start=obs["pose"], yaw=yaw, place=place)
         self._todo = list(planned.pose)
 
 
@@ -98,6 +106,24 @@ class RandomPolicy:
         return step_towards(self._todo.pop(0), obs["pose"]) if self._todo else None
 
 
+class StuckPolicy:
+    """Stays where it is for :data:`STUCK_STEPS`."""
+
+    def __init__(self) -> None:
+        self.reset(0)
+
+    def reset(self, seed: int) -> None:
+        """It has not stood yet."""
+        del seed
+        self._left = STUCK_STEPS
+
+    def act(self, obs: dict[str, Any], instruction: str) -> np.ndarray | None:
+        """No change of pose, whatever it was told."""
+        del instruction
+        self._left -= 1
+        return step_towards(obs["pose"], obs["pose"]) if self._left >= 0 else None
+
+
 def step_towards(goal: np.ndarray, pose: np.ndarray) -> np.ndarray:
     """The action (7,) that brings the edge from one pose (5,) to another [m, rad], the gripper closed."""
     change = goal - pose
@@ -115,6 +141,8 @@ POLICIES: dict[str, tuple[Callable[[float], Policy], str]] = {
         "commands the edge 30 mm into the board and holds it for half a second",
     ),
     "boxed": (lambda sigma: Oracle(boxed=True), "knows the bounding box alone, as the published planner does"),
+    "hover": (lambda sigma: Oracle(hover=HOVER_HEIGHT), "turns back a millimetre above the food"),
+    "stuck": (lambda sigma: StuckPolicy(), "stays where it is"),
     "random": (lambda sigma: RandomPolicy(), "comes down somewhere"),
 }
 """Policies by name, each from a standard deviation [m], and what they do."""

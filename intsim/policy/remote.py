@@ -2,10 +2,14 @@
 
 HTTP, a JSON document each way:
 
-    GET  /about   -> {"protocol": 1, "name": ..., "action": "pose" or "joints", "cameras": [...]}
+    GET  /about   -> {"protocol": 1, "name": ..., "action": "pose" or "joints", "cameras": [...], "history": 1}
     POST /reset   {"seed": 7, "instruction": "cut the plum in half ..."} -> {}
     POST /act     {"instruction": ..., "pose": [x, y, z, yaw, pitch], "joints": [9 numbers] or null,
-                   "images": {camera: PNG in base64}} -> {"actions": [[...], ...], "done": false}
+                   "images": {camera: PNG in base64}, "past": [{camera: PNG in base64}, ...]}
+                   -> {"actions": [[...], ...], "done": false}
+
+``history`` is how many steps a policy looks at, this one included; ``past`` has the pictures of those before, the
+oldest first, as far as they are of this episode. A policy that says nothing looks at one, and is sent no past.
 
 ``pose`` actions have 7 numbers: change of x, y, z [m], roll, pitch, yaw [rad] from where the edge is, and the gripper.
 ``joints`` actions have 8: joint targets [rad] and the gripper. The gripper stays closed, whatever is sent: the knife is
@@ -27,6 +31,7 @@ import os
 import time
 import urllib.error
 import urllib.request
+from collections import deque
 from collections.abc import Sequence
 from http.client import HTTPException
 from typing import Any, Protocol
@@ -41,6 +46,7 @@ ACTION_SIZES = {"pose": 7, "joints": 8}
 """Kinds of action, and how many numbers each has."""
 ANSWER_TIMEOUT_S = 600.0  # until an answer; the first one may load a network
 MAX_ANSWER_BYTES = 10_000_000  # bytes of an answer
+MOST_HISTORY = 16  # steps that a policy may look at
 MOST_ACTIONS = 10_000  # actions of an answer: minutes of control steps
 MOST_PIXELS = 4096 * 4096  # pixels of a picture
 TOKEN = "CUTCAL_POLICY_TOKEN"
@@ -50,7 +56,8 @@ TOKEN = "CUTCAL_POLICY_TOKEN"
 class Model(Protocol):
     """What a server asks: a policy as its authors' code has it.
 
-    Attributes: name; action, a kind of :data:`ACTION_SIZES`; cameras, the pictures it wants.
+    Attributes: name; action, a kind of :data:`ACTION_SIZES`; cameras, the pictures it wants. It may have ``history``,
+    how many steps it looks at, and then ``see(images)``, which takes those of the steps since it acted last.
     """
 
     name: str
@@ -99,12 +106,17 @@ class Remote:
         if about.get("protocol") != PROTOCOL or not known or not _are_names(cameras):
             raise CutcalError(f"--server {address}: is no policy server of protocol {PROTOCOL} ({brief(about)})")
         self.name, self.action, self.cameras = brief(about.get("name")), str(kind), list(cameras)
+        history = about.get("history", 1)
+        if not (isinstance(history, int) and 1 <= history <= MOST_HISTORY):
+            raise CutcalError(f"--server {address}: history {brief(history)}; a whole number from 1 to {MOST_HISTORY}")
+        self._past: deque[dict[str, np.ndarray]] = deque(maxlen=history - 1)
         self._todo: list[np.ndarray] = []
         self._seed, self._begun, self._done = 0, False, False
 
     def reset(self, seed: int) -> None:
         """A new episode begins; the server is told with its first sentence."""
         self._seed, self._begun, self._done, self._todo = seed, False, False, []
+        self._past.clear()
 
     def act(self, obs: dict[str, Any], instruction: str) -> np.ndarray | None:
         """The next action, None when the policy has said that it is done."""
@@ -115,22 +127,24 @@ class Remote:
         if not self._begun:
             self._ask("reset", {"seed": self._seed, "instruction": instruction})
             self._begun = True
+        now = {name: self._image(obs, name) for name in self.cameras} if self._past.maxlen or not self._todo else {}
         if not self._todo and not self._done:
             joints = obs.get("joints")
-            answer = self._ask(
-                "act",
-                {
-                    "instruction": instruction,
-                    "pose": np.asarray(obs["pose"], float).tolist(),
-                    "joints": None if joints is None else np.asarray(joints, float).tolist(),
-                    "images": {name: encode_png(self._image(obs, name)) for name in self.cameras},
-                },
-            )
+            question = {
+                "instruction": instruction,
+                "pose": np.asarray(obs["pose"], float).tolist(),
+                "joints": None if joints is None else np.asarray(joints, float).tolist(),
+                "images": _encoded(now),
+            }
+            if self._past:
+                question["past"] = [_encoded(images) for images in self._past]
+            answer = self._ask("act", question)
             done = answer.get("done", False)
             if not isinstance(done, bool):
                 raise CutcalError(f"--server {self.address}: {self.name} says done: {brief(done)}, not true or false")
             self._done = done
             self._todo = [] if self._done and answer.get("actions") == [] else self._actions(answer.get("actions"))
+        self._past.append(now)
         return self._todo.pop(0) if self._todo else None
 
     def _image(self, obs: dict[str, Any], name: str) -> np.ndarray:
@@ -177,6 +191,11 @@ class Remote:
         if not isinstance(found, dict):
             raise CutcalError(f"{where}: answers {brief(found)}, not a JSON object")
         return found
+
+
+def _encoded(images: dict[str, np.ndarray]) -> dict[str, str]:
+    """Pictures by camera, as PNG in base64."""
+    return {name: encode_png(image) for name, image in images.items()}
 
 
 def _are_names(cameras: Any) -> bool:

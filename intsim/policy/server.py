@@ -19,7 +19,7 @@ from intsim.policy.remote import ACTION_SIZES, PROTOCOL, TOKEN, Model, decode_pn
 from mpm.scene.errors import CutcalError
 
 MAX_REQUEST_BYTES = 100_000_000  # bytes of a question
-MOST_PICTURES = 16  # pictures of a question
+MOST_PICTURES = 16  # pictures of a question, those of the past included
 MOST_CONNECTIONS = 32  # connections at a time; one more waits for the system's own queue
 QUESTION_S = 60.0  # time in which a question must have arrived
 SILENCE_S = 20.0  # time in which a connection may say nothing
@@ -130,6 +130,7 @@ class _Handler(BaseHTTPRequestHandler):
             "name": str(model.name),
             "action": str(model.action),
             "cameras": [str(c) for c in model.cameras],
+            "history": int(getattr(model, "history", 1)),
         }
 
     def _asked(self) -> dict[str, Any]:
@@ -174,12 +175,19 @@ class _Handler(BaseHTTPRequestHandler):
         joints = None if asked.get("joints") is None else finite_rows([asked["joints"]], 9)
         if joints is None and asked.get("joints") is not None:
             raise Refused(400, f"joints {brief(asked['joints'])}; nine finite numbers")
-        if len(asked["images"]) > MOST_PICTURES:
-            raise Refused(400, f"{len(asked['images'])} pictures; at most {MOST_PICTURES}")
-        images = {name: decode_png(text) for name, text in asked["images"].items()}
+        shown = [*asked.get("past", ()), asked["images"]]
+        if sum(map(len, shown)) > MOST_PICTURES:
+            raise Refused(400, f"{sum(map(len, shown))} pictures; at most {MOST_PICTURES}")
+        *past, images = [{name: decode_png(text) for name, text in one.items()} for one in shown]
         words = str(asked["instruction"])
         own = None if joints is None else joints[0]
-        found = self._model(lambda model: np.atleast_2d(model.act(words, pose[0], own, images)))
+
+        def act(model: Any) -> np.ndarray:
+            for one in past if hasattr(model, "see") else ():
+                model.see(one)
+            return np.atleast_2d(model.act(words, pose[0], own, images))
+
+        found = self._model(act)
         if not found.size:
             return {"actions": [], "done": True}
         kind = self.server.model.action

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from calib.errors import OutputError
-from intsim.data.shards import StoredTrajectory, stored_item, trajectories
+from intsim.data.shards import StoredTrajectory, is_kept, stored_item, trajectories
 from intsim.policy.behaviour_cloning import (
     ACTION_CHUNK,
     Clone,
@@ -22,7 +22,6 @@ from intsim.task.targets import TaskError
 
 HIDDEN_WIDTH, LAYER_COUNT = 256, 3
 TRAINING_STEPS, BATCH_SIZE, LEARNING_RATE = 4000, 256, 1e-3  # Adam with a rate that falls to nothing (cosine)
-KEEP_KINDS = ("published", "severed", "all")
 
 
 def train(folder: Path, *, keep: str = "severed", most: int | None = None, seed: int = 0) -> Clone:
@@ -131,9 +130,5 @@ def _examples(folder: Path, keep: str, most: int | None) -> _Examples:
 
 
 def _kept(folder: Path, keep: str) -> Iterator[StoredTrajectory]:
-    if keep not in KEEP_KINDS:
-        raise TaskError(f"clone: keep {keep!r} is none of {', '.join(KEEP_KINDS)}")
-    for stored in trajectories(folder):
-        a = stored.entry
-        if a["status"] == "done" and (keep == "all" or (a["published"] and (keep != "severed" or a["severed"]))):
-            yield stored
+    """Those of the trajectories whose simulation did not break down."""
+    return (s for s in trajectories(folder) if s.entry["status"] == "done" and is_kept(s.entry, keep))

@@ -22,35 +22,55 @@ import numpy as np
 
 from intsim.policy.remote import TOKEN, Model
 from intsim.policy.server import Server
+from intsim.task.gym_action import from_gym_action
 from mpm.scene.errors import CutcalError
 
 FRONT_CAMERA = "front"  # the picture that all three are given
 ACTION_STRIDE = 4  # RDT's actions are interpolated four times finer than its control
 HISTORY = 2  # pictures that RDT and Octo remember
+CROP_AREA = 0.9  # part of a picture's area that OpenVLA is shown, as in its training with crops
+STATISTICS_FILE = "dataset_statistics.json"  # beside the weights of a fine-tuned OpenVLA
 PRIMARY_PIXELS, WRIST_PIXELS = 256, 128  # sizes of Octo's pictures
 
 
 class OpenVLA:
     """OpenVLA (Kim et al. 2024, arXiv:2406.09246): one picture, one change of pose.
 
+    It is shown the middle of the picture, nine tenths of its area, in the picture's size, as its authors' evaluations
+    do of a model that was fine-tuned with crops.
+
     Args:
         weights: Folder or name of a fine-tuned model.
-        key: Name of the data set whose statistics scale its actions back.
+        key: Name of the data set whose statistics scale its actions back; the only one where it is empty.
         device: Of the network.
+        statistics: File of these statistics; ``dataset_statistics.json`` beside the weights without it, if it is there.
+
+    Raises:
+        CutcalError: There are no statistics of that name.
     """
 
     name, action = "openvla", "pose"
     cameras: Sequence[str] = (FRONT_CAMERA,)
 
-    def __init__(self, weights: str, key: str, device: str = "cuda:0") -> None:
+    def __init__(self, weights: str, key: str, device: str = "cuda:0", statistics: str | None = None) -> None:
         import torch
         from transformers import AutoModelForVision2Seq, AutoProcessor
 
-        self.key, self.device, self.kind = key, device, torch.bfloat16
+        self.device, self.kind = device, torch.bfloat16
         self.processor = AutoProcessor.from_pretrained(weights, trust_remote_code=True)
         self.network = AutoModelForVision2Seq.from_pretrained(
             weights, torch_dtype=self.kind, low_cpu_mem_usage=True, trust_remote_code=True
         ).to(device)
+        own = Path(statistics) if statistics is not None else Path(weights) / STATISTICS_FILE
+        if statistics is not None or own.is_file():
+            self.network.norm_stats = _statistics(own)
+        known = list(getattr(self.network, "norm_stats", None) or {})
+        self.key = key or (known[0] if len(known) == 1 else "")
+        if self.key not in known:
+            raise CutcalError(
+                f"openvla: --key {key!r}: its statistics are of {', '.join(known) or 'nothing'}; give the name of the "
+                f"data set that it was fine-tuned on, and --statistics FILE where they are not beside the weights"
+            )
 
     def reset(self, seed: int, instruction: str) -> None:
         """It remembers nothing."""
@@ -62,19 +82,17 @@ class OpenVLA:
 
         Args:
             instruction: What is asked for, in words.
-            pose: Pose of the edge x, y, z [m], yaw and tilt [rad], shape (5,); not used.
+            pose: Pose of the edge x, y, z [m], yaw and tilt [rad], shape (5,).
             joints: Arm and fingers [rad, m], shape (9,); not used.
             images: Pictures by camera, from 0 to 255 [-], shape (h, w, 3) each.
 
         Returns:
             Change of pose [m, rad] and gripper, shape (1, 7).
         """
-        from PIL import Image
-
         asked = f"In: What action should the robot take to {instruction.lower()}?\nOut:"
-        given = self.processor(asked, Image.fromarray(images[FRONT_CAMERA])).to(self.device, dtype=self.kind)
+        given = self.processor(asked, _cropped(images[FRONT_CAMERA])).to(self.device, dtype=self.kind)
         found = self.network.predict_action(**given, unnorm_key=self.key, do_sample=False)
-        return np.asarray(found, float).reshape(1, 7)
+        return from_gym_action(np.asarray(found, float).reshape(1, 7), pose[3])
 
 
 class Octo:
@@ -85,7 +103,7 @@ class Octo:
         key: Name of the data set whose statistics scale its actions back, where the model has several.
     """
 
-    name, action = "octo", "pose"
+    name, action, history = "octo", "pose", HISTORY
     cameras: Sequence[str] = (FRONT_CAMERA, "wrist")
 
     def __init__(self, weights: str, key: str = "") -> None:
@@ -104,6 +122,15 @@ class Octo:
         self.seen: deque[dict[str, np.ndarray]] = deque(maxlen=HISTORY)
         self.task = self.network.create_tasks(texts=[instruction])
 
+    def see(self, images: dict[str, np.ndarray]) -> None:
+        """Take in the pictures of a step (h, w, 3), by camera."""
+        self.seen.append(
+            {
+                "image_primary": _sized(images[FRONT_CAMERA], PRIMARY_PIXELS),
+                "image_wrist": _sized(images["wrist"], WRIST_PIXELS),
+            }
+        )
+
     def act(
         self, instruction: str, pose: np.ndarray, joints: np.ndarray | None, images: dict[str, np.ndarray]
     ) -> np.ndarray:
@@ -111,7 +138,7 @@ class Octo:
 
         Args:
             instruction: What is asked for, in words.
-            pose: Pose of the edge x, y, z [m], yaw and tilt [rad], shape (5,); not used.
+            pose: Pose of the edge x, y, z [m], yaw and tilt [rad], shape (5,).
             joints: Arm and fingers [rad, m], shape (9,); not used.
             images: Pictures by camera, from 0 to 255 [-], shape (h, w, 3) each.
 
@@ -120,18 +147,15 @@ class Octo:
         """
         import jax
 
-        now = {
-            "image_primary": _sized(images[FRONT_CAMERA], PRIMARY_PIXELS),
-            "image_wrist": _sized(images["wrist"], WRIST_PIXELS),
-        }
-        self.seen.append(now)
+        self.see(images)
+        now = self.seen[-1]
         missing = HISTORY - len(self.seen)
         window = [self.seen[0]] * missing + list(self.seen)
         given: dict[str, np.ndarray] = {name: np.stack([one[name] for one in window])[None] for name in now}
         given["timestep_pad_mask"] = np.array([[False] * missing + [True] * len(self.seen)])
         self.random, own = jax.random.split(self.random)
         found = self.network.sample_actions(given, self.task, unnormalization_statistics=self.statistics, rng=own)
-        return np.asarray(found, float)[0]
+        return from_gym_action(np.asarray(found, float)[0], pose[3])
 
 
 class RDT:
@@ -146,7 +170,7 @@ class RDT:
         text, vision: Names of its encoders.
     """
 
-    name, action = "rdt", "joints"
+    name, action, history = "rdt", "joints", HISTORY
     cameras: Sequence[str] = (FRONT_CAMERA,)
 
     def __init__(
@@ -182,6 +206,12 @@ class RDT:
         self.words = self.network.encode_instruction(instruction)
         self.seen: deque[Any] = deque([None] * HISTORY, maxlen=HISTORY)
 
+    def see(self, images: dict[str, np.ndarray]) -> None:
+        """Take in the pictures of a step (h, w, 3), by camera."""
+        from PIL import Image
+
+        self.seen.append(Image.fromarray(images[FRONT_CAMERA]))
+
     def act(
         self, instruction: str, pose: np.ndarray, joints: np.ndarray | None, images: dict[str, np.ndarray]
     ) -> np.ndarray:
@@ -200,15 +230,40 @@ class RDT:
             ValueError: Joints are missing.
         """
         import torch
-        from PIL import Image
 
         if joints is None:
             raise ValueError("joints are missing: RDT is evaluated with --world intsim")
-        self.seen.append(Image.fromarray(images[FRONT_CAMERA]))
+        self.see(images)
         shown = [one for picture in self.seen for one in (picture, None, None)]  # its wrist cameras are not there
         own = torch.tensor(joints[None, :-1], dtype=torch.float32)
         found = self.network.step(own, shown, self.words).squeeze(0).cpu().numpy()
         return np.asarray(found, float)[::ACTION_STRIDE]
+
+
+def _cropped(image: np.ndarray) -> Any:
+    """The middle of a picture (h, w, 3), :data:`CROP_AREA` of it, in the picture's size."""
+    from PIL import Image
+
+    whole = Image.fromarray(image)
+    width, height = (int(np.sqrt(CROP_AREA) * size) for size in whole.size)
+    left, top = round((whole.width - width) / 2), round((whole.height - height) / 2)
+    part = whole.crop((left, top, left + width, top + height))
+    return part.resize(whole.size, Image.Resampling.BILINEAR)
+
+
+def _statistics(path: Path) -> dict[str, Any]:
+    """Statistics by data set.
+
+    Raises:
+        CutcalError: There is no such file, or it is no JSON object.
+    """
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as e:
+        raise CutcalError(f"--statistics {path}: cannot be read ({e}); give the fine-tuning's own file") from None
+    if not isinstance(found, dict):
+        raise CutcalError(f"--statistics {path}: is no JSON object of data sets")
+    return found
 
 
 def _sized(image: np.ndarray, size: int) -> np.ndarray:
@@ -226,7 +281,7 @@ def load_model(args: argparse.Namespace) -> Model:
     """
     try:
         if args.model == "openvla":
-            return OpenVLA(args.weights, args.key, args.device)
+            return OpenVLA(args.weights, args.key, args.device, args.statistics)
         if args.model == "octo":
             return Octo(args.weights, args.key)
         if args.root is None or args.statistics is None:
@@ -247,7 +302,7 @@ def main(words: Sequence[str] | None = None) -> int:
     p.add_argument("--weights", required=True, help="fine-tuned weights: a folder, a file or a name")
     p.add_argument("--key", default="", help="data set whose statistics scale the actions back (openvla, octo)")
     p.add_argument("--root", help="repository of rdt")
-    p.add_argument("--statistics", help="statistics.json of the export that rdt was fine-tuned on")
+    p.add_argument("--statistics", help="of rdt: statistics.json of the export; of openvla: a dataset_statistics.json")
     p.add_argument("--device", default="cuda:0", help="of openvla (default cuda:0)")
     p.add_argument(
         "--host", default="127.0.0.1", help=f"(default 127.0.0.1; another one needs a token in the variable {TOKEN})"

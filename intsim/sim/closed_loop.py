@@ -10,16 +10,14 @@ import numpy as np
 from calib.material.food import FoodSpec
 from intsim.sim.severing import SeveringOutcome
 from intsim.sim.world import ENV_ID, EPISODE_STEPS, World
+from intsim.task.guardrail import MAX_JOINT_SPEEDS, Guardrail
 from intsim.task.kinematic_table import limit_command
+from intsim.task.motion import at_rest
 from intsim.task.planner import CONTROL_RATE, GRIPPER_CLOSED
 from intsim.task.rollout import Policy, Rollout
 from intsim.task.suites import sample_episode
 from mpm.scene.errors import CutcalError
 
-STALL_STEPS, STALL_DISTANCE = 30, 1e-3
-"""Steps within which an edge that has not moved so far [m] is stuck, and the episode over."""
-MAX_JOINT_SPEEDS = np.array([2.175] * 4 + [2.61] * 3)
-"""Speeds of a Franka arm's joints at most [rad/s] (Franka control interface)."""
 _environments: dict[str, Any] = {}
 
 
@@ -96,13 +94,13 @@ class _ArmCommand:
         self.pose, self.joints = env.pose, _joints(env)
 
     def update(self, action: np.ndarray) -> tuple[str, ...]:
-        """Take in a change of pose (7,) or joint targets (8,), within the arm's limits; returns those that were met."""
+        """Take in a change of pose (7,), within the arm's limits, or joint targets (8,); returns the limits met.
+
+        Those of the joints are the environment's guardrail's.
+        """
         if len(action) == len(MAX_JOINT_SPEEDS) + 1:
-            turn = np.asarray(action[:-1], float) - self.joints[:7]
-            slow = np.clip(turn, -MAX_JOINT_SPEEDS / CONTROL_RATE, MAX_JOINT_SPEEDS / CONTROL_RATE)
-            self.joints = np.array([*(self.joints[:7] + slow), 0.0, 0.0])
-            self.pose = self._env.kinematics.pose(self.joints)
-            return ("joint",) * bool((slow != turn).any())
+            self._be_at(np.asarray(action[:-1], float))
+            return ()
         x, y, z, _, pitch, yaw = np.asarray(action, float)[:6]
         change = self._env.pose + [x, y, z, yaw, pitch] - self.pose
         kept = limit_command(np.array([*change[:3], 0.0, change[4], change[3]]), self._velocity)
@@ -110,6 +108,17 @@ class _ArmCommand:
         self.pose = self.pose + [*kept.delta[:3], kept.delta[5], kept.delta[4]]
         self.joints, _ = self._env.kinematics.joints(self.pose, np.array([*self.joints[:7], 0.0, 0.0]))
         return kept.clipped
+
+    def follow(self, guardrail: Guardrail) -> tuple[str, ...]:
+        """Take in what the environment made of the last command; returns the limits that it met."""
+        if guardrail.last:
+            self._be_at(guardrail.joints)
+        return guardrail.last
+
+    def _be_at(self, joints: np.ndarray) -> None:
+        """Command joints (7,) [rad]."""
+        self.joints = np.array([*joints, 0.0, 0.0])
+        self.pose = self._env.kinematics.pose(self.joints)
 
 
 def roll_out_closed_loop(env: Any, policy: Policy, seed: int) -> SeveringOutcome:
@@ -138,12 +147,12 @@ def roll_out_closed_loop(env: Any, policy: Policy, seed: int) -> SeveringOutcome
             break
         clipped = command.update(action)
         env.step(np.array([*command.joints[:7], GRIPPER_CLOSED], np.float32))
-        env.table.rollout.clipped[-1] = clipped
+        env.table.rollout.clipped[-1] = clipped + command.follow(env.guardrail)
         peak = max(peak, float(env.forces[:, 2].max()))
         way.append(env.pose[:3])
         if way[-1][2] == min(there[2] for there in way):
             short = float(way[-1][2] - command.pose[2])
-        if _stuck(way):
+        if at_rest(way):
             break
     env.coupling.end()
     return _outcome(env, peak, short)
@@ -155,18 +164,12 @@ def _joints(env: Any) -> np.ndarray:
     return own
 
 
-def _stuck(way: list[np.ndarray]) -> bool:
-    """Whether the edge, from where it has been (3,) [m], has not moved for :data:`STALL_STEPS`."""
-    last = np.array(way[-STALL_STEPS:])
-    return len(way) > STALL_STEPS and bool(np.linalg.norm(last - way[-1], axis=1).max() < STALL_DISTANCE)
-
-
 def _outcome(env: Any, peak: float, short: float) -> SeveringOutcome:
     """What the solver has found of an episode that is over."""
     done = env.coupling.done
-    broken = [d.why for d in done if d.severed is None]
+    broken = env.coupling.broken
     if broken or not env.coupled:
-        why = broken[0] if broken else "the food does not resist here"
+        why = broken or "the food does not resist here"
         return SeveringOutcome(None, peak=peak, short=short, why=why)
     severed = len(env.coupling.items[0].pieces) > env.episode.spec.cuts
     why = done[-1].why if done else "the edge does not reach the food"

@@ -8,8 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib.material.food import FoodSpec
+from intsim.sim.lateral import face_area, lateral_force
+from intsim.sim.piece_mesh import Ends, Mesh, item_mesh
 from intsim.sim.severing import cut_scene_at
 from intsim.task.kinematic_table import axis_crossing
+from intsim.task.motion import RELEASE_CLEARANCE
+from intsim.task.pieces import cut_ends, piece_shape
 from intsim.task.planner import DESCENT_SPEED
 from intsim.task.targets import Item
 from mpm.live import LiveCut
@@ -24,7 +28,7 @@ STALL_SPEED = 1e-3
 
 It stands above the board where one end of the blade, say, is on the board and the middle hangs.
 """
-READY_CLEARANCE = 0.01  # height of the edge above the food at which its cut is made ready [m]
+READY_CLEARANCE = RELEASE_CLEARANCE  # height of the edge above the food at which its cut is made ready [m]
 TOUCH_FORCE = 1e-3  # force from which on the knife touches the food, over the weight of the food [-]
 MAX_CELLS = 14
 """Cells over height and width of a food at most: large foods have larger cells, which save much time.
@@ -60,8 +64,10 @@ class Coupling:
 
     The solver's blade stays in the plane in which it came down, across the food's axis. The way of the knife down is
     passed on, and where it ``draws`` its way along the edge and its tilt are too. Its way across the blade is not, nor
-    the tilt elsewhere: both are recorded as ``aside`` and ``pitch``. The force has no component across the blade
-    either: of two even halves it has none. A second cut is one of the whole outline at its place.
+    the tilt elsewhere: both are recorded as ``aside`` and ``pitch``. A blade that leaves its plane is held by the sides
+    of the cut, by a closed form beside the solver (:mod:`intsim.sim.lateral`): that is the force across it. A second
+    cut is one of the piece that is there, with its ends, its place and what it still has of its skin
+    (:mod:`intsim.task.pieces`), at rest.
 
     A cut begins only from above: a food that is met from its side is not cut. It ends
 
@@ -85,8 +91,8 @@ class Coupling:
         live: The cut that goes on, or None.
         done: Cuts that have ended.
         force: Force of the food on the knife, world axes [N], shape (3,).
-        torque: Of the food on the knife about :meth:`point`, world axes [N m], shape (3,): what tilts the edge; 0
-            unless it ``draws``.
+        torque: Of the food on the knife about :meth:`point`, world axes [N m], shape (3,): what tilts the edge, where
+            it ``draws``, and of the force across the blade, which acts half-way up its face in the food.
         impulse: Impulse of the food on the knife so far [N s], shape (3,).
         touching: Whether the food presses on the knife.
         aside, pitch: Largest way across the blade [m] and tilt [rad] of the knife since a cut began.
@@ -109,12 +115,26 @@ class Coupling:
         self.force, self.torque, self.impulse, self.touching = np.zeros(3), np.zeros(3), np.zeros(3), False
         self.aside = self.pitch = 0.0
         self._which, self._along, self._begin = 0, 0.0, np.zeros(5)
+        self._plane: np.ndarray | None = None
+        self._ends: Ends | None = None
+        self._others = Mesh.of([])
         self._ready: set[int] = set()  # foods that the edge has been above since it was last down
 
     @property
     def severed(self) -> bool:
         """Whether every cut so far has left pieces, and there was one."""
         return bool(self.done) and all(d.severed for d in self.done)
+
+    @property
+    def broken(self) -> str:
+        """Why a cut was not simulated to its end, in words; empty where all were."""
+        return next((d.why for d in self.done if d.severed is None), "")
+
+    def count(self) -> int:
+        """Pieces of the first food, as it lies there now: those of a cut that goes on as soon as nothing holds."""
+        here = self.live if self.live is not None and self._which == 0 and self.live.begun else None
+        parted = here is not None and here.status == "done" and here.uncut == 0 and here.pieces().complete
+        return len(self.items[0].pieces) + parted
 
     def move(self, pose: np.ndarray, span: float) -> np.ndarray:
         """The knife has moved to a pose in a span of time.
@@ -147,7 +167,10 @@ class Coupling:
         return np.array([*(pose[:2] + off * np.cos(tilt) * edge), pose[2] + off * np.sin(tilt)])
 
     def mesh(self) -> tuple[int, np.ndarray, np.ndarray, np.ndarray] | None:
-        """The food under the knife; None while no cut goes on.
+        """The food under the knife, all of it; None while no cut goes on.
+
+        Beside what is simulated these are the ends of a long piece, which go with the simulated part, and the other
+        pieces, which lie still.
 
         Returns:
             Its place in ``items``, vertices in the world [m] (m, 3), triangles (t, 3), and which vertices lie on the
@@ -155,8 +178,23 @@ class Coupling:
         """
         if self.live is None or not self.live.begun:
             return None
-        points, triangles, flesh = self.live.surface()
-        return self._which, self.items[self._which].placed(points, self._along), triangles, flesh
+        item = self.items[self._which]
+        own = Mesh(*self.live.surface())
+        if self._ends is None:
+            self._ends, self._others = self._beside(item)
+        parts = [own, *self._ends.now(own.points)]
+        whole = Mesh.of([*(replace(m, points=item.placed(m.points, self._along)) for m in parts), self._others])
+        return self._which, whole.points, whole.triangles, whole.flesh
+
+    def _beside(self, item: Item) -> tuple[Ends, Mesh]:
+        """What is drawn beside the simulated part of the piece that is cut."""
+        assert self.live is not None
+        which = item.piece_at(self._along)
+        assert which is not None
+        place = self._along - item.pieces[which].shift
+        faces = cut_ends(item, which)
+        own = self.live.scene.food.shape
+        return Ends(own, piece_shape(item, which, place), faces, self.live.rest), item_mesh(item, which)
 
     def uncut(self) -> float:
         """Part of the section of the present cut that still holds [-], 1 where there is none."""
@@ -195,7 +233,8 @@ class Coupling:
         if met:
             self._which, self._along = met[0]
             self._ready.discard(self._which)
-            self._begin, self.aside, self.pitch = np.array(pose, float), 0.0, 0.0
+            self._begin, self.aside, self.pitch, self._ends = np.array(pose, float), 0.0, 0.0, None
+            self._plane = None
             item = self.items[self._which]
             try:
                 self.live = LiveCut(self._scene(item, self._along))
@@ -247,6 +286,7 @@ class Coupling:
         self.torque = self.live.moment * np.array([edge[1], -edge[0], 0.0])
         weight = self.live.weight
         self.touching = bool(np.linalg.norm(self.force) > TOUCH_FORCE * weight)
+        self._hold(pose, edge)
         above = pose[2] > item.shape.height + READY_CLEARANCE and (
             self.live.begun or pose[2] > self._begin[2] + READY_CLEARANCE
         )
@@ -254,6 +294,20 @@ class Coupling:
             self.live.begun and self.live.uncut == 0 and self._through(before - self.live.height, pose[2], span)
         ):
             self.end()
+
+    def _hold(self, pose: np.ndarray, edge: np.ndarray) -> None:
+        """Add the force of the sides of the cut on a blade that has left the plane in which it met the food."""
+        assert self.live is not None
+        if self._plane is None:
+            if self.touching:
+                self._plane = np.array(pose[:2], float)
+            return
+        across, scene = np.array([-edge[1], edge[0]]), self.live.scene
+        area = face_area(scene, float(pose[2]))
+        force = lateral_force(scene.food.material, area, float((pose[:2] - self._plane) @ across))
+        push = np.array([*(force * across), 0.0])
+        arm = np.array([0.0, 0.0, max(scene.food.shape.height - float(pose[2]), 0.0) / 2])
+        self.force, self.torque = self.force + push, self.torque + np.cross(arm, push)
 
     def _through(self, down: float, height: float, span: float) -> bool:
         """Whether an edge that has passed the whole section is done.

@@ -19,18 +19,30 @@ from mani_skill.sensors.camera import CameraConfig
 from mani_skill.utils import sapien_utils
 from mani_skill.utils.registration import register_env
 from mani_skill.utils.structs.types import SimConfig
+from scipy.spatial.transform import Rotation
 
 from calib.material.food import FoodSpec, load_food
 from intsim.sim.background import Background
 from intsim.sim.coupling import Coupling
-from intsim.sim.panda import BASE_POSITION, BLADE_LINK, EDGE_LINK, Kinematics, PandaKnife, edge_pose
+from intsim.sim.panda import (
+    BASE_POSITION,
+    BLADE_LINK,
+    EDGE_LINK,
+    MANISKILL_DAMPING,
+    Kinematics,
+    PandaKnife,
+    edge_pose,
+)
 from intsim.sim.scenery import Scenery
 from intsim.sim.world import ENV_ID, EPISODE_STEPS
-from intsim.task.kinematic_table import KinematicTable
+from intsim.task.guardrail import Guardrail
+from intsim.task.kinematic_table import KinematicTable, axis_crossing
+from intsim.task.motion import MotionEnd
 from intsim.task.planner import CONTROL_RATE, HOME
+from intsim.task.reward import dense_reward
 from intsim.task.success import judge_geometry
 from intsim.task.suites import FOODS, Episode, sample_episode
-from intsim.task.targets import CAMERAS
+from intsim.task.targets import CAMERAS, Item, TaskError, target
 from mpm.scene.errors import CutcalError
 
 PHYSICS_RATE = 100  # steps of the robot's physics a second
@@ -43,7 +55,11 @@ class CutFoodEnv(BaseEnv):
 
     ``reset(seed=...)`` draws the task from a suite; ``reset(options={"episode": episode})`` sets one, with ``draws``
     beside it for that episode alone. ``instruction`` is the sentence of the episode. The force of the food is in
-    ``info`` and not among the observations: a real arm of this kind does not feel it.
+    ``info`` and not among the observations: a real arm of this kind does not feel it. Observations of the ``state``
+    modes have the food's place, size and pieces, and where the next cut goes; those with pictures do not.
+
+    Nothing succeeds before the motion is over: the knife has been in a food and is above it again, or rests, or the
+    time is out (:mod:`intsim.task.motion`). ``info["published"]`` and ``info["severed"]`` say how it stands meanwhile.
 
     Its arguments are keywords of ``gymnasium.make``, which is why they are no object.
 
@@ -54,18 +70,22 @@ class CutFoodEnv(BaseEnv):
         coupled: Whether the food resists; without it the knife passes through, as in geometry alone.
         coarse: Cells of a screening run.
         draws: Whether the knife is drawn along its edge and tilted in the solver as well.
-        stiffness, damping: Of the arm's joints [N m/rad, N m s/rad]; ManiSkill's own without it.
-        criterion: What ``info["success"]`` is: ``published`` for the four published criteria, ``severed`` for pieces in
-            the solver too.
+        stiffness, damping: Of all the arm's joints [N m/rad, N m s/rad]; without them joint impedance with libfranka's
+            example gains. The torques are limited to those of the real arm. A stiffness without a damping has
+            ManiSkill's, 100.
+        criterion: What ``info["success"]`` is once the motion is over: ``severed`` for the published criteria and
+            pieces in the solver, ``published`` for the published criteria alone. ``severed`` where the food resists.
+        guardrail: Whether commands beyond the arm's speeds are clipped, as they are in every published evaluation.
         pixels: Width and height of the cameras' pictures.
         scenery: Which background, see :mod:`intsim.sim.background`.
 
     Attributes:
         solver_s: Time that the solver has taken so far [s].
+        guardrail: What clips the commands of this episode, with its log.
     """
 
     SUPPORTED_ROBOTS = [PandaKnife.uid]
-    SUPPORTED_REWARD_MODES = ("sparse", "none")
+    SUPPORTED_REWARD_MODES = ("sparse", "dense", "normalized_dense", "none")
     agent: PandaKnife
 
     def __init__(
@@ -79,18 +99,25 @@ class CutFoodEnv(BaseEnv):
         draws: bool = False,
         stiffness: float | None = None,
         damping: float | None = None,
-        criterion: str = "published",
+        criterion: str | None = None,
+        guardrail: bool = True,
         pixels: int = PIXELS,
         scenery: int = 0,
         **kwargs: Any,
     ) -> None:
+        if criterion is None:
+            criterion = "severed" if coupled else "published"
         if criterion not in ("published", "severed"):
             raise CutcalError(f"CutFood-v1: criterion {criterion!r} is neither 'published' nor 'severed'")
+        if criterion == "severed" and not coupled:
+            raise CutcalError("CutFood-v1: criterion 'severed' of food that does not resist; give coupled=True")
         self.suite, self.knife, self.coupled, self.coarse, self.draws = suite, knife, coupled, coarse, draws
         self.foods = dict(foods) if foods is not None else {name: load_food(name) for name in FOODS}
-        self.criterion, self.pixels = criterion, pixels
+        self.criterion, self.pixels, self._guarded = criterion, pixels, guardrail
         self.scenery = Scenery(Background.of(scenery))
         self.solver_s = 0.0
+        if stiffness is not None and damping is None:
+            damping = MANISKILL_DAMPING
         self._gains = {k: v for k, v in (("arm_stiffness", stiffness), ("arm_damping", damping)) if v is not None}
         self.episode: Episode | None = None
         kwargs.setdefault("robot_uids", PandaKnife.uid)
@@ -158,7 +185,34 @@ class CutFoodEnv(BaseEnv):
         self.agent.robot.set_pose(sapien.Pose(p=list(BASE_POSITION)))
         self._force, self._point = np.zeros(3), np.zeros(3)
         self._forces: list[np.ndarray] = []
+        self._clipped: tuple[str, ...] = ()
+        self.motion = MotionEnd(self._steps)
+        self.guardrail = Guardrail(self.agent.control_mode, joints[:7], self._hand())
         self.scenery.serve(self.scene, items)
+
+    @property
+    def _steps(self) -> int:
+        """Control steps of an episode."""
+        return int(getattr(self.spec, "max_episode_steps", None) or EPISODE_STEPS)
+
+    def _hand(self) -> np.ndarray:
+        """The edge's frame as ``pd_ee_pose`` names it: x, y, z [m] from the base and Euler angles [rad], shape (6,)."""
+        there = self._edge.entity_pose
+        turn = Rotation.from_matrix(there.to_transformation_matrix()[:3, :3]).as_euler("XYZ")
+        return np.array([*(np.array(there.p, float) - BASE_POSITION), *turn])
+
+    def _step_action(self, action: Any) -> Any:
+        """Clip a command to what the arm may do, and carry it out."""
+        given = action["action"] if isinstance(action, dict) and "control_mode" in action else action
+        self._clipped = ()
+        if self._guarded and given is not None and not isinstance(given, dict):
+            asked = np.asarray(given, np.float32)
+            if isinstance(action, dict):
+                self.guardrail.mode = action["control_mode"]
+            within = self.guardrail.clip(asked.reshape(-1)).reshape(asked.shape)
+            self._clipped = self.guardrail.last
+            action = {**action, "action": within} if isinstance(action, dict) else within
+        return super()._step_action(action)
 
     @property
     def instruction(self) -> str:
@@ -193,32 +247,101 @@ class CutFoodEnv(BaseEnv):
     def _after_control_step(self) -> None:
         there = self.pose
         there[2] = max(there[2], 0.0)
-        self.table.arrive(self.pose, there)
+        self.motion.step(there, (self.coupling if self.coupled else self.table).items)
+        self.table.arrive(self.pose, there, self._clipped)
         self.scenery.follow(self.scene, self.coupling)
 
     def evaluate(self) -> dict[str, Any]:
-        """Success, the criteria, what the solver has found, and the force of the control step [N]."""
+        """Success, how it stands, why the motion is over, what the solver has found, and the control step's force [N].
+
+        A cut that the solver could not follow is ``broken``, and no success.
+        """
         assert self.episode is not None
-        no = torch.zeros(1, dtype=torch.bool)
-        info: dict[str, Any] = {"success": no, "published": no, "severed": no}
+        spec, published, severed, broken = self.episode.spec, False, False, False
         if self.table.rollout.pose:
-            judged = judge_geometry(self.episode.spec, self.episode.item, self.table.rollout, self.table.items[0])
-            severed = len(self.coupling.items[0].pieces) > max(self.episode.spec.cuts, 1)
-            info["severed"] = torch.tensor([severed])
-            published = (
-                judged.published if not self.episode.spec.pieces else judged.published and judged.criteria["count"]
-            )
-            info["published"] = torch.tensor([published])
-            info["success"] = torch.tensor([published and (severed or self.criterion == "published")])
+            judged = judge_geometry(spec, self.episode.item, self.table.rollout, self.table.items[0])
+            published = judged.published and (not spec.pieces or judged.criteria["count"])
+            severed = self.coupling.count() > spec.cuts
+            broken = bool(self.coupling.broken)
+        over = bool(self.motion.why)
+        wanted = published and (self.criterion == "published" or (severed and not broken))
+        flags = {
+            "success": over and wanted,
+            "published": published,
+            "severed": severed,
+            "broken": broken,
+            "over": over,
+            "touching": self.coupling.touching,
+            "clipped": bool(self._clipped),
+        }
         mean = np.mean(self._forces, axis=0) if self._forces else np.zeros(3)
-        info["force"] = torch.tensor(mean[None], dtype=torch.float32)
-        info["touching"] = torch.tensor([self.coupling.touching])
-        info["uncut"] = torch.tensor([self.coupling.uncut()], dtype=torch.float32)
-        return info
+        numbers = {"force": mean, "uncut": self.coupling.uncut()}
+        return {
+            **{name: torch.tensor([bool(value)]) for name, value in flags.items()},
+            **{name: torch.tensor(np.array([value]), dtype=torch.float32) for name, value in numbers.items()},
+        }
 
     def _get_obs_extra(self, info: dict[str, Any]) -> dict[str, torch.Tensor]:
+        """Pose of the edge, and the food's state where states are observed."""
         del info
-        return {"edge": torch.tensor(self.pose[None], dtype=torch.float32)}
+        seen = {"edge": self.pose}
+        if self.obs_mode_struct.use_state:
+            seen |= {"food": self._food_state()}
+        return {name: torch.tensor(values[None], dtype=torch.float32) for name, values in seen.items()}
+
+    @property
+    def food(self) -> Item:
+        """The food that is meant, as it is now."""
+        item: Item = (self.coupling if self.coupled else self.table).items[0]
+        return item
+
+    def _food_state(self) -> np.ndarray:
+        """The food: middle x, y [m], its axis (2,), length, width, height [m], its pieces, the part of the section that
+        holds, and where on the table the next cut goes, x, y [m], shape (11,)."""
+        assert self.episode is not None
+        item = self.food
+        try:
+            place = item.at(target(self.episode.spec, item))
+        except TaskError:  # in as many pieces as asked for
+            place = np.array([item.x, item.y])
+        shape = item.shape
+        sizes = (shape.length, shape.width, shape.height)
+        return np.array([item.x, item.y, *item.axis, *sizes, len(item.pieces), self.coupling.uncut(), *place])
+
+    def compute_dense_reward(self, obs: Any, action: Any, info: dict[str, Any]) -> torch.Tensor:
+        """How far the cut has got.
+
+        Args:
+            obs, action: Not used.
+            info: What :meth:`evaluate` has found.
+
+        Returns:
+            :func:`intsim.task.reward.dense_reward` [-], 1 for success, shape (1,).
+        """
+        del obs, action
+        assert self.episode is not None
+        if bool(info["success"]):
+            return torch.ones(1)
+        spec, pose = self.episode.spec, self.pose
+        if self.coupled:
+            made, uncut = len(self.food.pieces) - 1, self.coupling.uncut() if self.coupling.live is not None else 1.0
+        else:
+            made = len(self.table.rollout.cuts)
+            inside = self.motion.met and axis_crossing(self.food, pose) is not None
+            uncut = float(np.clip(pose[2] / self.food.shape.height, 0.0, 1.0)) if inside else 1.0
+        return torch.tensor([dense_reward(spec, self.food, pose, uncut, made)], dtype=torch.float32)
+
+    def compute_normalized_dense_reward(self, obs: Any, action: Any, info: dict[str, Any]) -> torch.Tensor:
+        """The dense reward, which is never more than 1.
+
+        Args:
+            obs, action: Not used.
+            info: What :meth:`evaluate` has found.
+
+        Returns:
+            The reward [-], shape (1,).
+        """
+        return self.compute_dense_reward(obs, action, info)
 
     @property
     def forces(self) -> np.ndarray:

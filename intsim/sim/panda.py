@@ -21,6 +21,17 @@ URDF_SOURCE = Path(PACKAGE_ASSET_DIR) / "robots" / "panda" / "panda_v2.urdf"
 BASE_POSITION = (-0.615, 0.0, 0.0)  # where ManiSkill's table scenes put the arm [m]
 BLADE_OFFSET = 0.12  # from the hand to the back of the blade [m]: beyond the fingertips
 STEEL_DENSITY = 7850.0  # kg/m^3
+JOINT_IMPEDANCE = np.array([3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0])
+"""Stiffness of a Franka arm's joints [N m/rad]: what libfranka's examples set (setJointImpedance)."""
+TORQUE_LIMITS = np.array([87.0] * 4 + [12.0] * 3)
+"""Most torque of its joints [N m] (Franka control interface)."""
+JOINT_INERTIA = 1.0
+"""Inertia that a joint's damping is chosen for [kg m^2]; what an arm's first joints see.
+
+The damping of the arm's own controller is not published: it is critical for this inertia, 2 sqrt(stiffness x inertia).
+"""
+MANISKILL_STIFFNESS, MANISKILL_DAMPING = 1e3, 1e2
+"""Gains of ManiSkill's own Panda [N m/rad, N m s/rad], which a stiffness that is given as one number goes with."""
 EDGE_LINK = "knife_edge"
 BLADE_LINK = "knife"
 
@@ -87,6 +98,9 @@ class PandaKnife(Panda):
     uid = "panda_knife"
     ee_link_name = EDGE_LINK
     knife, visible = "kitchen", True
+    arm_stiffness = JOINT_IMPEDANCE.tolist()
+    arm_damping = (2 * np.sqrt(JOINT_IMPEDANCE * JOINT_INERTIA)).tolist()
+    arm_force_limit = TORQUE_LIMITS.tolist()
     keyframes = {
         "rest": Keyframe(
             qpos=np.array([0.0, np.pi / 8, 0, -np.pi * 5 / 8, 0, np.pi * 3 / 4, np.pi / 4, 0.0, 0.0]),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,12 +10,11 @@ import sapien
 
 from intsim.sim.background import Background
 from intsim.sim.coupling import Coupling
+from intsim.sim.piece_mesh import item_mesh
 from intsim.task.targets import Item
-from mpm.output.surface import half_of
 
 TABLE_SIZE, BOARD_SIZE, THICKNESS = (0.8, 1.2), (0.4, 0.5), 0.02  # sizes along x, y and the board's thickness [m]
 WALL_DISTANCE = 3.0  # of the walls from the board [m]
-OUTLINE_STEP = 3e-3  # distance of the rings of a food's outline beside the cut [m]
 #: Skin and flesh by food, red, green, blue: for the eye only.
 FOOD_COLOURS = {
     "banana": ((0.88, 0.75, 0.2), (0.96, 0.92, 0.72)),
@@ -96,7 +94,8 @@ class Scenery:
         for item in items:
             entity = sapien.Entity()
             entity.name = f"food {item.name}"
-            body = _body(*_whole(item), item.name)
+            mesh = item_mesh(item)
+            body = _body(mesh.points, mesh.triangles, mesh.flesh, item.name)
             entity.add_component(body)
             own.add_entity(entity)
             self._foods.append(entity)
@@ -131,14 +130,6 @@ class Scenery:
 def dull_material(colour: np.ndarray) -> sapien.render.RenderMaterial:
     """A dull material of a colour."""
     return sapien.render.RenderMaterial(base_color=[*map(float, colour), 1.0], roughness=0.9, specular=0.1)
-
-
-def _whole(item: Item) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices in the world, triangles, and which are flesh, of a food that nothing has touched."""
-    half = half_of(replace(item.shape, cut=0.0), OUTLINE_STEP)
-    points = np.concatenate([half.points * [1.0, -1.0, 1.0], half.points])
-    triangles = np.concatenate([half.triangles[:, ::-1], half.triangles + len(half.points)])
-    return item.placed(points, 0.0), triangles, np.zeros(len(points), bool)
 
 
 def _body(points: np.ndarray, triangles: np.ndarray, flesh: np.ndarray, name: str) -> sapien.render.RenderBodyComponent:

@@ -8,12 +8,14 @@ import numpy as np
 
 from calib.material.food import FoodSpec
 from calib.material.knife import load_knife
-from calib.material.scene import CELL_PER_ZONE, Sizing, cut_scene, specimen
+from calib.material.scene import CELL_PER_ZONE, LENGTH_PER_HEIGHT, Sizing, cut_scene, specimen
+from intsim.task.pieces import piece_shape
 from intsim.task.planner import CONTROL_RATE
 from intsim.task.targets import Item
 from mpm.output.record import ForceRecord
 from mpm.scene import Arm, Scene
 from mpm.scene.errors import SceneError
+from mpm.scene.shapes import Shape
 from mpm.solver import Simulation
 
 PANDA_ARM = Arm(1 / 0.57e-3)
@@ -58,12 +60,13 @@ def cut_scene_at(
     coarse: bool = True,
     cells: int | None = None,
 ) -> Scene:
-    """A press cut through a food at a place along its axis.
+    """A press cut through a food, or the piece of it that is there, at a place along its axis.
 
-    A place nearer to the end than two cells asks for finer ones.
+    A place nearer to the end than two cells asks for finer ones. A piece lies on the board at rest: how it was deformed
+    before is forgotten.
 
     Args:
-        item: The food, taken for whole.
+        item: The food as it is.
         along: Where along its axis [m].
         food: Its properties.
         knife: Name of the knife.
@@ -76,11 +79,13 @@ def cut_scene_at(
     Raises:
         SceneError: A cut that the solver cannot make.
     """
-    shape = item.shape
-    sizing = Sizing(shape.kind, shape.height, shape.width, None, 0.5 + along / shape.length)
-    sized, _ = specimen(food, None, sizing)
+    which = item.piece_at(along)
+    if which is None:
+        raise SceneError(f"no piece of the {item.name} lies {1e3 * along:.1f} mm from its middle")
+    shape = sized = _simulated_part(item, which, along - item.pieces[which].shift, food)
     least = min(-sized.ends[0], sized.ends[1])
-    whole, blade = replace(sized, cut=0.0), load_knife(knife)
+    # cells and zone do not depend on the length, and a slice may be too short for the usual cells
+    whole, blade = replace(sized, cut=0.0, length=max(sized.length, sized.height)), load_knife(knife)
     usual = cut_scene(food, whole, blade, coarse=coarse)
     largest = 0.0 if cells is None else min(shape.height, shape.width) / cells
     if largest > usual.numerics.dx:
@@ -91,6 +96,23 @@ def cut_scene_at(
             f"a slice of {least * 1e3:.2g} mm would need cells of {cell * 1e3:.2g} mm, which take too long"
         )
     return replace(usual, food=replace(usual.food, shape=sized), numerics=replace(usual.numerics, dx=cell))
+
+
+def _simulated_part(item: Item, which: int, place: float, food: FoodSpec) -> Shape:
+    """The piece as it is simulated: of parallel sides only what is near the cut.
+
+    ``place`` is where the blade is, along the axis of the uncut food [m].
+    """
+    if len(item.pieces) == 1 and item.shape.outline is None:
+        whole = item.shape
+        sizing = Sizing(whole.kind, whole.height, whole.width, None, 0.5 + place / whole.length)
+        return specimen(food, None, sizing)[0]
+    piece = piece_shape(item, which, place)
+    if not piece.prism:
+        return piece
+    most = LENGTH_PER_HEIGHT * piece.height / 2
+    low, high = (min(abs(end), most) for end in piece.ends)
+    return replace(piece, length=low + high, cut=(low - high) / 2)
 
 
 def commanded_scene(

@@ -16,7 +16,7 @@ class World:
 
     Attributes:
         coupled: Whether the food resists.
-        stiffness: Of the arm's joints [N m/rad]; ManiSkill's own (1000) without it.
+        stiffness: Of all the arm's joints [N m/rad], with ManiSkill's damping; libfranka's example gains without it.
         knife: Name of the knife.
         pixels: Width and height of the pictures that a policy is given; 0 for none, which needs no renderer.
     """

@@ -32,6 +32,9 @@ class GeometricOutcome:
         pieces: Pieces of the food at the end, in plain geometry.
         length_variation: Standard deviation of the lengths of the pieces over their mean; NaN for one piece.
         criteria: Which of :data:`CRITERIA` are met; ``count`` and ``even`` for equal pieces alone.
+        offsets: Of every cut in order, the error of its place over the length of what was cut [-].
+        volume_variation: Standard deviation of the volumes of the pieces over their mean: 0 for equal ones, NaN for one
+            piece. The published measure of a split is the number and uniformity of its pieces, without a formula.
     """
 
     height: float
@@ -40,6 +43,8 @@ class GeometricOutcome:
     pieces: int
     length_variation: float
     criteria: Mapping[str, bool]
+    offsets: tuple[float, ...] = ()
+    volume_variation: float = math.nan
 
     @property
     def published(self) -> bool:
@@ -56,8 +61,9 @@ def judge_geometry(spec: CutSpec, item: Item, rollout: Rollout, after: Item) -> 
     """Judge an episode by geometry.
 
     The published criteria are read so that each fails by itself: the tip's error is its height above the table, the
-    region is the food, the place is along its axis. A tip within 50 mm of the table says nothing of a grape 25 mm high:
-    ``strict_tip`` asks for 5 mm. For equal pieces every cut counts against the piece that was there: the worst angle
+    region is the food, into which the edge has to go, the place is along its axis. A tip within 50 mm of the table says
+    nothing of a grape 25 mm high: a knife that has not touched it has not met the region, and ``strict_tip`` asks for
+    5 mm. For equal pieces every cut counts against the piece that was there: the worst angle
     and place.
 
     Args:
@@ -88,14 +94,15 @@ def judge_geometry(spec: CutSpec, item: Item, rollout: Rollout, after: Item) -> 
     even = coefficient_of_variation(lengths) if len(lengths) > 1 else math.nan
     criteria = {
         "tip": height < TIP_HEIGHT,
-        "region": bool(tries),
+        "region": bool(tries) and (bool(spec.pieces) or height < item.top(tries[0][1])),
         "angle": angle <= ANGLE_TOLERANCE,
         "place": abs(offset) <= PLACE_TOLERANCE,
         "strict_tip": height < STRICT_TIP_HEIGHT,
     }
     if spec.pieces:
         criteria |= {"count": len(lengths) == spec.pieces, "even": even <= LENGTH_VARIATION_LIMIT}
-    return GeometricOutcome(height, angle, offset, len(lengths), even, criteria)
+    uneven = coefficient_of_variation(after.volumes()) if len(lengths) > 1 else math.nan
+    return GeometricOutcome(height, angle, offset, len(lengths), even, criteria, tuple(errors), uneven)
 
 
 def _offset(spec: CutSpec, was: Item, along: float) -> float:

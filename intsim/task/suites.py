@@ -25,7 +25,7 @@ CUT_RATIOS = tuple(Fraction(*r) for r in ((1, 2), (1, 3), (1, 4), (1, 6), (2, 3)
 SIZE_VARIATION = 0.1  # most that a food's size deviates from its usual one, part of it
 FOOD_X, FOOD_Y = (-0.08, 0.08), (-0.12, 0.12)  # where a food may lie [m]
 FOOD_SPACING = 0.03  # between foods [m]
-MAX_PIECES = 4
+MAX_PIECES = 5  # as in the published table of splits
 PLACEMENT_TRIES = 200
 
 
@@ -134,7 +134,7 @@ SUITES = {
     "objects": TaskSuite("other foods on the table", distractors=3),
     "language": TaskSuite("sentences that training has not seen", unseen=True),
     "continuous": TaskSuite("any part from 0.1 to 0.9", task=_continuous),
-    "split": TaskSuite("two to four equal pieces", task=_split),
+    "split": TaskSuite("two to five equal pieces", task=_split),
     "flips": TaskSuite("a quarter and three quarters from either end", task=_flip),
 }
 """Suites by name. Leave one food out by naming it: a suite of a policy that was trained without it."""

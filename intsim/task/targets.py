@@ -10,7 +10,7 @@ from fractions import Fraction
 import numpy as np
 
 from mpm.scene.errors import CutcalError
-from mpm.scene.shapes import Shape, half_width, section_area
+from mpm.scene.shapes import Shape, half_width, section_area, span, surface
 
 SIDES = ("left", "right", "centre")
 MIN_VIEW_ANGLE = math.radians(15.0)
@@ -161,6 +161,15 @@ class Item:
         """Half of its width there [m], 0 where there is nothing."""
         k = self.piece_at(along)
         return 0.0 if k is None else half_width(self.shape, along - self.pieces[k].shift)
+
+    def top(self, along: float) -> float:
+        """Height of its upper surface above its axis there [m], 0 where there is nothing."""
+        k = self.piece_at(along)
+        if k is None:
+            return 0.0
+        place = along - self.pieces[k].shift
+        left, right = span(self.shape, place)
+        return float(np.nan_to_num(surface(self.shape, np.array((left + right) / 2), np.array(place))[1]))
 
     def volumes(self) -> list[float]:
         """Volumes of its pieces [m^3], from sections."""

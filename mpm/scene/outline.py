@@ -46,6 +46,7 @@ class Sections:
         bottom: Height of the lower surface over the food's height [-], shape (n, m), at ``places(m)`` from left to
             right.
         top: The same of the upper surface.
+        bare: Whether the food was cut off at its first and its last section, whose faces then have no skin and no rind.
 
     Raises:
         SceneError: The arrays do not belong together, or have values outside the food's box.
@@ -55,6 +56,7 @@ class Sections:
     right: np.ndarray
     bottom: np.ndarray
     top: np.ndarray
+    bare: tuple[bool, bool] = (False, False)
 
     def __post_init__(self) -> None:
         n, m = self.bottom.shape
@@ -81,6 +83,8 @@ class Sections:
         out = hashlib.sha256()
         for array in (self.left, self.right, self.bottom, self.top):
             out.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
+        if any(self.bare):
+            out.update(repr(self.bare).encode())
         return out.hexdigest()
 
     @cached_property
@@ -94,7 +98,7 @@ class Sections:
             pairs = zip(own, turned, weights, strict=True)
             return all(float((np.abs(a - b) * weight).max()) <= SYMMETRY for a, b, weight in pairs)
 
-        return same(self._mirrored_along()), same(self._mirrored_across())
+        return same(self._mirrored_along()), self.bare[0] == self.bare[1] and same(self._mirrored_across())
 
     def _mirrored_along(self) -> tuple[np.ndarray, ...]:
         """The arrays of the mirror image at x = 0."""

@@ -14,7 +14,7 @@ LEVELS = 33  # points up an end that is cut off, or a flank that is upright
 
 
 class SurfaceDistance:
-    """Distances from the surface that has a skin: all of it but the face where a food was halved.
+    """Distances from the surface that has a skin: all of it but the faces where a food was halved or cut off.
 
     The surface is sampled with its normals. The distance from the plane through the nearest sample is exact to second
     order in their spacing.
@@ -67,7 +67,9 @@ class SurfaceDistance:
             gap = (top - bottom)[:, rim]
             walled = np.where(gap > FLAT, gap, np.nan)[:, None] * up + bottom[:, [rim]]
             sheets.append(np.stack(np.broadcast_arrays(u[:, [rim]], v[:, None], walled), -1))
-        for end in (0, -1):  # ends that are cut off
+        for end, bare in zip((0, -1), sections.bare, strict=True):  # ends that are upright
+            if bare:
+                continue
             gap = np.where(right[end] - left[end] > FLAT, (top - bottom)[end], np.nan)
             face = bottom[end][:, None] + gap[:, None] * up
             sheets.append(np.stack(np.broadcast_arrays(u[end][:, None], v[end], face), -1))

@@ -18,9 +18,9 @@ from calib.material.food import load_food
 from calib.material.food_file import dump_material
 from cutcal.main import main
 from intsim.evaluate import RESULT_FILE, PolicyEvaluation, evaluate, roll_out, run_episode
-from intsim.outcomes import EvaluationResult, expected_place_rate
+from intsim.outcomes import EvaluationResult, SuiteResult, expected_place_rate
 from intsim.policy.oracles import POLICIES, SHALLOW_HEIGHT, make_policy
-from intsim.sim.severing import PANDA_ARM, commanded_scene, simulate_severing
+from intsim.sim.severing import PANDA_ARM, SeveringOutcome, commanded_scene, simulate_severing
 from intsim.sim.world import World
 from intsim.task.kinematic_table import KinematicTable
 from intsim.task.rollout import Rollout
@@ -49,7 +49,7 @@ def document(evaluation: PolicyEvaluation, out: Path) -> dict[str, Any]:
 def found(tmp_path_factory) -> dict[str, dict]:
     """What the evaluation says of each policy."""
     out = tmp_path_factory.mktemp("evaluate")
-    names = ("oracle", "wrong-side", "wrong-item", "shallow", "random")
+    names = ("oracle", "wrong-side", "wrong-item", "shallow", "random", "stuck", "hover")
     return {
         name: document(PolicyEvaluation(make_policy(name), name, ALL, list(SUITES), FEW), out / name) for name in names
     }
@@ -60,6 +60,27 @@ def test_the_oracle_succeeds_everywhere(found):
     for suite in found["oracle"]["suites"].values():
         assert suite["published"]["successes"] == suite["strict"]["successes"] == FEW
         assert suite["clipped_steps"] == 0
+
+
+def test_nothing_succeeds_without_contact(found):
+    """A knife that stays where it is, and one that turns back a millimetre above the food in the right place, succeed
+    in no suite by any reading; the second is within the published 50 mm of the table over small foods.
+    """
+    for name in ("stuck", "hover"):
+        for suite in found[name]["suites"].values():
+            assert suite["published"]["successes"] == suite["strict"]["successes"] == 0
+    seeds = found["hover"]["suites"]["seeds"]["criteria"]
+    assert seeds["tip"]["successes"] > 0 and seeds["angle"]["successes"] == seeds["place"]["successes"] == FEW
+
+
+def test_a_broken_simulation_stays_in_every_denominator():
+    """Of three cuts one is in pieces, one holds, and one broke down: one of three, and one that was not simulated."""
+    row = run_episode(PolicyEvaluation(make_policy("oracle"), "oracle", ALL, ["seeds"], 1), HALF)
+    rows = [replace(row, severing=SeveringOutcome(severed)) for severed in (True, False, None)]
+    suite = SuiteResult.of(rows, None)
+    assert (suite.severing.successes, suite.severing.trials) == (1, 3)
+    assert (suite.published_and_severed.successes, suite.published_and_severed.trials) == (1, 3)
+    assert suite.not_simulated == 1 and suite.published.trials == 3
 
 
 def test_each_wrong_oracle_fails_in_its_own_way(found):
@@ -92,8 +113,10 @@ def test_noise_succeeds_as_often_as_its_closed_form_says(tmp_path):
     ("pose", "failed"),
     [
         ((0.0, 0.0, 0.001, 0.0, 0.0), set()),
-        ((0.0, 0.0, TIP_HEIGHT - 1e-6, 0.0, 0.0), {"strict_tip"}),
-        ((0.0, 0.0, TIP_HEIGHT + 1e-6, 0.0, 0.0), {"tip", "strict_tip"}),
+        ((0.0, 0.0, 0.032 - 1e-6, 0.0, 0.0), {"strict_tip"}),
+        ((0.0, 0.0, 0.032 + 1e-6, 0.0, 0.0), {"region", "strict_tip"}),
+        ((0.0, 0.0, TIP_HEIGHT - 1e-6, 0.0, 0.0), {"region", "strict_tip"}),
+        ((0.0, 0.0, TIP_HEIGHT + 1e-6, 0.0, 0.0), {"tip", "region", "strict_tip"}),
         ((0.0, 0.0, 0.0, math.radians(9.9), 0.0), set()),
         ((0.0, 0.0, 0.0, math.radians(10.1), 0.0), {"angle"}),
         ((0.0, 0.0039, 0.0, 0.0, 0.0), set()),

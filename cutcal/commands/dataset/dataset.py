@@ -56,7 +56,10 @@ def add_args(p: Group) -> None:
         "--style", action="append", metavar="NAME", help="press, slice, rock or saw, or several (default: all)"
     )
     p.add_argument(
-        "--stiffness", type=number(1, 1e6, "N m/rad"), metavar="K", help="of the arm's joints [N m/rad] (default 1000)"
+        "--stiffness",
+        type=number(1, 1e6, "N m/rad"),
+        metavar="K",
+        help="of the arm's joints [N m/rad] (default: a Franka's)",
     )
     p.add_argument("--knife", default="kitchen", metavar="NAME", help=KNIFE_HELP)
     p.add_argument("--seed", type=whole(0), default=0, metavar="N", help="of the first trajectory (default 0)")
@@ -72,7 +75,7 @@ def add_args(p: Group) -> None:
         help="of an export: lerobot (default), rlds or rdt",
     )
     p.add_argument(
-        "--keep", choices=KEEP, default="severed", metavar="KIND", help="clone: severed (default), published, all"
+        "--keep", choices=KEEP, metavar="KIND", help="severed (default of clone), published, all (default of export)"
     )
     p.add_argument("--most", type=whole(1), metavar="N", help="clone: learn from at most so many")
     p.add_argument("--pixels", type=whole(16), default=128, metavar="N", help="of the pictures (default 128)")
@@ -176,7 +179,7 @@ def _clone(args: argparse.Namespace) -> dict[str, Any]:
         raise CutcalError(f"--out {path}: exists and is never overwritten; choose another file")
     from intsim.policy.training import train
 
-    clone = train(Path(args.folder), keep=args.keep, most=args.most, seed=args.seed)
+    clone = train(Path(args.folder), keep=args.keep or "severed", most=args.most, seed=args.seed)
     clone.save(path)
     if not args.json:
         about = clone.about
@@ -204,7 +207,9 @@ def _export(args: argparse.Namespace) -> dict[str, Any]:
     }
     args.arch = "cpu"
     with workers_of(args, say) if backgrounds else nullcontext() as pool:
-        found = exports[args.format](folder, out, backgrounds=backgrounds, pixels=args.pixels, pool=pool, say=say)
+        found = exports[args.format](
+            folder, out, backgrounds=backgrounds, pixels=args.pixels, pool=pool, say=say, keep=args.keep or "all"
+        )
     if not args.json and args.format == "rlds":
         print(", ".join(f"{s['shardLengths'][0]} episodes to {s['name']}" for s in found["splits"]))
     elif not args.json and args.format == "rdt":

@@ -15,7 +15,7 @@ from mpm.scene.errors import CutcalError
 
 if TYPE_CHECKING:
     from intsim.evaluate import PolicyEvaluation
-    from intsim.outcomes import EvaluationResult, SuccessRate
+    from intsim.outcomes import EvaluationResult, SuccessRate, SuiteResult
     from intsim.task.rollout import Policy
 
 HELP = "evaluate a policy that cuts what it is told, geometrically and in the solver"
@@ -58,7 +58,10 @@ def add_args(p: Group) -> None:
         "--world", choices=WORLDS, default="table", metavar="NAME", help="table, intsim, or kinematic (no resistance)"
     )
     p.add_argument(
-        "--stiffness", type=number(1, 1e6, "N m/rad"), metavar="K", help="of intsim's joints [N m/rad] (default 1000)"
+        "--stiffness",
+        type=number(1, 1e6, "N m/rad"),
+        metavar="K",
+        help="of intsim's joints [N m/rad] (default: Franka)",
     )
     p.add_argument("--pixels", type=whole(0), default=0, metavar="N", help="of intsim's pictures (default 0: none)")
     add_workers(p, "episodes of intsim")
@@ -193,11 +196,23 @@ def table(result: EvaluationResult) -> str:
         failed = [f"{key} {_cell(c)}" for key, c in found.criteria.items() if c.successes < c.trials]
         if failed:
             lines.append("      fails: " + ", ".join(failed))
+        lines += _splits(found)
         if found.expected_place is not None:
             lines.append(f"      place expected of its error: {found.expected_place:.0%}")
         if found.not_simulated:
-            lines.append(f"      {found.not_simulated} cuts could not be simulated: see evaluate.jsonl")
+            lines.append(f"      {found.not_simulated} cuts were not simulated and count as whole: see evaluate.jsonl")
     return "\n".join(lines)
+
+
+def _splits(found: SuiteResult) -> list[str]:
+    """How the cuts of splits went, a line for each number of pieces, and how even the pieces are."""
+    by_pieces: dict[str, list[str]] = {}
+    for name, rate in (found.steps or {}).items():
+        by_pieces.setdefault(name.partition(",")[0], []).append(f"{rate.rate:.0%}")
+    lines = [f"      {pieces}: cuts in their place {', '.join(rates)}" for pieces, rates in by_pieces.items()]
+    if found.volume_variation is not None:
+        lines.append(f"      volumes of the pieces: standard deviation {found.volume_variation:.1%} of their mean")
+    return lines
 
 
 def _cell(found: SuccessRate | None) -> str:

@@ -14,7 +14,7 @@ from intsim.data.cameras import CAMERA_NAMES
 from intsim.data.dataset_document import DatasetSpec
 from intsim.data.lerobot import FEATURES, episode_columns, export_lerobot, merge_statistics, statistics
 from intsim.data.manifest import Manifest
-from intsim.data.shards import trajectories
+from intsim.data.shards import is_kept, trajectories
 from intsim.task.planner import CONTROL_RATE
 from tests.intsim.data.test_generate import Inline
 from tests.intsim.painter import PIXELS, Here, Painter, paint_with
@@ -45,10 +45,12 @@ def test_the_columns_are_what_was_stored(stored, painted):
     out, info = painted
     table = pq.read_table(out / "data/chunk-000/file-000.parquet").to_pydict()
     assert info == json.loads((out / "meta/info.json").read_text())
-    assert info["total_episodes"] == 6 and info["total_frames"] == len(table["index"])
+    told = [len(one.entry["instructions"]) for one in trajectories(stored)]
+    assert min(told) >= 5 and info["total_episodes"] == 2 * sum(told) and info["total_frames"] == len(table["index"])
     assert table["index"] == list(range(info["total_frames"]))
     first = 0
-    for place, one in enumerate([*trajectories_of(stored), *trajectories_of(stored)]):
+    every = [one for one, times in zip(trajectories_of(stored), told, strict=True) for _ in range(times)]
+    for place, one in enumerate([*every, *every]):
         n = len(one["timestamp"])
         for name, values in one.items():
             assert np.array_equal(np.array(table[name][first : first + n]), values), name
@@ -82,11 +84,12 @@ def test_pictures_are_found_by_their_time(painted):
         key = f"observation.images.{view}"
         with av.open(str(out / f"videos/{key}/chunk-000/file-000.mp4")) as file:
             frames = [(float(f.time), f.to_ndarray(format="rgb24")) for f in file.decode(video=0)]
-        assert len(frames) == info["total_frames"]
+        seen = {e[f"videos/{key}/from_timestamp"]: e["length"] for e in episodes}
+        assert len(frames) == sum(seen.values()) < info["total_frames"] / 4, "a video for all sentences"
         assert np.allclose([t for t, _ in frames], np.arange(len(frames)) / CONTROL_RATE, atol=1e-4)
         for e in episodes:
             begin = round(e[f"videos/{key}/from_timestamp"] * CONTROL_RATE)
-            scene = 0 if e["episode_index"] < 3 else 2
+            scene = 0 if e["episode_index"] < len(episodes) / 2 else 2
             for k in (0, e["length"] - 1):
                 assert frames[begin + k][1].mean() == pytest.approx((10 * k + 40 * scene) % 256, abs=3)
 
@@ -101,17 +104,22 @@ def test_force_is_nothing_that_a_policy_learns_from(painted):
 
 
 def test_tasks_are_looked_up_by_their_row(painted):
-    """Row n of tasks.parquet is task n, the sentence its index; an episode of another background has another
-    sentence."""
+    """Row n of tasks.parquet is task n, the sentence its index; a trajectory is there in all of its sentences before
+    each background, and begins with another one."""
     out, info = painted
     tasks = pq.read_table(out / "meta/tasks.parquet")
     frame = tasks.to_pandas()
     assert frame["task_index"].tolist() == list(range(info["total_tasks"]))
     episodes = pq.read_table(out / "meta/episodes/chunk-000/file-000.parquet").to_pylist()
     assert {e["tasks"][0] for e in episodes} == set(frame.index)
-    assert episodes[0]["tasks"] != episodes[3]["tasks"]
     side = pq.read_table(out / "meta/culinary.parquet").to_pylist()
-    assert [s["scene"] for s in side] == [0, 0, 0, 2, 2, 2] and len(side[0]["instructions"]) >= 5
+    half = len(episodes) // 2
+    assert episodes[0]["tasks"] != episodes[half]["tasks"]
+    assert [s["scene"] for s in side] == [0] * half + [2] * half
+    for scene in (0, 2):
+        for index in range(3):
+            own = [k for k, s in enumerate(side) if (s["scene"], s["index"]) == (scene, index)]
+            assert sorted(episodes[k]["tasks"][0] for k in own) == sorted(side[own[0]]["instructions"])
 
 
 def test_without_pictures_there_are_no_videos(stored, tmp_path):
@@ -139,3 +147,31 @@ def test_a_wrong_scene_or_a_taken_folder_is_an_error(stored, tmp_path):
     with pytest.raises(OutputError, match="never overwritten"):
         export_lerobot(stored, tmp_path / "full")
     assert not (tmp_path / "x").exists()
+
+
+def test_actions_are_the_environments(stored, painted):
+    """A commanded change of 0.1 m is 1, as ``pd_ee_delta_pose`` has it."""
+    out, _ = painted
+    table = pq.read_table(out / "data/chunk-000/file-000.parquet").to_pydict()
+    for one in trajectories(stored):
+        first = one.group["control/delta"][()]
+        break
+    found = np.array(table["action"][: len(first)])
+    assert found[:, :3] == pytest.approx(first[:, :3] / 0.1, abs=1e-6) and found[:, 5] == pytest.approx(
+        -first[:, 5] / 0.1
+    )
+    assert np.array_equal(found[:, 6], first[:, 6]) and np.abs(first[:, :3]).max() > 0
+
+
+def test_failed_demonstrations_stay_out_where_they_are_not_wanted(stored, tmp_path):
+    """Those in pieces alone, or by the published criteria too, or all; none that is kept is one line."""
+    entries = [one.entry for one in trajectories(stored)]
+    one = {"status": "done", "published": True, "severed": False}
+    assert [is_kept(one, keep) for keep in ("severed", "published", "all")] == [False, True, True]
+    broken = {**one, "severed": True, "status": "stopped"}
+    assert [is_kept(broken, keep) for keep in ("severed", "published", "all")] == [False, False, True]
+    info = export_lerobot(stored, tmp_path / "kept", keep="severed")
+    wanted = [e for e in entries if is_kept(e, "severed")]
+    assert info["total_episodes"] == sum(len(e["instructions"]) for e in wanted)
+    with pytest.raises(OutputError, match="none of"):
+        export_lerobot(stored, tmp_path / "x", keep="good")

@@ -24,11 +24,16 @@ Image = pytest.importorskip("PIL.Image", reason="the extra [data] is not install
 
 @pytest.fixture
 def exported(tmp_path, monkeypatch):
-    """Made-up trajectories of two foods before two backgrounds."""
+    """Made-up trajectories of two foods before two backgrounds, the hand closed throughout as it is in real ones."""
     monkeypatch.setattr(g, "require_simulator", lambda: None)
     g.generate(
         DatasetSpec(Manifest(trajectories=10, foods=("plum", "kiwi"), suites=("flips",))), tmp_path / "set", Inline()
     )
+    for path in (tmp_path / "set").glob("*.h5"):
+        with h5py.File(path, "r+") as file:
+            for group in file.values():
+                group["obs/agent/qpos"][:, 7:] = 0.0
+                group["actions"][:, 7] = -1.0
     paint_with(Painter, monkeypatch)
     tasks = export_rdt(tmp_path / "set", tmp_path / "rdt", backgrounds=[0, 2], pixels=PIXELS, pool=Here())
     return tmp_path / "set", tmp_path / "rdt", tasks
@@ -71,6 +76,24 @@ def test_ranges_are_those_of_all_trajectories_and_of_the_gripper(exported):
     assert found["action_max"][:7] == pytest.approx(actions.max(axis=0)[:7])
     assert (found["state_max"] > found["state_min"]).all() and (found["action_max"] > found["action_min"]).all()
     assert found["action_min"][7] == -1 and found["state_max"][7] == 0.04
+
+
+def test_the_loaders_own_scaling_has_no_gap(exported):
+    """RDT's loader takes least and largest of all rows of its own (nine joints, eight actions) and scales to -1 to 1:
+    finite everywhere, the gripper closed after the first row of each trajectory."""
+    _, out, tasks = exported
+    states, actions = [], []
+    for name in tasks:
+        with h5py.File(out / name / "motionplanning" / f"{name}.h5") as file:
+            states += [file[key]["obs"]["agent"]["qpos"][:] for key in file]
+            actions += [file[key]["actions"][:] for key in file]
+    for kind, rows in (("state", states), ("action", actions)):
+        low, high = (np.concatenate(rows).min(axis=0), np.concatenate(rows).max(axis=0))
+        scaled = [(one - low) / (high - low) * 2 - 1 for one in rows]
+        assert all(np.isfinite(one).all() for one in scaled)
+        assert all(one[0, 7] == 1 and (one[1:, 7] == -1).all() for one in scaled)
+        found = json.loads((out / STATISTICS_FILE).read_text())
+        assert found[f"{kind}_min"] == pytest.approx(low[:8]) and found[f"{kind}_max"] == pytest.approx(high[:8])
 
 
 def test_a_task_is_one_cut_in_all_its_words(exported):

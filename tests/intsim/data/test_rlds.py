@@ -101,6 +101,8 @@ def test_records_hold_what_was_stored(exported):
         assert found["steps/is_first"].tolist() == [1] + [0] * (n - 1)
         assert found["steps/is_last"].tolist() == found["steps/is_terminal"].tolist() == [0] * (n - 1) + [1]
         assert found["steps/reward"].sum() == 1 and len(set(found["steps/language_instruction"])) == 1
+        told = {found[name][0] for name in found if name.startswith("steps/language_instruction")}
+        assert len(told) == 5 and found["steps/language_instruction"][0] in told
         assert len(found["steps/observation/wrist_image"]) == n
         picture = np.array(Image.open(io.BytesIO(found["steps/observation/image"][3])))
         assert picture.shape == (PIXELS, PIXELS, 3)

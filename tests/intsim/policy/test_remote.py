@@ -18,6 +18,7 @@ from intsim.policy.oracles import Oracle
 from intsim.policy.remote import Remote, decode_png, encode_png
 from intsim.policy.server import Server
 from intsim.policy.vla_adapters import RDT, Octo, OpenVLA
+from intsim.task.gym_action import from_gym_action
 from mpm.scene.errors import CutcalError
 
 pytest.importorskip("PIL.Image", reason="the extra [data] is not installed")
@@ -25,6 +26,8 @@ pytest.importorskip("PIL.Image", reason="the extra [data] is not installed")
 POSE = np.array([0.1, 0.2, 0.3, 0.4, 0.0])
 JOINTS = np.arange(9) / 10
 SEEN = {name: np.full((8, 8, 3), shade, np.uint8) for name, shade in (("front", 10), ("wrist", 200))}
+RAMP = np.broadcast_to(np.arange(0, 200, 2, dtype=np.uint8)[:, None], (100, 100, 3)).copy()
+"""A picture 100 wide, brighter by 2 a pixel from left to right."""
 OBS = {"pose": POSE, "joints": JOINTS, "items": (), "images": SEEN}
 
 
@@ -208,7 +211,7 @@ def packages(monkeypatch):
         return call
 
     inputs = SimpleNamespace(to=lambda device, dtype: {"pixels": 1})
-    network = SimpleNamespace(predict_action=called("predict", np.arange(7.0)))
+    network = SimpleNamespace(predict_action=called("predict", np.arange(7.0)), norm_stats={"cutcal": {}, "bridge": {}})
     module("torch", bfloat16="bf16", float32="f32", manual_seed=called("seed"), tensor=lambda v, dtype: Tensor(v))
     module(
         "transformers",
@@ -239,13 +242,69 @@ def packages(monkeypatch):
 
 
 def test_openvla_is_asked_in_its_own_words(packages, served):
-    """Its prompt in small letters, the name of its statistics, one action; through the protocol too."""
+    """Its prompt in small letters, the name of its statistics, the middle of the picture in its size; its action is the
+    environment's, a tenth of a metre for 1. Through the protocol too."""
     policy = Remote(served(OpenVLA("weights", "cutcal")))
     policy.reset(0)
-    assert policy.act(OBS, "Cut the Plum").tolist() == list(range(7))
+    found = policy.act({**OBS, "images": {"front": RAMP}}, "Cut the Plum")
+    assert found == pytest.approx(from_gym_action(np.arange(7.0), POSE[3])) and found[1] == pytest.approx(0.1)
     asked = dict((name, (args, how)) for name, args, how in packages.calls)
-    assert asked["processor"][0][0] == "In: What action should the robot take to cut the plum?\nOut:"
+    prompt, picture = asked["processor"][0]
+    assert prompt == "In: What action should the robot take to cut the plum?\nOut:"
     assert asked["predict"][1] == {"pixels": 1, "unnorm_key": "cutcal", "do_sample": False}
+    shown = np.array(picture)[0, :, 0].astype(float)
+    assert shown.shape == (100,) and (shown[0], shown[-1]) == pytest.approx((6.0, 193.0), abs=1.5)
+
+
+def test_openvla_has_the_statistics_of_its_fine_tuning(packages, tmp_path):
+    """Those beside the weights, or of a file; the only key without one; a key that is none is one line."""
+    (tmp_path / "dataset_statistics.json").write_text(json.dumps({"own": {"action": {}}}))
+    beside = OpenVLA(str(tmp_path), "")
+    assert beside.key == "own" and list(beside.network.norm_stats) == ["own"]
+    other = tmp_path / "other.json"
+    other.write_text(json.dumps({"a": {}, "b": {}}))
+    assert OpenVLA("weights", "b", statistics=str(other)).key == "b"
+    for key in ("", "cutcal"):
+        with pytest.raises(CutcalError, match="its statistics are of a, b"):
+            OpenVLA("weights", key, statistics=str(other))
+    with pytest.raises(CutcalError, match="cannot be read"):
+        OpenVLA("weights", "b", statistics=str(tmp_path / "none.json"))
+
+
+class Watching:
+    """Four actions at a time, and a memory of two pictures."""
+
+    name, action, cameras, history = "watching", "pose", ("front",), 2
+
+    def __init__(self) -> None:
+        self.seen: list[int] = []
+        self.asked: list[list[int]] = []
+
+    def reset(self, seed, instruction):
+        """Forget."""
+        self.seen = []
+
+    def see(self, images):
+        """Another picture."""
+        self.seen.append(int(images["front"][0, 0, 0]))
+
+    def act(self, instruction, pose, joints, images):
+        """What was seen so far."""
+        self.see(images)
+        self.asked.append(self.seen[-2:])
+        return np.zeros((4, 7))
+
+
+def test_a_policy_with_a_memory_is_sent_the_picture_of_the_step_before(served):
+    """Of ten steps it is asked in three: each time it has this step's picture and that of the step before, not of the
+    last question; nothing of the last episode."""
+    model = Watching()
+    policy = Remote(served(model))
+    for _ in range(2):
+        policy.reset(0)
+        for step in range(9):
+            policy.act({**OBS, "images": {"front": np.full((4, 4, 3), step, np.uint8)}}, "cut")
+    assert model.asked == 2 * [[0], [3, 4], [7, 8]]
 
 
 def test_octo_remembers_a_picture(packages):
@@ -254,7 +313,8 @@ def test_octo_remembers_a_picture(packages):
     model = Octo("weights", "cutcal")
     model.reset(3, "cut the plum")
     for _ in range(2):
-        assert model.act("cut the plum", POSE, JOINTS, SEEN).shape == (4, 7)
+        found = model.act("cut the plum", POSE, JOINTS, SEEN)
+        assert found == pytest.approx(from_gym_action(np.arange(28.0).reshape(4, 7), POSE[3]))
     first, second = [(args[0], how) for name, args, how in packages.calls if name == "sample"]
     assert first[0]["image_primary"].shape == (1, 2, 256, 256, 3) and first[0]["image_wrist"].shape == (
         1,
@@ -266,7 +326,9 @@ def test_octo_remembers_a_picture(packages):
     assert [g["timestep_pad_mask"].tolist() for g in (first[0], second[0])] == [[[False, True]], [[True, True]]]
     assert first[1]["rng"] != second[1]["rng"] and first[1]["unnormalization_statistics"] == {"mean": 0}
     model.reset(3, "cut the plum")
-    assert len(model.seen) == 0
+    assert len(model.seen) == 0 and model.history == 2
+    model.see(SEEN)
+    assert len(model.seen) == 1
 
 
 def test_rdt_gives_joint_targets(packages, tmp_path):
@@ -283,6 +345,10 @@ def test_rdt_gives_joint_targets(packages, tmp_path):
     (state, shown, words), _ = next((args, how) for name, args, how in packages.calls if name == "step")
     assert state.numpy().shape == (1, 8) and words == "words"
     assert [one is None for one in shown] == [True, True, True, False, True, True]
+    model.see(SEEN)
+    model.act("cut the plum", POSE, JOINTS, SEEN)
+    (_, shown, _), _ = [(args, how) for name, args, how in packages.calls if name == "step"][-1]
+    assert [one is None for one in shown] == [False, True, True, False, True, True] and model.history == 2
     with pytest.raises(ValueError, match="--world intsim"):
         model.act("cut", POSE, None, SEEN)
 

@@ -11,12 +11,15 @@ from calib.material.food import load_food
 from intsim.sim.coupling import MAX_CELLS, READY_CLEARANCE, Coupling
 from intsim.sim.severing import MIN_CELLS, cut_scene_at
 from intsim.task.planner import BladeDescent, plan_cut
-from intsim.task.targets import Item
+from intsim.task.targets import CutSpec, Item, target
 from mpm.live import LiveCut
+from mpm.scene.outline import ACROSS, ALONG, Outline, Sections, places
 from mpm.scene.shapes import Shape
 
 FOODS = {"strawberry": load_food("strawberry")}
 BERRY = Item("strawberry", Shape("ellipsoid", 0.04, 0.032, 0.032), x=0.03, y=-0.02, yaw=1.2)
+GRAPES = {"grape": load_food("grape")}
+GRAPE = Item("grape", Shape("ellipsoid", 0.022, 0.02, 0.02))
 STIFF, LAG, SPAN = 1754.0, 0.1, 0.01
 
 
@@ -184,6 +187,45 @@ def test_a_rock_off_the_foods_middle_is_the_same_cut():
         found.append(np.max(rows, axis=0))
         assert coupling.severed
     assert found[1] == pytest.approx(found[0], rel=0.03)
+
+
+def cap(low: float, high: float) -> Shape:
+    """What lies between two places of the grape, by the closed form of an ellipsoid, lying on the board."""
+    y = low + (places(ALONG) + 1) / 2 * (high - low)
+    radius = np.sqrt(np.maximum(1 - (2 * y / GRAPE.shape.length) ** 2, 0.0))
+    most, across = radius.max(), np.sqrt(1 - places(ACROSS) ** 2)
+    rise = np.outer(radius / most, across)
+    table = Sections(-radius / most, radius / most, (1 - rise) / 2, (1 + rise) / 2)
+    outline = Outline("cap", "0" * 64, "closed form", table)
+    return Shape("outline", high - low, most * GRAPE.shape.width, most * GRAPE.shape.height, 0.0, outline)
+
+
+def press(coupling: Coupling, along: float) -> float:
+    """Press the edge straight through the food there and lift it: the largest force."""
+    item, most = coupling.items[0], 0.0
+    for height in [*np.arange(item.shape.height + 0.012, 0, -5e-4), 0.0, 0.0, 0.04]:
+        pose = np.array([*item.at(along), height, item.yaw - np.pi / 2, 0.0])
+        most = max(most, float(coupling.move(pose, 0.0125)[2]))
+    return most
+
+
+@pytest.mark.slow  # each outline is another size of the solver's fields, compiled
+def test_each_cut_of_five_is_that_of_a_food_with_the_piece_s_shape():
+    """A grape in five: five pieces, and each later cut takes the force, to 3 %, of a food whose outline is the closed
+    form of the piece that is left, lying alone on the board; the last differ from the first by more.
+    """
+    coupling, spec, found = Coupling([GRAPE], GRAPES), CutSpec("grape", pieces=5), []
+    for k in range(4):
+        item = coupling.items[0]
+        along = target(spec, item)
+        found.append(press(coupling, along))
+        assert coupling.done[-1].severed and len(coupling.items[0].pieces) == k + 2
+        if k:
+            left = item.pieces[-1]
+            alone = Coupling([Item("grape", cap(left.low, left.high))], GRAPES)
+            want = press(alone, along - left.shift - (left.low + left.high) / 2)
+            assert alone.severed and found[-1] == pytest.approx(want, rel=0.03)
+    assert max(found) > 1.2 * min(found) and coupling.severed
 
 
 def test_its_mesh_lies_on_the_table():
