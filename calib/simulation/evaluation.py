@@ -45,7 +45,7 @@ def doubts_of_the_crack(scene: Scene) -> list[str]:
         (docs/theory.md, "Constants of the method").
     """
     material = scene.food.material
-    used, cell = quantity(scene.tie_strength, "Pa"), quantity(scene.numerics.dx, "m")
+    used, cell = quantity(scene.tie_strength, "Pa"), f"{scene.numerics.dx * 1e3:.3g} mm"
     out = []
     if scene.weakened:
         out.append(

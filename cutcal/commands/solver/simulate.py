@@ -113,7 +113,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
         "--mach",
         type=number(0, 0.05, "-"),
         metavar="PART",
-        help="blade speed over the P-wave's (default 0.01 or less)",
+        help="even speed over the P-wave's (default 0.01 or less)",
     )
     p.add_argument(
         "--slice-ratio",
@@ -216,6 +216,7 @@ def _scene(args: argparse.Namespace, food: FoodSpec, shape: Shape) -> Scene:
     motion = replace(
         scene.motion,
         mach=scene.motion.mach if args.mach is None else args.mach,
+        end_speed=scene.motion.end_speed if args.mach is None else 1.0,
         slice_ratio=args.slice_ratio,
         tilt=math.radians(args.tilt),
         retract=args.retract,
