@@ -79,6 +79,8 @@ def test_numerical_choices_are_checked(finished):
         "twice the band of the edge",
         "half the least gap to a surface",
         "twice the least gap to a surface",
+        "half the friction of the board",
+        "twice the friction of the board",
         "half the time step",
         "half the loss factor",
         "twice the loss factor",
