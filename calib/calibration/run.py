@@ -137,10 +137,15 @@ class _Calibration:
         self._begin_longest_check(found.fit)
         return found
 
+    @property
+    def _fitted(self) -> tuple[str, ...]:
+        """Names of what is fitted."""
+        return self.setup.objective.parameters.names
+
     def _begin_longest_check(self, fit: FitResult) -> None:
         """Begin the longest of the last simulations, beside those of the intervals."""
         scene = self.setup.scene(fit.best.evaluation.parameters)
-        for errand in sorted(check_errands(scene, self.store), key=lambda e: e.haste)[:1]:
+        for errand in sorted(check_errands(scene, self.store, self._fitted), key=lambda e: e.haste)[:1]:
             self.pool.begin(errand)
 
     def repeated(self, found: _Found) -> Calibrated:
@@ -150,12 +155,13 @@ class _Calibration:
         scene, ended = setup.scene(best.parameters), fit.status != "interrupted"
         errands = record_errands(scene, path)
         if ended:
-            errands += [*check_errands(scene, self.store), *self._start_errands()]
+            errands += [*check_errands(scene, self.store, self._fitted), *self._start_errands()]
         if errands:
             self.say(f"simulating the best values once more: {'whole, and ' + VARIED if ended else 'whole'}")
             self.pool.errands(self._counted(errands))
         record = read_record(scene, path)
-        checks = check(scene, best, self.store, setup.curve.stroke_length_m) if ended else []
+        way = setup.curve.stroke_length_m
+        checks = check(scene, best, self.store, way, self._fitted) if ended else []
         start = self._start_curve() if ended else np.full_like(setup.curve.stroke, np.nan)
         return Calibrated(setup.sized(best.parameters), fit, found.analysis, record, checks, start, found.posterior)
 

@@ -18,6 +18,7 @@ from calib.io.yaml_checks import Place, check_keys, choice, data_path, mapping, 
 from calib.material.food_file import dump_material
 from calib.material.own_food import OPTIONAL_HERE, filled
 from calib.material.properties import (
+    BOARD_FRICTION,
     DIMENSIONS,
     FORM,
     INCLUSIONS,
@@ -55,7 +56,7 @@ GIVEN_SPREAD = 10.0
 FILES = (".yaml", ".yml")
 """How the name of a food's file ends."""
 _STRENGTHS = ("strength_ratio", "tensile_strength")  # a food has one of them at most
-_OPTIONAL = (*LAYERS, *LAYERS.values(), "skin_stiffness", *RELAXATION, *_STRENGTHS)  # a file may leave these out
+_OPTIONAL = (*LAYERS, *LAYERS.values(), "skin_stiffness", BOARD_FRICTION, *RELAXATION, *_STRENGTHS)  # a file may leave these out
 _NULLABLE = ("R_skin", "fracture_energy", *_OPTIONAL)
 
 
@@ -160,7 +161,8 @@ class FoodSpec:
         """Names of the properties that a calibration fits unless told otherwise."""
         start = ("R_skin", "skin_thickness") if self.properties["skin_thickness"].value > 0.0 else ("R_initiation",)
         strength = tuple(name for name in _STRENGTHS if name in self.properties)
-        return ("E", "yield_stress", *strength, "R", *self.layers, *start, "initiation_depth", "mu")
+        board = (BOARD_FRICTION,) if BOARD_FRICTION in self.properties else ()
+        return ("E", "yield_stress", *strength, "R", *self.layers, *start, "initiation_depth", "mu", *board)
 
     @property
     def layers(self) -> tuple[str, ...]:
@@ -298,7 +300,7 @@ class FoodSpec:
 
         sizes = {"length": length, "width": width, "height": height}
         size: dict[str, Any] = {n: self.dims[n].value if given is None else given for n, given in sizes.items()}
-        values: dict[str, Any] = {n: p.value for n, p in self.properties.items()}
+        values: dict[str, Any] = {n: p.value for n, p in self.properties.items() if n != BOARD_FRICTION}
         if self._lacks_strength:
             del values["fracture_energy"]
         kind, roundness = named(shape or self.shape_kind)

@@ -7,8 +7,8 @@ from collections.abc import Collection, Mapping
 
 from calib.material.properties import MEANINGS, PROPERTIES, Property
 
-OPTIONAL_HERE = ("rho", "E", "nu", "yield_stress", "R", "R_initiation", "initiation_depth", "mu", "loss_factor",
-                 "strength_ratio")  # fmt: skip
+OPTIONAL_HERE = ("rho", "E", "nu", "yield_stress", "R", "R_initiation", "initiation_depth", "mu", "board_friction",
+                 "loss_factor", "strength_ratio")  # fmt: skip
 """Properties that a food's own file may leave out; without skin_thickness it has no skin."""
 OF_ANOTHER = {
     "yield_stress": ("E", 0.1, 0.01, 1.0, "a tenth of E, from a hundredth of it to all"),

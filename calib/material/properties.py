@@ -82,6 +82,7 @@ PROPERTIES: dict[str, Rule] = {
     ),
     "initiation_depth": Rule("m", 1e-4, 0.05, "indentation under the edge at which a cut starts"),
     "mu": Rule("-", 0.0, 2.0, "Coulomb friction of food on blade"),
+    "board_friction": Rule("-", 0.0, 2.0, "Coulomb friction of food on board"),
     "loss_factor": Rule("-", 0.0, 1.0, "mechanical loss factor tan(delta) at the first axial mode"),
     "relaxing_share": Rule(
         "-", 0.0, 0.99, "part of the instantaneous shear stiffness that relaxes, 0 = none; E is then instantaneous",
@@ -98,6 +99,9 @@ PROPERTIES: dict[str, Rule] = {
 
 RELAXATION = ("relaxing_share", "relaxation_time")
 """One branch of a Prony series of the shear stiffness. Only foods of which it is known have the two."""
+
+BOARD_FRICTION = "board_friction"
+"""Friction on the board. It is none of the food's material, but of how it lies there."""
 
 LAYERS = {"rind_thickness": "R_rind", "core_ratio": "R_core"}
 """The size of each layer beside the flesh and its resistance. Only foods whose anatomy has the layer have the two."""

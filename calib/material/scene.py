@@ -10,8 +10,9 @@ import numpy as np
 
 from calib.material.food import FoodSpec
 from calib.material.form import open_shape
+from calib.material.properties import BOARD_FRICTION
 from calib.trace.conditioning import Conditioned
-from mpm.scene import EdgeLaw, Knife, Motion, Numerics, Scene
+from mpm.scene import Board, EdgeLaw, Knife, Motion, Numerics, Scene
 from mpm.scene.outline import Outline
 from mpm.scene.profiles import spread
 from mpm.scene.shapes import OUTLINE, Shape, span
@@ -212,7 +213,7 @@ def height_range(food: FoodSpec, trace: Conditioned, sizing: Sizing) -> tuple[fl
 def of_specimen(
     scene: Scene, values: Mapping[str, float], kept: Collection[str] = ()
 ) -> tuple[Scene, dict[str, float]]:
-    """The scene at a fitted height and roundness, and the values that are left: those of the material.
+    """The scene at a fitted height, roundness and friction of the board, and the values left: those of the material.
 
     The cell grows with the height, so that every height has the same particles and nodes: on a fixed cell each height
     would draw other particles, and the force would jump by several per cent from one to the next. The stroke ends at
@@ -220,13 +221,16 @@ def of_specimen(
 
     Args:
         scene: The scene with any height.
-        values: Fitted values by name, ``height`` [m] and ``roundness`` [-] among them or not.
+        values: Fitted values by name, ``height`` [m], ``roundness`` [-] and ``board_friction`` [-] among them or not.
         kept: Which of ``width`` and ``length`` do not grow with the height, because they were measured.
 
     Returns:
-        The scene, and the values without both.
+        The scene, and the values without these.
     """
     rest = dict(values)
+    friction = rest.pop(BOARD_FRICTION, None)
+    if friction is not None:
+        scene = replace(scene, board=Board(friction))
     roundness = rest.pop("roundness", None)
     if roundness is not None:
         scene = replace(scene, food=replace(scene.food, shape=replace(scene.food.shape, roundness=roundness)))
@@ -339,11 +343,12 @@ def cut_scene(
     thick = mach < MACH
     if coarse:
         cell, mach = cell / CELL_PER_ZONE, 2 * mach
-    filled = food.to_scene_food()
+    filled, friction = food.to_scene_food(), food.value(BOARD_FRICTION)
     motion = stroke if isinstance(stroke, Motion) else Motion(stroke or shape.height)
     return Scene(
         food=type(filled)(shape, filled.material),
         knife=knife,
+        board=Board() if friction is None else Board(friction),
         motion=replace(
             motion, stroke=min(motion.stroke, shape.height), mach=mach, end_speed=END_SPEED if thick else 1.0
         ),

@@ -90,7 +90,7 @@ def fitted_cuts(specimens: Specimens, fit: JointFit, out: Path) -> dict[str, Fit
     """
     store, setups = specimens.store, specimens.setups
     scenes = {name: setups[name].scene(fit.values(name)) for name in fit.names}
-    errands = [errand for scene in scenes.values() for errand in check_errands(scene, store)]
+    errands = [e for name, scene in scenes.items() for e in check_errands(scene, store, fit.values(name))]
     errands += [e for name, scene in scenes.items() for e in record_errands(scene, out / f"record-{name}.h5")]
     if errands:
         specimens.say(f"simulating the best values of {', '.join(fit.names)} once more: whole, and {VARIED}")
@@ -98,6 +98,6 @@ def fitted_cuts(specimens: Specimens, fit: JointFit, out: Path) -> dict[str, Fit
     cuts = {}
     for name, scene in scenes.items():
         setup, run, values = setups[name], fit.run(name), fit.values(name)
-        checks = check(scene, run.evaluation, store, setup.curve.stroke_length_m)
+        checks = check(scene, run.evaluation, store, setup.curve.stroke_length_m, values)
         cuts[name] = FittedCut(setup, run, values, scene, fit.band(name), checks)
     return cuts

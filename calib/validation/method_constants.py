@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 from mpm.scene import Scene
@@ -105,7 +105,8 @@ CONSTANTS = (
     ),
     MethodConstant(
         "friction of the board", "board", "board_friction", (0.5, 2.0),
-        "assumed: wet food on a board; the halves slide on it as a thick blade parts them", field="mu",
+        "a food's (materials.yaml), where it is not fitted; the halves slide on it as a thick blade parts them",
+        field="mu",
     ),
     MethodConstant(
         "time step", "numerics", "safety", (0.5,), "numerical: part of the stability limit",
@@ -126,11 +127,12 @@ def aside(scene: Scene) -> Scene:
     return replace(scene, numerics=replace(scene.numerics, grid_shift=(x, y + 0.5, z)))
 
 
-def varied(scene: Scene) -> Mapping[str, Scene]:
+def varied(scene: Scene, fitted: Collection[str] = ()) -> Mapping[str, Scene]:
     """A scene with each constant of the method halved and doubled where that can be, by what was changed.
 
     Args:
         scene: A scene.
+        fitted: Names of what the trace was asked for: whatever is fitted has an interval, and is no constant.
 
     Returns:
         Other scenes; what is nothing in the scene (a loss factor of 0) is not varied.
@@ -139,7 +141,7 @@ def varied(scene: Scene) -> Mapping[str, Scene]:
     out = {
         f"{words[factor]} the {constant.name}": constant.varied(scene, factor)
         for constant in CONSTANTS
-        if constant.value(scene) != 0
+        if constant.key not in fitted and constant.value(scene) != 0
         for factor in constant.factors
     }
     return out | {"blade half a cell aside": aside(scene)}

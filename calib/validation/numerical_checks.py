@@ -3,7 +3,7 @@ each constant of the method halved and doubled."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -39,14 +39,14 @@ VARIED = (
 )
 
 
-def variants(scene: Scene) -> dict[str, Scene]:
-    """The scenes that are compared with a scene, by what was changed."""
-    return {name: vary(scene) for name, vary in VARIANTS.items()} | dict(varied(scene))
+def variants(scene: Scene, fitted: Collection[str] = ()) -> dict[str, Scene]:
+    """The scenes that are compared with a scene, by what was changed; what is ``fitted`` is no constant of the method."""
+    return {name: vary(scene) for name, vary in VARIANTS.items()} | dict(varied(scene, fitted))
 
 
-def check_errands(scene: Scene, store: EvaluationStore) -> list[Errand]:
+def check_errands(scene: Scene, store: EvaluationStore, fitted: Collection[str] = ()) -> list[Errand]:
     """The simulations that :func:`check` compares: those of the variants that the store does not know."""
-    others = {_key(other): other for other in variants(scene).values()}
+    others = {_key(other): other for other in variants(scene, fitted).values()}
     return [Errand(other, _keeper(store, key)) for key, other in others.items() if store.get(key) is None]
 
 
@@ -88,7 +88,9 @@ class Check:
         return to_document(self)
 
 
-def check(scene: Scene, own: Evaluation, store: EvaluationStore, stroke: float) -> list[Check]:
+def check(
+    scene: Scene, own: Evaluation, store: EvaluationStore, stroke: float, fitted: Collection[str] = ()
+) -> list[Check]:
     """The variants of a scene against it.
 
     Args:
@@ -96,6 +98,7 @@ def check(scene: Scene, own: Evaluation, store: EvaluationStore, stroke: float) 
         own: Its simulation.
         store: Where :func:`check_errands` were kept.
         stroke: What the trace has of the stroke [m].
+        fitted: Names of what was fitted.
 
     Returns:
         A check for each variant.
@@ -104,7 +107,7 @@ def check(scene: Scene, own: Evaluation, store: EvaluationStore, stroke: float) 
         KeyError: They were not made.
     """
     out = []
-    for name, other in variants(scene).items():
+    for name, other in variants(scene, fitted).items():
         run = store.last(_key(other))
         if run.ok and min(own.until(stroke)) > 0:
             peak, work = (new / old - 1 for new, old in zip(run.until(stroke), own.until(stroke), strict=True))

@@ -12,7 +12,7 @@ from calib.errors import OutputError
 from calib.io.provenance import code_key
 from calib.material.food import FoodSpec, load_food
 from calib.material.knife import load_knife
-from calib.material.scene import cut_scene
+from calib.material.scene import cut_scene, of_specimen
 from calib.problem.food_parameters import fit_parameters
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore
@@ -78,7 +78,8 @@ def made_up(pair: Pair, store: EvaluationStore, pool: Workers) -> Truth:
     for _ in range(TRIES):
         z = middle + half * TRUTH_PART * (2.0 * random.random(len(middle)) - 1.0)
         values = parameters.to_dict(z)
-        if not fine.with_material(**values).flows_at_its_crack and _run(rough, values, store, pool).completed == 1.0:
+        scene, material = of_specimen(fine, values)
+        if not scene.with_material(**material).flows_at_its_crack and _run(rough, values, store, pool).completed == 1.0:
             run = _run(fine, values, store, pool)
             if run.completed == 1.0 and all(line.passed for line in balances(Conservation.of(run))):
                 return Truth(shape, values, run)
