@@ -83,6 +83,10 @@ def hold_together(s: ti.template(), cut: ti.template()):
 def pull_tie(s: ti.template(), cut, n, dt):
     """One tie after the particles have moved: what the edge has cut of it, its pull, and what is left of it to cut.
 
+    A tie does not hold through the blade. Where the cut has not started yet, an edge that is withdrawn leaves it whole;
+    else it is cut. Ties that held there would press the faces together on the blade, with forces that depend on how
+    stiff contact and ties are.
+
     The pull is the food's own traction and, for what is missing, a stiff spring on the half opening, as of the contact
     (Nitsche). Its tension, and the shear where there are two halves, is capped together by the envelope of the largest
     half opening so far. It is unloaded along the tie's own stiffness; pressed it is a contact.
@@ -112,12 +116,13 @@ def pull_tie(s: ti.template(), cut, n, dt):
     tip, end = edge_height(s, cut, at[0]), s.par[cut, TIE_OPENING]
     band = s.par[cut, EDGE_BAND]
     above = (at[2] - tip) * s.par[cut, INV_DX]
-    between = False  # the blade
+    between, passed = False, 0.0  # the blade
     if under_blade(s, cut, at[0]) and above * s.par[cut, DX] < s.par[cut, BLADE_HEIGHT]:
+        passed = passed_part(above / band)
         if cut_has_started(s, cut, at[0]):
-            s.cut_part[cut, n] = ti.max(s.cut_part[cut, n], passed_part(above / band))
+            s.cut_part[cut, n] = ti.max(s.cut_part[cut, n], passed)
         between = above > 0
-    left = 1.0 - s.cut_part[cut, n]
+    left = 1.0 - ti.max(s.cut_part[cut, n], passed)
     m = s.par[cut, MASS] * s.volume_ratio[cut, p]
     stiff = s.par[cut, CONTACT] * m
     force = own + skin + stiff * jump
