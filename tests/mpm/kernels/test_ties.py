@@ -17,6 +17,7 @@ from mpm.scene.material import COHESIVE_ZONE, Material
 from mpm.scene.shapes import Shape
 from mpm.setup.setup import Setup
 from mpm.solver import Simulation
+from mpm.state import host_transfer
 from mpm.state.host_transfer import fill
 from mpm.state.tables import TIE_WORK
 from tests.mpm.scenes import FLESH, PRISM, WEDGE, cut
@@ -256,3 +257,23 @@ def test_a_large_loss_factor_makes_no_energy():
     record = cut(replace(ball, edge=EdgeLaw(zone=2e-3), numerics=Numerics(dx=1.5e-3)))
     assert record.viscous[-1] < 0.1 * record.work
     assert abs(record.lost) < 0.1
+
+
+def test_no_tie_holds_through_the_blade_before_the_cut_starts():
+    """A wedge in a food that it only dents has the food on its faces, as one in a cut has."""
+    food = Material(
+        E=1e6, nu=0.36, rho=1000, yield_stress=3e5, R=100.0, R_initiation=600.0, tensile_strength=2e5,
+        initiation_depth=8e-3, mu=0.1,
+    )  # fmt: skip
+    knife = Knife("wedge", 3e-3, 0.2, 0.05, 0.1)
+    block = Food(Shape("block", 0.03, 0.012, 0.02), food)
+    of = Scene(block, knife, Motion(8e-3, 0.02), Board(0.5), EdgeLaw(zone=4e-3), Numerics(dx=3e-3, room=1.0))
+    simulation = Simulation(of, Runtime(threads=1))
+    record = simulation.run()
+    faces, state = simulation.setup.ties()[:, 0], simulation.state
+    x = simulation.setup.to_scene_axes(host_transfer.particles(state, simulation.place).x)[faces]
+    above = x[:, 2] - (block.shape.height - record.stroke[-1])
+    half = np.minimum(above * np.tan(knife.angle / 2), knife.spine / 2)
+    opened = (np.abs(x[:, 1]) - state.tool_gap.to_numpy().ravel()[faces]) / half
+    assert not state.cut_part.to_numpy().any() and (above > 1.5e-3).sum() > 10
+    np.testing.assert_allclose(opened[above > 1.5e-3], 1.0, atol=0.05)
