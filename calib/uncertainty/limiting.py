@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calib.material.properties import BOARD_FRICTION
 from calib.material.scene import FITTED_SIZES
 from calib.problem.objective import Objective
 from calib.uncertainty.intervals import Uncertainty, marginal_information
@@ -22,6 +23,7 @@ SAID = 0.9
 REMEDIES = {
     "roundness": ("shape", "a photograph of the specimen would tell it (--outline)"),
     "height": ("height", "a ruler or a photograph would tell it (--height)"),
+    BOARD_FRICTION: ("friction of the board", "a board that is tilted until the food slides would tell it (--set, and --fit without it)"),
     "width": ("width", "a calliper or a photograph would tell it (--width)"),
     "gain": ("gain of the sensor", "a hung mass would tell it (--gain-sd)"),
 }
@@ -34,7 +36,8 @@ class Limiting:
 
     Attributes:
         name: The parameter whose interval it is.
-        parts: Its width over what it is [-], by what would be known: ``roundness``, ``height``, ``width``, ``gain``.
+        parts: Its width over what it is [-], by what would be known: ``roundness``, ``height``,
+            ``board_friction``, ``width``, ``gain``.
     """
 
     name: str
@@ -74,7 +77,7 @@ def limiting(objective: Objective, found: Uncertainty) -> Limiting | None:
     k = names.index(ANSWER)
     parts: dict[str, float] = {
         name: float(np.sqrt(max(1.0 - found.correlation[k, names.index(name)] ** 2, 0.0)))
-        for name in FITTED_SIZES
+        for name in (*FITTED_SIZES, BOARD_FRICTION)
         if name in names
     }
     prior = objective.parameters.prior_jacobian()
