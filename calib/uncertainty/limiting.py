@@ -23,7 +23,10 @@ SAID = 0.9
 REMEDIES = {
     "roundness": ("shape", "a photograph of the specimen would tell it (--outline)"),
     "height": ("height", "a ruler or a photograph would tell it (--height)"),
-    BOARD_FRICTION: ("friction of the board", "a board that is tilted until the food slides would tell it (--set, and --fit without it)"),
+    BOARD_FRICTION: (
+        "friction of the board",
+        "a board tilted until the food slides would tell it (--set; --fit without it)",
+    ),
     "width": ("width", "a calliper or a photograph would tell it (--width)"),
     "gain": ("gain of the sensor", "a hung mass would tell it (--gain-sd)"),
 }

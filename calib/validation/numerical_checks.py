@@ -40,7 +40,7 @@ VARIED = (
 
 
 def variants(scene: Scene, fitted: Collection[str] = ()) -> dict[str, Scene]:
-    """The scenes that are compared with a scene, by what was changed; what is ``fitted`` is no constant of the method."""
+    """The scenes that are compared with a scene, by what was changed; what is ``fitted`` is no constant."""
     return {name: vary(scene) for name, vary in VARIANTS.items()} | dict(varied(scene, fitted))
 
 
