@@ -25,7 +25,7 @@ REMEDIES = {
     "height": ("height", "a ruler or a photograph would tell it (--height)"),
     BOARD_FRICTION: (
         "friction of the board",
-        "a board tilted until the food slides would tell it (--set; --fit without it)",
+        "a tilted board would tell it (--set; --fit without it)",
     ),
     "width": ("width", "a calliper or a photograph would tell it (--width)"),
     "gain": ("gain of the sensor", "a hung mass would tell it (--gain-sd)"),
