@@ -41,8 +41,11 @@ STARTS = 0.7
 """Part of the largest force of the first third at which the cut has started in what is begun with [-]."""
 
 
-def layer_guess(scene: Scene, parameters: ParameterSet, stroke: FloatArray, curve: FloatArray) -> FloatArray | None:
-    """A start for the fitted parameters of a food with layers.
+def layer_guesses(
+    scene: Scene, parameters: ParameterSet, stroke: FloatArray, curve: FloatArray
+) -> tuple[FloatArray, ...]:
+    """Starts for the fitted parameters of a food with layers: a soft food whose skin gives way soon, and a food of the
+    usual stiffness that gives way under the edge up to the largest force of the first third of the stroke.
 
     Args:
         scene: The cut with the food's values.
@@ -51,12 +54,12 @@ def layer_guess(scene: Scene, parameters: ParameterSet, stroke: FloatArray, curv
         curve: Its force [N], shape (n,).
 
     Returns:
-        Internal coordinates (p,), those of the food's values where the trace says nothing; None where no layer
+        Internal coordinates, each (p,), those of the food's values where the trace says nothing; none where no layer
         is fitted.
     """
     fitted = [size for size in LAYERS if size in parameters.names and LAYERS[size] in parameters.names]
     if not fitted or "R" not in parameters.names or not all(is_shared(name) for name in parameters.names):
-        return None
+        return ()
     food, shape, start = scene.food.material, scene.food.shape, _first_load(stroke, curve)
     used = stroke > start
     best, found = np.inf, {}
@@ -73,7 +76,14 @@ def layer_guess(scene: Scene, parameters: ParameterSet, stroke: FloatArray, curv
     found |= {"E": LINE_DENT * outer / max(found["dent"], start / 2)}
     if "mu" in parameters.names:
         found["mu"] = FRICTION_PART * parameters["mu"].value
-    return _vector(parameters, found)
+    soft = _vector(parameters, found)
+    reached = float(stroke[int(np.argmax(curve[: max(len(curve) // 3, 2)]))])
+    height, chords = _chords(shape, food)
+    chord = max(float(np.interp(reached, height, chords.sum(axis=0))), chords.max() / POINTS[1])
+    line = EDGE_PART * float(np.interp(reached, stroke, curve)) / chord
+    stiff = found | {"initiation_depth": reached, "R_skin": max(line, outer), "R_initiation": max(line, outer)}
+    del stiff["E"]
+    return soft, _vector(parameters, stiff)
 
 
 def _tried(parameters: ParameterSet, size: str) -> FloatArray:

@@ -22,7 +22,7 @@ from calib.material.scene import (
     with_other_particles,
 )
 from calib.problem.food_parameters import Heights, fit_parameters, size_relative_sd
-from calib.problem.layer_guess import layer_guess
+from calib.problem.layer_guess import layer_guesses
 from calib.problem.nuisance import Sensor, nuisances, sensor_of
 from calib.problem.numerical_uncertainty import numerical_uncertainty
 from calib.problem.objective import Objective
@@ -223,14 +223,13 @@ def _objective(
     u_num = 0.0 if request.u_num is None else numerical_uncertainty(request.u_num, food.name, scene, curve)
     target = Target(curve.stroke, curve.curve, curve.curve_noise_sd_N, curve.peak_sd_N, filter_simulated, u_num)
     parameters = fit_parameters(food, _names(request, heights), heights)
-    guess = layer_guess(scene, parameters, curve.stroke, curve.curve)
     return Objective(
         target,
         parameters,
         request.errors,
         nuisances(curve, sensor, width_sd=width_sd, scaled=request.scaled),
         scale_sd=math.hypot(width_sd, sensor.gain_sd) if request.scaled else 0.0,
-        guesses=() if guess is None else (guess,),
+        guesses=layer_guesses(scene, parameters, curve.stroke, curve.curve),
     )
 
 

@@ -45,7 +45,16 @@ def variants(scene: Scene, fitted: Collection[str] = ()) -> dict[str, Scene]:
 
 
 def check_errands(scene: Scene, store: EvaluationStore, fitted: Collection[str] = ()) -> list[Errand]:
-    """The simulations that :func:`check` compares: those of the variants that the store does not know."""
+    """The simulations that :func:`check` compares: those of the variants that the store does not know.
+
+    Args:
+        scene: The scene with its calibrated material.
+        store: Where simulations are kept.
+        fitted: Names of what was fitted.
+
+    Returns:
+        The simulations to make.
+    """
     others = {_key(other): other for other in variants(scene, fitted).values()}
     return [Errand(other, _keeper(store, key)) for key, other in others.items() if store.get(key) is None]
 

@@ -24,7 +24,7 @@ from calib.io.progress import Countdown
 from calib.io.provenance import code_key, git_commit, key_of
 from calib.io.schema import tag
 from calib.material.food import FoodSpec
-from calib.material.scene import Sizing, cut_scene, specimen
+from calib.material.scene import Sizing, cut_scene, of_specimen, specimen
 from calib.problem.food_parameters import fit_parameters
 from calib.problem.parameters import ParameterSet
 from calib.simulation.evaluation import FULLY_PARTED, Evaluation
@@ -236,7 +236,7 @@ def evaluate(
         say(f"{len(found)} of {len(places)} runs are known already")
     rest = Countdown(sum(plans[i].cost for i, _ in new))
     if new:
-        for done in pool.run([(plans[i].scene, plans[i].candidates[k]) for i, k in new]):
+        for done in pool.run([of_specimen(plans[i].scene, plans[i].candidates[k]) for i, k in new]):
             place = new[done.index]
             store.append(keys[place], done, "coarse")
             found[place] = done

@@ -85,7 +85,14 @@ def test_kachru_is_what_the_abstract_says():
     assert (nendran.fullness, dwarf.fullness) == pytest.approx((1.337, 1.779), abs=1e-3)
     assert nendran.uniform_fullness == pytest.approx(4 / math.pi)
     assert (published.fit, published.limit) == (("R", "mu"), 0.2)
-    assert published.vary == ("E", "yield_stress", "strength_ratio", "R_initiation", "initiation_depth")
+    assert published.vary == (
+        "E",
+        "yield_stress",
+        "strength_ratio",
+        "R_initiation",
+        "initiation_depth",
+        "board_friction",
+    )
     assert published.food.value("skin_thickness") == 0
 
 
@@ -94,7 +101,7 @@ def test_other_roles():
     published = load_published(KACHRU)
     other = published.fitting(("R", "R_initiation"))
     assert other.fit == ("R", "R_initiation")
-    assert set(other.vary) == {"E", "yield_stress", "strength_ratio", "initiation_depth", "mu"}
+    assert set(other.vary) == {"E", "yield_stress", "strength_ratio", "initiation_depth", "mu", "board_friction"}
     assert len(published.all_given().given) == 4
     assert not any(cut.predicted for cut in published.all_given().cuts)
     with pytest.raises(PublishedError, match="fit at most 2"):
