@@ -70,7 +70,7 @@ def test_halves_that_tip_stay_on_the_grid():
     their ends rise by 9 mm."""
     fruit = Material(
         E=2.6e5, nu=0.35, rho=960, yield_stress=1.7e4, R=370, R_initiation=525, R_skin=434, skin_thickness=2.5e-3,
-        initiation_depth=1.6e-3, mu=0.18,
+        initiation_depth=1.6e-3, mu=0.3,
     )  # fmt: skip
     shape = Shape("cylinder", 0.132, 0.033, 0.033)
     blade = Knife("flat", 2e-3, np.deg2rad(2.55), 0.045, 0.2)

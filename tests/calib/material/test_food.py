@@ -204,8 +204,9 @@ def test_default_fit_follows_the_skin(foods: dict[str, FoodSpec]) -> None:
         "skin_thickness",
         "initiation_depth",
         "mu",
+        "board_friction",
     )
-    start = ("R_initiation", "initiation_depth", "mu")
+    start = ("R_initiation", "initiation_depth", "mu", "board_friction")
     assert foods["potato"].default_fit == ("E", "yield_stress", "strength_ratio", "R", *start)
 
 

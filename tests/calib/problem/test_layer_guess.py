@@ -11,7 +11,7 @@ from calib.material.food import load_food
 from calib.material.knife import load_knife
 from calib.material.scene import cut_scene
 from calib.problem.food_parameters import fit_parameters
-from calib.problem.layer_guess import EDGE_PART, _chords, layer_guess
+from calib.problem.layer_guess import EDGE_PART, _chords, layer_guesses
 from calib.problem.request import Request
 from calib.problem.setup import set_up
 from mpm.scene.shapes import Shape
@@ -38,8 +38,7 @@ def test_the_layers_of_a_made_up_force_are_found() -> None:
     """Two peaks, a dip and a fall tell the three resistances to a quarter and the sizes to a step of what is tried."""
     names = ("E", "R", "R_rind", "rind_thickness", "R_core", "core_ratio", "R_skin", "initiation_depth", "mu")
     parameters = fit_parameters(CUCUMBER, names)
-    guess = layer_guess(SCENE, parameters, *made())
-    assert guess is not None
+    guess, _ = layer_guesses(SCENE, parameters, *made())
     found = parameters.to_dict(guess)
     for name in ("R", "R_rind", "rind_thickness", "core_ratio"):
         assert found[name] == pytest.approx(TRUE[name], rel=0.25), name
@@ -48,10 +47,25 @@ def test_the_layers_of_a_made_up_force_are_found() -> None:
     assert 0 < found["mu"] < CUCUMBER.properties["mu"].value
 
 
+def test_a_peak_at_the_start_may_be_a_dent_of_stiff_food() -> None:
+    """The other start has the food's usual stiffness, and a cut that starts where the first force is largest, by the
+    chord of a circle there and no easier than through the rind."""
+    names = ("E", "R", "R_rind", "rind_thickness", "R_core", "core_ratio", "R_skin", "initiation_depth")
+    parameters = fit_parameters(CUCUMBER, names)
+    stroke = np.linspace(0.0, HEIGHT, 240)
+    force = np.where(stroke < 11e-3, 50.0 * (stroke / 11e-3) ** 2, 12.0)
+    _, guess = layer_guesses(SCENE, parameters, stroke, force)
+    found, top = parameters.to_dict(guess), float(stroke[stroke < 11e-3][-1])
+    chord = 2.0 * np.sqrt(top * (HEIGHT - top))
+    assert found["initiation_depth"] == pytest.approx(top)
+    assert found["R_skin"] == pytest.approx(max(EDGE_PART * force.max() / chord, found["R_rind"]), rel=0.02)
+    assert found["E"] == pytest.approx(CUCUMBER.properties["E"].value)
+
+
 @pytest.mark.parametrize("names", [("E", "R", "R_skin"), ("E", "R_rind", "rind_thickness"), ("R", "R_rind")])
 def test_there_is_no_guess_without_layers_to_fit(names: tuple[str, ...]) -> None:
     """A food without layers, or one whose flesh or size of layers is held, begins as it did."""
-    assert layer_guess(SCENE, fit_parameters(CUCUMBER, names), *made()) is None
+    assert layer_guesses(SCENE, fit_parameters(CUCUMBER, names), *made()) == ()
 
 
 def test_a_whole_cucumber_is_through_before_its_stroke_ends() -> None:
@@ -66,7 +80,7 @@ def test_a_whole_cucumber_is_through_before_its_stroke_ends() -> None:
     setup = set_up(request)
     assert setup.curve.stroke_length_m == pytest.approx(0.0425, abs=3e-4) == setup.fine.food.shape.height
     assert any("edge is through" in text for text in setup.curve.warnings)
-    (guess,) = setup.objective.guesses
+    guess, _ = setup.objective.guesses
     found = setup.objective.parameters.to_dict(guess)
     assert found["R_rind"] > 2 * found["R"] > 4 * found["R_core"]
     assert 2e-3 < found["rind_thickness"] < 3.5e-3 and 0.4 < found["core_ratio"] < 0.65

@@ -23,9 +23,14 @@ from tests.mpm.kernels.test_ties import SHORT
 
 APPLE = load_food("apple")
 STRENGTH = "strength_ratio"
-PEELED = replace(APPLE.to_scene_food().material, skin_thickness=0.0)
-SPLIT = replace(SHORT, food=replace(SHORT.food, material=PEELED), motion=replace(SHORT.motion, mach=0.04))
-"""A short cut of peeled apple that parts by a cohesive crack, under a thick blade."""
+PEELED = replace(
+    APPLE.to_scene_food().material, E=6e6, R=60.0, R_initiation=60.0, skin_thickness=0.0, initiation_depth=5e-4
+)
+STROKE = 10.5e-3
+SPLIT = replace(
+    SHORT, food=replace(SHORT.food, material=PEELED), motion=replace(SHORT.motion, mach=0.04, stroke=STROKE)
+)
+"""A short cut of stiff flesh that a thick blade opens ahead of its edge: there the strength is in the force."""
 
 
 class Cuts:
@@ -63,7 +68,7 @@ def test_strength_of_a_made_up_cut_is_found(truth: float) -> None:
     """Under a thick blade the force tells a weak food from a strong one of the same stiffness and toughness."""
     cuts = Cuts(SPLIT)
     real = next(cuts.evaluate([{STRENGTH: truth}]))
-    grid = np.linspace(0.0, 0.006, 60)
+    grid = np.linspace(0.0, STROKE, 60)
     curve = np.interp(grid, real.stroke, real.force)
     noise = 0.005 * float(curve.max())
     objective = Objective(Target(grid, curve, noise, noise, np.interp), fit_parameters(APPLE, (STRENGTH,)))
