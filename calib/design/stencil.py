@@ -44,7 +44,7 @@ class CutScene:
         """The scene and the material's values, at values of all parameters."""
         if self.fitted:
             return of_specimen(self.scene, values, self.kept)
-        return self.scene, {name: x for name, x in values.items() if name not in FITTED_SIZES}
+        return of_specimen(self.scene, {name: x for name, x in values.items() if name not in FITTED_SIZES})
 
 
 @dataclass(eq=False)
