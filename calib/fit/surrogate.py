@@ -35,6 +35,8 @@ DIFFERENCE_PRIOR = (math.log(0.007), 1.2, math.log(0.003), math.log(0.5))
 #: 95 % point of chi-square with 20 degrees of freedom over 20: how much more than its mean the information that noise
 #: makes along one direction may be in 20 independent points of a curve.
 NOISE_MARGIN = 1.57
+#: Information that noise is taken to make in every direction at least, over its mean along the parameters [-].
+LEAST_NOISE = 1e-9
 
 #: Width of the differences of expected curves in a Jacobian [coordinate units].
 JACOBIAN_STEP = 1e-3
@@ -224,6 +226,8 @@ class CurveProcess:
         per_row = objective.effective_points / objective.sigma**2 + 1.0 / objective.sigma_peak**2
         per_row *= objective.factor(self.predict(z)[0]) ** 2
         out: FloatArray = noise * self.peak**2 * per_row
+        # of fewer runs than parameters it has no rank in some directions
+        out += LEAST_NOISE * float(np.trace(out)) / p * np.eye(p)
         return out
 
 

@@ -90,6 +90,13 @@ def test_jacobian_of_noise_free_runs_is_the_true_one() -> None:
     assert np.linalg.norm(found - true) < 0.05 * np.linalg.norm(true)
 
 
+def test_fewer_runs_than_parameters_have_a_jacobian() -> None:
+    """A search that begins anew has one where two runs of three parameters ended."""
+    runs = trials(2, 0.01)
+    jacobian = Surrogate(goal(), runs, runs[0]).jacobian(THREE.start)
+    assert np.isfinite(jacobian).all() and jacobian.shape == true_jacobian(THREE.start).shape
+
+
 def test_noise_does_not_pass_for_information() -> None:
     """With 2 % noise the idle parameter stays unseen in nine of ten fits.
 
