@@ -70,3 +70,12 @@ def test_the_rows_of_a_tie_are_varied_only_in_layers():
     assert not any("rows of a tie" in name for name in varied(PRISM))
     assert varied(fruit)["half the rows of a tie"].numerics.layer_rows == 4
     assert isinstance(varied(fruit)["twice the rows of a tie"].numerics.layer_rows, int)
+
+
+def test_what_is_fitted_is_no_constant():
+    """A friction of the board and a loss factor that the trace is asked for have intervals, and are not varied too."""
+    damped = PRISM.with_material(loss_factor=0.1)
+    whole = varied(damped)
+    left_out = {name for name in whole if name.endswith(("the friction of the board", "the loss factor"))}
+    assert len(left_out) == 4
+    assert set(varied(damped, ("E", "board_friction", "loss_factor"))) == set(whole) - left_out

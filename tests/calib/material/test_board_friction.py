@@ -1,0 +1,52 @@
+"""The friction of a food on its board: a property that belongs to the scene's board and not to its material."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from calib.errors import MaterialError
+from calib.material.food import FoodSpec, load_food, load_foods
+from calib.material.knife import load_knife
+from calib.material.scene import Sizing, cut_scene, of_specimen, specimen
+from mpm.scene import Board, Scene
+
+CHERRY = load_food("cherry")
+
+
+def scene(food: FoodSpec) -> Scene:
+    """Its default cut."""
+    shape, _ = specimen(food, None, Sizing())
+    return cut_scene(food, shape, load_knife("kitchen"))
+
+
+def test_a_cut_lies_on_the_board_of_its_food() -> None:
+    """The food's value, another one given, and the default where a food has none."""
+    own = CHERRY.properties["board_friction"].value
+    assert scene(CHERRY).board == Board(own)
+    assert scene(CHERRY.with_values({"board_friction": 0.3})).board == Board(0.3)
+    properties = {name: p for name, p in CHERRY.properties.items() if name != "board_friction"}
+    bare = FoodSpec(CHERRY.name, CHERRY.shape_kind, CHERRY.dims, properties)
+    assert scene(bare).board == Board() and "board_friction" not in bare.default_fit
+
+
+def test_a_fitted_friction_is_the_boards() -> None:
+    """It leaves the values of the material, and nothing else of the scene changes."""
+    plain = scene(CHERRY)
+    found, rest = of_specimen(plain, {"board_friction": 0.8, "E": 2e5})
+    assert rest == {"E": 2e5} and found.board == Board(0.8)
+    assert {**found.as_dict(), "board": None} == {**plain.as_dict(), "board": None}
+
+
+def test_every_food_says_it(tmp_path: Path) -> None:
+    """With a range, as a fit's prior; and a saved food has what was given."""
+    assert all(food.prior("board_friction") == (0.25, 1.0) for food in load_foods().values())
+    CHERRY.with_values({"board_friction": 0.35}).save(tmp_path / "cherry.yaml")
+    assert FoodSpec.load(tmp_path / "cherry.yaml").value("board_friction") == 0.35
+
+
+def test_no_board_is_that_rough() -> None:
+    """One clear error."""
+    with pytest.raises(MaterialError, match="friction of food on board; it must lie between 0 and 2"):
+        CHERRY.with_values({"board_friction": 3.0})
