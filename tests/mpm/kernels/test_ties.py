@@ -259,21 +259,41 @@ def test_a_large_loss_factor_makes_no_energy():
     assert abs(record.lost) < 0.1
 
 
-def test_no_tie_holds_through_the_blade_before_the_cut_starts():
-    """A wedge in a food that it only dents has the food on its faces, as one in a cut has."""
-    food = Material(
-        E=1e6, nu=0.36, rho=1000, yield_stress=3e5, R=100.0, R_initiation=600.0, tensile_strength=2e5,
-        initiation_depth=8e-3, mu=0.1,
-    )  # fmt: skip
+DENTED = Material(
+    E=1e6, nu=0.36, rho=1000, yield_stress=3e5, R=100.0, R_initiation=600.0, tensile_strength=2e5,
+    initiation_depth=8e-3, mu=0.1,
+)  # fmt: skip
+"""A food that gives way under the edge by 8 mm before its cut starts."""
+
+
+def dent(food: Material, motion: Motion) -> Scene:
+    """A block of it under a wedge."""
     knife = Knife("wedge", 3e-3, 0.2, 0.05, 0.1)
     block = Food(Shape("block", 0.03, 0.012, 0.02), food)
-    of = Scene(block, knife, Motion(8e-3, 0.02), Board(0.5), EdgeLaw(zone=4e-3), Numerics(dx=3e-3, room=1.0))
+    return Scene(block, knife, motion, Board(0.5), EdgeLaw(zone=4e-3), Numerics(dx=3e-3, room=1.0))
+
+
+def test_no_tie_holds_through_the_blade_before_the_cut_starts():
+    """A wedge in a food that it only dents has the food on its faces, as one in a cut has."""
+    of = dent(DENTED, Motion(8e-3, 0.02))
     simulation = Simulation(of, Runtime(threads=1))
     record = simulation.run()
     faces, state = simulation.setup.ties()[:, 0], simulation.state
     x = simulation.setup.to_scene_axes(host_transfer.particles(state, simulation.place).x)[faces]
-    above = x[:, 2] - (block.shape.height - record.stroke[-1])
-    half = np.minimum(above * np.tan(knife.angle / 2), knife.spine / 2)
+    above = x[:, 2] - (of.food.shape.height - record.stroke[-1])
+    half = np.minimum(above * np.tan(of.knife.angle / 2), of.knife.spine / 2)
     opened = (np.abs(x[:, 1]) - state.tool_gap.to_numpy().ravel()[faces]) / half
     assert not state.cut_part.to_numpy().any() and (above > 1.5e-3).sum() > 10
     np.testing.assert_allclose(opened[above > 1.5e-3], 1.0, atol=0.05)
+
+
+@pytest.mark.parametrize("yields", [True, False])
+def test_a_dent_and_its_withdrawal_make_no_energy(yields):
+    """Ties that let go of the blade and hold again as it is withdrawn take energy at most: nothing is cut by then."""
+    food = DENTED if yields else replace(DENTED, yield_stress=np.inf, mu=0.0)
+    simulation = Simulation(dent(food, Motion(6e-3, 0.02, retract=7e-3)), Runtime(threads=1))
+    record = simulation.run()
+    work = record.work_done.max()
+    assert record.status == "done" and not simulation.state.cut_part.to_numpy().any()
+    assert record.unbooked.min() > -1e-3 * work and record.unbooked.max() < 0.05 * work
+    assert record.momentum_residual < 1e-10
