@@ -4,6 +4,8 @@ import taichi as ti
 
 from mpm.state.tables import INITIATION_DEPTH, LAYERED, R_START, SLIP, STATIONS
 
+AT_ONCE = 1e-9  # length of a fall in bare flesh [m], of no way that a step takes
+
 
 @ti.func
 def line_force(s: ti.template(), cut, i, tangential, forward, part):
@@ -74,15 +76,16 @@ def resistance_left(s: ti.template(), cut, i):
 def softening_law(depth, softening, start, resistance):
     """Line force that the edge can carry [N/m].
 
-    It falls from the force at which the cut started to the propagation resistance.
+    It falls from the force at which the cut started to the propagation resistance, over the way through the skin. Bare
+    flesh has none: what the start took beyond the resistance is spent at once.
 
     Args:
         depth: Way that has been cut since the start [m].
-        softening: Length over which the force falls [m].
+        softening: Length over which the force falls [m], 0 for at once.
         start: Force at which the cut started [N/m].
         resistance: Propagation resistance [N/m].
     """
-    return resistance + (start - resistance) * ti.exp(-depth / softening)
+    return resistance + (start - resistance) * ti.exp(-depth / ti.max(softening, AT_ONCE))
 
 
 @ti.func

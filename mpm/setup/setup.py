@@ -222,7 +222,7 @@ class Setup:
         if material.layered:
             out[:, powers] = np.transpose(slice_powers(scene.food.shape, xs, scene.numerics.dx))
         out[:, column.STARTED] = self._started()
-        out[:, column.SOFTENING], out[:, column.TOP_TOUGHNESS] = scene.edge.slip + path, self._top_toughness(material)
+        out[:, column.SOFTENING], out[:, column.TOP_TOUGHNESS] = path, self._top_toughness(material)
         return out
 
     def _started(self) -> np.ndarray:
