@@ -48,7 +48,7 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
             size = limit
         start = flesh + s.start_excess[cut, i]
         level = softening_law(s.cut_depth[cut, i], s.softening[cut, i], start, flesh) * size / limit
-    s.slip[cut, i] = e
+    s.slip[cut, i], s.line[cut, i] = e, level
     return level * steep * e / ti.max(e.norm(), 1e-30)
 
 

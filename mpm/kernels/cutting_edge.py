@@ -26,8 +26,10 @@ from mpm.state.tables import (
     SPACING,
     TILT_COS,
     TILT_SIN,
+    WIDTH_OF_FORCE,
     ZONE,
     ZONE_MASS,
+    ZONE_MOST,
 )
 
 # Kernel mass of the process zone of an edge that touches a flat surface, over rho dx zone^2 (exact: the zone is centred
@@ -90,7 +92,7 @@ def find_reaction(s: ti.template(), cut, i, dt):
     if ti.static(s.hollow):
         if s.start_force[cut, i] > 0:
             width = ti.cast(part > 0, float) * tied_width(s, cut, i)
-    full = SURFACE_FILL * s.par[cut, ZONE_MASS] * width * s.par[cut, INV_DX]
+    full = SURFACE_FILL * s.par[cut, ZONE_MASS] * (s.zone[cut, i] / s.par[cut, ZONE]) ** 2 * width * s.par[cut, INV_DX]
     if width > 0 and mass > EMPTY_ZONE * full:
         c, t = ti.cast(s.pose[cut, TILT_COS], float), ti.cast(s.pose[cut, TILT_SIN], float)
         mean, blade = s.zone_velocity[cut, i], blade_velocity(s, cut, place, tip)
@@ -105,11 +107,11 @@ def find_reaction(s: ti.template(), cut, i, dt):
             )
             s.sums[cut, CUTTING_WORK] += multiplicity_x(s, cut, i) * (impulse[0] * slide - impulse[1] * fall) / dt
         else:
-            s.slip[cut, i] = ti.Vector.zero(float, 2)
+            s.slip[cut, i], s.line[cut, i] = ti.Vector.zero(float, 2), 0.0
             if s.crack_front[cut, i] < 1e2:  # the blade has gone: the front stays in the material
                 s.front_drift[cut, i] = mean[2] * dt
     else:
-        s.slip[cut, i] = ti.Vector.zero(float, 2)
+        s.slip[cut, i], s.line[cut, i] = ti.Vector.zero(float, 2), 0.0
 
 
 @ti.func
@@ -147,7 +149,11 @@ def follow_material(s: ti.template(), cut, i):
 
     The slip of the next step is counted against it. Counted against the velocity before the reaction, the slip would
     run ahead by force x dt / mass in every step, and the edge would do work on the food that nobody did on the edge.
+    The zone has the width of the next step, for which the mean is.
     """
+    s.zone[cut, i] = ti.math.clamp(
+        s.line[cut, i] * s.par[cut, WIDTH_OF_FORCE], s.par[cut, ZONE], s.par[cut, ZONE_MOST]
+    )
     box = zone_nodes(s, cut, i)
     total = ti.Vector.zero(float, 4)
     for a in range(box[0], box[3]):
@@ -162,9 +168,9 @@ def follow_material(s: ti.template(), cut, i):
 @ti.func
 def zone_nodes(s: ti.template(), cut, i):
     """Nodes whose velocity slice i feels, as the corners (low 3, high 3) of a box."""
-    reach = 1.5 * s.par[cut, ZONE]
+    reach = 1.5 * s.zone[cut, i]
     place = s.par[cut, FIRST_STATION] + i * s.par[cut, DX]
-    mid = to_grid_axes(s, cut, ti.Vector([place, 0.0, s.crack_front[cut, i] - 0.5 * s.par[cut, ZONE]]))
+    mid = to_grid_axes(s, cut, ti.Vector([place, 0.0, s.crack_front[cut, i] - 0.5 * s.zone[cut, i]]))
     wide, deep = 0.0, reach
     if ti.static(s.turned):
         e = ti.abs(to_grid_axes(s, cut, ti.Vector([s.par[cut, DX], 0.0, 0.0])))
@@ -182,7 +188,7 @@ def zone_nodes(s: ti.template(), cut, i):
 @ti.func
 def zone_weight(s: ti.template(), cut, i, a, j, k):
     """Weight of node (a, j, k) in the process zone of slice i, which is centred half a zone below the edge."""
-    z = s.par[cut, ZONE]
+    z = s.zone[cut, i]
     at = to_scene_axes(s, cut, node_position(s, cut, a, j, k))
     w = bspline(at[1] / z) * bspline((at[2] - s.crack_front[cut, i]) / z + 0.5)
     if ti.static(s.turned):

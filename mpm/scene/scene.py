@@ -232,17 +232,33 @@ class Scene:
         return self.tied and self.tie_strength > self.food.material.yield_stress
 
     def process_zone(self, material: Material) -> float:
-        """Width over which the edge's line force is spread [m].
+        """Width over which the edge's line force is spread while it cuts [m].
 
-        It is ``edge.zone``, and wider where the food would flow under the edge in place of parting. A flat punch of
-        that width bears (2 + pi) / sqrt(3) of the yield stress (Prandtl 1920), which is to be ``edge.bearing`` times R.
-        It is no more than half the food's height: a food that bears less is squashed, whatever cuts it.
+        It is ``edge.zone``, and wider where the food would flow under R in place of parting (:meth:`width_of_force`).
+        It is no more than half the food's height: a food that bears less is squashed, whatever cuts it. Where the force
+        is larger than R, as it is before a cut starts in a skin, the kernels widen it by the same rule.
 
         Args:
             material: Constants of the food.
         """
-        wide = self.edge.bearing * material.R / (PUNCH * material.yield_stress)
-        return max(self.edge.zone, min(wide, self.food.shape.height / 2))
+        return max(self.edge.zone, min(material.R * self.width_of_force(material), self.widest_zone))
+
+    def width_of_force(self, material: Material) -> float:
+        """Width of food that bears a line force without flowing, over that force [m^2/N].
+
+        A flat punch of that width bears (2 + pi) / sqrt(3) of the yield stress (Prandtl 1920), which is to be
+        ``edge.bearing`` times the force. A skin that is pressed in hands the line force of the edge to the flesh over
+        that width.
+
+        Args:
+            material: Constants of the food.
+        """
+        return self.edge.bearing / (PUNCH * material.yield_stress)
+
+    @property
+    def widest_zone(self) -> float:
+        """Width over which the edge's line force is spread at most [m]."""
+        return max(self.edge.zone, self.food.shape.height / 2)
 
     @property
     def drop(self) -> float:

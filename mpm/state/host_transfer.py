@@ -57,6 +57,7 @@ from mpm.state.tables import (
     STRETCH,
     STRETCH_AT_REST,
     TIE_COUNT,
+    ZONE,
 )
 
 # Columns of the table of particles that is read after some steps: position, half, deformation gradient, Kirchhoff
@@ -180,6 +181,7 @@ def _write(
         s.softening[c, i], s.top_toughness[c, i] = row[SOFTENING], row[TOP_TOUGHNESS]
         s.slip[c, i] = ti.Vector.zero(float, 2)
         s.reaction[c, i] = ti.Vector.zero(float, 2)
+        s.line[c, i], s.zone[c, i] = 0.0, s.par[c, ZONE]
         s.zone_velocity[c, i] = ti.Vector.zero(float, 3)
         s.cut_depth[c, i] = 0.0
         s.front_drift[c, i] = 0.0
