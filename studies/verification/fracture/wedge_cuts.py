@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fem_reference.cutting.wedge import Blade, Block, Cut, Grid, Interface, cut
-from fem_reference.laws import Linear
+from fem_reference.laws import Corotated
 from mpm.arrays import FloatArray
 from mpm.scene.material import Material
 from mpm.scene.shapes import Shape
@@ -55,12 +55,9 @@ CUTS = (
 
 
 def by_elements(test: WedgeCut) -> Cut:
-    """The cut by finite elements of small strains, with free ends along the edge as the particles have.
-
-    In plane strain its force is 4 % larger at its highest. The particles' law of large strains makes it 1 % smaller.
-    """
+    """The cut by finite elements with the particles' law of large strains and free ends along the edge, as they have."""
     food = test.food
-    block = Block(BLOCK.length, BLOCK.height, Linear(food.shear, food.lame), width=BLOCK.width)
+    block = Block(BLOCK.length, BLOCK.height, Corotated(food.shear, food.lame), width=BLOCK.width)
     blade = Blade(test.wedge.angle, test.wedge.thickness, food.mu)
     tie = Interface(food.R, food.cohesion)
     return cut(block, blade, tie, ASKED, Grid(test.elements, layers=1))

@@ -1,0 +1,41 @@
+"""The force that starts a cut: it is the food's, and not that of the method's lengths."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from mpm.output.record import ForceRecord
+from mpm.scene import EdgeLaw, Motion
+from tests.mpm.scenes import FLESH, PRISM, cut
+
+SKINNED = replace(
+    FLESH, E=3e5, yield_stress=2e4, R=100.0, R_initiation=150.0, R_skin=600.0, skin_thickness=5e-4, initiation_depth=2e-3
+)
+
+
+def indented(material, edge: EdgeLaw) -> ForceRecord:
+    """The prism with this material, cut half through."""
+    return cut(replace(PRISM, food=replace(PRISM.food, material=material), motion=Motion(0.012, 0.01), edge=edge))
+
+
+def test_a_dent_in_a_soft_food_is_not_as_deep_as_the_zone_is_narrow():
+    """A food that yields at 20 kPa bears 600 N/m over 13 mm. The skin hands the force to that width, so twice the
+    smallest zone leaves peak and work (5 %); spread over the zone alone the edge sank until it had a wedge's force."""
+    narrow, wide = (indented(SKINNED, EdgeLaw(zone=z)) for z in (3e-3, 6e-3))
+    assert wide.peak == pytest.approx(narrow.peak, rel=0.05)
+    assert wide.work == pytest.approx(narrow.work, rel=0.05)
+    assert abs(narrow.unbooked[-1]) < 0.05 * narrow.work
+
+
+@pytest.mark.parametrize("skin", [0.0, 5e-4])
+def test_what_a_start_takes_beyond_the_resistance_is_spent_in_the_skin(skin):
+    """A stiff block needs 900 N/m to start and 300 after: the excess goes over the skin's way, in bare flesh at once,
+    so the edge's elastic slip, a number of the method, has no part in the work (0.5 %)."""
+    stiff = replace(FLESH, E=5e6, yield_stress=1e6, R_initiation=900.0, initiation_depth=1e-3)
+    if skin:
+        stiff = replace(stiff, R_skin=900.0, skin_thickness=skin)
+    short, long = (indented(stiff, EdgeLaw(zone=3e-3, slip=s)) for s in (0.5e-3, 2e-3))
+    assert long.work == pytest.approx(short.work, rel=0.005)
+    assert long.peak == pytest.approx(short.peak, rel=0.005)
