@@ -151,9 +151,7 @@ def follow_material(s: ti.template(), cut, i):
     run ahead by force x dt / mass in every step, and the edge would do work on the food that nobody did on the edge.
     The zone has the width of the next step, for which the mean is.
     """
-    s.zone[cut, i] = ti.math.clamp(
-        s.line[cut, i] * s.par[cut, WIDTH_OF_FORCE], s.par[cut, ZONE], s.par[cut, ZONE_MOST]
-    )
+    s.zone[cut, i] = ti.math.clamp(s.line[cut, i] * s.par[cut, WIDTH_OF_FORCE], s.par[cut, ZONE], s.par[cut, ZONE_MOST])
     box = zone_nodes(s, cut, i)
     total = ti.Vector.zero(float, 4)
     for a in range(box[0], box[3]):

@@ -89,8 +89,8 @@ class EdgeLaw:
     Attributes:
         zone: Width of the B-spline over which the edge's line force is spread [m]; at least one cell, and wider where
             the food asks for it (:meth:`Scene.process_zone`).
-        bearing: Line force that a food that flows bears over that width, over R [-]. Below about 1 it flows along with
-            the edge, and new surface is had for less than R.
+        bearing: Line force that a food that flows bears over that width, over the line force of the edge [-]. Below
+            about 1 it flows along with the edge, and new surface is had for less than R.
         slip: Slip of the edge in the material at which the line force is fully developed [m].
     """
 

@@ -35,7 +35,7 @@ class Contents:
         particles: Table, shape (n, N_PARTICLE): position in the grid's axes, distances at which board and tool are met
             [m], volume over that of a particle beside the cut [-], reference volumes before the board and before the
             tool [m^3], 0 for a surface that can stick, -2 in a stone and -1 for others.
-        slices: Table, shape (m, N_SLICE): outline of the food in each slice [m], the slip over which the edge's
+        slices: Table, shape (m, N_SLICE): outline of the food in each slice [m], the way over which the edge's
             resistance falls [m], the toughness below its upper surface [J/m^2], the powers with which upper and
             lower surface are passed [-], and the force at which a cut has started there before [N/m], 0 where none has.
         parameters: Shape (N_PARAMETERS,), rows as in :mod:`mpm.state.tables`.

@@ -141,7 +141,7 @@ class State:
         crack_front: Height of the crack front [m], far up where nothing is cut, (cut, slice).
         front_drift: Way of the front with the material in this step [m], (cut, slice).
         cut_depth: Way that has been cut since the start [m], (cut, slice).
-        softening: Slip over which the resistance falls after the start [m], (cut, slice).
+        softening: Way over which the resistance falls after the start, that through the skin [m], (cut, slice).
         top_power: Power of the way through the upper surface of a slice that is the part of it that the edge has
             reached [-], (cut, slice); ``floor_power`` the same for the lower one.
         top_toughness: Toughness of the food below its upper surface [J/m^2], (cut, slice).

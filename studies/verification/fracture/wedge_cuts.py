@@ -55,7 +55,7 @@ CUTS = (
 
 
 def by_elements(test: WedgeCut) -> Cut:
-    """The cut by finite elements with the particles' law of large strains and free ends along the edge, as they have."""
+    """The cut by finite elements with the particles' law of large strains, and free ends along the edge."""
     food = test.food
     block = Block(BLOCK.length, BLOCK.height, Corotated(food.shear, food.lame), width=BLOCK.width)
     blade = Blade(test.wedge.angle, test.wedge.thickness, food.mu)

@@ -11,7 +11,14 @@ from mpm.scene import EdgeLaw, Motion
 from tests.mpm.scenes import FLESH, PRISM, cut
 
 SKINNED = replace(
-    FLESH, E=3e5, yield_stress=2e4, R=100.0, R_initiation=150.0, R_skin=600.0, skin_thickness=5e-4, initiation_depth=2e-3
+    FLESH,
+    E=3e5,
+    yield_stress=2e4,
+    R=100.0,
+    R_initiation=150.0,
+    R_skin=600.0,
+    skin_thickness=5e-4,
+    initiation_depth=2e-3,
 )
 
 
