@@ -47,6 +47,16 @@ def test_the_layers_of_a_made_up_force_are_found() -> None:
     assert 0 < found["mu"] < CUCUMBER.properties["mu"].value
 
 
+def test_a_soft_start_yields_at_the_strain_of_its_food() -> None:
+    """A start that is softer than the food of the literature yields at the same strain, the stiff one as it."""
+    parameters = fit_parameters(CUCUMBER, ("E", "yield_stress", "R", "R_rind", "rind_thickness", "R_skin"))
+    soft, stiff = (parameters.to_dict(guess) for guess in layer_guesses(SCENE, parameters, *made()))
+    modulus, limit = (CUCUMBER.properties[name].value for name in ("E", "yield_stress"))
+    assert soft["E"] < 0.5 * modulus
+    assert soft["yield_stress"] / soft["E"] == pytest.approx(limit / modulus)
+    assert stiff["yield_stress"] == pytest.approx(limit)
+
+
 def test_a_peak_at_the_start_may_be_a_dent_of_stiff_food() -> None:
     """The other start has the food's usual stiffness, and a cut that starts where the first force is largest, by the
     chord of a circle there and no easier than through the rind."""
