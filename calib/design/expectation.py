@@ -55,7 +55,7 @@ def judge(
     Returns:
         The covariances.
     """
-    prior = np.diag(start.parameters.prior_sd**2)
+    prior = start.parameters.prior_covariance
     before = [] if start.run is None else [first_cut(start, about[FIRST], start.width_sd)]
     known = information(before) if before else np.zeros_like(prior)
     now = posterior(prior, known)

@@ -55,8 +55,8 @@ def global_optimum(surrogate: Surrogate, runs: Iterable[ScoredRun], random: np.r
     Returns:
         Its internal coordinates (p,).
     """
-    low, high = surrogate.objective.parameters.box
-    starts = np.array([*random.uniform(low, high, (GLOBAL_STARTS, len(low))), *(run.z for run in runs)])
+    parameters = surrogate.objective.parameters
+    starts = np.array([*parameters.in_box(random.random((GLOBAL_STARTS, len(parameters)))), *(run.z for run in runs)])
     order = np.argsort(surrogate.expected_all(starts, GLOBAL_WEIGHT), kind="stable")
     found = [surrogate.least(z, math.inf, GLOBAL_WEIGHT) for z in starts[order[:GLOBAL_DESCENTS]]]
     return min(found, key=lambda z: surrogate.expected(z, GLOBAL_WEIGHT))

@@ -111,10 +111,9 @@ class Search:
         self.rescreenings = 0
         self.noise_misfit = 0.0
         self.gained_misfit, self.gained_at = math.inf, 0.0
-        low, high = self.parameters.box
-        sobol = qmc.Sobol(len(low), scramble=True, seed=options.seed)
+        sobol = qmc.Sobol(len(self.parameters), scramble=True, seed=options.seed)
         count = MAX_DESIGNS * options.design
-        sample = low + (high - low) * (0.1 + 0.8 * sobol.random_base2(math.ceil(math.log2(count)))[:count])
+        sample = self.parameters.in_box(0.1 + 0.8 * sobol.random_base2(math.ceil(math.log2(count)))[:count])
         self.designs = np.split(sample, MAX_DESIGNS)
 
     @property

@@ -12,7 +12,9 @@ from calib.compression.measured import read_repeats, strain_grid
 from calib.compression.modulus import fit_modulus
 from calib.compression.press import homogeneous
 from calib.io.type_schema import Count, NotNegative, Positive, Shared
+from calib.material.food import FoodSpec
 from calib.multi_specimen.spec import CompressionSpec
+from calib.problem.food_parameters import with_yield_strain
 from calib.problem.parameters import Z95, ParameterSet
 from mpm.scene.shapes import Shape
 
@@ -79,8 +81,13 @@ def compression_modulus(spec: CompressionSpec) -> CompressionModulus:
     return CompressionModulus(spec.name, found.mean, spread, len(found.E), spec.nu, files)
 
 
-def with_measured_modulus(parameters: ParameterSet, tests: Sequence[CompressionModulus]) -> ParameterSet:
-    """The parameters with the prior of E narrowed by compression tests, as independent lognormal measurements."""
+def with_measured_modulus(
+    parameters: ParameterSet, tests: Sequence[CompressionModulus], food: FoodSpec
+) -> ParameterSet:
+    """The parameters with the prior of E narrowed by compression tests, as independent lognormal measurements.
+
+    That of the food's yield stress follows it.
+    """
     if not tests or "E" not in parameters.names:
         return parameters
     old = parameters["E"]
@@ -97,4 +104,5 @@ def with_measured_modulus(parameters: ParameterSet, tests: Sequence[CompressionM
         prior_low=low,
         prior_high=high,
     )
-    return ParameterSet(tuple(new if p.name == "E" else p for p in parameters))
+    measured = ParameterSet(tuple(new if p.name == "E" else p for p in parameters))
+    return with_yield_strain(measured, food)

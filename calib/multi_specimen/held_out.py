@@ -20,7 +20,7 @@ from calib.fit.options import FitOptions
 from calib.material.scene import of_specimen
 from calib.multi_specimen.specimens import JointFit, Specimens
 from calib.problem.objective import Objective
-from calib.problem.parameters import ParameterSet, is_shared
+from calib.problem.parameters import is_shared
 from calib.problem.setup import COARSE, FINE
 from calib.simulation.evaluation import Evaluation
 from calib.trace.filters import filter_simulated
@@ -149,7 +149,7 @@ def _own_fit(specimens: Specimens, shared: Mapping[str, float], name: str) -> _O
     setup, chosen = specimens.setups[name], specimens.own_parameters(name)
     if not chosen:
         return None
-    objective = replace(setup.objective, parameters=ParameterSet(chosen))
+    objective = replace(setup.objective, parameters=setup.objective.parameters.only(chosen))
     fine, coarse = (
         specimens.evaluator(sized.with_material(**flesh), name, fidelity)
         for (sized, flesh), fidelity in (

@@ -15,7 +15,7 @@ from calib.io.progress import Progress
 from calib.multi_specimen.compression_modulus import CompressionModulus, with_measured_modulus
 from calib.multi_specimen.spec import StudySpec
 from calib.problem.joint_objective import JointEvaluator, JointObjective
-from calib.problem.parameters import Parameter, is_shared, parameter_of, property_of
+from calib.problem.parameters import is_shared, parameter_of, property_of
 from calib.problem.scored_run import ScoredRun
 from calib.problem.setup import Setup, set_up
 from calib.simulation.evaluation import Evaluators
@@ -85,10 +85,10 @@ class Specimens:
     progress: Callable[[Progress], None] | None = None
     say: Callable[[str], None] = field(default=lambda text: None)
 
-    def own_parameters(self, name: str) -> tuple[Parameter, ...]:
-        """The parameters that the specimen of a trace has of its own."""
+    def own_parameters(self, name: str) -> tuple[str, ...]:
+        """Names of the parameters that the specimen of a trace has of its own."""
         chosen = self.study.specimen_properties
-        return tuple(p for p in self.setups[name].objective.parameters if p.name in chosen)
+        return tuple(p for p in self.setups[name].objective.parameters.names if p in chosen)
 
     def evaluator(self, scene: Scene, name: str, fidelity: str) -> CachedEvaluator:
         """What runs candidates of a scene of one trace.
@@ -129,7 +129,8 @@ class Specimens:
         objectives = {}
         for name in names:
             own = self.setups[name].objective
-            objectives[name] = replace(own, parameters=with_measured_modulus(own.parameters, self.moduli))
+            food = self.setups[name].request.food
+            objectives[name] = replace(own, parameters=with_measured_modulus(own.parameters, self.moduli, food))
         properties = {p.name for o in objectives.values() for p in o.parameters}
         return JointObjective.of(objectives, sorted(properties - set(self.study.specimen_properties)))
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 
 import numpy as np
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtri
 
 from calib.errors import CurveError
 from calib.posterior.likelihood import SIZE_SD, Likelihood
@@ -90,14 +90,11 @@ class Prior:
     """
 
     def __init__(self, parameters: ParameterSet) -> None:
-        self.mean, self.sd = parameters.prior_mean, parameters.prior_sd
-        self._low = ndtr((parameters.lower - self.mean) / self.sd)
-        self._high = ndtr((parameters.upper - self.mean) / self.sd)
+        self.parameters = parameters
 
     def __call__(self, cube: FloatArray) -> FloatArray:
         """Internal coordinates, and the logarithm of the size last (p + 1,), of a point of the unit cube."""
-        z = self.mean + self.sd * ndtri(self._low + (self._high - self._low) * cube[:-1])
-        return np.append(z, SIZE_SD * ndtri(0.5 + 0.5 * cube[-1]))
+        return np.append(self.parameters.from_cube(cube[:-1]), SIZE_SD * ndtri(0.5 + 0.5 * cube[-1]))
 
 
 def check_installed() -> None:
@@ -131,7 +128,7 @@ def sample(likelihood: Likelihood, effort: Effort, seed: int) -> Sample:
     sampler = dynesty.NestedSampler(
         log,
         prior,
-        len(prior.mean) + 1,
+        len(prior.parameters) + 1,
         nlive=effort.live,
         bound="multi",
         sample="rwalk",

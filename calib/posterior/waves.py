@@ -131,8 +131,7 @@ def on_lattice(parameters: ParameterSet, z: FloatArray) -> FloatArray:
 def first_wave(parameters: ParameterSet, count: int) -> FloatArray:
     """Points (count, p) that fill the prior: the same for each trace, so that a store serves the next one."""
     cube = qmc.Sobol(len(parameters), scramble=True, seed=0).random(count)
-    z = parameters.prior_mean + REACH * parameters.prior_sd * ndtri(0.005 + 0.99 * cube)
-    return on_lattice(parameters, z)
+    return on_lattice(parameters, parameters.from_steps(REACH * ndtri(0.005 + 0.99 * cube)))
 
 
 def match_history(

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from calib.errors import MaterialError
 from calib.material.food import FoodSpec
 from calib.material.form import ROUNDNESS, open_shape
 from calib.material.properties import rule_of
-from calib.problem.parameters import Z95, Parameter, ParameterSet
+from calib.problem.parameters import Z95, Parameter, ParameterSet, PriorCorrelation
 
 BOUND_FACTOR = 5.0
 """Hard bounds reach this factor beyond the literature's range [-], so that a trace may contradict the literature."""
 LINEAR = {"nu": (0.0, 0.49), "mu": (0.0, 1.2)}
 """Properties that are fitted on a linear scale, with their hard bounds."""
+YIELD_STRAIN_FACTOR = 3.0
+"""A food's yield stress over its E is this factor below or above that of the literature, at 95 % [-]: apples fail at
+about the same strain however firm they are (Segerlind and Dal Fabbro 1978), and single values of fruit lie between 5 %
+(kiwi) and 20 % (potato). Assumed, materials.yaml, remark 8."""
 Heights = tuple[float, float, float]
 """Lowest, likely and largest height of a specimen [m]."""
 
 
 def fit_parameters(food: FoodSpec, names: tuple[str, ...], heights: Heights | None = None) -> ParameterSet:
-    """The fitted properties with start value, hard bounds and literature prior.
+    """The fitted properties with start value, hard bounds and literature prior, in which E and yield stress are tied.
 
     Args:
         food: The food.
@@ -46,18 +51,57 @@ def fit_parameters(food: FoodSpec, names: tuple[str, ...], heights: Heights | No
         if name == ROUNDNESS:
             chosen.append(_roundness(food))
             continue
+        if name not in LINEAR:
+            chosen.append(fitted_range(name, food))
+            continue
         rule, (low, high) = rule_of(name), food.prior(name)
         value = food.value(name)
         assert value is not None  # prior() has a range only where there is a value
-        if name in LINEAR:
-            bottom, top = LINEAR[name]
-            chosen.append(Parameter(name, value, bottom, top, rule.unit, low, high, scale="linear"))
-            continue
-        if low <= 0:
-            raise MaterialError(f"{food.name}: {name} cannot be fitted from a range that starts at {low:g} {rule.unit}")
-        bottom, top = max(rule.low, low / BOUND_FACTOR), min(rule.high, high * BOUND_FACTOR)
-        chosen.append(Parameter(name, value, bottom, top, rule.unit, low, high))
-    return ParameterSet(tuple(chosen))
+        bottom, top = LINEAR[name]
+        chosen.append(Parameter(name, value, bottom, top, rule.unit, low, high, scale="linear"))
+    return with_yield_strain(ParameterSet(tuple(chosen)), food)
+
+
+def with_yield_strain(parameters: ParameterSet, food: FoodSpec) -> ParameterSet:
+    """The parameters with what the literature says of the strain at which a food yields, sigma_y / E.
+
+    The prior of E stays as it is. That of the yield stress at some E is its own range times that of E times the strain,
+    both normal in the logarithm: its range becomes narrower, and it is correlated with E.
+
+    Args:
+        parameters: With their own priors.
+        food: The food, whose ranges say the usual strain.
+
+    Returns:
+        The parameters; as they were where E or the yield stress is not among them.
+    """
+    if not {"E", "yield_stress"} <= set(parameters.names):
+        return parameters
+    E, own = parameters["E"], fitted_range("yield_stress", food)
+    usual = sum(s * math.log(end) for name, s in (("yield_stress", 0.5), ("E", -0.5)) for end in food.prior(name))
+    strain_sd = math.log(YIELD_STRAIN_FACTOR) / Z95
+    pulled = own.prior_sd**2 / (own.prior_sd**2 + strain_sd**2)  # part of a change of E that the yield stress follows
+    mean = (1.0 - pulled) * own.prior_mean + pulled * (E.prior_mean + usual)
+    sd = math.hypot(math.sqrt(pulled) * strain_sd, pulled * E.prior_sd)
+    low, high = math.exp(mean - Z95 * sd), math.exp(mean + Z95 * sd)
+    tied = replace(parameters["yield_stress"], prior_low=low, prior_high=high)
+    items = tuple(tied if p.name == "yield_stress" else p for p in parameters)
+    return ParameterSet(items, (PriorCorrelation("E", "yield_stress", pulled * E.prior_sd / sd),))
+
+
+def fitted_range(name: str, food: FoodSpec) -> Parameter:
+    """A property that is fitted by its logarithm, with the food's own range of it.
+
+    Raises:
+        MaterialError: A range from which it cannot be fitted, or no range.
+    """
+    rule, (low, high) = rule_of(name), food.prior(name)
+    value = food.value(name)
+    assert value is not None  # prior() has a range only where there is a value
+    if low <= 0:
+        raise MaterialError(f"{food.name}: {name} cannot be fitted from a range that starts at {low:g} {rule.unit}")
+    bottom, top = max(rule.low, low / BOUND_FACTOR), min(rule.high, high * BOUND_FACTOR)
+    return Parameter(name, value, bottom, top, rule.unit, low, high)
 
 
 def _roundness(food: FoodSpec) -> Parameter:

@@ -10,11 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
 from calib.problem.objective import Objective, ObjectiveTerm
-from calib.problem.parameters import Parameter, ParameterSet, parameter_of, property_of
+from calib.problem.parameters import Parameter, ParameterSet, PriorCorrelation, parameter_of, property_of
 from calib.problem.scored_run import ScoredRun
 from calib.simulation.evaluation import Evaluation, Evaluator
 from mpm.arrays import FloatArray
@@ -55,6 +56,16 @@ def residuals(
     return np.concatenate([*data, objective.parameters.prior_residual(z)], axis=1)
 
 
+def _with_common(correlations: Mapping[tuple[str, str], float]) -> tuple[PriorCorrelation, ...]:
+    """Correlations by pair, and those that follow between what has a partner in common and is independent beside it."""
+    out = [PriorCorrelation(*pair, value) for pair, value in correlations.items()]
+    for (one, a), (other, b) in combinations(correlations.items(), 2):
+        if set(one) & set(other):
+            first, second = sorted(set(one) ^ set(other))
+            out.append(PriorCorrelation(first, second, a * b))
+    return tuple(out)
+
+
 @dataclass(frozen=True)
 class JointObjective:
     """Residual vector and chi-square of joint evaluations.
@@ -82,6 +93,7 @@ class JointObjective:
         """
         places: dict[str, int] = {}
         items: list[Parameter] = []
+        correlations: dict[tuple[str, str], float] = {}
         terms = []
         for trace, objective in objectives.items():
             index = []
@@ -92,7 +104,9 @@ class JointObjective:
                     items.append(replace(p, name=name))
                 index.append(places[name])
             terms.append(ObjectiveTerm(trace, objective, np.array(index)))
-        return cls(ParameterSet(tuple(items)), tuple(terms))
+            own = dict(zip(objective.parameters.names, (items[k].name for k in index), strict=True))
+            correlations |= {(own[c.first], own[c.second]): c.value for c in objective.parameters.correlations}
+        return cls(ParameterSet(tuple(items), _with_common(correlations)), tuple(terms))
 
     @property
     def effective_rows(self) -> float:

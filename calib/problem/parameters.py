@@ -4,6 +4,9 @@ Stiffness-like quantities live over decades and are fitted by their logarithm; `
 In that *internal* coordinate ``z`` the prior is normal, and its 95 % range is the range of the literature:
 
     mean = (z(prior_low) + z(prior_high)) / 2,    sd = (z(prior_high) - z(prior_low)) / (2 * 1.96)
+
+The prior of several parameters is a normal one with these means and standard deviations. Two of them may be correlated
+in it, as a stiff food is a strong one.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from scipy.special import ndtr, ndtri
 
 from calib.errors import MaterialError
 from mpm.arrays import FloatArray
@@ -172,19 +176,44 @@ def _kept(values: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
+class PriorCorrelation:
+    """What the literature says of two parameters together.
+
+    Attributes:
+        first: Name of the one parameter.
+        second: Name of the other.
+        value: Correlation of their internal coordinates in the prior [-].
+    """
+
+    first: str
+    second: str
+    value: float
+
+
+@dataclass(frozen=True)
 class ParameterSet:
     """The fitted parameters in a fixed order, as a vector in internal coordinates or as a dictionary [units].
 
     Attributes:
         items: The parameters; names must be unique and there must be at least one.
+        correlations: Which of them are correlated in the prior; all others are independent.
 
     Raises:
-        MaterialError: No parameter, or a name given twice.
+        MaterialError: No parameter, a name given twice, or or correlations that no prior has.
     """
 
     items: tuple[Parameter, ...]
+    correlations: tuple[PriorCorrelation, ...] = ()
 
     def __post_init__(self) -> None:
+        self._check_items()
+        strangers = [n for c in self.correlations for n in (c.first, c.second) if n not in self.names]
+        if strangers:
+            raise MaterialError(f"{', '.join(strangers)} is correlated with another parameter and is none; add it.")
+        if np.linalg.eigvalsh(self.prior_covariance / np.outer(self.prior_sd, self.prior_sd))[0] <= 0.0:
+            raise MaterialError(f"no prior has the correlations {self.correlations}; give smaller ones.")
+
+    def _check_items(self) -> None:
         object.__setattr__(self, "items", tuple(self.items))
         if not self.items:
             raise MaterialError("there is no parameter to fit; name at least one, for instance E.")
@@ -268,13 +297,70 @@ class ParameterSet:
         """The point (p,) of the hard bounds that is nearest to ``z`` (p,)."""
         return np.clip(z, self.lower, self.upper)
 
+    @cached_property
+    def prior_covariance(self) -> FloatArray:
+        """Covariance of the prior in internal coordinates, (p, p)."""
+        out = np.diag(self.prior_sd**2)
+        for c in self.correlations:
+            i, j = self.names.index(c.first), self.names.index(c.second)
+            out[i, j] = out[j, i] = c.value * self.prior_sd[i] * self.prior_sd[j]
+        return _kept(out)
+
+    @cached_property
+    def prior_root(self) -> FloatArray:
+        """Lower triangle (p, p) whose product with its transpose is the covariance of the prior."""
+        return _kept(np.linalg.cholesky(self.prior_covariance))
+
+    @cached_property
+    def _whitener(self) -> FloatArray:
+        return _kept(np.linalg.inv(self.prior_root))
+
     def prior_residual(self, z: FloatArray) -> FloatArray:
-        """Distance from the prior centre in prior standard deviations, (p,)."""
-        return (z - self.prior_mean) / self.prior_sd
+        """Distance from the prior centre in prior standard deviations, each after those before it: (p,) of a point
+        (p,), (q, p) of many. The sum of its squares is the prior's chi-square."""
+        return (z - self.prior_mean) @ self._whitener.T
 
     def prior_jacobian(self) -> FloatArray:
-        """Derivative of :meth:`prior_residual`, (p, p): diagonal, 1 / prior_sd."""
-        return np.diag(1.0 / self.prior_sd)
+        """Derivative of :meth:`prior_residual`, (p, p): a lower triangle, diagonal where nothing is correlated."""
+        return self._whitener
+
+    def from_steps(self, steps: FloatArray) -> FloatArray:
+        """Internal coordinates, (p,) or (q, p), of independent steps in prior standard deviations from the prior's
+        centre, of the same shape; the nearest ones within the hard bounds."""
+        return self.clip(self.prior_mean + steps @ self.prior_root.T)
+
+    def in_box(self, cube: FloatArray) -> FloatArray:
+        """Points that fill the prior's 95 % box evenly, which is sheared where parameters are correlated.
+
+        Args:
+            cube: Places in the box along each parameter, from 0 to 1, (p,) or (q, p).
+
+        Returns:
+            Internal coordinates, of the same shape.
+        """
+        low, high = self.box
+        return self.from_steps((low + (high - low) * cube - self.prior_mean) / self.prior_sd)
+
+    def from_cube(self, cube: FloatArray) -> FloatArray:
+        """Draws from the prior between the hard bounds.
+
+        Args:
+            cube: Uniform numbers between 0 and 1, (p,) or (q, p).
+
+        Returns:
+            Internal coordinates, of the same shape.
+        """
+        root, steps = self.prior_root, np.zeros(np.shape(cube))
+        for i in range(len(self)):
+            shift = self.prior_mean[i] + steps @ root[i]  # the steps from here on are 0
+            low, high = (ndtr((end - shift) / root[i, i]) for end in (self.lower[i], self.upper[i]))
+            steps[..., i] = ndtri(low + (high - low) * cube[..., i])
+        return self.from_steps(steps)
+
+    def only(self, names: Sequence[str]) -> ParameterSet:
+        """The parameters of these names alone, with what the prior says of them."""
+        kept = tuple(c for c in self.correlations if c.first in names and c.second in names)
+        return ParameterSet(tuple(p for p in self.items if p.name in names), kept)
 
     def stress_like(self, names: Sequence[str] = STRESS_LIKE) -> FloatArray:
         """Direction (p,) of a joint scaling of the stress-like parameters: 1 for each on a log scale."""
@@ -282,4 +368,5 @@ class ParameterSet:
 
     def with_values(self, values: Mapping[str, float]) -> ParameterSet:
         """The same parameters with other present values [unit]; names not mentioned keep theirs."""
-        return ParameterSet(tuple(replace(p, value=float(values.get(p.name, p.value))) for p in self.items))
+        items = tuple(replace(p, value=float(values.get(p.name, p.value))) for p in self.items)
+        return ParameterSet(items, self.correlations)

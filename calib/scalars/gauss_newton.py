@@ -43,7 +43,7 @@ class LeastSquaresProblem:
         """Distances from target and prior in standard deviations, (n + p,)."""
         p = self.parameters
         centre = p.prior_mean if self.centre is None else self.centre
-        return np.concatenate([(y - self.target) / self.sd, (z - centre) / p.prior_sd])
+        return np.concatenate([(y - self.target) / self.sd, p.prior_jacobian() @ (z - centre)])
 
     def half_chi_square(self, z: FloatArray, y: FloatArray | None) -> float:
         """Half chi-square at a point (p,) with its values (n,); infinite without values."""

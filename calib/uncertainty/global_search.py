@@ -59,8 +59,7 @@ class DeflatedParameterSet(ParameterSet):
     claims: tuple[tuple[int, float, float], ...] = ()
 
     def prior_residual(self, z: FloatArray) -> FloatArray:
-        """Distance from the prior centre in prior standard deviations, and the depth: (p + 1,) of a point (p,),
-        (q, p + 1) of many."""
+        """That of the parameters, and the depth: (p + 1,) of a point (p,), (q, p + 1) of many."""
         depth = [1.0 - np.abs(z[..., place] - middle) / half for place, middle, half in self.claims]
         row = DEFLATION * np.maximum(np.min(depth, axis=0), 0.0)
         return np.concatenate([super().prior_residual(z), row[..., None]], axis=-1)
@@ -218,7 +217,7 @@ def _deflated(parameters: ParameterSet, claimed: Sequence[Interval]) -> Deflated
     for i in claimed:
         low, high = i.parameter.to_internal(i.low95), i.parameter.to_internal(i.high95)
         claims.append((parameters.names.index(i.parameter.name), 0.5 * (low + high), 0.5 * STRETCH * (high - low)))
-    return DeflatedParameterSet(parameters.items, tuple(claims))
+    return DeflatedParameterSet(parameters.items, parameters.correlations, tuple(claims))
 
 
 def _compared(

@@ -175,16 +175,20 @@ class _Profiler:
         along = np.array([points[k][self.i] for k in order])
         whole, alone = (np.array([costs[k][j] for k in order]) for j in (0, 1))
         feigned = np.minimum(self.feigned() * (along - start[self.i]) ** 2, self.one_run())
-        prior = (along - self.parameters.prior_mean[self.i]) ** 2 / self.parameters.prior_sd[self.i] ** 2
         alone = np.maximum(alone - alone.min() - feigned, 0.0)
-        whole = np.maximum(alone + prior - (alone + prior).min(), 0.0)
+        whole = alone + self.own(along)
+        whole = np.maximum(whole - whole.min(), 0.0)
         return Profile(self.parameters.names[self.i], along, whole, alone, np.array([points[k] for k in order]), self.i)
 
     def cost(self, z: FloatArray) -> tuple[float, float]:
         """Chi-square with all priors, and without this parameter's own."""
         rows = self.rows(z)
         whole = float(rows @ rows)
-        return whole, whole - float(rows[self.i - self.p]) ** 2
+        return whole, whole - float(self.own(z[self.i]))
+
+    def own(self, along: FloatArray | float) -> FloatArray:
+        """Chi-square of this parameter's own prior at some of its values."""
+        return np.asarray(((along - self.parameters.prior_mean[self.i]) / self.parameters.prior_sd[self.i]) ** 2)
 
     def feigned(self) -> float:
         """Curvature of the data's rise that the noise of the runs feigns: what the normal approximation leaves out."""

@@ -273,11 +273,10 @@ def _truth(
     """Values of a food that is cut to the end of the stroke, and that cut: stroke [m] and force [N]."""
     food, scene = plan.food, plan.scene
     parameters = fit_parameters(food, food.default_fit)
-    low, high = parameters.box
     scene = replace(scene, numerics=replace(scene.numerics, seed=TRUTH_SEED + k))
     evaluator = CachedEvaluator(pool.evaluator(scene), store, scene=scene.as_dict(), code=code_key(), fidelity="truth")
     for _ in range(TRIES):
-        z = low + (high - low) * (0.5 + TRUTH_PART * (random.random(len(low)) - 0.5))
+        z = parameters.in_box(0.5 + TRUTH_PART * (random.random(len(parameters)) - 0.5))
         values = parameters.to_dict(z)
         found = next(iter(evaluator.evaluate([values])))
         if found.completed == 1.0:

@@ -59,12 +59,13 @@ def prior_conflict(parameters: ParameterSet, values: FloatArray, covariance: Flo
     Returns:
         The conflict.
     """
-    sd = np.array([p.prior_sd for p in parameters])
-    away = (values - np.array([p.prior_mean for p in parameters])) / sd
-    left, axes = np.linalg.eigh(covariance / np.outer(sd, sd))
+    root = parameters.prior_jacobian()
+    left, axes = np.linalg.eigh(root @ covariance @ root.T)
     seen = left <= NOT_SEEN**2
-    size = float(np.sum((axes.T @ away)[seen] ** 2 / (1.0 - left[seen])))
+    size = float(np.sum((axes.T @ parameters.prior_residual(values))[seen] ** 2 / (1.0 - left[seen])))
     count = int(seen.sum())
+    sd = parameters.prior_sd
+    away = (values - parameters.prior_mean) / sd
     taken = 1.0 - np.diag(covariance) / sd**2
     alone = np.where(taken > HARDLY_KNOWN, away / np.sqrt(np.maximum(taken, HARDLY_KNOWN)), 0.0)
     # of a property of which the trace says nothing, the little that it says is mostly the fit's own noise

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import qmc, truncnorm
+from scipy.stats import qmc
 
 from calib._version import __version__
 from calib.errors import CurveError
@@ -130,9 +130,7 @@ def draw(parameters: ParameterSet, count: int, seed: int = 0) -> list[dict[str, 
         raise CurveError(f"{count} draws: give at least 1")
     sobol = qmc.Sobol(len(parameters), scramble=True, seed=seed)
     sample = sobol.random_base2(math.ceil(math.log2(count)))[:count]
-    mean, sd = parameters.prior_mean, parameters.prior_sd
-    low, high = (parameters.lower - mean) / sd, (parameters.upper - mean) / sd
-    return [parameters.to_dict(z) for z in truncnorm.ppf(sample, low, high, loc=mean, scale=sd)]
+    return [parameters.to_dict(z) for z in parameters.from_cube(sample)]
 
 
 @dataclass(frozen=True)

@@ -107,11 +107,10 @@ def made_up(food: FoodSpec, seed: int, folder: Path, pool: Workers) -> Truth:
     """
     random = np.random.default_rng(seed)
     parameters = fit_parameters(food, food.default_fit)
-    low, high = parameters.box
     usual = specimen(food, None, Sizing())[0]
     wide = math.exp(size_relative_sd(food, "width") * float(random.standard_normal()) / 2.0)
     for _ in range(TRIES):
-        z = low + (high - low) * (0.5 + TRUTH_PART * (random.random(len(low)) - 0.5))
+        z = parameters.in_box(0.5 + TRUTH_PART * (random.random(len(parameters)) - 0.5))
         truth = Truth(food, parameters.to_dict(z), replace(usual, width=wide * usual.width), seed)
         if truth.record(folder / "first.csv", pool, load_knife("kitchen"), truth.shape):
             return truth
@@ -188,7 +187,7 @@ def _pressed(truth: Truth, start: Start) -> FoodSpec:
         return (pressed_stress(math.exp(x[0]), nu, math.exp(x[1]), strain) - seen) / float(seen.max())
 
     best = least_squares(missed, logs).x
-    prior = np.diag(start.parameters.prior_sd**2)
+    prior = start.parameters.prior_covariance
     z = start.parameters.start
     sd = np.sqrt(np.diag(posterior(prior, information([compression_measurement(start, z)]))))
     known = dict(truth.food.properties)

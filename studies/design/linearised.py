@@ -97,7 +97,7 @@ class Bench:
         cut = CutScene(coarse_cut(start, start.knife, start.shape), True, start.kept)
         believed = start.parameters
         for _ in range(TRIES):
-            drawn = believed.start + SPREAD * believed.prior_sd * self.random.standard_normal(len(believed))
+            drawn = believed.start + SPREAD * believed.prior_root @ self.random.standard_normal(len(believed))
             self.truth = believed.clip(drawn)
             curve = self.measured(cut, start.stroke)
             if curve is not None:
@@ -129,7 +129,7 @@ class Bench:
         """
         parameters = start.parameters
         cuts = {name: record.cut for name, record in records.items()}
-        own, prior = np.diag(parameters.prior_sd**-2), np.diag(parameters.prior_sd**2)
+        own, prior = np.linalg.inv(parameters.prior_covariance), parameters.prior_covariance
         z = parameters.start
         for left in range(rounds, -1, -1):
             about = stencils(self.simulator, cuts, parameters, z, steps_of(parameters, start.present_sd))

@@ -73,10 +73,8 @@ def made_up(pair: Pair, store: EvaluationStore, pool: Workers) -> Truth:
     fine = _scene(pair, food, shape, coarse=False)
     parameters = fit_parameters(food, food.default_fit)
     random = np.random.default_rng(pair.number)
-    middle = np.array([p.prior_mean for p in parameters])
-    half = np.array([p.prior_sd for p in parameters]) * 1.96
     for _ in range(TRIES):
-        z = middle + half * TRUTH_PART * (2.0 * random.random(len(middle)) - 1.0)
+        z = parameters.in_box(0.5 + TRUTH_PART * (random.random(len(parameters)) - 0.5))
         values = parameters.to_dict(z)
         scene, material = of_specimen(fine, values)
         if not scene.with_material(**material).flows_at_its_crack and _run(rough, values, store, pool).completed == 1.0:
