@@ -309,25 +309,32 @@ class ParameterSet:
     @cached_property
     def prior_root(self) -> FloatArray:
         """Lower triangle (p, p) whose product with its transpose is the covariance of the prior."""
-        return _kept(np.linalg.cholesky(self.prior_covariance))
-
-    @cached_property
-    def _whitener(self) -> FloatArray:
-        return _kept(np.linalg.inv(self.prior_root))
+        return _kept(np.asarray(np.linalg.cholesky(self.prior_covariance), dtype=np.float64))
 
     def prior_residual(self, z: FloatArray) -> FloatArray:
         """Distance from the prior centre in prior standard deviations, each after those before it: (p,) of a point
         (p,), (q, p) of many. The sum of its squares is the prior's chi-square."""
-        return (z - self.prior_mean) @ self._whitener.T
+        out = z - self.prior_mean
+        for i, row in enumerate(self.prior_root):
+            for j in np.flatnonzero(row[:i]):
+                out[..., i] -= row[j] * out[..., j]
+            out[..., i] /= row[i]
+        return out
 
     def prior_jacobian(self) -> FloatArray:
         """Derivative of :meth:`prior_residual`, (p, p): a lower triangle, diagonal where nothing is correlated."""
-        return self._whitener
+        return np.asarray(np.linalg.inv(self.prior_root), dtype=np.float64)
 
     def from_steps(self, steps: FloatArray) -> FloatArray:
         """Internal coordinates, (p,) or (q, p), of independent steps in prior standard deviations from the prior's
-        centre, of the same shape; the nearest ones within the hard bounds."""
-        return self.clip(self.prior_mean + steps @ self.prior_root.T)
+        centre, of the same shape; the nearest ones within the hard bounds.
+
+        The sums are made one by one: a matrix product rounds otherwise with other points beside it.
+        """
+        out = np.empty(np.shape(steps))
+        for i, row in enumerate(self.prior_root):
+            out[..., i] = self.prior_mean[i] + sum(row[j] * steps[..., j] for j in np.flatnonzero(row))
+        return self.clip(out)
 
     def in_box(self, cube: FloatArray) -> FloatArray:
         """Points that fill the prior's 95 % box evenly, which is sheared where parameters are correlated.
@@ -352,7 +359,7 @@ class ParameterSet:
         """
         root, steps = self.prior_root, np.zeros(np.shape(cube))
         for i in range(len(self)):
-            shift = self.prior_mean[i] + steps @ root[i]  # the steps from here on are 0
+            shift = self.prior_mean[i] + sum(root[i, j] * steps[..., j] for j in np.flatnonzero(root[i, :i]))
             low, high = (ndtr((end - shift) / root[i, i]) for end in (self.lower[i], self.upper[i]))
             steps[..., i] = ndtri(low + (high - low) * cube[..., i])
         return self.from_steps(steps)

@@ -107,7 +107,7 @@ def test_a_size_that_a_study_shares_is_no_property_of_the_flesh(monkeypatch: pyt
     objective = goal(FLESH | {"R_skin": SKIN}, ParameterSet((FIVE.items[3],)))
     specimens: Any = SimpleNamespace(
         setups={"c": SimpleNamespace(objective=objective, fine=scene, coarse=scene, kept=())},
-        own_parameters=lambda name: (FIVE.items[3],),
+        own_parameters=lambda name: (FIVE.items[3].name,),
         evaluator=lambda scene, name, fidelity: cut.append(scene),
         pool=SimpleNamespace(batch=1),
         study=SimpleNamespace(seed=0),

@@ -9,9 +9,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calib.material.food import load_food
 from calib.multi_specimen.compression_modulus import compression_modulus, with_measured_modulus
 from calib.multi_specimen.spec import SCATTER, SPECIMEN_PROPERTIES
 from calib.multi_specimen.study_file import read_study
+from calib.problem.food_parameters import fit_parameters
 from mpm.scene.errors import CutcalError
 from tests.calib.fake import FIVE, goal
 
@@ -120,9 +122,12 @@ def test_a_compression_test_pins_the_modulus(tmp_path: Path) -> None:
         pd.DataFrame({"compression_m": 0.03 * strain, "force_N": force}).to_csv(tmp_path / f"{name}.csv", index=False)
     test = compression_modulus(read_study(written(tmp_path, GOOD)).compressions[0])
     assert test.repeats == 2 and test.E == pytest.approx(1e6, rel=0.1) and 0.1 < test.spread < 0.15
-    before, after = FIVE["E"], with_measured_modulus(FIVE, [test])["E"]
+    banana = load_food("banana")
+    narrowed = with_measured_modulus(FIVE, [test], banana)
+    before, after = FIVE["E"], narrowed["E"]
     assert after.prior_sd < 0.25 * before.prior_sd and after.prior_low < test.E < after.prior_high
-    assert with_measured_modulus(FIVE, []) is FIVE
+    assert narrowed["yield_stress"].prior_sd < 0.7 * fit_parameters(banana, ("yield_stress",))["yield_stress"].prior_sd
+    assert with_measured_modulus(FIVE, [], banana) is FIVE
 
 
 def test_factor_of_a_specimen_is_least_squares_with_its_prior() -> None:
