@@ -38,7 +38,8 @@ def test_the_range_of_E_stays_and_that_of_the_yield_stress_is_hardly_narrower() 
 
 
 def test_a_food_that_is_stiff_and_strong_is_likelier_than_one_that_yields_at_a_strain_of_one() -> None:
-    """Both three times up cost less than E alone; .35 MPa that yields at .32 MPa, as a search once ended, costs over ten, and no strain is better than that of the ranges' middles."""
+    """Both three times up cost less than E alone; .35 MPa that yields at .32 MPa, as a search once ended, costs over
+    ten, and no strain is better than that of the ranges' middles."""
     middle, strong = PRIOR["E"].prior_centre, PRIOR["yield_stress"].prior_centre
     assert chi_square(E=3 * middle, yield_stress=3 * strong) < chi_square(E=3 * middle)
     assert chi_square(E=0.35e6, yield_stress=0.32e6) > 10.0
