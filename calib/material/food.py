@@ -56,7 +56,7 @@ GIVEN_SPREAD = 10.0
 FILES = (".yaml", ".yml")
 """How the name of a food's file ends."""
 _STRENGTHS = ("strength_ratio", "tensile_strength")  # a food has one of them at most
-_OPTIONAL = (*LAYERS, *LAYERS.values(), "skin_stiffness", BOARD_FRICTION, *RELAXATION, *_STRENGTHS)
+_OPTIONAL = (*LAYERS, *LAYERS.values(), "rind_stiffness", "skin_stiffness", BOARD_FRICTION, *RELAXATION, *_STRENGTHS)
 _NULLABLE = ("R_skin", "fracture_energy", *_OPTIONAL)  # a file may leave the optional ones out
 
 

@@ -75,6 +75,7 @@ PROPERTIES: dict[str, Rule] = {
     "skin_stiffness": Rule("N/m", 0.0, 1e6, "Young's modulus of the skin times its thickness, 0 = it bears no tension"),
     "R_rind": Rule("J/m^2", 0.1, 1e5, "cutting (propagation) resistance of the rind"),
     "rind_thickness": Rule("m", 0.0, 0.05, "thickness of the rind all round, 0 = no rind"),
+    "rind_stiffness": Rule("-", 0.01, 100.0, "Young's modulus and yield stress of the rind over those of the flesh"),
     "R_core": Rule("J/m^2", 0.1, 1e5, "cutting (propagation) resistance of the core"),
     "core_ratio": Rule(
         "-", 0.0, 0.95, "radius of the core over that of the food's section, 0 = no core",

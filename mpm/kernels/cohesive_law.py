@@ -2,8 +2,19 @@
 
 import taichi as ti
 
-from mpm.state.tables import INITIATION_DEPTH, LAYERED, R_START, SLIP, STATIONS
+from mpm.state.tables import (
+    BEARING,
+    INITIATION_DEPTH,
+    LAYERED,
+    LOCAL_DENT,
+    R_START,
+    SLIP,
+    STATIONS,
+    WIDTH_OF_FORCE,
+)
 
+LEAST_LINE = 1e-3  # of the starting force, below which the dent is that of this part [-]
+SETTLES = 1.5  # least dent over the local one of the food [-]; below 1 the steps diverge
 AT_ONCE = 1e-9  # length of a fall in bare flesh [m], of no way that a step takes
 
 
@@ -36,7 +47,7 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
     steep = e[1] / size if size > 0 else 0.0
     level = 0.0
     if s.start_force[cut, i] <= 0:
-        level = s.par[cut, R_START] * size / s.par[cut, INITIATION_DEPTH]
+        level = s.par[cut, R_START] * size / dent_at_start(s, cut, i)
         if level >= s.par[cut, R_START] or (s.started_beside[cut, i] > 0 and level >= flesh):
             s.start_force[cut, i] = ti.max(level, 1e-9)
             s.start_excess[cut, i] = ti.max(level - s.passed_mean[cut, i][1], 0.0)
@@ -50,6 +61,22 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
         level = softening_law(s.cut_depth[cut, i], s.softening[cut, i], start, flesh) * size / limit
     s.slip[cut, i], s.line[cut, i] = e, level
     return level * steep * e / ti.max(e.norm(), 1e-30)
+
+
+@ti.func
+def dent_at_start(s: ti.template(), cut, i):
+    """How far the edge has sunk into the process zone of slice i where the cut starts [m].
+
+    It is the initiation depth, and the part of the food's own dent that a zone hides which is wider than the food asks
+    for. A line force F on a width w sinks by 2 (1 - nu^2) / (pi E) F ln(l / w), where l is a length far away (Johnson
+    1985, Contact Mechanics, section 2.4); the width that just bears F is the one of ``bearing`` 1. So the dent depends
+    neither on the width of the zone nor on the cells, which no zone is narrower than. The force is that of the step
+    before, and the dent at least so large that this settles.
+    """
+    local = s.par[cut, LOCAL_DENT]
+    line = ti.max(s.line[cut, i], LEAST_LINE * s.par[cut, R_START])
+    wider = s.par[cut, BEARING] * s.zone[cut, i] / ti.max(line * s.par[cut, WIDTH_OF_FORCE], 1e-30)
+    return ti.max(s.par[cut, INITIATION_DEPTH] + local * ti.log(wider), SETTLES * local)
 
 
 @ti.func

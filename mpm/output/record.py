@@ -53,7 +53,8 @@ class ForceRecord:
         moment: Moment of the food on the knife about the middle of the edge, which raises the end at +x [N m], shape
             (n,); 0 where x = 0 is a mirror.
         tilt: Angle of the edge to the board at the end of each interval [rad], shape (n,).
-        mass: Mass of the food, mirror images included [kg].
+        mass: Mass of the simulated food, mirror images included [kg]: that of the real one, and more where a rind is
+            stiffer than the flesh, for it is simulated as so much more of it.
         lagging: Whether contact acts on particles after they were moved: all but ``nodal`` contact.
         cell: Cell size [m].
         speed: Simulated blade speed [m/s].

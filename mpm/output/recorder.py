@@ -185,7 +185,7 @@ class Recorder:
             parting=np.cumsum(self._column("parting")),
             moment=self._column("moment"),
             tilt=self._column("tilt"),
-            mass=material.rho * setup.seeds.total * setup.grid.images,
+            mass=material.rho * setup.seeds.total * setup.grid.images * setup.heavier(material),
             lagging=scene.numerics.contact != "nodal",
             cell=scene.numerics.dx,
             speed=scene.motion.mach * material.p_wave,

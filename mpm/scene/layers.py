@@ -7,6 +7,7 @@ about that of the flat face; in a food with parallel sides it runs along all of 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -17,6 +18,7 @@ from mpm.scene.material import Material
 from mpm.scene.shapes import FLAT_DOWN, FLAT_TOP, Shape, depth, half_width, inside, radius2, span, surface
 
 SUBSAMPLES = 8  # points along each side of a particle's square of the section
+STIFF_SAMPLES = 3  # points along each edge of a particle's cube
 SECTION_SAMPLES = 400  # points along the width and along the height of a whole section
 
 
@@ -114,6 +116,33 @@ def mean_toughness(shape: Shape, material: Material, part: float = 1.0, without:
     points = _section(shape, (2 * even - 1) * half_width(shape, 0.0), even * shape.height, without)
     upper = points[np.argsort(-points[:, 2], kind="stable")][: max(round(part * len(points)), 1)]
     return float(toughness(shape, material, upper).mean())
+
+
+def layer_stiffness(shape: Shape, material: Material, spacing: float, places: np.ndarray) -> np.ndarray:
+    """E and yield stress of particles over those of the flesh: the mean over the cube that each stands for.
+
+    Args:
+        shape: The outline.
+        material: Its constants.
+        spacing: Edge of the cubes [m].
+        places: Where the particles are in the uncut food [m], shape (n, 3).
+
+    Returns:
+        The factors [-], shape (n,).
+    """
+    out = np.ones(len(places))
+    if not material.graded:
+        return out
+    near = ~_within(shape, places, material.rind_thickness + spacing)
+    offsets = (np.arange(STIFF_SAMPLES) + 0.5) / STIFF_SAMPLES - 0.5
+    rind, count = np.zeros(near.sum()), np.zeros(near.sum())
+    for off in itertools.product(offsets, repeat=3):
+        points = places[near] + spacing * np.array(off)
+        there = inside(shape, points)
+        rind += there & ~_within(shape, points, material.rind_thickness)
+        count += there
+    out[near] += (material.rind_stiffness - 1.0) * np.where(count > 0, rind / np.maximum(count, 1), 1.0)
+    return out
 
 
 def _section(shape: Shape, x: np.ndarray, z: np.ndarray, without: Sequence[Inclusion]) -> np.ndarray:

@@ -32,6 +32,8 @@ class Material:
         R_rind: Cutting resistance of the rind [J/m^2], the layer all round the food; needed with ``rind_thickness``.
         rind_thickness: Thickness of the rind [m]; 0 = no rind. It is there when the edge comes out below, too, while
             the skin is what it takes to start a cut.
+        rind_stiffness: Young's modulus and yield stress of the rind over those of the flesh [-]; both yield at the same
+            strain.
         R_core: Cutting resistance of the core [J/m^2]; needed with ``core_ratio``.
         core_ratio: Radius of the core over that of the food's section [-]; 0 = no core.
         initiation_depth: Indentation under the edge at which a cut starts [m]; soft solids go deep before a cut
@@ -67,6 +69,7 @@ class Material:
     skin_stiffness: float = 0.0
     R_rind: float | None = None
     rind_thickness: float = 0.0
+    rind_stiffness: float = 1.0
     R_core: float | None = None
     core_ratio: float = 0.0
     initiation_depth: float = 1e-3
@@ -98,6 +101,7 @@ class Material:
             ("skin_thickness", "m"),
             ("skin_stiffness", "N/m"),
             ("rind_thickness", "m"),
+            ("rind_stiffness", ""),
             ("mu", ""),
             ("loss_factor", ""),
             ("adhesion", "Pa"),
@@ -167,6 +171,11 @@ class Material:
         return self.rind_thickness > 0 or self.core_ratio > 0
 
     @property
+    def graded(self) -> bool:
+        """Whether the rind is stiffer or softer than the flesh."""
+        return self.rind_thickness > 0 and self.rind_stiffness != 1.0
+
+    @property
     def toughest(self) -> float:
         """Largest cutting resistance of flesh, rind and core [J/m^2]."""
         rind = self.R_rind if self.rind_thickness > 0 else None
@@ -221,7 +230,10 @@ class Material:
         """
         if not self.R > 0:
             return 0.0
-        return min(self.cohesion, math.sqrt(self.E * self.R * (self.R / self.toughest) / (spacing / 2)))
+        rind = (self.R_rind or self.R) / self.rind_stiffness if self.rind_thickness > 0 else 0.0
+        core = self.R_core or 0.0 if self.core_ratio > 0 else 0.0
+        shortest = self.R / max(self.R, rind, core)  # of the softening lengths, over that of the flesh
+        return min(self.cohesion, math.sqrt(self.E * self.R * shortest / (spacing / 2)))
 
     def tie_opening(self, spacing: float) -> float:
         """Half opening at which ties across the cut plane hold nothing any more [m]; ``spacing``: their distance."""

@@ -95,7 +95,7 @@ class EdgeLaw:
     """
 
     zone: float = 3e-3
-    bearing: float = 1.25
+    bearing: float = 2.5
     slip: float = 1e-3
 
     def __post_init__(self) -> None:
@@ -358,6 +358,8 @@ class Scene:
         for name in ("skin_stiffness", "strength_ratio"):
             if not out["food"]["material"][name]:
                 del out["food"]["material"][name]
+        if out["food"]["material"]["rind_stiffness"] == 1.0:
+            del out["food"]["material"]["rind_stiffness"]
         if not out["food"]["material"]["relaxing_share"]:
             del out["food"]["material"]["relaxing_share"], out["food"]["material"]["relaxation_time"]
         return out

@@ -14,7 +14,7 @@ from mpm.discretisation.grid import lay_out
 from mpm.discretisation.particles import seed
 from mpm.runtime import Runtime
 from mpm.scene import Scene
-from mpm.scene.layers import in_whole, layer_ties
+from mpm.scene.layers import in_whole, layer_stiffness, layer_ties
 from mpm.scene.material import Material
 from mpm.scene.shapes import skin_path, slice_powers, surface
 from mpm.scene.shapes import slices as outline
@@ -25,6 +25,7 @@ from mpm.setup.stone import half_of_stone, stone_table
 from mpm.state import contents as column
 from mpm.state.contents import Contents
 from mpm.state.state import IN_STONE, Configuration
+from mpm.state.tables import GRAVITY
 
 PARTICLES_PER_THREAD = 20_000  # for which another thread pays (docs/theory.md, "Measured choices")
 STARTED_BEFORE = 1e-9  # line force at which a cut has started that was there before [N/m]
@@ -118,7 +119,7 @@ class Setup:
             between=scene.mirrored_between,
             particles=self._particles(material),
             slices=self._slices(material),
-            parameters=parameters(scene, material, self.seeds, self.grid),
+            parameters=self._parameters(material),
             pose=pose(scene.food.shape.height + self.gap, 0.0, scene.motion.tilt),
             relaxation=self._relaxation(material),
             ties=self._ties(material),
@@ -127,6 +128,12 @@ class Setup:
             half=self._half() if scene.tied else np.zeros(0),
             stone=stone_table(scene.food, scene.numerics.dx),
         )
+
+    def _parameters(self, material: Material) -> np.ndarray:
+        """The table of parameters, with the gravity that gives the food its weight."""
+        out = parameters(self.scene, material, self.seeds, self.grid)
+        out[GRAVITY] /= self.heavier(material)
+        return out
 
     def _half(self) -> np.ndarray:
         """Half of the food that each particle belongs to, shape (n,); a stone off the middle is of one."""
@@ -195,7 +202,29 @@ class Setup:
         out[:, column.SURFACE_VOLUME + 1] = seeds.areas * gap * outer
         out[:, column.ADHERING] = np.where(seeds.beside & (material.adhesion > 0), 0, -1)
         out[self.scene.food.stony(seeds.x), column.ADHERING] = IN_STONE
+        if material.graded:
+            out[:, column.VOLUME_RATIO : column.ADHERING] *= self.layer_weights(material)[:, None]
         return out
+
+    def layer_weights(self, material: Material) -> np.ndarray:
+        """Stiffness, strength and mass of each particle over those of flesh, shape (n,).
+
+        A stiffer particle is simulated as so much more of the flesh: its mass grows with its stiffness, so that waves
+        are no faster in it and the time step stays. Gravity is less by what the food is heavier for it. Both ends of a
+        tie have the same weight, for the tie gives both the same change of velocity.
+        """
+        out = layer_stiffness(self.scene.food.shape, material, self.seeds.spacing, self.seeds.x)
+        ties = self.ties()
+        ties = ties[(ties >= 0).all(axis=1)]
+        out[ties] = out[ties].mean(axis=1, keepdims=True)
+        return out
+
+    def heavier(self, material: Material) -> float:
+        """Mass of the simulated food over that of the real one [-]: 1 without a layer of another stiffness."""
+        if not material.graded:
+            return 1.0
+        ratio = self.seeds.volume_ratio
+        return float((self.layer_weights(material) * ratio).sum() / ratio.sum())
 
     @cached_property
     def skin(self) -> SkinPoints:
