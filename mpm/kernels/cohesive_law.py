@@ -14,7 +14,8 @@ from mpm.state.tables import (
 )
 
 LEAST_LINE = 1e-3  # of the starting force, below which the dent is that of this part [-]
-SETTLES = 1.5  # least dent over the local one of the food [-]; below 1 the steps diverge
+SETTLES = 1.5  # least dent at which a cut starts, over the local one of the food [-]; below 1 the steps diverge
+LEAST_SLIP = 0.5  # of the edge's slip where the widest zone is narrower than the food asks for [-]
 AT_ONCE = 1e-9  # length of a fall in bare flesh [m], of no way that a step takes
 
 
@@ -36,7 +37,8 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
         forward: The same forward [m].
         part: Part of the slice that the edge is in [-].
     """
-    limit, flesh = s.par[cut, SLIP], resistance_left(s, cut, i)
+    hidden, flesh = hidden_dent(s, cut, i), resistance_left(s, cut, i)
+    limit = ti.max(s.par[cut, SLIP] + hidden * s.line[cut, i] / s.par[cut, R_START], LEAST_SLIP * s.par[cut, SLIP])
     held = 1.0
     if s.start_force[cut, i] <= 0:  # what has come into contact since has not slipped yet
         held = ti.min(1.0, s.contact_part[cut, i] / part)
@@ -47,7 +49,9 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
     steep = e[1] / size if size > 0 else 0.0
     level = 0.0
     if s.start_force[cut, i] <= 0:
-        level = s.par[cut, R_START] * size / dent_at_start(s, cut, i)
+        level = (
+            s.par[cut, R_START] * size / ti.max(s.par[cut, INITIATION_DEPTH] + hidden, SETTLES * s.par[cut, LOCAL_DENT])
+        )
         if level >= s.par[cut, R_START] or (s.started_beside[cut, i] > 0 and level >= flesh):
             s.start_force[cut, i] = ti.max(level, 1e-9)
             s.start_excess[cut, i] = ti.max(level - s.passed_mean[cut, i][1], 0.0)
@@ -64,19 +68,18 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
 
 
 @ti.func
-def dent_at_start(s: ti.template(), cut, i):
-    """How far the edge has sunk into the process zone of slice i where the cut starts [m].
+def hidden_dent(s: ti.template(), cut, i):
+    """The part of the food's own dent under the starting force that a process zone hides [m].
 
-    It is the initiation depth, and the part of the food's own dent that a zone hides which is wider than the food asks
-    for. A line force F on a width w sinks by 2 (1 - nu^2) / (pi E) F ln(l / w), where l is a length far away (Johnson
-    1985, Contact Mechanics, section 2.4); the width that just bears F is the one of ``bearing`` 1. So the dent depends
-    neither on the width of the zone nor on the cells, which no zone is narrower than. The force is that of the step
-    before, and the dent at least so large that this settles.
+    A line force F on a width w sinks by 2 (1 - nu^2) / (pi E) F ln(l / w), where l is a length far away (Johnson 1985,
+    Contact Mechanics, section 2.4); the width that just bears F is the one of ``bearing`` 1. The edge sinks into its
+    zone by what a wider zone hides, so that its dent depends neither on the width of the zone nor on the cells, which no
+    zone is narrower than. It is the food's and no cut: it is there while the edge cuts, too. The width is that which
+    belongs to the force of the step before.
     """
-    local = s.par[cut, LOCAL_DENT]
     line = ti.max(s.line[cut, i], LEAST_LINE * s.par[cut, R_START])
     wider = s.par[cut, BEARING] * s.zone[cut, i] / ti.max(line * s.par[cut, WIDTH_OF_FORCE], 1e-30)
-    return ti.max(s.par[cut, INITIATION_DEPTH] + local * ti.log(wider), SETTLES * local)
+    return s.par[cut, LOCAL_DENT] * ti.log(wider)
 
 
 @ti.func
