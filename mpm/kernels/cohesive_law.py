@@ -73,9 +73,9 @@ def hidden_dent(s: ti.template(), cut, i):
 
     A line force F on a width w sinks by 2 (1 - nu^2) / (pi E) F ln(l / w), where l is a length far away (Johnson 1985,
     Contact Mechanics, section 2.4); the width that just bears F is the one of ``bearing`` 1. The edge sinks into its
-    zone by what a wider zone hides, so that its dent depends neither on the width of the zone nor on the cells, which no
-    zone is narrower than. It is the food's and no cut: it is there while the edge cuts, too. The width is that which
-    belongs to the force of the step before.
+    zone by what a wider zone hides, so that its dent depends neither on the width of the zone nor on the cells. It is
+    the food's and no cut: it is there while the edge cuts, too. The width is that which belongs to the force of the
+    step before.
     """
     line = ti.max(s.line[cut, i], LEAST_LINE * s.par[cut, R_START])
     wider = s.par[cut, BEARING] * s.zone[cut, i] / ti.max(line * s.par[cut, WIDTH_OF_FORCE], 1e-30)
