@@ -37,8 +37,9 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
         forward: The same forward [m].
         part: Part of the slice that the edge is in [-].
     """
-    hidden, flesh = hidden_dent(s, cut, i), resistance_left(s, cut, i)
-    limit = ti.max(s.par[cut, SLIP] + hidden * s.line[cut, i] / s.par[cut, R_START], LEAST_SLIP * s.par[cut, SLIP])
+    hidden, flesh, threshold = hidden_dent(s, cut, i), resistance_left(s, cut, i), s.par[cut, R_START]
+    limit = ti.max(s.par[cut, SLIP] + hidden * s.line[cut, i] / ti.max(threshold, 1e-30), LEAST_SLIP * s.par[cut, SLIP])
+    dent = ti.max(s.par[cut, INITIATION_DEPTH] + hidden, SETTLES * s.par[cut, LOCAL_DENT])
     held = 1.0
     if s.start_force[cut, i] <= 0:  # what has come into contact since has not slipped yet
         held = ti.min(1.0, s.contact_part[cut, i] / part)
@@ -49,10 +50,8 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
     steep = e[1] / size if size > 0 else 0.0
     level = 0.0
     if s.start_force[cut, i] <= 0:
-        level = (
-            s.par[cut, R_START] * size / ti.max(s.par[cut, INITIATION_DEPTH] + hidden, SETTLES * s.par[cut, LOCAL_DENT])
-        )
-        if level >= s.par[cut, R_START] or (s.started_beside[cut, i] > 0 and level >= flesh):
+        level = threshold * size / dent
+        if level >= threshold or (s.started_beside[cut, i] > 0 and level >= flesh):
             s.start_force[cut, i] = ti.max(level, 1e-9)
             s.start_excess[cut, i] = ti.max(level - s.passed_mean[cut, i][1], 0.0)
             e *= limit / ti.max(size, 1e-30)  # without resistance a cut starts before the edge has slipped
