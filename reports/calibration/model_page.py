@@ -189,9 +189,12 @@ def _conditions(result: CalibrationResult) -> list[list[str]]:
 def _objective(result: CalibrationResult) -> str:
     words = "Tare, drift and lag are integrated out of the curve; gain and width widen the intervals."
     open_ = f" {words}" if result.nuisances else ""
+    tied = {"E", "yield_stress"} <= set(result.fitted)
+    ratio = " Yield stress over E is known to a factor of 3." if tied else ""
     return (
         "The fit minimises the sum of squared residuals of curve and peak, whitened, and of the parameters against the "
-        "literature's ranges (central 95 % of normal priors, of the logarithm for stresses and resistances). "
+        "literature's ranges (central 95 % of normal priors, of the logarithm for stresses and resistances)."
+        f"{ratio} "
         "A residual's variance is noise plus 3 % of the peak for what the model leaves out, unless another "
         f"--discrepancy is in the command [7].{open_} Intervals are profile likelihoods whose ends were simulated [8]."
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from pypdf import PdfReader
 
 from calib.calibration.result import CalibrationResult, read_result
 from calib.material.references import cited, references
+from calib.problem.food_parameters import YIELD_STRAIN_FACTOR
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.validation.acceptance import Conservation, judge
 from calib.validation.bounds import bound_word
@@ -214,3 +216,12 @@ def test_names_in_sources_have_their_reference() -> None:
     assert found["Du 2019"].startswith("Du, Wang, Wang and Yao")
     assert found["J. Texture Stud. 14:155"].startswith("A practical method")
     assert len(found) == 2 and len(references()) > 50
+
+
+def test_the_model_page_says_how_well_the_yield_strain_is_known() -> None:
+    """With the factor of the fit's prior; nothing is said of it where only one of the two was fitted."""
+    both, one = (
+        SimpleNamespace(fitted=dict.fromkeys(names), nuisances={}) for names in (("E", "yield_stress"), ("E",))
+    )
+    said = f"Yield stress over E is known to a factor of {YIELD_STRAIN_FACTOR:g}."
+    assert said in model_page._objective(both) and said not in model_page._objective(one)
