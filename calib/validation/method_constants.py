@@ -76,8 +76,9 @@ CONSTANTS = (
         "half of it is narrower than a cell",
     ),
     MethodConstant(
-        "bearing of the process zone", "edge", "bearing", (0.5, 2.0),
-        "numerical: at 1 the food flows along with the edge, at 1.25 in part",
+        "bearing of the process zone", "edge", "bearing", (2.0,),
+        "plastic collapse under a punch of the zone's width, and a quarter more",
+        "half of it is less than R, and the food flows along with the edge",
     ),
     MethodConstant("slip of the edge", "edge", "slip", (0.5, 2.0), "numerical: elastic way of the edge's law"),
     MethodConstant(

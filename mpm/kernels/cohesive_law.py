@@ -2,20 +2,8 @@
 
 import taichi as ti
 
-from mpm.state.tables import (
-    BEARING,
-    INITIATION_DEPTH,
-    LAYERED,
-    LOCAL_DENT,
-    R_START,
-    SLIP,
-    STATIONS,
-    WIDTH_OF_FORCE,
-)
+from mpm.state.tables import INITIATION_DEPTH, LAYERED, R_START, SLIP, STATIONS
 
-LEAST_LINE = 1e-3  # of the starting force, below which the dent is that of this part [-]
-SETTLES = 1.5  # least dent at which a cut starts, over the local one of the food [-]; below 1 the steps diverge
-LEAST_SLIP = 0.5  # of the edge's slip where the widest zone is narrower than the food asks for [-]
 AT_ONCE = 1e-9  # length of a fall in bare flesh [m], of no way that a step takes
 
 
@@ -37,9 +25,7 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
         forward: The same forward [m].
         part: Part of the slice that the edge is in [-].
     """
-    hidden, flesh, threshold = hidden_dent(s, cut, i), resistance_left(s, cut, i), s.par[cut, R_START]
-    limit = ti.max(s.par[cut, SLIP] + hidden * s.line[cut, i] / ti.max(threshold, 1e-30), LEAST_SLIP * s.par[cut, SLIP])
-    dent = ti.max(s.par[cut, INITIATION_DEPTH] + hidden, SETTLES * s.par[cut, LOCAL_DENT])
+    limit, flesh = s.par[cut, SLIP], resistance_left(s, cut, i)
     held = 1.0
     if s.start_force[cut, i] <= 0:  # what has come into contact since has not slipped yet
         held = ti.min(1.0, s.contact_part[cut, i] / part)
@@ -50,8 +36,8 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
     steep = e[1] / size if size > 0 else 0.0
     level = 0.0
     if s.start_force[cut, i] <= 0:
-        level = threshold * size / dent
-        if level >= threshold or (s.started_beside[cut, i] > 0 and level >= flesh):
+        level = s.par[cut, R_START] * size / s.par[cut, INITIATION_DEPTH]
+        if level >= s.par[cut, R_START] or (s.started_beside[cut, i] > 0 and level >= flesh):
             s.start_force[cut, i] = ti.max(level, 1e-9)
             s.start_excess[cut, i] = ti.max(level - s.passed_mean[cut, i][1], 0.0)
             e *= limit / ti.max(size, 1e-30)  # without resistance a cut starts before the edge has slipped
@@ -64,21 +50,6 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
         level = softening_law(s.cut_depth[cut, i], s.softening[cut, i], start, flesh) * size / limit
     s.slip[cut, i], s.line[cut, i] = e, level
     return level * steep * e / ti.max(e.norm(), 1e-30)
-
-
-@ti.func
-def hidden_dent(s: ti.template(), cut, i):
-    """The part of the food's own dent under the starting force that a process zone hides [m].
-
-    A line force F on a width w sinks by 2 (1 - nu^2) / (pi E) F ln(l / w), where l is a length far away (Johnson 1985,
-    Contact Mechanics, section 2.4); the width that just bears F is the one of ``bearing`` 1. The edge sinks into its
-    zone by what a wider zone hides, so that its dent depends neither on the width of the zone nor on the cells. It is
-    the food's and no cut: it is there while the edge cuts, too. The width is that which belongs to the force of the
-    step before.
-    """
-    line = ti.max(s.line[cut, i], LEAST_LINE * s.par[cut, R_START])
-    wider = s.par[cut, BEARING] * s.zone[cut, i] / ti.max(line * s.par[cut, WIDTH_OF_FORCE], 1e-30)
-    return s.par[cut, LOCAL_DENT] * ti.log(wider)
 
 
 @ti.func

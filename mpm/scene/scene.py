@@ -95,7 +95,7 @@ class EdgeLaw:
     """
 
     zone: float = 3e-3
-    bearing: float = 2.5
+    bearing: float = 1.25
     slip: float = 1e-3
 
     def __post_init__(self) -> None:

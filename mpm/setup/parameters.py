@@ -80,10 +80,7 @@ def _put_tool(table: np.ndarray, scene: Scene, material: Material) -> None:
     table[row.INITIATION_DEPTH] = material.initiation_depth
     table[row.SLIP], table[row.ZONE] = edge.slip, scene.process_zone(material)
     table[row.ZONE_MASS] = material.rho * scene.numerics.dx * table[row.ZONE] ** 2
-    table[row.WIDTH_OF_FORCE] = scene.width_of_force(material)
-    table[row.ZONE_MOST], table[row.BEARING] = scene.widest_zone, edge.bearing
-    if material.yield_stress < math.inf:  # what never yields bears any force on no width
-        table[row.LOCAL_DENT] = 2 * (1 - material.nu**2) / (math.pi * material.E) * material.start
+    table[row.WIDTH_OF_FORCE], table[row.ZONE_MOST] = scene.width_of_force(material), scene.widest_zone
     if isinstance(tool, Press):
         half, table[row.BLADE_MU], table[row.SPINE] = tool.half_angle, tool.mu, ENDLESS
     else:

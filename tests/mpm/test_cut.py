@@ -93,11 +93,11 @@ def test_thin_blade_needs_resistance_times_width(prism, modulus, R):
 
 
 def test_a_process_zone_is_as_wide_as_the_food_asks_for(prism):
-    """A punch of its width bears 2.5 R, unless that is half the food's height; then R is paid also by a food whose
-    yield stress over the zone of a firm one is a tenth of R."""
-    zones = [PRISM.process_zone(replace(FLESH, yield_stress=y)) for y in (np.inf, 2e5, 4e4, 1e3)]
+    """A punch of its width bears a quarter more than R, unless that is half the food's height; then R is paid also by a
+    food whose yield stress over the zone of a firm one is a tenth of R."""
+    zones = [PRISM.process_zone(replace(FLESH, yield_stress=y)) for y in (np.inf, 2e5, 2e4, 1e3)]
     assert zones[:2] == [3e-3, 3e-3] and zones[3] == PRISM.food.shape.height / 2
-    assert (2 + np.pi) / np.sqrt(3) * 4e4 * zones[2] == pytest.approx(2.5 * FLESH.R)
+    assert (2 + np.pi) / np.sqrt(3) * 2e4 * zones[2] == pytest.approx(1.25 * FLESH.R)
     assert prism.run(replace(FLESH, yield_stress=1e4)).parted == pytest.approx(1.0, abs=0.06)
 
 
@@ -105,7 +105,7 @@ def test_food_that_flows_is_pressed_away_not_parted(prism):
     """The edge takes R from each new area of a food that is cut (5 %), and far less of one whose yield stress over the
     process zone is a tenth of R: under an edge that does not follow it, that one flows along. Where nothing is to be
     parted there is no such number."""
-    cut = prism.run(replace(FLESH, yield_stress=2e5, initiation_depth=2e-4))
+    cut = prism.run(replace(FLESH, yield_stress=2e5))
     flown = run(replace(PRISM, edge=replace(PRISM.edge, bearing=0.0)), yield_stress=1e4)
     assert cut.parted == pytest.approx(1.0, abs=0.06)
     assert flown.status == "done" and flown.parted < 0.5

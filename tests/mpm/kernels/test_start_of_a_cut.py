@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from mpm.output.record import ForceRecord
@@ -47,15 +46,3 @@ def test_what_a_start_takes_beyond_the_resistance_is_spent_in_the_skin(skin):
     short, long = (indented(stiff, EdgeLaw(zone=3e-3, slip=s)) for s in (0.5e-3, 2e-3))
     assert long.work == pytest.approx(short.work, rel=0.005)
     assert long.peak == pytest.approx(short.peak, rel=0.005)
-
-
-@pytest.mark.parametrize("wider", [{"zone": 6e-3}, {"bearing": 5.0}])
-def test_where_a_cut_starts_does_not_depend_on_the_width_that_bears_the_edge(wider):
-    """A line force on twice the width sinks less by 2 (1 - nu^2) / (pi E) F ln 2, .7 mm here, and the edge so much more
-    into its zone: a skin of 600 N/m on flesh of 60 kPa parts at the same stroke (10 %, without that 16 and 24 %), for
-    the same work (3 %)."""
-    flesh = replace(SKINNED, yield_stress=6e4)
-    usual, other = (indented(flesh, EdgeLaw(**{"zone": 3e-3, **given})) for given in ({}, wider))
-    starts = [float(r.stroke[np.argmax(np.abs(r.knife[:, 2]))]) for r in (usual, other)]
-    assert starts[1] == pytest.approx(starts[0], rel=0.1)
-    assert other.work == pytest.approx(usual.work, rel=0.03)
