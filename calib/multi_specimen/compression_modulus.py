@@ -87,6 +87,14 @@ def with_measured_modulus(
     """The parameters with the prior of E narrowed by compression tests, as independent lognormal measurements.
 
     That of the food's yield stress follows it.
+
+    Args:
+        parameters: The fitted parameters.
+        tests: Compression tests of the food.
+        food: The food.
+
+    Returns:
+        The parameters; as they were without a test or without E among them.
     """
     if not tests or "E" not in parameters.names:
         return parameters

@@ -79,6 +79,7 @@ def test_shipped_foods(foods: dict[str, FoodSpec]) -> None:
             "strength_ratio",
             "fracture_energy",
             "skin_stiffness",
+            "rind_stiffness",
             *RELAXATION,
             *LAYERS,
             *LAYERS.values(),
@@ -609,6 +610,15 @@ def test_a_skin_that_bears_tension_is_asked_for() -> None:
     skinned = plain.with_values({"skin_stiffness": 3000.0})
     assert skinned.to_scene_food().material.skin_stiffness == 3000.0
     assert skinned.as_dict()["properties"]["skin_stiffness"]["value"] == 3000.0
+
+
+def test_a_stiff_rind_is_asked_for() -> None:
+    """No food has it by default; a value reaches the solver and comes back from a file."""
+    plain = load_food("cucumber")
+    assert not plain.to_scene_food().material.graded and "rind_stiffness" not in plain.as_dict()["properties"]
+    stiff = plain.with_values({"rind_stiffness": 4.0})
+    assert stiff.to_scene_food().material.graded and stiff.to_scene_food().material.rind_stiffness == 4.0
+    assert stiff.as_dict()["properties"]["rind_stiffness"]["value"] == 4.0
 
 
 def test_a_food_that_relaxes_is_asked_for() -> None:
