@@ -199,7 +199,7 @@ class ParameterSet:
         correlations: Which of them are correlated in the prior; all others are independent.
 
     Raises:
-        MaterialError: No parameter, a name given twice, or or correlations that no prior has.
+        MaterialError: No parameter, a name given twice, or correlations that no prior has.
     """
 
     items: tuple[Parameter, ...]

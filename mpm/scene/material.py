@@ -101,7 +101,6 @@ class Material:
             ("skin_thickness", "m"),
             ("skin_stiffness", "N/m"),
             ("rind_thickness", "m"),
-            ("rind_stiffness", ""),
             ("mu", ""),
             ("loss_factor", ""),
             ("adhesion", "Pa"),
@@ -137,6 +136,7 @@ class Material:
             raise SceneError(
                 "material: skin_thickness > 0 needs R_skin, the force per width that goes through the skin"
             )
+        check_number(w, "rind_stiffness", self.rind_stiffness, 0.0, 1e3, "of the flesh's")
         self._check_layers(w)
         if (self.adhesion > 0) != (self.adhesion_energy > 0):
             raise SceneError(

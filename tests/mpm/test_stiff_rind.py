@@ -80,4 +80,4 @@ def test_both_ends_of_a_tie_are_as_heavy() -> None:
 def test_a_rind_without_stiffness_is_refused() -> None:
     """A rind that bears nothing is no layer of a solid."""
     with pytest.raises(SceneError, match="rind_stiffness"):
-        replace(FLESH, **RIND, rind_stiffness=-1.0)
+        replace(FLESH, **RIND, rind_stiffness=0.0)
