@@ -16,9 +16,9 @@ BOUND_FACTOR = 5.0
 LINEAR = {"nu": (0.0, 0.49), "mu": (0.0, 1.2)}
 """Properties that are fitted on a linear scale, with their hard bounds."""
 YIELD_STRAIN_FACTOR = 3.0
-"""A food's yield stress over its E is this factor below or above that of the literature, at 95 % [-]: apples fail at
-about the same strain however firm they are (Segerlind and Dal Fabbro 1978), and single values of fruit lie between 5 %
-(kiwi) and 20 % (potato). Assumed, materials.yaml, remark 8."""
+"""A food's yield stress over its E is this factor below or above that of the literature, at 95 % [-]. A critical strain
+has been proposed as what fruit tissue fails at (Segerlind and Dal Fabbro 1978); published single values lie between 5 %
+(kiwi) and 16 % (apple). The factor is assumed, materials.yaml, remark 8."""
 Heights = tuple[float, float, float]
 """Lowest, likely and largest height of a specimen [m]."""
 

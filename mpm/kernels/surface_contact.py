@@ -307,7 +307,7 @@ def stick_face(s: ti.template(), cut, p, sign, at):
     opening, n = blade_opening(s, cut, y, (at[2] - edge_height(s, cut, at[0])) * cos_t)
     if opening < s.par[cut, ADHESION_GAP]:
         pull = s.par[cut, ADHESION] * adhesive_traction(ti.max(opening, 0.0), s.par[cut, ADHESION_GAP])
-        press = -pull / s.par[cut, CONTACT]
+        press = -pull / (s.par[cut, CONTACT] * s.volume_ratio[cut, p])  # of a stiff rind the blade holds no more
     else:
         s.adhering[cut, p] = 0
     return press, press * ti.Vector([-sin_t * n[2], sign * n[1], cos_t * n[2]])

@@ -213,11 +213,19 @@ class Setup:
         are no faster in it and the time step stays. Gravity is less by what the food is heavier for it. Both ends of a
         tie have the same weight, for the tie gives both the same change of velocity.
         """
+        if material in self._weights:
+            return self._weights[material]
         out = layer_stiffness(self.scene.food.shape, material, self.seeds.spacing, self.seeds.x)
         ties = self.ties()
         ties = ties[(ties >= 0).all(axis=1)]
         out[ties] = out[ties].mean(axis=1, keepdims=True)
+        self._weights[material] = out
         return out
+
+    @cached_property
+    def _weights(self) -> dict[Material, np.ndarray]:
+        """What :meth:`layer_weights` has found."""
+        return {}
 
     def heavier(self, material: Material) -> float:
         """Mass of the simulated food over that of the real one [-]: 1 without a layer of another stiffness."""

@@ -67,6 +67,23 @@ def test_a_stiff_rind_costs_no_time_and_weighs_nothing() -> None:
     assert slow.work == pytest.approx(record.work, rel=0.03)
 
 
+def test_a_food_that_is_all_rind_is_a_stiffer_food() -> None:
+    """With a rind right through it, one four times as stiff as the flesh is cut and left again with the forces of one
+    with four times E, yield stress and density, in a quarter of the gravity (1e-6): all of them, of the edge, the ties,
+    the contact, the friction and the adhesion."""
+    through = replace(FLESH, R_rind=FLESH.R, rind_thickness=0.013, mu=0.2, adhesion=5e3, adhesion_energy=0.5)
+    through = replace(through, tensile_strength=2e4, yield_stress=5e5)
+    four = replace(through, E=4 * FLESH.E, rho=4 * FLESH.rho, yield_stress=2e6)
+    base = replace(scene("sphere"), food=Food(BLOCK, through), motion=Motion(0.018, 0.01, retract=4e-3))
+    rind = cut(replace(base.with_material(rind_stiffness=4.0), numerics=replace(base.numerics, gravity=9.81)))
+    food = cut(replace(base, food=Food(BLOCK, four), numerics=replace(base.numerics, gravity=9.81 / 4)))
+    for name in ("edge", "face", "board", "friction", "elastic"):
+        one, other = getattr(rind, name), getattr(food, name)
+        assert np.abs(one - other).max() <= 1e-6 * np.abs(other).max(), name
+    dry = cut(base.with_material(adhesion=0.0, adhesion_energy=0.0))
+    assert np.abs(rind.face[-1, 2]) > 1.2 * np.abs(dry.face[-1, 2])  # or the adhesion would not be seen
+
+
 def test_both_ends_of_a_tie_are_as_heavy() -> None:
     """Or what one half gets the other would not lose: beside a blade aside of the middle the rinds differ."""
     aside = replace(scene("sphere", replace(FRUIT, rind_stiffness=5.0), mirror=False))
