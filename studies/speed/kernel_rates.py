@@ -18,6 +18,7 @@ from mpm.scene.material import Material
 from mpm.scene.shapes import Shape
 from studies.speed.peers import PEERS, measure
 from studies.speed.result import MeasuredPeer, PeerResult, PublishedConfiguration, Throughput, UnmeasuredPeer
+from studies.speed.standing_block import GRAVITY, Standing, StandingBlock, stand
 from studies.speed.timing import RateMeter, Session
 
 # The published configuration: nodes along each axis, time step [s] (CulinaryCut, section 4.1). Its cell is the one with
@@ -34,7 +35,6 @@ BENCHMARK_BLOCK = Scene(
     numerics=Numerics(dx=2e-3, mirror=False),
 )
 TEXTBOOK_STEPS = 10
-PEER_FLOOR = 4  # node that holds the block in a peer
 NUMBERS_TO_GRID = 46  # F twice, C, stress, the last stretch, x, v, two indices
 NUMBERS_TO_PARTICLES = 29  # x twice, v, C, two indices, height of contact, two stretches
 NUMBERS_OF_NODES = 3  # the nodes, each for eight particles, cleared, added to, turned to velocities and read
@@ -125,9 +125,10 @@ def published_configuration(session: Session, whole: Scene, stroke: float) -> Pu
 
 
 def peers(session: Session, python: str) -> tuple[PeerResult, ...]:
-    """Rates of the elastic block, ours and each peer's; ours before and after it.
+    """A block on which its weight is put at once, ours before and after each peer.
 
-    All in single precision, which is the peers' default.
+    All in single precision, which is the peers' default, with the same cells, particles and, where they are explicit,
+    time steps.
 
     Args:
         session: What all measurements share.
@@ -136,48 +137,43 @@ def peers(session: Session, python: str) -> tuple[PeerResult, ...]:
     Returns:
         A result for each peer.
     """
-    scene = BENCHMARK_BLOCK.with_material(yield_stress=math.inf, tensile_strength=None, fracture_energy=None)
-    scene = replace(scene, numerics=replace(scene.numerics, precision="f32"))
-    ours = session.kept.get(scene, session.runtime)
-    shape, dx, law = scene.food.shape, BENCHMARK_BLOCK.numerics.dx, scene.food.material
-    size = np.array([shape.width, shape.length, shape.height])
-    room = np.array(ours.setup.grid.nodes) * dx - size
-    block = {
-        "dx": dx,
-        "nodes": [int(n) for n in ours.setup.grid.nodes],
-        "low": [float(room[0]) / 2, float(room[1]) / 2, PEER_FLOOR * dx],
-        "counts": [round(s / dx * BENCHMARK_BLOCK.numerics.ppc) for s in size],
-        "dt": ours.run().dt,
-        "rho": law.rho,
-        "mu": law.shear,
-        "lam": law.lame,
-        "floor": PEER_FLOOR,
-        "steps": TEXTBOOK_STEPS,
-        "repeats": session.repeats,
-    }
+    numerics = replace(BENCHMARK_BLOCK.numerics, precision="f32", gravity=GRAVITY)
+    session.kept.drop()
     results = []
     for name in PEERS:
-        meter = RateMeter(ours)
-        meter.run(session.repeats)
-        answer = measure(python, name, block, session.runtime.cpu_threads)
-        results.append(_peer_result(answer, meter.run(session.repeats)))
+        block, before = stand(BENCHMARK_BLOCK.food.shape, numerics, session.runtime)
+        answer = measure(python, name, block.task(session.runtime.arch), session.runtime.cpu_threads)
+        _, after = stand(BENCHMARK_BLOCK.food.shape, numerics, session.runtime)
+        results.append(_peer_result(answer, block, min(before, after, key=lambda one: one.seconds)))
         session.say(_peer_words(results[-1]))
     return tuple(results)
 
 
-def _peer_result(answer: Mapping[str, Any], ours: float) -> PeerResult:
-    """What a peer answered, beside our particle steps a second [1/s]."""
+def _peer_result(answer: Mapping[str, Any], block: StandingBlock, ours: Standing) -> PeerResult:
+    """What a peer answered, beside ours."""
     if "seconds" not in answer:
         return UnmeasuredPeer(answer["name"], answer["error"])
-    theirs = answer["particles"] / answer["seconds"]
-    rates = {"Mps": theirs / 1e6, "ours_Mps": ours / 1e6, "ratio": ours / theirs}
-    return MeasuredPeer(answer["name"], answer["seconds"], answer["version"], answer["particles"], **rates)
+    rate = answer["particles"] / answer["seconds"]
+    return MeasuredPeer(
+        name=answer["name"],
+        seconds=answer["seconds"],
+        version=answer["version"],
+        particles=answer["particles"],
+        Mps=rate / 1e6,
+        ours_Mps=ours.rate / 1e6,
+        ratio=ours.rate / rate / answer["longer"],
+        force_error=block.force_error(answer["velocity"]),
+        ours_force_error=ours.force_error,
+    )
 
 
 def _peer_words(peer: PeerResult) -> str:
     if isinstance(peer, UnmeasuredPeer):
         return f"{peer.name}: not measured, {peer.error}"
-    return f"{peer.name} {peer.version}: {peer.Mps:.2f} million particle steps a second, {peer.ratio:.1f}"
+    return (
+        f"{peer.name} {peer.version}: {peer.Mps:.2f} million particle steps a second (ours {peer.ours_Mps:.2f}), "
+        f"{peer.ratio:.1f} times our time; error of the force {peer.force_error:.1%} (ours {peer.ours_force_error:.1%})"
+    )
 
 
 def bandwidth(threads: int) -> float:

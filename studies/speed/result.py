@@ -173,7 +173,9 @@ class MeasuredPeer:
         particles: Particles.
         Mps: Particle steps a second [1e6/s].
         ours_Mps: Those of cutcal [1e6/s].
-        ratio: Ours over theirs.
+        ratio: Its time for the same motion over ours.
+        force_error: Its error of the force on the floor, root mean square over the peak, against the closed form.
+        ours_force_error: That of cutcal.
     """
 
     name: str
@@ -183,6 +185,8 @@ class MeasuredPeer:
     Mps: Positive
     ours_Mps: Positive
     ratio: Positive
+    force_error: NotNegative
+    ours_force_error: NotNegative
 
 
 @dataclass(frozen=True)
