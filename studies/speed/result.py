@@ -221,7 +221,7 @@ class BenchmarkResult:
         versions: Versions of cutcal, of Python and of the packages that a result depends on.
         git: Commit of the checkout that ran, with +changes where it was edited; null where cutcal was installed without
             one.
-        peers: The elastic block in other simulators, with --peers.
+        peers: The standing block in other simulators, with --peers.
         throughput: Rate of the kernels on a block.
         paper_config: The published configuration on this machine.
         default_cut: The default cut against finer cells.

@@ -125,5 +125,8 @@ def _peer_line(peer: PeerResult) -> str:
     from studies.speed.result import UnmeasuredPeer
 
     if isinstance(peer, UnmeasuredPeer):
-        return f"  elastic block in {peer.name}: not measured, {peer.error}"
-    return f"  elastic block: {peer.ratio:.1f} times {peer.name} {peer.version} ({peer.Mps:.2f} million a second)"
+        return f"  standing block in {peer.name}: not measured, {peer.error}"
+    return (
+        f"  standing block: {peer.name} {peer.version} takes {peer.ratio:.1f} times our time ({peer.Mps:.2f} million a "
+        f"second, error of the force {peer.force_error:.1%}, ours {peer.ours_force_error:.1%})"
+    )

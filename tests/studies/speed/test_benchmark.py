@@ -24,6 +24,7 @@ from mpm.runtime import Runtime
 from mpm.scene import Scene
 from studies.speed.benchmark import BenchmarkSettings, run_benchmark
 from studies.speed.result import BenchmarkResult
+from studies.speed.standing_block import Standing, StandingBlock
 from tests.calib.documents import valid
 
 
@@ -105,12 +106,27 @@ def side_by_side(scenes: list[Scene], runtime: object) -> None:
     Workers.compiled.add(len(scenes))
 
 
+BLOCK = StandingBlock((0.04, 0.08, 0.04), 2e-3, 2, 3e-5)
+
+
+def fallen(block: dict) -> list[float]:
+    """Velocities of a block that no floor holds."""
+    return [-block["gravity"] * block["dt"] * block["steps"] * (n + 1) for n in range(block["windows"])]
+
+
 def peer(python: str, name: str, block: dict, threads: int) -> dict:
-    """One peer that takes 0.5 s a step, one that is not there."""
+    """Peers that take 0.5 s a step, whatever its length, and fall; one that is not there."""
     assert np.prod(block["counts"]) == 128000 and np.all(np.array(block["low"]) > 0) and threads == 2
     if name == "Genesis":
         return {"name": name, "error": "No module named 'genesis'"}
-    return {"name": name, "seconds": 0.5, "particles": 128000, "version": "1"}
+    longer = 10 if "10" in name else 1
+    moved = {"particles": 128000, "version": "1", "velocity": fallen(block)}
+    return {"name": name, "longer": longer, "seconds": 0.5, **moved}
+
+
+def stand(shape: object, numerics: object, runtime: object) -> tuple[StandingBlock, Standing]:
+    """The solver takes 0.128 s a step."""
+    return BLOCK, Standing(0.128, 128000, 0.01)
 
 
 @pytest.fixture
@@ -124,6 +140,7 @@ def document(monkeypatch, tmp_path) -> dict:
         (studies.speed.timing, "time", clock),
         (studies.speed.timing, "Simulation", Solver),
         (studies.speed.kernel_rates, "measure", peer),
+        (studies.speed.kernel_rates, "stand", stand),
         (studies.speed.kernel_rates, "bandwidth", lambda threads: 2e10),
         (studies.speed.textbook, "Textbook", Yardstick),
     ):
@@ -170,10 +187,21 @@ def test_ratios_are_those_of_the_times(document):
 
 
 def test_peers_are_compared_or_said_to_be_absent(document):
-    """The ratio is that of particle steps a second; a peer that is not installed says so."""
-    warp, genesis = document["peers"]
-    assert warp["ours_Mps"] == pytest.approx(1.0) and warp["ratio"] == pytest.approx(1.0 / 0.256)
+    """The ratio is that of the times of the same motion, the error that of a block that falls freely; a peer that is
+    not installed says so.
+    """
+    warp, genesis, newton, longer = document["peers"]
+    assert warp["ours_Mps"] == pytest.approx(1.0) and warp["Mps"] == pytest.approx(0.256)
+    assert warp["ratio"] == newton["ratio"] == pytest.approx(1.0 / 0.256)
+    assert longer["ratio"] == pytest.approx(0.1 / 0.256)
+    assert warp["force_error"] == pytest.approx(3**-0.5, rel=0.05) and warp["ours_force_error"] == 0.01
     assert "ratio" not in genesis and "genesis" in genesis["error"]
+
+
+def test_a_peer_is_not_asked_for_a_device_that_it_lacks():
+    """It says so, and nothing is started."""
+    row = studies.speed.peers.measure("no-such-python", "Warp", BLOCK.task("vulkan"), 1)
+    assert row["error"] == "it does not run on vulkan"
 
 
 @pytest.mark.parametrize("name", list(studies.speed.peers.PEERS))
@@ -195,4 +223,4 @@ def test_table_names_every_row(document):
     text = table(from_document(BenchmarkResult, document))
     assert all(row["name"] in text for row in document["ablations"]) and "to the power 1.00" in text
     assert "in Genesis: not measured, No module named" in text
-    assert "3.9 times Warp" in text and "2 processes do 2.00 times" in text
+    assert "Warp 1 takes 3.9 times our time" in text and "2 processes do 2.00 times" in text
