@@ -37,7 +37,7 @@ from calib.trace.filters import filter_simulated
 from calib.trace.stroke import board_stroke
 from mpm.scene import Motion, Scene
 
-COARSE_SPEED = 2.0
+COARSE_SPEED = 1.0
 """Speed of a search's coarse simulations over that of a screening scene [-] (docs/theory.md, "Surrogate and search").
 The surrogate takes their common offset from the fine ones away."""
 FINE, COARSE, REPLICATED = "fine", "coarse", "again"
