@@ -2,7 +2,7 @@
 
 import taichi as ti
 
-from mpm.state.tables import INITIATION_DEPTH, LAYERED, R_START, SLIP, STATIONS
+from mpm.state.tables import INITIATION_DEPTH, LAYERED, LEAST_WIDTH, LOCAL_DENT, R_START, SLIP, STATIONS, ZONE
 
 AT_ONCE = 1e-9  # length of a fall in bare flesh [m], of no way that a step takes
 
@@ -12,7 +12,7 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
     """Force per length of the edge in one slice after it moved against the material [N/m]: along the edge, forward.
 
     The slip is elastic up to a limit and points where the edge goes. A cut starts where the force reaches the
-    threshold, at the indentation that belongs to it, and from there runs along the blade to every slice that already
+    threshold, at the indentation that belongs to it and what a wide zone hides of the food's own, and from there runs along the blade to every slice that already
     carries the propagation resistance there: growing a crack takes less than starting one. Then the force falls to that
     resistance, or is it at once where a layer below is tougher than the threshold. Until the start the slip is the mean
     over the part of the slice that the edge has reached: on a round top more of it comes into contact, unslipped, as
@@ -36,7 +36,7 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
     steep = e[1] / size if size > 0 else 0.0
     level = 0.0
     if s.start_force[cut, i] <= 0:
-        level = s.par[cut, R_START] * size / s.par[cut, INITIATION_DEPTH]
+        level = s.par[cut, R_START] * size / (s.par[cut, INITIATION_DEPTH] + hidden_dent(s, cut, i))
         if level >= s.par[cut, R_START] or (s.started_beside[cut, i] > 0 and level >= flesh):
             s.start_force[cut, i] = ti.max(level, 1e-9)
             s.start_excess[cut, i] = ti.max(level - s.passed_mean[cut, i][1], 0.0)
@@ -50,6 +50,20 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
         level = softening_law(s.cut_depth[cut, i], s.softening[cut, i], start, flesh) * size / limit
     s.slip[cut, i], s.line[cut, i] = e, level
     return level * steep * e / ti.max(e.norm(), 1e-30)
+
+
+@ti.func
+def hidden_dent(s: ti.template(), cut, i):
+    """The part of the food's dent under the starting force that the process zone hides before the start [m].
+
+    A line force F on a width w sinks by 2 (1 - nu^2) / (pi E) F ln(l / w), where l is a length far away (Johnson 1985,
+    Contact Mechanics, section 2.4). The zone grows with the force beyond its width while it cuts, and to more than just
+    bears the force. What the greater width hides of the dent the edge sinks into its zone, so that the stroke at which
+    a cut starts does not hang on the width. A zone that is narrower than the food asks for hides nothing: there the
+    food flows.
+    """
+    bears = ti.max(s.line[cut, i] * s.par[cut, LEAST_WIDTH], s.par[cut, ZONE])
+    return s.par[cut, LOCAL_DENT] * ti.log(ti.max(s.zone[cut, i] / bears, 1.0))
 
 
 @ti.func
