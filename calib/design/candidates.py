@@ -10,7 +10,6 @@ from calib.errors import MaterialError
 from calib.io.yaml_checks import suggest
 from calib.material.knife import load_knives
 from calib.material.scene import cut_scene
-from calib.problem.setup import COARSE_SPEED
 from mpm.scene import Knife, Scene
 from mpm.scene.errors import CutcalError, SceneError
 from mpm.scene.shapes import Shape
@@ -75,7 +74,7 @@ class LeftOut:
 
 
 def coarse_cut(start: Start, knife: Knife, shape: Shape) -> Scene:
-    """A cut of the food as a search screens it: one cell to the process zone, and fast.
+    """A cut of the food as a search screens it: one cell to the process zone, and twice as fast.
 
     Args:
         start: What is known.
@@ -85,8 +84,7 @@ def coarse_cut(start: Start, knife: Knife, shape: Shape) -> Scene:
     Returns:
         The cut at the present values.
     """
-    scene = cut_scene(start.food, shape, knife, stroke=start.stroke, coarse=True)
-    return replace(scene, motion=replace(scene.motion, mach=COARSE_SPEED * scene.motion.mach))
+    return cut_scene(start.food, shape, knife, stroke=start.stroke, coarse=True)
 
 
 def candidates(start: Start, blades: Sequence[Knife] | None = None) -> tuple[list[Candidate], list[LeftOut]]:

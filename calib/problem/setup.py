@@ -37,9 +37,6 @@ from calib.trace.filters import filter_simulated
 from calib.trace.stroke import board_stroke
 from mpm.scene import Motion, Scene
 
-COARSE_SPEED = 1.0
-"""Speed of a search's coarse simulations over that of a screening scene [-] (docs/theory.md, "Surrogate and search").
-The surrogate takes their common offset from the fine ones away."""
 FINE, COARSE, REPLICATED = "fine", "coarse", "again"
 """What the fidelities of a search are called in its store; a replicate is called ``again``."""
 REPLICATE = 2
@@ -188,8 +185,7 @@ def _scenes(request: Request, curve: Conditioned, heights: Heights | None) -> tu
         windowed(cut_scene(food, shape, knife, stroke=stroke, dx=dx, seed=seed, coarse=coarse), heights)
         for coarse in (False, True)
     )
-    faster = replace(screening.motion, mach=COARSE_SPEED * screening.motion.mach)
-    return fine, replace(screening, motion=faster), [*assumed, *blade_warnings(shape, knife)]
+    return fine, screening, [*assumed, *blade_warnings(shape, knife)]
 
 
 def way_of(food: FoodSpec, curve: Conditioned) -> float | Motion:

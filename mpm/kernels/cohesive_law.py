@@ -12,12 +12,13 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
     """Force per length of the edge in one slice after it moved against the material [N/m]: along the edge, forward.
 
     The slip is elastic up to a limit and points where the edge goes. A cut starts where the force reaches the
-    threshold, at the indentation that belongs to it and what a wide zone hides of the food's own, and from there runs along the blade to every slice that already
-    carries the propagation resistance there: growing a crack takes less than starting one. Then the force falls to that
-    resistance, or is it at once where a layer below is tougher than the threshold. Until the start the slip is the mean
-    over the part of the slice that the edge has reached: on a round top more of it comes into contact, unslipped, as
-    the edge goes down. The force acts against the motion and only the way forward makes new surface, so that with a
-    slice/push ratio xi the forward force is R / (1 + xi^2) (Atkins, Xu and Jeronimidis 2004).
+    threshold, at the indentation that belongs to it and what a wide zone hides of the food's own. From there it runs
+    along the blade to every slice that already carries the propagation resistance there: growing a crack takes less
+    than starting one. Then the force falls to that resistance, or is it at once where a layer below is tougher than the
+    threshold. Until the start the slip is the mean over the part of the slice that the edge has reached: on a round top
+    more of it comes into contact, unslipped, as the edge goes down. The force acts against the motion and only the way
+    forward makes new surface, so that with a slice/push ratio xi the forward force is R / (1 + xi^2) (Atkins, Xu and
+    Jeronimidis 2004).
 
     Args:
         i: The slice.

@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
 KERNELS = "On a block at rest, in one run side by side; only the ratios mean something on another machine."
 PEERS = (
-    "An elastic block whose weight is put on at once, through their own packages: the same particles and grid, in single "
-    "precision, in one run. The error is that of the force on the floor over a period, root mean square over its peak, "
-    "against the closed form. The implicit code takes one step where the others take ten."
+    "An elastic block whose weight is put on at once, through their own packages: the same particles and grid, in "
+    "single precision, in one run. The error is that of the force on the floor over a period, root mean square over "
+    "its peak, against the closed form. The implicit code takes one step where the others take ten."
 )
 NOT_SHOWN = (
     "Run times are those of one machine on one day; ratios carry over to others better than times.",

@@ -13,7 +13,7 @@ import numpy as np
 
 
 def run(block: dict) -> tuple[float, int, list[float]]:
-    """Seconds a substep of the block, its particles, and the mean velocity upwards after each step of the scene [m/s]."""
+    """Seconds a substep of the block, its particles, and the mean velocity upwards after each window [m/s]."""
     backend = gs.cpu if block["device"] == "cpu" else gs.cuda
     gs.init(backend=backend, precision="32", logging_level="error")
     dx, low = block["dx"], np.array(block["low"])

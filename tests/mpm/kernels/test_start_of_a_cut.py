@@ -57,9 +57,9 @@ def start_of(record: ForceRecord) -> float:
 
 
 def test_a_line_force_sinks_less_on_a_wider_strip():
-    """Elastic flesh on cells of half the zone: where an edge has pressed 240 N/m into twice the zone it has sunk less, by
-    2 (1 - nu^2) / (pi E) F ln 2 on a half-space of small strains (Johnson 1985, section 2.4), and by up to twice of that
-    in a block of 24 mm."""
+    """Elastic flesh on cells of half the zone: where an edge has pressed 240 N/m into twice the zone it has sunk less,
+    by 2 (1 - nu^2) / (pi E) F ln 2 on a half-space of small strains (Johnson 1985, section 2.4), and by up to twice of
+    that in a block of 24 mm."""
     line, numerics = 240.0, replace(PRISM.numerics, dx=1.5e-3)
     elastic = replace(SKINNED, yield_stress=math.inf, initiation_depth=2e-4)
     sunk = []
@@ -74,8 +74,8 @@ def test_a_line_force_sinks_less_on_a_wider_strip():
 
 @pytest.mark.parametrize("yields", [4e4, 1.2e5])
 def test_where_a_cut_starts_does_not_hang_on_the_width_that_bears_the_edge(yields):
-    """What a wider zone hides of the food's own dent the edge sinks into it: with four times the width the cut starts at
-    the same stroke (10 %) for the same work (3 %). Without that it starts a quarter earlier, for 5 and 15 % less."""
+    """What a wider zone hides of the food's own dent the edge sinks into it: with four times the width the cut starts
+    at the same stroke (10 %) for the same work (3 %). Without that it starts a quarter earlier, for 5 and 15 % less."""
     flesh = replace(SKINNED, yield_stress=yields)
     usual, wider = (indented(flesh, EdgeLaw(zone=3e-3, bearing=b)) for b in (1.25, 5.0))
     assert start_of(wider) == pytest.approx(start_of(usual), rel=0.1)
