@@ -108,7 +108,7 @@ class StandingBlock:
         """
         span = WINDOW * self.dt
         force = 1 + np.diff([0.0, *velocity]) / (GRAVITY * span)  # over the weight
-        expected = np.diff(self._impulse(span * np.arange(len(force) + 1))) / span
+        expected = np.diff(self._impulse(span * np.arange(len(force) + 1, dtype=np.float64))) / span
         return float(np.sqrt(np.mean((force - expected) ** 2)) / 2)
 
     def _impulse(self, at: FloatArray) -> FloatArray:
