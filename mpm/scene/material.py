@@ -11,6 +11,9 @@ MAX_POISSON = 0.49  # above it a single-field quadratic MPM locks volumetrically
 COHESIVE_ZONE = 10e-3  # of the process zone of a food whose tensile strength is not known, at least [m]
 PARTS_BEFORE_IT_FLOWS = 0.8  # strength of such a food over its yield stress: that of apple (materials.yaml, remark 5)
 SKIN_POISSON = 0.5  # of a skin in its plane [-]: tomato skin has about a half (Int. Agrophys. 26:39, 2012)
+PUNCH = (2 + math.pi) / math.sqrt(3)
+"""Pressure that a flat punch needs to flow into a rigid-plastic solid in plane strain, over its yield stress [-]
+(Prandtl 1920)."""
 LEAST_OPENING = 1e-9  # half opening at which a food without resistance has parted [m]; the ties divide by it
 
 
@@ -197,6 +200,11 @@ class Material:
         """Force per width at which a cut starts: that of the skin where there is one, never below R [N/m]."""
         threshold = self.R_skin if self.skin_thickness > 0 else self.R_initiation
         return max(self.R, threshold or 0.0)
+
+    @property
+    def punch_width(self) -> float:
+        """Width of a flat punch that just bears a line force, over that force [m^2/N]; 0 for what never flows."""
+        return 1 / (PUNCH * self.yield_stress)
 
     @property
     def strength(self) -> float | None:

@@ -78,10 +78,6 @@ class Board:
         check_number("board", "mu", self.mu, -1e-300, 10.0, "")
 
 
-PUNCH = (2 + math.pi) / math.sqrt(3)
-"""Pressure that a flat punch needs to flow into a rigid-plastic solid in plane strain, over its yield stress [-]."""
-
-
 @dataclass(frozen=True)
 class EdgeLaw:
     """Regularisation of the cutting edge, fixed in metres so that the force does not follow the grid.
@@ -246,14 +242,13 @@ class Scene:
     def width_of_force(self, material: Material) -> float:
         """Width of food that bears a line force without flowing, over that force [m^2/N].
 
-        A flat punch of that width bears (2 + pi) / sqrt(3) of the yield stress (Prandtl 1920), which is to be
-        ``edge.bearing`` times the force. A skin that is pressed in hands the line force of the edge to the flesh over
-        that width.
+        A flat punch of that width bears ``edge.bearing`` times the force (:attr:`Material.punch_width`). A skin that is
+        pressed in hands the line force of the edge to the flesh over that width.
 
         Args:
             material: Constants of the food.
         """
-        return self.edge.bearing / (PUNCH * material.yield_stress)
+        return self.edge.bearing * material.punch_width
 
     @property
     def widest_zone(self) -> float:

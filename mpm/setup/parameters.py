@@ -10,7 +10,6 @@ from mpm.discretisation.grid import Grid
 from mpm.discretisation.particles import Seeds
 from mpm.scene import BAND_CELLS, Press, Scene
 from mpm.scene.material import SKIN_POISSON, Material
-from mpm.scene.scene import PUNCH
 from mpm.scene.shapes import section_area
 from mpm.setup.stable_step import contact_stiffness, retardation_time
 from mpm.state import tables as row
@@ -82,7 +81,7 @@ def _put_tool(table: np.ndarray, scene: Scene, material: Material) -> None:
     table[row.SLIP], table[row.ZONE] = edge.slip, scene.process_zone(material)
     table[row.ZONE_MASS] = material.rho * scene.numerics.dx * table[row.ZONE] ** 2
     table[row.WIDTH_OF_FORCE], table[row.ZONE_MOST] = scene.width_of_force(material), scene.widest_zone
-    table[row.LEAST_WIDTH] = 1 / (PUNCH * material.yield_stress)
+    table[row.LEAST_WIDTH] = material.punch_width
     table[row.LOCAL_DENT] = 2 * (1 - material.nu**2) / (math.pi * material.E) * material.start
     if isinstance(tool, Press):
         half, table[row.BLADE_MU], table[row.SPINE] = tool.half_angle, tool.mu, ENDLESS

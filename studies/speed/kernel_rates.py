@@ -152,6 +152,8 @@ def _peer_result(answer: Mapping[str, Any], block: StandingBlock, ours: Standing
     """What a peer answered, beside ours."""
     if "seconds" not in answer:
         return UnmeasuredPeer(answer["name"], answer["error"])
+    if not np.isfinite(answer["velocity"]).all():
+        return UnmeasuredPeer(answer["name"], "its block has broken down: velocities that are no numbers")
     rate = answer["particles"] / answer["seconds"]
     return MeasuredPeer(
         name=answer["name"],

@@ -80,3 +80,4 @@ def test_where_a_cut_starts_does_not_hang_on_the_width_that_bears_the_edge(yield
     usual, wider = (indented(flesh, EdgeLaw(zone=3e-3, bearing=b)) for b in (1.25, 5.0))
     assert start_of(wider) == pytest.approx(start_of(usual), rel=0.1)
     assert wider.work == pytest.approx(usual.work, rel=0.03)
+    assert max(usual.momentum_residual, wider.momentum_residual) < 1e-9

@@ -23,7 +23,7 @@ from cutcal.main import main
 from mpm.runtime import Runtime
 from mpm.scene import Scene
 from studies.speed.benchmark import BenchmarkSettings, run_benchmark
-from studies.speed.result import BenchmarkResult
+from studies.speed.result import BenchmarkResult, UnmeasuredPeer
 from studies.speed.standing_block import Standing, StandingBlock
 from tests.calib.documents import valid
 
@@ -196,6 +196,14 @@ def test_peers_are_compared_or_said_to_be_absent(document):
     assert longer["ratio"] == pytest.approx(0.1 / 0.256)
     assert warp["force_error"] == pytest.approx(3**-0.5, rel=0.05) and warp["ours_force_error"] == 0.01
     assert "ratio" not in genesis and "genesis" in genesis["error"]
+
+
+def test_a_peer_whose_block_breaks_down_has_no_rate():
+    """A block that flies apart may be fast; no NaN gets into a document."""
+    broken = [*fallen(BLOCK.task("cpu"))[:-1], float("nan")]
+    answer = {"name": "Warp", "longer": 1, "seconds": 0.5, "particles": 128000, "version": "1", "velocity": broken}
+    found = studies.speed.kernel_rates._peer_result(answer, BLOCK, Standing(0.128, 128000, 0.01))
+    assert isinstance(found, UnmeasuredPeer) and "broken down" in found.error
 
 
 def test_a_peer_is_not_asked_for_a_device_that_it_lacks():
