@@ -112,6 +112,8 @@ class FoodSpec:
             if len(have) == 1:
                 other = resistance if have[0] == size else size
                 raise here.at("properties").error(f"{have[0]} needs {other}; give both, or neither")
+        if "rind_stiffness" in self.properties and "rind_thickness" not in self.properties:
+            raise here.at("properties").error("rind_stiffness needs a rind; give rind_thickness and R_rind too")
 
     def __repr__(self) -> str:
         size = " x ".join(f"{1e3 * self.dims[name].value:.3g}" for name in DIMENSIONS)
@@ -166,9 +168,11 @@ class FoodSpec:
 
     @property
     def layers(self) -> tuple[str, ...]:
-        """Names of the properties of the layers that the food has beside its flesh: resistance and size of each."""
+        """Names of the properties of the layers that the food has beside its flesh: resistance and size of each, and
+        the rind's stiffness where it is known."""
         there = [size for size in LAYERS if size in self.properties and self.properties[size].value > 0.0]
-        return tuple(name for size in there for name in (LAYERS[size], size))
+        stiff = ("rind_stiffness",) if "rind_thickness" in there and "rind_stiffness" in self.properties else ()
+        return (*(name for size in there for name in (LAYERS[size], size)), *stiff)
 
     def value(self, name: str) -> float | None:
         """Value of a property [SI], None where the food has none.

@@ -201,6 +201,7 @@ def test_default_fit_follows_the_skin(foods: dict[str, FoodSpec]) -> None:
         "rind_thickness",
         "R_core",
         "core_ratio",
+        "rind_stiffness",
         "R_skin",
         "skin_thickness",
         "initiation_depth",
@@ -612,13 +613,19 @@ def test_a_skin_that_bears_tension_is_asked_for() -> None:
     assert skinned.as_dict()["properties"]["skin_stiffness"]["value"] == 3000.0
 
 
-def test_a_stiff_rind_is_asked_for() -> None:
-    """No food has it by default; a value reaches the solver and comes back from a file."""
-    plain = load_food("cucumber")
-    assert not plain.to_scene_food().material.graded and "rind_stiffness" not in plain.as_dict()["properties"]
-    stiff = plain.with_values({"rind_stiffness": 4.0})
-    assert stiff.to_scene_food().material.graded and stiff.to_scene_food().material.rind_stiffness == 4.0
-    assert stiff.as_dict()["properties"]["rind_stiffness"]["value"] == 4.0
+def test_the_stiffness_of_a_rind_is_fitted_where_it_is_known() -> None:
+    """Foods with a rind have it; it reaches the solver and comes back; without a rind there is none to be stiff."""
+    food = load_food("cucumber")
+    stiffness = food.properties["rind_stiffness"].value
+    assert food.to_scene_food().material.rind_stiffness == stiffness > 1.0 and "rind_stiffness" in food.default_fit
+    assert not food.with_values({"rind_stiffness": 1.0}).to_scene_food().material.graded
+    assert food.with_values({"rind_stiffness": 4.0}).as_dict()["properties"]["rind_stiffness"]["value"] == 4.0
+    bare = food.with_values({"rind_thickness": 0.0})
+    assert "rind_stiffness" not in bare.default_fit and not bare.to_scene_food().material.graded
+    plain = load_food("banana").with_values(RIND)
+    assert not plain.to_scene_food().material.graded and "rind_stiffness" not in plain.default_fit
+    with pytest.raises(MaterialError, match="banana.properties: rind_stiffness needs a rind"):
+        load_food("banana").with_values({"rind_stiffness": 4.0})
 
 
 def test_a_food_that_relaxes_is_asked_for() -> None:
