@@ -22,6 +22,7 @@ from calib.material.properties import (
     DIMENSIONS,
     FORM,
     INCLUSIONS,
+    LAYER_STIFFNESS,
     LAYERS,
     PROPERTIES,
     RELAXATION,
@@ -56,7 +57,8 @@ GIVEN_SPREAD = 10.0
 FILES = (".yaml", ".yml")
 """How the name of a food's file ends."""
 _STRENGTHS = ("strength_ratio", "tensile_strength")  # a food has one of them at most
-_OPTIONAL = (*LAYERS, *LAYERS.values(), "rind_stiffness", "skin_stiffness", BOARD_FRICTION, *RELAXATION, *_STRENGTHS)
+_LAYERS = (*LAYERS, *LAYERS.values(), *LAYER_STIFFNESS.values())
+_OPTIONAL = (*_LAYERS, "skin_stiffness", BOARD_FRICTION, *RELAXATION, *_STRENGTHS)
 _NULLABLE = ("R_skin", "fracture_energy", *_OPTIONAL)  # a file may leave the optional ones out
 
 
@@ -112,8 +114,9 @@ class FoodSpec:
             if len(have) == 1:
                 other = resistance if have[0] == size else size
                 raise here.at("properties").error(f"{have[0]} needs {other}; give both, or neither")
-        if "rind_stiffness" in self.properties and "rind_thickness" not in self.properties:
-            raise here.at("properties").error("rind_stiffness needs a rind; give rind_thickness and R_rind too")
+        for size, stiffness in LAYER_STIFFNESS.items():
+            if stiffness in self.properties and size not in self.properties:
+                raise here.at("properties").error(f"{stiffness} needs {size}; give it, and {LAYERS[size]}")
 
     def __repr__(self) -> str:
         size = " x ".join(f"{1e3 * self.dims[name].value:.3g}" for name in DIMENSIONS)
@@ -169,10 +172,10 @@ class FoodSpec:
     @property
     def layers(self) -> tuple[str, ...]:
         """Names of the properties of the layers that the food has beside its flesh: resistance and size of each, and
-        the rind's stiffness where it is known."""
+        its stiffness where that is another one."""
         there = [size for size in LAYERS if size in self.properties and self.properties[size].value > 0.0]
-        stiff = ("rind_stiffness",) if "rind_thickness" in there and "rind_stiffness" in self.properties else ()
-        return (*(name for size in there for name in (LAYERS[size], size)), *stiff)
+        each = [name for size in there for name in (LAYERS[size], size, LAYER_STIFFNESS[size])]
+        return tuple(name for name in each if name in self.properties)
 
     def value(self, name: str) -> float | None:
         """Value of a property [SI], None where the food has none.

@@ -81,6 +81,7 @@ PROPERTIES: dict[str, Rule] = {
         "-", 0.0, 0.95, "radius of the core over that of the food's section, 0 = no core",
         "a larger one leaves no flesh around it",
     ),
+    "core_stiffness": Rule("-", 0.001, 100.0, "Young's modulus and yield stress of the core over those of the flesh"),
     "initiation_depth": Rule("m", 1e-4, 0.05, "indentation under the edge at which a cut starts"),
     "mu": Rule("-", 0.0, 2.0, "Coulomb friction of food on blade"),
     "board_friction": Rule("-", 0.0, 2.0, "Coulomb friction of food on board"),
@@ -106,6 +107,9 @@ BOARD_FRICTION = "board_friction"
 
 LAYERS = {"rind_thickness": "R_rind", "core_ratio": "R_core"}
 """The size of each layer beside the flesh and its resistance. Only foods whose anatomy has the layer have the two."""
+
+LAYER_STIFFNESS = {"rind_thickness": "rind_stiffness", "core_ratio": "core_stiffness"}
+"""The size of each layer and its stiffness over the flesh's; a layer without it is as stiff as the flesh."""
 
 DIMENSIONS: dict[str, Rule] = {
     "length": Rule("m", 1e-3, 1.0, "size along y, across the blade"),

@@ -130,18 +130,25 @@ def layer_stiffness(shape: Shape, material: Material, spacing: float, places: np
     Returns:
         The factors [-], shape (n,).
     """
-    out = np.ones(len(places))
     if not material.graded:
-        return out
-    near = ~_within(shape, places, material.rind_thickness + spacing)
+        return np.ones(len(places))
     offsets = (np.arange(STIFF_SAMPLES) + 0.5) / STIFF_SAMPLES - 0.5
-    rind, count = np.zeros(near.sum()), np.zeros(near.sum())
+    total, count = np.zeros(len(places)), np.zeros(len(places))
     for off in itertools.product(offsets, repeat=3):
-        points = places[near] + spacing * np.array(off)
+        points = places + spacing * np.array(off)
         there = inside(shape, points)
-        rind += there & ~_within(shape, points, material.rind_thickness)
+        total += np.where(there, _stiffness(shape, material, points), 0.0)
         count += there
-    out[near] += (material.rind_stiffness - 1.0) * np.where(count > 0, rind / np.maximum(count, 1), 1.0)
+    return np.where(count > 0, total / np.maximum(count, 1), _stiffness(shape, material, places))
+
+
+def _stiffness(shape: Shape, material: Material, points: np.ndarray) -> np.ndarray:
+    """E and yield stress at some points (n, 3) over those of the flesh, shape (n,)."""
+    out = np.ones(len(points))
+    if material.core_ratio > 0:
+        out[_in_core(shape, points, material.core_ratio)] = material.core_stiffness
+    if material.rind_thickness > 0:
+        out[~_within(shape, points, material.rind_thickness)] = material.rind_stiffness
     return out
 
 

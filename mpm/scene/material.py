@@ -39,6 +39,8 @@ class Material:
             strain.
         R_core: Cutting resistance of the core [J/m^2]; needed with ``core_ratio``.
         core_ratio: Radius of the core over that of the food's section [-]; 0 = no core.
+        core_stiffness: Young's modulus and yield stress of the core over those of the flesh [-]; both yield at the same
+            strain. Below 1 where seeds lie in gel: the wall about it then gives way under the blade as a ring does.
         initiation_depth: Indentation under the edge at which a cut starts [m]; soft solids go deep before a cut
             nucleates (Reyssat et al. 2012, Phys. Rev. Lett. 109:244301).
         mu: Coulomb friction of food on the blade's faces [-].
@@ -75,6 +77,7 @@ class Material:
     rind_stiffness: float = 1.0
     R_core: float | None = None
     core_ratio: float = 0.0
+    core_stiffness: float = 1.0
     initiation_depth: float = 1e-3
     mu: float = 0.0
     tensile_strength: float | None = None
@@ -139,7 +142,6 @@ class Material:
             raise SceneError(
                 "material: skin_thickness > 0 needs R_skin, the force per width that goes through the skin"
             )
-        check_number(w, "rind_stiffness", self.rind_stiffness, 0.0, 1e3, "of the flesh's")
         self._check_layers(w)
         if (self.adhesion > 0) != (self.adhesion_energy > 0):
             raise SceneError(
@@ -155,7 +157,9 @@ class Material:
             )
 
     def _check_layers(self, where: str) -> None:
-        """Refuse layers without a resistance, and a core as large as the food."""
+        """Refuse layers without a resistance or of no stiffness, and a core as large as the food."""
+        for name in ("rind_stiffness", "core_stiffness"):
+            check_number(where, name, getattr(self, name), 0.0, 1e3, "of the flesh's")
         for resistance, size, what in (
             ("R_rind", "rind_thickness", "the rind"),
             ("R_core", "core_ratio", "the core"),
@@ -175,8 +179,10 @@ class Material:
 
     @property
     def graded(self) -> bool:
-        """Whether the rind is stiffer or softer than the flesh."""
-        return self.rind_thickness > 0 and self.rind_stiffness != 1.0
+        """Whether rind or core is stiffer or softer than the flesh."""
+        return (self.rind_thickness > 0 and self.rind_stiffness != 1.0) or (
+            self.core_ratio > 0 and self.core_stiffness != 1.0
+        )
 
     @property
     def toughest(self) -> float:
@@ -184,6 +190,13 @@ class Material:
         rind = self.R_rind if self.rind_thickness > 0 else None
         core = self.R_core if self.core_ratio > 0 else None
         return max(self.R, rind or 0.0, core or 0.0)
+
+    @property
+    def toughest_for_mass(self) -> float:
+        """Largest of the same over the stiffness of its layer, which is what its particles weigh [J/m^2]."""
+        rind = (self.R_rind or 0.0) / self.rind_stiffness if self.rind_thickness > 0 else 0.0
+        core = (self.R_core or 0.0) / self.core_stiffness if self.core_ratio > 0 else 0.0
+        return max(self.R, rind, core)
 
     @property
     def shear(self) -> float:
@@ -238,9 +251,7 @@ class Material:
         """
         if not self.R > 0:
             return 0.0
-        rind = (self.R_rind or self.R) / self.rind_stiffness if self.rind_thickness > 0 else 0.0
-        core = self.R_core or 0.0 if self.core_ratio > 0 else 0.0
-        shortest = self.R / max(self.R, rind, core)  # of the softening lengths, over that of the flesh
+        shortest = self.R / self.toughest_for_mass  # of the softening lengths, over that of the flesh
         return min(self.cohesion, math.sqrt(self.E * self.R * shortest / (spacing / 2)))
 
     def tie_opening(self, spacing: float) -> float:

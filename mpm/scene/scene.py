@@ -353,8 +353,9 @@ class Scene:
         for name in ("skin_stiffness", "strength_ratio"):
             if not out["food"]["material"][name]:
                 del out["food"]["material"][name]
-        if out["food"]["material"]["rind_stiffness"] == 1.0:
-            del out["food"]["material"]["rind_stiffness"]
+        for name in ("rind_stiffness", "core_stiffness"):
+            if out["food"]["material"][name] == 1.0:
+                del out["food"]["material"][name]
         if not out["food"]["material"]["relaxing_share"]:
             del out["food"]["material"]["relaxing_share"], out["food"]["material"]["relaxation_time"]
         return out

@@ -54,7 +54,7 @@ def stable_step(scene: Scene, material: Material, spacing: float) -> float:
     if num.contact == "cohesive":
         dt = min(dt, math.sqrt(CONTACT_LIMIT / contact_stiffness(scene, material, spacing)))
     if num.contact == "cohesive" and scene.cuts:
-        toughest = max(material.start, material.toughest, 1e-12)
+        toughest = max(material.start, material.toughest_for_mass, 1e-12)
         spring = math.sqrt(toughest / (edge.slip * material.rho * scene.process_zone(material) ** 2))
         dt = min(dt, EDGE_STABILITY / spring)
         if material.adhesion > 0:
