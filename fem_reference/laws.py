@@ -212,6 +212,44 @@ class NeoHookean:
         return out
 
 
+@dataclass(frozen=True, eq=False)
+class Graded:
+    """A law whose stresses differ from point to point by a factor: layers of other stiffness that yield at one strain.
+
+    Attributes: law, that of a factor of 1; factor [-], one for each quadrature point.
+    """
+
+    law: Law
+    factor: np.ndarray
+
+    @property
+    def symmetric(self) -> bool:
+        """As of the law."""
+        return self.law.symmetric
+
+    @property
+    def linear(self) -> bool:
+        """As of the law."""
+        return self.law.linear
+
+    def start(self, shape: tuple[int, ...]) -> np.ndarray | None:
+        """As of the law."""
+        return self.law.start(shape)
+
+    def energy(self, f: np.ndarray, state: np.ndarray | None = None) -> np.ndarray:
+        """Energy per volume [J/m^3]."""
+        return self.factor * self.law.energy(f, state)
+
+    def stress(self, f: np.ndarray, state: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
+        """First Piola-Kirchhoff stress [Pa] and the new state."""
+        p, after = self.law.stress(f, state)
+        return self.factor * p, after
+
+    def tangent(self, f: np.ndarray, state: np.ndarray | None) -> np.ndarray:
+        """dP/dF [Pa]."""
+        return self.factor * self.law.tangent(f, state)
+
+
 @dataclass(frozen=True)
 class Plastic:
     """Corotated elasticity with a von Mises yield stress, without hardening.

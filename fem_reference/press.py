@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fem_reference.contact import Contact, Obstacle, Plane, Wedge
-from fem_reference.laws import Corotated, Law, Plastic
+from fem_reference.laws import Corotated, Graded, Law, Plastic
 from fem_reference.meshes import MeshError, quarter, surface
 from fem_reference.solid import EquilibriumError, Solid
+from mpm.scene.layers import layer_stiffness
 from mpm.scene.material import Material
 from mpm.scene.shapes import Shape
 
@@ -82,7 +83,7 @@ def press(
 
     Args:
         shape: Outline of the food.
-        material: Its constants.
+        material: Its constants; layers of their own stiffness are looked up at the quadrature points.
         strokes: Ways of the tool below the food's top at which the force is wanted [m], rising, the first above 0.
         half_angle: Angle between the faces of the wedge and the vertical [rad]; a plate at pi / 2.
         bonded: Whether flat ends stick to plate and board; without that there is no friction.
@@ -101,6 +102,10 @@ def press(
     if bonded and (not flat or half_angle < math.pi / 2):
         raise MeshError(f"press: a {shape.kind} under this tool has no flat ends to bond; leave out bonded")
     solid = Solid(mesh, law or law_of(material), elements.order, elements.mixed)
+    if material.graded:
+        places = np.moveaxis(solid.places, 0, -1)
+        factor = layer_stiffness(shape, material, 0.0, places.reshape(-1, 3)).reshape(places.shape[:-1])
+        solid.law = Graded(solid.law, factor)
     h, size = shape.height, shape.height / (2 * elements.cells)
     x, y, z = solid.nodes.T
     near = 1e-6 * h

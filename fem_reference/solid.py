@@ -85,6 +85,7 @@ class Solid:
 
     Attributes:
         nodes: Places of the element's nodes, of second order also those in the middle of edges [m], shape (n, 3).
+        places: Those of the quadrature points in the undeformed body [m], shape (3, elements, points).
         u: Displacements in equilibrium [m], shape (n, 3).
         state: Memory of the law at the quadrature points, or None.
         body: Force per reference volume at the quadrature points [N/m^3], shape (3, elements, points), or None.
@@ -99,6 +100,7 @@ class Solid:
     mixed: bool = False
     tolerance: float = TOLERANCE
     nodes: np.ndarray = field(init=False)
+    places: np.ndarray = field(init=False)
     u: np.ndarray = field(init=False)
     state: np.ndarray | None = field(init=False)
     body: np.ndarray | None = field(init=False, default=None)
@@ -124,7 +126,8 @@ class Solid:
             self.hold(np.arange(len(self.nodes)), [0])
         self._condensed: Condensation | None = None
         self._constant: sp.csr_matrix | None = None  # tangent of a linear law
-        self._dilatation = Dilatation(self._spatial(np.asarray(self.basis.global_coordinates())), self.weights)
+        self.places = self._spatial(np.asarray(self.basis.global_coordinates()))
+        self._dilatation = Dilatation(self.places, self.weights)
         count = 3 * len(self.cells)
         unknowns = (3 * self.cells[:, None] + np.arange(3)[:, None]).reshape(count, -1)  # [3 function + axis, element]
         self._scatter = unknowns

@@ -38,6 +38,7 @@ class PressTest:
         bonded: Whether tool and board stick to the food.
         yield_stress: Yield stress of the food [Pa].
         poisson: Its Poisson's ratio [-].
+        core: Radius of its core over that of the section, and stiffness of it over the flesh's [-]; None: it has none.
         tolerance: Largest error of a force that passes [-].
         reference: Options of the finite elements.
         mesh: Elements of a wedge on a block that flows, which touches points between the nodes; None: ``reference``.
@@ -53,6 +54,7 @@ class PressTest:
     bonded: bool = False
     yield_stress: float = math.inf
     poisson: float = PRESSED_MATERIAL.nu
+    core: tuple[float, float] | None = None
     tolerance: float = 0.02
     reference: tuple[tuple[str, Any], ...] = ()
     mesh: Mesh | None = None
@@ -63,7 +65,11 @@ class PressTest:
     @property
     def food(self) -> Material:
         """Constants of the food."""
-        return replace(PRESSED_MATERIAL, nu=self.poisson, yield_stress=self.yield_stress)
+        food = replace(PRESSED_MATERIAL, nu=self.poisson, yield_stress=self.yield_stress)
+        if self.core is None:
+            return food
+        # nothing is cut: resistances are there because layers have some
+        return replace(food, R=1.0, R_core=1.0, core_ratio=self.core[0], core_stiffness=self.core[1])
 
     def by_elements(self) -> Curve:
         """Force over stroke by finite elements of the particles' law."""
@@ -119,6 +125,14 @@ PRESS_TESTS = (
         "lying cylinder",
         Shape("cylinder", 0.016, 0.03, 0.03),
         (0.002, 0.004, 0.006),
+        reference=(("cells", 4), ("order", 2), ("grade", 1.2)),
+        cost=300.0,
+    ),
+    PressTest(
+        "lying cylinder with a soft core",
+        Shape("cylinder", 0.016, 0.03, 0.03),
+        (0.002, 0.004, 0.006),
+        core=(0.6, 0.03),
         reference=(("cells", 4), ("order", 2), ("grade", 1.2)),
         cost=300.0,
     ),
