@@ -12,12 +12,13 @@
    (:mod:`calib.fit.acquisition`). Where there is a coarse evaluator, the latter two are run on it first, and only
    points near the best one on the fine one.
 4. The end, when neither the surrogate nor the runs give a gain worth its noise. If the curve is still not explained
-   (chi-square above its 99 % quantile), the screening is begun anew from another design, with nothing of what is
-   known, so that it ends in a valley of its own. Its best points are run on fine cells, and rounds follow whose fine
-   runs are made only where the coarse ones promise a gain; at most so many times, or until nothing was gained for
-   long. Without a coarse evaluator, differences about the best point, and again 3 if they bring or promise a gain;
-   with one the profiles step along each parameter anyway. The Jacobian is that of the surrogate, in which the noise of
-   single runs is averaged out; plain differences of noisy curves would make every parameter look well identified.
+   (chi-square above its 99 % quantile), another design is begun, with nothing of what is known, and from its best point
+   a descent on coarse cells (:mod:`calib.fit.descent`), so that it ends in a valley of its own. Its best points are run
+   on fine cells, and rounds follow whose fine runs are made only where the coarse ones promise a gain; at most so many
+   times, or until nothing was gained for long. Without a coarse evaluator, differences about the best point, and again
+   3 if they bring or promise a gain; with one the profiles step along each parameter anyway. The Jacobian is that of
+   the surrogate, in which the noise of single runs is averaged out; plain differences of noisy curves would make every
+   parameter look well identified.
 
 What these choices save on real and made-up cuts is in docs/theory.md, "Measured choices".
 
@@ -37,6 +38,7 @@ from scipy.stats import chi2, qmc
 
 from calib.fit.acquisition import LATTICE, beside, expected_gain, global_optimum, local_optimum, probes
 from calib.fit.budget import longest_time_left, progress_of_all
+from calib.fit.descent import descend
 from calib.fit.options import FitOptions
 from calib.fit.surrogate import Surrogate, coordinate_unit
 from calib.io.progress import Progress
@@ -72,6 +74,8 @@ FAR_OFF = 4.0
 IDLE_BUDGET = 25.0
 #: Part of the budget that the coarse evaluator may spend on the screening [-]: 60 runs of the default budget.
 SCREENING_BUDGET = 0.15
+#: Coarse runs for each parameter that a further screening may take; its descent ends before, where it gains no more.
+DESCENT_RUNS = 12
 #: Largest joint scaling of the design's materials, as a logarithm: a factor 20 either way.
 LARGEST_SCALE = 3.0
 
@@ -190,24 +194,28 @@ class Search:
         if self.coarse is None:
             self._differences()
 
-    def _screen(self, given: list[FloatArray]) -> list[FloatArray]:
-        """Search on the coarse evaluator; where its surrogate expects the best point, and its runs, best first."""
+    def _screen(self, given: list[FloatArray], *, downhill: bool = False) -> list[FloatArray]:
+        """Search on the coarse evaluator, by rounds or ``downhill`` from the best point of the design; where its
+        surrogate expects the best point, and its runs, best first.
+        """
         self.screening = True
         try:
             self._design(given)
             if not self.finished:
                 return []
-            self._differences()
-            self._rounds()
+            if downhill:
+                descend(self._descended, self.best, self.parameters.steps, self.parameters.prior_mean)
+            else:
+                self._differences()
+                self._rounds()
             best_first = sorted(self.finished, key=lambda run: run.misfit)
             return [local_optimum(self.surrogate()), *(run.z for run in best_first)]
         finally:
             self.screening, self.centre, self.hyper = False, None, None
 
     def _rescreen(self) -> bool:
-        """Screen from another design, with nothing of what is known, and run what that finds.
-
-        False where it cannot or need not be paid.
+        """Go down from another design, with nothing of what is known, and run what that finds; False where it cannot or
+        need not be paid.
         """
         far_off = self.best.misfit > FAR_OFF * self.objective.effective_rows
         rest = self.options.budget - self.spent - 2 * self.options.batch
@@ -215,15 +223,16 @@ class Search:
         if self.coarse is None or unpaid or (self.rescreenings >= MAX_RESCREENINGS and not far_off):
             return False
         self.rescreenings += 1
+        wanted = DESCENT_RUNS * len(self.parameters) * self.options.coarse_cost
         options = replace(
             self.options,
-            budget=min(self.options.budget, rest / SCREENING_BUDGET),
+            budget=min(max(SCREENING_BUDGET * self.options.budget, wanted), rest) / SCREENING_BUDGET,
             seed=self.options.seed + RESCREENING_SEED * self.rescreenings,
         )
         told = progress_of_all(self.progress, self.runs, self.best, self.options)
         other = Search(self.objective, self.fine, self.coarse, options, told, self.enough)
         try:
-            points = other._screen([])
+            points = other._screen([], downhill=True)
         finally:
             self.runs += other.runs
         self._evaluate(points, "screened", most=self.options.batch)
@@ -359,6 +368,13 @@ class Search:
             if new and self.spent + (len(batch) + 1) * cost <= self.options.budget + 1e-9:
                 batch.append(z)
         return batch
+
+    def _descended(self, points: Sequence[FloatArray]) -> list[ScoredRun]:
+        """Run points of a descent on coarse cells; the runs of them that there are."""
+        grid = LATTICE * self.unit
+        self._evaluate(points, "descent", coarse=True)
+        wanted = np.array([self.parameters.clip(np.round(point / grid) * grid) for point in points])
+        return [run for run in self.runs if run.coarse and np.all(np.abs(wanted - run.z) <= 0.5 * grid, axis=1).any()]
 
     def _simulate(self, batch: list[dict[str, float]], coarse: bool) -> Iterator[Evaluation]:
         evaluator = self.coarse if coarse and self.coarse is not None else self.fine

@@ -18,7 +18,8 @@ class ScoredRun:
         curve: Its smoothed force on the stroke grid of the trace [N] (n,); of a joint objective all traces' in turn.
         residual: Its residual vector [-] (rows of the data and p of the priors).
         coarse: Whether it was run at the coarse resolution.
-        stage: Why it was run: design, scaled, difference, round, scouting, screened, replicate or profile.
+        stage: Why it was run: design, scaled, difference, descent, round, scouting, screened, replicate or
+            profile.
         parts: The run as each trace of a joint objective sees it; empty for a single trace.
     """
 

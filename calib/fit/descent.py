@@ -1,0 +1,100 @@
+"""A descent on cheap simulations: Levenberg-Marquardt with a Jacobian of differences, for valleys of many parameters.
+
+A surrogate of fifteen parameters needs more runs than a screening has before it knows where a valley leads. One step
+along each parameter says so at once, and all these runs are made at a time. Steps of several dampings are tried in one
+batch; what they find corrects the Jacobian (Broyden 1965, Math. Comput. 19:577), and only where that no longer helps
+are differences made anew.
+
+Source: More 1978, Lecture Notes in Mathematics 630:105, for the scaling and the damping.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from calib.problem.scored_run import ScoredRun
+from mpm.arrays import FloatArray
+
+DAMPINGS = (0.003, 0.03, 0.1, 0.4, 1.5, 6.0)
+"""Dampings that are tried, over the diagonal of the normal equations and times the present damping [-]."""
+DAMPING_RANGE = (0.1, 30.0)
+"""Range of the present damping [-]."""
+REFINED = 0.1
+"""Part of the chi-square that a step must gain for the corrected Jacobian to be used for another one [-]."""
+LEAST_GAIN = 0.01
+"""Part of the chi-square that a step along new differences must gain for the descent to go on [-]."""
+NEXT_TO_NOTHING = 1e-9
+"""Added to the diagonal, for a parameter that is not felt."""
+
+
+def descend(
+    run: Callable[[Sequence[FloatArray]], list[ScoredRun]], start: ScoredRun, steps: FloatArray, inwards: FloatArray
+) -> ScoredRun:
+    """Follow a valley down.
+
+    Args:
+        run: Runs points, internal coordinates (p,) each, or looks them up; those that can be paid, in any order.
+        start: Where it begins.
+        steps: Steps of the differences [-] (p,).
+        inwards: Point on whose side of the present one the differences are made [-] (p,).
+
+    Returns:
+        The best run, after the last that brought a gain or could be paid.
+    """
+    best, damping = start, 1.0
+    while True:
+        signs = np.where(best.z > inwards, -1.0, 1.0)
+        sides = run([best.z + d for d in np.diag(signs * steps)])
+        if len(sides) < len(steps):
+            return min([best, *sides], key=_misfit)
+        jacobian = _differences(best, sides)
+        begun = best.misfit
+        while True:
+            before = best
+            tried = run(_trials(best, jacobian, damping))
+            best = min([best, *sides, *tried], key=_misfit)
+            jacobian = _corrected(jacobian, before, tried)
+            if tried and best is not before:
+                damping = float(np.clip(damping * _damping_of(tried, best), *DAMPING_RANGE))
+            if not tried or before.misfit - best.misfit < REFINED * before.misfit:
+                break
+        if not tried or begun - best.misfit < LEAST_GAIN * begun:
+            return best
+
+
+def _misfit(run: ScoredRun) -> float:
+    return run.misfit
+
+
+def _differences(best: ScoredRun, sides: Sequence[ScoredRun]) -> FloatArray:
+    """Derivatives of the residual by least squares through steps along each parameter (rows, p)."""
+    moved = np.array([side.z - best.z for side in sides])
+    changed = np.array([side.residual - best.residual if side.ok else 0.0 * best.residual for side in sides])
+    return np.linalg.lstsq(moved, changed, rcond=None)[0].T
+
+
+def _trials(best: ScoredRun, jacobian: FloatArray, damping: float) -> list[FloatArray]:
+    """Steps of several dampings from the best point."""
+    normal, slope = jacobian.T @ jacobian, jacobian.T @ best.residual
+    diagonal = np.diag(np.diag(normal) + NEXT_TO_NOTHING)
+    return [best.z - np.linalg.solve(normal + k * damping * diagonal, slope) for k in DAMPINGS]
+
+
+def _damping_of(tried: Sequence[ScoredRun], best: ScoredRun) -> float:
+    """About the damping of the best of the trials over the present one: the longer its step, the less [-]."""
+    order = sorted(tried, key=lambda run: -float(np.linalg.norm(run.z - best.z)))
+    place = next((i for i, run in enumerate(order) if run is best), len(DAMPINGS) // 2)
+    return DAMPINGS[min(place, len(DAMPINGS) - 1)] / DAMPINGS[2]
+
+
+def _corrected(jacobian: FloatArray, best: ScoredRun, tried: Sequence[ScoredRun]) -> FloatArray:
+    """Broyden's correction of the Jacobian by runs that are known."""
+    for run in sorted(tried, key=_misfit, reverse=True):
+        step = run.z - best.z
+        length = float(step @ step)
+        if run.ok and length > 0:
+            wrong = run.residual - best.residual - jacobian @ step
+            jacobian = jacobian + np.outer(wrong, step) / length
+    return jacobian
