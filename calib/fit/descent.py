@@ -10,6 +10,7 @@ Source: More 1978, Lecture Notes in Mathematics 630:105, for the scaling and the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -30,21 +31,27 @@ NEXT_TO_NOTHING = 1e-9
 
 
 def descend(
-    run: Callable[[Sequence[FloatArray]], list[ScoredRun]], start: ScoredRun, steps: FloatArray, inwards: FloatArray
+    run: Callable[[Sequence[FloatArray]], list[ScoredRun]],
+    steps: FloatArray,
+    inwards: FloatArray,
+    start: ScoredRun,
+    most: float = math.inf,
 ) -> ScoredRun:
     """Follow a valley down.
 
     Args:
         run: Runs points, internal coordinates (p,) each, or looks them up; those that can be paid, in any order.
-        start: Where it begins.
         steps: Steps of the differences [-] (p,).
         inwards: Point on whose side of the present one the differences are made [-] (p,).
+        start: Where it begins.
+        most: How often differences are made.
 
     Returns:
         The best run, after the last that brought a gain or could be paid.
     """
-    best, damping = start, 1.0
-    while True:
+    best, damping, made = start, 1.0, 0
+    while made < most:
+        made += 1
         signs = np.where(best.z > inwards, -1.0, 1.0)
         sides = run([best.z + d for d in np.diag(signs * steps)])
         if len(sides) < len(steps):
@@ -61,7 +68,8 @@ def descend(
             if not tried or before.misfit - best.misfit < REFINED * before.misfit:
                 break
         if not tried or begun - best.misfit < LEAST_GAIN * begun:
-            return best
+            break
+    return best
 
 
 def _misfit(run: ScoredRun) -> float:

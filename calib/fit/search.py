@@ -1,7 +1,8 @@
 """The search for the material: few, noisy, expensive simulations, run two or more at a time.
 
 0. Screening, where there is a coarse evaluator: steps 1 to 3 with it alone, within a part of the budget. Its curves
-   stay in the surrogate, with an offset of their own, and the fine search starts at its best points.
+   stay in the surrogate, with an offset of their own, and the fine search starts at its best points. Where the
+   objective has guesses, a descent (:mod:`calib.fit.descent`) from them takes the place of 2 and 3.
 1. Design: the given values, the centre of the prior and a scrambled Sobol sample of its 95 % box. Quasi-static forces
    scale with the stress-like parameters, so every run of the design stands for a whole line of materials; the best
    points of the best lines are run next.
@@ -13,12 +14,10 @@
    points near the best one on the fine one.
 4. The end, when neither the surrogate nor the runs give a gain worth its noise. If the curve is still not explained
    (chi-square above its 99 % quantile), another design is begun, with nothing of what is known, and from its best point
-   a descent on coarse cells (:mod:`calib.fit.descent`), so that it ends in a valley of its own. Its best points are run
-   on fine cells, and rounds follow whose fine runs are made only where the coarse ones promise a gain; at most so many
-   times, or until nothing was gained for long. Without a coarse evaluator, differences about the best point, and again
-   3 if they bring or promise a gain; with one the profiles step along each parameter anyway. The Jacobian is that of
-   the surrogate, in which the noise of single runs is averaged out; plain differences of noisy curves would make every
-   parameter look well identified.
+   a descent on coarse cells. What that finds is run on fine cells, and rounds follow whose fine runs are made only
+   where the coarse ones promise a gain; at most so many times, or until nothing was gained for long. Without a coarse
+   evaluator, differences about the best point, and again 3 if they bring or promise a gain. The Jacobian is that of the
+   surrogate, in which the noise of single runs is averaged out: plain differences make every parameter look identified.
 
 What these choices save on real and made-up cuts is in docs/theory.md, "Measured choices".
 
@@ -74,7 +73,7 @@ FAR_OFF = 4.0
 IDLE_BUDGET = 25.0
 #: Part of the budget that the coarse evaluator may spend on the screening [-]: 60 runs of the default budget.
 SCREENING_BUDGET = 0.15
-#: Coarse runs for each parameter that a further screening may take; its descent ends before, where it gains no more.
+#: Coarse runs for each parameter that a screening with a descent may take; it ends before, where it gains no more.
 DESCENT_RUNS = 12
 #: Largest joint scaling of the design's materials, as a logarithm: a factor 20 either way.
 LARGEST_SCALE = 3.0
@@ -111,7 +110,10 @@ class Search:
         self.unit = coordinate_unit(self.parameters)
         self.hyper: list[FloatArray] | None = None
         self.centre: FloatArray | None = None
-        self.screening = False
+        self.screening, self.screening_budget = False, SCREENING_BUDGET * options.budget
+        if objective.guesses:
+            wanted = DESCENT_RUNS * len(self.parameters) * options.coarse_cost
+            self.screening_budget = max(self.screening_budget, min(wanted, options.budget / 2))
         self.rescreenings = 0
         self.noise_misfit = 0.0
         self.gained_misfit, self.gained_at = math.inf, 0.0
@@ -181,7 +183,7 @@ class Search:
         """Screen, or run the design; then further designs while every run breaks down."""
         first = [self.parameters.start, self.parameters.prior_mean, *self.objective.guesses]
         if self.coarse is not None:
-            points, first = self._screen(first), []
+            points, first = self._screen(first, downhill=bool(self.objective.guesses)), []
             begun = len(self.runs)
             self._evaluate(points, "screened", most=max(2, self.options.batch))
             self._follow_lines(begun)
@@ -195,8 +197,8 @@ class Search:
             self._differences()
 
     def _screen(self, given: list[FloatArray], *, downhill: bool = False) -> list[FloatArray]:
-        """Search on the coarse evaluator, by rounds or ``downhill`` from the best point of the design; where its
-        surrogate expects the best point, and its runs, best first.
+        """Search on the coarse evaluator, by rounds or ``downhill`` from guesses that are given and the best of the design;
+        where its surrogate expects the best point, and its runs, best first.
         """
         self.screening = True
         try:
@@ -204,7 +206,10 @@ class Search:
             if not self.finished:
                 return []
             if downhill:
-                descend(self._descended, self.best, self.parameters.steps, self.parameters.prior_mean)
+                how = self._descended, self.parameters.steps, self.parameters.prior_mean
+                for start in self._descended(self.objective.guesses) if given else []:
+                    descend(*how, start, most=1)
+                descend(*how, self.best)
             else:
                 self._differences()
                 self._rounds()
@@ -214,9 +219,7 @@ class Search:
             self.screening, self.centre, self.hyper = False, None, None
 
     def _rescreen(self) -> bool:
-        """Go down from another design, with nothing of what is known, and run what that finds; False where it cannot or
-        need not be paid.
-        """
+        """Go down from another design and run what that finds; False where it cannot or need not be paid."""
         far_off = self.best.misfit > FAR_OFF * self.objective.effective_rows
         rest = self.options.budget - self.spent - 2 * self.options.batch
         unpaid = rest < self.options.coarse_cost * self.options.least(len(self.parameters))
@@ -231,6 +234,7 @@ class Search:
         )
         told = progress_of_all(self.progress, self.runs, self.best, self.options)
         other = Search(self.objective, self.fine, self.coarse, options, told, self.enough)
+        other.screening_budget = SCREENING_BUDGET * options.budget
         try:
             points = other._screen([], downhill=True)
         finally:
@@ -338,7 +342,7 @@ class Search:
     def _affordable(self) -> int:
         """Simulations that the budget, while screening its part of it, still holds."""
         if self.screening:
-            return int((SCREENING_BUDGET * self.options.budget - self.spent) / self.options.coarse_cost + 1e-9)
+            return int((self.screening_budget - self.spent) / self.options.coarse_cost + 1e-9)
         return int(self.options.budget - self.spent + 1e-9)
 
     def _evaluate(

@@ -37,6 +37,8 @@ LINE_DENT = 2.0
 the contact's (Johnson 1985, Contact Mechanics), so any number near it will do for a start."""
 FRICTION_PART = 0.3
 """Friction in what is begun with over the food's [-]: what rubs is not part of the chords."""
+PARTS_AT = 0.05
+"""Dent at which a firm food parts in what is begun with, over its height [-]."""
 STARTS = 0.7
 """Part of the largest force of the first third at which the cut has started in what is begun with [-]."""
 
@@ -44,8 +46,9 @@ STARTS = 0.7
 def layer_guesses(
     scene: Scene, parameters: ParameterSet, stroke: FloatArray, curve: FloatArray
 ) -> tuple[FloatArray, ...]:
-    """Starts for the fitted parameters of a food with layers: a soft food whose skin gives way soon, and a food of the
-    usual stiffness that gives way under the edge up to the largest force of the first third of the stroke.
+    """Starts for the fitted parameters of a food with layers: a food of the usual stiffness that parts at once, whose
+    force is the chords' alone; a soft food whose skin gives way soon; and a food of the usual stiffness that gives way
+    under the edge up to the largest force of the first third of the stroke.
 
     The soft food yields at the usual strain. With the usual yield stress a search ended in a cucumber that yields at a
     strain of 0.9, which no tissue bears, and whose crack 3 mm do not resolve.
@@ -82,13 +85,18 @@ def layer_guesses(
     if "mu" in parameters.names:
         found["mu"] = FRICTION_PART * parameters["mu"].value
     soft = _vector(parameters, found)
+    firm = _vector(
+        parameters,
+        {k: v for k, v in found.items() if k not in ("E", "yield_stress")}
+        | {"initiation_depth": PARTS_AT * shape.height},
+    )
     reached = float(stroke[int(np.argmax(curve[: max(len(curve) // 3, 2)]))])
     height, chords = _chords(shape, food)
     chord = max(float(np.interp(reached, height, chords.sum(axis=0))), chords.max() / POINTS[1])
     line = EDGE_PART * float(np.interp(reached, stroke, curve)) / chord
     stiff = found | {"initiation_depth": reached, "R_skin": max(line, outer), "R_initiation": max(line, outer)}
     usual = {name: value for name, value in stiff.items() if name not in ("E", "yield_stress")}
-    return soft, _vector(parameters, usual)
+    return firm, soft, _vector(parameters, usual)
 
 
 def _tried(parameters: ParameterSet, size: str) -> FloatArray:
