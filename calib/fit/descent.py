@@ -65,9 +65,9 @@ def descend(
             jacobian = _corrected(jacobian, before, tried)
             if tried and best is not before:
                 damping = float(np.clip(damping * _damping_of(tried, best), *DAMPING_RANGE))
-            if not tried or before.misfit - best.misfit < REFINED * before.misfit:
+            if not tried or before.misfit - best.misfit <= REFINED * before.misfit:
                 break
-        if not tried or begun - best.misfit < LEAST_GAIN * begun:
+        if not tried or begun - best.misfit <= LEAST_GAIN * begun:
             break
     return best
 

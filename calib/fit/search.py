@@ -197,9 +197,7 @@ class Search:
             self._differences()
 
     def _screen(self, given: list[FloatArray], *, downhill: bool = False) -> list[FloatArray]:
-        """Search on the coarse evaluator, by rounds or ``downhill`` from guesses that are given and the best of the design;
-        where its surrogate expects the best point, and its runs, best first.
-        """
+        """Search on the coarse evaluator, by rounds or ``downhill``; where it expects the best point, and its runs."""
         self.screening = True
         try:
             self._design(given)

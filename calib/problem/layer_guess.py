@@ -84,19 +84,14 @@ def layer_guesses(
         found["yield_stress"] = parameters["yield_stress"].value * found["E"] / parameters["E"].value
     if "mu" in parameters.names:
         found["mu"] = FRICTION_PART * parameters["mu"].value
-    soft = _vector(parameters, found)
-    firm = _vector(
-        parameters,
-        {k: v for k, v in found.items() if k not in ("E", "yield_stress")}
-        | {"initiation_depth": PARTS_AT * shape.height},
-    )
     reached = float(stroke[int(np.argmax(curve[: max(len(curve) // 3, 2)]))])
     height, chords = _chords(shape, food)
     chord = max(float(np.interp(reached, height, chords.sum(axis=0))), chords.max() / POINTS[1])
     line = EDGE_PART * float(np.interp(reached, stroke, curve)) / chord
-    stiff = found | {"initiation_depth": reached, "R_skin": max(line, outer), "R_initiation": max(line, outer)}
-    usual = {name: value for name, value in stiff.items() if name not in ("E", "yield_stress")}
-    return firm, soft, _vector(parameters, usual)
+    usual = {name: value for name, value in found.items() if name not in ("E", "yield_stress")}
+    firm = usual | {"initiation_depth": PARTS_AT * shape.height}
+    dented = usual | {"initiation_depth": reached, "R_skin": max(line, outer), "R_initiation": max(line, outer)}
+    return _vector(parameters, firm), _vector(parameters, found), _vector(parameters, dented)
 
 
 def _tried(parameters: ParameterSet, size: str) -> FloatArray:

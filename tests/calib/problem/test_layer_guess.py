@@ -38,7 +38,7 @@ def test_the_layers_of_a_made_up_force_are_found() -> None:
     """Two peaks, a dip and a fall tell the three resistances to a quarter and the sizes to a step of what is tried."""
     names = ("E", "R", "R_rind", "rind_thickness", "R_core", "core_ratio", "R_skin", "initiation_depth", "mu")
     parameters = fit_parameters(CUCUMBER, names)
-    guess, _ = layer_guesses(SCENE, parameters, *made())
+    _, guess, _ = layer_guesses(SCENE, parameters, *made())
     found = parameters.to_dict(guess)
     for name in ("R", "R_rind", "rind_thickness", "core_ratio"):
         assert found[name] == pytest.approx(TRUE[name], rel=0.25), name
@@ -48,13 +48,24 @@ def test_the_layers_of_a_made_up_force_are_found() -> None:
 
 
 def test_a_soft_start_yields_at_the_strain_of_its_food() -> None:
-    """A start that is softer than the food of the literature yields at the same strain, the stiff one as it."""
+    """A start that is softer than the food of the literature yields at the same strain, the stiff ones as it."""
     parameters = fit_parameters(CUCUMBER, ("E", "yield_stress", "R", "R_rind", "rind_thickness", "R_skin"))
-    soft, stiff = (parameters.to_dict(guess) for guess in layer_guesses(SCENE, parameters, *made()))
+    firm, soft, dented = (parameters.to_dict(guess) for guess in layer_guesses(SCENE, parameters, *made()))
     modulus, limit = (CUCUMBER.properties[name].value for name in ("E", "yield_stress"))
     assert soft["E"] < 0.5 * modulus
     assert soft["yield_stress"] / soft["E"] == pytest.approx(limit / modulus)
-    assert stiff["yield_stress"] == pytest.approx(limit)
+    for stiff in (firm, dented):
+        assert (stiff["E"], stiff["yield_stress"]) == pytest.approx((modulus, limit))
+
+
+def test_a_firm_food_parts_at_once() -> None:
+    """Its layers are those of the others, and it gives way by a twentieth of its height only."""
+    names = ("E", "R", "R_rind", "rind_thickness", "R_core", "core_ratio", "R_skin", "initiation_depth")
+    parameters = fit_parameters(CUCUMBER, names)
+    firm, soft, dented = (parameters.to_dict(guess) for guess in layer_guesses(SCENE, parameters, *made()))
+    assert firm["initiation_depth"] == pytest.approx(HEIGHT / 20)
+    assert firm["initiation_depth"] < dented["initiation_depth"]
+    assert [firm[name] for name in TRUE] == [soft[name] for name in TRUE] == [dented[name] for name in TRUE]
 
 
 def test_a_peak_at_the_start_may_be_a_dent_of_stiff_food() -> None:
@@ -64,7 +75,7 @@ def test_a_peak_at_the_start_may_be_a_dent_of_stiff_food() -> None:
     parameters = fit_parameters(CUCUMBER, names)
     stroke = np.linspace(0.0, HEIGHT, 240)
     force = np.where(stroke < 11e-3, 50.0 * (stroke / 11e-3) ** 2, 12.0)
-    _, guess = layer_guesses(SCENE, parameters, stroke, force)
+    *_, guess = layer_guesses(SCENE, parameters, stroke, force)
     found, top = parameters.to_dict(guess), float(stroke[stroke < 11e-3][-1])
     chord = 2.0 * np.sqrt(top * (HEIGHT - top))
     assert found["initiation_depth"] == pytest.approx(top)
@@ -90,7 +101,7 @@ def test_a_whole_cucumber_is_through_before_its_stroke_ends() -> None:
     setup = set_up(request)
     assert setup.curve.stroke_length_m == pytest.approx(0.0425, abs=3e-4) == setup.fine.food.shape.height
     assert any("edge is through" in text for text in setup.curve.warnings)
-    guess, _ = setup.objective.guesses
+    guess, *_ = setup.objective.guesses
     found = setup.objective.parameters.to_dict(guess)
     assert found["R_rind"] > 2 * found["R"] > 4 * found["R_core"]
     assert 2e-3 < found["rind_thickness"] < 3.5e-3 and 0.4 < found["core_ratio"] < 0.65
