@@ -85,7 +85,7 @@ def test_a_layer_of_another_stiffness_weighs_nothing(layer: dict[str, float]) ->
 
 
 def test_time_steps_are_those_of_the_flesh_and_of_its_lightest_layer() -> None:
-    """A stiff rind costs no time; a core as tough as the flesh, and a hundredth as stiff, holds the edge with less mass."""
+    """A stiff rind costs no time; a core as tough as the flesh, a hundredth as stiff, holds the edge with less mass."""
     steps = [
         Setup(scene("cylinder", replace(FRUIT, **layer)), Runtime(threads=1)).time_step(replace(FRUIT, **layer))
         for layer in ({}, {"rind_stiffness": 5.0}, {"core_stiffness": 0.01, "R_core": 80.0})

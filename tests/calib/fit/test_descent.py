@@ -44,7 +44,7 @@ def found(runs: Runs, **more: Any) -> Any:
 
 
 def test_a_bent_valley_is_followed_to_its_end() -> None:
-    """Ten parameters: a hundredth of the misfit in ten sets of differences, nothing left at the end, and then it stops."""
+    """Ten parameters: a hundredth of the misfit in ten sets of differences, nothing at the end, where it stops."""
     runs = Runs(10 * (COUNT + len(DAMPINGS)))
     assert found(runs).misfit < 0.01 * (COUNT - 1)
     runs = Runs()

@@ -21,7 +21,16 @@ from calib.material.food import (
     load_material_file,
 )
 from calib.material.food_file import dump_material
-from calib.material.properties import DIMENSIONS, LAYERS, PROPERTIES, RELAXATION, Property, Source, check_override
+from calib.material.properties import (
+    DIMENSIONS,
+    LAYER_STIFFNESS,
+    LAYERS,
+    PROPERTIES,
+    RELAXATION,
+    Property,
+    Source,
+    check_override,
+)
 from tests.data_dir import data_file
 
 TABLE2 = {  # rho, E, nu of CulinaryCut, Table 2
@@ -79,8 +88,8 @@ def test_shipped_foods(foods: dict[str, FoodSpec]) -> None:
             "strength_ratio",
             "fracture_energy",
             "skin_stiffness",
-            "rind_stiffness",
             *RELAXATION,
+            *LAYER_STIFFNESS.values(),
             *LAYERS,
             *LAYERS.values(),
         }
@@ -199,9 +208,10 @@ def test_default_fit_follows_the_skin(foods: dict[str, FoodSpec]) -> None:
         "R",
         "R_rind",
         "rind_thickness",
+        "rind_stiffness",
         "R_core",
         "core_ratio",
-        "rind_stiffness",
+        "core_stiffness",
         "R_skin",
         "skin_thickness",
         "initiation_depth",
@@ -613,19 +623,23 @@ def test_a_skin_that_bears_tension_is_asked_for() -> None:
     assert skinned.as_dict()["properties"]["skin_stiffness"]["value"] == 3000.0
 
 
-def test_the_stiffness_of_a_rind_is_fitted_where_it_is_known() -> None:
-    """Foods with a rind have it; it reaches the solver and comes back; without a rind there is none to be stiff."""
+@pytest.mark.parametrize(
+    ("name", "size", "layer"),
+    [("rind_stiffness", "rind_thickness", RIND), ("core_stiffness", "core_ratio", {"R_core": 60.0, "core_ratio": 0.3})],
+)
+def test_the_stiffness_of_a_layer_is_fitted_where_it_is_known(name: str, size: str, layer: dict[str, float]) -> None:
+    """It reaches the solver and comes back; a layer without it is as stiff as the flesh, and without a layer there is
+    none to be stiff."""
     food = load_food("cucumber")
-    stiffness = food.properties["rind_stiffness"].value
-    assert food.to_scene_food().material.rind_stiffness == stiffness > 1.0 and "rind_stiffness" in food.default_fit
-    assert not food.with_values({"rind_stiffness": 1.0}).to_scene_food().material.graded
-    assert food.with_values({"rind_stiffness": 4.0}).as_dict()["properties"]["rind_stiffness"]["value"] == 4.0
-    bare = food.with_values({"rind_thickness": 0.0})
-    assert "rind_stiffness" not in bare.default_fit and not bare.to_scene_food().material.graded
-    plain = load_food("banana").with_values(RIND)
-    assert not plain.to_scene_food().material.graded and "rind_stiffness" not in plain.default_fit
-    with pytest.raises(MaterialError, match="banana.properties: rind_stiffness needs a rind"):
-        load_food("banana").with_values({"rind_stiffness": 4.0})
+    value = food.properties[name].value
+    assert getattr(food.to_scene_food().material, name) == value != 1.0 and name in food.default_fit
+    assert food.with_values({name: 4.0}).as_dict()["properties"][name]["value"] == 4.0
+    assert name not in food.with_values({size: 0.0}).default_fit
+    plain = load_food("banana").with_values(layer)
+    assert not plain.to_scene_food().material.graded and name not in plain.default_fit
+    assert plain.with_values({name: 4.0}).to_scene_food().material.graded
+    with pytest.raises(MaterialError, match=f"banana.properties: {name} needs {size}; give it, and R_"):
+        load_food("banana").with_values({name: 4.0})
 
 
 def test_a_food_that_relaxes_is_asked_for() -> None:

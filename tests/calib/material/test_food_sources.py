@@ -87,14 +87,15 @@ def test_what_is_measured_names_who_measured_it() -> None:
 
 def test_layers_are_of_foods_that_have_them() -> None:
     """Rind and core are where anatomy has them, and in the default cut of no other food."""
-    assert {name: food.layers[1::2] for name, food in FOODS.items() if food.layers} == {
-        "cucumber": ("rind_thickness", "core_ratio"),
-        "melon": ("rind_thickness",),
-        "orange": ("rind_thickness",),
-        "kiwi": ("core_ratio",),
-        "tomato": ("core_ratio",),
+    rind, core = ("R_rind", "rind_thickness", "rind_stiffness"), ("R_core", "core_ratio")
+    assert {name: food.layers for name, food in FOODS.items() if food.layers} == {
+        "cucumber": (*rind, *core, "core_stiffness"),
+        "melon": rind,
+        "orange": rind,
+        "kiwi": core,
+        "tomato": core,
     }
     for food in FOODS.values():
         if food.layers:
-            shape, rind = food.to_scene_food().shape, food.properties.get("rind_thickness")
-            assert rind is None or rind.high < min(shape.height, shape.width) / 4
+            shape, outer = food.to_scene_food().shape, food.properties.get("rind_thickness")
+            assert outer is None or outer.high < min(shape.height, shape.width) / 4
