@@ -132,7 +132,7 @@ PRESS_TESTS = (
         "lying cylinder with a soft core",
         Shape("cylinder", 0.016, 0.03, 0.03),
         (0.002, 0.004, 0.006),
-        core=(0.6, 0.03),
+        core=(0.6, 0.1),
         reference=(("cells", 4), ("order", 2), ("grade", 1.2)),
         cost=300.0,
     ),
