@@ -73,7 +73,9 @@ FAR_OFF = 4.0
 IDLE_BUDGET = 25.0
 #: Part of the budget that the coarse evaluator may spend on the screening [-]: 60 runs of the default budget.
 SCREENING_BUDGET = 0.15
-#: Coarse runs for each parameter that a screening with a descent may take; it ends before, where it gains no more.
+#: The same where it goes down from guesses: it ends before, where that gains no more.
+DESCENT_BUDGET = 0.7
+#: Coarse runs for each parameter that a further screening may take.
 DESCENT_RUNS = 12
 #: Largest joint scaling of the design's materials, as a logarithm: a factor 20 either way.
 LARGEST_SCALE = 3.0
@@ -110,10 +112,8 @@ class Search:
         self.unit = coordinate_unit(self.parameters)
         self.hyper: list[FloatArray] | None = None
         self.centre: FloatArray | None = None
-        self.screening, self.screening_budget = False, SCREENING_BUDGET * options.budget
-        if objective.guesses:
-            wanted = DESCENT_RUNS * len(self.parameters) * options.coarse_cost
-            self.screening_budget = max(self.screening_budget, min(wanted, options.budget / 2))
+        self.screening = False
+        self.screening_budget = (DESCENT_BUDGET if objective.guesses else SCREENING_BUDGET) * options.budget
         self.rescreenings = 0
         self.noise_misfit = 0.0
         self.gained_misfit, self.gained_at = math.inf, 0.0
@@ -374,7 +374,7 @@ class Search:
     def _descended(self, points: Sequence[FloatArray]) -> list[ScoredRun]:
         """Run points of a descent on coarse cells; the runs of them that there are."""
         grid = LATTICE * self.unit
-        self._evaluate(points, "descent", coarse=True)
+        self._evaluate(points, "descent", coarse=True, most=max(self._affordable(), 0))
         wanted = np.array([self.parameters.clip(np.round(point / grid) * grid) for point in points])
         return [run for run in self.runs if run.coarse and np.all(np.abs(wanted - run.z) <= 0.5 * grid, axis=1).any()]
 

@@ -18,6 +18,7 @@ from calib.fit.acquisition import LOCAL_WEIGHT
 from calib.fit.multistart import FINALIST_MARGIN, RESTART_SEED, FitResult, _may_win, multistart_search
 from calib.fit.options import FitOptions
 from calib.fit.search import (
+    DESCENT_BUDGET,
     FAR_OFF,
     MAX_RESCREENINGS,
     NOISE_TOLERANCE,
@@ -258,6 +259,25 @@ def test_a_curve_far_off_is_sought_as_long_as_the_budget_holds(
     result = multistart_search(objective, Fake(two_terms), coarse=Fake(two_terms), options=options)
     assert (result.best.misfit > FAR_OFF * objective.effective_rows) is spent
     assert (screenings(result, options) > 1 + MAX_RESCREENINGS) is spent
+
+
+@pytest.mark.parametrize("budget", [25.0, 60.0])
+def test_guesses_are_gone_down_from_within_the_budget(budget: float) -> None:
+    """Guesses far from the truth are stepped from on coarse cells; the descents leave a part for fine runs, and nothing
+    is spent beyond the budget, also where no curve is explained."""
+    objective = goal(TRUTHS[0])
+    guesses = tuple(FIVE.clip(FIVE.to_vector(TRUTHS[0]) + shift) for shift in (1.0, -1.0))
+    objective = replace(objective, guesses=guesses)
+    options = FitOptions(budget=budget, design=3)
+    result = multistart_search(objective, Fake(three_terms), coarse=Fake(three_terms), options=options)
+    screened = [k for k, run in enumerate(result.history) if not run.coarse][0]
+    descended = [run for run in result.history[:screened] if run.stage == "descent"]
+    assert len(descended) >= len(guesses) * len(FIVE)
+    assert options.cost(result.history[:screened]) <= DESCENT_BUDGET * budget + 1e-9
+    assert options.cost(result.history) <= budget
+    never = replace(wiggly(0.3), guesses=(TWO.start,))
+    lost = multistart_search(never, Fake(two_terms), coarse=Fake(two_terms), options=options)
+    assert options.cost(lost.history) <= budget
 
 
 @pytest.mark.parametrize(("size", "polished"), [(0.0, True), (2.0, False)])
