@@ -50,7 +50,7 @@ class Simulation:
         self.serial = start(self.setup.runtime, scene.numerics.precision)
         configuration = self.setup.configuration(self.setup.threads())
         self.state: Any = state_of(configuration, self.serial) if alone else None
-        self.place = 0
+        self.place, self._loaded = 0, scene.food.material
 
     @property
     def scene(self) -> Scene:
@@ -59,7 +59,7 @@ class Simulation:
 
     def load(self, material: Material) -> None:
         """Write seeds and constants into the fields."""
-        self.state.owner = self
+        self.state.owner, self._loaded = self, material
         host_transfer.begin(self.state, [self.setup.contents(material)])
 
     def set_pose(self, z: float, along: float = 0.0, tilt: float = 0.0) -> None:
@@ -121,6 +121,8 @@ class Simulation:
             What there is to see.
         """
         now = host_transfer.particles(self.state, self.place)
+        if self._loaded.graded:  # what is kept is the stress of so much of the flesh
+            now = replace(now, tau=now.tau * self.setup.layer_weights(self._loaded)[:, None])
         return snapshot(time, stroke, slide, now, self.setup.to_scene_axes(now.x))
 
     def topology(self) -> Topology:
