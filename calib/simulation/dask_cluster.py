@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import functools
+import gc
 import logging
 import pickle
 import sys
@@ -222,9 +223,11 @@ def _client(connect: Callable[[], Client]) -> Client:
 
     Whatever the scheduler tells all its clients within milliseconds of its greeting, such as what another run has
     cancelled, arrives together with that; ``Client`` asserts that a greeting comes alone. Who connects again is greeted
-    anew.
+    anew. A client that was not greeted closes itself when Python collects it, and would wait for ever if that was in the
+    midst of another's start, so it is collected before.
     """
     for _ in range(GREETINGS):
+        gc.collect()
         with suppress(AssertionError):
             return connect()
     raise OSError("it is too busy to greet a client")

@@ -3,6 +3,7 @@ rest."""
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import shutil
@@ -396,6 +397,31 @@ def test_news_that_comes_with_the_greeting(two, monkeypatch, greeted):
         with pytest.raises(ClusterError, match="too busy to greet"):
             Cluster(two.address)
         assert len(attempts) == dask_cluster.GREETINGS
+
+
+def test_a_client_that_nobody_holds_is_gone_before_another_starts() -> None:
+    """One that was not greeted is part of a cycle; collected in the midst of another's start it would wait for ever."""
+    gone, seen = [], []
+
+    class Ungreeted:
+        def __init__(self) -> None:
+            self.myself = self
+
+        def __del__(self) -> None:
+            gone.append(self)
+
+    def connect() -> Any:
+        seen.append(len(gone))
+        Ungreeted()
+        assert len(seen) > 1, "as Client says where a greeting does not come alone"
+
+    gc.disable()
+    try:
+        Ungreeted()
+        dask_cluster._client(connect)
+    finally:
+        gc.enable()
+    assert seen == [1, 2]
 
 
 def usable(made: Servers) -> bool:
