@@ -223,8 +223,8 @@ def _client(connect: Callable[[], Client]) -> Client:
 
     Whatever the scheduler tells all its clients within milliseconds of its greeting, such as what another run has
     cancelled, arrives together with that; ``Client`` asserts that a greeting comes alone. Who connects again is greeted
-    anew. A client that was not greeted closes itself when Python collects it, and would wait for ever if that was in the
-    midst of another's start, so it is collected before.
+    anew. A client that was not greeted closes itself when Python collects it, and would wait for ever if that was in
+    the midst of another's start, so it is collected before.
     """
     for _ in range(GREETINGS):
         gc.collect()
