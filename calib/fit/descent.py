@@ -40,7 +40,7 @@ def descend(
     """Follow a valley down.
 
     Args:
-        run: Runs points, internal coordinates (p,) each, or looks them up; those that can be paid, in any order.
+        run: Runs points, internal coordinates [-] (p,) each, or looks them up; those that can be paid, in any order.
         steps: Steps of the differences [-] (p,).
         inwards: Point on whose side of the present one the differences are made [-] (p,).
         start: Where it begins.

@@ -41,15 +41,7 @@ if TYPE_CHECKING:
 
     from mpm.scene import Food
 
-__all__ = [
-    "FoodSpec",
-    "Property",
-    "Source",
-    "check_override",
-    "load_food",
-    "load_foods",
-    "load_material_file",
-]
+__all__ = ["FoodSpec", "Property", "Source", "check_override", "load_food", "load_foods", "load_material_file"]
 
 GIVEN_SPREAD = 10.0
 """Range of a property that has no literature and is given by the user: the value over and times this."""
@@ -171,8 +163,7 @@ class FoodSpec:
 
     @property
     def layers(self) -> tuple[str, ...]:
-        """Names of the properties of the layers that the food has beside its flesh: resistance and size of each, and
-        its stiffness where that is another one."""
+        """Names of the layers' properties: of each resistance, size, and stiffness where it is another than flesh's."""
         there = [size for size in LAYERS if size in self.properties and self.properties[size].value > 0.0]
         each = [name for size in there for name in (LAYERS[size], size, LAYER_STIFFNESS[size])]
         return tuple(name for name in each if name in self.properties)
