@@ -5,7 +5,7 @@ Tensors are arrays [3, 3, ...] whose last axes are the quadrature points, so tha
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -28,6 +28,11 @@ class Law(Protocol):
     @property
     def linear(self) -> bool:
         """Whether the tangent is a constant."""
+        ...
+
+    @property
+    def elastic(self) -> Law:
+        """The same law of a solid that does not yield."""
         ...
 
     def start(self, shape: tuple[int, ...]) -> np.ndarray | None:
@@ -99,6 +104,11 @@ class Linear:
     symmetric = True
     linear = True
 
+    @property
+    def elastic(self) -> Linear:
+        """This law itself."""
+        return self
+
     def start(self, shape: tuple[int, ...]) -> None:
         """No memory."""
 
@@ -139,6 +149,11 @@ class Corotated:
     lam: float
     symmetric = True
     linear = False
+
+    @property
+    def elastic(self) -> Corotated:
+        """This law itself."""
+        return self
 
     def start(self, shape: tuple[int, ...]) -> None:
         """No memory."""
@@ -186,6 +201,11 @@ class NeoHookean:
     symmetric = True
     linear = False
 
+    @property
+    def elastic(self) -> NeoHookean:
+        """This law itself."""
+        return self
+
     def start(self, shape: tuple[int, ...]) -> None:
         """No memory."""
 
@@ -232,6 +252,11 @@ class Graded:
         """As of the law."""
         return self.law.linear
 
+    @property
+    def elastic(self) -> Graded:
+        """As of the law."""
+        return Graded(self.law.elastic, self.factor)
+
     def start(self, shape: tuple[int, ...]) -> np.ndarray | None:
         """As of the law."""
         return self.law.start(shape)
@@ -266,6 +291,11 @@ class Plastic:
     yield_stress: float
     symmetric = False
     linear = False
+
+    @property
+    def elastic(self) -> Plastic:
+        """Without a yield stress; its state goes on."""
+        return replace(self, yield_stress=np.inf)
 
     def start(self, shape: tuple[int, ...]) -> np.ndarray:
         """No plastic deformation."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,7 +16,7 @@ import skfem as sk
 from fem_reference.condensation import Condensation
 from fem_reference.contact import Contact
 from fem_reference.dilatation import Dilatation
-from fem_reference.laws import Law, Plastic, determinant, identity
+from fem_reference.laws import Law, determinant, identity
 from mpm.scene.errors import CutcalError
 
 ELEMENTS = {
@@ -195,7 +195,7 @@ class Solid:
 
     def stiffness(self, u: np.ndarray, flow: bool = True) -> sp.csr_matrix:
         """Consistent tangent, without ``flow`` that of a solid that does not yield [N/m]."""
-        law = self.law if flow or not isinstance(self.law, Plastic) else replace(self.law, yield_stress=np.inf)
+        law = self.law if flow else self.law.elastic
         if self._constant is not None:
             return self._constant
         f = self.deformation(u)

@@ -13,6 +13,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from calib.fit.surrogate import Surrogate
+from calib.problem.parameters import ParameterSet
 from calib.problem.scored_run import ScoredRun
 from mpm.arrays import FloatArray
 
@@ -32,6 +33,35 @@ GLOBAL_STARTS, GLOBAL_DESCENTS = 100, 5
 #: chi-square than the best run: about a 90 % region of one parameter, where curvature matters for the intervals. The
 #: last number is how many are drawn (docs/theory.md, "Measured choices").
 PROBE_SPREAD, PROBE_COST, PROBES = 1.5, 3.0, 200
+
+
+def on_lattice(parameters: ParameterSet, unit: FloatArray, z: FloatArray) -> FloatArray:
+    """The point of the lattice that is nearest.
+
+    Args:
+        parameters: Their bounds are kept.
+        unit: Coordinate units [-] (p,).
+        z: Internal coordinates of a point [-] (p,).
+
+    Returns:
+        Internal coordinates (p,).
+    """
+    grid = LATTICE * unit
+    return parameters.clip(np.round(z / grid) * grid)
+
+
+def same_point(unit: FloatArray, one: FloatArray, other: FloatArray) -> bool:
+    """Whether two points are one of the lattice.
+
+    Args:
+        unit: Coordinate units [-] (p,).
+        one: Internal coordinates of a point [-] (p,).
+        other: Those of the other [-] (p,).
+
+    Returns:
+        Whether they are no further apart than half a step of the lattice along any axis.
+    """
+    return bool(np.all(np.abs(one - other) <= 0.5 * (LATTICE * unit)))
 
 
 def local_optimum(surrogate: Surrogate) -> FloatArray:

@@ -11,7 +11,7 @@ from calib.fit.options import FitOptions
 from calib.io.progress import Progress
 from calib.problem.scored_run import ScoredRun
 
-COARSE_TIME = 0.09
+COARSE_TIME = 0.18
 """Time of a coarse run over that of a default one [-] (docs/theory.md, "Measured choices"). The budget counts it as
 more (``FitOptions.coarse_cost``)."""
 

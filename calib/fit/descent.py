@@ -20,6 +20,8 @@ from mpm.arrays import FloatArray
 
 DAMPINGS = (0.003, 0.03, 0.1, 0.4, 1.5, 6.0)
 """Dampings that are tried, over the diagonal of the normal equations and times the present damping [-]."""
+USUAL_DAMPING = 0.1
+"""That of them which keeps the present damping as it is; a longer step lowers it, a shorter one raises it [-]."""
 DAMPING_RANGE = (0.1, 30.0)
 """Range of the present damping [-]."""
 REFINED = 0.1
@@ -59,12 +61,13 @@ def descend(
         jacobian = _differences(best, sides)
         begun = best.misfit
         while True:
-            before = best
-            tried = run(_trials(best, jacobian, damping))
+            before, trials = best, _trials(best, jacobian, damping)
+            tried = run(trials)
             best = min([best, *sides, *tried], key=_misfit)
             jacobian = _corrected(jacobian, before, tried)
-            if tried and best is not before:
-                damping = float(np.clip(damping * _damping_of(tried, best), *DAMPING_RANGE))
+            if any(best is one for one in tried):
+                nearest = int(np.argmin([np.abs(trial - best.z).max() for trial in trials]))
+                damping = float(np.clip(damping * DAMPINGS[nearest] / USUAL_DAMPING, *DAMPING_RANGE))
             if not tried or before.misfit - best.misfit <= REFINED * before.misfit:
                 break
         if not tried or begun - best.misfit <= LEAST_GAIN * begun:
@@ -73,7 +76,8 @@ def descend(
 
 
 def _misfit(run: ScoredRun) -> float:
-    return run.misfit
+    """Chi-square of a run; of one that broke down it is no answer."""
+    return run.misfit if run.ok else math.inf
 
 
 def _differences(best: ScoredRun, sides: Sequence[ScoredRun]) -> FloatArray:
@@ -88,13 +92,6 @@ def _trials(best: ScoredRun, jacobian: FloatArray, damping: float) -> list[Float
     normal, slope = jacobian.T @ jacobian, jacobian.T @ best.residual
     diagonal = np.diag(np.diag(normal) + NEXT_TO_NOTHING)
     return [best.z - np.linalg.solve(normal + k * damping * diagonal, slope) for k in DAMPINGS]
-
-
-def _damping_of(tried: Sequence[ScoredRun], best: ScoredRun) -> float:
-    """About the damping of the best of the trials over the present one: the longer its step, the less [-]."""
-    order = sorted(tried, key=lambda run: -float(np.linalg.norm(run.z - best.z)))
-    place = next((i for i, run in enumerate(order) if run is best), len(DAMPINGS) // 2)
-    return DAMPINGS[min(place, len(DAMPINGS) - 1)] / DAMPINGS[2]
 
 
 def _corrected(jacobian: FloatArray, best: ScoredRun, tried: Sequence[ScoredRun]) -> FloatArray:

@@ -35,7 +35,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.stats import chi2, qmc
 
-from calib.fit.acquisition import LATTICE, beside, expected_gain, global_optimum, local_optimum, probes
+from calib.fit.acquisition import beside, expected_gain, global_optimum, local_optimum, on_lattice, probes, same_point
 from calib.fit.budget import longest_time_left, progress_of_all
 from calib.fit.descent import descend
 from calib.fit.options import FitOptions
@@ -205,8 +205,9 @@ class Search:
                 return []
             if downhill:
                 how = self._descended, self.parameters.steps, self.parameters.prior_mean
-                for start in self._descended(self.objective.guesses) if given else []:
-                    descend(*how, start, most=1)
+                for start in self._descended(self.objective.guesses if given else ()):
+                    if start.ok:
+                        descend(*how, start, most=1)
                 descend(*how, self.best)
             else:
                 self._differences()
@@ -227,12 +228,12 @@ class Search:
         wanted = DESCENT_RUNS * len(self.parameters) * self.options.coarse_cost
         options = replace(
             self.options,
-            budget=min(max(SCREENING_BUDGET * self.options.budget, wanted), rest) / SCREENING_BUDGET,
+            budget=min(max(SCREENING_BUDGET * self.options.budget, wanted), rest),
             seed=self.options.seed + RESCREENING_SEED * self.rescreenings,
         )
         told = progress_of_all(self.progress, self.runs, self.best, self.options)
         other = Search(self.objective, self.fine, self.coarse, options, told, self.enough)
-        other.screening_budget = SCREENING_BUDGET * options.budget
+        other.screening_budget = options.budget
         try:
             points = other._screen([], downhill=True)
         finally:
@@ -361,22 +362,20 @@ class Search:
     def _new(self, points: Sequence[FloatArray], coarse: bool) -> list[FloatArray]:
         """The points, on the lattice, that were not run at this resolution and can be paid."""
         cost = self.options.coarse_cost if coarse else 1.0
-        grid = LATTICE * self.unit
         known = [run.z for run in self.runs if run.coarse == coarse]
         batch: list[FloatArray] = []
         for point in points:
-            z = self.parameters.clip(np.round(point / grid) * grid)
-            new = all(np.any(np.abs(z - other) > 0.5 * grid) for other in known + batch)
+            z = on_lattice(self.parameters, self.unit, point)
+            new = not any(same_point(self.unit, z, other) for other in known + batch)
             if new and self.spent + (len(batch) + 1) * cost <= self.options.budget + 1e-9:
                 batch.append(z)
         return batch
 
     def _descended(self, points: Sequence[FloatArray]) -> list[ScoredRun]:
         """Run points of a descent on coarse cells; the runs of them that there are."""
-        grid = LATTICE * self.unit
         self._evaluate(points, "descent", coarse=True, most=max(self._affordable(), 0))
-        wanted = np.array([self.parameters.clip(np.round(point / grid) * grid) for point in points])
-        return [run for run in self.runs if run.coarse and np.all(np.abs(wanted - run.z) <= 0.5 * grid, axis=1).any()]
+        wanted = [on_lattice(self.parameters, self.unit, point) for point in points]
+        return [run for run in self.runs if run.coarse and any(same_point(self.unit, run.z, z) for z in wanted)]
 
     def _simulate(self, batch: list[dict[str, float]], coarse: bool) -> Iterator[Evaluation]:
         evaluator = self.coarse if coarse and self.coarse is not None else self.fine

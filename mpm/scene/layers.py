@@ -19,6 +19,7 @@ from mpm.scene.shapes import FLAT_DOWN, FLAT_TOP, Shape, depth, half_width, insi
 
 SUBSAMPLES = 8  # points along each side of a particle's square of the section
 STIFF_SAMPLES = 3  # points along each edge of a particle's cube
+STATIONS = 100  # along the food, between which the middle of a tabulated section is interpolated
 SECTION_SAMPLES = 400  # points along the width and along the height of a whole section
 
 
@@ -195,9 +196,8 @@ def _in_tabulated_core(shape: Shape, points: np.ndarray, ratio: float) -> np.nda
     assert shape.table is not None
     x, y, z = points.T
     along = y if shape.prism else (y + shape.cut) / ratio - shape.cut
-    middle = np.array([sum(span(shape, float(v))) / 2 for v in np.unique(along)])[
-        np.unique(along, return_inverse=True)[1]
-    ]
+    stations = np.linspace(along.min(), along.max(), STATIONS) if np.ptp(along) > 0 else along[:1]
+    middle = np.interp(along, stations, [sum(span(shape, float(v))) / 2 for v in stations])
     floor, roof = surface(shape, middle, along)
     level = 0.0 if shape.table.halved else (floor + roof) / 2
     return inside(shape, np.column_stack([middle + (x - middle) / ratio, along, level + (z - level) / ratio]))

@@ -185,15 +185,8 @@ class Material:
         )
 
     @property
-    def toughest(self) -> float:
-        """Largest cutting resistance of flesh, rind and core [J/m^2]."""
-        rind = self.R_rind if self.rind_thickness > 0 else None
-        core = self.R_core if self.core_ratio > 0 else None
-        return max(self.R, rind or 0.0, core or 0.0)
-
-    @property
     def toughest_for_mass(self) -> float:
-        """Largest of the same over the stiffness of its layer, which is what its particles weigh [J/m^2]."""
+        """Largest cutting resistance of flesh, rind and core, each over its stiffness, which it weighs by [J/m^2]."""
         rind = (self.R_rind or 0.0) / self.rind_stiffness if self.rind_thickness > 0 else 0.0
         core = (self.R_core or 0.0) / self.core_stiffness if self.core_ratio > 0 else 0.0
         return max(self.R, rind, core)

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fem_reference.laws import Corotated, NeoHookean, Plastic, determinant, mises, product
+from fem_reference.laws import Corotated, Graded, NeoHookean, Plastic, determinant, mises, product
 from tests.mpm import twins
 
 MU, LAM, SY = 0.37, 0.86, 0.05
@@ -70,3 +70,18 @@ def test_a_point_on_the_yield_surface_stays_a_number():
         p, state = law.stress(F, state)
         assert np.isfinite(p).all()
         assert np.isfinite(law.tangent(F, state)).all()
+
+
+def test_a_graded_law_is_its_law_times_a_factor_at_each_point():
+    """Stress, energy and tangent, with flow and without; all points yield at the strain of the law."""
+    factor = RNG.uniform(0.1, 5.0, 40)
+    law = Plastic(MU, LAM, SY)
+    graded, state = Graded(law, factor), law.start((40,))
+    for one, other in ((graded, law), (graded.elastic, law.elastic)):
+        (p, after), (want, flowed) = one.stress(F, state), other.stress(F, state)
+        np.testing.assert_allclose(p, factor * want)
+        np.testing.assert_allclose(after, flowed)
+        np.testing.assert_allclose(one.energy(F, after), factor * other.energy(F, flowed))
+        np.testing.assert_allclose(one.tangent(F, state), factor * other.tangent(F, state))
+    assert np.abs(graded.stress(F, state)[1] - state).max() > 0.01  # or nothing would flow
+    np.testing.assert_allclose(graded.elastic.stress(F, state)[1], state, atol=1e-12)
