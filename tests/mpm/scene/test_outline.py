@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mpm.discretisation.particles import seed
-from mpm.scene import EdgeLaw, Food, Motion, Numerics, Scene
+from mpm.scene import EdgeLaw, Food, Motion, Numerics, Scene, layers
 from mpm.scene.errors import SceneError
 from mpm.scene.layers import mean_toughness, toughness
 from mpm.scene.material import Material
@@ -164,3 +164,19 @@ def test_particles_fill_a_banana():
     scene = Scene(Food(shape, FRUIT), THIN, Motion(0.02), edge=EdgeLaw(3e-3), numerics=Numerics(dx=3e-3))
     seeds = seed(scene)
     assert inside(shape, seeds.x).all() and 2 * seeds.total == pytest.approx(volume(shape), rel=1e-12)
+
+
+def test_the_core_of_a_bent_food_is_looked_up_at_few_places(monkeypatch):
+    """The middle of its sections is interpolated: of 2000 points no more than 2 lie in another layer than in a section
+    of their own, and a food of ten thousand particles does not look at ten thousand sections."""
+    shape, random = Shape("bent", 0.03, 0.12, 0.03), np.random.default_rng(0)
+    points = np.column_stack(
+        [random.uniform(-0.02, 0.02, 2000), random.uniform(-0.05, 0.05, 2000), 0.03 * random.random(2000)]
+    )
+    points = points[inside(shape, points)]
+    alone = np.concatenate([toughness(shape, FRUIT, point[None]) for point in points])
+    looked = []
+    monkeypatch.setattr(layers, "span", lambda *at: looked.append(at) or span(*at))
+    together = toughness(shape, FRUIT, points)
+    assert {30.0, 80.0, 500.0} == set(alone) and (alone != together).sum() <= 2
+    assert 1 < len(looked) <= layers.STATIONS
