@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -59,7 +60,7 @@ def box(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> sk.MeshHex:
     return sk.MeshHex.init_tensor(x, y, z)
 
 
-def quarter(shape: Shape, cells: int, grade: float = 1.0, order: int = 1) -> sk.MeshHex:
+def quarter(shape: Shape, cells: int, grade: float = 1.0, order: int = 1, core: float | None = None) -> sk.MeshHex:
     """The quarter x >= 0, y >= 0 of a food shape, standing on z = 0.
 
     Args:
@@ -67,20 +68,24 @@ def quarter(shape: Shape, cells: int, grade: float = 1.0, order: int = 1) -> sk.
         cells: Elements along half the height; along a quarter of a round outline they are twice as many.
         grade: Power by which the elements shrink towards the axes, 1 for none.
         order: 1 for straight edges; 2 for elements whose outer faces follow a round outline.
+        core: Radius of a core over that of the outline, which faces of elements follow, too, in a cylinder [-].
 
     Returns:
         The mesh.
 
     Raises:
-        MeshError: A shape without such a mesh, or one that is not cut in the middle.
+        MeshError: A shape without such a mesh, one that is not cut in the middle, or a core in a shape that has none.
     """
     if shape.cut != 0:
         raise MeshError("mesh: the finite-element mesh is a quarter of a food that is cut in the middle")
-    mesh = _straight(shape, cells, grade)
-    return mesh if order == 1 or shape.kind == "block" else _rounded(mesh, shape)
+    if core is not None and shape.kind not in ("cylinder", "upright_cylinder"):
+        raise MeshError(f"mesh: no finite-element mesh of a {shape.kind} with a core; use a cylinder")
+    radii = (1.0,) if core is None else (core, 1.0)
+    mesh = _straight(shape, cells, grade, radii)
+    return mesh if order == 1 or shape.kind == "block" else _rounded(mesh, shape, radii)
 
 
-def _straight(shape: Shape, cells: int, grade: float) -> sk.MeshHex:
+def _straight(shape: Shape, cells: int, grade: float, radii: Sequence[float]) -> sk.MeshHex:
     a, b, h = shape.width / 2, shape.length / 2, shape.height / 2
     if shape.kind == "block":
         count = [max(2, round(cells * size / h)) for size in (a, b)]
@@ -89,10 +94,10 @@ def _straight(shape: Shape, cells: int, grade: float) -> sk.MeshHex:
         )
     if shape.kind == "upright_cylinder":
         layers = np.linspace(0, 2 * h, 2 * cells + 1)
-        return _join(_disc(cells, grade, lambda p: p * [a, b], lambda p, s: np.stack([p[0], p[1], s]), layers))
+        return _join(_disc(cells, grade, radii, lambda p: p * [a, b], lambda p, s: np.stack([p[0], p[1], s]), layers))
     if shape.kind == "cylinder":
         layers = np.linspace(0, b, max(2, round(cells * b / h)) + 1)
-        top = _disc(cells, grade, lambda p: p * [a, h], lambda p, s: np.stack([p[0], s, p[1] + h]), layers)
+        top = _disc(cells, grade, radii, lambda p: p * [a, h], lambda p, s: np.stack([p[0], s, p[1] + h]), layers)
         return _join([*top, *(_mirrored(m, h) for m in top)])
     if shape.kind in ("sphere", "ellipsoid"):
         top = [_mapped(m, lambda p: p + [[0.0], [0.0], [h]]) for m in _ball(cells, grade, np.array([a, b, h]))]
@@ -169,34 +174,38 @@ def _ball(cells: int, grade: float, radii: np.ndarray) -> list[sk.MeshHex]:
 def _disc(
     cells: int,
     grade: float,
+    radii: Sequence[float],
     scale: Callable[[np.ndarray], np.ndarray],
     place: Callable[[np.ndarray, np.ndarray], np.ndarray],
     layers: np.ndarray,
 ) -> list[sk.MeshHex]:
-    """A quarter of a disc drawn out over ``layers``: a block in the middle and two around it.
+    """A quarter of a disc drawn out over ``layers``: a block in the middle and two around it, for each circle.
 
     Args:
         cells: Elements along each side of a block.
         grade: Power by which they shrink towards the axes.
+        radii: Circles that faces of elements follow, rising; the last is the unit disc's outline [-].
         scale: From the unit disc, (n, 2), to the real one.
         place: From the plane (2, n) and the height of a layer (n,) to space (3, n).
         layers: Heights [m].
     """
     line = np.linspace(0, 1, cells + 1) ** grade
-    even = np.linspace(0, 1, cells + 1)
 
     def build(first: np.ndarray, inward: Map) -> sk.MeshHex:
         mesh = sk.MeshHex.init_tensor(first, line, layers)
         return _mapped(mesh, lambda p: place(scale(inward(p[:2]).T).T, p[2]))
 
-    blocks = [build(line, _core)]
-    for axis in range(2):
+    blocks = [build(line, lambda p: radii[0] * _core(p))]
+    for k, axis in itertools.product(range(len(radii)), range(2)):
 
-        def outward(p: np.ndarray, axis: int = axis) -> np.ndarray:
+        def outward(p: np.ndarray, k: int = k, axis: int = axis) -> np.ndarray:
             one = np.ones_like(p[0])
-            return _between(np.stack([one, p[1]] if axis == 0 else [p[1], one]), p[0])
+            face = np.stack([one, p[1]] if axis == 0 else [p[1], one])
+            if k == 0:
+                return radii[0] * _between(face, p[0])
+            return (radii[k - 1] + p[0] * (radii[k] - radii[k - 1])) * _between(face, one)
 
-        blocks.append(build(even, outward))
+        blocks.append(build(np.linspace(0, 1, cells + 1), outward))
     return blocks
 
 
@@ -214,8 +223,8 @@ def _between(face: np.ndarray, t: np.ndarray) -> np.ndarray:
     return (1 - t) * _core(face) + t * q / np.linalg.norm(q, axis=0)
 
 
-def _rounded(mesh: sk.MeshHex, shape: Shape) -> sk.MeshHex2:
-    """Quadratic elements whose nodes on round outer faces lie on the outline."""
+def _rounded(mesh: sk.MeshHex, shape: Shape, circles: Sequence[float]) -> sk.MeshHex2:
+    """Quadratic elements whose nodes on round faces lie on the outline, and on what lies in proportion within it."""
     out = sk.MeshHex2.from_mesh(mesh)
     radii = np.array([shape.width, shape.length, shape.height])[:, None] / 2
     round_axes = np.array({"upright_cylinder": [0, 1], "cylinder": [0, 2]}.get(shape.kind, [0, 1, 2]))
@@ -223,10 +232,11 @@ def _rounded(mesh: sk.MeshHex, shape: Shape) -> sk.MeshHex2:
     at[2] -= shape.height / 2
 
     level = np.sqrt(((at[round_axes] / radii[round_axes]) ** 2).sum(axis=0))
-    facets = mesh.boundary_facets()
-    facets = facets[(np.abs(level[mesh.facets[:, facets]] - 1) < ON_OUTLINE).all(axis=0)]
-    outside = np.unique(sk.CellBasis(out, sk.ElementHex2(), intorder=1).get_dofs(facets).flatten())
-    at[np.ix_(round_axes, outside)] /= level[outside]
+    basis = sk.CellBasis(out, sk.ElementHex2(), intorder=1)
+    for circle in circles:
+        facets = np.flatnonzero((np.abs(level[mesh.facets] - circle) < ON_OUTLINE).all(axis=0))
+        nodes = np.unique(basis.get_dofs(facets).flatten())
+        at[np.ix_(round_axes, nodes)] *= circle / level[nodes]
     at[2] += shape.height / 2
     return replace(out, doflocs=at)
 

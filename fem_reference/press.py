@@ -97,7 +97,8 @@ def press(
         MeshError: A shape without a mesh, or a bonded shape without flat ends.
         EquilibriumError: No equilibrium even in small steps; the message says where.
     """
-    mesh = quarter(shape, elements.cells, elements.grade, elements.order)
+    core = material.core_ratio if material.core_stiffness != 1 and shape.kind.endswith("cylinder") else 0.0
+    mesh = quarter(shape, elements.cells, elements.grade, elements.order, core or None)
     flat = shape.kind in ("block", "upright_cylinder")
     if bonded and (not flat or half_angle < math.pi / 2):
         raise MeshError(f"press: a {shape.kind} under this tool has no flat ends to bond; leave out bonded")

@@ -115,6 +115,21 @@ def test_quarter_meshes_fill_the_shape(kind):
     assert (p > -1e-12).all()
 
 
+@pytest.mark.parametrize("kind", ["cylinder", "upright_cylinder"])
+def test_elements_follow_the_core(kind):
+    """No element lies on both sides of the core's circle, and those within it have its volume."""
+    shape, core = Shape(kind, 0.05, 0.04, 0.03), 0.6
+    mesh = meshes.quarter(shape, 3, order=2, core=core)
+    basis = sk.CellBasis(mesh, sk.ElementHex2(), intorder=4)
+    x, y, z = np.asarray(basis.global_coordinates())
+    other = (z - shape.height / 2) / (shape.height / 2) if kind == "cylinder" else y / (shape.length / 2)
+    within = (x / (shape.width / 2)) ** 2 + other**2 < core**2
+    assert (within.all(axis=1) | ~within.any(axis=1)).all()
+    assert 4 * basis.dx[within].sum() == pytest.approx(core**2 * volume(shape), rel=1e-4)
+    with pytest.raises(meshes.MeshError, match="no finite-element mesh of a block with a core"):
+        meshes.quarter(CUBE, 3, core=core)
+
+
 def test_a_mesh_survives_its_file(tmp_path):
     """A mesh goes to a file and comes back with its volume, the displacements beside it."""
     mesh = meshes.quarter(CUBE, 2)
