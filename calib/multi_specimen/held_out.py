@@ -247,11 +247,11 @@ def _band(objective: Objective, curves: Sequence[FloatArray], fit: JointFit, see
     """Band of the simulated curves, each with its own factor, and of errors as the fit showed them."""
     random = np.random.default_rng(seed)
     found = None if fit.analysis is None else fit.analysis.uncertainty
-    widened = 1.0 if found is None else float(np.sqrt(found.widened))
+    size = 1.0 if found is None else float(np.sqrt(found.error_variance))
     length = objective.errors.correlation if found is None else float(np.mean(found.data.lengths))
     drawn = [
         objective.factor(curve) * curve + error
         for curve in curves
-        for error in error_draws(objective, length, widened, ERRORS_PER_MATERIAL, random)
+        for error in error_draws(objective, length, size, ERRORS_PER_MATERIAL, random)
     ]
     return pointwise_band(np.array(drawn), objective.target.curve)

@@ -6,9 +6,10 @@ J_d the rows of the data and J_p those of the priors:
     covariance = (J_d^T J_d / s + J_p^T J_p)^-1,   s = max(1, reduced chi-square of the data)
 
 Where the model misses the curve by more than the stated errors, s widens what the data say, with Student's factor
-because it is estimated. It does not touch the literature, so no parameter ends up known less than before. The rows of
-the data are weighted by the correlation length that the residuals show. What the measurement leaves open without the
-search being free to use it (gain, width) is integrated out.
+because it is estimated. It does not touch the literature, so no parameter ends up known less than before. A band of
+forces takes the size of the errors from what is stated of it and from what is seen, both: few data alone would allow
+any size. The rows of the data are weighted by the correlation length that the residuals show. What the measurement
+leaves open without the search being free to use it (gain, width) is integrated out.
 """
 
 from __future__ import annotations
@@ -44,6 +45,9 @@ CREDIBLE_LEVEL = 0.95
 """Part of the posterior within an interval [-]."""
 LARGEST_CORRELATION = 0.5
 """Residuals that keep their sign over more than this part of the stroke are a wrong model, not noise."""
+STATED_WORTH = 2.0
+"""How many independent data the stated size of the errors is worth, where a band of forces is predicted: with it bands
+hold 95 % of another measurement whose errors are 0.6 to 2.9 times the stated (docs/theory.md, "Measured choices")."""
 ASSUMED_SPREAD, SEEN_SPREAD = 0.5, 0.4
 """Standard deviations of the logarithm of the correlation length: of what is assumed before the residuals are seen (a
 factor of 2.7 either way), and of what one curve shows (docs/theory.md, "Measured choices")."""
@@ -137,6 +141,8 @@ class Uncertainty:
         freedom: Degrees of freedom [-].
         widened: Factor on the variance of the data's errors [-]: ``reduced_chi2`` but at least 1, times Student's where
             it is more.
+        error_variance: Variance of another measurement's errors over the stated one [-], at least 1: expected from what
+            is stated and what is seen, times Student's factor where it is more.
         data: The likelihood at the best values.
         alone: The covariance if gain and width were known (p, p).
         unsearched: Posterior mean and standard deviation of each nuisance that the search may not use, in prior
@@ -150,6 +156,7 @@ class Uncertainty:
     reduced_chi2: float
     freedom: float
     widened: float
+    error_variance: float
     data: LinearisedLikelihood
     alone: FloatArray
     unsearched: tuple[tuple[float, float], ...] = ()
@@ -260,10 +267,14 @@ def uncertainty(parameters: ParameterSet, data: LinearisedLikelihood) -> Uncerta
     information = data.jacobian.T @ data.jacobian
     first = np.linalg.inv(information + own)
     freedom = max(data.rows - float(np.trace(first @ information)), 1.0)
-    reduced = float(data.residual @ data.residual) / freedom
+    misfit = float(data.residual @ data.residual)
+    reduced = misfit / freedom
     size = max(1.0, reduced)
-    tails = float(student.ppf(0.5 + 0.5 * CREDIBLE_LEVEL, freedom)) / Z95 if reduced > 1.0 else 1.0
-    widened = size * tails**2
+    widened, error_variance = 1.0, 1.0
+    if reduced > 1.0:
+        worth = STATED_WORTH + freedom
+        widened = size * _student(freedom) ** 2
+        error_variance = (STATED_WORTH + misfit) / worth * _student(worth) ** 2
     marginal = marginal_information(data.jacobian, data.unsearched, widened)
     covariance: FloatArray = np.asarray(np.linalg.inv(marginal + own), dtype=np.float64)
     sd = np.sqrt(np.diag(covariance))
@@ -272,7 +283,14 @@ def uncertainty(parameters: ParameterSet, data: LinearisedLikelihood) -> Uncerta
     beside = _beside(data, own, prior.T @ parameters.prior_residual(parameters.start), size)
     ties = _ties(parameters.names, correlation)
     alone: FloatArray = np.asarray(np.linalg.inv(information / widened + own), dtype=np.float64)
-    return Uncertainty(intervals, covariance, correlation, ties, reduced, freedom, widened, data, alone, beside)
+    return Uncertainty(
+        intervals, covariance, correlation, ties, reduced, freedom, widened, error_variance, data, alone, beside
+    )
+
+
+def _student(freedom: float) -> float:
+    """Half width of Student's 95 % interval of so many degrees of freedom, over the normal one's [-]."""
+    return float(student.ppf(0.5 + 0.5 * CREDIBLE_LEVEL, freedom)) / Z95
 
 
 def _beside(

@@ -4,8 +4,8 @@ Draws come from the normal approximation of the posterior, with the specimen's w
 in this cut, and are weighted by what the surrogate says of them (sampling, importance resampling: Rubin 1988, Bayesian
 Statistics 3). A curve that it hardly knows could be anything, so its likelihood is small, and what it could be is drawn
 given the measured curve: a normal process with the errors of the fit (Rasmussen and Williams 2006, chapter 2). To each
-curve come an error of the size and correlation length that the residuals showed, and tare, drift and lag from their
-priors.
+curve come an error of the correlation length that the residuals showed, of a size that what is stated of it and the
+residuals make likely, and tare, drift and lag from their priors.
 """
 
 from __future__ import annotations
@@ -57,11 +57,11 @@ def predictive_bands(surrogate: Surrogate, z: FloatArray, found: Uncertainty, se
     out = []
     for process, case, length in zip(surrogate.each, surrogate.objective.terms, found.data.lengths, strict=True):
         goal = case.objective
-        added = error_draws(goal, length, math.sqrt(found.widened), len(drawn), random)
+        added = error_draws(goal, length, math.sqrt(found.error_variance), len(drawn), random)
         curves = []
         for point, error in zip(drawn, added, strict=True):
             curve, sd, _ = process.predict(point[case.index])
-            ratio = unknown(process, curve, sd) / found.widened
+            ratio = unknown(process, curve, sd) / found.error_variance
             seen = goal.target.curve / goal.factor(curve)
             expected = curve + ratio / (1.0 + ratio) * (seen - curve)
             drawn_curve = expected + sd / math.sqrt(1.0 + ratio) * float(random.standard_normal())
@@ -90,10 +90,12 @@ def posterior_draws(surrogate: Surrogate, z: FloatArray, found: Uncertainty, ran
         Internal coordinates (POSTERIOR_DRAWS, p).
     """
     parameters = surrogate.objective.parameters
-    root = np.linalg.cholesky(found.alone)
+    prior = parameters.prior_jacobian()
+    information = found.data.jacobian.T @ found.data.jacobian / found.error_variance + prior.T @ prior
+    root = np.linalg.cholesky(np.linalg.inv(information))
     normal = random.standard_normal((POSTERIOR_DRAWS, len(z)))
     points = parameters.clip(z + normal @ root.T)
-    weights = found.data.weights / math.sqrt(found.widened)
+    weights = found.data.weights / math.sqrt(found.error_variance)
     size = len(weights)
 
     def cost(point: FloatArray) -> float:
@@ -102,7 +104,7 @@ def posterior_draws(surrogate: Surrogate, z: FloatArray, found: Uncertainty, ran
         for process, term in zip(surrogate.each, surrogate.objective.terms, strict=True):
             own = slice(first, first + term.objective.data_rows)
             curve, sd, _ = process.predict(point[term.index])
-            ratio = unknown(process, curve, sd) / found.widened
+            ratio = unknown(process, curve, sd) / found.error_variance
             total += float(np.sum((weights[own] * rows[own]) ** 2)) / (1.0 + ratio)
             total += term.objective.effective_points * math.log1p(ratio)
             first = own.stop
@@ -130,13 +132,13 @@ def unknown(process: CurveProcess, curve: FloatArray, sd: float) -> float:
     return added**2 / process.objective.effective_points
 
 
-def error_draws(goal: Objective, length: float, widened: float, count: int, random: np.random.Generator) -> FloatArray:
+def error_draws(goal: Objective, length: float, size: float, count: int, random: np.random.Generator) -> FloatArray:
     """Draws of the errors of the model and the measurement along a curve.
 
     Args:
         goal: The objective of a trace.
         length: Correlation length of the model's errors, part of the stroke [-].
-        widened: Their standard deviation over the stated one [-].
+        size: Their standard deviation over the stated one [-].
         count: How many.
         random: Source of randomness.
 
@@ -148,7 +150,7 @@ def error_draws(goal: Objective, length: float, widened: float, count: int, rand
     kernel = np.exp(-math.pi * ((parts[:, None] - parts) / length) ** 2) + JITTER * np.eye(n)
     values, vectors = np.linalg.eigh(kernel)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
-    out: FloatArray = widened * goal.sigmas * (random.standard_normal((count, n)) @ root.T)
+    out: FloatArray = size * goal.sigmas * (random.standard_normal((count, n)) @ root.T)
     for nuisance in goal.nuisances:
         if nuisance.name in ("tare", "drift", "lag"):
             out += nuisance.sd * random.standard_normal((count, 1)) * nuisance.shape

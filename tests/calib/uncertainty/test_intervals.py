@@ -110,6 +110,33 @@ def test_unseen_parameter_keeps_its_prior() -> None:
     assert seen.width == pytest.approx(1.0 / math.sqrt(25.0 / found.reduced_chi2 / tails**2 + 1.0))
 
 
+def test_a_band_holds_another_measurement_and_few_data_do_not_blow_it_up() -> None:
+    """Six data, five parameters, errors of 0.6 to 2.9 times the stated size: 95 % of new data lie in the band.
+
+    With errors widened as those of the intervals are, which few data hardly bound, it would be a fourth wider.
+    """
+    random = np.random.default_rng(2)
+    inside, widths = [], []
+    for _ in range(400):
+        rows = np.vstack([1.2 * random.standard_normal((6, 5)) * np.exp(random.standard_normal(5)), np.eye(5)])
+        truth, size = random.standard_normal(5), math.sqrt(4.0 / random.chisquare(4))
+        seen, again = rows[:6] @ truth + size * random.standard_normal((2, 6))
+        z = np.linalg.lstsq(rows, np.concatenate([seen, np.zeros(5)]), rcond=None)[0]
+        found = uncertainty(parameters(5), data_of(rows, rows @ z - np.concatenate([seen, np.zeros(5)]), 6.0))
+        each = []
+        for variance in (found.error_variance, found.widened):
+            spread = np.linalg.inv(rows[:6].T @ rows[:6] / variance + np.eye(5))
+            centre = rows[:6] @ spread @ rows[:6].T @ seen / variance
+            half = Z95 * np.sqrt(np.einsum("ij,jk,ik->i", rows[:6], spread, rows[:6]) + variance)
+            each.append(half.mean())
+            if variance == found.error_variance:
+                inside.append(np.mean(np.abs(centre - again) < half))
+        widths.append(each)
+    assert 0.93 < np.mean(inside) < 0.965
+    own, widened = np.mean(widths, axis=0)
+    assert own < 0.85 * widened
+
+
 def test_a_small_misfit_does_not_narrow_the_intervals() -> None:
     """A chi-square below its expectation is luck, or errors stated too large: the interval stays."""
     assert known(np.array([[3.0]]), reduced=0.01).intervals[0].width == pytest.approx(math.sqrt(0.1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 from typing import Any
 
@@ -33,10 +34,12 @@ def surrogate(sd_far: float) -> Any:
     return SimpleNamespace(objective=GOAL, each=[process], residual=residual)
 
 
-def uncertainty() -> Any:
-    """Of one parameter, with a standard deviation of 0.6."""
-    data = SimpleNamespace(weights=np.ones(GOAL.data_rows), lengths=(0.1,))
-    return SimpleNamespace(alone=np.array([[0.36]]), widened=1.0, data=data)
+def uncertainty(error_variance: float = 1.0) -> Any:
+    """Of one parameter, with a standard deviation of 0.6 where the errors are those stated."""
+    prior = float(LINE.prior_jacobian()[0, 0])
+    seen = np.array([[math.sqrt(1.0 / 0.36 - prior**2)]])
+    data = SimpleNamespace(weights=np.ones(GOAL.data_rows), lengths=(0.1,), jacobian=seen)
+    return SimpleNamespace(error_variance=error_variance, data=data)
 
 
 def test_what_is_not_known_is_no_explanation() -> None:
@@ -54,3 +57,12 @@ def test_band_is_no_wider_than_the_errors_of_the_fit(sd: float) -> None:
     """However little the surrogate knows elsewhere; the band used to be as wide as that."""
     (band,) = predictive_bands(surrogate(sd), LINE.start, uncertainty())
     assert np.max(band.high - band.low) < 6.0 * GOAL.sigma and band.inside > 0.95
+
+
+def test_band_is_as_wide_as_the_errors_are_expected_to_be() -> None:
+    """Errors of twice the size have a band of twice the width."""
+    widths = []
+    for variance in (1.0, 4.0):
+        (band,) = predictive_bands(surrogate(0.01), LINE.start, uncertainty(variance))
+        widths.append(float(np.mean(band.high - band.low)))
+    assert widths[1] / widths[0] == pytest.approx(2.0, rel=0.03)
