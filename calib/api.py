@@ -45,6 +45,7 @@ LIMITS: dict[str, tuple[float, float, str]] = {
     "budget": (0.0, 1e6, ""),
     "gain_sd": (0.0, 1.0, ""),
     "lag_sd": (0.0, 1.0, "s"),
+    "bandwidth": (1.0, 1e5, "Hz"),
     "discrepancy": (0.0, 1.0, ""),
 }
 """Numbers between which a value must lie, and its unit: those of the command line."""
@@ -91,6 +92,7 @@ class Calibration:
         time_col, force_col, position_col, depth_col, sign, rate: How files and DataFrames are read, as in ``columns``.
         gain_sd: Relative standard deviation of the sensor's gain [-]; None for what its kind suggests.
         lag_sd: Standard deviation of the sensor's delay [s], or None.
+        bandwidth: Cut-off of the low-pass that the force went through [Hz]; None for what its kind suggests.
         discrepancy: How far a right model may be from the trace, part of the peak [-]; None for the usual 0.03.
         u_num: Folder of a ``converge`` study whose numerical uncertainty the fit heeds, or None.
         scheduler: Address of a Dask cluster that runs the simulations, such as ``tcp://host:8786``, or None.
@@ -133,6 +135,7 @@ class Calibration:
     rate: float | None = None
     gain_sd: float | None = None
     lag_sd: float | None = None
+    bandwidth: float | None = None
     discrepancy: float | None = None
     u_num: str | Path | None = None
     scheduler: str | None = None
@@ -223,6 +226,7 @@ class Calibration:
             sample=self.sample,
             gain_sd=self.gain_sd,
             lag_sd=self.lag_sd,
+            bandwidth=self.bandwidth,
             errors=ErrorModel() if self.discrepancy is None else ErrorModel(discrepancy=self.discrepancy),
             u_num=None if self.u_num is None else Path(self.u_num),
             seed=self.seed,

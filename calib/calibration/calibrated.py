@@ -13,7 +13,6 @@ from calib.material.food import FoodSpec
 from calib.material.form import ROUNDNESS, with_roundness
 from calib.posterior.posterior import SampledPosterior
 from calib.problem.setup import Setup
-from calib.trace.filters import filter_simulated
 from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.sobol import Indices, sensitivity
 from calib.validation.metrics import Metrics, compare
@@ -98,8 +97,9 @@ class Calibrated:
         """Columns of curves.csv, all on the trace's stroke grid."""
         curve, best, record = self.setup.curve, self.fit.best.curve, self.record
         columns = {"stroke_m": curve.stroke, "real_N": curve.curve, "sim_N": best, "residual_N": best - curve.curve}
-        columns["edge_N"] = filter_simulated(curve.stroke, record.stroke, record.edge[:, 2])
-        columns["face_N"] = filter_simulated(curve.stroke, record.stroke, record.resolved_face)
+        smooth = self.setup.objective.target.smooth
+        columns["edge_N"] = smooth(curve.stroke, record.stroke, record.edge[:, 2])
+        columns["face_N"] = smooth(curve.stroke, record.stroke, record.resolved_face)
         columns["start_N"] = self.start
         columns |= {f"{name}_N": null.curve for name, null in self.nulls.items()}
         if self.analysis is not None:

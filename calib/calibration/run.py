@@ -36,7 +36,6 @@ from calib.simulation.evaluation import Evaluators
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore
 from calib.simulation.record_file import read_record, record_errands
 from calib.simulation.workers import Errand, Workers
-from calib.trace.filters import filter_simulated
 from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.global_search import Listener, fit_with_uncertainty
 from calib.validation.numerical_checks import VARIED, check, check_errands
@@ -194,7 +193,8 @@ class _Calibration:
         """Smoothed curve of the literature's values [N] (n,); NaN where that run broke down."""
         stroke = self.setup.curve.stroke
         run = next(iter(self._fine.evaluate([self.setup.start_values])))
-        return filter_simulated(stroke, run.stroke, run.force) if run.ok else np.full_like(stroke, np.nan)
+        smooth = self.setup.objective.target.smooth
+        return smooth(stroke, run.stroke, run.force) if run.ok else np.full_like(stroke, np.nan)
 
 
 def _write(done: Calibrated, out: Path, began: float) -> CalibrationResult:

@@ -23,7 +23,6 @@ from calib.problem.objective import Objective
 from calib.problem.parameters import is_shared
 from calib.problem.setup import COARSE, FINE
 from calib.simulation.evaluation import Evaluation
-from calib.trace.filters import filter_simulated
 from calib.uncertainty.intervals import linearised_likelihood, uncertainty
 from calib.uncertainty.predictive import Band, error_draws, pointwise_band, posterior_draws
 from calib.validation.acceptance import Conservation, Verdict, balances
@@ -113,7 +112,7 @@ def predict(specimens: Specimens, fit: JointFit, name: str) -> HeldOutPrediction
     others = _drawn(fit, specimens.study.scatter, seed)
     drawn = [{**x, **y} for x, y in zip(others, _adapted(specimens, own, shared, others, name), strict=True)]
     runs = _simulated(specimens, name, [{**shared, **best}, *drawn])
-    curve, *others_curves = (filter_simulated(objective.target.stroke, e.stroke, e.force) for e in runs if e.ok)
+    curve, *others_curves = (objective.target.smooth(objective.target.stroke, e.stroke, e.force) for e in runs if e.ok)
     factor = objective.factor(curve)
     stroke, real = objective.target.stroke, objective.target.curve
     nulls = {n: m.metrics for n, m in null_models(stroke, real).items()}

@@ -34,7 +34,8 @@ LARGEST_SCATTER = 1.0
 EACH = "each"
 """What ``hold_out`` says where each cut is held out in turn."""
 TOP = ("material", "knife", "fit", "own", "hold_out", "scatter", "budget", "seed", "dx", "set")
-NUMBERS = ("speed", "board_z", "t_end", "height", "width", "length", "at", "gain_sd", "lag_sd", "rate", "cut")
+SENSOR = ("gain_sd", "lag_sd", "bandwidth")
+NUMBERS = ("speed", "board_z", "t_end", "height", "width", "length", "at", *SENSOR, "rate", "cut")
 TEXTS = ("time_col", "force_col", "position_col", "depth_col", "sign", "decimal", "baseline", "shape", "knife")
 OUTLINES = tuple(one.name for one in fields(OutlineFile))
 COMPRESSION_SIZES = ("height", "diameter", "width", "length")
@@ -139,6 +140,7 @@ def _request(place: Place, given: Mapping[str, Any], folder: Path, base: Request
         cut=None if numbers["cut"] is None else int(numbers["cut"]),
         gain_sd=numbers["gain_sd"],
         lag_sd=numbers["lag_sd"],
+        bandwidth=numbers["bandwidth"],
     )
 
 

@@ -1,4 +1,4 @@
-"""What a measurement leaves open of its own curve: tare, drift, lag and gain, each with a standard deviation.
+"""What a measurement leaves open of its own curve: tare, drift, lag, bandwidth and gain, each to a standard deviation.
 
 To first order each of them moves the measured curve along one known shape g. Its size is normal about zero with a
 standard deviation of its own, so that it joins the covariance of the residuals (Kennedy & O'Hagan 2001, J. R. Statist.
@@ -11,26 +11,29 @@ model, Rasmussen & Williams 2006, section 2.7):
     tare    1
     drift   s / L: 0 at contact, 1 at the end of the stroke
     lag     -dF/ds
+    bandwidth  dF/d(ln f): of a low-pass of cut-off f that the force went through
     gain    F
     width   F: that of the specimen, where nobody measured it
     ======  =========================================================
 
-Tare, drift and lag are integrated out of the curve while the search runs: an onset found 0.3 mm late costs the right
-material a chi-square of hundreds where the model is right to 1 %, and the search would go elsewhere for it. The
-headline figures stay those of the bare simulation against the bare trace, and so does the peak in the search: a drift
-widens its tolerance and cannot explain it away. Gain and width only scale a curve, as the stress-like parameters do:
-the search leaves them at their likely values, and they widen the intervals.
+Tare, drift, lag and bandwidth are integrated out of the curve while the search runs: an onset found 0.3 mm late costs
+the right material a chi-square of hundreds where the model is right to 1 %, and the search would go elsewhere for it.
+The headline figures stay those of the bare simulation against the bare trace, and so does the peak in the search: a
+drift widens its tolerance and cannot explain it away. Gain and width only scale a curve, as the stress-like parameters
+do: the search leaves them at their likely values, and they widen the intervals.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib.errors import TraceError
 from calib.trace.conditioning import Conditioned
+from calib.trace.filters import BandLimited, delay_of
 from calib.trace.names import from_joint_torques
 from mpm.arrays import FloatArray
 
@@ -44,6 +47,13 @@ TORQUE_GAIN_SD = 0.15
 LARGEST_DRIFT = 0.05
 #: A size that is this many standard deviations of its prior away contradicts it.
 OUTSIDE = 3.0
+LATE_SPREAD = 0.5
+"""Standard deviation of how late contact is found behind a low-pass, over the delay of it [-]: made-up rises in a line,
+with the power 1.5 and in a parabola are found 0.4, 0.9 and 1.7 delays late (docs/theory.md, "Measured choices")."""
+TORQUE_BANDWIDTH, TORQUE_BANDWIDTH_SPREAD = 15.0, 0.35
+"""Cut-off of the low-pass that such a wrench goes through [Hz], and the standard deviation of its logarithm, a factor
+of two at 95 % [-]: above it the noise of an arm that cuts air falls by 40 dB a decade (docs/theory.md, "Measured
+choices")."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +63,8 @@ class Sensor:
     Attributes:
         gain_sd: Relative standard deviation of its gain [-].
         lag_sd: Standard deviation of the delay between its force and its position or clock [s].
+        bandwidth: Cut-off of the low-pass that its force went through [Hz]; infinite for none.
+        bandwidth_sd: Standard deviation of the logarithm of that [-].
 
     Raises:
         TraceError: A negative or infinite one, or a gain that is not known to a factor.
@@ -60,6 +72,8 @@ class Sensor:
 
     gain_sd: float = GAIN_SD
     lag_sd: float = 0.0
+    bandwidth: float = math.inf
+    bandwidth_sd: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.gain_sd < 1.0:
@@ -68,31 +82,44 @@ class Sensor:
             raise TraceError(f"--lag-sd {self.lag_sd:g} s: give the uncertainty of the sensor's delay, 0 to 1 s")
 
 
-def sensor_of(curve: Conditioned, gain_sd: float | None, lag_sd: float | None) -> tuple[Sensor, str | None]:
+def sensor_of(
+    curve: Conditioned, gain_sd: float | None, lag_sd: float | None, bandwidth: float | None = None
+) -> tuple[Sensor, tuple[str, ...]]:
     """The sensor of a trace, by the name of its force column where nothing is given, and what was assumed.
 
     Args:
         curve: The conditioned trace.
         gain_sd: Given relative standard deviation of the gain [-], or None.
         lag_sd: Given standard deviation of the delay [s], or None.
+        bandwidth: Given cut-off of the low-pass that the force went through [Hz], or None.
 
     Returns:
-        The sensor, and what was assumed of it in one sentence, or None.
+        The sensor, and what was assumed of it, one sentence each.
 
     Raises:
         TraceError: Impossible values.
     """
-    lag = 0.0 if lag_sd is None else lag_sd
-    if gain_sd is not None:
-        return Sensor(gain_sd, lag), None
-    if from_joint_torques(curve.trace.columns.get("force", "")):
-        said = (
-            f"{curve.trace.columns['force']} is estimated from joint torques: its gain is taken as known to "
-            f"{TORQUE_GAIN_SD:.0%} (hung masses read 1 to 25 % too little on such an arm); give --gain-sd if you "
-            "measured it"
+    column = curve.trace.columns.get("force", "")
+    torques, said = from_joint_torques(column), []
+    if gain_sd is None and torques:
+        said.append(
+            f"{column} is estimated from joint torques: its gain is taken as known to {TORQUE_GAIN_SD:.0%} (hung "
+            "masses read 1 to 25 % too little on such an arm); give --gain-sd if you measured it"
         )
-        return Sensor(TORQUE_GAIN_SD, lag), said
-    return Sensor(GAIN_SD, lag), None
+    if bandwidth is None and torques:
+        said.append(
+            f"{column} is estimated from joint torques and filtered: the simulated force goes through a low-pass of "
+            f"{TORQUE_BANDWIDTH:g} Hz, known to a factor of two; give --bandwidth if you know it"
+        )
+    usual = Sensor(TORQUE_GAIN_SD, 0.0, TORQUE_BANDWIDTH, TORQUE_BANDWIDTH_SPREAD) if torques else Sensor()
+    sensor = replace(
+        usual,
+        gain_sd=usual.gain_sd if gain_sd is None else gain_sd,
+        lag_sd=usual.lag_sd if lag_sd is None else lag_sd,
+        bandwidth=usual.bandwidth if bandwidth is None else bandwidth,
+        bandwidth_sd=usual.bandwidth_sd if bandwidth is None else 0.0,
+    )
+    return sensor, tuple(said)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +127,7 @@ class Nuisance:
     """One thing that the measurement leaves open.
 
     Attributes:
-        name: ``tare``, ``drift``, ``lag``, ``gain`` or ``width``.
+        name: ``tare``, ``drift``, ``lag``, ``bandwidth``, ``gain`` or ``width``.
         unit: Unit of its size.
         sd: Prior standard deviation [unit]; the prior mean is zero.
         shape: Change of the measured curve by one unit [N/unit] (n,).
@@ -169,11 +196,26 @@ def nuisances(
     speed = length / (curve.end_s - curve.onset_s)
     peak = float(curve.curve.max())
     drift = min(float(np.hypot(curve.drift_N_per_s, curve.drift_sd_N_per_s)) * length / speed, LARGEST_DRIFT * peak)
-    lag = float(np.hypot(curve.onset_sd_s, sensor.lag_sd)) * speed
+    late = LATE_SPREAD * delay_of(sensor.bandwidth)
+    lag = math.hypot(curve.onset_sd_s, sensor.lag_sd, late) * speed
     sizes = {"tare": curve.baseline_sd_N, "drift": drift, "lag": lag}
     if not scaled:
         sizes |= {"gain": sensor.gain_sd, "width": width_sd}
-    return nuisances_of_size(curve.stroke, curve.curve, sizes)
+    found = nuisances_of_size(curve.stroke, curve.curve, sizes)
+    if not (sensor.bandwidth_sd > 0.0 and math.isfinite(sensor.bandwidth)):
+        return found
+    shape = _by_bandwidth(curve, sensor.bandwidth)
+    at_peak = float(shape[int(curve.curve.argmax())])
+    return (*found, Nuisance("bandwidth", "-", sensor.bandwidth_sd, shape, at_peak, True))
+
+
+def _by_bandwidth(curve: Conditioned, bandwidth: float) -> FloatArray:
+    """Change of a curve by the logarithm of the cut-off that it goes through [N], (n,); that of the measured one."""
+    low, high = (
+        BandLimited(bandwidth * math.exp(h), curve.stroke, curve.clock)(curve.stroke, curve.stroke, curve.curve)
+        for h in (-TORQUE_BANDWIDTH_SPREAD, TORQUE_BANDWIDTH_SPREAD)
+    )
+    return (high - low) / (2.0 * TORQUE_BANDWIDTH_SPREAD)
 
 
 def nuisances_of_size(stroke: FloatArray, curve: FloatArray, sizes: Mapping[str, float]) -> tuple[Nuisance, ...]:

@@ -35,6 +35,7 @@ class Request:
         dx: Cell size [m], or None.
         gain_sd: Relative standard deviation of the sensor's gain [-]; None for what its kind suggests.
         lag_sd: Standard deviation of the sensor's delay [s], or None.
+        bandwidth: Cut-off of the low-pass that the force went through [Hz]; None for what its kind suggests.
         scaled: Whether the search has a factor for the width of the specimen, as it has in a fit of several.
         u_num: Folder of a convergence study whose numerical uncertainty enters the likelihood, or None.
         errors: How far a right model may be from the trace.
@@ -60,6 +61,7 @@ class Request:
     dx: float | None = None
     gain_sd: float | None = None
     lag_sd: float | None = None
+    bandwidth: float | None = None
     scaled: bool = False
     u_num: Path | None = None
     errors: ErrorModel = field(default_factory=ErrorModel)

@@ -33,7 +33,7 @@ from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, 
 from calib.simulation.workers import Workers
 from calib.trace.conditioning import Conditioned, condition
 from calib.trace.cuts import single_cut
-from calib.trace.filters import filter_simulated
+from calib.trace.filters import BandLimited
 from calib.trace.stroke import board_stroke
 from mpm.scene import Motion, Scene
 
@@ -139,9 +139,9 @@ def set_up(request: Request) -> Setup:
     request = with_height(request, curve)
     heights = height_range(request.food, curve, request.sizing)
     fine, coarse, assumed = _scenes(request, curve, heights)
-    sensor, said = sensor_of(curve, request.gain_sd, request.lag_sd)
+    sensor, said = sensor_of(curve, request.gain_sd, request.lag_sd, request.bandwidth)
     objective = _objective(request, curve, fine, sensor, heights)
-    return Setup(request, curve, fine, coarse, objective, (*assumed, *([said] if said else [])), air_sha256)
+    return Setup(request, curve, fine, coarse, objective, (*assumed, *said), air_sha256)
 
 
 def conditioned(request: Request) -> tuple[Conditioned, str | None]:
@@ -217,7 +217,8 @@ def _objective(
     food = request.food
     width_sd = 0.0 if request.sizing.width is not None else size_relative_sd(food, "width")
     u_num = 0.0 if request.u_num is None else numerical_uncertainty(request.u_num, food.name, scene, curve)
-    target = Target(curve.stroke, curve.curve, curve.curve_noise_sd_N, curve.peak_sd_N, filter_simulated, u_num)
+    smooth = BandLimited(sensor.bandwidth, curve.stroke, curve.clock)
+    target = Target(curve.stroke, curve.curve, curve.curve_noise_sd_N, curve.peak_sd_N, smooth, u_num)
     parameters = fit_parameters(food, _names(request, heights), heights)
     return Objective(
         target,

@@ -28,7 +28,7 @@ from calib.trace.cuts import single_cut
 from calib.trace.filters import FILTER_SD_M, N_STROKE, leading_grid, parabola_peak, resample, smooth
 from calib.trace.mending import mended
 from calib.trace.missing import held_samples
-from calib.trace.stroke import DWELL_M, board_warnings, end_of_descent, stroke_axis, stroke_in_food
+from calib.trace.stroke import DWELL_M, board_warnings, clock_of, end_of_descent, stroke_axis, stroke_in_food
 from calib.trace.sudden import sudden_changes
 from calib.trace.trace import MIN_SAMPLES, Trace
 
@@ -69,6 +69,7 @@ class Conditioned:
         time: Time of the whole record [s], shape (n,).
         force: Tared, unfiltered force of the whole record [N], shape (n,).
         stroke: Uniform stroke from contact to the end of the downward stroke [m], shape (240,).
+        clock: Time after contact at which the edge was there first [s], shape (240,).
         curve: Filtered force on that stroke [N], shape (240,).
         stroke_source: ``position``, ``speed`` or ``height``.
         stroke_length_m: Length of the downward stroke after contact [m].
@@ -93,6 +94,7 @@ class Conditioned:
     time: np.ndarray
     force: np.ndarray
     stroke: np.ndarray
+    clock: np.ndarray
     curve: np.ndarray
     stroke_source: str
     stroke_length_m: float
@@ -186,6 +188,7 @@ def condition(
         time=trace.time,
         force=tared,
         stroke=grid,
+        clock=clock_of(trace.time, axis.stroke, grid, (contact.onset, end_s)),
         curve=curve,
         stroke_source=axis.source,
         stroke_length_m=length,

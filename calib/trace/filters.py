@@ -1,10 +1,14 @@
-"""Resampling over the stroke and the zero-phase filter that measured and simulated curves share."""
+"""Resampling over the stroke, the zero-phase filter that measured and simulated curves share, and the sensor's own."""
 
 from __future__ import annotations
 
-import numpy as np
+import math
+from dataclasses import dataclass
 
-from calib.errors import CurveError
+import numpy as np
+from scipy.signal import butter, lfilter
+
+from calib.errors import CurveError, TraceError
 
 N_STROKE = 240
 """Number of stroke points of every curve; the slope part of the ISO rating depends on it, so it is fixed."""
@@ -18,6 +22,15 @@ PEAK_HALF_WIDTH = 2
 UNIFORM_TOLERANCE = 1e-6
 """Largest relative deviation of a step from the mean step in a uniform stroke (rounding in a CSV of 7
 digits)."""
+
+LOWPASS_ORDER = 2
+"""Order of the low-pass; the delay below is that of this order [-]."""
+LOWPASS_STEPS = 400
+"""Time steps in a period of the cut-off [-]: a ramp through the filter is then right to 1e-4 of its height."""
+UNFELT = 0.02
+"""Way of the edge in the delay of a low-pass, over the width of the filter over the stroke, that is not felt [-]."""
+BANDWIDTH_HZ = (1.0, 1e5)
+"""Cut-offs that are not taken for a mistake of the unit [Hz]."""
 
 
 def resample(stroke: np.ndarray, force: np.ndarray, grid: np.ndarray) -> np.ndarray:
@@ -126,6 +139,86 @@ def filter_simulated(grid: np.ndarray, stroke: np.ndarray, force: np.ndarray, sd
     f = np.concatenate([np.zeros(len(rest)), force])
     values = resample(s, f, np.concatenate([lead, grid]))
     return smooth(grid, values[len(lead) :], sd_m, before=values[: len(lead)])
+
+
+@dataclass(frozen=True, eq=False)
+class BandLimited:
+    """Puts a simulated record on the strokes of a trace as :func:`filter_simulated` does, after
+    the sensor's low-pass.
+
+    A force that falls in a millisecond when a skin parts takes some 20 ms in the log of a robot that filters at 15 Hz.
+    The simulated force is sent through such a filter, a second-order Butterworth low-pass, in the real time of the cut.
+    A filter delays. But contact was found in the filtered force, and so is late as well: the delay is taken off.
+
+    Attributes:
+        bandwidth: Cut-off of the low-pass [Hz]; infinite for none.
+        stroke: Stroke of the trace from contact [m], shape (n,).
+        clock: Time after contact at which the edge was there [s], shape (n,), rising.
+
+    Raises:
+        TraceError: A cut-off beyond :data:`BANDWIDTH_HZ`.
+    """
+
+    bandwidth: float
+    stroke: np.ndarray
+    clock: np.ndarray
+
+    def __post_init__(self) -> None:
+        low, high = BANDWIDTH_HZ
+        if not (low <= self.bandwidth <= high or math.isinf(self.bandwidth)):
+            raise TraceError(
+                f"--bandwidth {self.bandwidth:g} Hz: give the cut-off of the sensor's low-pass, {low:g} to {high:g} "
+                "Hz, or leave it out where the force is not filtered"
+            )
+
+    def __call__(self, grid: np.ndarray, stroke: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """The record on some strokes.
+
+        Args:
+            grid: Strokes [m], shape (k,).
+            stroke: Simulated stroke from contact [m], shape (m,), rising.
+            force: Simulated force [N], shape (m,).
+
+        Returns:
+            Filtered force on the strokes [N], shape (k,).
+
+        Raises:
+            CurveError: The simulated stroke ends before the grid.
+        """
+        fastest = float(np.max(np.diff(self.stroke) / np.diff(self.clock)))
+        delay, step = delay_of(self.bandwidth), 1.0 / (LOWPASS_STEPS * self.bandwidth)
+        if delay * fastest < UNFELT * FILTER_SD_M:
+            return filter_simulated(grid, stroke, force)
+        end = float(np.interp(stroke[-1], self.stroke, self.clock)) + max(stroke[-1] - self.stroke[-1], 0.0) / self._end
+        time = np.arange(-delay - step, end + delay + 2.0 * step, step)
+        way = np.interp(time, self.clock, self.stroke)
+        way += np.minimum(time, 0.0) * self._begin + np.maximum(time - self.clock[-1], 0.0) * self._end
+        there = np.interp(way, np.append(0.0, stroke), np.append(0.0, force), left=0.0)
+        felt = lfilter(*butter(LOWPASS_ORDER, self.bandwidth, fs=1.0 / step), there)
+        seen = time <= end + step
+        return filter_simulated(grid, way[seen], np.interp(time[seen] + delay, time, felt))
+
+    @property
+    def _begin(self) -> float:
+        """Speed at contact [m/s]."""
+        return float((self.stroke[1] - self.stroke[0]) / (self.clock[1] - self.clock[0]))
+
+    @property
+    def _end(self) -> float:
+        """Speed at the end [m/s]."""
+        return float((self.stroke[-1] - self.stroke[-2]) / (self.clock[-1] - self.clock[-2]))
+
+
+def delay_of(bandwidth: float) -> float:
+    """Time by which a sensor's low-pass delays what changes slowly.
+
+    Args:
+        bandwidth: Its cut-off [Hz]; infinite for none.
+
+    Returns:
+        The delay [s].
+    """
+    return math.sqrt(2.0) / (2.0 * math.pi * bandwidth)
 
 
 def parabola_peak(curve: np.ndarray) -> float:

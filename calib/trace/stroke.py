@@ -37,6 +37,8 @@ THROUGH_LEVEL, THROUGH_FALL = 0.1, 0.5
 THROUGH_FALL_M, THROUGH_REST_M = 3e-3, 1e-3
 """Way over which the force falls from the one to the other at most, and way of the knife behind it at least [m]: a
 force that falls with the chord of a round food, or where the stroke ends, does not tell where the board is."""
+CLOCK_STEP = 1e-9
+"""Least step of the clock, part of its whole time [-], so that it rises."""
 MAX_DESCENT_FRACTION = 0.5
 """Part of the position's range that must lie before its lowest point for a record to be a downward stroke."""
 
@@ -206,6 +208,27 @@ def board_stroke(trace: Trace, onset: float, board_z: float) -> float:
             f"column {trace.columns.get('position')}; give what that column reads with the edge on the board"
         )
     return below
+
+
+def clock_of(time: np.ndarray, stroke: np.ndarray, grid: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
+    """Time after contact at which the edge comes to each point of the stroke first.
+
+    Args:
+        time: Of the samples [s], shape (n,).
+        stroke: Way of the edge after contact at each [m], shape (n,).
+        grid: Points of the stroke [m], shape (k,).
+        ends: Time of contact, and of the end of the descent [s].
+
+    Returns:
+        The times [s], shape (k,), rising.
+    """
+    onset, end = ends
+    inside = (time > onset) & (time <= end)
+    deepest = np.maximum.accumulate(np.concatenate([[0.0], stroke[inside]]))
+    after = np.concatenate([[0.0], time[inside] - onset])
+    first = np.concatenate([[True], np.diff(deepest) > 0.0])
+    out: np.ndarray = np.interp(grid, deepest[first], after[first])
+    return out + np.arange(len(out)) * CLOCK_STEP * max(float(out[-1]), CLOCK_STEP)
 
 
 def edge_through(stroke: np.ndarray, tared: np.ndarray, end: float) -> float | None:

@@ -5,7 +5,7 @@ in this cut, and are weighted by what the surrogate says of them (sampling, impo
 Statistics 3). A curve that it hardly knows could be anything, so its likelihood is small, and what it could be is drawn
 given the measured curve: a normal process with the errors of the fit (Rasmussen and Williams 2006, chapter 2). To each
 curve come an error of the correlation length that the residuals showed, of a size that what is stated of it and the
-residuals make likely, and tare, drift and lag from their priors.
+residuals make likely, and tare, drift, lag and bandwidth from their priors.
 """
 
 from __future__ import annotations
@@ -152,6 +152,6 @@ def error_draws(goal: Objective, length: float, size: float, count: int, random:
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     out: FloatArray = size * goal.sigmas * (random.standard_normal((count, n)) @ root.T)
     for nuisance in goal.nuisances:
-        if nuisance.name in ("tare", "drift", "lag"):
+        if nuisance.searched:
             out += nuisance.sd * random.standard_normal((count, 1)) * nuisance.shape
     return out

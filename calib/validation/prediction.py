@@ -15,9 +15,10 @@ from calib.io.typed_document import FLAT
 from calib.material.food import FoodSpec
 from calib.material.knife import load_knife
 from calib.material.scene import blade_warnings, cut_scene, specimen, windowed
+from calib.problem.nuisance import sensor_of
 from calib.problem.request import Request
 from calib.problem.setup import conditioned, way_of, with_height
-from calib.trace.filters import filter_simulated
+from calib.trace.filters import BandLimited
 from calib.validation.metrics import Metrics, compare
 from mpm.output.record import ForceRecord
 from mpm.scene import Scene
@@ -139,6 +140,9 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
     scene = windowed(
         cut_scene(request.food, shape, knife, stroke=way_of(request.food, curve), dx=request.dx, seed=request.seed)
     )
+    sensor, of_sensor = sensor_of(curve, request.gain_sd, request.lag_sd, request.bandwidth)
+    smooth = BandLimited(sensor.bandwidth, curve.stroke, curve.clock)
+    assumed = [*assumed, *(text for text in of_sensor if "--bandwidth" in text)]  # no prediction has a gain
     warnings: tuple[str, ...] = (*request.food.warnings(), *curve.warnings, *assumed, *blade_warnings(shape, knife))
     unseen = held_out(request.food, curve.trace.sha256)
     if not unseen:
@@ -148,7 +152,7 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
         say(text)
     with prepare(out, "predict", resume=False):
         record = _simulated(scene, request.arch)
-        whole = filter_simulated(curve.stroke, record.stroke, record.resolved)
+        whole = smooth(curve.stroke, record.stroke, record.resolved)
         unscaled = compare(curve.stroke, curve.curve, whole)
         factor = unscaled.best_scale if scale_width else 1.0
         metrics = compare(curve.stroke, curve.curve, factor * whole)
@@ -158,8 +162,8 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
                 "stroke_m": curve.stroke,
                 "real_N": curve.curve,
                 "sim_N": factor * whole,
-                "edge_N": factor * filter_simulated(curve.stroke, record.stroke, record.edge[:, 2]),
-                "face_N": factor * filter_simulated(curve.stroke, record.stroke, record.resolved_face),
+                "edge_N": factor * smooth(curve.stroke, record.stroke, record.edge[:, 2]),
+                "face_N": factor * smooth(curve.stroke, record.stroke, record.resolved_face),
             },
         )
         result = PredictionResult(

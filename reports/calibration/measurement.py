@@ -17,6 +17,7 @@ LEFT_OPEN = {
     "tare": "level of the force before contact",
     "drift": "change of that level until the end",
     "lag": "shift of the force along the stroke",
+    "bandwidth": "logarithm of the cut-off of the sensor's low-pass",
     "gain": "factor on the force: the sensor",
     "width": "factor on the force: width of the specimen",
     "scale": "factor on the force: width and sensor",

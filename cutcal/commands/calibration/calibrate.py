@@ -94,6 +94,12 @@ def add_trace(p: argparse.ArgumentParser, *, required: bool = True) -> None:
         "--gain-sd", type=number(0, 1, "-"), metavar="PART", help="doubt of the sensor's gain (default 0.02)"
     )
     g.add_argument("--lag-sd", type=number(0, 1, "s"), metavar="S", help="doubt of force against position in time [s]")
+    g.add_argument(
+        "--bandwidth",
+        type=number(1, 1e5, "/s"),
+        metavar="HZ",
+        help="cut-off of the sensor's low-pass, if any",
+    )
     g.add_argument("--baseline", choices=BASELINES, default=CONSTANT, metavar="KIND", help=BASELINE_HELP)
     g.add_argument("--cut", type=cut_number, metavar="N", help="which of several cuts in the file ('whole': it is one)")
     time = number(-math.inf, math.inf, "s")
@@ -166,6 +172,7 @@ def measured(args: argparse.Namespace, command: Sequence[str]) -> Request:
         cut=args.cut,
         gain_sd=args.gain_sd,
         lag_sd=args.lag_sd,
+        bandwidth=args.bandwidth,
         sizing=sizing_of(args),
         dx=args.dx,
         seed=args.seed,

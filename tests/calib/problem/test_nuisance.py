@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,12 +16,23 @@ from calib.errors import TraceError
 from calib.material.food import load_food
 from calib.material.knife import load_knife
 from calib.material.scene import Sizing, cut_scene, specimen
-from calib.problem.nuisance import GAIN_SD, TORQUE_GAIN_SD, Nuisance, Sensor, Whitening, nuisances, sensor_of
+from calib.problem.nuisance import (
+    GAIN_SD,
+    TORQUE_BANDWIDTH,
+    TORQUE_BANDWIDTH_SPREAD,
+    TORQUE_GAIN_SD,
+    Nuisance,
+    Sensor,
+    Whitening,
+    nuisances,
+    sensor_of,
+)
 from calib.problem.numerical_uncertainty import numerical_uncertainty
 from calib.problem.objective import Objective
 from calib.problem.parameters import Parameter, ParameterSet
 from calib.problem.target import Target
 from calib.trace.conditioning import Conditioned, condition
+from calib.trace.filters import BandLimited
 from calib.trace.trace import Trace
 from mpm.scene.errors import CutcalError
 
@@ -126,11 +138,40 @@ def test_a_late_onset_is_not_a_misfit() -> None:
 def test_a_wrench_from_joint_torques_has_an_uncertain_gain() -> None:
     """The sensor is told by its column, the user's word goes before, and nonsense is refused."""
     robot, said = sensor_of(cut("base_Fz_N"), None, None)
-    assert robot.gain_sd == TORQUE_GAIN_SD and said is not None and "--gain-sd" in said
-    assert sensor_of(cut(), None, 0.02) == (Sensor(GAIN_SD, 0.02), None)
-    assert sensor_of(cut("base_Fz_N"), 0.01, None) == (Sensor(0.01, 0.0), None)
+    assert robot.gain_sd == TORQUE_GAIN_SD and "--gain-sd" in said[0]
+    assert sensor_of(cut(), None, 0.02) == (Sensor(GAIN_SD, 0.02), ())
+    given, said = sensor_of(cut("base_Fz_N"), 0.01, None)
+    assert given.gain_sd == 0.01 and not any("--gain-sd" in text for text in said)
     with pytest.raises(TraceError, match="--gain-sd 15"):
         Sensor(15.0)
+
+
+def test_a_wrench_from_joint_torques_went_through_a_low_pass() -> None:
+    """It is told by its column and known to a factor of two, unless the user knows it; another sensor has none."""
+    robot, said = sensor_of(cut("base_Fz_N"), None, None)
+    assert (robot.bandwidth, robot.bandwidth_sd) == (TORQUE_BANDWIDTH, TORQUE_BANDWIDTH_SPREAD)
+    assert "--bandwidth" in said[1]
+    known, said = sensor_of(cut("base_Fz_N"), None, None, 30.0)
+    assert (known.bandwidth, known.bandwidth_sd) == (30.0, 0.0) and not any("--bandwidth" in text for text in said)
+    assert sensor_of(cut(), None, None)[0].bandwidth == math.inf
+    names = [n.name for n in nuisances(cut("base_Fz_N"), robot)]
+    assert "bandwidth" in names and "bandwidth" not in [n.name for n in nuisances(cut("base_Fz_N"), known)]
+
+
+def test_another_bandwidth_is_what_the_nuisance_says() -> None:
+    """A curve whose low-pass is a fifth higher differs from that of the usual one along the nuisance, by a half to all
+    of it: its own curve is the only one known, and went through the low-pass already."""
+    curve = cut("base_Fz_N")
+    peaked = 10.0 * np.exp(-(((curve.stroke / curve.stroke[-1] - 0.5) / 0.1) ** 2))
+    middle, higher = (
+        BandLimited(f, curve.stroke, curve.clock)(curve.stroke, curve.stroke, peaked) for f in (15.0, 18.0)
+    )
+    robot = sensor_of(curve, None, None)[0]
+    (found,) = (n for n in nuisances(replace(curve, curve=middle), robot) if n.name == "bandwidth")
+    change, said = higher - middle, math.log(1.2) * found.shape
+    size = float(said @ change) / float(said @ said)
+    assert 0.5 < size < 1.5 and np.linalg.norm(change - size * said) < 0.3 * np.linalg.norm(change)
+    assert found.searched and found.peak == pytest.approx(found.shape[int(np.argmax(middle))])
 
 
 def test_a_drift_is_not_extrapolated_without_end() -> None:
