@@ -1,4 +1,5 @@
-"""The report of a calibration: its result, ``curves.csv`` and ``evaluations.h5`` become ``report.pdf`` and ``report.html``.
+"""The report of a calibration: its result, ``curves.csv`` and ``evaluations.h5`` become ``report.pdf`` and
+``report.html``.
 
 Numbers and the sentences that depend on them are made here, once for both; the other words are in
 ``templates/calibration.typ`` and :mod:`reports.web.calibration`.
@@ -59,9 +60,7 @@ INTERRUPTED = (
     "The fit was stopped before it had ended. Values are those of the best simulation until then; intervals may be "
     "missing or too narrow. Continue with --resume.",
 )
-USE = (
-    "for simulating cuts of this food with this knife; the values are constants of the simulation, fitted to one cut"
-)
+USE = "for simulating cuts of this food with this knife; the values are constants of the simulation, fitted to one cut"
 RELATIONS = {"<=": "≤ ", ">=": "≥ "}
 
 

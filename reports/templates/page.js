@@ -12,7 +12,8 @@
   let frame = null; // scales of the last drawing
 
   const number = (value, places) => value.toFixed(places).replace("-", "\u2212");
-  const newtons = (value) => (value === null ? "\u2013" : number(value, curves.places.force) + space + "N");
+  const newtons = (value, kind) => (
+    value === null ? "\u2013" : number(value, curves.places[kind || "force"]) + space + "N");
   const member = () => (chosen === null ? null : curves.members[chosen]);
 
   function make(parent, name, attributes, text) {
@@ -137,7 +138,7 @@
       rows.push(["band", "95" + space + "% band", newtons(ends[0]) + " to " + newtons(ends[1]), null]);
     }
     const rest = curves.residual_N[now];
-    rows.push(["residual", "residual", newtons(rest), frame.lower.y(rest)]);
+    rows.push(["residual", "residual", newtons(rest, "residual"), frame.lower.y(rest)]);
     if (own) rows.push(["member", own.name, newtons(own.curve_N[now]), frame.upper.y(own.curve_N[now])]);
     return rows;
   }
@@ -165,7 +166,7 @@
     const ratio = box.clientWidth / frame.width, there = place * ratio, wide = tip.offsetWidth;
     const right = there + 14 + wide < box.clientWidth;
     tip.style.left = Math.max(right ? there + 14 : there - 14 - wide, 0) + "px";
-    tip.style.top = frame.upper.top + "px";
+    tip.style.top = Math.max((frame.upper.top + frame.upper.height) * ratio - tip.offsetHeight - 6, 0) + "px";
   }
 
   function point(event) {
@@ -197,6 +198,7 @@
     pick.value = k === null ? "" : String(k);
     at("chosen").parentNode.parentNode.hidden = k === null;
     if (k !== null) {
+      at("chosen").tHead.rows[0].cells[1].textContent = curves.members[k].name.replace("m", "M");
       Array.from(at("chosen").tBodies[0].rows).forEach((row, j) => {
         row.cells[1].textContent = texts.values[k][j];
         row.cells[4].textContent = texts.inside[k][j];

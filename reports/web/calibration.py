@@ -14,7 +14,7 @@ from reports import ReportError
 from reports.base.run_folder import Data, Finished
 from reports.web.curves import drawable, legend
 from reports.web.markup import Markup, data, document, element, joined, picture, table
-from reports.web.members import members_section
+from reports.web.members import members_section, picker
 
 if TYPE_CHECKING:
     from calib.calibration.members import Members
@@ -40,15 +40,13 @@ def calibration_page(done: Finished, content: Data, members: Members | None, for
     shown = () if members is None else members.shown
     sections = [
         _verdict(content),
-        _forces(done, content, forces),
+        _forces(done, content, members, forces),
         members_section(done.result.fitted, members),
         _parameters(content),
         _limits(content),
         _provenance(content),
     ]
-    body = joined(
-        [_head(content), element("main", *sections), _foot(content), data("curves", drawable(done, shown))]
-    )
+    body = joined([_head(content), element("main", *sections), _foot(content), data("curves", drawable(done, shown))])
     style, script = ((TEMPLATES / name).read_text(encoding="utf-8") for name in ("page.css", "page.js"))
     return document(f"Calibration of {content['food'].lower()}", body, style, script)
 
@@ -111,8 +109,8 @@ def _mark(kind: str) -> tuple[str, str]:
     return f"{sign} ", word
 
 
-def _forces(done: Finished, c: Data, forces: bytes) -> Markup:
-    """The chart, the way of its cursor, and the switches of its curves."""
+def _forces(done: Finished, c: Data, members: Members | None, forces: bytes) -> Markup:
+    """The chart, the way of its cursor, the choice of a member, and the switches of the curves."""
     chart = element("svg", role="img", aria_label=FORCES, id="chart")
     tip = element("div", id="tip", hidden=True)
     way = element("input", type="range", id="cursor", min="0", step="1", value="0")
@@ -125,6 +123,7 @@ def _forces(done: Finished, c: Data, forces: bytes) -> Markup:
         element("p", element("label", "Stroke ", way), " ", element("output", for_="cursor", id="at"), hidden=True,
                 class_="way"),
         element("p", hint, class_="note screen", hidden=True),
+        picker(done.result.fitted, members),
         element("div", legend(done, c["curves"]), hidden=True, id="legend"),
         element("noscript", element("p", "Without scripts this is the figure of report.pdf."), *paper),
         element("p", " ".join(c["errors"]), class_="note") if c["errors"] else None,

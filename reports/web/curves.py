@@ -15,7 +15,7 @@ from reports.web.markup import Markup, element
 if TYPE_CHECKING:
     from calib.calibration.members import Member
 
-#: Columns of ``curves.csv`` beside the trace and the simulation, what they are called, and what the PDF draws at first.
+#: Other columns of ``curves.csv`` and what they are called; the page does not draw them at first.
 PARTS = (
     ("edge_N", "edge part of the simulation"),
     ("face_N", "face part of the simulation"),
@@ -26,7 +26,9 @@ PARTS = (
 )
 BAND = "95 % predictive band"
 DIGITS = 6
-"""Significant digits of a member's curve: a ten thousandth of a hundredth of the peak."""
+"""Significant digits of a member's curve."""
+MOST_PLACES = 4
+"""Decimals that are shown at most: a tenth of a millinewton is less than any sensor of a cut tells."""
 
 
 def drawable(done: Finished, members: Sequence[Member]) -> dict[str, Any]:
@@ -43,6 +45,8 @@ def drawable(done: Finished, members: Sequence[Member]) -> dict[str, Any]:
     names = {"real_N": label, "sim_N": "simulated"} | {key: name for key, name in PARTS if known(curves, key)}
     band = {key: _numbers(curves[key]) for key in BAND_COLUMNS} if known(curves, BAND_COLUMNS[0]) else None
     peak = max(float(np.max(curves[key])) for key in ("real_N", "sim_N"))
+    force, residual = places(peak), places(float(np.max(np.abs(curves["residual_N"]))))
+    decimals = {"stroke": places(1e3 * float(curves["stroke_m"][-1])), "force": force, "residual": max(force, residual)}
     return {
         "stroke_mm": _numbers(1e3 * curves["stroke_m"], 9),
         "names": names,
@@ -51,7 +55,7 @@ def drawable(done: Finished, members: Sequence[Member]) -> dict[str, Any]:
         "residual_N": _numbers(curves["residual_N"]),
         "residual_name": f"simulated − {label}",
         "noise_sd_N": done.result.conditioning.noise_sd_N,
-        "places": {"stroke": places(1e3 * float(curves["stroke_m"][-1])), "force": places(peak)},
+        "places": decimals,
         "members": [{"name": f"member {m.number}", "curve_N": _numbers(m.curve, DIGITS)} for m in members],
     }
 
@@ -62,8 +66,8 @@ def known(curves: Mapping[str, FloatArray], column: str) -> bool:
 
 
 def places(largest: float) -> int:
-    """Decimals that show three digits of the largest value, and no more than what is known of a force."""
-    return min(max(2 - math.floor(math.log10(largest)), 0), 6) if largest > 0.0 else 2
+    """Decimals that show three digits of the largest value."""
+    return min(max(2 - math.floor(math.log10(largest)), 0), MOST_PLACES) if largest > 0.0 else 0
 
 
 def legend(done: Finished, said: Mapping[str, str]) -> Markup:

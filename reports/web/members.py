@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from reports.base.format import DASH, interval, quantity
-from reports.web.markup import Markup, data, element, table
+from reports.web.markup import Markup, data, element, joined, table
 
 if TYPE_CHECKING:
     from calib.calibration.members import Member, Members
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 Fitted = Mapping[str, "FittedParameter"]
 
 WHAT = (
-    "A member is one simulation that the fit made and stored: its force, filtered as the trace was, and the values that "
-    "it was run with. Members are where the search looked, not draws from the posterior: how many lie somewhere says "
-    "nothing of how probable it is there, and one whose values lie within all intervals can still be improbable. The "
-    "draws behind the 95 % band are not stored."
+    "A member is one simulation that the fit made and stored: its force, filtered as the trace was, and the values "
+    "that it was run with. Members are where the search looked, not draws from the posterior: how many lie somewhere "
+    "says nothing of how probable it is there, and one whose values lie within all intervals can still be improbable. "
+    "The draws behind the 95 % band are not stored."
 )
 NEAREST = "The best values need not be those nearest to the trace: the fit weighs its peak and the literature as well."
 COARSE = (
@@ -28,8 +28,27 @@ COARSE = (
 NONE = "No curves of single simulations are stored in this folder, so there is no member to pick."
 
 
+def picker(fitted: Fitted, members: Members | None) -> Markup | None:
+    """The choice of a member and the values of the chosen one, to stand below the chart.
+
+    Args:
+        fitted: The fitted parameters, by name.
+        members: Simulations to choose from; None where they were not read.
+
+    Returns:
+        Both; None where there is nothing to choose.
+    """
+    if members is None or not members.shown:
+        return None
+    shown = members.shown
+    texts = {"values": [_values(m, fitted) for m in shown], "inside": [_inside(m, fitted) for m in shown]}
+    return joined([
+        element("div", _choice(shown), _chosen(fitted), hidden=True, id="choice"), data("texts", texts)
+    ])  # fmt: skip
+
+
 def members_section(fitted: Fitted, members: Members | None) -> Markup:
-    """The section of the members: what they are, a choice, the values of the chosen one, and all as a table.
+    """The section of the members: what they are, and all as a table.
 
     Args:
         fitted: The fitted parameters, by name.
@@ -43,15 +62,12 @@ def members_section(fitted: Fitted, members: Members | None) -> Markup:
     shown = members.shown
     count = f"{len(shown)} of {members.stored} are here, those on the fine grid and the nearest to the trace first."
     coarse = COARSE if any(m.grid == "coarse" for m in shown) else ""
-    texts = {"values": [_values(m, fitted) for m in shown], "inside": [_inside(m, fitted) for m in shown]}
     return element(
         "section",
         element("h2", "Members"),
         element("p", WHAT),
         element("p", " ".join(filter(None, (count, NEAREST, coarse)))),
-        element("div", _choice(shown), _chosen(fitted), hidden=True, id="choice"),
         _all(shown, fitted),
-        data("texts", texts),
         id="members",
     )
 
@@ -73,6 +89,7 @@ def _choice(shown: tuple[Member, ...]) -> Markup:
         element("button", "‹ previous", type="button", id="previous"),
         element("button", "next ›", type="button", id="next"),
         element("label", element("input", type="checkbox", id="every"), " all in the chart, to click on"),
+        element("a", "what a member is", href="#members"),
         class_="choice",
     )
 
