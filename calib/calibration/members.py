@@ -78,6 +78,8 @@ def read_members(result: CalibrationResult, most: int = MOST) -> Members:
         stroke, real = (curves[name].to_numpy(dtype=float) for name in ("stroke_m", "real_N"))
     except (OutputError, KeyError, ValueError):
         return Members()
+    if len(stroke) < 2:  # which the report refuses
+        return Members()
     # A file's digits leave its grid not as even as the filter asks for.
     stroke = np.linspace(stroke[0], min(stroke[-1], result.conditioning.stroke_m), len(stroke))
     found = [_member(result, entry, stroke, real) for entry in _stored(result.folder / STORE)]

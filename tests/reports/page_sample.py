@@ -28,7 +28,7 @@ def add_members(folder: Path, count: int = 12) -> Path:
     with EvaluationStore(path, Header(sample.SHA256, "sample")) as store:
         store.append("best", run(BEST, stroke, best), "fine")
         store.append("again", run(BEST, stroke, 1.01 * best), "again")
-        store.append("broken", run(BEST, stroke[:40], best[:40], status="failed"), "fine")
+        store.append("broken", run(BEST, stroke, best, status="failed"), "fine")
         for k in range(1, count):
             values = {name: x * (1.0 + 0.05 * k) for name, x in BEST.items()}
             store.append(f"run{k}", run(values, stroke, (1.0 + 0.03 * k) * best), "fine" if k % 3 else "coarse")
@@ -40,7 +40,7 @@ def add_members(folder: Path, count: int = 12) -> Path:
 
 def run(values: dict[str, float], stroke: np.ndarray, force: np.ndarray, status: str = "ok") -> Evaluation:
     """A simulation with these values, a stroke [m] and a force [N], each (n,)."""
-    reason, part = ("", 1.0) if status == "ok" else ("inverted", 0.2)
+    reason, part = ("", 1.0) if status == "ok" else ("inverted", 0.9)
     return Evaluation(0, values, status, reason, part, stroke, force)
 
 

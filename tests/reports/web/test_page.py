@@ -6,6 +6,8 @@ import base64
 import hashlib
 import json
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -108,6 +110,14 @@ def test_the_script_finds_what_it_asks_for(whole: Page) -> None:
     assert set(re.findall(r"#(\w+)[ .{,:]", re.sub(r":\s*#\w+", "", style))) <= names
     curves = {key for key in whole.values("data-curve") if key != "band"}
     assert curves == set(whole.data["curves"]["names"]) and all(f".{key} " in style for key in curves)
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no node to read the script with")
+def test_the_script_is_one() -> None:
+    """It parses."""
+    path = ROOT / "reports" / "templates" / "page.js"
+    done = subprocess.run(["node", "--check", str(path)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def test_a_page_that_cannot_be_written(tmp_path: Path) -> None:
