@@ -14,7 +14,6 @@ from calib.errors import CurveError, OutputError
 from calib.simulation.evaluation_file import UNREADABLE, Header, StoredEvaluation, read_hdf5
 from calib.simulation.evaluation_frame import STORE
 from calib.trace.filters import filter_simulated
-from calib.validation.metrics import compare
 from mpm.arrays import FloatArray
 
 GRIDS = ("fine", "coarse")
@@ -106,14 +105,15 @@ def _stored(path: Path) -> list[StoredEvaluation]:
 
 
 def _member(result: CalibrationResult, entry: StoredEvaluation, stroke: FloatArray, real: FloatArray) -> Member | None:
-    """A stored run as a member; None where it is none of the search, broke down or has no force."""
+    """A stored run as a member; None where it is none of the search or broke down."""
     run = entry.evaluation
     if entry.fidelity not in GRIDS or not run.ok:
         return None
     try:
         curve = filter_simulated(stroke, run.stroke, run.force, result.conditioning.filter_sd_m)
-        agreement = compare(stroke, real, curve)
     except CurveError:
+        return None
+    if not np.all(np.isfinite(curve)):
         return None
     fitted = {name: p.value for name, p in result.fitted.items()}
     fine = entry.fidelity == GRIDS[0]
@@ -124,11 +124,26 @@ def _member(result: CalibrationResult, entry: StoredEvaluation, stroke: FloatArr
         grid=entry.fidelity,
         parameters=run.parameters,
         curve=curve,
-        peak_N=agreement.peak_sim_N,
-        nrmse=agreement.nrmse,
+        peak_N=float(curve.max()),
+        nrmse=nrmse(stroke, real, curve),
         best=fine and _same(run.parameters, fitted),
         modes=of,
     )
+
+
+def nrmse(stroke: FloatArray, real: FloatArray, curve: FloatArray) -> float:
+    """What :func:`calib.validation.metrics.compare` gives as NRMSE, without its ratings, which take 50 ms a curve.
+
+    Args:
+        stroke: Stroke [m], shape (n,).
+        real: Measured force [N], shape (n,).
+        curve: Simulated force [N], shape (n,).
+
+    Returns:
+        Root mean square difference over the measured peak [-].
+    """
+    square = np.trapezoid((curve - real) ** 2, stroke) / (stroke[-1] - stroke[0])
+    return float(np.sqrt(square) / real.max())
 
 
 def _same(one: Mapping[str, float], other: Mapping[str, float]) -> bool:

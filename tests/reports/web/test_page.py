@@ -20,6 +20,7 @@ from calib.calibration.result import read_result
 from calib.io.typed_document import to_document
 from calib.posterior.estimates import ModeSummary, PosteriorSummary, Range, WaveSummary
 from calib.trace.filters import filter_simulated
+from calib.validation.metrics import compare
 from reports import ReportError
 from reports.base.format import interval, quantity
 from reports.calibration import report
@@ -205,7 +206,8 @@ def test_members_have_their_curves_and_values(run: Path, whole: Page) -> None:
         assert drawn[k]["curve_N"] == pytest.approx(curve, rel=1e-5, abs=1e-5)
         said = [quantity((1.0 + 0.05 * own) * BEST[name], p.unit) for name, p in result.fitted.items()]
         assert texts["values"][k] == row[5:] == said
-        assert row[4] == quantity(float(max(curve)), "N")
+        agreement = compare(stroke, sample.curves()["real_N"], curve)
+        assert row[3:5] == [quantity(agreement.nrmse, "fraction"), quantity(agreement.peak_sim_N, "N")]
     inside = dict(zip(BEST, texts["inside"][best[0]], strict=True))
     assert set(inside.values()) == {"yes"} and "no" in texts["inside"][-1]
     options = [known["value"] for name, known in whole.elements if name == "option"]
