@@ -19,6 +19,7 @@ import numpy as np
 
 from calib.calibration.calibrated import Calibrated
 from calib.calibration.credibility import write_credibility
+from calib.calibration.report import write_reports_of
 from calib.calibration.result import SUMMARY, CalibrationResult, read_result, to_document
 from calib.calibration.run_clock import RunClock, earlier_runs
 from calib.calibration.summary import add_conditioning, summarise
@@ -198,10 +199,8 @@ class _Calibration:
 
 
 def _write(done: Calibrated, out: Path, began: float) -> CalibrationResult:
-    """Write curves.csv, material.yaml, summary.json, credibility.json and report.pdf; returns the result, as the folder
-    has it."""
-    from reports.calibration.report import write_report
-
+    """Write curves.csv, material.yaml, summary.json, credibility.json, report.pdf and report.html; returns the result,
+    as the folder has it."""
     document = to_document(summarise(done, out, began))
     write_csv(out / "curves.csv", done.curves())
     provenance = {key: document[key] for key in PROVENANCE} | {"trace": done.setup.curve.trace.label}
@@ -209,5 +208,5 @@ def _write(done: Calibrated, out: Path, began: float) -> CalibrationResult:
     write_json(out / SUMMARY, document)
     result = read_result(out)
     write_credibility(result)
-    write_report(result)
+    write_reports_of(result)
     return result

@@ -37,6 +37,7 @@ RUN_FILES = (
     "evaluate.jsonl",
     "bench.json",
     "report.pdf",
+    "report.html",
     "force.csv",
     "evaluations.h5",
     "evaluations.h5.journal",
@@ -48,7 +49,7 @@ RUN_FILES = (
 SUMMARY = "summary.json"  # which several commands write; its schema says whose it is
 STORE_FILES = ("evaluations.h5", "evaluations.h5.journal")
 OWN_FILES: Mapping[str, tuple[str, ...]] = {
-    "calibrate": (SUMMARY, "material.yaml", "curves.csv", "report.pdf", "record.h5", *STORE_FILES),
+    "calibrate": (SUMMARY, "material.yaml", "curves.csv", "report.pdf", "report.html", "record.h5", *STORE_FILES),
     "study": (SUMMARY, "material.yaml", "report.pdf", *STORE_FILES),
     "converge": ("converge.json", "curves.csv", "report.pdf", *STORE_FILES),
     "stress": ("stress.json", "report.pdf", *STORE_FILES),

@@ -1,7 +1,8 @@
-"""The report of a calibration: its result, ``curves.csv`` and ``evaluations.h5`` become ``report.pdf``.
+"""The report of a calibration: its result, ``curves.csv`` and ``evaluations.h5`` become ``report.pdf`` and
+``report.html``.
 
-Numbers and the sentences that depend on them are made here; the other words are in
-``templates/calibration.typ``.
+Numbers and the sentences that depend on them are made here, once for both; the other words are in
+``templates/calibration.typ`` and :mod:`reports.web.calibration`.
 """
 
 from __future__ import annotations
@@ -26,8 +27,10 @@ from reports.calibration import (
     parameter_page,
     posterior_page,
 )
+from reports.web.calibration import calibration_page, write_page
 
 if TYPE_CHECKING:
+    from calib.calibration.members import Members
     from calib.calibration.result import CalibrationResult
     from calib.calibration.result_parts import Agreement, NullRating
     from calib.validation.acceptance import Verdict
@@ -47,19 +50,31 @@ MEASURES = (
 )
 #: Noise below this part of the peak is that of digitised, smoothed or clipped data [-].
 NO_NOISE = 1e-3
+#: Head and text of the notices.
+RECONSTRUCTED = (
+    "Reconstructed trace, not a measurement",
+    "No force sensor recorded this curve. Nothing that is fitted to it is validated by it.",
+)
+INTERRUPTED = (
+    "Interrupted",
+    "The fit was stopped before it had ended. Values are those of the best simulation until then; intervals may be "
+    "missing or too narrow. Continue with --resume.",
+)
+USE = "for simulating cuts of this food with this knife; the values are constants of the simulation, fitted to one cut"
 RELATIONS = {"<=": "≤ ", ">=": "≥ "}
 
 
-def write_report(result: CalibrationResult) -> Path:
-    """Write ``report.pdf`` of a finished or interrupted calibration into its folder.
+def write_report(result: CalibrationResult, members: Members | None = None) -> Path:
+    """Write ``report.pdf`` and ``report.html`` of a finished or interrupted calibration into its folder.
 
     The same result and files give the same bytes. If the report cannot be made, an older one stays as it is.
 
     Args:
         result: The calibration; its folder has ``curves.csv`` and ``evaluations.h5``.
+        members: Simulations that the page in HTML has to choose from.
 
     Returns:
-        Path of the report.
+        Path of ``report.pdf``; ``report.html`` lies beside it.
 
     Raises:
         ReportError: A file is missing, damaged or incomplete, or the report cannot be written.
@@ -68,24 +83,24 @@ def write_report(result: CalibrationResult) -> Path:
     pictures = _pictures(done)
     content = {**_content(done), "figures": sorted(pictures)}
     target = result.folder / "report.pdf"
+    page = calibration_page(done, content, members, pictures.get("forces.svg", b""))
     publish(target, "calibration.typ", content, pictures, date=done.created)
+    write_page(target.with_suffix(".html"), page)
     return target
 
 
 def _pictures(done: Finished) -> dict[str, bytes]:
     """The figures by file name."""
     result, curves = done.result, done.curves
-    agreement, fitted = result.agreement, result.fitted
-    trace = result.trace.label
-    real = f"{trace}, peak {uncertain(agreement.peak_real_N, result.peak_sd_N, 'N')}"
-    simulated = f"simulated, peak {quantity(agreement.peak_sim_N, 'N')}"
+    fitted, trace = result.fitted, result.trace.label
+    legend = _legend(result)
     look = None
     if done.section is not None:
         cut = result.cut
         of_cut = (done.section, cut.knife, cut.shape.height, curves["stroke_m"], curves["sim_N"])
         look = cut_figure.glance(*of_cut)
     found = {
-        "forces.svg": figures.forces(curves, real, simulated, _room(result), _inside(result), look),
+        "forces.svg": figures.forces(curves, legend["real_N"], legend["sim_N"], _room(result), _inside(result), look),
         "conditioning.svg": figures.conditioning(_record(done), curves),
         "fit.svg": figures.fit(curves, result.conditioning.noise_sd_N, trace),
         "sketch.svg": model_page.sketch(result),
@@ -118,6 +133,15 @@ def _null_peaks(result: CalibrationResult) -> dict[str, str]:
     models = {**agreement.null_models, **({"start": result.at_literature} if result.at_literature else {})}
     peaks = {name: agreement.peak_real_N * (1.0 + (m.peak_error or 0.0)) for name, m in models.items()}
     return {f"{name}_N": quantity(peak, "N") for name, peak in peaks.items()}
+
+
+def _legend(result: CalibrationResult) -> dict[str, str]:
+    """What the two curves of the main figure are called, with their peaks, by column of ``curves.csv``."""
+    agreement = result.agreement
+    return {
+        "real_N": f"{result.trace.label}, peak {uncertain(agreement.peak_real_N, result.peak_sd_N, 'N')}",
+        "sim_N": f"simulated, peak {quantity(agreement.peak_sim_N, 'N')}",
+    }
 
 
 def _inside(result: CalibrationResult) -> str:
@@ -163,13 +187,18 @@ def _content(done: Finished) -> Data:
         "created": done.created.strftime("%Y-%m-%d %H:%M"),
         "interrupted": result.status == "interrupted",
         "reconstructed": result.trace.label == "reconstructed",
+        "banners": _banners(result),
         "passed": result.passed,
         "sentence": _sentence(result),
         "identified": posterior_page.identified(fitted),
         "verdicts": [_verdict_line(v) for v in result.verdicts],
         "trace": _trace(result),
-        "specimen": _specimen(result.cut.shape),
-        "knife": _knife(result.cut.knife),
+        "facts": [
+            ["Food", _specimen(result.cut.shape)],
+            ["Knife", _knife(result.cut.knife)],
+            ["Use", USE],
+        ],
+        "curves": {**_legend(result), "inside": _inside(result)},
         "conditioning": _conditioning(done),
         "left_open": [measurement.left_open(name, n) for name, n in result.nuisances.items()],
         "errors": measurement.errors(result.posterior, result.conditioning.stroke_m, len(done.curves["stroke_m"])),
@@ -199,9 +228,16 @@ def _specimen(shape: Shape) -> str:
     return f"{name}, {sizes} mm (across the blade, along it, height)"
 
 
-def _knife(knife: Knife) -> Data:
-    sizes = {k: quantity(getattr(knife, k), "m") for k in ("spine", "height", "length")}
-    return {"name": breakable(knife.name), "angle": quantity(knife.angle, "rad"), **sizes}
+def _knife(knife: Knife) -> str:
+    spine, height, edge = (quantity(getattr(knife, k), "m") for k in ("spine", "height", "length"))
+    angle = quantity(knife.angle, "rad")
+    return f"{breakable(knife.name)}: spine {spine}, wedge {angle}, height {height}, edge {edge}"
+
+
+def _banners(result: CalibrationResult) -> list[list[str]]:
+    """Loud notices above the verdict: head and text of each."""
+    said = {RECONSTRUCTED: result.trace.label == "reconstructed", INTERRUPTED: result.status == "interrupted"}
+    return [list(notice) for notice, shown_ in said.items() if shown_]
 
 
 def _trace(result: CalibrationResult) -> Data:

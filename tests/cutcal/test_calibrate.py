@@ -170,8 +170,9 @@ def test_material_file_loads_back(finished):
 
 
 def test_report_is_a_pdf_that_names_the_reconstruction(finished):
-    """report.pdf was written, and summary and report call the trace reconstructed."""
+    """report.pdf and report.html were written, and summary and report call the trace reconstructed."""
     assert (finished[0] / "report.pdf").read_bytes().startswith(b"%PDF")
+    assert "Reconstructed trace, not a measurement" in (finished[0] / "report.html").read_text(encoding="utf-8")
     s = json.loads((finished[0] / "summary.json").read_text())
     assert s["trace"]["label"] == "reconstructed"
     assert any("reconstructed" in text for text in s["limits"])

@@ -13,7 +13,8 @@ from reports import ReportError
 
 HELP = "write report.pdf of a finished run again"
 DESCRIPTION = """Typeset report.pdf again from the files that a calibration, a study of several
-cuts, converge, verify, stress or bench wrote."""
+cuts, converge, verify, stress or bench wrote; that of a calibration on one trace with its
+report.html."""
 EPILOG = "examples:\n  cutcal report runs/banana\n  cutcal report runs/banana --context context.yaml"
 
 
@@ -34,7 +35,8 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         print_json({"schema": tag("report"), "report": str(path)})
     else:
-        print(f"wrote {path}")
+        page = path.with_suffix(".html")
+        print(f"wrote {path}{f' and {page.name}' if page.exists() else ''}")
     return 0
 
 

@@ -74,8 +74,9 @@ def test_same_files_give_same_bytes_in_another_process(tmp_path: Path) -> None:
     env = {**os.environ, "PYTHONHASHSEED": "12345", "TZ": "Asia/Tokyo", "PYTHONPATH": str(ROOT)}
     subprocess.run([sys.executable, "-c", code, str(second)], check=True, env=env, cwd=tmp_path)
     assert (second / "report.pdf").read_bytes() == first
+    assert (second / "report.html").read_bytes() == (tmp_path / "a" / "report.html").read_bytes()
     assert sorted(p.name for p in second.iterdir()) == [
-        "curves.csv", "evaluations.h5", "report.pdf", "summary.json"
+        "curves.csv", "evaluations.h5", "report.html", "report.pdf", "summary.json"
     ]  # fmt: skip
 
 

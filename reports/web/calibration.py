@@ -1,0 +1,214 @@
+"""The page of a calibration: ``report.html``, one file that shows verdict, curves, parameters and members.
+
+Its numbers are the texts of ``report.pdf``: what this module gets is what the typesetter gets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mpm.files import write_atomic
+from reports import ReportError
+from reports.base.run_folder import Data, Finished
+from reports.web.curves import drawable, legend
+from reports.web.markup import Markup, data, document, element, joined, picture, table
+from reports.web.members import members_section, picker
+
+if TYPE_CHECKING:
+    from calib.calibration.members import Members
+
+TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
+MARKS = {"yes": ("✓", "passed"), "no": ("✗", "failed"), "none": ("–", "not run")}
+FORCES = "Measured and simulated force over stroke with the 95 % band, and the residual below"
+PAPER = "Measured and simulated force over stroke, with the edge and face parts of the simulation"
+
+
+def calibration_page(done: Finished, content: Data, members: Members | None, forces: bytes) -> str:
+    """The page of a calibration.
+
+    Args:
+        done: The run and its curves.
+        content: What the PDF prints, as text.
+        members: Simulations to choose from; None where they were not read.
+        forces: The main figure of the PDF, an SVG document for readers without scripts; empty where there is none.
+
+    Returns:
+        The HTML document.
+    """
+    shown = () if members is None else members.shown
+    sections = [
+        _verdict(content),
+        _forces(done, content, members, forces),
+        members_section(done.result.fitted, members),
+        _parameters(content),
+        _limits(content),
+        _provenance(content),
+    ]
+    body = joined([_head(content), element("main", *sections), _foot(content), data("curves", drawable(done, shown))])
+    style, script = ((TEMPLATES / name).read_text(encoding="utf-8") for name in ("page.css", "page.js"))
+    return document(f"Calibration of {content['food'].lower()}", body, style, script)
+
+
+def write_page(target: Path, page: str) -> None:
+    """Write a page, whole or not at all.
+
+    Args:
+        target: The file.
+        page: The HTML document.
+
+    Raises:
+        ReportError: It cannot be written.
+    """
+    try:
+        write_atomic(target, page.encode("utf-8", "backslashreplace"))
+    except OSError as e:
+        raise ReportError(
+            f"{target}: cannot be written ({e.strerror}); free the disk or the permission, then make the "
+            "report again with cutcal report"
+        ) from None
+
+
+def _head(c: Data) -> Markup:
+    """Food, trace and outcome, and where the parts of the page are."""
+    passed = c["passed"]
+    stamp = element("p", "✓ passed" if passed else "✗ not passed", class_="stamp" if passed else "stamp failed")
+    name = element(
+        "div",
+        element("p", "Calibration of a cutting simulation", class_="kind"),
+        element("h1", c["food"]),
+        element("p", element("code", c["trace"]["source"])),
+    )
+    parts = {"forces": "Forces", "members": "Members", "parameters": "Parameters", "limits": "What this does not show"}
+    links = [element("a", text, href=f"#{place}") for place, text in parts.items()]
+    return element("header", element("div", name, stamp, class_="top"), element("nav", *links, aria_label="Parts"))
+
+
+def _verdict(c: Data) -> Markup:
+    """What was identified, the sentence, the facts and the verdict table."""
+    notices = [element("p", element("strong", head), " ", text, class_="notice") for head, text in c["banners"]]
+    rows = [
+        [v["name"], v["value"], v["limit"], element("span", *_mark(v["mark"]), class_=v["mark"]), v["note"]]
+        for v in c["verdicts"]
+    ]
+    return element(
+        "section",
+        element("h2", c["identified"]),
+        *notices,
+        element("p", c["sentence"]),
+        _pairs(c["facts"]),
+        table(("Line", "Value", "Limit", "Verdict", "Note"), rows, (1, 2), id="verdicts", label="Verdict table"),
+        id="verdict",
+    )
+
+
+def _mark(kind: str) -> tuple[str, str]:
+    """A sign and a word, so that it needs no colour."""
+    sign, word = MARKS[kind]
+    return f"{sign} ", word
+
+
+def _forces(done: Finished, c: Data, members: Members | None, forces: bytes) -> Markup:
+    """The chart, the way of its cursor, the choice of a member, and the switches of the curves."""
+    chart = element("svg", role="img", aria_label=FORCES, id="chart")
+    tip = element("div", id="tip", hidden=True)
+    way = element("input", type="range", id="cursor", min="0", step="1", value="0")
+    hint = "Point at a curve, or move the slider with the arrow keys, for the values at a stroke."
+    paper = [picture(forces, PAPER)] if forces else []
+    return element(
+        "section",
+        element("h2", "Force over stroke"),
+        element("div", chart, tip, id="box", hidden=True),
+        element("p", element("label", "Stroke ", way), " ", element("output", for_="cursor", id="at"), hidden=True,
+                class_="way"),
+        element("p", hint, class_="note screen", hidden=True),
+        picker(done.result.fitted, members),
+        element("div", legend(done, c["curves"]), hidden=True, id="legend"),
+        element("noscript", element("p", "Without scripts this is the figure of report.pdf."), *paper),
+        element("p", " ".join(c["errors"]), class_="note") if c["errors"] else None,
+        id="forces",
+    )  # fmt: skip
+
+
+def _parameters(c: Data) -> Markup:
+    """The fitted values, what the words mean, the posterior, and what cannot be told apart."""
+    head = ("Parameter", "Value", "95 % interval", "Literature, 95 %", "Identifiability", "Status")
+    rows = []
+    for p in c["parameters"]:
+        name = joined([element("code", p["name"]), element("small", p["meaning"])])
+        outside = joined([", ", element("em", "outside the literature’s range")]) if p["outside"] else None
+        word = joined([p["verdict"], outside])
+        rows.append([name, element("strong", p["value"]), p["interval"], p["literature"], word, p["status"]])
+    words = [joined([element("em", word), f": {text}"]) for word, text in c["legend"]]
+    alike = c["correlations"]
+    none = "Not determined." if alike is None else "No two fitted parameters are correlated above 0.9 in magnitude."
+    return element(
+        "section",
+        element("h2", "The fitted parameters"),
+        table(head, rows, (1, 2, 3), id="values", label="Fitted parameters") if rows else "No parameter was fitted.",
+        _list(words, class_="note") if words else None,
+        _posterior(c["posterior"]),
+        element("h3", "Parameters that the trace cannot tell apart"),
+        _list(alike) if alike else element("p", none),
+        id="parameters",
+    )
+
+
+def _posterior(p: Data | None) -> Markup | None:
+    """The combinations and modes of a sampled posterior."""
+    if p is None:
+        return None
+    modes = ("Mode", "Weight", "Log evidence", "Chi-square of its best simulated food")
+    values = ("Parameter", *(f"Mode {m[0]}, median and 95 %" for m in p["modes"]))
+    differ = f"Modes differ in {p['differ']}." if len(p["modes"]) > 1 and p["differ"] else None
+    return joined([
+        element("h3", "All foods that are plausible"),
+        element("p", "The posterior was sampled over the whole of the literature’s ranges. h is the height."),
+        table(("Combination", "Median", "95 % interval"), p["combinations"], (1,), label="Combinations"),
+        table(modes, p["modes"], (1, 2, 3), label="Modes"),
+        table(values, p["values"], label="Values in each mode"),
+        element("p", differ) if differ else None,
+        element("p", f"Posterior predictive p-value: {p['explained']}."),
+    ])  # fmt: skip
+
+
+def _limits(c: Data) -> Markup:
+    """What the run does not show, and what it warned of."""
+    return element(
+        "section",
+        element("h2", "What this does not show"),
+        _list(c["limits"]) if c["limits"] else element("p", "Nothing was stated by the run."),
+        element("h3", "Warnings"),
+        _list(c["warnings"]) if c["warnings"] else element("p", "None."),
+        id="limits",
+    )
+
+
+def _provenance(c: Data) -> Markup:
+    """Where the numbers come from."""
+    o = c["provenance"]
+    rows = [
+        ("Trace, SHA-256", o["trace"]),
+        ("Air run, SHA-256", o["air"] or "no air run"),
+        ("Commit", o["commit"] or "not run from a checkout"),
+        ("Seed, device", f"{o['seed']}, {o['device']}"),
+        ("Versions", o["versions"]),
+        ("Command", " ".join(o["command"])),
+    ]
+    return element("section", element("h2", "Provenance"), _pairs(rows, "code"), id="provenance")
+
+
+def _foot(c: Data) -> Markup:
+    made = f"cutcal {c['cutcal']}, run of {c['created']}. Model, record, numerics and references are in "
+    return element("footer", element("p", made, element("a", "report.pdf", href="report.pdf"), " of the same folder."))
+
+
+def _pairs(rows: Iterable[Iterable[str]], kind: str = "span") -> Markup:
+    """Labels and their texts."""
+    cells = [joined([element("dt", name), element("dd", element(kind, text))]) for name, text in rows]
+    return element("dl", *cells)
+
+
+def _list(items: Iterable[str], **attributes: str) -> Markup:
+    return element("ul", *(element("li", item) for item in items), **attributes)
