@@ -18,7 +18,7 @@ from calib.problem.joint_objective import JointEvaluator, JointObjective
 from calib.problem.parameters import is_shared, parameter_of, property_of
 from calib.problem.rate_exponent import check_speeds
 from calib.problem.scored_run import ScoredRun
-from calib.problem.setup import Setup, set_up
+from calib.problem.setup import Setup, real_speed, set_up
 from calib.simulation.evaluation import Evaluators
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore
 from calib.simulation.workers import Workers
@@ -152,6 +152,6 @@ def set_ups(study: StudySpec) -> dict[str, Setup]:
     fits = [study.fitted, *(tuple(n for n in study.fitted if n != held) for held in study.hold_out)]
     for names in fits:
         fitted = {p for n in names for p in setups[n].objective.parameters.names}
-        speeds = {n: setups[n].fine.motion.speed for n in names}
+        speeds = {n: real_speed(setups[n].curve) for n in names}
         check_speeds(fitted, speeds, study.specimen_properties, "fit" if names == study.fitted else "hold_out:")
     return setups

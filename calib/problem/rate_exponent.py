@@ -15,7 +15,7 @@ LEAST_SPEED_RATIO = 1.5
 
 
 def check_speeds(
-    fitted: Collection[str], speeds: Mapping[str, float | None], own: Collection[str] = (), where: str = "--fit"
+    fitted: Collection[str], speeds: Mapping[str, float], own: Collection[str] = (), where: str = "--fit"
 ) -> None:
     """Refuse a fit of the rate exponent to cuts that cannot tell it.
 
@@ -39,7 +39,7 @@ def check_speeds(
                 f"own {name}: a cut with {name} of its own tells nothing of how R depends on the speed; leave "
                 f"{name} out of own, or {RATE_EXPONENT} out of fit"
             )
-    known = [v for v in speeds.values() if v is not None]
+    known = list(speeds.values())
     told = known if "R" in fitted else [*known, REFERENCE_SPEED]
     if max(told) >= LEAST_SPEED_RATIO * min(told):
         return

@@ -12,7 +12,7 @@ from typing import Any
 
 from mpm.scene.errors import SceneError, check_number
 from mpm.scene.inclusions import Food
-from mpm.scene.material import Material
+from mpm.scene.material import REFERENCE_SPEED, Material
 from mpm.scene.motion import Arm, Motion
 
 CONTACTS = ("cohesive", "nodal")
@@ -295,10 +295,11 @@ class Scene:
                 + (f" and the tilted edge reaches {self.drop * 1e3:.1f} mm lower than its middle" if m.tilt else "")
             )
         if self.food.material.rate_dependent and m.speed is None:
-            cause = "relaxation makes" if self.food.material.relaxes else "rate_exponent makes"
+            relaxes = self.food.material.relaxes
             raise SceneError(
-                f"material: {cause} the force depend on the real speed of the knife, which is not that of the "
-                "simulation; give motion.speed [m/s] (--speed)"
+                f"material: {'relaxation' if relaxes else 'rate_exponent'} makes the force depend on the real speed of "
+                "the knife, which is not that of the simulation; give motion.speed [m/s] (--speed)"
+                + ("" if relaxes else f", or rate_exponent 0 for a cut at {1e3 * REFERENCE_SPEED:g} mm/s")
             )
 
     def _check_band(self) -> None:
