@@ -114,7 +114,7 @@ GIVEN_SPREAD = 10.0
 """Range of a property that has no literature and is given by the user: the value over and times this."""
 GIVEN_RATE_RANGE = 0.5
 """The same of a rate exponent, which may be none or negative: the value less and plus this [-]. Assumed: published
-toughnesses of a starch-based food have 0.19 and 0 (docs/theory.md, "Speed of the cut")."""
+toughnesses of a starch-based food have 0.17 and 0 (docs/theory.md, "Speed of the cut")."""
 
 BOARD_FRICTION = "board_friction"
 """Friction on the board. It is none of the food's material, but of how it lies there."""

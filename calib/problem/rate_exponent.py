@@ -11,7 +11,7 @@ from mpm.scene.material import REFERENCE_SPEED
 
 LEAST_SPEED_RATIO = 1.5
 """Largest over smallest speed from which a fit may be asked for the exponent [-]. Two cuts whose resistances scatter by
-10 % tell it to 0.35 there, and the prior of one given by hand to 0.26."""
+10 % tell it to 0.35 there (standard deviation), the prior of one given by hand to 0.26."""
 
 
 def check_speeds(
