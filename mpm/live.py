@@ -57,8 +57,8 @@ class LiveCut:
             raise SceneError("live cut: the motion has no real speed; give the one at which the blade usually moves")
         if not scene.arm.rigid:
             raise SceneError("live cut: the blade is held from outside; leave the scene's arm rigid")
-        self.scene = scene
         self._simulation = Simulation(scene, runtime or Runtime(threads=1))
+        self.scene = scene = self._simulation.scene
         self._simulation.load(scene.food.material)
         self._dt = self._simulation.setup.time_step(scene.food.material)
         self._top = scene.food.shape.height + CLEARANCE * scene.numerics.dx

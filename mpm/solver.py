@@ -32,7 +32,7 @@ class Simulation:
     """A scene made ready to run; candidates of its material run without recompiling.
 
     Args:
-        scene: What to simulate.
+        scene: What to simulate; what is kept of it has the resistances of its real speed.
         runtime: Device.
         alone: Have fields of its own; without them it runs in a batch (:mod:`mpm.batch`).
 
@@ -46,6 +46,7 @@ class Simulation:
     """
 
     def __init__(self, scene: Scene, runtime: Runtime | None = None, *, alone: bool = True) -> None:
+        scene = scene.at_its_speed
         self.setup = Setup(scene, runtime or Runtime())
         self.serial = start(self.setup.runtime, scene.numerics.precision)
         configuration = self.setup.configuration(self.setup.threads())
@@ -58,7 +59,8 @@ class Simulation:
         return self.setup.scene
 
     def load(self, material: Material) -> None:
-        """Write seeds and constants into the fields."""
+        """Write seeds and constants into the fields; what depends on the real speed is that of the scene's."""
+        material = material.at_speed(self.scene.motion.speed) if material.rate_exponent != 0 else material
         self.state.owner, self._loaded = self, material
         host_transfer.begin(self.state, [self.setup.contents(material)])
 
@@ -95,7 +97,7 @@ class Simulation:
         if serial != self.serial:  # another simulation has started Taichi anew: the fields are gone
             self.serial = serial
             self.state = state_of(self.setup.configuration(self.setup.threads()), serial)
-        scene = self.scene if material is None else self.scene.with_material(**vars(material))
+        scene = self.scene if material is None else self.scene.with_material(**vars(material)).at_its_speed
         self.load(scene.food.material)
         run = CutRun(self.setup, scene, progress, sections, snapshots)
         while (order := run.order()) is not None:

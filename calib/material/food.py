@@ -25,11 +25,13 @@ from calib.material.properties import (
     LAYER_STIFFNESS,
     LAYERS,
     PROPERTIES,
+    RATE_EXPONENT,
     RELAXATION,
     SYNONYMS,
     Property,
     Source,
     check_override,
+    given_range,
     read_property,
     rule_of,
 )
@@ -43,14 +45,11 @@ if TYPE_CHECKING:
 
 __all__ = ["FoodSpec", "Property", "Source", "check_override", "load_food", "load_foods", "load_material_file"]
 
-GIVEN_SPREAD = 10.0
-"""Range of a property that has no literature and is given by the user: the value over and times this."""
-
 FILES = (".yaml", ".yml")
 """How the name of a food's file ends."""
 _STRENGTHS = ("strength_ratio", "tensile_strength")  # a food has one of them at most
 _LAYERS = (*LAYERS, *LAYERS.values(), *LAYER_STIFFNESS.values())
-_OPTIONAL = (*_LAYERS, "skin_stiffness", BOARD_FRICTION, *RELAXATION, *_STRENGTHS)
+_OPTIONAL = (*_LAYERS, "skin_stiffness", BOARD_FRICTION, *RELAXATION, RATE_EXPONENT, *_STRENGTHS)
 _NULLABLE = ("R_skin", "fracture_energy", *_OPTIONAL)  # a file may leave the optional ones out
 
 
@@ -221,7 +220,7 @@ class FoodSpec:
             source: Where the values come from.
 
         Returns:
-            The food; a property that it had no value for has a range of ``GIVEN_SPREAD`` to either side. One of
+            The food; a property that it had no value for has a range about it (:func:`given_range`). One of
             ``strength_ratio`` and ``tensile_strength`` takes the place of the other.
 
         Raises:
@@ -234,9 +233,7 @@ class FoodSpec:
                 new.pop(_STRENGTHS[1 - _STRENGTHS.index(name)], None)
             old = new.get(name)
             if old is None:
-                rule = PROPERTIES[name]
-                low, high = max(x / GIVEN_SPREAD, rule.low), min(x * GIVEN_SPREAD, rule.high)
-                new[name] = Property(name, x, low, high, rule.unit, source, status)
+                new[name] = Property(name, x, *given_range(name, x), PROPERTIES[name].unit, source, status)
             else:
                 new[name] = replace(old, value=x, status=status, source=source)
         return replace(self, properties=new)
@@ -266,9 +263,11 @@ class FoodSpec:
         return "fracture_energy" in self.properties and not set(_STRENGTHS) & set(self.properties)
 
     @property
-    def relaxes(self) -> bool:
-        """Whether a part of its stiffness relaxes, so that its force depends on the real speed."""
-        return "relaxing_share" in self.properties and self.properties["relaxing_share"].value > 0.0
+    def rate_dependent(self) -> bool:
+        """Whether its force depends on the real speed: a part of its stiffness relaxes, or it has a rate exponent, be
+        it 0, from where a fit begins."""
+        relaxes = "relaxing_share" in self.properties and self.properties["relaxing_share"].value > 0.0
+        return relaxes or RATE_EXPONENT in self.properties
 
     def to_scene_food(
         self,

@@ -10,7 +10,7 @@ from calib.errors import MaterialError
 from calib.io.yaml_checks import Place, check_keys, check_unit, choice, finite_number, mapping, suggest, text
 from calib.table.si_numbers import si_number
 from mpm.output.number_text import interval
-from mpm.scene.material import MAX_POISSON
+from mpm.scene.material import LARGEST_RATE_EXPONENT, MAX_POISSON, REFERENCE_SPEED
 
 #: Where a literature value comes from: measured on this food; Table 2 of the CulinaryCut paper; another food,
 #: another test or a second-hand quotation; nobody's measurement.
@@ -36,6 +36,7 @@ SYNONYMS = {
     "initiation": "R_initiation", "depth": "initiation_depth", "damping": "loss_factor",
     "skin": "skin_thickness", "skin_resistance": "R_skin", "rind": "rind_thickness", "peel": "rind_thickness",
     "wall": "rind_thickness", "core": "core_ratio", "core_part": "core_ratio",
+    "rate": "rate_exponent", "speed_exponent": "rate_exponent", "exponent": "rate_exponent",
     "gf": "fracture_energy", "strength": "tensile_strength", "cohesive_strength": "tensile_strength",
     "sigma_c": "tensile_strength", "sigma_t": "tensile_strength", "diameter": "width",
 }  # fmt: skip
@@ -91,6 +92,11 @@ PROPERTIES: dict[str, Rule] = {
         "a solid keeps some of its stiffness",
     ),
     "relaxation_time": Rule("s", 1e-4, 1e6, "time in which that part relaxes to 1/e"),
+    "rate_exponent": Rule(
+        "-", -LARGEST_RATE_EXPONENT, LARGEST_RATE_EXPONENT,
+        f"power of the real speed, over {1e3 * REFERENCE_SPEED:g} mm/s, in all resistances, 0 = none",
+        "one in proportion to the speed is beyond all that is known of foods",
+    ),
     "tensile_strength": Rule("Pa", 10.0, 1e9, "tension at which the flesh parts"),
     "strength_ratio": Rule(
         "-", 0.01, 1.0, "tension at which the flesh parts over its yield stress",
@@ -101,6 +107,14 @@ PROPERTIES: dict[str, Rule] = {
 
 RELAXATION = ("relaxing_share", "relaxation_time")
 """One branch of a Prony series of the shear stiffness. Only foods of which it is known have the two."""
+
+RATE_EXPONENT = "rate_exponent"
+"""How resistances depend on the real speed. Only foods of which it is known have it; the others' do not."""
+GIVEN_SPREAD = 10.0
+"""Range of a property that has no literature and is given by the user: the value over and times this."""
+GIVEN_RATE_RANGE = 0.5
+"""The same of a rate exponent, which may be none or negative: the value less and plus this [-]. Assumed: published
+toughnesses of a starch-based food have 0.17 and 0 (docs/theory.md, "Speed of the cut")."""
 
 BOARD_FRICTION = "board_friction"
 """Friction on the board. It is none of the food's material, but of how it lies there."""
@@ -245,6 +259,23 @@ def check_override(name: str, value: float | str) -> float:
     x = finite_number(place, value)
     _check_limits(place, x, rule)
     return x
+
+
+def given_range(name: str, value: float) -> tuple[float, float]:
+    """Range of a property that is given by hand and has no literature.
+
+    Args:
+        name: The property.
+        value: What was given [SI].
+
+    Returns:
+        Its lower and upper end [SI], within what the property may be.
+    """
+    rule = rule_of(name)
+    ends = (value / GIVEN_SPREAD, value * GIVEN_SPREAD)
+    if name == RATE_EXPONENT:
+        ends = (value - GIVEN_RATE_RANGE, value + GIVEN_RATE_RANGE)
+    return max(ends[0], rule.low), min(ends[1], rule.high)
 
 
 def rule_of(name: str, rules: Mapping[str, Rule] = PROPERTIES) -> Rule:

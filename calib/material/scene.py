@@ -323,8 +323,8 @@ def cut_scene(
         food: Material and its values.
         shape: Specimen.
         knife: Blade.
-        stroke: Way of the edge [m]; the whole height by default. A motion says the real speed too, which a food that
-            relaxes needs; its simulated speed is set here.
+        stroke: Way of the edge [m]; the whole height by default. A motion says the real speed too, which a food whose
+            force depends on it needs; its simulated speed is set here.
         dx: Cell [m]; by default three quarters of the process zone, which grows with larger ones: a screening version
             has the same edge.
         coarse: Screening version of the scene: one cell to the process zone, twice the speed.

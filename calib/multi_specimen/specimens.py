@@ -16,8 +16,9 @@ from calib.multi_specimen.compression_modulus import CompressionModulus, with_me
 from calib.multi_specimen.spec import StudySpec
 from calib.problem.joint_objective import JointEvaluator, JointObjective
 from calib.problem.parameters import is_shared, parameter_of, property_of
+from calib.problem.rate_exponent import check_speeds
 from calib.problem.scored_run import ScoredRun
-from calib.problem.setup import Setup, set_up
+from calib.problem.setup import Setup, real_speed, set_up
 from calib.simulation.evaluation import Evaluators
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore
 from calib.simulation.workers import Workers
@@ -144,6 +145,13 @@ def set_ups(study: StudySpec) -> dict[str, Setup]:
     """What is decided for each trace before the first simulation.
 
     Raises:
-        CutcalError: Anything wrong with a trace; the message names it.
+        CutcalError: Anything wrong with a trace; the message names it. Or a fit of the study, be it one that predicts
+            a cut from the others, is asked for a rate exponent that its cuts cannot tell.
     """
-    return {name: set_up(request) for name, request in study.requests.items()}
+    setups = {name: set_up(request) for name, request in study.requests.items()}
+    fits = [study.fitted, *(tuple(n for n in study.fitted if n != held) for held in study.hold_out)]
+    for names in fits:
+        fitted = {p for n in names for p in setups[n].objective.parameters.names}
+        speeds = {n: real_speed(setups[n].curve) for n in names}
+        check_speeds(fitted, speeds, study.specimen_properties, "fit" if names == study.fitted else "hold_out:")
+    return setups

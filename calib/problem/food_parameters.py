@@ -10,10 +10,15 @@ from calib.material.food import FoodSpec
 from calib.material.form import ROUNDNESS, open_shape
 from calib.material.properties import rule_of
 from calib.problem.parameters import Z95, Parameter, ParameterSet, PriorCorrelation
+from mpm.scene.material import LARGEST_RATE_EXPONENT
 
 BOUND_FACTOR = 5.0
 """Hard bounds reach this factor beyond the literature's range [-], so that a trace may contradict the literature."""
-LINEAR = {"nu": (0.0, 0.49), "mu": (0.0, 1.2)}
+LINEAR = {
+    "nu": (0.0, 0.49),
+    "mu": (0.0, 1.2),
+    "rate_exponent": (-LARGEST_RATE_EXPONENT, LARGEST_RATE_EXPONENT),
+}
 """Properties that are fitted on a linear scale, with their hard bounds."""
 YIELD_STRAIN_FACTOR = 3.0
 """A food's yield stress over its E is this factor below or above that of the literature, at 95 % [-]. A critical strain

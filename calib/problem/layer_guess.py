@@ -21,7 +21,7 @@ from calib.problem.parameters import ParameterSet, is_shared
 from mpm.arrays import FloatArray
 from mpm.scene import Scene
 from mpm.scene.layers import toughness
-from mpm.scene.material import Material
+from mpm.scene.material import RESISTANCES, Material
 from mpm.scene.shapes import Shape, inside
 
 DENTS = np.arange(0.0, 0.201, 0.025)
@@ -91,7 +91,8 @@ def layer_guesses(
     usual = {name: value for name, value in found.items() if name not in ("E", "yield_stress")}
     firm = usual | {"initiation_depth": PARTS_AT * shape.height}
     dented = usual | {"initiation_depth": reached, "R_skin": max(line, outer), "R_initiation": max(line, outer)}
-    return _vector(parameters, firm), _vector(parameters, found), _vector(parameters, dented)
+    pace = food.rate_factor(scene.motion.speed)  # the force is that of the trace's speed
+    return _vector(parameters, firm, pace), _vector(parameters, found, pace), _vector(parameters, dented, pace)
 
 
 def _tried(parameters: ParameterSet, size: str) -> FloatArray:
@@ -123,7 +124,9 @@ def _chords(shape: Shape, food: Material) -> tuple[FloatArray, FloatArray]:
     return depth, np.array([(there & (marked == k)).sum(axis=1) for k in (1, 2, 3)]) * shape.width / POINTS[1]
 
 
-def _vector(parameters: ParameterSet, found: Mapping[str, float]) -> FloatArray:
-    """Internal coordinates of what was found within the bounds, of the present values where nothing was."""
+def _vector(parameters: ParameterSet, found: Mapping[str, float], pace: float) -> FloatArray:
+    """Internal coordinates of what was found within the bounds, of the present values where nothing was; resistances
+    are those found over ``pace`` [-]."""
+    found = {name: value / (pace if name in RESISTANCES else 1.0) for name, value in found.items()}
     values = {p.name: min(max(found.get(p.name, p.value), p.low), p.high) for p in parameters}
     return parameters.to_vector(values)

@@ -22,6 +22,7 @@ from scipy.special import ndtr, ndtri
 
 from calib.errors import MaterialError
 from mpm.arrays import FloatArray
+from mpm.scene.material import RESISTANCES
 
 Scale = Literal["log", "linear"]
 
@@ -36,10 +37,8 @@ LOG_STEP = math.log(1.1)
 #: Width of a finite difference in a linear coordinate, as a part of the prior's 95 % range (same argument).
 LINEAR_STEP = 0.1
 
-#: Properties with the dimension of a force per length: what the edge works against.
-RESISTANCES = ("R", "R_rind", "R_core", "R_initiation", "R_skin")
-#: Material properties with that dimension or that of a stress. Multiplying all of them by k multiplies every
-#: quasi-static force by k and leaves the geometry of the cut alone.
+#: Material properties with the dimension of a force per length or of a stress. Multiplying all of them by k multiplies
+#: every quasi-static force by k and leaves the geometry of the cut alone.
 STRESS_LIKE = ("E", "yield_stress", *RESISTANCES, "tensile_strength", "fracture_energy")
 
 #: Between the name of a property and that of the trace which has a value of its own: ``R_skin@cut2``.

@@ -26,6 +26,7 @@ from calib.problem.layer_guess import layer_guesses
 from calib.problem.nuisance import Sensor, nuisances, sensor_of
 from calib.problem.numerical_uncertainty import numerical_uncertainty
 from calib.problem.objective import Objective
+from calib.problem.rate_exponent import check_speeds
 from calib.problem.request import Request
 from calib.problem.target import Target
 from calib.simulation.evaluation import Evaluators
@@ -139,6 +140,8 @@ def set_up(request: Request) -> Setup:
     request = with_height(request, curve)
     heights = height_range(request.food, curve, request.sizing)
     fine, coarse, assumed = _scenes(request, curve, heights)
+    if not request.scaled:  # several are judged together
+        check_speeds(_names(request, heights), {curve.trace.source: real_speed(curve)})
     sensor, said = sensor_of(curve, request.gain_sd, request.lag_sd, request.bandwidth)
     objective = _objective(request, curve, fine, sensor, heights)
     return Setup(request, curve, fine, coarse, objective, (*assumed, *said), air_sha256)
@@ -189,9 +192,14 @@ def _scenes(request: Request, curve: Conditioned, heights: Heights | None) -> tu
 
 
 def way_of(food: FoodSpec, curve: Conditioned) -> float | Motion:
-    """Way of the edge [m]; of a food that relaxes the motion with the mean speed of the trace."""
+    """Way of the edge [m]; where the force depends on the real speed the motion with the mean one of the trace."""
     length = curve.stroke_length_m
-    return Motion(length, speed=length / (curve.end_s - curve.onset_s)) if food.relaxes else length
+    return Motion(length, speed=real_speed(curve)) if food.rate_dependent else length
+
+
+def real_speed(curve: Conditioned) -> float:
+    """Mean real speed of the knife in a cut, its way over its time [m/s]."""
+    return curve.stroke_length_m / (curve.end_s - curve.onset_s)
 
 
 def _names(request: Request, heights: Heights | None) -> tuple[str, ...]:

@@ -44,6 +44,7 @@ def doubts_of_the_crack(scene: Scene) -> list[str]:
         Nothing where it does; that its tensile strength was lowered, or that it flows at the crack's tip
         (docs/theory.md, "Constants of the method").
     """
+    scene = scene.at_its_speed
     material = scene.food.material
     used, cell = quantity(scene.tie_strength, "Pa"), f"{scene.numerics.dx * 1e3:.3g} mm"
     out = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mpm.scene.errors import SceneError, check_number
 
@@ -14,6 +14,14 @@ SKIN_POISSON = 0.5  # of a skin in its plane [-]: tomato skin has about a half (
 PUNCH = (2 + math.pi) / math.sqrt(3)
 """Pressure that a flat punch needs to flow into a rigid-plastic solid in plane strain, over its yield stress [-]
 (Prandtl 1920)."""
+RESISTANCES = ("R", "R_rind", "R_core", "R_initiation", "R_skin")
+"""Properties with the dimension of a force per length: what the edge works against."""
+REFERENCE_SPEED = 10e-3
+"""Real speed of the knife at which the resistances of a food are what its values say [m/s]: in the middle of the 5, 10
+and 30 mm/s at which blades cut a starch-based food (Skamniotis et al. 2016, Interface Focus 6:20160005)."""
+LARGEST_RATE_EXPONENT = 1.0
+"""Of the power of the speed in a resistance [-]: in proportion to it. Assumed, five times what blades in a starch-based
+food have told (docs/theory.md, "Speed of the cut")."""
 LEAST_OPENING = 1e-9  # half opening at which a food without resistance has parted [m]; the ties divide by it
 
 
@@ -59,6 +67,8 @@ class Material:
             the shares add up to less than 1 (Simo 1987). Empty = rate-independent, the default.
         relaxing_share: Share [-] of one branch beside those of ``prony``: what a fit moves. 0 = none, the default.
         relaxation_time: Its time [s]; nothing uses it without a share.
+        rate_exponent: Power n [-] of the real speed v of the knife in all resistances of the edge, those of layers,
+            skin and start too: each is its value times (v / :data:`REFERENCE_SPEED`)^n. 0 = none, the default.
         adhesion: Largest normal traction of the food on the blade's faces [Pa]; 0 = none, the default.
         adhesion_energy: Work of adhesion [J/m^2], needed with ``adhesion``.
     """
@@ -88,6 +98,7 @@ class Material:
     prony: tuple[tuple[float, float], ...] = ()
     relaxing_share: float = 0.0
     relaxation_time: float = 1.0
+    rate_exponent: float = 0.0
     adhesion: float = 0.0
     adhesion_energy: float = 0.0
 
@@ -143,6 +154,8 @@ class Material:
                 "material: skin_thickness > 0 needs R_skin, the force per width that goes through the skin"
             )
         self._check_layers(w)
+        beyond = LARGEST_RATE_EXPONENT * (1 + 1e-9)
+        check_number(w, "rate_exponent", self.rate_exponent, -beyond, beyond, "")
         if (self.adhesion > 0) != (self.adhesion_energy > 0):
             raise SceneError(
                 "material: adhesion [Pa] and adhesion_energy [J/m^2] make sticky faces together; give both"
@@ -257,9 +270,27 @@ class Material:
         return self.fracture_energy is not None
 
     @property
+    def relaxes(self) -> bool:
+        """Whether a part of the stiffness relaxes in time."""
+        return bool(self.branches)
+
+    @property
     def rate_dependent(self) -> bool:
         """Whether the force depends on the real speed of the knife."""
-        return bool(self.branches)
+        return self.relaxes or self.rate_exponent != 0
+
+    def rate_factor(self, speed: float | None) -> float:
+        """Resistances at a real speed of the knife [m/s] over those at :data:`REFERENCE_SPEED` [-]; 1 where no speed is
+        known."""
+        return 1.0 if speed is None else float((speed / REFERENCE_SPEED) ** self.rate_exponent)
+
+    def at_speed(self, speed: float | None) -> Material:
+        """The food with the resistances that it has at a real speed of the knife [m/s], and no rate exponent: what a
+        cut at that one speed sees."""
+        factor = self.rate_factor(speed)
+        have = {name: getattr(self, name) for name in RESISTANCES}
+        scaled = {name: factor * value for name, value in have.items() if value is not None}
+        return replace(self, rate_exponent=0.0, **scaled)
 
     @property
     def branches(self) -> tuple[tuple[float, float], ...]:

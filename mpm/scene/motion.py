@@ -19,18 +19,19 @@ class Motion:
 
     Attributes:
         stroke: Way of the edge's middle below the food's top [m].
-        mach: Blade speed over the P-wave speed [-]. All laws are rate-independent by default, so the real speed is
+        mach: Blade speed over the P-wave speed [-]. No law but relaxation follows the time, so the real speed is
             replaced by this one (docs/theory.md, "Measured choices").
         slice_ratio: Speed along the edge over the speed down (slice/push ratio xi) [-].
         tilt: Angle of the edge to the board, positive when the end at +x is higher [rad].
         dwell: Pause at the end of the stroke [s], in real time; needs ``speed``.
         retract: Way back up after it [m].
         speed: Real speed of the stroke [m/s]; needed by rate-dependent laws and by ``dwell``. Times of the material are
-            then shortened by simulated over real speed, so that the laws see the real duration.
+            then shortened by simulated over real speed, so that the laws see the real duration; the resistances of a
+            food with a rate exponent are those at this speed, all the way.
         end_speed: Part of its first speed that the blade keeps at the end of the stroke [-]. Below :data:`SLOWED_FROM`
             of the food's height the speed falls in a line with what is left of the height. The halves of a food rock
             the more slowly the less holds them together, and a thick blade that opens them too fast rings. Not used
-            where the food is rate-dependent.
+            where the food relaxes.
     """
 
     stroke: float

@@ -12,7 +12,7 @@ from typing import Any
 
 from mpm.scene.errors import SceneError, check_number
 from mpm.scene.inclusions import Food
-from mpm.scene.material import Material
+from mpm.scene.material import REFERENCE_SPEED, Material
 from mpm.scene.motion import Arm, Motion
 
 CONTACTS = ("cohesive", "nodal")
@@ -275,7 +275,7 @@ class Scene:
     @property
     def slows_down(self) -> bool:
         """Whether the blade slows down towards the end of its stroke."""
-        return self.motion.end_speed < 1 and not self.food.material.rate_dependent
+        return self.motion.end_speed < 1 and not self.food.material.relaxes
 
     @property
     def time_scale(self) -> float:
@@ -295,9 +295,11 @@ class Scene:
                 + (f" and the tilted edge reaches {self.drop * 1e3:.1f} mm lower than its middle" if m.tilt else "")
             )
         if self.food.material.rate_dependent and m.speed is None:
+            relaxes = self.food.material.relaxes
             raise SceneError(
-                "material: relaxation makes the force depend on the real speed of the knife, and speeding the "
-                "simulation up would change it; give motion.speed [m/s] (--speed)"
+                f"material: {'relaxation' if relaxes else 'rate_exponent'} makes the force depend on the real speed of "
+                "the knife, which is not that of the simulation; give motion.speed [m/s] (--speed)"
+                + ("" if relaxes else f", or rate_exponent 0 for a cut at {1e3 * REFERENCE_SPEED:g} mm/s")
             )
 
     def _check_band(self) -> None:
@@ -331,6 +333,13 @@ class Scene:
         """Whether x = 0 is a mirror that lies half-way between nodes."""
         return self.mirrors[0] and not float(self.numerics.grid_shift[0]).is_integer()
 
+    @property
+    def at_its_speed(self) -> Scene:
+        """The same cut of a food whose resistances are those at the real speed of the knife: what the solver takes."""
+        if self.food.material.rate_exponent == 0:
+            return self
+        return replace(self, food=replace(self.food, material=self.food.material.at_speed(self.motion.speed)))
+
     def with_material(self, **values: Any) -> Scene:
         """The same scene with other material constants."""
         return replace(self, food=replace(self.food, material=replace(self.food.material, **values)))
@@ -350,7 +359,7 @@ class Scene:
             del out["motion"]["end_speed"]
         if not self.food.material.layered:  # nothing else has a use for them
             del out["numerics"]["layer_rows"]
-        for name in ("skin_stiffness", "strength_ratio"):
+        for name in ("skin_stiffness", "strength_ratio", "rate_exponent"):
             if not out["food"]["material"][name]:
                 del out["food"]["material"][name]
         for name in ("rind_stiffness", "core_stiffness"):

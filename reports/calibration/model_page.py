@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
+from mpm.scene.material import REFERENCE_SPEED
 from reports.base.format import breakable, count, quantity
 from reports.base.run_folder import Data
 from reports.calibration import model_sketch
@@ -152,6 +153,9 @@ def _laws(result: CalibrationResult) -> list[list[str]]:
          "R_skin, R_initiation, initiation_depth, R"],
         ["Faces", "contact without adhesion (Nitsche [6]), Coulomb friction up to the shear yield stress", "mu"],
     ]  # fmt: skip
+    if power := _known(result, "rate_exponent"):
+        at = quantity(REFERENCE_SPEED, "m/s", digits=None)
+        rows[4][1] += f"; resistances follow the real speed over {at} to the power {power}"
     if zone is not None and slip is not None:
         rows[4][1] += f"; acts over {quantity(zone, 'm')}, slip {quantity(slip, 'm')}"
     if mu is not None:

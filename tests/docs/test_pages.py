@@ -154,15 +154,16 @@ def test_every_line_of_the_report_is_explained() -> None:
 
 
 def test_own_files_can_be_read(tmp_path: Path) -> None:
-    """The food, the knife and the study of the page on own data are taken as they stand there."""
+    """The food, the knife and the studies of the page on own data are taken as they stand there."""
     blocks = re.findall(r"^```yaml\n(.*?)^```", read(DOCS / "own-data.md"), flags=re.MULTILINE | re.DOTALL)
     files = [tmp_path / f"{k}.yaml" for k in range(len(blocks))]
     for file, block in zip(files, blocks, strict=True):
         file.write_text(block, encoding="utf-8")
-    food, knife, study = files
+    food, knife, study, speeds = files
     assert load_material_file(food).to_scene_food().material.E == 5e4
     assert load_knife(food.with_name(knife.name)).spine == 1.8e-3
     assert read_study(study).hold_out == ("first", "second")
+    assert read_study(speeds).food.value("rate_exponent") == 0.1
 
 
 README = ROOT / "README.md"

@@ -65,7 +65,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
     add_food(p)
     p.add_argument(
-        "--speed", type=number(0, 10, "m/s"), metavar="M/S", help="real speed of the knife; relaxation needs it"
+        "--speed", type=number(0, 10, "m/s"), metavar="M/S", help="real speed of the knife; relaxation and rate need it"
     )
     p.add_argument(
         "--stroke", type=number(1e-4, 1, "m"), metavar="M", help="way of the edge [m] (default: the whole height)"

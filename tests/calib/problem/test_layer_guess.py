@@ -47,6 +47,20 @@ def test_the_layers_of_a_made_up_force_are_found() -> None:
     assert 0 < found["mu"] < CUCUMBER.properties["mu"].value
 
 
+def test_the_guess_of_a_fast_cut_is_at_the_reference_speed() -> None:
+    """At 40 mm/s and an exponent of a half the same force means half the resistances, and the same stiffness."""
+    parameters = fit_parameters(CUCUMBER, ("E", "R", "R_rind", "rind_thickness", "R_core", "core_ratio", "R_skin"))
+    motion = replace(SCENE.motion, speed=0.04)
+    fast = replace(SCENE, motion=motion).with_material(rate_exponent=0.5)
+    for plain, found in zip(
+        layer_guesses(SCENE, parameters, *made()), layer_guesses(fast, parameters, *made()), strict=True
+    ):
+        usual, got = parameters.to_dict(plain), parameters.to_dict(found)
+        for name in ("R", "R_rind", "R_core", "R_skin"):
+            assert got[name] == pytest.approx(max(usual[name] / 2, parameters[name].low)), name
+        assert got["E"] == pytest.approx(usual["E"]) and got["core_ratio"] == usual["core_ratio"]
+
+
 def test_a_soft_start_yields_at_the_strain_of_its_food() -> None:
     """A start that is softer than the food of the literature yields at the same strain, the stiff ones as it."""
     parameters = fit_parameters(CUCUMBER, ("E", "yield_stress", "R", "R_rind", "rind_thickness", "R_skin"))

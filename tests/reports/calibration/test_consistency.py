@@ -225,3 +225,14 @@ def test_the_model_page_says_how_well_the_yield_strain_is_known() -> None:
     )
     said = f"Yield stress over E is known to a factor of {YIELD_STRAIN_FACTOR:g}."
     assert said in model_page._objective(both) and said not in model_page._objective(one)
+
+
+def test_the_model_page_says_that_resistances_follow_the_speed() -> None:
+    """Where the food has a rate exponent, be it held or fitted; nothing is said where it has none."""
+    held = SimpleNamespace(value=0.2, unit="-")
+    rows = {}
+    for name, fixed in (("none", {}), ("held", {"rate_exponent": held})):
+        result = SimpleNamespace(cut=SimpleNamespace(scene={}), fitted={}, fixed_parameters=fixed)
+        rows[name] = spaced(" ".join(dict((row[0], row[1]) for row in model_page._laws(result))["Edge"].split()))
+    assert "real speed" not in rows["none"]
+    assert "; resistances follow the real speed over 10 mm/s to the power 0.2" in rows["held"]
