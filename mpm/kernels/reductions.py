@@ -106,7 +106,7 @@ def report(s: ti.template(), cut, row, out: ti.template()):
 def take_sum(s: ti.template(), field: ti.template(), cut, row):
     """Sum of the copies of a sum over particles, which are cleared."""
     total = ti.cast(0.0, ti.f64)
-    for k in range(s.copies):
+    for k in range(ti.min(s.copies, s.size[cut, COUNT])):
         total += field[cut, k, row]
         field[cut, k, row] = 0.0
     return total
