@@ -348,6 +348,8 @@ class Plastic:
             return mises(2 * self.mu * (product(new, new) - new)) / self.yield_stress - 1
 
         points = np.arange(len(j))
-        root = find_root(excess, (np.zeros(len(j)), np.ones(len(j))), args=(points,), tolerances={"xatol": 1e-15})
+        # nearer to the root the excess is rounding alone, in which a bracket shrinks by halves
+        near = {"xatol": 1e-15, "fatol": np.finfo(float).eps * max(2 * self.mu / self.yield_stress, 1.0)}
+        root = find_root(excess, (np.zeros(len(j)), np.ones(len(j))), args=(points,), tolerances=near)
         out[:, :, flows] = scaled(root.x, points)
         return out

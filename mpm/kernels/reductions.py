@@ -28,6 +28,7 @@ from mpm.state.tables import (
     NODES,
     PLANE_Y,
     PLASTIC,
+    SKIN_COUNT,
     VOLUME,
 )
 
@@ -104,11 +105,18 @@ def report(s: ti.template(), cut, row, out: ti.template()):
 
 @ti.func
 def take_sum(s: ti.template(), field: ti.template(), cut, row):
-    """Sum of the copies of a sum over particles, which are cleared."""
+    """Sum of the copies of a sum over particles or points of the skin, which are cleared."""
     total = ti.cast(0.0, ti.f64)
-    for k in range(s.copies):
-        total += field[cut, k, row]
-        field[cut, k, row] = 0.0
+    if ti.static(s.copies > 1):
+        # As many as were added to. A compiler that knew how many would write them out one by one: most of the time
+        # before the first step.
+        for k in range(ti.min(s.copies, ti.max(s.size[cut, COUNT], s.size[cut, SKIN_COUNT]))):
+            total += field[cut, k, row]
+            field[cut, k, row] = 0.0
+    else:
+        for k in range(s.copies):
+            total += field[cut, k, row]
+            field[cut, k, row] = 0.0
     return total
 
 

@@ -17,6 +17,10 @@ SINGLE = ("vulkan",)
 """Devices whose kernels are in single precision, whatever a scene asks for: Taichi has no exponential of doubles for
 them, and its additions to a double are no atomic ones there, so that impulses are lost."""
 
+CACHE_SIZE = 1 << 29
+"""Machine code that is kept for later processes at most [bytes]: some 400 kernels of a time step. Beyond it Taichi throws
+a quarter away. Its own limit, 100 MiB, holds fewer than the tests have, so that they compiled most of them again."""
+
 
 @dataclass(frozen=True)
 class Runtime:
@@ -63,6 +67,7 @@ def start(runtime: Runtime, precision: str) -> int:
                 default_fp=real,
                 cpu_max_num_threads=runtime.cpu_threads,
                 offline_cache=True,
+                offline_cache_max_size_of_files=CACHE_SIZE,
                 # LLVM does the same work again (docs/theory.md, "Measured choices")
                 advanced_optimization=runtime.arch != "cpu",
                 log_level=ti.ERROR,

@@ -36,11 +36,14 @@ PATIENCE_S = 120.0  # until a study that was started anew has got on, on a loade
 STUDY = """
 if __name__ == "__main__":
     import sys
+    from types import SimpleNamespace
+
     from cutcal import options
     from cutcal.main import main
     from tests.calib.cheap import CheapPool
 
     options.Pool = CheapPool
+    sys.modules["reports.calibration.report"] = SimpleNamespace(write_report=lambda result: None)  # takes seconds
     sys.exit(main(sys.argv[1:]))
 """
 

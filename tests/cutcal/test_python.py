@@ -22,15 +22,20 @@ from calib.problem.request import Request
 from calib.problem.setup import conditioned
 from cutcal import Calibration, Food, Trace
 from mpm.scene.errors import CutcalError
+from tests.calib.cheap import LOG, noted
 from tests.data_dir import ROOT
 
 BANANA = ROOT / "force_data" / "banana_reconstructed.csv"
-# A coarse grid and two parameters, and a file to see that the script is run once.
+# A formula in place of the solver, in processes as real, a coarse grid and two parameters for the cuts that follow, and a
+# file to see that the script is run once. That the solver answers to the same call test_calibrate.py proves.
 SMALL = """
 import pathlib
 from dataclasses import dataclass
 import calib.api as module
+import calib.simulation.process_pool as processes
+from tests.calib.cheap import CheapPool
 
+processes.Pool = CheapPool
 print("began", file=pathlib.Path("began").open("a"))
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +57,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     text = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
     (folder / "script.py").write_text(SMALL + "\n".join(blocks), encoding="utf-8")
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    environment = os.environ | {"PYTHONPATH": str(ROOT), LOG: str(folder / "runs.log")}
     done = subprocess.run(
         [sys.executable, "script.py"], cwd=folder, env=environment, capture_output=True, text=True, check=False
     )
@@ -65,6 +70,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_documented_script_runs(folder: Path) -> None:
     """All blocks, without a guard for worker processes: they do not run the script again."""
     assert (folder / "began").read_text() == "began\n"
+    assert noted(folder / "runs.log", "end").total() > 14  # in those processes
     said = (folder / "said").read_text()
     assert "report.pdf" in said and "verdict" in said and "J/m^2" in said
 

@@ -16,7 +16,7 @@ from mpm.setup.setup import Setup
 from mpm.solver import Simulation
 from tests.mpm.scenes import PRISM, WEDGE
 
-CUT = replace(PRISM, knife=WEDGE, motion=replace(PRISM.motion, stroke=4e-3))
+CUT = replace(PRISM, knife=WEDGE, motion=replace(PRISM.motion, stroke=4e-3, mach=0.03))
 SHAPE = CUT.food.shape
 SCENES = (
     CUT,

@@ -19,7 +19,7 @@ from mpm.setup.setup import Setup
 from mpm.solver import Simulation
 from tests.mpm.scenes import PRISM, WEDGE
 
-SCENE = replace(PRISM, knife=WEDGE, motion=replace(PRISM.motion, stroke=6e-3))
+SCENE = replace(PRISM, knife=WEDGE, motion=replace(PRISM.motion, stroke=4e-3, mach=0.03))
 """A wedge that cuts, rubs and lets the food flow."""
 BRITTLE = SCENE.with_material(tensile_strength=1e4, fracture_energy=20.0)
 

@@ -90,8 +90,9 @@ class FakePool(Workers):
 
 @pytest.fixture(autouse=True)
 def fake_pool(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No particles in this file."""
+    """No particles in this file, and no report but that of ``finished``."""
     monkeypatch.setattr(cutcal.commands.calibration.calibrate, "workers_of", lambda args, say: FakePool())
+    monkeypatch.setattr("reports.calibration.multi_specimen.write_report", lambda out, meanings: None)
 
 
 @pytest.fixture
@@ -141,6 +142,7 @@ def test_each_cut_is_predicted_from_the_others(finished: tuple[Path, Path, int])
     """Held-out NRMSE under 3 %, with the specimen's own skin and width found and the flesh that of the others."""
     _, out, code = finished
     summary = json.loads((out / "summary.json").read_text())
+    assert (out / "report.pdf").read_bytes().startswith(b"%PDF")
     assert code == 0 and summary["passed"] and summary["held_out"] == ["a", "b", "c"]
     for name, (skin, _) in SPECIMENS.items():
         held = summary["hold_out"][name]

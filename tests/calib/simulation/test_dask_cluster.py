@@ -42,6 +42,7 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "killpg"), reason="processes can
 
 PATIENCE_S = 120.0  # until a server is up, on a loaded machine
 STUDY = ["--food", "banana", "--trace", str(ROOT / "force_data" / "banana_reconstructed.csv"), "--fit", "E,R"]
+STUDY += ["--budget", "20"]
 JOBS = """
 import os, time
 
@@ -198,7 +199,14 @@ def test_the_same_bits_as_on_this_machine(two):
         assert np.array_equal(value, same[name]), name
 
 
+@pytest.fixture
+def no_report(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No report of what a study has found, which takes longer than its runs."""
+    monkeypatch.setattr("reports.calibration.report.write_report", lambda result: None)
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures("no_report")
 def test_a_killed_worker_costs_one_run(two, tmp_path, monkeypatch, capsys):
     """SIGKILL in the middle of a run: the study ends with the same optimum as one undisturbed, each run stored once."""
     log = two.folder / "log"
@@ -230,6 +238,7 @@ def test_a_killed_worker_costs_one_run(two, tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("no_report")
 def test_one_worker_finds_what_two_find(tmp_path, monkeypatch):
     """The same runs, the same values and the same intervals: a round of the search does not shrink with the workers."""
     monkeypatch.setenv("CHEAP_LOG", str(tmp_path / "log"))
