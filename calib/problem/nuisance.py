@@ -49,7 +49,7 @@ LARGEST_DRIFT = 0.05
 OUTSIDE = 3.0
 LATE_SPREAD = 0.5
 """Standard deviation of how late contact is found behind a low-pass, over the delay of it [-]: made-up rises in a line,
-with the power 1.5 and in a parabola are found 0.4, 0.9 and 1.7 delays late (docs/theory.md, "Measured choices")."""
+with the power 1.5 and in a parabola are found 0.2 to 1.7 delays late (docs/theory.md, "Measured choices")."""
 TORQUE_BANDWIDTH, TORQUE_BANDWIDTH_SPREAD = 15.0, 0.35
 """Cut-off of the low-pass that such a wrench goes through [Hz], and the standard deviation of its logarithm, a factor
 of two at 95 % [-]: above it the noise of an arm that cuts air falls by 40 dB a decade (docs/theory.md, "Measured

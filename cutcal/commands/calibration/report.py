@@ -12,9 +12,9 @@ from cutcal.options import add_json, print_json
 from reports import ReportError
 
 HELP = "write report.pdf of a finished run again"
-DESCRIPTION = """Typeset report.pdf again from the files that a calibration, a study of several
-cuts, converge, verify, stress or bench wrote; that of a calibration on one trace with its
-report.html."""
+DESCRIPTION = """Typeset report.pdf again from the files that a calibration, a study of
+several cuts, converge, verify, stress or bench wrote; that of a calibration on
+one trace with its report.html."""
 EPILOG = "examples:\n  cutcal report runs/banana\n  cutcal report runs/banana --context context.yaml"
 
 

@@ -639,9 +639,8 @@ def test_what_changes_slowly_passes_a_sensor_without_delay() -> None:
 
 
 def test_a_filtered_record_is_that_of_the_filtered_simulation() -> None:
-    """A cut whose skin parts at once, logged behind a low-pass: the force that went in is found again to 4 % of the
-    peak once the same low-pass is known, and missed by a tenth without it, wherever contact was within half its delay.
-    """
+    """A cut whose skin parts at once, logged behind a low-pass: wherever contact is within its delay, the force is that
+    of the simulation to 1 % of the peak once the same low-pass is known, and off by 5 % without it."""
     time, speed = np.arange(0.0, 1.5, 1e-3), 0.05
     stroke = speed * (time - 0.5)
     force = np.where(stroke < 0.012, 24.0 * np.maximum(stroke / 0.012, 0.0) ** 1.5, 10.0)
@@ -649,11 +648,11 @@ def test_a_filtered_record_is_that_of_the_filtered_simulation() -> None:
     cut = condition(Trace(time, logged, -stroke, "made.csv", ""))
     way = np.linspace(0.0, 0.05, 4000)
     sent = np.interp(way, stroke, force)
-    moves = np.linspace(-0.5, 0.5, 41) * delay_of(12.0) * speed
+    moves = np.linspace(-1.0, 1.0, 81) * delay_of(12.0) * speed
 
     def missed(cut_off: float) -> float:
         found = BandLimited(cut_off, cut.stroke, cut.clock)(cut.stroke, way, sent)
         shifted = [np.interp(cut.stroke + move, cut.stroke, found) for move in moves]
         return min(float(np.max(np.abs(one - cut.curve)[3:-3])) for one in shifted) / 24.0
 
-    assert missed(12.0) < 0.04 and missed(np.inf) > 0.1
+    assert missed(12.0) < 0.01 and missed(np.inf) > 0.04
