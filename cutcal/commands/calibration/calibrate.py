@@ -90,7 +90,7 @@ def add_trace(p: argparse.ArgumentParser, *, required: bool = True) -> None:
     g.add_argument("--speed", type=number(0, 10, "m/s"), metavar="M/S", help="of the knife, where there is no position")
     height = number(-100, 100, "m")
     g.add_argument("--board-z", type=height, metavar="M", help="what its height reads with the edge on the board [m]")
-    doubt = "doubt of the sensor's gain (0.02); --lag-sd S of its delay"
+    doubt = "doubt of the sensor's gain (0.02), --lag-sd of delay"
     g.add_argument("--gain-sd", type=number(0, 1, "-"), metavar="PART", help=doubt)
     g.add_argument("--lag-sd", type=number(0, 1, "s"), metavar="S", help=argparse.SUPPRESS)
     g.add_argument(
