@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -104,6 +105,8 @@ class Calibrated:
         columns |= {f"{name}_N": null.curve for name, null in self.nulls.items()}
         if self.analysis is not None:
             columns |= {"band_low_N": self.analysis.bands[0].low, "band_high_N": self.analysis.bands[0].high}
+        if math.isfinite(self.setup.bandwidth):  # whoever filters another simulation needs it
+            columns["after_contact_s"] = curve.clock
         return columns
 
     def food(self) -> FoodSpec:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import h5py
@@ -11,9 +12,10 @@ import numpy as np
 
 from calib.calibration.result import CalibrationResult
 from calib.errors import CurveError, OutputError
+from calib.problem.target import Smoother
 from calib.simulation.evaluation_file import UNREADABLE, Header, StoredEvaluation, read_hdf5
 from calib.simulation.evaluation_frame import STORE
-from calib.trace.filters import filter_simulated
+from calib.trace.filters import BandLimited, filter_simulated
 from mpm.arrays import FloatArray
 
 GRIDS = ("fine", "coarse")
@@ -81,11 +83,28 @@ def read_members(result: CalibrationResult, most: int = MOST) -> Members:
         return Members()
     # A file's digits leave its grid not as even as the filter asks for.
     stroke = np.linspace(stroke[0], min(stroke[-1], result.conditioning.stroke_m), len(stroke))
-    found = [_member(result, entry, stroke, real) for entry in _stored(result.folder / STORE)]
+    felt = sensed(result, stroke)
+    found = [_member(result, entry, stroke, real, felt) for entry in _stored(result.folder / STORE)]
     members = sorted((m for m in found if m is not None), key=_order)
     named = [m for m in members if m.best or m.modes]
     others = [m for m in members if not (m.best or m.modes)][: max(most - len(named), 0)]
     return Members(tuple(sorted([*named, *others], key=_order)), len(members))
+
+
+def sensed(result: CalibrationResult, stroke: FloatArray) -> Smoother:
+    """What puts a simulation on the strokes of the trace, through the sensor's low-pass where there is one.
+
+    Args:
+        result: The calibration, with its curves.
+        stroke: Stroke grid of the trace [m], shape (n,).
+
+    Returns:
+        It takes strokes [m] (k,), a simulated stroke [m] (m,) and its force [N] (m,), and gives the force [N] (k,).
+    """
+    bandwidth = result.conditioning.bandwidth_Hz
+    if bandwidth is None or "after_contact_s" not in result.curves:
+        return partial(filter_simulated, sd_m=result.conditioning.filter_sd_m)
+    return BandLimited(bandwidth, stroke, result.curves["after_contact_s"].to_numpy(dtype=float))
 
 
 def _order(member: Member) -> tuple[int, float]:
@@ -104,13 +123,15 @@ def _stored(path: Path) -> list[StoredEvaluation]:
         return []
 
 
-def _member(result: CalibrationResult, entry: StoredEvaluation, stroke: FloatArray, real: FloatArray) -> Member | None:
-    """A stored run as a member; None where it is none of the search or broke down."""
+def _member(
+    result: CalibrationResult, entry: StoredEvaluation, stroke: FloatArray, real: FloatArray, felt: Smoother
+) -> Member | None:
+    """A stored run as a member, as the sensor would have felt it; None where it is none of the search or broke down."""
     run = entry.evaluation
     if entry.fidelity not in GRIDS or not run.ok:
         return None
     try:
-        curve = filter_simulated(stroke, run.stroke, run.force, result.conditioning.filter_sd_m)
+        curve = felt(stroke, run.stroke, run.force)
     except CurveError:
         return None
     if not np.all(np.isfinite(curve)):

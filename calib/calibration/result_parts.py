@@ -66,6 +66,7 @@ class Conditioning:
         stroke_source: What the stroke rests on: the trace's position, a constant speed, or the height of the food.
         noise_sd_N: Standard deviation of the noise of the force [N].
         filter_sd_m: Width of the Gaussian filter on both curves [m].
+        bandwidth_Hz: Cut-off of the sensor's low-pass, through which the simulated force goes too [Hz]; missing: none.
         baseline_window_s: Start and end of the baseline window [s].
         end_sd_s: Standard deviation of the end [s].
     """
@@ -80,6 +81,7 @@ class Conditioning:
     stroke_source: Annotated[str, one_of("position", "speed", "height")]
     noise_sd_N: NotNegative
     filter_sd_m: NotNegative
+    bandwidth_Hz: Positive | None = None
     baseline_window_s: tuple[float, float] | None = field(default=None, metadata=FORMER)
     end_sd_s: float | None = field(default=None, metadata=FORMER)
 

@@ -86,7 +86,7 @@ def summarise(done: Calibrated, folder: Path, began: float) -> CalibrationResult
         verdicts=tuple(verdicts),
         trace=_trace(curve),
         air=None if request.air is None else AirSource(request.air_source, setup.air_sha256),
-        conditioning=_conditioning(curve),
+        conditioning=_conditioning(curve, setup.bandwidth),
         agreement=Agreement(done.metrics, nulls, curve.peak_sd_N),
         fitted=fitted,
         nuisances=nuisances,
@@ -159,7 +159,7 @@ def _trace(curve: Conditioned) -> TraceSource:
     return TraceSource(trace.source, trace.label, trace.sha256, len(trace.time), duration, dict(trace.columns))
 
 
-def _conditioning(curve: Conditioned) -> Conditioning:
+def _conditioning(curve: Conditioned, bandwidth: float) -> Conditioning:
     return Conditioning(
         baseline_N=curve.baseline_N,
         baseline_sd_N=curve.baseline_sd_N,
@@ -171,6 +171,7 @@ def _conditioning(curve: Conditioned) -> Conditioning:
         stroke_source=curve.stroke_source,
         noise_sd_N=curve.noise_sd_N,
         filter_sd_m=curve.filter_sd_m,
+        bandwidth_Hz=bandwidth if math.isfinite(bandwidth) else None,
     )
 
 

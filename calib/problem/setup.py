@@ -56,6 +56,7 @@ class Setup:
         objective: Target, parameters and error model.
         assumed: What was assumed of specimen and sensor, one sentence each.
         air_sha256: SHA-256 of the air run, None without one.
+        bandwidth: Cut-off of the sensor's low-pass [Hz]; infinite for none.
     """
 
     request: Request
@@ -65,6 +66,7 @@ class Setup:
     objective: Objective
     assumed: tuple[str, ...]
     air_sha256: str | None = None
+    bandwidth: float = math.inf
 
     @property
     def kept(self) -> tuple[str, ...]:
@@ -144,7 +146,7 @@ def set_up(request: Request) -> Setup:
         check_speeds(_names(request, heights), {curve.trace.source: real_speed(curve)})
     sensor, said = sensor_of(curve, request.gain_sd, request.lag_sd, request.bandwidth)
     objective = _objective(request, curve, fine, sensor, heights)
-    return Setup(request, curve, fine, coarse, objective, (*assumed, *said), air_sha256)
+    return Setup(request, curve, fine, coarse, objective, (*assumed, *said), air_sha256, sensor.bandwidth)
 
 
 def conditioned(request: Request) -> tuple[Conditioned, str | None]:

@@ -264,6 +264,7 @@ def _conditioning(done: Finished) -> Data:
         "noise": quantity(c.noise_sd_N, "N", digits=2) if noisy else "none",
         "noisy": noisy,
         "filter": quantity(c.filter_sd_m, "m", digits=None),
+        "bandwidth": None if c.bandwidth_Hz is None else quantity(c.bandwidth_Hz, "Hz"),
         "onset": uncertain(c.onset_s, sd, "s"),
         "onset_stroke": quantity(sd * speed, "m", digits=2) if sd and speed else None,
         "end": uncertain(c.end_s, c.end_sd_s, "s"),

@@ -9,17 +9,20 @@ import re
 import shutil
 import subprocess
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from pypdf import PdfReader
 
-from calib.calibration.members import MOST
+from calib.calibration.members import MOST, sensed
 from calib.calibration.report import write_report
 from calib.calibration.result import read_result
 from calib.io.typed_document import to_document
 from calib.posterior.estimates import ModeSummary, PosteriorSummary, Range, WaveSummary
-from calib.trace.filters import filter_simulated
+from calib.trace.filters import BandLimited, filter_simulated
 from calib.validation.metrics import compare
 from reports import ReportError
 from reports.base.format import interval, quantity
@@ -277,3 +280,18 @@ def test_markup_escapes_what_it_did_not_make() -> None:
 def test_templates_are_part_of_the_package() -> None:
     """Style and script lie where the packages are, so that a wheel has them."""
     assert {p.name for p in (ROOT / "reports" / "templates").iterdir()} >= {"page.css", "page.js"}
+
+
+def test_members_go_through_the_sensors_low_pass() -> None:
+    """Where the fit had one, the curve of a member is what that sensor would have felt; else it is only smoothed."""
+    stroke = np.linspace(0.0, 0.04, 240)
+    curves = pd.DataFrame({"stroke_m": stroke, "after_contact_s": stroke / 0.05})
+    force = np.where(stroke < 0.01, 20.0, 5.0)
+    felt = {}
+    for bandwidth in (15.0, None):
+        conditioning = SimpleNamespace(bandwidth_Hz=bandwidth, filter_sd_m=5e-4)
+        result: Any = SimpleNamespace(conditioning=conditioning, curves=curves)
+        felt[bandwidth] = sensed(result, stroke)(stroke, stroke, force)
+    np.testing.assert_array_equal(felt[15.0], BandLimited(15.0, stroke, stroke / 0.05)(stroke, stroke, force))
+    np.testing.assert_array_equal(felt[None], filter_simulated(stroke, stroke, force))
+    assert np.max(np.abs(felt[15.0] - felt[None])) > 2.0
