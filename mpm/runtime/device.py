@@ -19,7 +19,7 @@ them, and its additions to a double are no atomic ones there, so that impulses a
 
 CACHE_SIZE = 1 << 29
 """Machine code that is kept for later processes at most [bytes]: some 400 kernels of a time step. Beyond it Taichi
-throws a quarter away. Its own limit, 100 MiB, holds fewer than the tests have: they compiled most of them again."""
+drops a quarter. Its own limit, 100 MiB, holds fewer than the tests have, so that they compiled many of them again."""
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,8 @@ from tests.calib.cheap import LOG, noted
 from tests.data_dir import ROOT
 
 BANANA = ROOT / "force_data" / "banana_reconstructed.csv"
-# A formula in place of the solver, in processes as real, a coarse grid and two parameters for the cuts that follow, and
-# a file to see that the script is run once. That the solver answers to the same call test_calibrate.py proves.
+# A formula in place of the solver, in real processes, a coarse grid and two parameters for the cuts that follow, and a
+# file to see that the script is run once. That the solver answers to the same call test_calibrate.py proves.
 SMALL = """
 import pathlib
 from dataclasses import dataclass

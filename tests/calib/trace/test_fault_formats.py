@@ -5,6 +5,7 @@ The inputs are the same in every run; ``-m slow`` draws a thousand of them.
 
 from __future__ import annotations
 
+import functools
 import io
 import json
 from collections.abc import Callable
@@ -210,12 +211,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("faults")
 
 
+@functools.cache
+def true_peak(level: float, peak: float, seed: int) -> float:
+    """Peak [N] of a cut without faults."""
+    return condition(made_cut(level=level, peak=peak, seed=seed).trace()).peak_N
+
+
 def never_off_unsaid(folder: Path, data: st.DataObject) -> None:
     """One cut with up to two faults, written in one format."""
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))
     level, peak = data.draw(st.sampled_from((3.0, -4.0, 0.0))), data.draw(st.sampled_from((12.0, 5.0, 25.0)))
-    cut = made_cut(level=level, peak=peak, seed=data.draw(st.integers(0, 50)))
-    true = condition(cut.trace()).peak_N
+    seed = data.draw(st.integers(0, 50))
+    cut, true = made_cut(level=level, peak=peak, seed=seed), true_peak(level, peak, seed)
     faults = data.draw(st.lists(st.sampled_from(FAULTS), min_size=1, max_size=1))
     for fault in faults:
         cut = fault(cut, rng)
