@@ -202,7 +202,7 @@ def test_the_same_bits_as_on_this_machine(two):
 @pytest.fixture
 def no_report(monkeypatch: pytest.MonkeyPatch) -> None:
     """No report of what a study has found, which takes longer than its runs."""
-    monkeypatch.setattr("reports.calibration.report.write_report", lambda result: None)
+    monkeypatch.setattr("reports.calibration.report.write_report", lambda result, members: None)
 
 
 @pytest.mark.slow
