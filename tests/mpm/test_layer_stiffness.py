@@ -76,6 +76,7 @@ def test_the_stiffness_of_a_particle_is_the_mean_over_its_cube() -> None:
     assert np.all(layer_stiffness(BLOCK, replace(material, rind_stiffness=1.0), 1e-3, np.zeros((3, 3))) == 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("layer", "mass"), [({"rind_stiffness": 5.0}, (1.5, np.inf)), ({"core_stiffness": 0.1}, (0.7, 0.85))]
 )
@@ -121,6 +122,7 @@ def test_a_food_that_is_all_rind_is_a_stiffer_food() -> None:
     assert np.abs(rind.face[-1, 2]) > 1.2 * np.abs(dry.face[-1, 2])  # or the adhesion would not be seen
 
 
+@pytest.mark.slow
 def test_both_ends_of_a_tie_are_as_heavy() -> None:
     """Or what one half gets the other would not lose: beside a blade aside of the middle the rinds differ."""
     aside = replace(scene("sphere", replace(FRUIT, rind_stiffness=5.0), mirror=False))
