@@ -43,7 +43,7 @@ if __name__ == "__main__":
     from tests.calib.cheap import CheapPool
 
     options.Pool = CheapPool
-    sys.modules["reports.calibration.report"] = SimpleNamespace(write_report=lambda result, members: None)  # takes seconds
+    sys.modules["reports.calibration.report"] = SimpleNamespace(write_report=lambda result, members: None)
     sys.exit(main(sys.argv[1:]))
 """
 
