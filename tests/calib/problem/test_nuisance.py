@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calib.api import Calibration
 from calib.errors import TraceError
 from calib.material.food import load_food
 from calib.material.knife import load_knife
@@ -30,11 +31,13 @@ from calib.problem.nuisance import (
 from calib.problem.numerical_uncertainty import numerical_uncertainty
 from calib.problem.objective import Objective
 from calib.problem.parameters import Parameter, ParameterSet
+from calib.problem.setup import set_up
 from calib.problem.target import Target
 from calib.trace.conditioning import Conditioned, condition
 from calib.trace.filters import BandLimited
 from calib.trace.trace import Trace
 from mpm.scene.errors import CutcalError
+from tests.calib.made_cuts import made_cut
 
 ONE = ParameterSet((Parameter("E", 1e5, 1e3, 1e7, "Pa", 5e4, 2e5),))
 
@@ -154,8 +157,31 @@ def test_a_wrench_from_joint_torques_went_through_a_low_pass() -> None:
     known, said = sensor_of(cut("base_Fz_N"), None, None, 30.0)
     assert (known.bandwidth, known.bandwidth_sd) == (30.0, 0.0) and not any("--bandwidth" in text for text in said)
     assert sensor_of(cut(), None, None)[0].bandwidth == math.inf
+    sizes = [{n.name: n.sd for n in nuisances(cut("base_Fz_N"), sensor)} for sensor in (robot, Sensor())]
+    delay = math.sqrt(2.0) / (2.0 * math.pi * TORQUE_BANDWIDTH)
+    speed = cut().stroke_length_m / (cut().end_s - cut().onset_s)
+    assert math.sqrt(sizes[0]["lag"] ** 2 - sizes[1].get("lag", 0.0) ** 2) == pytest.approx(0.5 * delay * speed)
     names = [n.name for n in nuisances(cut("base_Fz_N"), robot)]
     assert "bandwidth" in names and "bandwidth" not in [n.name for n in nuisances(cut("base_Fz_N"), known)]
+
+
+def test_a_simulation_is_compared_through_the_sensors_low_pass() -> None:
+    """That of the trace's kind, or the one that is given: a force that falls at once has another curve."""
+    record = replace(made_cut().trace(), columns={"force": "base_Fz_N"})
+    curves = []
+    for bandwidth in (None, 30.0, 9e4):
+        setup = set_up(Calibration("banana", record, bandwidth=bandwidth).request())
+        target = setup.objective.target
+        step = np.where(target.stroke < 0.5 * target.stroke[-1], 10.0, 0.0)
+        curves.append(target.smooth(target.stroke, target.stroke, step))
+        cut_off = TORQUE_BANDWIDTH if bandwidth is None else bandwidth
+        want = BandLimited(cut_off, setup.curve.stroke, setup.curve.clock)(target.stroke, target.stroke, step)
+        np.testing.assert_array_equal(curves[-1], want)
+        assert setup.bandwidth == cut_off and any("--bandwidth" in text for text in setup.assumed) is (
+            bandwidth is None
+        )
+    slopes = [float(np.max(-np.diff(curve))) for curve in curves]
+    assert slopes[0] < slopes[1] < slopes[2]
 
 
 def test_another_bandwidth_is_what_the_nuisance_says() -> None:
