@@ -53,6 +53,19 @@ def test_prediction_takes_one_number_from_the_trace(material, tmp_path, capsys):
     assert "one factor" in capsys.readouterr().out
 
 
+def test_a_prediction_goes_through_the_sensors_low_pass(material, tmp_path):
+    """Behind a slow filter the predicted force varies less on its way, and its parts differ; the trace is what it was."""
+    curves = []
+    for name, extra in (("bare", []), ("filtered", ["--bandwidth", "2Hz"])):
+        main(["predict", "--food", "banana", "--material", material, *TRACE, *extra, "--out", str(tmp_path / name)])
+        curves.append(pd.read_csv(tmp_path / name / "curves.csv"))
+    bare, filtered = curves
+    np.testing.assert_array_equal(filtered["real_N"], bare["real_N"])
+    assert filtered["sim_N"].diff().abs().sum() < 0.98 * bare["sim_N"].diff().abs().sum()
+    for column in ("edge_N", "face_N"):
+        assert (filtered[column] - bare[column]).abs().max() > 0.005 * bare[column].abs().max()
+
+
 def test_a_trace_that_was_fitted_is_not_held_out(tmp_path, capsys):
     """Values fitted to the very trace, by its SHA-256: in-sample, in the document and in words."""
     path, out = tmp_path / "material.yaml", tmp_path / "out"
