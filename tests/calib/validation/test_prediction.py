@@ -54,7 +54,7 @@ def test_prediction_takes_one_number_from_the_trace(material, tmp_path, capsys):
 
 
 def test_a_prediction_goes_through_the_sensors_low_pass(material, tmp_path):
-    """Behind a slow filter the predicted force varies less on its way, and its parts differ; the trace is what it was."""
+    """Behind a slow filter the predicted force varies less, and its parts differ; the trace is what it was."""
     curves = []
     for name, extra in (("bare", []), ("filtered", ["--bandwidth", "2Hz"])):
         main(["predict", "--food", "banana", "--material", material, *TRACE, *extra, "--out", str(tmp_path / name)])
