@@ -76,8 +76,8 @@ class CalibrationResult:
         conditioning: How the record became a curve over the stroke.
         agreement: The simulated curve, and curves that explain nothing, against the trace.
         fitted: Fitted parameters, by name.
-        nuisances: What the fit says of the measurement, by name: tare, drift, lag, gain, width; empty where the fit
-            ended too early.
+        nuisances: What the fit says of the measurement, by name: tare, drift, lag, bandwidth, gain, width; empty where
+            the fit ended too early.
         posterior: What is known of all parameters together.
         fixed_parameters: Properties that were not fitted, by name.
         history: The simulations of the search.

@@ -18,9 +18,10 @@ model, Rasmussen & Williams 2006, section 2.7):
 
 Tare, drift, lag and bandwidth are integrated out of the curve while the search runs: an onset found 0.3 mm late costs
 the right material a chi-square of hundreds where the model is right to 1 %, and the search would go elsewhere for it.
-The headline figures stay those of the bare simulation against the bare trace, and so does the peak in the search: a
-drift widens its tolerance and cannot explain it away. Gain and width only scale a curve, as the stress-like parameters
-do: the search leaves them at their likely values, and they widen the intervals.
+The headline figures use none of them: they compare the trace with the simulation as the sensor would have felt it, its
+low-pass at the stated cut-off. So does the peak in the search: a drift widens its tolerance and cannot explain it away.
+Gain and width only scale a curve, as the stress-like parameters do: the search leaves them at their likely values, and
+they widen the intervals.
 """
 
 from __future__ import annotations
@@ -177,6 +178,11 @@ class NuisanceEstimate:
         }
 
 
+def real_speed(curve: Conditioned) -> float:
+    """Mean real speed of the knife in a cut, its way over its time [m/s]."""
+    return curve.stroke_length_m / (curve.end_s - curve.onset_s)
+
+
 def nuisances(
     curve: Conditioned, sensor: Sensor, *, width_sd: float = 0.0, scaled: bool = False
 ) -> tuple[Nuisance, ...]:
@@ -192,8 +198,7 @@ def nuisances(
     Returns:
         The nuisances whose standard deviation is not zero.
     """
-    length = curve.stroke_length_m
-    speed = length / (curve.end_s - curve.onset_s)
+    length, speed = curve.stroke_length_m, real_speed(curve)
     peak = float(curve.curve.max())
     drift = min(float(np.hypot(curve.drift_N_per_s, curve.drift_sd_N_per_s)) * length / speed, LARGEST_DRIFT * peak)
     late = LATE_SPREAD * delay_of(sensor.bandwidth)

@@ -23,7 +23,7 @@ from calib.material.scene import (
 )
 from calib.problem.food_parameters import Heights, fit_parameters, size_relative_sd
 from calib.problem.layer_guess import layer_guesses
-from calib.problem.nuisance import Sensor, nuisances, sensor_of
+from calib.problem.nuisance import Sensor, nuisances, real_speed, sensor_of
 from calib.problem.numerical_uncertainty import numerical_uncertainty
 from calib.problem.objective import Objective
 from calib.problem.rate_exponent import check_speeds
@@ -197,11 +197,6 @@ def way_of(food: FoodSpec, curve: Conditioned) -> float | Motion:
     """Way of the edge [m]; where the force depends on the real speed the motion with the mean one of the trace."""
     length = curve.stroke_length_m
     return Motion(length, speed=real_speed(curve)) if food.rate_dependent else length
-
-
-def real_speed(curve: Conditioned) -> float:
-    """Mean real speed of the knife in a cut, its way over its time [m/s]."""
-    return curve.stroke_length_m / (curve.end_s - curve.onset_s)
 
 
 def _names(request: Request, heights: Heights | None) -> tuple[str, ...]:

@@ -140,10 +140,10 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
     scene = windowed(
         cut_scene(request.food, shape, knife, stroke=way_of(request.food, curve), dx=request.dx, seed=request.seed)
     )
-    sensor, of_sensor = sensor_of(curve, request.gain_sd, request.lag_sd, request.bandwidth)
+    sensor, of_sensor = sensor_of(curve, 0.0, request.lag_sd, request.bandwidth)  # no prediction has a gain
     smooth = BandLimited(sensor.bandwidth, curve.stroke, curve.clock)
-    assumed = [*assumed, *(text for text in of_sensor if "--bandwidth" in text)]  # no prediction has a gain
-    warnings: tuple[str, ...] = (*request.food.warnings(), *curve.warnings, *assumed, *blade_warnings(shape, knife))
+    blade = blade_warnings(shape, knife)
+    warnings: tuple[str, ...] = (*request.food.warnings(), *curve.warnings, *assumed, *of_sensor, *blade)
     unseen = held_out(request.food, curve.trace.sha256)
     if not unseen:
         said = "in-sample: the values were fitted to this very trace (equal SHA-256), so the agreement predicts nothing"
