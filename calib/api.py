@@ -95,6 +95,8 @@ class Calibration:
         bandwidth: Cut-off of the low-pass that the force went through [Hz]; None for what its kind suggests.
         discrepancy: How far a right model may be from the trace, part of the peak [-]; None for the usual 0.03.
         u_num: Folder of a ``converge`` study whose numerical uncertainty the fit heeds, or None.
+        start_from: Folder of an earlier calibration of the same food and knife, or of several, at whose closest foods
+            the search begins, or None.
         scheduler: Address of a Dask cluster that runs the simulations, such as ``tcp://host:8786``, or None.
 
     Raises:
@@ -138,6 +140,7 @@ class Calibration:
     bandwidth: float | None = None
     discrepancy: float | None = None
     u_num: str | Path | None = None
+    start_from: str | Path | None = None
     scheduler: str | None = None
     _food: FoodSpec = field(init=False, repr=False)
     _records: tuple[Trace, Trace | None] = field(init=False, repr=False)
@@ -229,6 +232,7 @@ class Calibration:
             bandwidth=self.bandwidth,
             errors=ErrorModel() if self.discrepancy is None else ErrorModel(discrepancy=self.discrepancy),
             u_num=None if self.u_num is None else Path(self.u_num),
+            start_from=None if self.start_from is None else Path(self.start_from),
             seed=self.seed,
             arch=self.arch,
             command=(f"{self._call()}.run({str(out)!r})" if str(out) else f"{self._call()}.run()",),

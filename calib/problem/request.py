@@ -38,6 +38,8 @@ class Request:
         bandwidth: Cut-off of the low-pass that the force went through [Hz]; None for what its kind suggests.
         scaled: Whether the search has a factor for the width of the specimen, as it has in a fit of several.
         u_num: Folder of a convergence study whose numerical uncertainty enters the likelihood, or None.
+        start_from: Folder of an earlier calibration of the same food and knife, or of several, at whose closest foods
+            the search begins, or None.
         errors: How far a right model may be from the trace.
         sample: Whether the posterior over all plausible foods is sampled, in place of a search for the best one.
         budget: Largest number of simulations.
@@ -64,6 +66,7 @@ class Request:
     bandwidth: float | None = None
     scaled: bool = False
     u_num: Path | None = None
+    start_from: Path | None = None
     errors: ErrorModel = field(default_factory=ErrorModel)
     sample: bool = False
     budget: float = 100

@@ -21,6 +21,7 @@ from calib.material.scene import (
     windowed,
     with_other_particles,
 )
+from calib.problem.earlier_calibration import earlier_guesses
 from calib.problem.food_parameters import Heights, fit_parameters, size_relative_sd
 from calib.problem.layer_guess import layer_guesses
 from calib.problem.nuisance import Sensor, nuisances, real_speed, sensor_of
@@ -225,7 +226,7 @@ def _objective(
     smooth = BandLimited(sensor.bandwidth, curve.stroke, curve.clock)
     target = Target(curve.stroke, curve.curve, curve.curve_noise_sd_N, curve.peak_sd_N, smooth, u_num)
     parameters = fit_parameters(food, _names(request, heights), heights)
-    return Objective(
+    objective = Objective(
         target,
         parameters,
         request.errors,
@@ -233,6 +234,9 @@ def _objective(
         scale_sd=math.hypot(width_sd, sensor.gain_sd) if request.scaled else 0.0,
         guesses=layer_guesses(scene, parameters, curve.stroke, curve.curve),
     )
+    if request.start_from is None:
+        return objective
+    return replace(objective, guesses=earlier_guesses(request.start_from, objective, food.name, scene.knife.name))
 
 
 def slower(scene: Scene) -> Scene:

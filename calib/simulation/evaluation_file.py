@@ -144,6 +144,29 @@ def read_hdf5(path: Path, header: Header) -> tuple[list[StoredEvaluation], int]:
     return sound, len(entries) - len(sound)
 
 
+def read_runs(path: Path) -> list[StoredEvaluation]:
+    """The sound runs of an HDF5 file, whatever calibration they belong to.
+
+    Args:
+        path: The file.
+
+    Returns:
+        The runs.
+
+    Raises:
+        OSError: There is no such file.
+        OutputError: It cannot be read.
+    """
+    try:
+        with h5py.File(io.BytesIO(path.read_bytes()), "r") as file:
+            header = Header(**{name: _plain(file.attrs[name]) for name in Header.__dataclass_fields__})
+    except FileNotFoundError:
+        raise
+    except UNREADABLE as error:
+        raise OutputError(f"{path} is no store of evaluations, or damaged: {' '.join(str(error).split())}") from error
+    return read_hdf5(path, header)[0]
+
+
 def _check_sizes(file: h5py.File, size: int) -> None:
     """Refuse a data set that is larger than the file, whose sets are not compressed; reading it might take all memory.
 

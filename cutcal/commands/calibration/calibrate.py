@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from calib.multi_specimen.result import HeldOutCut, InSampleCut, StudyResult
 
 MEASUREMENT = "measurement"  # title of the group of options that say what was measured
+HEIGHT_HELP = "column of the knife's height ('none'), or --depth-col"
 CHECK_HELP = "say how the trace is read (and draw it), then end"
 BASELINE_HELP = f"of a force without --air: {', '.join(BASELINES)}"
 HELP = "fit a food to a measured knife-force trace, and report"
@@ -70,6 +71,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
     )
     fit.add_argument("--sample", action="store_true", help="sample all plausible foods (needs dynesty)")
     fit.add_argument("--u-num", metavar="DIR", help="a converge study whose uncertainty the fit heeds")
+    fit.add_argument("--start-from", metavar="DIR", help="begin at the foods of earlier calibrations there")
     add_workers(p, "simulations")
     titled(p, RUN).add_argument("--check", nargs="?", const="", metavar="PNG", help=CHECK_HELP)
     titled(p, RUN).add_argument("--resume", action="store_true", help=RESUME_HELP)
@@ -83,8 +85,8 @@ def add_trace(p: argparse.ArgumentParser, *, required: bool = True) -> None:
     g.add_argument("--air", metavar="FILE", help="the same motion without food, to be subtracted")
     g.add_argument("--time-col", metavar="NAME", help="column of the time; NAME=UNIT says its unit")
     g.add_argument("--force-col", metavar="NAME", help="column of the force on the knife")
-    g.add_argument("--position-col", metavar="NAME", help="column of the knife's height ('none': none)")
-    g.add_argument("--depth-col", metavar="NAME", help="the same where it grows as the knife descends")
+    g.add_argument("--position-col", metavar="NAME", help=HEIGHT_HELP)
+    g.add_argument("--depth-col", metavar="NAME", help=argparse.SUPPRESS)
     g.add_argument("--sign", choices=("+", "-"), metavar="+|-", help="sign that makes resistance positive")
     g.add_argument("--rate", type=number(0, 1e6, "/s"), metavar="HZ", help="rows a second, where there is no clock")
     g.add_argument("--speed", type=number(0, 10, "m/s"), metavar="M/S", help="of the knife, where there is no position")
@@ -146,6 +148,7 @@ def request_of(args: argparse.Namespace, command: Sequence[str]) -> Request:
         fit=named,
         budget=args.budget or BUDGET,
         u_num=u_num,
+        start_from=None if args.start_from is None else Path(args.start_from),
         sample=args.sample,
     )
 
@@ -186,8 +189,12 @@ def run(args: argparse.Namespace) -> int:
     from calib.calibration.run import run as calibrate
 
     command = ["calibrate", *(a for a in sys.argv[1:] if a != "calibrate")]
-    if args.sample and (args.all or args.config is not None):
-        raise CutcalError("--sample is for one trace; leave it out of a fit of several, or name one with --cut")
+    for option in (name for name in ("sample", "start_from") if getattr(args, name)):
+        if args.all or args.config is not None:
+            said = option.replace("_", "-")
+            raise CutcalError(f"--{said} is for one trace; leave it out of a fit of several, or name one with --cut")
+        if args.sample and args.start_from:
+            raise CutcalError("--sample beside --start-from, which is where a search begins; give one of them")
     if args.config is not None:
         return run_study(args, command)
     missing = [f"--{name}" for name in ("food", "trace") if getattr(args, name) is None]
