@@ -63,9 +63,11 @@ def test_every_option_is_an_argument_of_the_same_name() -> None:
 def test_arguments_reach_the_request() -> None:
     """The new ones; reading options turn the force round as ``columns`` does."""
     given: dict[str, Any] = {"gain_sd": 0.05, "lag_sd": 0.01, "discrepancy": 0.04, "u_num": "study", "set": {"E": 2e5}}
+    given |= {"start_from": "earlier"}
     request = Calibration("banana", BANANA, sign="-", **given).request()
     assert (request.gain_sd, request.lag_sd, request.errors.discrepancy) == (0.05, 0.01, 0.04)
     assert request.u_num == Path("study") and request.food.value("E") == 2e5
+    assert request.start_from == Path("earlier")
     plain, turned = Calibration("banana", BANANA).request().records()[0], request.records()[0]
     np.testing.assert_array_equal(turned.force, -plain.force)
 
