@@ -87,6 +87,7 @@ class CutRun:
         self._total = sum(steps for steps, _, _ in self._phases)
         self._limited = scene.arm.rigid and scene.arm.force_limit is not None
         self._left, self._batch, self._asked = self._phases[0][0], 1, 0.0
+        self._rows_down: int | None = None
         self._began = clock.perf_counter()
 
     def _descent(self, speed: float, gap: float) -> list[tuple[int, float, float]]:
@@ -158,6 +159,8 @@ class CutRun:
             snapshot: The particles now, at a simulated time [s], a stroke [m] and a way along the blade [m].
         """
         recorder = self._recorder
+        if self._rows_down is None and self._phases[0][1] > 0:
+            self._rows_down = len(recorder.intervals)
         for report in reports:
             steps = min(self._every, self._left)
             self._left -= steps
@@ -182,7 +185,7 @@ class CutRun:
         pieces = topology() if self.status == "done" else None
         record = self._recorder.record(pieces, dt=self.dt, fraction=self.fraction, wall=wall)
         ended = LIMIT if self.stopped else BOARD if self.home else STROKE
-        return replace(record, section=self._sections.section(), ended=ended)
+        return replace(record, section=self._sections.section(), ended=ended, rows_down=self._rows_down)
 
 
 def pressed_home(scene: Scene, intervals: Sequence[Interval]) -> bool:

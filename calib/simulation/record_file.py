@@ -23,7 +23,7 @@ from calib.simulation.evaluation_file import UNREADABLE
 from calib.simulation.evaluation_store import content_key
 from calib.simulation.workers import Errand
 from mpm.files import write_atomic
-from mpm.output.record import COHESION, ForceRecord
+from mpm.output.record import ADHESION, COHESION, ForceRecord
 from mpm.output.section import Section
 from mpm.output.topology import Topology
 from mpm.scene import Scene
@@ -109,7 +109,9 @@ def _read(path: Path, key: str) -> ForceRecord | None:
             found |= {name: v.item() if isinstance(v, np.generic) else v for name, v in file.attrs.items()}
             found[SECTION_GROUP] = Section(**section) if section else None
             found.setdefault(COHESION, None)
+            found.setdefault(ADHESION, None)
             found.setdefault("slowed", False)
+            found.setdefault("rows_down", None)
             values = {f.name: found[f.name] for f in fields(ForceRecord)}
             values |= {name: json.loads(values[name]) for name in JSON_FIELDS}
     except UNREADABLE:

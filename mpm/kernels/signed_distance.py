@@ -1,6 +1,10 @@
-"""The blade as a signed distance field, and the laws of friction and adhesion of what touches it."""
+"""The blade as a signed distance field, and the laws of friction of what touches it."""
 
 import taichi as ti
+
+from mpm.state.tables import BLADE_HEIGHT, SPINE, TIP_RADIUS, WEDGE_COS, WEDGE_SIN
+
+FACE_POINTS = 4  # points of a particle's face, one above another
 
 
 @ti.func
@@ -78,13 +82,22 @@ def passed_part(q):
 
 
 @ti.func
-def adhesive_traction(opening, gap):
-    """Traction of a sticky face over its strength when it has opened by ``opening`` [-]; ``gap`` [m] ends it.
+def blade_opening(s: ti.template(), cut, y, above):
+    """Opening between a point of a particle's face and the blade, and the blade's outward normal there.
 
-    Triangular law: full strength at a tenth of the gap, work of adhesion = strength times gap / 2.
+    In the plane across the edge. Beside the tip a point that is pressed beyond the blade's plane counts as on it.
+
+    Args:
+        y: Distance of the point from the blade's plane towards its own half [m].
+        above: Its height above the edge [m].
+
+    Returns:
+        Opening [m], negative where they press, and the unit normal (0, n_y, n_z).
     """
-    r = opening / gap
-    return ti.math.clamp(ti.min(10 * r, (1 - r) / 0.9), 0.0, 1.0)
+    cos_h, sin_h, radius = s.par[cut, WEDGE_COS], s.par[cut, WEDGE_SIN], s.par[cut, TIP_RADIUS]
+    if y * sin_h + (above - radius) * cos_h < 0:
+        y = ti.max(y, 0.0)
+    return rounded_blade_distance(y, above, s.par[cut, SPINE], cos_h, sin_h, radius, s.par[cut, BLADE_HEIGHT])
 
 
 @ti.func

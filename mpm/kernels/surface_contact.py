@@ -2,15 +2,16 @@
 
 import taichi as ti
 
+from mpm.kernels.adhesion import stick_face
 from mpm.kernels.constitutive.laws import full
 from mpm.kernels.crack import particle_half
-from mpm.kernels.signed_distance import adhesive_traction, blade_distance, rounded_blade_distance, stick_slip
+from mpm.kernels.signed_distance import FACE_POINTS, blade_distance, blade_opening, stick_slip
 from mpm.kernels.tool import blade_velocity, book_impulse, book_knife_impulse, edge_height, under_blade
 from mpm.state.accessors import to_grid_axes, to_scene_axes, velocity_gradient
 from mpm.state.state import IN_STONE
 from mpm.state.tables import (
-    ADHESION,
     ADHESION_GAP,
+    ADHESION_WORK,
     BLADE_HEIGHT,
     BLADE_MU,
     BOARD,
@@ -35,8 +36,6 @@ from mpm.state.tables import (
     WEDGE_SIN,
     YIELD,
 )
-
-FACE_POINTS = 4  # points of a particle's face, one above another
 
 
 @ti.func
@@ -202,24 +201,33 @@ def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
     touching = False
     dv, lift, wide = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
     tall = s.par[cut, BLADE_HEIGHT] + 0.5 * s.par[cut, SPINE] + s.par[cut, SPACING]
-    meets = -s.par[cut, SPACING] < above < tall and under_blade(s, cut, at[0])
+    below = s.par[cut, SPACING]
+    if s.adhering[cut, p] > 0:
+        below = ti.max(below, s.par[cut, ADHESION_GAP])
+    meets = -below < above < tall and under_blade(s, cut, at[0])
     if ti.static(s.stone):  # a stone meets the blade as a whole (mpm.kernels.stone)
         meets = meets and s.adhering[cut, p] != IN_STONE
     if meets:
         sign = 1.0 if particle_half(s, cut, p) == 1 else -1.0
         gap, high = s.tool_gap[cut, p], s.par[cut, SPACING] * s.face_rise[cut, p]
-        press, normal, turned, middle = press_face(s, cut, p, sign, high, at)
-        if press > 0:
-            if s.adhering[cut, p] == 0:
-                s.adhering[cut, p] = 1
-        elif s.adhering[cut, p] == 1:
-            press, normal = stick_face(s, cut, p, sign, at)
-        if press != 0:
-            touching = True
-            n = (1 / press) * normal
+        press, normal, turned, middle, pressed = press_face(s, cut, p, sign, high, at)
+        size, facing = press, normal
+        pulled, twisted = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
+        if s.adhering[cut, p] >= 0:
+            pull, place = 0.0, 0.0
+            pull, pulled, twisted, place = stick_face(s, cut, p, sign, high, pressed, at)
+            if pull > 0:
+                size = press + pull
+                middle = (press * middle + pull * place) / size
+                facing = normal + pulled
+                normal -= pulled
+                turned -= twisted
+        if size > 0:
+            touching = press > 0  # what is held only by its pull does not rub
+            n = (1 / size) * facing
             n *= 1 / n.norm()
             own = surface_traction(s, cut, p, s.surface_volume[cut, p][1], gap, n)
-            most = friction_limit(s, cut, p, ti.abs(press), own.dot(n))
+            most = friction_limit(s, cut, p, press, own.dot(n))
             own -= own.dot(n) * n
             arm = middle * high - gap * n
             blade = blade_velocity(s, cut, at[0] + arm[0], at[2] + arm[2])
@@ -238,8 +246,10 @@ def blade_contact(s: ti.template(), cut, p, m, dt, u, up, across, at):
             wide[1] -= gap * sign * normal[1]  # the opening is taken from the face, which stretches with the particle
             book_knife_impulse(s, cut, FACE, -m * dv, at[0] + arm[0], at[2] + arm[2])
             s.sums[cut, FRICTION_WORK] -= m * hold.dot(slide)
-            if press < 0:
-                s.sums[cut, FRICTION_WORK] -= m * (normal.dot(u - blade) - gap * sign * normal[1] * across[1])
+            if s.adhering[cut, p] > 0:
+                opens = pulled.dot(u - blade) - gap * sign * pulled[1] * across[1]
+                opens += twisted.dot(high[2] * up + high[1] * across)
+                s.sums[cut, ADHESION_WORK] += m * scale * opens
     if not touching:
         s.stick[cut, 1, p] = ti.Vector.zero(float, 3)
     return dv, lift, wide
@@ -266,13 +276,14 @@ def press_face(s: ti.template(), cut, p, sign, high, at):
 
     Returns:
         Over the contact's stiffness: size of the force, summed over the points [m]; the force [m]; its moment along the
-        face over the face's height [m]. Place of its middle along the face, from -1/2 to 1/2.
+        face over the face's height [m]. Place of its middle along the face, from -1/2 to 1/2. Which points are pressed,
+        a bit each.
     """
     cos_t, sin_t = ti.cast(s.pose[cut, TILT_COS], float), ti.cast(s.pose[cut, TILT_SIN], float)
     gap, shell = s.tool_gap[cut, p], s.surface_volume[cut, p][1]
     y, wide = sign * at[1] - gap, sign * high[1]
     above, rise = (at[2] - edge_height(s, cut, at[0])) * cos_t, high[2] * cos_t - high[0] * sin_t
-    press, middle = 0.0, 0.0
+    press, middle, pressed = 0.0, 0.0, 0
     normal, turned = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
     # an end that LLVM can't know keeps the points one by one, so that every kernel adds them in the same order
     for q in range(ti.min(FACE_POINTS, s.size[cut, COUNT])):
@@ -285,51 +296,10 @@ def press_face(s: ti.template(), cut, p, sign, high, at):
             middle += part * force
             normal += force * n
             turned += part * force * n
+            pressed |= 1 << q
     if press > 0:
         middle /= press
-    return press, normal, turned, middle
-
-
-@ti.func
-def stick_face(s: ti.template(), cut, p, sign, at):
-    """Pull of a sticky blade on a particle that has touched it, until they are too far apart.
-
-    Args:
-        p: The particle.
-        sign: 1 for the half at +y, else -1.
-        at: Position of its centre [m].
-
-    Returns:
-        Over the contact's stiffness: the force along the blade's outward normal, 0 or negative [m], and the force [m].
-    """
-    cos_t, sin_t = ti.cast(s.pose[cut, TILT_COS], float), ti.cast(s.pose[cut, TILT_SIN], float)
-    press, y = 0.0, sign * at[1] - s.tool_gap[cut, p]
-    opening, n = blade_opening(s, cut, y, (at[2] - edge_height(s, cut, at[0])) * cos_t)
-    if opening < s.par[cut, ADHESION_GAP]:
-        pull = s.par[cut, ADHESION] * adhesive_traction(ti.max(opening, 0.0), s.par[cut, ADHESION_GAP])
-        press = -pull / (s.par[cut, CONTACT] * s.volume_ratio[cut, p])  # of a stiff rind the blade holds no more
-    else:
-        s.adhering[cut, p] = 0
-    return press, press * ti.Vector([-sin_t * n[2], sign * n[1], cos_t * n[2]])
-
-
-@ti.func
-def blade_opening(s: ti.template(), cut, y, above):
-    """Opening between a point of a particle's face and the blade, and the blade's outward normal there.
-
-    In the plane across the edge. Beside the tip a point that is pressed beyond the blade's plane counts as on it.
-
-    Args:
-        y: Distance of the point from the blade's plane towards its own half [m].
-        above: Its height above the edge [m].
-
-    Returns:
-        Opening [m], negative where they press, and the unit normal (0, n_y, n_z).
-    """
-    cos_h, sin_h, radius = s.par[cut, WEDGE_COS], s.par[cut, WEDGE_SIN], s.par[cut, TIP_RADIUS]
-    if y * sin_h + (above - radius) * cos_h < 0:
-        y = ti.max(y, 0.0)
-    return rounded_blade_distance(y, above, s.par[cut, SPINE], cos_h, sin_h, radius, s.par[cut, BLADE_HEIGHT])
+    return press, normal, turned, middle, pressed
 
 
 @ti.func

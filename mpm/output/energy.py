@@ -8,6 +8,7 @@ SPENT = {
     "parting": "parting the food",
     "cohesion": "opening ahead of the edge",
     "friction": "friction",
+    "adhesion": "adhesion",
     "plastic": "flow",
     "damage": "damage",
     "viscous": "loss factor",

@@ -14,9 +14,11 @@ from mpm.output.topology import Topology
 ENERGIES = ("kinetic", "elastic", "plastic", "damage", "viscous", "friction", "parting", "unbooked")
 """Where the work of knife and gravity has gone, each a column of a record; together they are that work.
 
-A cut with a cohesive crack has one more, :data:`COHESION`."""
+A cut with a cohesive crack has one more, :data:`COHESION`, and one of a food that sticks :data:`ADHESION`."""
 COHESION = "cohesion"
 """What the food has taken where it opened across the cut plane by itself, ahead of the edge."""
+ADHESION = "adhesion"
+"""What it has taken to take the food off the blade's faces."""
 STROKE, BOARD, LIMIT = "stroke", "board", "force_limit"
 ENDINGS = (STROKE, BOARD, LIMIT)
 """Why a motion ends: as commanded, with the edge pressed on the board by an arm that yields, or where the force on the
@@ -47,8 +49,8 @@ class ForceRecord:
         plastic: Energy dissipated by J2 flow so far [J], shape (n,).
         damage: Energy dissipated by bulk damage so far [J], shape (n,).
         viscous: Energy dissipated by the loss factor so far [J], shape (n,).
-        friction: Energy that friction, and faces that stick, have taken so far [J], shape (n,); of particles that
-            touch, so that of the ``nodal`` contact is not in it.
+        friction: Energy that friction has taken so far [J], shape (n,); of particles that touch, so that of the
+            ``nodal`` contact is not in it.
         parting: Energy that the cutting edge has taken so far [J], shape (n,): new surface, and the start of the cut.
         moment: Moment of the food on the knife about the middle of the edge, which raises the end at +x [N m], shape
             (n,); 0 where x = 0 is a mirror.
@@ -74,8 +76,11 @@ class ForceRecord:
             parts it.
         cohesion: Energy that the ties of a cohesive crack have taken so far, where the food opened ahead of the edge
             [J], shape (n,); None without one.
+        adhesion: Energy that it has taken so far to take the food off the blade's faces [J], shape (n,); None where it
+            does not stick. A part of it is stored in faces that are being taken off.
         slowed: Whether the blade slowed down on its way.
         ended: Why the motion ended, one of :data:`ENDINGS`; a run that broke down has its reason in ``status``.
+        rows_down: Rows before the blade is withdrawn, all of its way down and of its pause; None where it is not.
     """
 
     stroke: np.ndarray
@@ -115,8 +120,10 @@ class ForceRecord:
     section: Section | None = None
     resistance: float = math.nan
     cohesion: np.ndarray | None = None
+    adhesion: np.ndarray | None = None
     slowed: bool = False
     ended: str = STROKE
+    rows_down: int | None = None
 
     @property
     def knife(self) -> np.ndarray:
@@ -129,14 +136,17 @@ class ForceRecord:
 
         The crack front behind the edge advances by whole node layers, so the force on the faces carries a ripple with
         the period of one cell. A moving mean over exactly one cell removes it and nothing longer; on the last half
-        cell, which has no such window, the curve is carried on along the last two whole ones.
+        cell, which has no such window, the curve is carried on along the last two whole ones. Way down and
+        withdrawal are apart, for the force jumps where the blade turns.
         """
         way = self.time * self.speed
         if self.slowed:
             step = np.diff(way, prepend=0.0)
             told = np.abs(np.diff(self.command, prepend=self.command[:1] - step[:1]))
             way = np.cumsum(np.where(told > 0.0, np.minimum(told, step), step))  # a pause counts by its time
-        return _moving_mean(way, self.face[:, 2], self.cell)
+        n, face = self.cut_rows, self.face[:, 2]
+        down, begin = _moving_mean(way[:n], face[:n], self.cell), way[n - 1] if n else 0.0
+        return np.concatenate([down, _moving_mean(way[n:] - begin, face[n:], self.cell)]) if n < len(way) else down
 
     @property
     def resolved(self) -> np.ndarray:
@@ -150,8 +160,22 @@ class ForceRecord:
 
     @property
     def peak(self) -> float:
-        """Largest resolved upward force on the knife [N]."""
-        return float(self.resolved.max()) if len(self.stroke) else 0.0
+        """Largest resolved upward force on the knife on its way down [N]."""
+        return float(self.resolved[: self.cut_rows].max()) if self.cut_rows else 0.0
+
+    @property
+    def cut_rows(self) -> int:
+        """Rows of the cut: those before the blade is withdrawn."""
+        return len(self.stroke) if self.rows_down is None else self.rows_down
+
+    @property
+    def withdrawal(self) -> dict[str, float] | None:
+        """The way back up: its largest downward force on the knife, resolved (``pull_N``), and its work on the food
+        (``work_J``), which is negative where the food pushes the blade out; None where it is not withdrawn."""
+        up = self.resolved[self.cut_rows :]
+        if not len(up):
+            return None
+        return {"pull_N": max(0.0, -float(up.min())), "work_J": float(self.work_done[-1]) - self.work}
 
     @property
     def severed(self) -> bool:
@@ -168,8 +192,8 @@ class ForceRecord:
 
     @property
     def work(self) -> float:
-        """Work of the knife on the food [J]: down, along the blade, and as it turns."""
-        return float(self.work_done[-1]) if len(self.stroke) else 0.0
+        """Work of the knife on the food until it is withdrawn [J]: down, along the blade, and as it turns."""
+        return float(self.work_done[self.cut_rows - 1]) if self.cut_rows else 0.0
 
     @property
     def work_done(self) -> np.ndarray:
@@ -187,8 +211,8 @@ class ForceRecord:
         Without ties across the cut plane (the ``nodal`` contact) it holds all that new surface costs as well.
         """
         booked = self.kinetic + self.elastic + self.plastic + self.damage + self.viscous + self.friction + self.parting
-        if self.cohesion is not None:
-            booked = booked + self.cohesion
+        for more in (self.cohesion, self.adhesion):
+            booked = booked if more is None else booked + more
         return self.work_done + self.weighing - booked
 
     @property
@@ -203,8 +227,10 @@ class ForceRecord:
 
     @property
     def energies(self) -> tuple[str, ...]:
-        """Names of the energies of this record: :data:`ENERGIES`, and :data:`COHESION` where there are ties."""
-        return ENERGIES if self.cohesion is None else (*ENERGIES[:-1], COHESION, ENERGIES[-1])
+        """Names of the energies of this record: :data:`ENERGIES`, and :data:`COHESION` and :data:`ADHESION` where there
+        are ties and sticky faces."""
+        more = [name for name in (COHESION, ADHESION) if getattr(self, name) is not None]
+        return (*ENERGIES[:-1], *more, ENERGIES[-1])
 
     @property
     def budget(self) -> dict[str, float]:
@@ -309,7 +335,7 @@ class ForceRecord:
             "counters": dict(self.counters),
             "status": self.status,
             "fraction": self.fraction,
-        }
+        } | ({} if self.withdrawal is None else {"withdrawal": self.withdrawal})
 
 
 def _moving_mean(way: np.ndarray, values: np.ndarray, width: float) -> np.ndarray:

@@ -40,6 +40,7 @@ class Interval:
         friction: Energy that friction has taken in it [J].
         parting: Energy that the cutting edge has taken in it [J].
         cohesion: Energy that ties across the cut plane have taken in it [J].
+        adhesion: Energy that sticky faces have taken in it [J].
         moment: Of the food on the knife about the middle of the edge [N m].
         tilt: Angle of the edge to the board at its end [rad].
     """
@@ -62,6 +63,7 @@ class Interval:
     friction: float
     parting: float
     cohesion: float
+    adhesion: float
     moment: float
     tilt: float
 
@@ -140,6 +142,7 @@ class Recorder:
             friction=sums[row.FRICTION_WORK],
             parting=sums[row.CUTTING_WORK],
             cohesion=sums[row.TIE_WORK],
+            adhesion=sums[row.ADHESION_WORK],
             moment=sums[row.MOMENT] / span,
             tilt=pose[row.TILT],
         )
@@ -202,5 +205,6 @@ class Recorder:
             fraction=fraction,
             resistance=mean_toughness(food.shape, material, parted / section, food.crossed) if cohesive else math.nan,
             cohesion=np.cumsum(self._column("cohesion")) if scene.tied else None,
+            adhesion=np.cumsum(self._column("adhesion")) if material.adhesion > 0 else None,
             slowed=scene.slows_down,
         )

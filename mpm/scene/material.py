@@ -69,7 +69,8 @@ class Material:
         relaxation_time: Its time [s]; nothing uses it without a share.
         rate_exponent: Power n [-] of the real speed v of the knife in all resistances of the edge, those of layers,
             skin and start too: each is its value times (v / :data:`REFERENCE_SPEED`)^n. 0 = none, the default.
-        adhesion: Largest normal traction of the food on the blade's faces [Pa]; 0 = none, the default.
+        adhesion: Largest normal traction of the food on the blade's faces [Pa]; 0 = none, the default. A face that has
+            been pressed on the blade sticks, and one that is held by this alone does not rub (Raous et al. 1999).
         adhesion_energy: Work of adhesion [J/m^2], needed with ``adhesion``.
     """
 
@@ -259,6 +260,17 @@ class Material:
             return 0.0
         shortest = self.R / self.toughest_for_mass  # of the softening lengths, over that of the flesh
         return min(self.cohesion, math.sqrt(self.E * self.R * shortest / (spacing / 2)))
+
+    def sticking_strength(self, spacing: float) -> float:
+        """Largest normal traction of sticky faces on a grid [Pa]: ``adhesion``, and no more than the grid resolves.
+
+        As a tie does, a face that gives way over less than the food beside it stretches would snap off. It is made
+        weaker until it does not, at the same work of adhesion (Turon et al. 2007, as :meth:`tie_strength`).
+
+        Args:
+            spacing: Distance of the particles [m].
+        """
+        return min(self.adhesion, math.sqrt(self.E * self.adhesion_energy / (spacing / 2)))
 
     def tie_opening(self, spacing: float) -> float:
         """Half opening at which ties across the cut plane hold nothing any more [m]; ``spacing``: their distance."""

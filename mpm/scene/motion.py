@@ -24,7 +24,7 @@ class Motion:
         slice_ratio: Speed along the edge over the speed down (slice/push ratio xi) [-].
         tilt: Angle of the edge to the board, positive when the end at +x is higher [rad].
         dwell: Pause at the end of the stroke [s], in real time; needs ``speed``.
-        retract: Way back up after it [m].
+        retract: Withdrawal: way back up after it [m], at the first speed.
         speed: Real speed of the stroke [m/s]; needed by rate-dependent laws and by ``dwell``. Times of the material are
             then shortened by simulated over real speed, so that the laws see the real duration; the resistances of a
             food with a rate exponent are those at this speed, all the way.

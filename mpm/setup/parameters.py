@@ -67,9 +67,10 @@ def _put_material(table: np.ndarray, scene: Scene, material: Material, seeds: Se
     table[row.SPACING] = seeds.spacing
     table[row.SKIN_STIFFNESS], table[row.SKIN_POISSON] = material.skin_stiffness, SKIN_POISSON
     table[row.LEAST_GAP] = scene.numerics.least_gap * scene.numerics.dx
-    table[row.ADHESION], table[row.ADHESION_GAP] = material.adhesion / (material.rho * seeds.spacing), 1.0
-    if material.adhesion > 0:
-        table[row.ADHESION_GAP] = 2 * material.adhesion_energy / material.adhesion
+    strength = material.sticking_strength(seeds.spacing)
+    table[row.ADHESION], table[row.ADHESION_GAP] = strength / (material.rho * seeds.spacing), 1.0
+    if strength > 0:
+        table[row.ADHESION_GAP] = 2 * material.adhesion_energy / strength
 
 
 def _put_tool(table: np.ndarray, scene: Scene, material: Material) -> None:

@@ -57,7 +57,8 @@ def stable_step(scene: Scene, material: Material, spacing: float) -> float:
         toughest = max(material.start, material.toughest_for_mass, 1e-12)
         spring = math.sqrt(toughest / (edge.slip * material.rho * scene.process_zone(material) ** 2))
         dt = min(dt, EDGE_STABILITY / spring)
-        if material.adhesion > 0:
-            pull = material.adhesion / (material.rho * spacing)  # acceleration at full strength
-            dt = min(dt, ADHESION_STABILITY * math.sqrt(0.1 * 2 * material.adhesion_energy / material.adhesion / pull))
+        strength = material.sticking_strength(spacing)
+        if strength > 0:
+            pull = strength / (material.rho * spacing)  # acceleration at full strength
+            dt = min(dt, ADHESION_STABILITY * math.sqrt(0.1 * 2 * material.adhesion_energy / strength / pull))
     return dt

@@ -112,7 +112,8 @@ class State:
         stick: Stretch of the friction's spring on board and tool [m], (cut, 2, particle).
         face_rise: Way along the face of a particle beside the cut plane from its lower end to its upper, in the scene's
             axes, over the spacing of the particles [-], (cut, particle).
-        adhering: 1 where a particle sticks to the blade, 0 where it may, -1 where not, -2 in a stone, (cut, particle).
+        adhering: Which points of its face stick to the blade, a bit each, 0 where they may, -1 where not, -2 in a
+            stone, (cut, particle).
         visibility: What :func:`mpm.kernels.crack.visible_columns` found in the last step, with ``IN_CONTACT`` where
             ``contact_moment`` is of this step; elsewhere it means nothing, (cut, particle).
         kappa: Largest strain that has acted on bulk damage [-], (cut, particle).
@@ -206,7 +207,7 @@ class State:
         self.pose, self.order = ti.field(ti.f64, (own.batch, N_POSE)), ti.field(ti.f64, (own.batch, N_ORDER))
         ti.sync()
         booked = ti.f64 if adds_doubles() else ti.f32
-        self.booked_sums = N_SUMS if self.cuts else TIE_WORK  # the last is of the ties
+        self.booked_sums = N_SUMS if self.cuts else TIE_WORK  # the last are of ties and sticky faces
         self.copies = SUM_COPIES if self.atomic else 1
         self.sums = ti.field(booked, (own.batch, self.booked_sums))
         self.losses = ti.field(booked, (own.batch, self.copies, N_LOSSES))

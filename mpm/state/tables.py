@@ -39,10 +39,10 @@ N_SIZES = 13
 
 # Rows of the table of sums over an output interval: impulses on edge, faces and board (three each), losses of the
 # particles, how many were inverted or left the grid, work of friction and of the edge, moment on the knife, work of
-# ties.
+# ties and of sticky faces.
 EDGE, FACE, BOARD = 0, 3, 6
-PLASTIC, DAMAGE, VISCOUS, INVERTED, OUTSIDE, FRICTION_WORK, CUTTING_WORK, MOMENT, TIE_WORK = range(9, 18)
-N_SUMS = 18
+PLASTIC, DAMAGE, VISCOUS, INVERTED, OUTSIDE, FRICTION_WORK, CUTTING_WORK, MOMENT, TIE_WORK, ADHESION_WORK = range(9, 19)
+N_SUMS = 19
 N_LOSSES = 5  # rows from PLASTIC to OUTSIDE, which are sums over particles
 
 # Rows of the sums over all particles at an output: momentum (three), kinetic and elastic energy.

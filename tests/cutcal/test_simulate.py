@@ -37,6 +37,35 @@ def test_simulate_writes_a_force_record_that_reads_back(tmp_path: Path, capsys):
     assert "never overwritten" in capsys.readouterr().err
 
 
+def test_simulate_withdraws_the_blade(tmp_path: Path, capsys):
+    """Peak and work are those of the way down, the withdrawal is told beside them, and adhesion is among the energies;
+    the stroke of the record comes back up."""
+    argv = [
+        "simulate",
+        "--food",
+        "strawberry",
+        "--knife",
+        "edc",
+        "--stroke",
+        "8mm",
+        "--retract",
+        "5mm",
+        "--threads",
+        "1",
+    ]
+    stuck = ["--set", "adhesion=5kPa", "--set", "adhesion_energy=1"]
+    assert main([*argv, *stuck, "--out", str(tmp_path / "cut")]) == 0
+    said = capsys.readouterr().out
+    summary = valid(json.loads((tmp_path / "cut" / "summary.json").read_text()))
+    up, c = summary["withdrawal"], pd.read_csv(tmp_path / "cut" / "force.csv")
+    assert f"withdrawal: held back with up to {up['pull_N']:.2f} N, work {up['work_J']:.3f} J" in said
+    works = c["knife_fz_N"] * np.diff(c["stroke_m"], prepend=0)
+    turn = int(c["stroke_m"].argmax()) + 1
+    assert summary["work_J"] == pytest.approx(works[:turn].sum(), rel=1e-6)
+    assert up["work_J"] == pytest.approx(works[turn:].sum(), rel=1e-6)
+    assert c["stroke_m"].iloc[-1] == pytest.approx(3e-3, abs=3e-4) and "adhesion" in summary["energy_J"]
+
+
 def test_simulate_cuts_where_it_is_told(tmp_path: Path, capsys):
     """A strawberry at a quarter of its length parts into caps of a quarter's height and the rest (5/32 of an
     ellipsoid)."""

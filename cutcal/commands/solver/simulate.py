@@ -126,7 +126,11 @@ def add_args(p: argparse.ArgumentParser) -> None:
         "--tilt", type=number(-60, 60, "degrees"), default=0.0, metavar="DEG", help="edge against the board [degrees]"
     )
     p.add_argument(
-        "--retract", type=number(0, 1, "m"), default=0.0, metavar="M", help="way back up after the stroke [m]"
+        "--retract",
+        type=number(0, 1, "m"),
+        default=0.0,
+        metavar="M",
+        help="withdrawal: way back up after the stroke [m]",
     )
     p.add_argument(
         "--turn", type=number(-90, 90, "degrees"), default=0.0, metavar="DEG", help="scene against the grid [degrees]"
@@ -316,6 +320,9 @@ def _words(name: str, scene: Scene, record: ForceRecord, out: Path) -> str:
         f"{name}: peak {record.peak:.2f} N, work {record.work:.3f} J, {record.status}; "
         f"momentum balance closes to {record.momentum_residual:.1e} of the peak; wrote {out}"
     ]
+    up = record.withdrawal
+    if up is not None:
+        lines.append(f"withdrawal: held back with up to {up['pull_N']:.2f} N, work {up['work_J']:.3f} J")
     part, fracture = unbooked(record.budget), record.fracture
     if part is not None:
         rate = "" if fracture is None else f" ({fracture['released_J_m2']:.3g} J/m^2)"

@@ -16,7 +16,7 @@ from calib.material import properties
 from calib.uncertainty import estimates, intervals
 from cutcal.main import COMMANDS, main
 from cutcal.options import print_json
-from mpm.output.record import COHESION, ENERGIES
+from mpm.output.record import ADHESION, COHESION, ENERGIES
 from mpm.runtime import ARCHES
 from mpm.scene import CONTACTS
 from mpm.scene.shapes import SHAPE_KINDS
@@ -102,7 +102,7 @@ def test_words_are_those_of_the_code():
     assert set(of["verdictWord"]) == set(of["intervalWord"]) | {"only_as_product", "at_limit", estimates.UNKNOWN}
     assert (of["shapeKind"], of["device"]) == (list(SHAPE_KINDS), list(ARCHES))
     assert set(of["status"]) == {*properties.LITERATURE_STATUSES, *properties.OTHER_STATUSES}
-    assert list(parts["energy"]["properties"]) == [*ENERGIES[:-1], COHESION, ENERGIES[-1]]
+    assert list(parts["energy"]["properties"]) == [*ENERGIES[:-1], COHESION, ADHESION, ENERGIES[-1]]
     assert parts["energy"]["required"] == list(ENERGIES)
     assert schema("converge")["properties"]["verdict"]["enum"] == list(gci.TRENDS)
     assert schema("simulate")["properties"]["contact"]["enum"] == list(CONTACTS)
