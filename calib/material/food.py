@@ -18,6 +18,7 @@ from calib.io.yaml_checks import Place, check_keys, choice, data_path, mapping, 
 from calib.material.food_file import dump_material
 from calib.material.own_food import OPTIONAL_HERE, filled
 from calib.material.properties import (
+    ADHESION,
     BOARD_FRICTION,
     DIMENSIONS,
     FORM,
@@ -49,7 +50,7 @@ FILES = (".yaml", ".yml")
 """How the name of a food's file ends."""
 _STRENGTHS = ("strength_ratio", "tensile_strength")  # a food has one of them at most
 _LAYERS = (*LAYERS, *LAYERS.values(), *LAYER_STIFFNESS.values())
-_OPTIONAL = (*_LAYERS, "skin_stiffness", BOARD_FRICTION, *RELAXATION, RATE_EXPONENT, *_STRENGTHS)
+_OPTIONAL = (*_LAYERS, "skin_stiffness", BOARD_FRICTION, *ADHESION, *RELAXATION, RATE_EXPONENT, *_STRENGTHS)
 _NULLABLE = ("R_skin", "fracture_energy", *_OPTIONAL)  # a file may leave the optional ones out
 
 
@@ -100,7 +101,7 @@ class FoodSpec:
             raise here.at("properties").error("skin_thickness > 0 needs R_skin; give it, or skin_thickness 0")
         if all(name in self.properties for name in _STRENGTHS):
             raise here.at("properties").error("strength_ratio and tensile_strength are the same; give one of them")
-        for size, resistance in (*LAYERS.items(), RELAXATION):
+        for size, resistance in (*LAYERS.items(), ADHESION, RELAXATION):
             have = [name for name in (size, resistance) if name in self.properties]
             if len(have) == 1:
                 other = resistance if have[0] == size else size

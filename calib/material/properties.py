@@ -31,6 +31,7 @@ SYNONYMS = {
     "young": "E", "youngs": "E", "youngs_modulus": "E", "modulus": "E", "stiffness": "E",
     "poisson": "nu", "poissons_ratio": "nu", "density": "rho",
     "yield": "yield_stress", "sigma_y": "yield_stress", "yield_strength": "yield_stress",
+    "stickiness": "adhesion", "work_of_adhesion": "adhesion_energy",
     "friction": "mu", "friction_coefficient": "mu",
     "toughness": "R", "fracture_toughness": "R", "cutting_resistance": "R", "resistance": "R",
     "initiation": "R_initiation", "depth": "initiation_depth", "damping": "loss_factor",
@@ -87,6 +88,8 @@ PROPERTIES: dict[str, Rule] = {
     "mu": Rule("-", 0.0, 2.0, "Coulomb friction of food on blade"),
     "board_friction": Rule("-", 0.0, 2.0, "Coulomb friction of food on board"),
     "loss_factor": Rule("-", 0.0, 1.0, "mechanical loss factor tan(delta) at the first axial mode"),
+    "adhesion": Rule("Pa", 1.0, 1e6, "largest normal traction of the food on the blade's faces"),
+    "adhesion_energy": Rule("J/m^2", 1e-4, 1e3, "work to take a unit of the food's face off the blade"),
     "relaxing_share": Rule(
         "-", 0.0, 0.99, "part of the instantaneous shear stiffness that relaxes, 0 = none; E is then instantaneous",
         "a solid keeps some of its stiffness",
@@ -104,6 +107,9 @@ PROPERTIES: dict[str, Rule] = {
     ),
     "fracture_energy": Rule("J/m^2", 0.1, 1e6, "energy per crack area of bulk damage"),
 }  # fmt: skip
+
+ADHESION = ("adhesion", "adhesion_energy")
+"""How a food sticks to the blade. Only foods of which it is known have the two."""
 
 RELAXATION = ("relaxing_share", "relaxation_time")
 """One branch of a Prony series of the shear stiffness. Only foods of which it is known have the two."""

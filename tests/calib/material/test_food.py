@@ -22,6 +22,7 @@ from calib.material.food import (
 )
 from calib.material.food_file import dump_material
 from calib.material.properties import (
+    ADHESION,
     DIMENSIONS,
     LAYER_STIFFNESS,
     LAYERS,
@@ -89,6 +90,7 @@ def test_shipped_foods(foods: dict[str, FoodSpec]) -> None:
             "strength_ratio",
             "fracture_energy",
             "skin_stiffness",
+            *ADHESION,
             *RELAXATION,
             RATE_EXPONENT,
             *LAYER_STIFFNESS.values(),
@@ -642,6 +644,18 @@ def test_the_stiffness_of_a_layer_is_fitted_where_it_is_known(name: str, size: s
     assert plain.with_values({name: 4.0}).to_scene_food().material.graded
     with pytest.raises(MaterialError, match=f"banana.properties: {name} needs {size}; give it, and R_"):
         load_food("banana").with_values({name: 4.0})
+
+
+def test_a_food_that_sticks_is_asked_for() -> None:
+    """No food does by default; strength and energy come together, reach the solver and come back."""
+    plain = load_food("banana")
+    assert plain.to_scene_food().material.adhesion == 0.0 and "adhesion" not in plain.as_dict()["properties"]
+    sticky = plain.with_values({"adhesion": "5kPa", "adhesion_energy": 2.0})
+    material = sticky.to_scene_food().material
+    assert (material.adhesion, material.adhesion_energy) == (5e3, 2.0)
+    assert sticky.as_dict()["properties"]["adhesion_energy"]["value"] == 2.0
+    with pytest.raises(MaterialError, match="adhesion_energy needs adhesion; give both, or neither"):
+        plain.with_values({"adhesion_energy": 2.0})
 
 
 def test_a_food_that_relaxes_is_asked_for() -> None:
