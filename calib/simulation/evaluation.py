@@ -59,6 +59,12 @@ def doubts_of_the_crack(scene: Scene) -> list[str]:
             f"at the tip of its crack, which cells of {cell} hardly resolve: finer ones need up to a quarter more; "
             "give it a tensile_strength below its yield_stress, or look at smaller cells (--dx)"
         )
+    held = material.sticking_strength(scene.numerics.dx / scene.numerics.ppc)
+    if scene.tied and held < material.adhesion:
+        out.append(
+            f"the adhesion of {quantity(material.adhesion, 'Pa')} is more than cells of {cell} resolve; "
+            f"{quantity(held, 'Pa')} was used, the work of adhesion is the same; a smaller cell (--dx) resolves more"
+        )
     return out
 
 
@@ -72,7 +78,8 @@ class Evaluation:
         status: ``ok`` or the kind of failure (``failed``, ``crashed``, ``timeout``...).
         reason: Typed reason of a failure, empty when ok.
         fraction: Part of the stroke that was completed [-], 0 to 1.
-        stroke: Knife path from first contact [m] (k,), rising; may be empty after a failure.
+        stroke: Knife path from first contact [m] (k,), rising; may be empty after a failure. Where the blade is
+            withdrawn the way up is added to the way down, which ends at the scalar ``turn_m``.
         force: Force of the food on the knife, upwards positive [N] (k,).
         scalars: Named results: momentum_residual, ke_over_ie, wall_s, ...
         seconds: Wall time of the run [s].

@@ -67,6 +67,11 @@ def evaluation_of(record: ForceRecord) -> Evaluation:
     }
     if not math.isnan(record.parted):
         scalars["parted"] = record.parted
+    way = record.stroke
+    if len(way) > record.cut_rows > 0:
+        turn = float(way[record.cut_rows - 1])
+        scalars["turn_m"] = round(turn, STROKE_DECIMALS)
+        way = np.append(way[: record.cut_rows], 2.0 * turn - way[record.cut_rows :])
     done = record.status == "done"
     return Evaluation(
         index=0,
@@ -74,7 +79,7 @@ def evaluation_of(record: ForceRecord) -> Evaluation:
         status="ok" if done else "failed",
         reason="" if done else record.status,
         fraction=record.fraction,
-        stroke=np.round(record.stroke, STROKE_DECIMALS),
+        stroke=np.round(way, STROKE_DECIMALS),
         force=np.round(record.resolved, FORCE_DECIMALS),
         scalars=scalars,
         seconds=record.wall,

@@ -102,3 +102,5 @@ def test_what_the_grid_resolves_is_judged_at_the_speed() -> None:
     slow = replace(strong, motion=replace(strong.motion, speed=1e-3))
     assert doubts_of_the_crack(strong) == []
     assert "more than cells of" in doubts_of_the_crack(slow)[0]
+    sticky = strong.with_material(adhesion=5e5, adhesion_energy=0.5)
+    assert "the adhesion of 500\u00a0kPa is more than cells of" in doubts_of_the_crack(sticky)[0]
