@@ -9,16 +9,20 @@ from typing import Any
 
 import numpy as np
 
+from mpm.kernels.signed_distance import FACE_POINTS
 from mpm.output.energy import unbooked
 from mpm.output.record import ForceRecord
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
 from mpm.scene.material import Material
 from mpm.scene.shapes import Shape
+from mpm.solver import Simulation
+from mpm.state.host_transfer import of_particles
 from studies.verification.case import SuiteOptions, VerificationCase
 from studies.verification.result import Comparison
 
 THIN = Knife("thin", 0.2e-3, math.radians(1.0), 0.05, 0.4)
 WEDGE = Knife("wedge", 2e-3, math.radians(11.0), 0.0104, 0.2)
+TALL = Knife("tall wedge", 8e-3, math.radians(11.0), 0.05, 0.2)
 FLESH = Material(E=1e6, nu=0.35, rho=1000, yield_stress=2e5, R=300.0, R_initiation=300.0)
 PRISM = Shape("block", 0.03, 0.024, 0.024)
 READ_BACK = "bookkeeping: "
@@ -157,8 +161,56 @@ def invariance(options: SuiteOptions) -> Iterator[Comparison]:
         )
 
 
+def withdrawal(options: SuiteOptions) -> Iterator[Comparison]:
+    """A wedge that is withdrawn from an elastic block feels friction and adhesion, each of a known size, and no R.
+
+    The block is held on the board, and as heavy as ten, or it would be lifted. Without friction the force says the
+    normal force at each depth, by the angle of the wedge. The faces that adhesion holds are counted at the lowest
+    place.
+    """
+    half, mu, energy = TALL.angle / 2, 0.05, 2.0
+    there = Motion(0.012, 0.005, retract=0.014)
+
+    def scene(motion: Motion = there, **values: Any) -> Scene:
+        flesh = replace(FLESH, yield_stress=math.inf, loss_factor=0.1, **values)
+        num = Numerics(dx=3e-3, gravity=98.1, seed=options.seed)
+        return Scene(Food(PRISM, flesh), TALL, motion, Board(9.0), edge=EdgeLaw(zone=3e-3), numerics=num)
+
+    sticks: dict[str, Any] = {"adhesion": 5e3, "adhesion_energy": energy}
+    foods: tuple[dict[str, Any], ...] = ({}, {"mu": mu}, sticks)
+    dry, rubbed, sticky = (options.simulate(scene(**values)) for values in foods)
+    up = np.arange(len(dry.stroke)) >= dry.cut_rows
+    rows = up & (dry.stroke > 3e-3) & (dry.stroke < 9e-3)
+    normal = dry.resolved_face[rows] / (2 * math.sin(half))
+    drag = dry.resolved_face[rows] - rubbed.resolved_face[rows]
+    yield Comparison(
+        "withdrawn wedge, friction 0.05",
+        "friction over the normal force [-]",
+        mu,
+        float(drag.sum() / (2 * math.cos(half) * normal).sum()),
+        0.05,
+        "Coulomb; the normal force is that of a cut without friction",
+    )
+    down = Simulation(scene(replace(there, retract=0.0), **sticks), options.runtime)
+    down.run()
+    stuck = of_particles(down.state, down.state.adhering).clip(0)
+    points = sum(int(np.count_nonzero(stuck & (1 << q))) for q in range(FACE_POINTS))
+    area = points / FACE_POINTS * down.setup.seeds.spacing**2 * down.setup.grid.images
+    taken = 0.0 if sticky.adhesion is None else float(sticky.adhesion[-1])
+    works = [0.0 if one.withdrawal is None else one.withdrawal["work_J"] for one in (dry, sticky)]
+    source = "work of adhesion times the faces that have touched"
+    name = "withdrawn wedge, adhesion of 2 J/m^2"
+    yield Comparison(name, "energy that adhesion takes [J]", energy * area, taken, 0.05, source)
+    yield Comparison(name, "more work of the knife [J]", energy * area, works[1] - works[0], 0.05, source)
+    felt = float(np.abs(sticky.edge[rows, 2]).max()) / sticky.peak
+    yield Comparison(name, "force on the edge over the peak [-]", 0.0, felt, 1e-3, "nothing is parted on the way up")
+    lost = float(sticky.unbooked[-1] - dry.unbooked[-1]) / (energy * area)
+    yield Comparison(name, "energy lost more, of that of adhesion [-]", 0.0, lost, 0.05, "all work is taken by a law")
+
+
 CASES = [
     VerificationCase("cutting resistance", resistance, cost=50),
     VerificationCase("slicing", slicing, fast=False, cost=22),
     VerificationCase("invariance of the cut", invariance, fast=False, cost=25),
+    VerificationCase("withdrawal", withdrawal, fast=False, cost=15),
 ]
