@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from calib.errors import TraceError
+from calib.formats.bundled import BUNDLED, bundled_or_same
 from calib.formats.csv_table import table_of_csv
 from calib.formats.json_table import table_of_json
 from calib.table.clock_cells import with_clocks
@@ -42,7 +43,7 @@ def read_table(path: str | Path, decimal: str | None = None) -> Table:
     Args:
         path: A text file of cells, a JSON file of lists or records, an HDF5 file (``file.h5``, or ``file.h5:/group``
             for a group or data set in it), a MATLAB file, an .xlsx file (``file.xlsx:sheet``), a Parquet or TDMS file
-            (``file.tdms:group``), or a bag of ROS.
+            (``file.tdms:group``), or a bag of ROS. The name of a trace of :mod:`calib.formats.bundled` will do.
         decimal: The mark before decimals in a text file, a point or a comma; None to tell it from the numbers.
 
     Returns:
@@ -57,6 +58,7 @@ def read_table(path: str | Path, decimal: str | None = None) -> Table:
 def _table(path: str | Path, decimal: str | None) -> Table:
     """The table as the file holds it."""
     file, address = split_address(path)
+    file = bundled_or_same(file)
     suffix = file.suffix.lower()
     if (file.is_dir() and (file / "metadata.yaml").is_file()) or (suffix in _BAG_SUFFIXES and file.is_file()):
         from calib.formats.bag_table import table_of_bag
@@ -134,7 +136,7 @@ def _content(path: Path) -> bytes:
         if path.is_dir():
             raise TraceError(f"{path} is a directory; name a CSV, JSON or HDF5 file")
         if not path.exists():
-            near = difflib.get_close_matches(path.name, _names_beside(path), n=3)
+            near = difflib.get_close_matches(path.name, [*_names_beside(path), *BUNDLED], n=3)
             hint = f"did you mean {' or '.join(near)}?" if near else "check the path"
             raise TraceError(f"{path}: no such file; {hint}")
         raw = read_regular(path)

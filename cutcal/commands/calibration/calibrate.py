@@ -81,7 +81,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
 def add_trace(p: argparse.ArgumentParser, *, required: bool = True) -> None:
     """Options that say what was measured."""
     g = p.add_argument_group(MEASUREMENT)
-    g.add_argument("--trace", required=required, metavar="FILE", help="record of the cut")
+    g.add_argument("--trace", required=required, metavar="FILE", help="record of the cut, or the name of a bundled one")
     g.add_argument("--air", metavar="FILE", help="the same motion without food, to be subtracted")
     g.add_argument("--time-col", metavar="NAME", help="column of the time; NAME=UNIT says its unit")
     g.add_argument("--force-col", metavar="NAME", help="column of the force on the knife")
