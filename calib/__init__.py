@@ -1,5 +1,4 @@
-"""From a force trace to calibrated food properties: ``from calib import Calibration, Food, Study,
-Trace``.
+"""From a force trace to calibrated food properties: ``from calib import Calibration, Design, Food, Study, Trace``.
 
 Importing it imports no Taichi, no plotting and no pandas; each name is loaded when it is first used.
 """
@@ -13,13 +12,15 @@ from calib._version import __version__ as __version__
 
 if TYPE_CHECKING:
     from calib.api import Calibration, Study
+    from calib.design_api import Design
     from calib.material.food import FoodSpec as Food
     from calib.trace.trace import Trace
 
-__all__ = ["Calibration", "Food", "Study", "Trace"]
+__all__ = ["Calibration", "Design", "Food", "Study", "Trace"]
 
 _PLACES = {
     "Calibration": ("calib.api", "Calibration"),
+    "Design": ("calib.design_api", "Design"),
     "Food": ("calib.material.food", "FoodSpec"),
     "Study": ("calib.api", "Study"),
     "Trace": ("calib.trace.trace", "Trace"),

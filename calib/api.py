@@ -265,20 +265,11 @@ class Calibration:
         request = self.request("" if out is None else out)
         folder = Path(f"cutcal-{request.food.name}-{request.stem}" if out is None else out)
         say = in_arguments(say)
-        with speaking_of_arguments(), script_hidden(), self._workers(say) as pool, ExitStack() as shown:
+        with speaking_of_arguments(), script_hidden(), ExitStack() as shown:
+            pool = shown.enter_context(workers_for(self.workers, self.arch, self.scheduler, say))
             if isinstance(progress, bool):
                 progress = shown.enter_context(ProgressBar()) if progress else None
             return run(request, folder, pool, resume=resume, progress=progress, say=say)
-
-    def _workers(self, say: Callable[[str], None] | None) -> Workers:
-        """What runs the simulations: processes of this machine, or a cluster."""
-        if self.scheduler is not None:
-            from calib.simulation.dask_cluster import Cluster
-
-            return Cluster(self.scheduler, self.workers, self.arch, say=say or (lambda _: None))
-        from calib.simulation.process_pool import Pool
-
-        return Pool(LOCAL_WORKERS if self.workers is None else self.workers, self.arch)
 
     @staticmethod
     def load(out: str | Path) -> CalibrationResult:
@@ -367,6 +358,27 @@ class Study:
         with speaking_of_arguments(), script_hidden(), Pool(workers, self.spec.first.arch) as pool:
             result = run(self.spec, Path(out), pool, resume=resume, progress=progress, say=in_arguments(say))
         return dict(finite(to_document(result)))
+
+
+def workers_for(workers: int | None, arch: str, scheduler: str | None, say: Callable[[str], None] | None) -> Workers:
+    """What runs the simulations: processes of this machine, or a cluster.
+
+    Args:
+        workers: Simulations at a time; None for 2, of a cluster for all.
+        arch: Device of the simulations.
+        scheduler: Address of a Dask cluster, or None.
+        say: Called with a sentence about the workers of a cluster, or None.
+
+    Returns:
+        The workers; nothing is started before it has to do.
+    """
+    if scheduler is not None:
+        from calib.simulation.dask_cluster import Cluster
+
+        return Cluster(scheduler, workers, arch, say=say or (lambda _: None))
+    from calib.simulation.process_pool import Pool
+
+    return Pool(LOCAL_WORKERS if workers is None else workers, arch)
 
 
 @contextmanager

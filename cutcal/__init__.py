@@ -1,4 +1,4 @@
-"""Calibrated cuts of food: ``from cutcal import Calibration, Food, Study, Trace``.
+"""Calibrated cuts of food: ``from cutcal import Calibration, Design, Food, Study, Trace``.
 
 Importing it imports no Taichi, no plotting and no pandas; each name is loaded when it is first used.
 """
@@ -11,9 +11,9 @@ import calib
 from calib._version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from calib import Calibration, Food, Study, Trace
+    from calib import Calibration, Design, Food, Study, Trace
 
-__all__ = ["Calibration", "Food", "Study", "Trace"]
+__all__ = ["Calibration", "Design", "Food", "Study", "Trace"]
 
 
 def __getattr__(name: str) -> Any:

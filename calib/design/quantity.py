@@ -9,6 +9,7 @@ import numpy as np
 
 from calib.design.candidates import check_asked
 from calib.design.measurement import curve_of
+from calib.design.result import ALL
 from calib.design.start import Start
 from calib.design.stencil import Stencil
 from calib.material.knife import load_knife
@@ -16,7 +17,6 @@ from calib.simulation.evaluation import Evaluation
 from mpm.arrays import FloatArray
 from mpm.scene import Knife
 
-ALL = "all"
 UNDER = re.compile(r"(peak|work) under knife (\S.*)")
 UNITS = {"peak": "N", "work": "J"}
 

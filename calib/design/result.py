@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from calib.design.candidates import CALIBRATE, NONE, RANGES, STUDY, LeftOut
 from calib.io import typed_document
@@ -13,6 +14,11 @@ from calib.io.provenance import Invocation, Software
 from calib.io.type_schema import Count, Fraction, NotNegative, Positive, Shared, keywords, one_of
 from calib.io.typed_document import FLAT, NULL
 
+if TYPE_CHECKING:
+    import pandas
+
+ALL = "all"
+"""What is to be narrowed, where that is every parameter."""
 HELPS = 0.9
 """Part of the present interval's width below which a test narrows it, as the verdicts of a fit have it [-]."""
 
@@ -78,13 +84,21 @@ class DesignedTest:
     draws: Count
 
     @property
+    def shown(self) -> tuple[str | None, Expected]:
+        """What a table shows of it: what was asked for, which has no name here; of all parameters the one that it
+        narrows most, with its name."""
+        if self.asked is not None:
+            return None, self.asked
+        name = min(self.parameters, key=lambda n: self.parameters[n].part)
+        return name, self.parameters[name]
+
+    @property
     def helps(self) -> bool:
         """Whether it narrows what was asked for, and a command takes its record."""
-        narrowed = [self.asked.part] if self.asked is not None else [p.part for p in self.parameters.values()]
-        return self.taken_by != NONE and min(narrowed) <= HELPS
+        return self.taken_by != NONE and self.shown[1].part <= HELPS
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class DesignResult:
     """The next test of a food.
 
@@ -131,11 +145,50 @@ class DesignResult:
     limits: Annotated[tuple[str, ...], Shared("limits")]
     wall_s: NotNegative
 
+    def __repr__(self) -> str:
+        return f"DesignResult({self.food!r}, asked={self.asked!r}, recommended={self.recommended!r})"
+
     @property
     def recommended(self) -> str | None:
         """The first test that narrows what was asked for by a tenth and whose record a command takes; null where there
         is none."""
         return next((t.name for t in self.tests if t.helps), None)
+
+    @property
+    def ranking(self) -> pandas.DataFrame:
+        """The tests by name, the one that narrows most first: minutes [min], bits [bit], what it narrows, expected ends
+        of the 95 % interval [unit], its width over the present one [-], the command that takes the record, and what is
+        done."""
+        import pandas
+
+        rows = {}
+        for test in self.tests:
+            name, expected = test.shown
+            rows[test.name] = {
+                "minutes": test.minutes,
+                "bits": test.bits,
+                "narrows": self.asked if name is None else name,
+                "low95": expected.low95,
+                "high95": expected.high95,
+                "part": expected.part,
+                "record": test.taken_by,
+                "what": test.what,
+            }
+        return pandas.DataFrame.from_dict(rows, orient="index")
+
+    def plot(self) -> Any:
+        """Draw what each test leaves of the present intervals; the figure of ``design.svg``.
+
+        Returns:
+            The axes, on a new figure.
+        """
+        from reports.studies.design import design_axes
+
+        return design_axes(self)
+
+    def _repr_html_(self) -> str:
+        best = "no test narrows it by a tenth" if self.recommended is None else f"next: {self.recommended}"
+        return f"<p>{escape(self.food)}, asked: {escape(self.asked)}; {escape(best)}</p>{self.ranking.to_html()}"
 
 
 def to_document(result: DesignResult) -> dict[str, Any]:

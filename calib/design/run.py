@@ -13,8 +13,8 @@ from threadpoolctl import threadpool_limits
 
 from calib.design.candidates import Candidate, LeftOut, candidates, coarse_cut, minutes_of
 from calib.design.expectation import FIRST, Expectation, Judged, Outlook, judge
-from calib.design.quantity import ALL, Quantity, asked_quantity
-from calib.design.result import DesignedTest, DesignResult, Expected, Known, to_document
+from calib.design.quantity import Quantity, asked_quantity
+from calib.design.result import ALL, DesignedTest, DesignResult, Expected, Known, to_document
 from calib.design.start import Start
 from calib.design.stencil import CutScene, Simulator, Stencil, stencils, steps_of
 from calib.errors import OutputError

@@ -53,7 +53,7 @@ def listed(names: Sequence[object], letters: int = LETTERS) -> str:
 
 OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*[a-z])")
 """An option of the command line in a sentence."""
-ARGUMENTS = {"material": "food", "config": "Study.read", "resume": "resume=True"}
+ARGUMENTS = {"material": "food", "run": "start", "config": "Study.read", "resume": "resume=True"}
 """What an option is called in Python, where its name is another one."""
 
 

@@ -121,11 +121,12 @@ def test_folders_and_modules_can_be_overlooked():
 
 
 def test_the_face_loads_nothing_heavy():
-    """``from cutcal import ...`` knows the four names, and has loaded neither Taichi nor pandas nor matplotlib before
+    """``from cutcal import ...`` knows the five names, and has loaded neither Taichi nor pandas nor matplotlib before
     they are used."""
     code = (
         "import sys, cutcal; assert not {'taichi', 'pandas', 'matplotlib', 'scipy'} & set(sys.modules); "
-        "from cutcal import Calibration, Food, Study, Trace; assert not {'taichi', 'matplotlib'} & set(sys.modules); "
+        "from cutcal import Calibration, Design, Food, Study, Trace; "
+        "assert not {'taichi', 'matplotlib'} & set(sys.modules); "
         "print(Calibration.__name__, cutcal.__version__)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

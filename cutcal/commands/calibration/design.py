@@ -155,12 +155,7 @@ def _known(result: DesignResult) -> list[str]:
 
 def _row(result: DesignResult, test: DesignedTest) -> str:
     """One test; of all parameters the one that it narrows most."""
-    name = result.asked
-    if test.asked is not None:
-        shown = test.asked
-    else:
-        name = min(test.parameters, key=lambda n: test.parameters[n].part)
-        shown = test.parameters[name]
-    what = f"{shown.low95:.3g} to {shown.high95:.3g}" + (f" ({name})" if test.asked is None else "")
+    name, shown = test.shown
+    what = f"{shown.low95:.3g} to {shown.high95:.3g}" + ("" if name is None else f" ({name})")
     record = "no command takes it yet" if test.taken_by == "none" else test.taken_by
     return f"  {test.name:16s} {test.minutes:7g} {test.bits:6.2f}  {what:>28s} {shown.part:7.0%}  {record}"
