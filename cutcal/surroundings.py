@@ -19,7 +19,6 @@ ENOUGH_FILES = 1024
 INTERRUPTED = 130
 """What a shell reports for a program ended by Ctrl-C."""
 VARIABLES = {
-    "TI_ENABLE_PYBUF": "0",  # Taichi takes a stream that is not Python's own for a notebook's, and says so
     "OPENBLAS_NUM_THREADS": "1",  # the simulations have the cores: more threads for small matrices get in their way
 }
 """Variables that are set where they are not."""

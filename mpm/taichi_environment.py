@@ -18,6 +18,7 @@ def prepare_taichi() -> None:
     folder among the temporary files, which the next process of the same user finds again.
     """
     os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")  # stdout belongs to the caller
+    os.environ.setdefault("TI_ENABLE_PYBUF", "0")  # it takes a notebook's stream for its own affair, and says so
     os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")  # it would tell its makers once a day that it was started
     if os.name == "posix" and not _usable(_cache()):
         os.environ[CACHE] = str(_temporary())

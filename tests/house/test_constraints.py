@@ -19,6 +19,14 @@ def pins(name):
     return found
 
 
+def extras():
+    """What the extras need, without that of the robot's and the documentation's, which are not in the file."""
+    text = (ROOT / "pyproject.toml").read_text().partition("[project.optional-dependencies]")[2].partition("\n[")[0]
+    lines = [line for line in text.strip().splitlines() if not line.startswith(("robot", "docs"))]
+    needed = re.findall(r'"([\w.-]+)[^"\[]*"', "\n".join(lines))
+    return {re.sub(r"[-_.]+", "-", name.lower()) for name in needed}
+
+
 def test_pins_with_hashes_are_those_without():
     """No package has another version in the file with hashes, none is without, and all that is needed is there."""
     plain, hashed = pins("constraints.txt"), pins("constraints-hashes.txt")
@@ -30,3 +38,4 @@ def test_pins_with_hashes_are_those_without():
     project = (ROOT / "pyproject.toml").read_text().partition("dependencies = [")[2].partition("]")[0]
     needed = {re.sub(r"[-_.]+", "-", n.lower()) for n in re.findall(r'^    "([\w.-]+)', project, re.MULTILINE)}
     assert "numpy" in needed and needed <= set(hashed)
+    assert extras() >= {"nbclient", "openpyxl", "pytest"} and extras() <= set(hashed)

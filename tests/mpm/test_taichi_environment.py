@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 
 import pytest
 
 from mpm import taichi_environment
 from mpm.taichi_environment import CACHE, prepare_taichi
+from tests.data_dir import ROOT
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="only elsewhere Taichi looks for a home")
 
@@ -42,3 +45,17 @@ def test_a_home_that_can_be_used_is(tmp_path, monkeypatch):
     monkeypatch.setenv(CACHE, str(tmp_path / "own"))
     prepare_taichi()
     assert os.environ[CACHE] == str(tmp_path / "own")
+
+
+def test_a_stream_of_a_notebook_is_not_spoken_of():
+    """Where standard output is not Python's own, as in a notebook, importing Taichi says nothing."""
+    code = (
+        "import io, contextlib\n"
+        "with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:\n"
+        "    import mpm.solver\n"
+        "print(repr(out.getvalue() + err.getvalue()))"
+    )
+    variables = {name: value for name, value in os.environ.items() if not name.startswith("TI_")}
+    environment = variables | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    assert (done.stdout.strip(), done.stderr) == ("''", "")
