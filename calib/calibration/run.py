@@ -76,7 +76,7 @@ def run(
     say = say or (lambda text: None)
     began = time.monotonic()
     setup = set_up(request)
-    for text in [*setup.warnings, *setup.assumed]:
+    for text in setup.notes:
         say(text)
     options = FitOptions(budget=request.budget, batch=pool.batch, seed=request.seed)
     if request.sample:

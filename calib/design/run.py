@@ -20,6 +20,7 @@ from calib.design.stencil import CutScene, Simulator, Stencil, stencils, steps_o
 from calib.errors import OutputError
 from calib.io.folder import prepare, write_json
 from calib.io.provenance import Invocation, Software, key_of
+from calib.material.remarks import notes
 from calib.problem.parameters import Z95, Parameter
 from calib.simulation.evaluation_store import EvaluationStore, Header
 from calib.simulation.workers import Workers
@@ -74,7 +75,7 @@ def run(request: DesignRequest, out: Path, pool: Workers, *, resume: bool, say: 
     minutes = minutes_of(request.minutes)
     quantity = asked_quantity(start, request.asked)
     tests, left_out = candidates(start, request.blades)
-    for text in start.food.warnings():
+    for text in notes(start.food):
         say(f"note: {text}")
     with prepare(out, "design", resume=resume), threadpool_limits(1, "blas"):
         began = time.monotonic()

@@ -261,7 +261,7 @@ def check_keys(
             raise place.at(key).error(f"unknown key{suggest(key, known, synonyms)}")
     missing = [key for key in required if key not in given]
     if missing:
-        raise place.error(f"misses {', '.join(missing)}; add it")
+        raise place.error(f"misses {', '.join(missing)}; add {'it' if len(missing) == 1 else 'them'}")
 
 
 def finite_number(place: Place, value: Any) -> float:

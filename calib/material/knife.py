@@ -40,6 +40,21 @@ _SYNONYMS = {
     "blade_height": "height", "blade_length": "length",
 }  # fmt: skip
 
+TEMPLATE = """# A knife of your own, in SI units: calibrate --knife {name}.yaml --food potato --trace cut.csv
+# A straight symmetric blade: a wedge from the edge up to the thickness of the spine, parallel above it.
+# status: measured, proxy, assumed or given.
+{name}:
+  # thickness of the spine
+  spine:  {{value: 2.0e-3, unit: m, status: measured, source: "say how"}}
+  # included angle of the wedge, not that of the sharpening bevel: 2 atan(spine / 2 / height)
+  angle:  {{value: 2.55, unit: deg, status: measured, source: "say how"}}
+  # from edge to spine
+  height: {{value: 0.045, unit: m, status: measured, source: "say how"}}
+  # of the edge
+  length: {{value: 0.2, unit: m, status: measured, source: "say how"}}
+"""
+"""A file to begin a knife with."""
+
 
 @dataclass(frozen=True)
 class KnifeNumber:
@@ -115,7 +130,8 @@ def load_knife(name: str | Path) -> Knife:
     if name not in knives:
         near = suggest(name, knives)
         listing = "" if near.startswith(";") else f"; known: {', '.join(knives)}"
-        raise SceneError(f"unknown knife {name!r}{near}{listing}, or the path of a .yaml file")
+        begin = ", or the path of a .yaml file, which cutcal knives --template begins"
+        raise SceneError(f"unknown knife {name!r}{near}{listing}{begin}")
     return knives[name]
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from calib.errors import MaterialError
+from calib.io.wording import quoted
 from calib.io.yaml_checks import Place, check_keys, check_unit, choice, finite_number, mapping, suggest, text
 from calib.table.si_numbers import si_number
 from mpm.output.number_text import interval
@@ -219,13 +220,7 @@ class Property:
 
     def warnings(self) -> list[str]:
         """What a reader of this value must know, one sentence each; empty where there is nothing."""
-        said = []
-        values = [s.value for s in self.sources] + ([self.value] if self.status in LITERATURE_STATUSES else [])
-        if min(values, default=0.0) > 0.0 and max(values) > DISAGREEMENT * min(values):
-            said.append(
-                f"published values go from {interval(min(values), max(values), self.unit)}, "
-                f"{max(values) / min(values):.3g} times"
-            )
+        said = [] if self.disagreement is None else [self.disagreement]
         if self.flag:
             said.append(self.flag)
         if not self.low <= self.value <= self.high:
@@ -234,6 +229,15 @@ class Property:
                 f"{self.low:.3g} to {self.high:.3g} {self.unit}"
             )
         return said
+
+    @property
+    def disagreement(self) -> str | None:
+        """How far published values lie apart, as a sentence; None where they agree."""
+        values = [s.value for s in self.sources] + ([self.value] if self.status in LITERATURE_STATUSES else [])
+        if not (min(values, default=0.0) > 0.0 and max(values) > DISAGREEMENT * min(values)):
+            return None
+        apart = f"{max(values) / min(values):.3g} times"
+        return f"published values go from {interval(min(values), max(values), self.unit)}, {apart}"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data in the layout of ``materials.yaml``."""
@@ -319,6 +323,12 @@ def read_property(parent: Place, name: str, raw: Any) -> Property:
         CutcalError: Of the class of ``parent``: unknown name or key, wrong unit or status, a number out of its limits.
     """
     place = parent.at(name)
+    if isinstance(raw, (str, float, int)):
+        unit = PROPERTIES[name].unit if name in PROPERTIES else "m"
+        raise place.error(
+            f'is {quoted(raw)} alone; write {{value: 1.0, low: 0.9, high: 1.1, unit: "{unit}", status: measured, '
+            'source: "how"} with your numbers, as cutcal foods --template shows'
+        )
     given = mapping(place, raw)
     check_keys(place, given, REQUIRED_KEYS, OPTIONAL_KEYS)
     listed = given.get("sources", [])

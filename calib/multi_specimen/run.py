@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
@@ -19,6 +19,7 @@ from calib.io.provenance import Invocation, Software, key_of
 from calib.material.food import FoodSpec
 from calib.material.food_file import dump_material
 from calib.material.properties import MEANINGS
+from calib.material.remarks import notes
 from calib.multi_specimen.compression_modulus import CompressionModulus, compression_modulus
 from calib.multi_specimen.fitted_cuts import FittedCut, fitted_cuts
 from calib.multi_specimen.held_out import HeldOutPrediction, predict
@@ -63,7 +64,7 @@ def run(
     began = time.monotonic()
     setups = set_ups(study)
     moduli = tuple(compression_modulus(spec) for spec in study.compressions)
-    for text in _warnings(study, setups):
+    for text in _warnings(notes(study.food), setups):
         say(text)
     with prepare(out, "study", resume=resume):
         with EvaluationStore(out / "evaluations.h5", _header(setups), resume=resume, say=say) as store:
@@ -118,7 +119,7 @@ class Finished:
             failed_simulations=fit.result.failed,
             limits=(*(() if analysis is None else analysis.remarks), *self._limits()),
             presses={m.name: m for m in self.moduli},
-            warnings=tuple(_warnings(study, self.setups)),
+            warnings=tuple(_warnings(self.study.food.warnings(), self.setups)),
             simulations=self.simulations,
             wall_s=wall_s,
             invocation=Invocation(study.seed, study.first.arch, study.first.command),
@@ -195,9 +196,9 @@ def _write(done: Finished, out: Path, began: float) -> StudyResult:
     return result
 
 
-def _warnings(study: StudySpec, setups: Mapping[str, Setup]) -> list[str]:
+def _warnings(of_food: Sequence[str], setups: Mapping[str, Setup]) -> list[str]:
     """Warnings of the food and of each trace, each once."""
-    found = list(study.food.warnings())
+    found = list(of_food)
     for name, setup in setups.items():
         found += [f"{name}: {text}" for text in (*setup.curve.warnings, *setup.assumed)]
     return found

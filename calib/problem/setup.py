@@ -11,6 +11,7 @@ from calib.io.provenance import code_key, key_of
 from calib.material.food import FoodSpec
 from calib.material.form import ROUNDNESS
 from calib.material.knife import load_knife
+from calib.material.remarks import notes
 from calib.material.scene import (
     blade_warnings,
     cut_scene,
@@ -78,6 +79,11 @@ class Setup:
     def start_values(self) -> dict[str, float]:
         """The values that a fit begins with, by name [SI]: those of the literature."""
         return {p.name: p.value for p in self.objective.parameters}
+
+    @property
+    def notes(self) -> list[str]:
+        """The same as a run says it, and what is assumed of the specimen."""
+        return [*notes(self.request.food), *self.curve.warnings, *self.assumed]
 
     @property
     def warnings(self) -> list[str]:

@@ -14,6 +14,7 @@ from calib.io.type_schema import NotNegative, Positive, Shared, one_of
 from calib.io.typed_document import FLAT
 from calib.material.food import FoodSpec
 from calib.material.knife import load_knife
+from calib.material.remarks import notes
 from calib.material.scene import blade_warnings, cut_scene, specimen, windowed
 from calib.problem.nuisance import sensor_of
 from calib.problem.request import Request
@@ -143,13 +144,14 @@ def run(request: Request, out: Path, *, scale_width: bool, say: Callable[[str], 
     sensor, of_sensor = sensor_of(curve, 0.0, request.lag_sd, request.bandwidth)  # no prediction has a gain
     smooth = BandLimited(sensor.bandwidth, curve.stroke, curve.clock)
     blade = blade_warnings(shape, knife)
-    warnings: tuple[str, ...] = (*request.food.warnings(), *curve.warnings, *assumed, *of_sensor, *blade)
+    warnings: tuple[str, ...] = (*curve.warnings, *assumed, *of_sensor, *blade)
     unseen = held_out(request.food, curve.trace.sha256)
     if not unseen:
         said = "in-sample: the values were fitted to this very trace (equal SHA-256), so the agreement predicts nothing"
         warnings = (*warnings, said)
-    for text in warnings:
+    for text in (*notes(request.food), *warnings):
         say(text)
+    warnings = (*request.food.warnings(), *warnings)
     with prepare(out, "predict", resume=False):
         record = _simulated(scene, request.arch)
         whole = smooth(curve.stroke, record.stroke, record.resolved)

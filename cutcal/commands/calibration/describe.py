@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from calib.errors import OutputError
+from calib.material.remarks import notes
 from calib.problem.request import Request
 from calib.problem.setup import set_up
 from calib.trace.conditioning import Conditioned
@@ -55,7 +56,7 @@ def description(request: Request, png: Path | None = None) -> str:
         draw_record(request, c, png)
         lines.append(("picture", f"{png}, the record as it was read"))
     words = [f"{name:12s}{text}" for name, text in lines]
-    warned = [*c.warnings, *setup.assumed, *request.food.warnings()]
+    warned = [*c.warnings, *setup.assumed, *notes(request.food)]
     return "\n".join([*words, *(f"note: {text}" for text in warned)])
 
 

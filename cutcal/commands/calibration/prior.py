@@ -9,6 +9,7 @@ from typing import Any
 
 from calib.material.food import load_food, load_foods
 from calib.material.knife import load_knife
+from calib.material.remarks import notes
 from cutcal.options import (
     KNIFE_HELP,
     RESUME_HELP,
@@ -64,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
         print_json(document)
         return 0 if document["passed"] else 2
     for food in foods:
-        for warning in food.warnings():
+        for warning in notes(food):
             print(f"note: {warning}", file=sys.stderr)
     print(table(document))
     print(f"wrote {out}")

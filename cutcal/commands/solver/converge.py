@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from calib.io.typed_document import to_document
 from calib.material.knife import load_knife
+from calib.material.remarks import notes
 from calib.material.scene import blade_warnings, cut_scene, specimen
 from cutcal.options import (
     RESUME_HELP,
@@ -116,7 +117,7 @@ def run(args: argparse.Namespace) -> int:
     command = ("converge", *(a for a in sys.argv[1:] if a != "converge"))
     cut = CutDescription(food.name, knife.name, shape, command, (*food.warnings(), *assumed))
 
-    for text in cut.warnings:
+    for text in (*notes(food), *assumed):
         say(f"note: {text}")
     with workers_of(args, say) as pool:
         result = refine(

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -160,3 +161,17 @@ def test_knives_are_listed_with_their_sources(capsys, tmp_path):
     assert "no source" in capsys.readouterr().out
     assert main(["knives", "ecd"]) == 1
     assert "edc" in capsys.readouterr().err
+
+
+def test_a_template_is_a_knife(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What the command prints is read back as a knife; an unknown knife names the command; odd names begin none."""
+    assert main(["knives", "--template", "mine"]) == 0
+    path = tmp_path / "mine.yaml"
+    path.write_text(capsys.readouterr().out, encoding="utf-8")
+    assert load_knife(path) == replace(load_knife("kitchen"), name="mine")
+    assert main(["knives", str(path)]) == 0 and "mine: a wedge" in capsys.readouterr().out
+    with pytest.raises(SceneError, match="cutcal knives --template"):
+        load_knife("spoon")
+    for name in ("edc", "My knife"):
+        assert main(["knives", "--template", name]) == 1
+    assert "no name for a new knife" in capsys.readouterr().err

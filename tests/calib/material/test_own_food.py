@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import yaml
 
 from calib.errors import MaterialError
 from calib.material.food import FoodSpec, load_food, load_foods
 from calib.material.own_food import OPTIONAL_HERE, template
+from calib.material.remarks import notes
 from cutcal.main import main
 
 SIZES = "".join(
@@ -71,3 +73,33 @@ def test_an_unknown_food_names_the_template(capsys: pytest.CaptureFixture[str]) 
         assert main(["foods", "--template", name]) == 1
     assert "no name for a new food" in capsys.readouterr().err
     assert template("tofu", [f.properties for f in load_foods().values()]).startswith("# A food of your own")
+
+
+YIELD = "{value: 100, low: 90, high: 110, unit: Pa, status: measured, source: ours}"
+
+
+@pytest.mark.parametrize(("said", "unit"), [("20kPa", "Pa"), ("3", "Pa"), ("true", "Pa")])
+def test_a_number_alone_is_told_how_to_be_written(said: str, unit: str, tmp_path: Path) -> None:
+    """The layout stands in the message, with the unit; it can be copied."""
+    with pytest.raises(MaterialError, match="gel.properties.E: is .* alone; write") as caught:
+        load_food(written(tmp_path, f"{{E: {said}}}"))
+    layout = str(caught.value).partition("write ")[2].partition(" with")[0]
+    assert yaml.safe_load(layout)["unit"] == unit
+    for example, number in (("1.0", "1000"), ("0.9", "900"), ("1.1", "1e5")):
+        layout = layout.replace(example, number)
+    given = f"{{E: {layout}, yield_stress: {YIELD}}}"
+    assert load_food(written(tmp_path, given)).properties["E"].value == 1000.0
+
+
+def test_a_run_counts_remarks_and_says_what_is_left_out(tmp_path: Path) -> None:
+    """Remarks on published values are one sentence for a known food; defaults of a food's own file are all said."""
+    banana = load_food("banana")
+    said = notes(banana)
+    assert said == ["banana: 2 remarks on published values, which cutcal foods banana and the report have"]
+    assert len(banana.warnings()) == 2
+    odd = banana.with_values({"E": 1e8})
+    assert [text for text in notes(odd) if "outside the literature's range" in text] and len(notes(odd)) == 2
+    own = load_food(written(tmp_path, "{}"))
+    assert notes(own) == own.warnings() and len(notes(own)) == len(OPTIONAL_HERE)
+    stone = next(food for food in load_foods().values() if food.not_modelled)
+    assert any("not modelled" in text for text in notes(stone))
