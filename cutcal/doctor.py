@@ -104,7 +104,8 @@ def packages() -> Finding:
         asked = metadata.requires("cutcal") or []
     except metadata.PackageNotFoundError:
         return Finding("packages", "fail", "cutcal itself is not installed: pip install . in the checkout")
-    needed, missing, without = 0, [], []
+    needed, missing = 0, list[str]()
+    without: dict[str, list[str]] = {}
     for line in asked:
         name, extra = str(re.match(r"[\w.-]+", line)[0]), re.search(r"extra == ['\"](\w+)", line)  # type: ignore[index]
         if extra is not None and extra[1] not in EXTRAS:
@@ -114,10 +115,11 @@ def packages() -> Finding:
             needed += 1
             missing += [] if here else [name]
         elif not here:
-            without.append(f"{name} for {EXTRAS[extra[1]]} (pip install 'cutcal[{extra[1]}]')")
+            without.setdefault(extra[1], []).append(name)
     if missing:
         return Finding("packages", "fail", f"missing: pip install {' '.join(missing)}")
-    absent = f"; absent: {', '.join(without)}" if without else ""
+    each = [f"{', '.join(names)} for {EXTRAS[x]} (pip install 'cutcal[{x}]')" for x, names in without.items()]
+    absent = f"; absent: {'; '.join(each)}" if each else ""
     return Finding("packages", "ok", f"all {needed} are installed{absent}")
 
 

@@ -11,6 +11,7 @@ import pytest
 import taichi
 
 from cutcal import doctor
+from cutcal.commands.catalogue.doctor import WIDE, line
 from cutcal.main import main
 from mpm.runtime import Runtime, start
 from mpm.scene.errors import SceneError
@@ -43,6 +44,17 @@ def test_a_missing_package_is_named_with_its_remedy(monkeypatch):
     gone = {"dynesty"}
     found = doctor.packages()
     assert found.state == "ok" and "dynesty for --sample (pip install 'cutcal[sample]')" in found.words
+    gone = {"av", "pyarrow"}
+    assert "av, pyarrow for dataset export (pip install 'cutcal[data]')" in doctor.packages().words
+
+
+def test_a_long_finding_goes_on_below_itself():
+    """Lines stay short, nothing is lost, and the words of the second begin under those of the first."""
+    words = "all are installed; absent: " + "; ".join(f"some-package-{k} for something" for k in range(9))
+    lines = line(doctor.Finding("packages", "ok", words)).splitlines()
+    assert len(lines) > 2 and max(map(len, lines)) <= WIDE
+    assert {len(text) - len(text.lstrip()) for text in lines[1:]} == {lines[0].index("all are")}
+    assert " ".join(text.strip() for text in lines).endswith(words)
 
 
 @pytest.mark.parametrize(

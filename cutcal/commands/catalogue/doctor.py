@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import textwrap
 from pathlib import Path
 
 from calib.io.schema import tag
-from cutcal.doctor import examine
+from cutcal.doctor import Finding, examine
 from cutcal.options import add_json, print_json
 
 HELP = "try what cutcal needs of this machine"
@@ -19,11 +20,27 @@ EPILOG = """example:
 
 Exit codes: 0 all that is needed is there, 2 something is not."""
 
+WIDE = 110
+"""Columns after which a finding goes on below itself."""
+
 
 def add_args(p: argparse.ArgumentParser) -> None:
     """Options of this command."""
     p.add_argument("--out", metavar="DIR", default=".", help="folder for results (default: the current one)")
     add_json(p)
+
+
+def line(finding: Finding) -> str:
+    """A finding as the terminal shows it: state, name, and words that go on below themselves."""
+    head = f"  {finding.state:7s} {finding.name:19s} "
+    return textwrap.fill(
+        finding.words,
+        WIDE,
+        initial_indent=head,
+        subsequent_indent=" " * len(head),
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -32,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     for finding in examine(Path(args.out)):
         found.append(finding)
         if not args.json:
-            print(f"  {finding.state:7s} {finding.name:19s} {finding.words}", flush=True)
+            print(line(finding), flush=True)
     failed = sum(f.state == "fail" for f in found)
     if args.json:
         print_json({"schema": tag("doctor"), "passed": not failed, "findings": [f.as_dict() for f in found]})
