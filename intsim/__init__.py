@@ -6,3 +6,8 @@ other packages only the command line, ``cutcal``, imports this one.
 
 Lengths in m, angles in rad, forces in N, times in s.
 """
+
+import warnings
+
+# SAPIEN warns in every worker that it brings a Vulkan library of its own; ``cutcal doctor`` says what works.
+warnings.filterwarnings("ignore", message="Failed to find system libvulkan")

@@ -99,10 +99,10 @@ class Manifest:
             raise TaskError(
                 "dataset: no trajectories, backgrounds, sentences, foods, tasks or styles; give one of each at least"
             )
-        for what, given, known in (("suite", self.suites, SUITES), ("style", self.styles, STYLES)):
+        for what, given, known in (("task", self.suites, SUITES), ("style", self.styles, STYLES)):
             for name in given:
                 if name not in known:
-                    raise TaskError(f"dataset: {what} {name!r} is none of {', '.join(known)}")
+                    raise TaskError(f"dataset: {name!r} is none of {', '.join(known)} (option --{what})")
         end = self.seed + self.trajectories
         if self.seed < 0 or end > FIRST_TEST_SEED:
             raise TaskError(f"dataset: seeds {self.seed} to {end}; those from {FIRST_TEST_SEED} on are for tests")

@@ -43,7 +43,10 @@ def add_args(p: Group) -> None:
         "--food", action="append", metavar="NAME", help="this food alone, or several (default: the 15, in turn)"
     )
     p.add_argument(
-        "--task", action="append", metavar="SUITE", help="this kind of task, or several (default: all, in turn)"
+        "--task",
+        action="append",
+        metavar="SUITE",
+        help="seeds, objects, language, continuous, split or flips, or several (default: all, in turn)",
     )
     p.add_argument(
         "--demos",

@@ -90,6 +90,8 @@ def test_an_impossible_manifest_is_an_error(how):
         Manifest(**{"trajectories": 10, **how})
     with pytest.raises(TaskError, match="demos 'lazy' is none of sustained"):
         DatasetSpec(Manifest(), demos="lazy")
+    with pytest.raises(TaskError, match=r"'half' is none of seeds, .* \(option --task\)"):
+        Manifest(suites=("half",))
 
 
 class Inline(Workers):
