@@ -21,6 +21,8 @@ from reports.base.format import breakable, count, duration, interval, listed, pu
 from reports.base.labels import capital, in_words
 from reports.base.run_folder import Data, check_kind, read_columns, read_date, read_json, read_section
 from reports.calibration import cut_figure, measurement
+from reports.web.calibration import write_page
+from reports.web.study import study_page
 
 PREDICTED: dict[str, Any] = {"color": BLUE, "lw": 1.8, "dashes": (1.4, 1.2)}
 FIGURE_HEIGHT = 60.0  # of the figure of a trace [mm]
@@ -70,22 +72,26 @@ class FinishedStudy:
 
 
 def write_report(folder: Path, meanings: Mapping[str, str] | None = None) -> Path:
-    """Write ``report.pdf`` of a finished study into its folder.
+    """Write ``report.pdf`` and ``report.html`` of a finished study into its folder.
 
     Args:
         folder: Folder with ``summary.json`` and ``curves-NAME.csv`` of each trace.
         meanings: What each property of the material is, in words.
 
     Returns:
-        Path of the report.
+        Path of the PDF; the page lies beside it.
 
     Raises:
         ReportError: A file is missing, damaged or incomplete, or the report cannot be written.
     """
     done = read_study(Path(folder), meanings)
-    pictures = {f"trace{k}.svg": picture(done, name) for k, name in enumerate(done.curves)}
+    figures = {name: picture(done, name) for name in done.curves}
+    printed = content(done)
     target = Path(folder) / "report.pdf"
-    publish(target, "study.typ", content(done), pictures, date=done.created)
+    pictures = {f"trace{k}.svg": drawn for k, drawn in enumerate(figures.values())}
+    publish(target, "study.typ", printed, pictures, date=done.created)
+    page = study_page(printed, done.curves, list(done.summary["hold_out"]), figures)
+    write_page(target.with_suffix(".html"), page)
     return target
 
 

@@ -2,14 +2,33 @@
   "use strict";
   const at = (id) => document.getElementById(id);
   const read = (id) => (at(id) ? JSON.parse(at(id).textContent) : null);
-  const curves = read("curves"), texts = read("texts");
+  const all = read("curves"), texts = read("texts");
+  const cuts = all.cuts || [all], cut = at("cut"); // a study has several
+  let curves, x, count, last;
   const chart = at("chart"), box = at("box"), tip = at("tip"), way = at("cursor"), said = at("at");
   const pick = at("member"), every = at("every"), space = "\u00a0";
-  const x = curves.stroke_mm, count = x.length, last = x[count - 1];
   const shown = new Set();
   let now = null; // place of the cursor among the points
   let chosen = null; // number of the member among those of the page
   let frame = null; // scales of the last drawing
+
+  // Show another cut: its curves, and what belongs to it alone.
+  function show(k) {
+    curves = cuts[k];
+    x = curves.stroke_mm;
+    count = x.length;
+    last = x[count - 1];
+    now = null;
+    tip.hidden = true;
+    way.max = String(count - 1);
+    way.value = "0";
+    said.textContent = "";
+    document.querySelectorAll("[data-cut]").forEach((one) => { one.hidden = one.getAttribute("data-cut") !== String(k); });
+    document.querySelectorAll("[data-curve]").forEach((one) => {
+      const key = one.getAttribute("data-curve");
+      one.closest("li").hidden = !(key === "band" ? curves.band_N : key in curves.names);
+    });
+  }
 
   const number = (value, places) => value.toFixed(places).replace("-", "\u2212");
   const newtons = (value, kind) => (
@@ -138,7 +157,7 @@
       rows.push(["band", "95" + space + "% band", newtons(ends[0]) + " to " + newtons(ends[1]), null]);
     }
     const rest = curves.residual_N[now];
-    rows.push(["residual", "residual", newtons(rest, "residual"), frame.lower.y(rest)]);
+    rows.push(["residual", "residual", newtons(rest, "residual"), rest === null ? null : frame.lower.y(rest)]);
     if (own) rows.push(["member", own.name, newtons(own.curve_N[now]), frame.upper.y(own.curve_N[now])]);
     return rows;
   }
@@ -219,7 +238,8 @@
 
   ["box", "legend", "choice"].map(at).filter(Boolean).concat(Array.from(document.querySelectorAll("#forces > p[hidden]")))
     .forEach((one) => { one.hidden = false; });
-  way.max = String(count - 1);
+  show(0);
+  if (cut) cut.addEventListener("change", () => { show(cut.selectedIndex); draw(); });
   document.querySelectorAll("[data-curve]").forEach((one) => {
     const key = one.getAttribute("data-curve");
     const set = () => { if (one.checked) shown.add(key); else shown.delete(key); };

@@ -5,7 +5,6 @@ Its numbers are the texts of ``report.pdf``: what this module gets is what the t
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,12 +14,11 @@ from reports.base.run_folder import Data, Finished
 from reports.web.curves import drawable, legend
 from reports.web.markup import Markup, data, document, element, joined, picture, table
 from reports.web.members import members_section, picker
+from reports.web.parts import assets, chart, items, mark, pairs, stamped
 
 if TYPE_CHECKING:
     from calib.calibration.members import Members
 
-TEMPLATES = Path(__file__).resolve().parents[1] / "templates"
-MARKS = {"yes": ("✓", "passed"), "no": ("✗", "failed"), "none": ("–", "not run")}
 FORCES = "Measured and simulated force over stroke with the 95 % band, and the residual below"
 PAPER = "Measured and simulated force over stroke, with the edge and face parts of the simulation"
 
@@ -47,8 +45,7 @@ def calibration_page(done: Finished, content: Data, members: Members | None, for
         _provenance(content),
     ]
     body = joined([_head(content), element("main", *sections), _foot(content), data("curves", drawable(done, shown))])
-    style, script = ((TEMPLATES / name).read_text(encoding="utf-8") for name in ("page.css", "page.js"))
-    return document(f"Calibration of {content['food'].lower()}", body, style, script)
+    return document(f"Calibration of {content['food'].lower()}", body, *assets())
 
 
 def write_page(target: Path, page: str) -> None:
@@ -72,57 +69,32 @@ def write_page(target: Path, page: str) -> None:
 
 def _head(c: Data) -> Markup:
     """Food, trace and outcome, and where the parts of the page are."""
-    passed = c["passed"]
-    stamp = element("p", "✓ passed" if passed else "✗ not passed", class_="stamp" if passed else "stamp failed")
-    name = element(
-        "div",
-        element("p", "Calibration of a cutting simulation", class_="kind"),
-        element("h1", c["food"]),
-        element("p", element("code", c["trace"]["source"])),
-    )
     parts = {"forces": "Forces", "members": "Members", "parameters": "Parameters", "limits": "What this does not show"}
-    links = [element("a", text, href=f"#{place}") for place, text in parts.items()]
-    return element("header", element("div", name, stamp, class_="top"), element("nav", *links, aria_label="Parts"))
+    return stamped("Calibration of a cutting simulation", c["food"], c["trace"]["source"], c["passed"], parts)
 
 
 def _verdict(c: Data) -> Markup:
     """What was identified, the sentence, the facts and the verdict table."""
     notices = [element("p", element("strong", head), " ", text, class_="notice") for head, text in c["banners"]]
-    rows = [
-        [v["name"], v["value"], v["limit"], element("span", *_mark(v["mark"]), class_=v["mark"]), v["note"]]
-        for v in c["verdicts"]
-    ]
+    rows = [[v["name"], v["value"], v["limit"], mark(v["mark"]), v["note"]] for v in c["verdicts"]]
     return element(
         "section",
         element("h2", c["identified"]),
         *notices,
         element("p", c["sentence"]),
-        _pairs(c["facts"]),
+        pairs(c["facts"]),
         table(("Line", "Value", "Limit", "Verdict", "Note"), rows, (1, 2), id="verdicts", label="Verdict table"),
         id="verdict",
     )
 
 
-def _mark(kind: str) -> tuple[str, str]:
-    """A sign and a word, so that it needs no colour."""
-    sign, word = MARKS[kind]
-    return f"{sign} ", word
-
-
 def _forces(done: Finished, c: Data, members: Members | None, forces: bytes) -> Markup:
     """The chart, the way of its cursor, the choice of a member, and the switches of the curves."""
-    chart = element("svg", role="img", aria_label=FORCES, id="chart")
-    tip = element("div", id="tip", hidden=True)
-    way = element("input", type="range", id="cursor", min="0", step="1", value="0")
-    hint = "Point at a curve, or move the slider with the arrow keys, for the values at a stroke."
     paper = [picture(forces, PAPER)] if forces else []
     return element(
         "section",
         element("h2", "Force over stroke"),
-        element("div", chart, tip, id="box", hidden=True),
-        element("p", element("label", "Stroke ", way), " ", element("output", for_="cursor", id="at"), hidden=True,
-                class_="way"),
-        element("p", hint, class_="note screen", hidden=True),
+        chart(FORCES),
         picker(done.result.fitted, members),
         element("div", legend(done, c["curves"]), hidden=True, id="legend"),
         element("noscript", element("p", "Without scripts this is the figure of report.pdf."), *paper),
@@ -147,10 +119,10 @@ def _parameters(c: Data) -> Markup:
         "section",
         element("h2", "The fitted parameters"),
         table(head, rows, (1, 2, 3), id="values", label="Fitted parameters") if rows else "No parameter was fitted.",
-        _list(words, class_="note") if words else None,
+        items(words, class_="note") if words else None,
         _posterior(c["posterior"]),
         element("h3", "Parameters that the trace cannot tell apart"),
-        _list(alike) if alike else element("p", none),
+        items(alike) if alike else element("p", none),
         id="parameters",
     )
 
@@ -178,9 +150,9 @@ def _limits(c: Data) -> Markup:
     return element(
         "section",
         element("h2", "What this does not show"),
-        _list(c["limits"]) if c["limits"] else element("p", "Nothing was stated by the run."),
+        items(c["limits"]) if c["limits"] else element("p", "Nothing was stated by the run."),
         element("h3", "Warnings"),
-        _list(c["warnings"]) if c["warnings"] else element("p", "None."),
+        items(c["warnings"]) if c["warnings"] else element("p", "None."),
         id="limits",
     )
 
@@ -196,19 +168,9 @@ def _provenance(c: Data) -> Markup:
         ("Versions", o["versions"]),
         ("Command", " ".join(o["command"])),
     ]
-    return element("section", element("h2", "Provenance"), _pairs(rows, "code"), id="provenance")
+    return element("section", element("h2", "Provenance"), pairs(rows, "code"), id="provenance")
 
 
 def _foot(c: Data) -> Markup:
     made = f"cutcal {c['cutcal']}, run of {c['created']}. Model, record, numerics and references are in "
     return element("footer", element("p", made, element("a", "report.pdf", href="report.pdf"), " of the same folder."))
-
-
-def _pairs(rows: Iterable[Iterable[str]], kind: str = "span") -> Markup:
-    """Labels and their texts."""
-    cells = [joined([element("dt", name), element("dd", element(kind, text))]) for name, text in rows]
-    return element("dl", *cells)
-
-
-def _list(items: Iterable[str], **attributes: str) -> Markup:
-    return element("ul", *(element("li", item) for item in items), **attributes)

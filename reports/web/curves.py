@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,20 +43,20 @@ def drawable(done: Finished, members: Sequence[Member]) -> dict[str, Any]:
     """
     curves, label = done.curves, done.result.trace.label
     names = {"real_N": label, "sim_N": "simulated"} | {key: name for key, name in PARTS if known(curves, key)}
-    band = {key: _numbers(curves[key]) for key in BAND_COLUMNS} if known(curves, BAND_COLUMNS[0]) else None
+    band = {key: numbers(curves[key]) for key in BAND_COLUMNS} if known(curves, BAND_COLUMNS[0]) else None
     peak = max(float(np.max(curves[key])) for key in ("real_N", "sim_N"))
     force, residual = places(peak), places(float(np.max(np.abs(curves["residual_N"]))))
     decimals = {"stroke": places(1e3 * float(curves["stroke_m"][-1])), "force": force, "residual": max(force, residual)}
     return {
-        "stroke_mm": _numbers(1e3 * curves["stroke_m"], 9),
+        "stroke_mm": numbers(1e3 * curves["stroke_m"], 9),
         "names": names,
-        "forces_N": {key: _numbers(curves[key]) for key in names},
+        "forces_N": {key: numbers(curves[key]) for key in names},
         "band_N": band,
-        "residual_N": _numbers(curves["residual_N"]),
+        "residual_N": numbers(curves["residual_N"]),
         "residual_name": f"simulated − {label}",
         "noise_sd_N": done.result.conditioning.noise_sd_N,
         "places": decimals,
-        "members": [{"name": f"member {m.number}", "curve_N": _numbers(m.curve, DIGITS)} for m in members],
+        "members": [{"name": f"member {m.number}", "curve_N": numbers(m.curve, DIGITS)} for m in members],
     }
 
 
@@ -84,6 +84,11 @@ def legend(done: Finished, said: Mapping[str, str]) -> Markup:
     if known(done.curves, BAND_COLUMNS[0]):
         rows.append(("band", f"{BAND}{said['inside']}", True))
     rows += [(key, name, False) for key, name in PARTS if known(done.curves, key)]
+    return switches(rows)
+
+
+def switches(rows: Iterable[tuple[str, str, bool]]) -> Markup:
+    """A switch for each curve: its key, its name, and whether it is drawn at first."""
     return element("ul", *(_switch(*row) for row in rows), class_="legend")
 
 
@@ -95,7 +100,7 @@ def _switch(key: str, name: str, shown: bool) -> Markup:
     return element("li", element("label", box, sample, element("span", name)), class_=None if shown else "more")
 
 
-def _numbers(values: FloatArray, digits: int | None = None) -> list[float | None]:
+def numbers(values: FloatArray, digits: int | None = None) -> list[float | None]:
     """Numbers (n,) that JSON can hold, with as many significant digits, or all for None."""
     rounded = (float(x) if digits is None else float(f"{x:.{digits}g}") for x in values)
     return [x if math.isfinite(x) else None for x in rounded]

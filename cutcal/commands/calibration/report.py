@@ -13,8 +13,8 @@ from reports import ReportError
 
 HELP = "write report.pdf of a finished run again"
 DESCRIPTION = """Typeset report.pdf again from the files that a calibration, a study of
-several cuts, converge, verify, stress or bench wrote; that of a calibration on
-one trace with its report.html."""
+several cuts, converge, verify, stress or bench wrote; that of a calibration or
+a study with its report.html."""
 EPILOG = "examples:\n  cutcal report runs/banana\n  cutcal report runs/banana --context context.yaml"
 
 

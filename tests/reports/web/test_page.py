@@ -108,7 +108,7 @@ def test_the_page_is_small(run: Path, tmp_path: Path) -> None:
 def test_the_script_finds_what_it_asks_for(whole: Page) -> None:
     """Each name and each kind of curve that script and style use is in the page or made by the script."""
     script, style = whole.scripts[0], whole.styles[0]
-    names = set(whole.values("id")) | {"curves", "texts"}
+    names = set(whole.values("id")) | {"curves", "texts", "cut"}  # the last is a study's
     asked = set(re.findall(r"\b(?:at|read)\(\"(\w+)\"\)", script))
     assert asked >= {"chart", "tip", "cursor", "member", "chosen", "all"} and asked <= names
     assert set(re.findall(r"#(\w+)[ .{,:]", re.sub(r":\s*#\w+", "", style))) <= names
