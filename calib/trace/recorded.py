@@ -99,8 +99,7 @@ def recorded(table: Table, how: Reading) -> Recorded:
     Raises:
         TraceError: A column or a cell cannot be used; the message names file, column and row.
     """
-    time, said = _time_column(table, how)
-    force = choose(table, "force", how.force_col)
+    time, said, force = _time_and_force(table, how)
     position = _position_column(table, how)
     if how.sign is not None:
         force = replace(force, factor=abs(force.factor) * parse_sign(how.sign))
@@ -143,6 +142,26 @@ def parse_sign(sign: str | int) -> float:
     if str(sign) not in signs:
         raise TraceError(f"sign {quoted(sign)} is not one of +, -, 1, -1 (option --sign)")
     return signs[str(sign)]
+
+
+def _time_and_force(table: Table, how: Reading) -> tuple[Column, list[str], Column]:
+    """The columns of the time and of the force, and what was said of the time.
+
+    Raises:
+        TraceError: One cannot be used, or both: it is then said of both at once.
+    """
+    try:
+        time, said = _time_column(table, how)
+    except TraceError as missing:
+        try:
+            choose(table, "force", how.force_col)
+        except TraceError as also:
+            first = str(missing).split("; ")
+            more = [text for text in str(also).removeprefix(f"{table.source}: ").split("; ") if text not in first]
+            if more and str(also) != str(missing):
+                raise TraceError(f"{missing}; and {'; '.join(more)}") from None
+        raise
+    return time, said, choose(table, "force", how.force_col)
 
 
 def _time_column(table: Table, how: Reading) -> tuple[Column, list[str]]:

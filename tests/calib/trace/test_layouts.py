@@ -315,3 +315,14 @@ def test_long_topic_names_are_shown_whole(tmp_path: Path) -> None:
     with pytest.raises(TraceError, match="several columns could be the force") as refused:
         read_trace(path)
     assert all(name in str(refused.value) for name in names)
+
+
+def test_all_missing_columns_are_said_at_once(tmp_path: Path) -> None:
+    """A table with neither time nor force names both options in one line, and lists its columns once."""
+    path = tmp_path / "odd.csv"
+    path.write_text("a,b\n" + "".join(f"{k},{k}\n" for k in range(30)))
+    with pytest.raises(TraceError) as caught:
+        read_trace(path)
+    said = str(caught.value)
+    assert "--time-col" in said and "--force-col" in said and "\n" not in said
+    assert said.count("the columns are a, b") == 1
