@@ -18,6 +18,7 @@ from calib.io.typed_document import ANY
 from calib.io.yaml_checks import PACKAGE
 
 DATA = "data"  # folder of a package that an installed one has and a checkout has not
+BUILT = "commit.txt"  # in that folder: the commit that a wheel was built from
 PACKAGES = ("taichi", "numpy", "scipy", "SALib", "dynesty", "pandas", "h5py", "matplotlib", "typst")
 
 
@@ -33,10 +34,12 @@ def versions() -> dict[str, str]:
 
 
 def git_commit() -> str | None:
-    """Commit of the checkout that cutcal runs from, with ``+changes`` where it was edited; None when installed."""
+    """Commit of the checkout that cutcal runs from, or that its wheel was built from, with ``+changes`` where it was
+    edited; None where nobody knows."""
     top = PACKAGE.parent
     if not (top / ".git").exists():
-        return None
+        built = PACKAGE / DATA / BUILT
+        return built.read_text(encoding="utf-8").strip() or None if built.is_file() else None
     try:
         commit = _git(top, "rev-parse", "HEAD")
         dirty = _git(top, "status", "--porcelain", "--untracked-files=no")
