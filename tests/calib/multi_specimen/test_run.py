@@ -143,6 +143,7 @@ def test_each_cut_is_predicted_from_the_others(finished: tuple[Path, Path, int])
     _, out, code = finished
     summary = json.loads((out / "summary.json").read_text())
     assert (out / "report.pdf").read_bytes().startswith(b"%PDF")
+    assert "<!doctype html>" in (out / "report.html").read_text(encoding="utf-8")
     assert code == 0 and summary["passed"] and summary["held_out"] == ["a", "b", "c"]
     for name, (skin, _) in SPECIMENS.items():
         held = summary["hold_out"][name]
