@@ -64,7 +64,7 @@ def test_a_first_calibration(folder: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert "not a measurement" in said and "Warning" not in said and "[Taichi]" not in said
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_which_test_next(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of an R that only the width limits the width is asked for, and it narrows by half or more."""
     said = run(NEXT, folder, monkeypatch)

@@ -60,7 +60,7 @@ def environment(tmp_path: Path) -> dict[str, str]:
     return os.environ | {"PATH": f"{bin_}{os.pathsep}{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["own_csv.sh", "own_food.sh"])
 def test_a_path_ends_well(
     name: str, environment: dict[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]

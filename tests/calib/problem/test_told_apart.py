@@ -24,7 +24,7 @@ from mpm.scene import Board, Motion
 from mpm.solver import Simulation
 from tests.mpm.scenes import PRISM, WEDGE
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 STROKE, NOISE = 0.018, 0.02
 MADE, ASSUMED = 2e-3, 3e-3
 """Cells of the truth, with other particles too, and of what explains it [m]."""
