@@ -14,7 +14,7 @@ from reports.base.run_folder import Data, Finished
 from reports.web.curves import drawable, legend
 from reports.web.markup import Markup, data, document, element, joined, picture, table
 from reports.web.members import members_section, picker
-from reports.web.parts import assets, chart, items, mark, pairs, stamped
+from reports.web.parts import assets, chart, items, limits_section, mark, pairs, stamped
 
 if TYPE_CHECKING:
     from calib.calibration.members import Members
@@ -41,7 +41,7 @@ def calibration_page(done: Finished, content: Data, members: Members | None, for
         _forces(done, content, members, forces),
         members_section(done.result.fitted, members),
         _parameters(content),
-        _limits(content),
+        limits_section(content),
         _provenance(content),
     ]
     body = joined([_head(content), element("main", *sections), _foot(content), data("curves", drawable(done, shown))])
@@ -143,18 +143,6 @@ def _posterior(p: Data | None) -> Markup | None:
         element("p", differ) if differ else None,
         element("p", f"Posterior predictive p-value: {p['explained']}."),
     ])  # fmt: skip
-
-
-def _limits(c: Data) -> Markup:
-    """What the run does not show, and what it warned of."""
-    return element(
-        "section",
-        element("h2", "What this does not show"),
-        items(c["limits"]) if c["limits"] else element("p", "Nothing was stated by the run."),
-        element("h3", "Warnings"),
-        items(c["warnings"]) if c["warnings"] else element("p", "None."),
-        id="limits",
-    )
 
 
 def _provenance(c: Data) -> Markup:

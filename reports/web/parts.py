@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 from reports.web.markup import Markup, element, joined
 
@@ -33,6 +34,25 @@ def pairs(rows: Iterable[Iterable[str]], kind: str = "span") -> Markup:
 def items(texts: Iterable[str], **attributes: str) -> Markup:
     """A list."""
     return element("ul", *(element("li", text) for text in texts), **attributes)
+
+
+def limits_section(content: Mapping[str, Any]) -> Markup:
+    """What a run does not show, and what it warned of.
+
+    Args:
+        content: Texts of the report, with lists of both: ``limits`` and ``warnings``.
+
+    Returns:
+        The section.
+    """
+    return element(
+        "section",
+        element("h2", "What this does not show"),
+        items(content["limits"]) if content["limits"] else element("p", "Nothing was stated by the run."),
+        element("h3", "Warnings"),
+        items(content["warnings"]) if content["warnings"] else element("p", "None."),
+        id="limits",
+    )
 
 
 def stamped(kind: str, name: str, source: str, passed: bool, parts: dict[str, str]) -> Markup:

@@ -15,7 +15,7 @@ from mpm.arrays import FloatArray
 from reports.base.run_folder import Data
 from reports.web.curves import BAND, known, numbers, places, switches
 from reports.web.markup import Markup, data, document, element, joined, picture, table
-from reports.web.parts import assets, chart, items, mark, pairs, stamped
+from reports.web.parts import assets, chart, items, limits_section, mark, pairs, stamped
 
 FORCES = "Measured, simulated and predicted force over stroke with the 95 % band, and the residual below"
 HEAD = ("Cut", "NRMSE", "Shape", "ISO rating", "Peak", "Work", "In band", "Factor", "Verdict")
@@ -47,7 +47,7 @@ def study_page(
                 {"forces": "Forces", "ranking": "Null models", "parameters": "What was fitted",
                  "limits": "What this does not show"}),
         element("main", _verdict(content), _forces(content, curves, held, figures), _ranking(content),
-                _parameters(content), _limits(content), _provenance(content)),
+                _parameters(content), limits_section(content), _provenance(content)),
         element("footer", element("p", f"cutcal {content['cutcal']}, run of {content['created']}. ",
                                   element("a", "report.pdf", href="report.pdf"), " lies in the same folder.")),
         data("curves", {"cuts": [drawable(columns, name in held) for name, columns in curves.items()]}),
@@ -165,18 +165,6 @@ def _parameters(c: Data) -> Markup:
 def mark_of(word: str) -> Markup:
     """Whether a value lies within what was known before."""
     return element("span", "yes" if word == "yes" else "no: outside", class_="yes" if word == "yes" else "no")
-
-
-def _limits(c: Data) -> Markup:
-    """What the study does not show, and what it warned of."""
-    return element(
-        "section",
-        element("h2", "What this does not show"),
-        items(c["limits"]) if c["limits"] else element("p", "Nothing was stated by the run."),
-        element("h3", "Warnings"),
-        items(c["warnings"]) if c["warnings"] else element("p", "None."),
-        id="limits",
-    )
 
 
 def _provenance(c: Data) -> Markup:
