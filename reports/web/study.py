@@ -15,7 +15,7 @@ from mpm.arrays import FloatArray
 from reports.base.run_folder import Data
 from reports.web.curves import BAND, known, numbers, places, switches
 from reports.web.markup import Markup, data, document, element, joined, picture, table
-from reports.web.parts import assets, chart, items, limits_section, mark, pairs, stamped
+from reports.web.parts import assets, chart, limits_section, mark, pairs, stamped
 
 FORCES = "Measured, simulated and predicted force over stroke with the 95 % band, and the residual below"
 HEAD = ("Cut", "NRMSE", "Shape", "ISO rating", "Peak", "Work", "In band", "Factor", "Verdict")
