@@ -125,7 +125,7 @@ class Study:
         return s
 
 
-@pytest.mark.slow
+@pytest.mark.long
 # Only a signal that cannot be caught proves this; where there is none (Windows) test_store covers the states that a
 # kill leaves.
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="processes cannot be killed without notice here")

@@ -47,6 +47,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def run(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     """What a notebook shows in a new kernel, with folders of its own for what Jupyter keeps."""
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    monkeypatch.delenv("MPLBACKEND", raising=False)  # which pictures of other tests are drawn with
     for variable in ("IPYTHONDIR", "JUPYTER_CONFIG_DIR", "JUPYTER_RUNTIME_DIR", "JUPYTER_DATA_DIR"):
         monkeypatch.setenv(variable, str(folder / "jupyter"))
     return shown(maker().executed(NOTEBOOKS / name, folder))

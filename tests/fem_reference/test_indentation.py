@@ -37,7 +37,7 @@ def test_without_lateral_contraction_a_section_is_enough():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("angle", [90, 140])
+@pytest.mark.parametrize("angle", [90, pytest.param(140, marks=pytest.mark.long)])
 def test_a_flowing_block_under_a_wedge(angle: int):
     """J2 flow: the force grows with the way, without the steps of contact by nodes, and hardly follows the elements."""
     soft, ways = replace(FOOD, yield_stress=8e3), [0.5e-3, 1e-3, 1.5e-3, 2e-3]

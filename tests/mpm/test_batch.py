@@ -33,7 +33,7 @@ def alone(scenes: tuple[Scene, ...]) -> list[ForceRecord]:
     return [Simulation(scene, Runtime(threads=1)).run() for scene in scenes]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_thread_for_each_cut_changes_no_bit() -> None:
     """Three cuts that differ in food, size, time step and way, on two threads: bit for bit those of one run each; so
     are two of them in the fields of three, after the third has gone.
@@ -50,7 +50,7 @@ def test_a_thread_for_each_cut_changes_no_bit() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scenes", [SCENES, BRITTLE], ids=["flows", "breaks"])
+@pytest.mark.parametrize("scenes", [SCENES, pytest.param(BRITTLE, marks=pytest.mark.long)], ids=["flows", "breaks"])
 def test_one_launch_for_all_cuts(scenes: tuple[Scene, ...], monkeypatch: pytest.MonkeyPatch) -> None:
     """As on a GPU, where a launch does a step of all cuts and those that are through rest: the forces of each alone, to
     1e-9, and the momentum closes.

@@ -270,7 +270,7 @@ def test_no_peak_is_off_without_a_word(folder: Path, data: st.DataObject) -> Non
     never_off_unsaid(folder, data)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @_settings(1000)
 @given(st.data())
 def test_no_peak_of_a_thousand_files_is_off_without_a_word(folder: Path, data: st.DataObject) -> None:
