@@ -31,7 +31,10 @@ class CommitHook(BuildHookInterface[Any]):
 
 
 def commit_of(top: Path) -> str | None:
-    """Commit of a checkout, with ``+changes`` where it was edited; None where it is none, or git is not there."""
+    """Commit of a checkout, with ``+changes`` where it was edited; None where it is none, or git is not there.
+
+    ``calib.io.provenance`` asks alike, and cannot be imported: a build has none of what it needs.
+    """
     if not (top / ".git").exists():
         return None
     try:

@@ -238,11 +238,12 @@ def _objective(
         request.errors,
         nuisances(curve, sensor, width_sd=width_sd, scaled=request.scaled),
         scale_sd=math.hypot(width_sd, sensor.gain_sd) if request.scaled else 0.0,
-        guesses=layer_guesses(scene, parameters, curve.stroke, curve.curve),
     )
-    if request.start_from is None:
-        return objective
-    return replace(objective, guesses=earlier_guesses(request.start_from, objective, food.name, scene.knife.name))
+    if request.start_from is not None:
+        guesses = earlier_guesses(request.start_from, objective, food.name, scene.knife.name)
+    else:
+        guesses = layer_guesses(scene, parameters, curve.stroke, curve.curve)
+    return replace(objective, guesses=guesses)
 
 
 def slower(scene: Scene) -> Scene:

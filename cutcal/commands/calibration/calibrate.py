@@ -189,12 +189,11 @@ def run(args: argparse.Namespace) -> int:
     from calib.calibration.run import run as calibrate
 
     command = ["calibrate", *(a for a in sys.argv[1:] if a != "calibrate")]
-    for option in (name for name in ("sample", "start_from") if getattr(args, name)):
-        if args.all or args.config is not None:
-            said = option.replace("_", "-")
-            raise CutcalError(f"--{said} is for one trace; leave it out of a fit of several, or name one with --cut")
-        if args.sample and args.start_from:
-            raise CutcalError("--sample beside --start-from, which is where a search begins; give one of them")
+    of_one = [name.replace("_", "-") for name in ("sample", "start_from") if getattr(args, name)]
+    if of_one and (args.all or args.config is not None):
+        raise CutcalError(f"--{of_one[0]} is for one trace; leave it out of a fit of several, or name one with --cut")
+    if len(of_one) > 1:
+        raise CutcalError("--sample beside --start-from, which is where a search begins; give one of them")
     if args.config is not None:
         return run_study(args, command)
     missing = [f"--{name}" for name in ("food", "trace") if getattr(args, name) is None]

@@ -8,10 +8,12 @@ from typing import Any
 
 import pytest
 
+from calib.api import Calibration
 from calib.errors import OutputError
 from calib.problem.earlier_calibration import earlier_guesses
 from calib.problem.objective import Objective
 from calib.problem.parameters import Parameter, ParameterSet
+from calib.problem.setup import set_up
 from calib.problem.target import Target
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_file import Header
@@ -77,6 +79,17 @@ def test_a_damaged_store_is_named(tmp_path: Path) -> None:
     store.unlink()
     with pytest.raises(OutputError, match=r"evaluations.h5 cannot be read"):
         found(tmp_path / "one")
+
+
+def test_a_calibration_begins_there(tmp_path: Path) -> None:
+    """Its search is given the earlier food, and without one nothing of it."""
+    trace = Path(__file__).parents[3] / "force_data" / "banana_reconstructed.csv"
+    asked = {"food": "banana", "trace": trace, "fit": ["E", "R"]}
+    assert set_up(Calibration(**asked).request()).objective.guesses == ()
+    earlier(tmp_path / "one", (2e5, 300.0, 1.0))
+    objective = set_up(Calibration(**asked, start_from=tmp_path / "one").request()).objective
+    (guess,) = objective.guesses
+    assert objective.parameters.to_dict(guess) == {"E": pytest.approx(2e5), "R": pytest.approx(300.0)}
 
 
 @pytest.mark.parametrize("beside", [["--all"], ["--sample"]])
