@@ -2,8 +2,9 @@
 
 import taichi as ti
 
-from mpm.kernels.signed_distance import FACE_POINTS, blade_opening
+from mpm.kernels.signed_distance import blade_opening
 from mpm.kernels.tool import edge_height
+from mpm.state.state import FACE_POINTS
 from mpm.state.tables import ADHESION, ADHESION_GAP, CONTACT, TILT_COS, TILT_SIN
 
 

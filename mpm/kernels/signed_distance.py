@@ -4,8 +4,6 @@ import taichi as ti
 
 from mpm.state.tables import BLADE_HEIGHT, SPINE, TIP_RADIUS, WEDGE_COS, WEDGE_SIN
 
-FACE_POINTS = 4  # points of a particle's face, one above another
-
 
 @ti.func
 def blade_distance(y, above, spine, cos_h, sin_h, radius):

@@ -5,10 +5,10 @@ import taichi as ti
 from mpm.kernels.adhesion import stick_face
 from mpm.kernels.constitutive.laws import full
 from mpm.kernels.crack import particle_half
-from mpm.kernels.signed_distance import FACE_POINTS, blade_distance, blade_opening, stick_slip
+from mpm.kernels.signed_distance import blade_distance, blade_opening, stick_slip
 from mpm.kernels.tool import blade_velocity, book_impulse, book_knife_impulse, edge_height, under_blade
 from mpm.state.accessors import to_grid_axes, to_scene_axes, velocity_gradient
-from mpm.state.state import IN_STONE
+from mpm.state.state import FACE_POINTS, IN_STONE
 from mpm.state.tables import (
     ADHESION_GAP,
     ADHESION_WORK,
@@ -261,9 +261,9 @@ def press_face(s: ti.template(), cut, p, sign, high, at):
 
     A particle meets the blade with a face. The face lies as far from its centre as the centre was from the cut plane
     when the food was whole, so that the blade displaces the food by its true half thickness. It is as high as the
-    particle is in the food, but never higher than at rest, and turns with it. Each of its :data:`FACE_POINTS` points
-    feels the blade's profile, so a face passes a shoulder point by point. With one point a whole row of particles would
-    let go at once of all that the wedge had given it.
+    particle is in the food, but never higher than at rest, and turns with it. Each of its points
+    (:data:`mpm.state.state.FACE_POINTS`) feels the blade's profile, so a face passes a shoulder point by point. With
+    one point a whole row of particles would let go at once of all that the wedge had given it.
 
     The force of a point is the gradient of its opening, in the particle's place and in its stretch: what passes the
     shoulder gives back what it was pressed with.

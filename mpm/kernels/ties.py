@@ -3,6 +3,10 @@
 The law of a cohesive crack. The cut plane is parted from the beginning. Each pair of particles that face each other
 across it is held by a tie, as stiff as the contact of surfaces, whose tension is capped by a softening envelope: the
 food's own law of fracture, whoever loads it (docs/theory.md, "A crack with a law").
+
+A tie joins the two faces of its particles at :data:`mpm.state.state.FACE_POINTS` points, one above another. Each opens
+by itself and is cut by itself. So the edge can cut a quarter of a row of particles at a time: what is held above it is
+opened by the blade, and a thin blade rubs many times as hard for it.
 """
 
 import taichi as ti
@@ -13,10 +17,11 @@ from mpm.kernels.signed_distance import passed_part
 from mpm.kernels.tool import edge_height, under_blade
 from mpm.state.accessors import deformation_gradient, step_size, to_grid_axes, to_scene_axes, velocity_gradient
 from mpm.state.loops import locate_active, repetitions
-from mpm.state.state import SLICES, TIES
+from mpm.state.state import FACE_POINTS, SLICES, TIES
 from mpm.state.tables import (
     BLADE_HEIGHT,
     CONTACT,
+    COUNT,
     DX,
     EDGE_BAND,
     EPS0,
@@ -83,13 +88,8 @@ def hold_together(s: ti.template(), cut: ti.template()):
 def pull_tie(s: ti.template(), cut, n, dt):
     """One tie after the particles have moved: what the edge has cut of it, its pull, and what is left of it to cut.
 
-    A tie does not hold through the blade. Where the cut has not started yet, an edge that is withdrawn leaves it whole;
-    else it is cut. Ties that held there would press the faces together on the blade, with forces that depend on how
-    stiff contact and ties are.
-
     The pull is the food's own traction and, for what is missing, a stiff spring on the half opening, as of the contact
-    (Nitsche). Its tension, and the shear where there are two halves, is capped together by the envelope of the largest
-    half opening so far. It is unloaded along the tie's own stiffness; pressed it is a contact.
+    (Nitsche). Its moments along the faces are given to the particles, as those of the blade's contact are.
     """
     p, other = s.tie_ends[cut, n][0], s.tie_ends[cut, n][1]
     at = to_scene_axes(s, cut, s.x[cut, p])
@@ -98,11 +98,13 @@ def pull_tie(s: ti.template(), cut, n, dt):
     if ti.static(s.membrane):
         skin = s.skin_pull[cut, n]
         s.skin_pull[cut, n] = ti.Vector.zero(float, 3)
-    jump = ti.Vector([0.0, -at[1] - s.tool_gap[cut, p], 0.0])  # half of it
+    jump = ti.Vector([0.0, -at[1] - s.tool_gap[cut, p], 0.0])  # half of it, between the middles of the faces
+    high = s.par[cut, SPACING] * s.face_rise[cut, p]  # way along the face from its lower end to its upper
+    far, tilt = high, ti.Vector([0.0, -high[1], 0.0])  # what the jump at the upper end is more than at the lower
     if ti.static(s.mirror_y):
         own[0], own[2], skin[0], skin[2] = 0.0, 0.0, 0.0, 0.0
     else:
-        there = to_scene_axes(s, cut, s.x[cut, other])
+        there, far = to_scene_axes(s, cut, s.x[cut, other]), s.par[cut, SPACING] * s.face_rise[cut, other]
         own = 0.5 * (own + plane_traction(s, cut, other))
         y = to_grid_axes(s, cut, ti.Vector([0.0, 1.0, 0.0]))
         shear = s.tool_gap[cut, p] * to_scene_axes(s, cut, velocity_gradient(s, cut, p) @ y)
@@ -113,23 +115,61 @@ def pull_tie(s: ti.template(), cut, n, dt):
         jump[0] += s.face_shear[cut, n][0]
         jump[2] += s.face_shear[cut, n][1]
         at = 0.5 * (at + there)
-    tip, end = edge_height(s, cut, at[0]), s.par[cut, TIE_OPENING]
-    band = s.par[cut, EDGE_BAND]
-    above = (at[2] - tip) * s.par[cut, INV_DX]
+        tilt = 0.5 * (far - high)
+    whole, turned = ti.Vector.zero(float, 3), ti.Vector.zero(float, 3)
+    # an end that LLVM can't know keeps the points one by one, so that every kernel adds them in the same order
+    for q in range(ti.min(FACE_POINTS, s.size[cut, COUNT])):
+        part = (q + 0.5) / FACE_POINTS - 0.5
+        dv = pull_point(s, cut, n, q, at + 0.5 * part * (high + far), own + skin, jump + part * tilt, dt) / FACE_POINTS
+        whole += dv
+        turned += part * dv
+    if whole.norm_sqr() + turned.norm_sqr() > 0:
+        push_face(s, cut, p, s.tool_gap[cut, p], whole, high, turned)
+        if ti.static(not s.mirror_y):
+            push_face(s, cut, other, -s.tool_gap[cut, other], -whole, far, -turned)
+    if s.par[cut, LAYERED] > 0:
+        count_rows(s, cut, n, at, edge_height(s, cut, at[0]))
+
+
+@ti.func
+def pull_point(s: ti.template(), cut, n, q, at, own, jump, dt):
+    """One point of a tie: what the edge cuts of it, and what it pulls.
+
+    It does not hold through the blade. Where the cut has not started yet, an edge that is withdrawn leaves it whole;
+    else it is cut. A point that held there would press the faces together on the blade, with forces that depend on how
+    stiff contact and ties are.
+
+    The tension, and the shear where there are two halves, is capped together by the envelope of the largest half
+    opening so far. It is unloaded along the tie's own stiffness; pressed it is a contact.
+
+    Args:
+        n: The tie.
+        q: Its point.
+        at: Where the point is [m].
+        own: Force of the food's own traction and of the skin on the whole face [N].
+        jump: Half of what the faces have moved apart there [m].
+        dt: Time step [s].
+
+    Returns:
+        Change of velocity of the left particle if the whole face were pulled so [m/s].
+    """
+    p, end, band = s.tie_ends[cut, n][0], s.par[cut, TIE_OPENING], s.par[cut, EDGE_BAND]
+    above = (at[2] - edge_height(s, cut, at[0])) * s.par[cut, INV_DX]
     between, passed = False, 0.0  # the blade
     if under_blade(s, cut, at[0]) and above * s.par[cut, DX] < s.par[cut, BLADE_HEIGHT]:
         passed = passed_part(above / band)
         if cut_has_started(s, cut, at[0]):
-            s.cut_part[cut, n] = ti.max(s.cut_part[cut, n], passed)
+            s.cut_part[cut, n, q] = ti.max(s.cut_part[cut, n, q], passed)
         between = above > 0
-    left = 1.0 - ti.max(s.cut_part[cut, n], passed)
-    m = s.par[cut, MASS] * s.volume_ratio[cut, p]
+    left = 1.0 - ti.max(s.cut_part[cut, n, q], passed)
+    m, tough = s.par[cut, MASS] * s.volume_ratio[cut, p], s.tie_toughness[cut, n]
     stiff = s.par[cut, CONTACT] * m
-    force = own + skin + stiff * jump
+    force = own + stiff * jump
     pressed = ti.min(force[1], 0.0)
+    dv = ti.Vector.zero(float, 3)
     if left > 0 or (pressed < 0 and not between):
         opening = ti.sqrt(ti.max(jump[1], 0.0) ** 2 + jump[0] ** 2 + jump[2] ** 2)
-        tough, largest = s.tie_toughness[cut, n], s.largest_opening[cut, n]
+        largest = s.largest_opening[cut, n, q]
         area = s.par[cut, SPACING] ** 2
         most = tough / end * area * softened_tension(largest, end) - 0.5 * stiff * ti.max(0.0, largest - opening)
         force[1] -= pressed
@@ -137,24 +177,19 @@ def pull_tie(s: ti.template(), cut, n, dt):
         if size > ti.max(most, 0.0):
             force *= ti.max(most, 0.0) / size
             if opening > largest:
-                s.largest_opening[cut, n] = opening
-                work = left * area * tough * (work_spent(opening, end) - work_spent(largest, end))
+                s.largest_opening[cut, n, q] = opening
+                work = left * area / FACE_POINTS * tough * (work_spent(opening, end) - work_spent(largest, end))
                 s.sums[cut, TIE_WORK] += ti.static(2.0 if s.mirror_x else 1.0) * work
         dv = left * dt / m * force
         if not between:
             dv[1] += dt / m * pressed
-        push_face(s, cut, p, s.tool_gap[cut, p], dv)
-        if ti.static(not s.mirror_y):
-            push_face(s, cut, other, -s.tool_gap[cut, other], -dv)
-    if s.par[cut, LAYERED] > 0:
-        count_rows(s, cut, n, at, tip)
-    weight = passing_weight(above / band)
+    weight = passing_weight(above / band) / FACE_POINTS
     if weight > 0:
-        tough = s.tie_toughness[cut, n]
-        rest = tough * (1.0 - work_spent(s.largest_opening[cut, n], end)) if left > 0 else 0.0
+        rest = tough * (1.0 - work_spent(s.largest_opening[cut, n, q], end)) if left > 0 else 0.0
         charge_edge(s, cut, at[0], weight * ti.Vector([rest, tough, 1.0]))
         if ti.static(s.hollow):
             s.at_edge[cut, slice_of(s, cut, at[0])][2] += s.tie_share[cut, n] * weight
+    return dv
 
 
 @ti.func
@@ -187,22 +222,26 @@ def elastic_stress(s: ti.template(), cut, p):
 
 
 @ti.func
-def push_face(s: ti.template(), cut, p, arm, dv):
-    """Change the velocity of a particle by an impulse that acts on its face.
+def push_face(s: ti.template(), cut, p, arm, dv, high, turned):
+    """Change the velocity of a particle by impulses that act on its face.
 
     Args:
         p: The particle.
         arm: Place of the face across the blade from its centre [m].
         dv: Change of its velocity, in the scene's axes [m/s].
+        high: Way along the face from its lower end to its upper [m].
+        turned: Sum of the impulses' parts of ``dv``, each times its place along the face from -1/2 to 1/2 [m/s].
     """
-    kick, before = to_grid_axes(s, cut, dv), s.v[cut, p]
+    kick, twist, before = to_grid_axes(s, cut, dv), to_grid_axes(s, cut, turned), s.v[cut, p]
     if not s.visibility[cut, p] & IN_CONTACT:
         s.visibility[cut, p] |= IN_CONTACT
         s.contact_moment[cut, p, 0] = ti.Vector.zero(float, 4)
         s.contact_moment[cut, p, 1] = ti.Vector.zero(float, 4)
-    turn = 4 * s.par[cut, INV_DX] * s.par[cut, INV_DX] * arm * kick
-    s.contact_moment[cut, p, 0][3] += 0.5 * ((before + kick).norm_sqr() - before.norm_sqr())
-    s.contact_moment[cut, p, 1] += ti.Vector([turn[0], turn[1], turn[2], 0.0])
+    scale = 4 * s.par[cut, INV_DX] * s.par[cut, INV_DX]
+    lift, wide = scale * high[2] * twist, scale * (arm * kick + high[1] * twist)
+    given = 0.5 * ((before + kick).norm_sqr() - before.norm_sqr())
+    s.contact_moment[cut, p, 0] += ti.Vector([lift[0], lift[1], lift[2], given])
+    s.contact_moment[cut, p, 1] += ti.Vector([wide[0], wide[1], wide[2], 0.0])
     s.v[cut, p] = before + kick
 
 

@@ -132,7 +132,7 @@ class Numerics:
     far: float | None = None
     contact: str = "cohesive"
     contact_stiffness: float = 2.0
-    edge_band: float = 0.5
+    edge_band: float = 0.125
     layer_rows: int = 8
     least_gap: float = 0.02
     grid_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)

@@ -45,7 +45,7 @@ from mpm.state.contents import (
     WIDTH,
     Contents,
 )
-from mpm.state.state import SECOND_FIELD_CELLS, State
+from mpm.state.state import FACE_POINTS, SECOND_FIELD_CELLS, State
 from mpm.state.tables import (
     COUNT,
     N_PARAMETERS,
@@ -207,8 +207,9 @@ def _write_ties(s: ti.template(), ties: TABLES, rows: TABLES, half: ROWS):
             for k in ti.static(range(N_TIE)):
                 row[k] = ti.cast(ties[c, n, k], float)
         s.tie_ends[c, n] = ti.Vector([ti.cast(row[LEFT], ti.i32), ti.cast(row[RIGHT], ti.i32)])
-        s.tie_toughness[c, n], s.largest_opening[c, n], s.cut_part[c, n] = row[TOUGHNESS], 0.0, row[CUT_BEFORE]
-        s.tie_share[c, n] = row[SHARE]
+        s.tie_toughness[c, n], s.tie_share[c, n] = row[TOUGHNESS], row[SHARE]
+        for q in range(FACE_POINTS):
+            s.largest_opening[c, n, q], s.cut_part[c, n, q] = 0.0, row[CUT_BEFORE]
         for k in range(s.rows):
             there = n < s.size[c, TIE_COUNT]
             s.row_toughness[c, n, k] = ti.cast(rows[c, n, k], float) if there else 0.0

@@ -30,6 +30,7 @@ SECOND_FIELD_CELLS = 3  # cells on either side of the cut plane whose nodes may 
 REGISTER = 32  # bytes of a register of a CPU: as many particles as fill it have their elastic stress found at once
 SUM_COPIES = 64  # copies of a sum over particles on a GPU, where additions to one number wait for each other
 CPU_BLOCK = 512  # Taichi runs CPU loops shorter than this on one thread, so one iteration in 512 works for a thread
+FACE_POINTS = 4  # of a particle's face, one above another, at which it meets the blade and the other half
 IN_STONE = -2  # of State.adhering, where a particle is in a stone
 # What a loop goes over: each cut, rows of nodes in reach, lines of nodes across the mirror, parts of the particles,
 # slices along the edge, rows of nodes about what could be damaged, ties across the cut plane, points of the skin.
@@ -157,8 +158,8 @@ class State:
         tie_ends: Left and right particle of a tie, (cut, tie).
         tie_toughness: Its work of fracture over its area [J/m^2], (cut, tie).
         tie_share: Its part of the section over a square of the spacing, where toughness differs [-], (cut, tie).
-        largest_opening: Largest half opening of its two faces so far [m], (cut, tie).
-        cut_part: Part of it that the edge has cut [-], (cut, tie).
+        largest_opening: Largest half opening of its two faces so far at a point of them [m], (cut, tie, point).
+        cut_part: Part of that point that the edge has cut [-], (cut, tie, point).
         face_shear: Half of the shear of the two faces against their centres, along the cut and upwards [m], (cut, tie).
         passing: Sums over the ties that the edge passes, with their weights: what is left of their toughness, toughness
             [J/m^2], and the weights [-], (cut, slice).
@@ -301,8 +302,8 @@ class State:
         vec2, batch, slices = ti.types.vector(2, real), self.batch, (self.batch, self.slices)
         self.half = ti.field(ti.i32, (batch, self.room))
         self.tie_ends = ti.Vector.field(2, ti.i32, (batch, ties))
-        self.tie_toughness, self.largest_opening, self.cut_part = (ti.field(real, (batch, ties)) for _ in range(3))
-        self.tie_share = ti.field(real, (batch, ties))
+        self.tie_toughness, self.tie_share = (ti.field(real, (batch, ties)) for _ in range(2))
+        self.largest_opening, self.cut_part = (ti.field(real, (batch, ties, FACE_POINTS)) for _ in range(2))
         self.row_toughness, self.row_share = (ti.field(real, (batch, ties, self.rows)) for _ in range(2))
         self.face_shear = vec2.field(shape=(batch, ties))
         self.passing, self.passed_mean = ti.types.vector(3, real).field(shape=slices), vec2.field(shape=slices)

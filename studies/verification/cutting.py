@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from mpm.kernels.signed_distance import FACE_POINTS
 from mpm.output.energy import unbooked
 from mpm.output.record import ForceRecord
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
@@ -17,6 +16,7 @@ from mpm.scene.material import Material
 from mpm.scene.shapes import Shape
 from mpm.solver import Simulation
 from mpm.state.host_transfer import of_particles
+from mpm.state.state import FACE_POINTS
 from studies.verification.case import SuiteOptions, VerificationCase
 from studies.verification.result import Comparison
 

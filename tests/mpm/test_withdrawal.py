@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mpm.kernels.signed_distance import FACE_POINTS
 from mpm.output.record import ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import Board, Knife, Motion
 from mpm.solver import Simulation
 from mpm.state.host_transfer import of_particles
+from mpm.state.state import FACE_POINTS
 from tests.mpm.scenes import FLESH, PRISM, cut
 
 HALF = np.deg2rad(5.5)
