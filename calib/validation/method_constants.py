@@ -87,7 +87,7 @@ CONSTANTS = (
     ),
     MethodConstant(
         "band of the edge", "numerics", "edge_band", (0.5, 2.0),
-        "numerical: half a cell about the edge, one spacing of the particles",
+        "numerical: a quarter of the particles' spacing, as far apart as the points of a face are",
     ),
     MethodConstant(
         "rows of a tie", "numerics", "layer_rows", (0.5, 2.0),

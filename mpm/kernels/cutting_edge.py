@@ -12,7 +12,6 @@ from mpm.state.tables import (
     CUTTING_WORK,
     DX,
     EDGE,
-    EDGE_BAND,
     FIRST_STATION,
     INV_DX,
     LAYERED,
@@ -116,13 +115,13 @@ def find_reaction(s: ti.template(), cut, i, dt):
 
 @ti.func
 def tied_width(s: ti.template(), cut, i):
-    """Width of flesh in slice i that the edge is cutting, by the ties that it passes [m].
+    """Width of flesh in slice i that the edge is cutting, by the ties within a spacing of it [m].
 
     Each of them stands for its part of the section, so a slice that lies half in a stone or a cavity has half of its
     width, and what is cut in all is the flesh's area, wherever that has moved.
     """
     many = 2.0 / multiplicity_x(s, cut, i) if ti.static(s.mirror_x) else 1.0  # half of the middle one is modelled
-    return many * s.at_edge[cut, i][2] * s.par[cut, SPACING] ** 2 / (s.par[cut, EDGE_BAND] * s.par[cut, DX])
+    return many * s.at_edge[cut, i][2] * s.par[cut, SPACING]
 
 
 @ti.func

@@ -127,8 +127,12 @@ def pull_tie(s: ti.template(), cut, n, dt):
         push_face(s, cut, p, s.tool_gap[cut, p], whole, high, turned)
         if ti.static(not s.mirror_y):
             push_face(s, cut, other, -s.tool_gap[cut, other], -whole, far, -turned)
+    tip = edge_height(s, cut, at[0])
+    if ti.static(s.hollow):
+        weight = passing_weight((at[2] - tip) / s.par[cut, SPACING])
+        s.at_edge[cut, slice_of(s, cut, at[0])][2] += s.tie_share[cut, n] * weight
     if s.par[cut, LAYERED] > 0:
-        count_rows(s, cut, n, at, edge_height(s, cut, at[0]))
+        count_rows(s, cut, n, at, tip)
 
 
 @ti.func
@@ -187,8 +191,6 @@ def pull_point(s: ti.template(), cut, n, q, at, own, jump, dt):
     if weight > 0:
         rest = tough * (1.0 - work_spent(s.largest_opening[cut, n, q], end)) if left > 0 else 0.0
         charge_edge(s, cut, at[0], weight * ti.Vector([rest, tough, 1.0]))
-        if ti.static(s.hollow):
-            s.at_edge[cut, slice_of(s, cut, at[0])][2] += s.tie_share[cut, n] * weight
     return dv
 
 
