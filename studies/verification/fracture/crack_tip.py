@@ -24,7 +24,7 @@ def tip_height(simulation: Simulation) -> float:
     ties = simulation.setup.ties()
     opening, cut = (field.to_numpy()[place, : len(ties)] for field in (state.largest_opening, state.cut_part))
     spread = np.minimum(opening / state.par.to_numpy()[place, TIE_OPENING], 1.0)
-    left = (1 - cut) * (1 - spread) ** 2
+    left = ((1 - cut) * (1 - spread) ** 2).mean(axis=-1)  # of the points of a tie
     x = simulation.setup.to_scene_axes(host_transfer.particles(state, place).x)[ties[:, 0], 2]
     row = simulation.setup.seeds.x[ties[:, 0], 2] // simulation.setup.seeds.spacing
     _, group, count = np.unique(row, return_inverse=True, return_counts=True)

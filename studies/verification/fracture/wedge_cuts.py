@@ -64,7 +64,7 @@ CUTS = (
 
 
 def by_elements(test: WedgeCut, size: float) -> Cut:
-    """The cut by finite elements of a size [m], with the particles' law of large strains and free ends along the edge."""
+    """The cut by finite elements of a size [m], with the particles' law of large strains, and free ends."""
     food = test.food
     block = Block(BLOCK.length, BLOCK.height, Corotated(food.shear, food.lame), width=BLOCK.width)
     blade = Blade(test.wedge.angle, test.wedge.thickness, food.mu)
