@@ -31,14 +31,17 @@ from calib.calibration.result_parts import (
 )
 from calib.errors import OutputError
 from calib.fit.multistart import FitResult
+from calib.io.meaning import describe_sets
 from calib.io.provenance import Invocation, Software
+from calib.material.properties import property_of
 from calib.material.scene import blade_warnings
 from calib.posterior.estimates import summarised
-from calib.problem.parameters import STRESS_LIKE, property_of
+from calib.problem.parameters import STRESS_LIKE
 from calib.problem.request import Request
 from calib.problem.setup import Setup
 from calib.simulation.evaluation import doubts_of_the_crack
 from calib.simulation.evaluation_frame import evaluation_frame
+from calib.simulation.evaluation_meanings import meaning_of
 from calib.trace.conditioning import Conditioned
 from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
@@ -295,6 +298,7 @@ def add_conditioning(path: Path, curve: Conditioned) -> None:
             group = file.create_group("conditioning")
             for name, values in columns.items():
                 group[name] = values
+            describe_sets(file, meaning_of)
         write_atomic(path, stream.getvalue(), sync=True)
     except OSError as e:
         raise OutputError(f"{path}: cannot be written ({e}); check the disk") from None

@@ -87,13 +87,13 @@ def _object(kind: Any) -> dict[str, Any]:
     other: Any = False
     if others:
         (_, each) = get_args(get_type_hints(kind, include_extras=True)[others[0].name])
-        other = {"description": _attributes(kind)[others[0].name]} | _item(each)
+        other = {"description": attributes_of(kind)[others[0].name]} | _item(each)
     return {"type": "object", "properties": properties, "required": required, "additionalProperties": other}
 
 
 def _properties(kind: Any) -> tuple[dict[str, Any], list[str]]:
     """Schemas of the keys of a dataclass, and those that are always there."""
-    hints, texts = get_type_hints(kind, include_extras=True), _attributes(kind)
+    hints, texts = get_type_hints(kind, include_extras=True), attributes_of(kind)
     known = {f.name: f for f in fields(kind)}
     properties: dict[str, Any] = {}
     required: list[str] = []
@@ -196,7 +196,7 @@ def _first(documented: Any) -> str:
     return " ".join((inspect.getdoc(documented) or "").split("\n\n")[0].split()).rstrip(".")
 
 
-def _attributes(kind: Any) -> dict[str, str]:
+def attributes_of(kind: Any) -> dict[str, str]:
     """What the docstring of a class says of its attributes, each without its full stop."""
     _, _, listed = (inspect.getdoc(kind) or "").partition("Attributes:\n")
     entries = re.findall(r"^ {4}(\w+): (.*(?:\n {8,}.*)*)", listed, flags=re.MULTILINE)

@@ -148,6 +148,10 @@ INCLUSIONS = ("stone", "cavity")
 """What may lie in a food; each has a length, a width and a height."""
 
 
+OF_TRACE = "@"
+"""Between the name of a property and that of the trace which has a value of its own: ``R_skin@cut2``."""
+
+
 @dataclass(frozen=True)
 class Source:
     """One published value.
@@ -306,6 +310,15 @@ def _check_limits(place: Place, x: float, rule: Rule) -> None:
             f"{x:g}{unit} cannot be the {rule.meaning}; "
             f"it must lie between {rule.low:g} and {rule.high:g}{unit}: {rule.why}"
         )
+
+
+def property_of(name: str) -> str:
+    """Name of the property that a parameter is.
+
+    >>> property_of("R_skin@cut2"), property_of("E")
+    ('R_skin', 'E')
+    """
+    return name.split(OF_TRACE)[0]
 
 
 def read_property(parent: Place, name: str, raw: Any) -> Property:

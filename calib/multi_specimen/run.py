@@ -18,7 +18,7 @@ from calib.io.progress import Progress
 from calib.io.provenance import Invocation, Software, key_of
 from calib.material.food import FoodSpec
 from calib.material.food_file import dump_material
-from calib.material.properties import MEANINGS
+from calib.material.properties import MEANINGS, property_of
 from calib.material.remarks import notes
 from calib.multi_specimen.compression_modulus import CompressionModulus, compression_modulus
 from calib.multi_specimen.fitted_cuts import FittedCut, fitted_cuts
@@ -26,7 +26,7 @@ from calib.multi_specimen.held_out import HeldOutPrediction, predict
 from calib.multi_specimen.result import HeldOutCut, InSampleCut, StudyParameter, StudyResult, write_result
 from calib.multi_specimen.spec import StudySpec
 from calib.multi_specimen.specimens import JointFit, Specimens, set_ups
-from calib.problem.parameters import is_shared, property_of
+from calib.problem.parameters import is_shared
 from calib.problem.setup import Setup
 from calib.simulation.evaluation_store import EvaluationStore, Header
 from calib.simulation.workers import Workers

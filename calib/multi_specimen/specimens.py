@@ -12,11 +12,12 @@ from dataclasses import dataclass, field, replace
 from calib.fit.multistart import FitResult
 from calib.fit.options import FitOptions
 from calib.io.progress import Progress
+from calib.material.properties import property_of
 from calib.multi_specimen.compression_modulus import CompressionModulus, with_measured_modulus
 from calib.multi_specimen.spec import StudySpec
 from calib.problem.joint_objective import JointEvaluator, JointObjective
 from calib.problem.nuisance import real_speed
-from calib.problem.parameters import is_shared, parameter_of, property_of
+from calib.problem.parameters import is_shared, parameter_of
 from calib.problem.rate_exponent import check_speeds
 from calib.problem.scored_run import ScoredRun
 from calib.problem.setup import Setup, set_up

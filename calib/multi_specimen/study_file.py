@@ -22,11 +22,10 @@ from typing import Any
 from calib.errors import MaterialError, ShapeError
 from calib.io.yaml_checks import Place, check_keys, choice, finite_number, mapping, read_yaml, text
 from calib.material.food import FoodSpec, load_food, load_material_file
-from calib.material.properties import check_override
+from calib.material.properties import OF_TRACE, check_override
 from calib.material.scene import MID_LENGTH, Sizing
 from calib.multi_specimen.spec import COMPRESSION, CUT, SCATTER, SPECIMEN_PROPERTIES, CompressionSpec, StudySpec
 from calib.outline.outline_file import OutlineFile
-from calib.problem.parameters import OF_TRACE
 from calib.problem.request import Request
 
 LARGEST_SCATTER = 1.0

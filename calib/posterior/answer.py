@@ -9,10 +9,11 @@ import numpy as np
 
 from calib.fit.multistart import FitResult
 from calib.fit.surrogate import Surrogate
+from calib.material.properties import property_of
 from calib.posterior.coordinates import Coordinates
 from calib.posterior.posterior import SampledPosterior, runs_near, sample_posterior
 from calib.problem.objective import EXPLAINED
-from calib.problem.parameters import Z95, Parameter, property_of
+from calib.problem.parameters import Z95, Parameter
 from calib.problem.setup import Setup
 from calib.simulation.evaluation import Evaluators
 from calib.uncertainty.analysis import UncertaintyAnalysis, nuisances_of

@@ -15,7 +15,8 @@ from functools import cached_property
 
 import numpy as np
 
-from calib.problem.parameters import STRESS_LIKE, ParameterSet, property_of
+from calib.material.properties import property_of
+from calib.problem.parameters import STRESS_LIKE, ParameterSet
 from mpm.arrays import FloatArray
 
 SCALES = ("R", "R_skin", "R_initiation", "E", "yield_stress", "tensile_strength")

@@ -14,8 +14,9 @@ from itertools import combinations
 
 import numpy as np
 
+from calib.material.properties import property_of
 from calib.problem.objective import Objective, ObjectiveTerm
-from calib.problem.parameters import Parameter, ParameterSet, PriorCorrelation, parameter_of, property_of
+from calib.problem.parameters import Parameter, ParameterSet, PriorCorrelation, parameter_of
 from calib.problem.scored_run import ScoredRun
 from calib.simulation.evaluation import Evaluation, Evaluator
 from mpm.arrays import FloatArray

@@ -21,6 +21,7 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from calib.errors import MaterialError
+from calib.material.properties import OF_TRACE, property_of
 from mpm.arrays import FloatArray
 from mpm.scene.material import RESISTANCES
 
@@ -41,9 +42,6 @@ LINEAR_STEP = 0.1
 #: every quasi-static force by k and leaves the geometry of the cut alone.
 STRESS_LIKE = ("E", "yield_stress", *RESISTANCES, "tensile_strength", "fracture_energy")
 
-#: Between the name of a property and that of the trace which has a value of its own: ``R_skin@cut2``.
-OF_TRACE = "@"
-
 
 def parameter_of(name: str, trace: str) -> str:
     """Name of the parameter that a property is for one trace alone.
@@ -52,15 +50,6 @@ def parameter_of(name: str, trace: str) -> str:
     'R_skin@cut2'
     """
     return f"{name}{OF_TRACE}{trace}"
-
-
-def property_of(name: str) -> str:
-    """Name of the property that a parameter is.
-
-    >>> property_of("R_skin@cut2"), property_of("E")
-    ('R_skin', 'E')
-    """
-    return name.split(OF_TRACE)[0]
 
 
 def is_shared(name: str) -> bool:

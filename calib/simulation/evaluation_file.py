@@ -20,7 +20,9 @@ import h5py
 import numpy as np
 
 from calib.errors import OutputError
+from calib.io.meaning import describe_attributes, describe_sets
 from calib.simulation.evaluation import Evaluation
+from calib.simulation.evaluation_meanings import ATTRIBUTES, WHAT, meaning_of
 
 LAYOUT_VERSION = 2
 """Version of both layouts; a file with another one is refused."""
@@ -113,6 +115,8 @@ def hdf5_of(header: Header, entries: Sequence[StoredEvaluation]) -> bytes:
     with h5py.File(stream, "w") as file:
         file.attrs.update(asdict(header))
         _write_entries(file, header, entries)
+        describe_sets(file, meaning_of)
+        describe_attributes(file, WHAT, ATTRIBUTES)
     return stream.getvalue()
 
 

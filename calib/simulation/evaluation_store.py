@@ -12,6 +12,9 @@ runs):
     curves/stroke [m], curves/force [N]  (m,) all curves end to end
     curves/start    (n + 1,) run k owns stroke[start[k]:start[k + 1]] and the same part of force
 
+Each data set says its ``unit`` and its ``description`` as attributes (:mod:`calib.simulation.evaluation_meanings`);
+files of older versions do not, and are read all the same.
+
     with h5py.File("evaluations.h5") as f:
         table = pandas.DataFrame({name: column[()] for name, column in f["parameters"].items()})
         table["status"] = f["status"].asstr()[()]

@@ -2,7 +2,9 @@
 
 An HDF5 file: what a :class:`mpm.output.record.ForceRecord` has over the stroke as datasets of its names and units, all
 else as attributes, ``counters`` and ``pieces`` as JSON, ``key``, the SHA-256 of scene and code, and ``sha256``, that of
-all the rest: a file in which a bit has flipped is no record.
+all the rest: a file in which a bit has flipped is no record. Unit and meaning of each data set are attributes of it,
+and those of the file's attributes are in ``attribute_meanings``; files of older versions have neither, and are read all
+the same.
 """
 
 from __future__ import annotations
@@ -10,7 +12,8 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from dataclasses import asdict, fields
+import re
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +21,9 @@ import h5py
 import numpy as np
 
 from calib.errors import OutputError
+from calib.io.meaning import NO_UNIT, UNKNOWN, Meaning, describe_attributes, describe_sets
 from calib.io.provenance import code_key
+from calib.io.type_schema import attributes_of
 from calib.simulation.evaluation_file import UNREADABLE
 from calib.simulation.evaluation_store import content_key
 from calib.simulation.workers import Errand
@@ -31,6 +36,7 @@ from mpm.scene import Scene
 SECTION_GROUP = "section"
 CHECKSUM = "sha256"  # attribute
 JSON_FIELDS = ("counters", "pieces")  # parts of a record that are neither arrays nor numbers
+WHAT = "All forces, momenta and energies of one simulated cut, a row for each interval of its output"
 
 
 def record_errands(scene: Scene, path: Path) -> list[Errand]:
@@ -72,11 +78,35 @@ def _write(path: Path, key: str, record: ForceRecord) -> None:
                     file[f"{SECTION_GROUP}/{part}"] = content
             elif value is not None or name in JSON_FIELDS:
                 file.attrs[name] = json.dumps(value) if name in JSON_FIELDS else value
+        told = record_meanings()
+        describe_sets(file, lambda path: told.get(path, UNKNOWN))
+        describe_attributes(file, WHAT, {name: told.get(name, UNKNOWN) for name in sorted({*file.attrs, CHECKSUM})})
         file.attrs[CHECKSUM] = _digest(file)
     try:
         write_atomic(path, stream.getvalue())
     except OSError as e:
         raise OutputError(f"{path}: cannot be written ({e}); check the disk") from None
+
+
+def record_meanings() -> dict[str, Meaning]:
+    """What each data set and attribute of the file is, by its path: what the docstrings of the record say of it."""
+    texts = attributes_of(ForceRecord)
+    texts |= {f"{SECTION_GROUP}/{name}": text for name, text in attributes_of(Section).items()}
+    out = {name: _meaning(text) for name, text in texts.items()}
+    out |= {name: replace(out[name], text=f"{out[name].text}; as JSON") for name in JSON_FIELDS if name in out}
+    out["key"] = Meaning(NO_UNIT, "SHA-256 of scene and version of the code")
+    out[CHECKSUM] = Meaning(NO_UNIT, "checksum of all data sets and all other attributes of the file")
+    return out
+
+
+def _meaning(text: str) -> Meaning:
+    """Unit, text and shape of an attribute, as its docstring has them."""
+    plain = re.sub(r":\w+:`([^`]*)`", r"\1", text).replace("``", "")
+    unit = re.search(r" \[([^\]]*)\]", plain)
+    shape = re.search(r", shape (\([^)]*\))", plain)
+    for part in (unit, shape):
+        plain = plain if part is None else plain.replace(part[0], "", 1)
+    return Meaning(NO_UNIT if unit is None else unit[1], plain, "" if shape is None else shape[1])
 
 
 def _digest(file: h5py.File) -> str:

@@ -24,9 +24,10 @@ from calib.fit.options import FitOptions
 from calib.fit.search import Search
 from calib.fit.surrogate import Surrogate
 from calib.io.progress import Progress
+from calib.material.properties import property_of
 from calib.problem.joint_objective import JointObjective
 from calib.problem.objective import EXPLAINED, Objective
-from calib.problem.parameters import ParameterSet, property_of
+from calib.problem.parameters import ParameterSet
 from calib.problem.scored_run import ScoredRun
 from calib.simulation.evaluation import Evaluator, Evaluators
 from calib.uncertainty.analysis import UncertaintyAnalysis, analyse, equally_good, search_uncertainty

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from calib.io.typed_document import ANY, FORMER, to_document
+from calib.material.properties import property_of
 from calib.problem.nuisance import OUTSIDE
 from calib.problem.objective import EXPLAINED
-from calib.problem.parameters import property_of
 from calib.simulation.evaluation import FULLY_PARTED, Evaluation
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.validation.bounds import AT_BOUND, AT_LIMIT, bound_word

@@ -19,10 +19,12 @@ import h5py
 import numpy as np
 
 from calib.errors import OutputError
+from calib.io.meaning import describe_sets
 from calib.io.progress import Countdown
 from calib.simulation.workers import Workers
 from intsim.data.dataset_document import DatasetDocument, PictureTotals
 from intsim.data.manifest import PUBLISHED_TRAJECTORIES
+from intsim.data.shard_meanings import picture_meaning
 from intsim.data.shards import StoredTrajectory, merge_parts, shard_entries, shard_number, shard_paths, write_part
 from intsim.sim.background import BACKGROUNDS
 
@@ -151,6 +153,7 @@ def render_trajectory(
                 stream = io.BytesIO()
                 Image.fromarray(frame).save(stream, "PNG")
                 column[t] = np.frombuffer(stream.getvalue(), np.uint8)
+        describe_sets(file, picture_meaning)
         file.attrs["seconds"] = time.perf_counter() - began
     return out.getvalue()
 

@@ -22,8 +22,10 @@ import h5py
 import numpy as np
 
 from calib.errors import OutputError
+from calib.io.meaning import describe_sets
 from calib.simulation.workers import Workers
 from intsim.data.export_episodes import ExportEpisode, check_pictured_target, export_episodes
+from intsim.data.shard_meanings import meaning_of
 from intsim.data.shards import is_kept, trajectories
 
 CAMERA_NAME = "front"
@@ -96,6 +98,7 @@ def _trajectory(path: Path, k: int, episode: ExportEpisode) -> None:
         group = file.create_group(f"traj_{k}")
         for name, values in zip(("actions", "obs/agent/qpos"), _opened(stored), strict=True):
             group.create_dataset(name, data=values, compression="gzip", shuffle=True)
+        describe_sets(group, meaning_of)
         group.attrs["scene"], group.attrs["sentence"] = episode.background, episode.sentence
 
 

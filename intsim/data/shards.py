@@ -22,7 +22,8 @@
         contact_step (-1 without contact)
 
 ``shard-0000.json`` beside it lists environment and episodes as ManiSkill's does: seeds, sentences, task, success.
-The force is in no group that a loader of observations or actions reads.
+The force is in no group that a loader of observations or actions reads. Each data set says its unit and meaning as
+attributes (:mod:`intsim.data.shard_meanings`).
 """
 
 from __future__ import annotations
@@ -39,7 +40,9 @@ import numpy as np
 
 from calib.errors import OutputError
 from calib.io.folder import finite
+from calib.io.meaning import describe_attributes, describe_sets
 from intsim.data.demonstrate import Demonstration
+from intsim.data.shard_meanings import GROUP, GROUP_ATTRIBUTES, meaning_of
 from intsim.task.planner import CONTROL_RATE, GRIPPER_CLOSED, PHASES
 from intsim.task.targets import Item
 from mpm.files import replacing, write_atomic
@@ -101,6 +104,8 @@ def pack_episode(demo: Demonstration, entry: Mapping[str, Any], mpm: Mapping[str
         attributes = {**mpm, "contact_step": int(touched[0]) if len(touched) else -1}
         for name, value in attributes.items():
             file["mpm"].attrs[name] = value
+        describe_sets(file, meaning_of)
+        describe_attributes(file["mpm"], GROUP, GROUP_ATTRIBUTES)
     return stream.getvalue()
 
 

@@ -18,12 +18,14 @@ from intsim.data import generate as g
 from intsim.data.dataset_document import DATASET_FILE, DatasetDocument, DatasetSpec, PictureTotals
 from intsim.data.demonstrate import Demonstration
 from intsim.data.manifest import PROPERTY_SCATTER, TRAINING_SUITES, Manifest
+from intsim.data.shard_meanings import COLUMNS, meaning_of
 from intsim.data.shards import pack_episode, trajectories
 from intsim.task.language import instructions, parse_instruction
 from intsim.task.planner import CONTROL_RATE, PHASES
 from intsim.task.suites import FIRST_TEST_SEED, FOODS
 from intsim.task.targets import TaskError
 from tests.calib.documents import valid
+from tests.calib.io.test_meaning import assert_told, attributes, axes, rank, sets
 
 
 def track(steps: int = 12, seed: int = 0) -> Demonstration:
@@ -205,6 +207,23 @@ def test_what_is_stored_has_maniskills_layout_and_keeps_the_force_apart(tmp_path
         first = file["mpm/surface/0"]
         assert first["step"][()].tolist() == [6, 7]
         assert np.allclose(first["vertices"][0] + first.attrs["origin"], t.meshes[0][2], atol=3e-4)
+
+
+def test_every_set_says_its_unit_and_what_it_is(tmp_path):
+    """Of the trajectories and of the food's surface; the attributes of what the food did are those that are told."""
+    g.generate(DatasetSpec(Manifest(trajectories=2), shard=2), tmp_path / "d", Inline())
+    found = sets(tmp_path / "d" / "shard-0000.h5")
+    assert_told(found)
+    ranks = {name: rank(meaning_of(name.split("/", 1)[1]).shape) for name in found}
+    assert axes(tmp_path / "d" / "shard-0000.h5") == ranks
+    assert found["traj_1/mpm/force"][0] == "N" and found["traj_0/mpm/surface/1/vertices"][0] == "m"
+    assert {name.removeprefix("traj_0/") for name in found if name.startswith("traj_0/") and "surface" not in name} == {
+        *COLUMNS
+    }
+    names, told = attributes(tmp_path / "d" / "shard-0000.h5", "traj_0/mpm")
+    assert names == {"food", "material", "contact_step"} and names < set(told)
+    spec = Manifest(trajectories=1).trajectory(0)
+    assert {*g._attributes(spec, g.World()), "contact_step"} == set(told)
 
 
 def test_a_folder_that_is_taken_or_damaged_is_an_error(tmp_path):

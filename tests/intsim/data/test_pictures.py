@@ -24,6 +24,7 @@ from intsim.data.rlds import export_rlds
 from intsim.data.shards import trajectories
 from mpm.scene.errors import CutcalError
 from tests.calib.documents import valid
+from tests.calib.io.test_meaning import assert_told, sets
 from tests.intsim.data.test_generate import Inline
 from tests.intsim.painter import PIXELS, Here, Painter, paint_with
 
@@ -49,6 +50,7 @@ def test_what_was_rendered_comes_back_pixel_by_pixel(made):
     """Of every trajectory before every background, from files beside their shard; dataset.json says what it took."""
     found = render_dataset(made, [0, 2], PIXELS, Here())
     assert files(made) == [f"pictures-32-{scene:02d}-{n:04d}.h5" for scene in (0, 2) for n in range(3)]
+    assert_told(sets(made / files(made)[0]))
     document = valid(json.loads((made / DATASET_FILE).read_text()))
     steps = document["steps"]
     assert document["pictures"] == to_document(found)

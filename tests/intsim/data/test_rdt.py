@@ -16,6 +16,7 @@ from intsim.data.manifest import Manifest
 from intsim.data.rdt import STATISTICS_FILE, TASKS_FILE, export_rdt, task_name
 from intsim.data.shards import trajectories
 from intsim.task.language import parse_instruction, same_task
+from tests.calib.io.test_meaning import assert_told, sets
 from tests.intsim.data.test_generate import Inline
 from tests.intsim.painter import PIXELS, Here, Painter, paint_with
 
@@ -51,6 +52,7 @@ def test_the_loader_finds_every_picture_and_joint(exported):
         with h5py.File(path) as file:
             keys = sorted(file, key=lambda key: int(key.split("_")[-1]))
             assert len(keys) == task["episodes"]
+            assert_told(sets(path))
             for k, key in enumerate(keys):
                 actions, states = file[key]["actions"][:], file[key]["obs"]["agent"]["qpos"][:]
                 n = len(actions)
