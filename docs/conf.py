@@ -16,7 +16,7 @@ author = "the cutcal developers"
 project_copyright = author
 version = release = cutcal.__version__
 
-extensions = ["commands", "mathml", "myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+extensions = ["commands", "documents", "mathml", "myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 exclude_patterns = ["_build"]
 myst_enable_extensions = ["amsmath", "dollarmath"]
 myst_heading_anchors = 3

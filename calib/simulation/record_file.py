@@ -28,7 +28,7 @@ from calib.simulation.evaluation_file import UNREADABLE
 from calib.simulation.evaluation_store import content_key
 from calib.simulation.workers import Errand
 from mpm.files import write_atomic
-from mpm.output.record import ADHESION, COHESION, ForceRecord
+from mpm.output.record import ADHESION, COHESION, ENDINGS, ForceRecord
 from mpm.output.section import Section
 from mpm.output.topology import Topology
 from mpm.scene import Scene
@@ -94,6 +94,8 @@ def record_meanings() -> dict[str, Meaning]:
     texts |= {f"{SECTION_GROUP}/{name}": text for name, text in attributes_of(Section).items()}
     out = {name: _meaning(text) for name, text in texts.items()}
     out |= {name: replace(out[name], text=f"{out[name].text}; as JSON") for name in JSON_FIELDS if name in out}
+    if "ended" in out:  # whose docstring names a constant
+        out["ended"] = replace(out["ended"], text=out["ended"].text.replace("ENDINGS", ", ".join(ENDINGS)))
     out["key"] = Meaning(NO_UNIT, "SHA-256 of scene and version of the code")
     out[CHECKSUM] = Meaning(NO_UNIT, "checksum of all data sets and all other attributes of the file")
     return out
