@@ -132,6 +132,7 @@ def _with_simulated_ends(
         (fine, ("identified", "weak"), False),
         *[(fine, ("identified",), False)] * (END_ROUNDS - 1),
     ]
+    turn = 0
     for evaluator, verdicts, alone in rounds:
         if evaluator is None:
             continue
@@ -139,7 +140,8 @@ def _with_simulated_ends(
         known = runs if cheap else [t for t in runs if not t.coarse]
         asked = _new(objective, _end_points(found, profiles, verdicts, alone=alone), known)
         if asked:
-            say(f"intervals: {len(asked)} of their ends{' on coarse cells' if cheap else ''}")
+            turn += 1
+            say(f"intervals, round {turn}: simulating {len(asked)} of their ends{' on coarse cells' if cheap else ''}")
             runs += _run(objective, evaluator, asked, cheap)
             surrogate = Surrogate(objective, runs, result.best, surrogate.hyper)
             found, profiles = _profiled(objective, result, surrogate, surrogate.jacobian(result.best.z))
