@@ -62,15 +62,16 @@ def reference() -> ForceRecord:
 @pytest.mark.parametrize(
     "change",
     [
-        {"grid_shift": (0.0, 0.25, 0.0)},
+        pytest.param({"grid_shift": (0.0, 0.25, 0.0)}, marks=pytest.mark.long),
         {"grid_shift": (0.0, 0.5, 0.0)},
         {"grid_shift": (0.31, 0.73, 0.62)},
-        {"grid_turn": np.deg2rad(15.0)},
+        pytest.param({"grid_turn": np.deg2rad(15.0)}, marks=pytest.mark.long),
         {"grid_turn": np.deg2rad(45.0)},
         {"mirror": False},
         {"ppc": 3},
         {"far": 8e-3},
-        *({"seed": s} for s in (1, 2, 3, 4)),
+        {"seed": 1},
+        *(pytest.param({"seed": s}, marks=pytest.mark.long) for s in (2, 3, 4)),
     ],
     ids=str,
 )
