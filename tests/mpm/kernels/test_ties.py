@@ -8,7 +8,7 @@ import taichi as ti
 
 from mpm.batch import simulate_together
 from mpm.kernels.signed_distance import passed_part
-from mpm.kernels.ties import passing_weight, softened_tension, work_spent
+from mpm.kernels.ties import passing_weight, pull_tie, softened_tension, work_spent
 from mpm.output.record import ENERGIES, ForceRecord
 from mpm.runtime import Runtime
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
@@ -19,7 +19,7 @@ from mpm.setup.setup import Setup
 from mpm.solver import Simulation
 from mpm.state import host_transfer
 from mpm.state.host_transfer import fill
-from mpm.state.tables import TIE_WORK
+from mpm.state.tables import CONTACT, TIE_WORK
 from tests.mpm.scenes import FLESH, PRISM, WEDGE, cut
 from tests.mpm.test_cut import with_images
 
@@ -192,6 +192,35 @@ def test_the_edge_cuts_a_row_of_ties_point_by_point():
     gone = simulation.state.cut_part.to_numpy()[0, : len(simulation.setup.ties())]
     assert ((gone[:, -1] == 1.0) & (gone[:, 0] == 0.0)).any()
     assert (np.diff(gone, axis=1) >= 0.0).all()
+
+
+@ti.kernel
+def pull_one(s: ti.template(), n: int, dt: float):
+    """One tie alone."""
+    for _ in range(1):
+        pull_tie(s, 0, n, dt)
+
+
+def test_a_tie_turns_a_face_that_leans():
+    """A face that leans over by a little about its middle is pulled at its upper half and pressed at its lower one.
+
+    Nothing moves it as a whole. The moment is that of springs at the four points: their places along the face, squared,
+    have the mean 0.078125.
+    """
+    sim = Simulation(SHORT, Runtime(threads=1))
+    sim.load(TUBER)
+    sim.set_pose(1.0)
+    s, lean, dt = sim.state, 1e-5, 1e-6
+    p, h = sim.setup.ties()[0, 0], sim.setup.seeds.spacing
+    fill(s, s.face_rise, np.tile([0.0, lean, 1.0], (s.n[0], 1)))
+    fill(s, s.v, np.zeros((s.n[0], 3)))
+    sim.state.visibility.fill(0)
+    pull_one(s, 0, dt)
+    lift, wide = s.contact_moment.to_numpy()[0, p]
+    pull = s.par.to_numpy()[0, CONTACT] * dt * lean * h * 0.078125
+    assert np.abs(s.v.to_numpy()[0, p]).max() < 1e-9 * abs(pull)
+    np.testing.assert_allclose(lift, [0.0, -4 * h * pull / SHORT.numerics.dx**2, 0.0, 0.0], rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(wide[1], lean * lift[1], rtol=1e-6)
 
 
 def test_rows_that_pass_a_thick_shoulder_give_back_what_pressed_them():
