@@ -23,7 +23,7 @@ from calib.io.folder import write_json
 from calib.io.type_schema import NotNegative, Positive, Shared
 from calib.io.typed_document import FLAT, NULL
 from calib.io.yaml_checks import check_keys, read_yaml, text
-from calib.validation.numerical_checks import HALF_SPEED, VARIANTS
+from calib.validation.numerical_checks import HALF_SPEED, VARIANTS, Check, at_rest
 
 NAME = "credibility.json"
 COVERAGE = 2.0
@@ -149,12 +149,17 @@ def _error(simulated: float, measured: float, unit: str, uncertain: tuple[float 
 
 
 def _numerics(result: CalibrationResult, which: str) -> float | None:
-    """Root of the sum of squares of what each numerical choice changes, part of the value; what half the speed changes
+    """Root of the sum of squares of what each numerical choice changes, part of the value; what smaller speeds change
     is carried on to rest."""
-    changes = {check.name: getattr(check, which) for check in result.numerical_checks if check.name in VARIANTS}
+
+    def of(check: Check) -> float | None:
+        return None if check.reason else getattr(check, which)
+
+    checks = result.numerical_checks
+    changes = {c.name: of(c) for c in checks if c.name in VARIANTS} | {HALF_SPEED: at_rest(checks, of)}
     if set(changes) != set(VARIANTS) or None in changes.values():
         return None
-    return math.hypot(*(x * (2.0 if name == HALF_SPEED else 1.0) for name, x in changes.items()))
+    return math.hypot(*(x for x in changes.values() if x is not None))
 
 
 def write_credibility(result: CalibrationResult, context: Context | None = None) -> Path:

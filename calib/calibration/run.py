@@ -39,7 +39,7 @@ from calib.simulation.record_file import read_record, record_errands
 from calib.simulation.workers import Errand, Workers
 from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.global_search import Listener, fit_with_uncertainty
-from calib.validation.numerical_checks import VARIED, check, check_errands
+from calib.validation.numerical_checks import QUARTER_SPEED, VARIED, check, check_errands, further_errands
 from mpm.arrays import FloatArray
 
 STORE, RECORD = "evaluations.h5", "record.h5"
@@ -161,6 +161,10 @@ class _Calibration:
             self.pool.errands(self._counted(errands))
         record = read_record(scene, path)
         way = setup.curve.stroke_length_m
+        more = further_errands(scene, best, self.store, way) if ended else []
+        if more:
+            self.say(f"simulating the best values once more: {QUARTER_SPEED}, as half of it still changes the force")
+            self.pool.errands(self._counted(more))
         checks = check(scene, best, self.store, way, self._fitted) if ended else []
         start = self._start_curve() if ended else np.full_like(setup.curve.stroke, np.nan)
         return Calibrated(setup.sized(best.parameters), fit, found.analysis, record, checks, start, found.posterior)

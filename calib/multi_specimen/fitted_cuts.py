@@ -15,7 +15,7 @@ from calib.uncertainty.predictive import Band
 from calib.validation.acceptance import Conservation, Verdict, agreement, balances, changes
 from calib.validation.metrics import Metrics, compare
 from calib.validation.null_models import null_models
-from calib.validation.numerical_checks import VARIED, Check, check, check_errands
+from calib.validation.numerical_checks import QUARTER_SPEED, VARIED, Check, check, check_errands, further_errands
 from mpm.arrays import FloatArray
 from mpm.scene import Scene
 
@@ -95,9 +95,14 @@ def fitted_cuts(specimens: Specimens, fit: JointFit, out: Path) -> dict[str, Fit
     if errands:
         specimens.say(f"simulating the best values of {', '.join(fit.names)} once more: whole, and {VARIED}")
         specimens.pool.errands(errands)
+    ways = {name: setups[name].curve.stroke_length_m for name in scenes}
+    more = [e for n, scene in scenes.items() for e in further_errands(scene, fit.run(n).evaluation, store, ways[n])]
+    if more:
+        specimens.say(f"simulating the best values once more: {QUARTER_SPEED}, as half of it still changes the force")
+        specimens.pool.errands(more)
     cuts = {}
     for name, scene in scenes.items():
         setup, run, values = setups[name], fit.run(name), fit.values(name)
-        checks = check(scene, run.evaluation, store, setup.curve.stroke_length_m, values)
+        checks = check(scene, run.evaluation, store, ways[name], values)
         cuts[name] = FittedCut(setup, run, values, scene, fit.band(name), checks)
     return cuts

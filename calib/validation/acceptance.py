@@ -15,7 +15,15 @@ from calib.simulation.evaluation import FULLY_PARTED, Evaluation
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.validation.bounds import AT_BOUND, AT_LIMIT, bound_word
 from calib.validation.metrics import Metrics
-from calib.validation.numerical_checks import FINER_GRID, HALF_SPEED, VARIANTS, Check
+from calib.validation.numerical_checks import (
+    CHANGE_LIMIT,
+    FINER_GRID,
+    HALF_SPEED,
+    QUARTER_SPEED,
+    VARIANTS,
+    Check,
+    at_rest,
+)
 from calib.validation.predictive_score import PredictiveScore
 from calib.validation.prior_conflict import PriorConflict
 from mpm.output.number_text import listed, quantity, uncertain
@@ -27,7 +35,6 @@ PEAK_LIMIT = 0.05
 FIT_NRMSE_LIMIT = 0.08
 SHAPE_LIMIT = 0.08
 MOMENTUM_BALANCE_LIMIT = 0.01
-CHANGE_LIMIT = 0.05  # of peak and work by numerical choices: as much as the peak may miss the trace
 CHANGE_DIGITS = 2  # significant digits of such a change
 LOSS_LIMIT = 0.05  # energy lost by the discretisation, of all work: the force is too large by about that
 CURVE_LINE = "curve error (NRMSE)"
@@ -104,21 +111,25 @@ def _below(name: str, value: float, limit: float, unit: str = "fraction", note: 
 def changes(checks: Sequence[Check]) -> list[Verdict]:
     """Lines of what numerical choices change: one each, and one for all constants of the method.
 
-    What half the speed changes is carried on to rest. The bias is of first order in the speed, so that it is twice the
-    change.
+    What half the speed changes is carried on to rest (:func:`calib.validation.numerical_checks.at_rest`).
     """
-    own = [_change(c) for c in checks if c.name in VARIANTS]
-    others = [c for c in checks if c.name not in VARIANTS]
-    return [*own, *([_constants(others)] if others else [])]
+    own = {c.name: [c] for c in checks if c.name in VARIANTS}
+    own.get(HALF_SPEED, []).extend(c for c in checks if c.name == QUARTER_SPEED)
+    others = [c for c in checks if c.name not in (*VARIANTS, QUARTER_SPEED)]
+    return [*(_change(name, runs) for name, runs in own.items()), *([_constants(others)] if others else [])]
 
 
-def _change(check: Check) -> Verdict:
-    if check.peak_change is None or check.work_change is None:
-        return Verdict(check.name, None, CHANGE_LIMIT, "fraction", False, f"broke down: {check.reason}")
-    factor, rest = (2.0, ", extrapolated to rest") if check.name == HALF_SPEED else (1.0, "")
-    peak, work = factor * check.peak_change, factor * check.work_change
-    change = max(abs(peak), abs(work))
-    return Verdict(check.name, change, CHANGE_LIMIT, "fraction", change <= CHANGE_LIMIT, _changed(peak, work) + rest)
+def _change(name: str, runs: Sequence[Check]) -> Verdict:
+    """The line of one numerical choice: a single run, or those at smaller speeds."""
+    broken = [c for c in runs if c.change is None]
+    if broken:
+        return Verdict(name, None, CHANGE_LIMIT, "fraction", False, f"broke down: {broken[0].reason}")
+    peak, work, rest = runs[0].peak_change, runs[0].work_change, ""
+    if name == HALF_SPEED:
+        peak, work = at_rest(runs, lambda c: c.peak_change), at_rest(runs, lambda c: c.work_change)
+        rest = ", extrapolated to rest" + (" from half and a quarter of it" if len(runs) > 1 else "")
+    change = max(abs(peak or 0.0), abs(work or 0.0))
+    return Verdict(name, change, CHANGE_LIMIT, "fraction", change <= CHANGE_LIMIT, _changed(peak, work) + rest)
 
 
 def _changed(peak: float | None, work: float | None) -> str:

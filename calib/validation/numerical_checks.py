@@ -3,7 +3,8 @@ each constant of the method halved and doubled."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -21,11 +22,17 @@ FINER = 2 / 3
 """Cell of the finer grid over that of the calibration: five times the cost of the cut."""
 
 
+CHANGE_LIMIT = 0.05
+"""Of peak and work by numerical choices [-]: as much as the peak may miss the trace."""
+
+
 def _finer(scene: Scene) -> Scene:
     return replace(scene, numerics=replace(scene.numerics, dx=FINER * scene.numerics.dx))
 
 
 FINER_GRID, HALF_SPEED = "cells of two thirds", "half the simulated speed"
+QUARTER_SPEED = "a quarter of the simulated speed"
+"""Simulated where half the speed, carried on to rest, changes the force by more than :data:`CHANGE_LIMIT`."""
 VARIANTS: Mapping[str, Callable[[Scene], Scene]] = {
     HALF_SPEED: slower,
     "grid and particles elsewhere": lambda scene: with_other_particles(scene, 1),
@@ -97,6 +104,28 @@ class Check:
         return to_document(self)
 
 
+def further_errands(scene: Scene, own: Evaluation, store: EvaluationStore, stroke: float) -> list[Errand]:
+    """The simulation at a quarter of the speed, where half of it cannot tell what a slow cut would give.
+
+    A bias of first order in the speed is twice the change at half of it. A force whose bias falls faster is not that
+    far from a slow one, and the two slowest runs say so.
+
+    Args:
+        scene: The scene with its calibrated material.
+        own: Its simulation.
+        store: Where :func:`check_errands` were kept.
+        stroke: What the trace has of the stroke [m].
+
+    Returns:
+        One simulation, or none where half the speed says enough or broke down.
+    """
+    half = _against(own, HALF_SPEED, store.last(_key(slower(scene))), stroke)
+    slowest = slower(slower(scene))
+    if store.get(_key(slowest)) is not None or half.change is None or 2.0 * half.change <= CHANGE_LIMIT:
+        return []
+    return [Errand(slowest, _keeper(store, _key(slowest)))]
+
+
 def check(
     scene: Scene, own: Evaluation, store: EvaluationStore, stroke: float, fitted: Collection[str] = ()
 ) -> list[Check]:
@@ -110,17 +139,38 @@ def check(
         fitted: Names of what was fitted.
 
     Returns:
-        A check for each variant.
+        A check for each variant, and one of a quarter of the speed where that was made.
 
     Raises:
         KeyError: They were not made.
     """
-    out = []
-    for name, other in variants(scene, fitted).items():
-        run = store.last(_key(other))
-        if run.ok and min(own.until(stroke)) > 0:
-            peak, work = (new / old - 1 for new, old in zip(run.until(stroke), own.until(stroke), strict=True))
-            out.append(Check(name, None, peak, work, run.unbooked - own.unbooked))
-        else:
-            out.append(Check(name, run.reason or "no force", None, None))
-    return out
+    out = [_against(own, name, store.last(_key(other)), stroke) for name, other in variants(scene, fitted).items()]
+    slowest = store.get(_key(slower(slower(scene))))
+    return out if slowest is None else [*out, _against(own, QUARTER_SPEED, slowest, stroke)]
+
+
+def _against(own: Evaluation, name: str, run: Evaluation, stroke: float) -> Check:
+    """A repeated simulation against the one that is reported."""
+    if not run.ok or min(own.until(stroke)) <= 0:
+        return Check(name, run.reason or "no force", None, None)
+    peak, work = (new / old - 1 for new, old in zip(run.until(stroke), own.until(stroke), strict=True))
+    return Check(name, None, peak, work, run.unbooked - own.unbooked)
+
+
+def at_rest(checks: Sequence[Check], which: Callable[[Check], float | None]) -> float | None:
+    """Change from the reported simulation to a slow one, carried on from the slowest two speeds.
+
+    The bias of the slowest run is taken to be of first order in the speed.
+
+    Args:
+        checks: The repeated simulations.
+        which: Gives a check's change, such as of the peak.
+
+    Returns:
+        The change [-]; None where a run broke down, or none was at half the speed.
+    """
+    found = {check.name: which(check) for check in checks}
+    half, quarter = found.get(HALF_SPEED), found.get(QUARTER_SPEED, math.nan)
+    if half is None or quarter is None:
+        return None
+    return 2.0 * half if math.isnan(quarter) else 2.0 * quarter - half

@@ -35,7 +35,7 @@ from calib.material.scene import (
     with_other_particles,
 )
 from calib.problem.food_parameters import fit_parameters
-from calib.problem.setup import set_up
+from calib.problem.setup import set_up, slower
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_store import EvaluationStore, Header
 from calib.simulation.process_pool import Pool
@@ -47,7 +47,14 @@ from calib.validation.acceptance import Conservation, balances, changes, judge, 
 from calib.validation.method_constants import varied
 from calib.validation.metrics import compare
 from calib.validation.null_models import null_models
-from calib.validation.numerical_checks import Check, check, check_errands
+from calib.validation.numerical_checks import (
+    HALF_SPEED,
+    QUARTER_SPEED,
+    Check,
+    check,
+    check_errands,
+    further_errands,
+)
 from mpm.discretisation.particles import seed
 from mpm.output.energy import spent, unbooked
 from mpm.output.record import ENERGIES, ForceRecord
@@ -216,6 +223,23 @@ def test_a_repeated_run_is_compared_over_the_stroke_of_the_trace(tmp_path):
         assert (elsewhere_.reason, elsewhere_.change) == ("not_finite", None)
         silent = check(PRISM, replace(own, force=0.0 * stroke), store, 0.015)
         assert {c.reason for c in silent} == {"no force", "not_finite"}
+        (further,) = further_errands(PRISM, own, store, 0.015)  # twice 5 % is beyond the limit
+        assert further.scene == slower(slower(PRISM))
+        further.keep(replace(own, force=np.where(stroke < 0.0155, 10.4, 0.0), scalars={"work_J": 1.0}))
+        *_, quarter = check(PRISM, own, store, 0.015)
+        assert quarter.name == QUARTER_SPEED and quarter.peak_change == pytest.approx(0.04)
+        assert not further_errands(PRISM, own, store, 0.015)
+
+
+def test_a_force_is_carried_on_to_rest_from_the_two_slowest_runs():
+    """Twice the change at half the speed; with a quarter of it from both, as a line through the two."""
+    half, quarter = Check(HALF_SPEED, None, -0.04, 0.02), Check(QUARTER_SPEED, None, -0.043, 0.04)
+    far, near = changes([half]), changes([half, quarter])
+    assert (far[0].value, far[0].passed) == (pytest.approx(0.08), False)
+    assert (near[0].name, near[0].value, near[0].passed) == (HALF_SPEED, pytest.approx(0.06), False)
+    assert near[0].note == "peak −4.6\xa0%, work +6.0\xa0%, extrapolated to rest from half and a quarter of it"
+    assert len(near) == 1 and changes([half, replace(quarter, work_change=0.02)])[0].passed
+    assert changes([half, Check(QUARTER_SPEED, "inverted", None, None)])[0].note == "broke down: inverted"
 
 
 def test_height_is_fitted_only_where_it_is_free():

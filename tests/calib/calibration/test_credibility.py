@@ -19,7 +19,7 @@ from calib.calibration.credibility import (
 )
 from calib.calibration.result import read_result
 from calib.errors import MaterialError
-from calib.validation.numerical_checks import VARIANTS, Check
+from calib.validation.numerical_checks import QUARTER_SPEED, VARIANTS, Check
 from cutcal.main import main
 from tests.calib.documents import valid
 from tests.reports import sample
@@ -42,6 +42,9 @@ def test_comparison_error_and_its_uncertainty(tmp_path: Path) -> None:
     assert peak.high == pytest.approx(peak.error + 2.0 * (peak.u_val or 0.0))
     assert found.work.u_num == pytest.approx(0.28 * m.work_sim_J)
     valid(to_document(found), "credibility")
+    slowest = Check(QUARTER_SPEED, None, 0.03, 0.06)
+    slow = credibility(replace(result, numerical_checks=(*CHECKS, slowest))).peak
+    assert slow.u_num == pytest.approx(0.13 * m.peak_sim_N)  # (.03, .04, .12): nothing more comes below half the speed
 
 
 def test_numerics_that_nobody_checked_are_not_zero(tmp_path: Path) -> None:
