@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from reports.base.format import breakable, count, listed, quantity
+from reports.base.format import NBSP, breakable, count, listed, quantity
 
 #: Names of the files in words; what is not here loses its underscores.
 WORDS = {
@@ -20,6 +20,8 @@ WORDS = {
     "unknown": "not determined",
     "paper_table2": "paper, Table 2",
 }
+#: Parts below which no number of per cent with two decimals is left.
+LEAST_PART = 5e-5
 #: Properties of the material whose names are single words, which no capital changes.
 SYMBOLS = ("rho", "E", "nu", "R", "mu")
 
@@ -39,6 +41,8 @@ def shown(x: Any, unit: str, digits: int | None) -> str:
         return "yes" if x else "no"
     if isinstance(x, int) and unit == "-":
         return count(x)
+    if isinstance(x, float) and unit == "fraction" and 0.0 < abs(x) < LEAST_PART:
+        return f"<{NBSP}{quantity(2 * LEAST_PART, unit, digits=None)}"
     if x is None or isinstance(x, (int, float)):
         return quantity(x, unit, digits=digits)
     return breakable(listed([str(i) for i in x]) if isinstance(x, list) else str(x))

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from reports.base.format import DASH, breakable, count, duration, interval, listed, quantity, uncertain
+from reports.base.format import DASH, NBSP, breakable, count, duration, interval, listed, quantity, uncertain
+from reports.base.labels import shown
 from tests.reports.sample import spaced
 
 
@@ -85,3 +86,11 @@ def test_breaks_are_only_in_long_words() -> None:
     path = "folder/" * 6 + "trace.csv"
     assert breakable(path).split("\u200b") == ["folder/"] * 6 + ["trace.", "csv"]
     assert max(len(part) for part in breakable("x" * 100).split("\u200b")) <= 20
+
+
+def test_a_part_too_small_for_per_cent_is_no_nought():
+    """A probability of one in a million is not shown as 0.00 %; nothing is, and what two decimals hold."""
+    assert shown(9.2e-7, "fraction", 3) == f"<{NBSP}0.01{NBSP}%" == shown(-4.9e-5, "fraction", 3)
+    assert shown(5.1e-5, "fraction", 3) == f"0.01{NBSP}%"
+    assert shown(0.0, "fraction", 3) == f"0{NBSP}%"
+    assert shown(9.2e-7, "-", 3) != shown(9.2e-7, "fraction", 3)
