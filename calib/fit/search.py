@@ -65,9 +65,9 @@ CONVERGED_ROUNDS, STALLED_ROUNDS = 2, 4
 MAX_DESIGNS = 3
 #: Further screenings of a curve that is not explained, and what each adds to the seed.
 MAX_RESCREENINGS, RESCREENING_SEED = 3, 77
-#: The best curve is off by more than twice its tolerance where chi-square exceeds so many times the number of
-#: independent data [-]: no model's error explains that, and what is left of the budget is spent on looking elsewhere.
-FAR_OFF = 4.0
+#: Quantile of the chi-square of the right material beyond which the best curve is far off, and what is left of the
+#: budget is spent on looking elsewhere: one right material in a thousand leaves as much.
+FAR_OFF = 0.999
 #: Spent without a gain worth a round [fine simulations], after which a search whose curve is not explained, but not
 #: far off, ends: nearly what one that explains its curve takes in all.
 IDLE_BUDGET = 25.0
@@ -105,6 +105,7 @@ class Search:
     ) -> None:
         self.objective, self.options, self.progress = objective, options, progress
         self.enough = chi2.ppf(EXPLAINED, objective.effective_rows) if enough is None else enough
+        self.far_off = float(chi2.ppf(FAR_OFF, objective.effective_rows))
         self.parameters = objective.parameters
         self.fine, self.coarse = evaluator, coarse
         self.runs: list[ScoredRun] = []
@@ -141,7 +142,7 @@ class Search:
     @property
     def idle(self) -> bool:
         """Whether nothing has been gained for long, and the curve is off by no more than a model's error may be."""
-        off = not self.screening and self.enough < self.best.misfit <= FAR_OFF * self.objective.effective_rows
+        off = not self.screening and self.enough < self.best.misfit <= self.far_off
         return off and self.spent - self.gained_at >= IDLE_BUDGET
 
     @property
@@ -219,7 +220,7 @@ class Search:
 
     def _rescreen(self) -> bool:
         """Go down from another design and run what that finds; False where it cannot or need not be paid."""
-        far_off = self.best.misfit > FAR_OFF * self.objective.effective_rows
+        far_off = self.best.misfit > self.far_off
         rest = self.options.budget - self.spent - 2 * self.options.batch
         unpaid = rest < self.options.coarse_cost * self.options.least(len(self.parameters))
         if self.coarse is None or unpaid or (self.rescreenings >= MAX_RESCREENINGS and not far_off):
