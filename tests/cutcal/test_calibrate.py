@@ -26,7 +26,7 @@ from tests.data_dir import ROOT
 
 TRACE = ROOT / "force_data" / "banana_reconstructed.csv"
 # A coarse grid and two parameters: seconds a simulation, enough to pass through every stage.
-SMALL = ["--food", "banana", "--trace", str(TRACE), "--fit", "E,R", "--dx", "4.1e-3", "--budget", "14"]
+SMALL = ["--food", "banana", "--trace", str(TRACE), "--fit", "E,R", "--dx", "5e-3", "--budget", "14"]
 pytestmark = pytest.mark.slow
 PATIENCE_S = 400.0  # for the first stored runs, kernels compiled by two processes on a loaded machine included
 
@@ -192,7 +192,7 @@ def test_another_trace_is_not_mixed_in(finished, tmp_path, capsys):
             "--trace",
             str(other),
             "--dx",
-            "4.1e-3",
+            "5e-3",
             "--out",
             str(finished[0]),
             "--resume",
