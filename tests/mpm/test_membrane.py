@@ -21,6 +21,7 @@ from mpm.state.host_transfer import particles
 from tests.mpm.scenes import PRISM, THIN, cut
 
 BALL = Shape("sphere", 0.03, 0.03, 0.03)
+SMALL = Shape("sphere", 0.022, 0.022, 0.022)
 BAR = Shape("cylinder", 0.09, 0.021, 0.021)
 SOFT = Material(E=1e5, nu=0.3, rho=1000, loss_factor=0.5, skin_stiffness=100.0)
 BULK = SOFT.E / (3 * (1 - 2 * SOFT.nu))
@@ -146,9 +147,9 @@ def test_shortened_skin_is_slack():
 
 @pytest.fixture(scope="module")
 def fruits() -> dict[str, ForceRecord]:
-    """A ball cut with and without its skin, and whole in place of a quarter."""
+    """A small ball cut with and without its skin, and whole in place of a quarter."""
     flesh = replace(PRISM.food.material, E=5e5, R=150.0, R_initiation=300.0, loss_factor=0.1)
-    bare = replace(PRISM, food=Food(BALL, flesh), motion=Motion(0.03, 0.02))
+    bare = replace(PRISM, food=Food(SMALL, flesh), motion=Motion(SMALL.height, 0.02))
     skinned = bare.with_material(skin_stiffness=3000.0)
     whole = replace(skinned, numerics=replace(skinned.numerics, mirror=False))
     return {"bare": cut(bare), "skinned": cut(skinned), "whole": cut(whole)}
@@ -164,7 +165,7 @@ def test_skin_hardly_changes_a_cut_but_stiffens_a_press(fruits):
     """The edge goes through it, and what is left is slack; between plates it is stretched all round."""
     assert fruits["skinned"].work == pytest.approx(fruits["bare"].work, rel=0.1)
     soft = replace(SOFT, skin_stiffness=1000.0)
-    pressed = replace(PRISM, food=Food(BALL, soft), knife=Press(), motion=Motion(6e-3, 0.01))
+    pressed = replace(PRISM, food=Food(SMALL, soft), knife=Press(), motion=Motion(SMALL.height / 5, 0.01))
     bare = pressed.with_material(skin_stiffness=0.0)
     assert cut(pressed).peak > 1.07 * cut(bare).peak
 
