@@ -211,7 +211,7 @@ def test_two_threads_repeat_one_beside_mirrors(shift, mirrors):
 @pytest.mark.slow
 def test_a_simulation_outlives_a_restart_of_taichi():
     """Another precision starts Taichi anew, and every field is gone; a simulation made before runs again, and alike."""
-    scene = replace(BRITTLE, motion=replace(BRITTLE.motion, stroke=2e-3))
+    scene = replace(PRISM, knife=WEDGE, motion=replace(PRISM.motion, stroke=2e-3))
     double = Simulation(scene, Runtime(threads=1))
     first = double.run().resolved
     single = (
