@@ -243,7 +243,8 @@ def test_a_weaker_food_rubs_less():
     finer the cells.
     """
     strong = replace(PRISM, knife=WEDGE).with_material(mu=0.7, R=50.0, R_initiation=50.0)
-    strong = replace(strong, numerics=replace(strong.numerics, dx=2e-3))
+    short = replace(strong.food, shape=replace(strong.food.shape, length=0.024))
+    strong = replace(strong, food=short, motion=Motion(0.012, 0.01), numerics=replace(strong.numerics, dx=2e-3))
     weak = strong.with_material(yield_stress=FLESH.yield_stress / 8)
     fine = replace(weak, numerics=replace(weak.numerics, dx=1.5e-3))
     rubbed = run(weak)
