@@ -22,10 +22,11 @@ FRUIT = replace(FLESH, **RIND, R_core=30.0, core_ratio=0.5, R_initiation=500.0)
 
 
 def scene(kind: str, material: Material = FRUIT, *, shift=(0.0, 0.0, 0.0), mirror: bool = True, seed: int = 0) -> Scene:
-    """A fruit 36 mm wide on a board, cut through by a thin smooth blade."""
+    """A fruit 36 mm wide on a board, cut through by a thin smooth blade; a cylinder is 30 mm long."""
     height = 0.018 if kind in ("half_cylinder", "hemisphere") else 0.036
+    length = 0.03 if kind == "cylinder" else 0.036
     return Scene(
-        Food(Shape(kind, 0.036, 0.036, height), material),
+        Food(Shape(kind, length, 0.036, height), material),
         BLADE,
         Motion(height, 0.01),
         Board(0.5),
