@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -58,6 +59,12 @@ def reference() -> ForceRecord:
     return cut(BANANA)
 
 
+@cache
+def whole() -> ForceRecord:
+    """The banana cut without mirrors."""
+    return cut(vary(mirror=False))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "change",
@@ -77,7 +84,7 @@ def reference() -> ForceRecord:
 )
 def test_cut_of_a_banana_does_not_see_how_it_is_discretised(reference, change):
     """Peak and work within 2 % of the default whatever the offset, the angle, the mirrors, the particles, the seed."""
-    record = cut(vary(**change))
+    record = whole() if change == {"mirror": False} else cut(vary(**change))
     assert record.peak == pytest.approx(reference.peak, rel=0.02)
     assert record.work == pytest.approx(reference.work, rel=0.02)
 
@@ -115,10 +122,10 @@ def test_longer_halves_are_bent_apart_with_more_force():
     def force(record: ForceRecord) -> float:
         return float(np.interp(np.linspace(5e-3, 8.5e-3, 50), record.stroke, record.resolved_face).mean())
 
-    long, thinned = opened(0.096), opened(0.096, far=6e-3)
+    long, thinned = opened(0.066), opened(0.066, far=6e-3)
     assert force(long) > 1.4 * force(opened(0.024))
     slow = {"tough": 1.0, "mach": 0.0025}  # faster, the inertia of long arms that fly apart is most of their force
-    assert force(opened(0.096, **slow)) < 1.25 * force(opened(0.024, **slow))
+    assert force(opened(0.066, **slow)) < 1.25 * force(opened(0.024, **slow))
     assert thinned.particles < 0.6 * long.particles
     assert force(thinned) == pytest.approx(force(long), rel=0.01)
     assert thinned.mass == pytest.approx(long.mass, rel=1e-12)
@@ -153,7 +160,7 @@ def test_force_is_proportional_to_the_width():
     flesh = Material(E=1e6, nu=0.35, rho=1000, yield_stress=2e5, R=300.0, loss_factor=0.1)
     for width in (0.010, 0.020, 0.040):
         scene = Scene(
-            Food(Shape("block", 0.024, width, 0.024), flesh),
+            Food(Shape("block", 0.016, width, 0.024), flesh),
             THIN,
             Motion(0.017, 0.01),
             edge=EdgeLaw(zone=3e-3),
@@ -168,6 +175,6 @@ def test_force_is_proportional_to_the_width():
 def test_halves_are_pressed_apart_alike(reference):
     """With mirrors there is no sideways force; without, random particles left and right leave 1 % of the peak (rms)."""
     assert np.abs(reference.knife[:, 1]).max() == 0.0
-    record = cut(vary(mirror=False))
+    record = whole()
     sideways = np.convolve(record.knife[:, 1], np.ones(4) / 4, mode="valid")  # over one millimetre
     assert np.sqrt(np.mean(sideways**2)) < 0.01 * record.peak
