@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+from collections.abc import Iterator
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: more threads only make the tests slower
 
@@ -16,3 +17,14 @@ def _seed() -> None:
     """Start every test from the same global random state, whatever ran before it."""
     random.seed(0)
     np.random.seed(0)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _kept_states() -> Iterator[None]:
+    """Keep the fields of more scenes than a process of its own does: tests take turns with some dozen sizes of them,
+    and kernels are compiled anew, for many seconds, where they are made again."""
+    import mpm.solver
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mpm.solver, "KEPT", 12)
+        yield
