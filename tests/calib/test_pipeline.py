@@ -223,7 +223,10 @@ def test_a_repeated_run_is_compared_over_the_stroke_of_the_trace(tmp_path):
         assert (elsewhere_.reason, elsewhere_.change) == ("not_finite", None)
         silent = check(PRISM, replace(own, force=0.0 * stroke), store, 0.015)
         assert {c.reason for c in silent} == {"no force", "not_finite"}
-        (further,) = further_errands(PRISM, own, store, 0.015)  # twice 5 % is beyond the limit
+        for force, asked in ((10.3, 0), (10.2, 1)):  # twice 1.9 % is within the limit, twice 2.9 % is not
+            near = replace(own, force=own.force * force / 10.0, scalars={"work_J": 2.0, "unbooked_J": 0.1})
+            assert len(further_errands(PRISM, near, store, 0.015)) == asked
+        (further,) = further_errands(PRISM, own, store, 0.015)
         assert further.scene == slower(slower(PRISM))
         further.keep(replace(own, force=np.where(stroke < 0.0155, 10.4, 0.0), scalars={"work_J": 1.0}))
         *_, quarter = check(PRISM, own, store, 0.015)
