@@ -160,7 +160,8 @@ def _against(own: Evaluation, name: str, run: Evaluation, stroke: float) -> Chec
 def at_rest(checks: Sequence[Check], which: Callable[[Check], float | None]) -> float | None:
     """Change from the reported simulation to a slow one, carried on from the slowest two speeds.
 
-    The bias of the slowest run is taken to be of first order in the speed.
+    The bias of the slowest run is taken to be of first order in the speed. What is carried on is never nearer than the
+    slowest run itself: a force that scatters with the speed is not slow because a line through two runs ends well.
 
     Args:
         checks: The repeated simulations.
@@ -173,4 +174,4 @@ def at_rest(checks: Sequence[Check], which: Callable[[Check], float | None]) -> 
     half, quarter = found.get(HALF_SPEED), found.get(QUARTER_SPEED, math.nan)
     if half is None or quarter is None:
         return None
-    return 2.0 * half if math.isnan(quarter) else 2.0 * quarter - half
+    return 2.0 * half if math.isnan(quarter) else max(2.0 * quarter - half, quarter, key=abs)

@@ -241,6 +241,8 @@ def test_a_force_is_carried_on_to_rest_from_the_two_slowest_runs():
     assert (far[0].value, far[0].passed) == (pytest.approx(0.08), False)
     assert (near[0].name, near[0].value, near[0].passed) == (HALF_SPEED, pytest.approx(0.06), False)
     assert near[0].note == "peak −4.6\xa0%, work +6.0\xa0%, extrapolated to rest from half and a quarter of it"
+    scattered = [Check(HALF_SPEED, None, 0.12, 0.0), Check(QUARTER_SPEED, None, 0.06, 0.0)]
+    assert (changes(scattered)[0].value, changes(scattered)[0].passed) == (0.06, False)  # the line ends at nothing
     assert len(near) == 1 and changes([half, replace(quarter, work_change=0.02)])[0].passed
     assert changes([half, Check(QUARTER_SPEED, "inverted", None, None)])[0].note == "broke down: inverted"
 
