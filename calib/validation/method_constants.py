@@ -90,6 +90,10 @@ CONSTANTS = (
         "numerical: a quarter of the particles' spacing, as far apart as the points of a face are",
     ),
     MethodConstant(
+        "nodes that follow", "numerics", "extension", (0.5, 2.0),
+        "numerical: part of the mass of the nodes inside, below which a node follows them",
+    ),
+    MethodConstant(
         "rows of a tie", "numerics", "layer_rows", (0.5, 2.0),
         "numerical: parts of a particle's spacing in which the toughness of a food of layers is looked up",
         only="layered",

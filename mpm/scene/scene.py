@@ -112,6 +112,8 @@ class Numerics:
         contact_stiffness: Stiffness of the contact's spring over that of a layer of particles [-]. Below 1.5 Nitsche's
             method is not stable in every food (docs/theory.md, "Measured choices"); stiffer asks for shorter steps.
         edge_band: Half height of what the edge is cutting, about the edge [cells].
+        extension: Beside the cut plane a node whose mass is less than this part of that of the next two inside follows
+            them (:mod:`mpm.kernels.outer_nodes`) [-]; 0 for none.
         layer_rows: Rows of a tie across the cut plane, each with the toughness of the layer that it lies in.
         least_gap: Least distance of a particle's centre from the food's surface that squeezing leaves [cells].
         contact: ``cohesive`` (edge law and particle contact) or ``nodal`` (the plain projection of grid velocities).
@@ -133,6 +135,7 @@ class Numerics:
     contact: str = "cohesive"
     contact_stiffness: float = 2.0
     edge_band: float = 0.125
+    extension: float = 0.1
     layer_rows: int = 8
     least_gap: float = 0.02
     grid_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -158,6 +161,7 @@ class Numerics:
             check_number(w, "far", self.far, 0.0, 1.0, "m")
         check_number(w, "room", self.room, 0.0, 100.0, "of half the food's size")
         check_number(w, "contact_stiffness", self.contact_stiffness, 0.1, 100.0, "of a layer's")
+        check_number(w, "extension", self.extension, -1e-300, 0.25, "of the mass inside")
         check_number(w, "edge_band", self.edge_band, 0.01, 5.0, "cells")
         check_number(w, "least_gap", self.least_gap, 1e-6, 0.2, "cells")
         if not isinstance(self.layer_rows, int) or not 1 <= self.layer_rows <= 64:

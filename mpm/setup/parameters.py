@@ -44,7 +44,7 @@ def _put_grid(table: np.ndarray, scene: Scene, grid: Grid) -> None:
     table[row.DX], table[row.INV_DX], table[row.FIRST_STATION] = num.dx, 1 / num.dx, grid.stations[0]
     table[row.ORIGIN_X], table[row.ORIGIN_Y], table[row.ORIGIN_Z] = grid.origin
     table[row.YAW_COS], table[row.YAW_SIN] = math.cos(num.grid_turn), math.sin(num.grid_turn)
-    table[row.GRAVITY] = num.gravity
+    table[row.GRAVITY], table[row.EXTENSION] = num.gravity, num.extension
 
 
 def _put_material(table: np.ndarray, scene: Scene, material: Material, seeds: Seeds) -> None:

@@ -10,7 +10,7 @@ launch of its own. Short loops are run where the kernel was launched (``serializ
 
 import taichi as ti
 
-from mpm.state.state import CPU_BLOCK, DAMAGE_ROWS, NODE_LINES, NODE_ROWS, PARTS, SKIN, SLICES, TIES
+from mpm.state.state import CPU_BLOCK, DAMAGE_ROWS, NODE_ACROSS, NODE_LINES, NODE_ROWS, PARTS, SKIN, SLICES, TIES
 from mpm.state.tables import BLOCKS, SKIN_COUNT, STATIONS, TIE_COUNT
 
 
@@ -28,6 +28,8 @@ def extent(s: ti.template(), cut, what: ti.template()):
         n = s.size[cut, SKIN_COUNT]
     elif ti.static(what == NODE_LINES):
         n = (s.window[cut, 4] - s.window[cut, 1]) * (s.window[cut, 5] - s.window[cut, 2])
+    elif ti.static(what == NODE_ACROSS):
+        n = (s.window[cut, 3] - s.window[cut, 0]) * (s.window[cut, 5] - s.window[cut, 2])
     elif ti.static(what == NODE_ROWS or what == DAMAGE_ROWS):
         w = node_box(s, cut, what)
         n = (w[3] - w[0]) * (w[4] - w[1]) * ((w[5] - w[2]) if ti.static(s.atomic) else 1)

@@ -34,7 +34,7 @@ FACE_POINTS = 4  # of a particle's face, one above another, at which it meets th
 IN_STONE = -2  # of State.adhering, where a particle is in a stone
 # What a loop goes over: each cut, rows of nodes in reach, lines of nodes across the mirror, parts of the particles,
 # slices along the edge, rows of nodes about what could be damaged, ties across the cut plane, points of the skin.
-CUTS, NODE_ROWS, NODE_LINES, PARTS, SLICES, DAMAGE_ROWS, TIES, SKIN = range(8)
+CUTS, NODE_ROWS, NODE_LINES, PARTS, SLICES, DAMAGE_ROWS, TIES, SKIN, NODE_ACROSS = range(9)
 
 
 @dataclass(frozen=True)
@@ -240,6 +240,7 @@ class State:
             DAMAGE_ROWS: nodes,
             TIES: max(own.ties, 1),
             SKIN: max(own.skin, 1),
+            NODE_ACROSS: own.nodes[0] * own.nodes[2],
         }
 
     def _add_particles(self, real: Any, damage: bool) -> None:

@@ -11,6 +11,7 @@ from mpm.kernels.cutting_edge import apply_edge_law, follow_slices
 from mpm.kernels.g2p import grid_to_particles
 from mpm.kernels.grid_update import clear_grid, fold_mirror_images, update_grid
 from mpm.kernels.membrane import grid_to_skin, skin_to_grid
+from mpm.kernels.outer_nodes import extend_interior
 from mpm.kernels.p2g import particles_to_grid
 from mpm.kernels.reductions import find_window, report
 from mpm.kernels.stone.rigid_motion import move_stone
@@ -37,6 +38,8 @@ def time_step(s: ti.template(), cut):
     update_grid(s, cut)
     if ti.static(s.cuts):
         apply_edge_law(s, cut)
+    if ti.static(s.cuts and not s.nodal):
+        extend_interior(s, cut)
     if ti.static(s.stone):
         move_stone(s, cut)
     if ti.static(s.cuts):
