@@ -21,6 +21,9 @@ from mpm.state.stencil import has_second_field, node_index, node_position
 from mpm.state.tables import EXTENSION, SECOND_BEGIN, SECOND_END, SECOND_OFFSET
 
 BESIDE = 2  # node planes to either side of those with a second field whose columns are followed up and down
+# Across the cut plane a node has to be so much lighter yet: blade and ties act on the nodes outside as well, and one
+# that comes to rest in good time is better left to bear its part.
+ACROSS = 0.1
 
 
 @ti.func
@@ -59,6 +62,7 @@ def extend_across(s: ti.template(), cut, i, k):
                     field_node(s, cut, half, i, j, k),
                     field_node(s, cut, half, i, j - 1, k),
                     field_node(s, cut, half, i, j - 2, k),
+                    ACROSS * s.par[cut, EXTENSION],
                 )
         if ti.static(half == 1 or s.turned):
             for n in range(ti.max(0, ti.min(high, last - 2) - low)):
@@ -69,6 +73,7 @@ def extend_across(s: ti.template(), cut, i, k):
                     field_node(s, cut, half, i, j, k),
                     field_node(s, cut, half, i, j + 1, k),
                     field_node(s, cut, half, i, j + 2, k),
+                    ACROSS * s.par[cut, EXTENSION],
                 )
 
 
@@ -84,6 +89,7 @@ def extend_along(s: ti.template(), cut, j, k):
                 field_node(s, cut, half, i, j, k),
                 field_node(s, cut, half, i - 1, j, k),
                 field_node(s, cut, half, i - 2, j, k),
+                ACROSS * s.par[cut, EXTENSION],
             )
         for n in range(ti.max(0, last - 2 - first)):
             i = last - 3 - n
@@ -93,6 +99,7 @@ def extend_along(s: ti.template(), cut, j, k):
                 field_node(s, cut, half, i, j, k),
                 field_node(s, cut, half, i + 1, j, k),
                 field_node(s, cut, half, i + 2, j, k),
+                ACROSS * s.par[cut, EXTENSION],
             )
 
 
@@ -116,10 +123,10 @@ def extend_upright(s: ti.template(), cut, r):
             base = field_node(s, cut, half, i, j, 0)
             if base >= 0:
                 for k in range(low + 2, high):
-                    follow(s, cut, base + k, base + k - 1, base + k - 2)
+                    follow(s, cut, base + k, base + k - 1, base + k - 2, s.par[cut, EXTENSION])
                 for n in range(ti.max(0, high - 2 - low)):
                     k = high - 3 - n
-                    follow(s, cut, base + k, base + k + 1, base + k + 2)
+                    follow(s, cut, base + k, base + k + 1, base + k + 2, s.par[cut, EXTENSION])
 
 
 @ti.func
@@ -133,7 +140,7 @@ def field_node(s: ti.template(), cut, half, i, j, k):
 
 
 @ti.func
-def follow(s: ti.template(), cut, at, near, far):
+def follow(s: ti.template(), cut, at, near, far, part):
     """Carry the velocity of a node on from the next two inside, if its mass is small against theirs.
 
     The three are projected on the condition that they lie on a line, weighted by mass. Seen from the far node the near
@@ -143,10 +150,11 @@ def follow(s: ti.template(), cut, at, near, far):
         at: Index of the node in the velocities.
         near: That of the next one inside, or -1.
         far: That of the one behind, or -1.
+        part: Of their mass, below which its own is small [-].
     """
     if at >= 0 and near >= 0 and far >= 0:
         u, a, b = s.u[at], s.u[near], s.u[far]
-        if 0 < u[3] < s.par[cut, EXTENSION] * ti.min(a[3], 2 * b[3]):
+        if 0 < u[3] < part * ti.min(a[3], 2 * b[3]):
             jump = (u - 2 * a + b) / (1 / u[3] + 4 / a[3] + 1 / b[3])
             jump[3] = 0.0
             s.u[at] = u - jump / u[3]

@@ -112,8 +112,8 @@ class Numerics:
         contact_stiffness: Stiffness of the contact's spring over that of a layer of particles [-]. Below 1.5 Nitsche's
             method is not stable in every food (docs/theory.md, "Measured choices"); stiffer asks for shorter steps.
         edge_band: Half height of what the edge is cutting, about the edge [cells].
-        extension: Beside the cut plane a node whose mass is less than this part of that of the next two inside follows
-            them (:mod:`mpm.kernels.outer_nodes`) [-]; 0 for none.
+        extension: Beside the cut plane a node above or below the food whose mass is less than this part of that of the
+            next two inside follows them (:mod:`mpm.kernels.outer_nodes`) [-]; across the plane a tenth; 0 for none.
         layer_rows: Rows of a tie across the cut plane, each with the toughness of the layer that it lies in.
         least_gap: Least distance of a particle's centre from the food's surface that squeezing leaves [cells].
         contact: ``cohesive`` (edge law and particle contact) or ``nodal`` (the plain projection of grid velocities).
