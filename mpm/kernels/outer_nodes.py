@@ -58,7 +58,6 @@ def extend_across(s: ti.template(), cut, i, k):
             for j in range(ti.max(low, first + 2), high):
                 follow(
                     s,
-                    cut,
                     field_node(s, cut, half, i, j, k),
                     field_node(s, cut, half, i, j - 1, k),
                     field_node(s, cut, half, i, j - 2, k),
@@ -69,7 +68,6 @@ def extend_across(s: ti.template(), cut, i, k):
                 j = ti.min(high, last - 2) - 1 - n
                 follow(
                     s,
-                    cut,
                     field_node(s, cut, half, i, j, k),
                     field_node(s, cut, half, i, j + 1, k),
                     field_node(s, cut, half, i, j + 2, k),
@@ -85,7 +83,6 @@ def extend_along(s: ti.template(), cut, j, k):
         for i in range(first + 2, last):
             follow(
                 s,
-                cut,
                 field_node(s, cut, half, i, j, k),
                 field_node(s, cut, half, i - 1, j, k),
                 field_node(s, cut, half, i - 2, j, k),
@@ -95,7 +92,6 @@ def extend_along(s: ti.template(), cut, j, k):
             i = last - 3 - n
             follow(
                 s,
-                cut,
                 field_node(s, cut, half, i, j, k),
                 field_node(s, cut, half, i + 1, j, k),
                 field_node(s, cut, half, i + 2, j, k),
@@ -123,10 +119,10 @@ def extend_upright(s: ti.template(), cut, r):
             base = field_node(s, cut, half, i, j, 0)
             if base >= 0:
                 for k in range(low + 2, high):
-                    follow(s, cut, base + k, base + k - 1, base + k - 2, s.par[cut, EXTENSION])
+                    follow(s, base + k, base + k - 1, base + k - 2, s.par[cut, EXTENSION])
                 for n in range(ti.max(0, high - 2 - low)):
                     k = high - 3 - n
-                    follow(s, cut, base + k, base + k + 1, base + k + 2, s.par[cut, EXTENSION])
+                    follow(s, base + k, base + k + 1, base + k + 2, s.par[cut, EXTENSION])
 
 
 @ti.func
@@ -140,7 +136,7 @@ def field_node(s: ti.template(), cut, half, i, j, k):
 
 
 @ti.func
-def follow(s: ti.template(), cut, at, near, far, part):
+def follow(s: ti.template(), at, near, far, part):
     """Carry the velocity of a node on from the next two inside, if its mass is small against theirs.
 
     The three are projected on the condition that they lie on a line, weighted by mass. Seen from the far node the near
