@@ -5,7 +5,7 @@ So it comes to rest the more slowly, the less mass it has, over thousands of ste
 layer of particles creeps under what presses it. That takes energy, also from a blade that stands still, and the more,
 the stiffer the contact is. An extended B-spline has no such node: its velocity is carried on in a line from the next
 two nodes inside (Hoellig, Reif and Wipper 2001, SIAM J. Numer. Anal. 39:442; in the material point method Yamaguchi,
-Moriguchi and Terada 2021, Int. J. Numer. Methods Eng. 122:1739).
+Moriguchi and Terada 2021, Int. J. Numer. Methods Eng. 122).
 
 Here the three velocities are projected on that condition, weighted by mass. The projection keeps momentum and its
 moment, and every velocity that is linear in space. It makes no energy, whatever the masses are.
