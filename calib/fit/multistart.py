@@ -3,14 +3,15 @@
 The best run ever made is returned, not the last one. Where simulations can be repeated slower and with other
 particles, it is the best of the most promising ones run twice: the best of fifty noisy runs owes part of that to its
 noise (selection by replication: Bechhofer 1954, Ann. Math. Statist. 25:16), and a force that hangs on the simulated
-speed is not the food's. A search that has stalled above what the right material would leave is started once more from
-another design, with the budget as its stopping rule.
+speed is not the food's. Of two that the curve does not tell apart, it is the one whose second run has the same force. A
+search that has stalled above what the right material would leave, or that has found none with the same force twice, is
+started once more from another design, with the budget as its stopping rule.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,6 +36,11 @@ from mpm.scene.errors import SimulationError
 FINALISTS = 4
 #: They may be expected to be worse than the best by the chi-square that the noise of so many runs makes.
 FINALIST_MARGIN = 2.0
+#: Largest change of peak or work in a second run that has the same force [-]: half of what the verdict allows for the
+#: speed, because it carries the change on to rest, and a hundredth for other particles.
+HELD_CHANGE = 0.035
+#: Chi-square that two runs may be apart if the curve does not tell them apart: that of an interval of 95 %.
+ALIKE = 3.84
 #: Added to the seed of a search that is started once more.
 RESTART_SEED = 1_000_003
 
@@ -118,10 +124,14 @@ def multistart_search(
     with threadpool_limits(1, "blas"):
         try:
             status = search.run()
-            if status == "stalled":
-                status = _restarted(search)
+            again = status == "stalled" and search.best.misfit > chi2.median(objective.effective_rows)
+            if again:
+                status = _restarted(search, status)
             if replicate is not None:
                 best, replicates = _best_of_finalists(search, replicate)
+                if not again and not holds(best, replicates):
+                    status = _restarted(search, status)
+                    best, replicates = _best_of_finalists(search, replicate, replicates)
         except KeyboardInterrupt:
             if not search.finished:
                 raise
@@ -129,11 +139,15 @@ def multistart_search(
         return _result(search, status, best or search.best, replicates)
 
 
-def _restarted(search: Search) -> str:
-    """Spend the rest of the budget of a stalled search on one from another design, with nothing of what it has learnt.
+def _restarted(search: Search, ended: str) -> str:
+    """Spend the rest of the budget of a search on one from another design, with nothing of what it has learnt.
 
-    That is where the right material would more likely than not have left a smaller chi-square, the budget holds a
-    search, and the first has not already looked elsewhere for long in vain. The runs of both are then the search's.
+    That is where the budget holds a search, and the first has not already looked elsewhere for long in vain. The runs
+    of both are then the search's.
+
+    Args:
+        search: The first search.
+        ended: How it ended.
 
     Returns:
         How the better of the two ended.
@@ -141,41 +155,47 @@ def _restarted(search: Search) -> str:
     goal, options = search.objective, search.options
     rest = options.budget - search.spent
     if rest < options.least(len(goal.parameters)) or search.idle:
-        return "stalled"
-    if search.best.misfit <= chi2.median(goal.effective_rows):
-        return "stalled"
+        return ended
     first, told = search.best, progress_of_all(search.progress, search.runs, search.best, options)
     own = replace(options, budget=rest, seed=options.seed + RESTART_SEED)
     other = Search(goal, search.fine, search.coarse, own, told)
     try:
         status = other.run()
     except SimulationError:
-        status = "stalled"  # no run of the other design ended its stroke
+        status = ended  # no run of the other design ended its stroke
     finally:
         search.runs += other.runs
-    return status if search.best is not first else "stalled"
+    return status if search.best is not first else ended
 
 
-def _best_of_finalists(search: Search, replicate: Evaluator) -> tuple[ScoredRun, list[ScoredRun]]:
-    """Repeat the most promising runs, slower and with other particles; the one of least mean chi-square, and those.
+def _best_of_finalists(
+    search: Search, replicate: Evaluator, known: list[ScoredRun] | None = None
+) -> tuple[ScoredRun, list[ScoredRun]]:
+    """Repeat the most promising runs, slower and with other particles; the answer among them, and the second runs.
 
     A run whose repetition breaks down is not the answer; where all break down, the next ones are repeated, promising or
-    not.
+    not. They are as well where the answer's second run has another force, as far as the curve may not tell them apart.
+
+    Args:
+        search: With the runs.
+        replicate: Runs them once more.
+        known: Second runs that there are.
     """
     surrogate = search.surrogate()
     order = sorted(search.finished, key=lambda run: surrogate.expected(run.z, LOCAL_WEIGHT))
     limit = surrogate.expected(order[0].z, LOCAL_WEIGHT) + FINALIST_MARGIN * max(surrogate.noise_misfit, 1.0)
-    tried: list[ScoredRun] = []
-    replicates: list[ScoredRun] = []
-    for bound in (limit, math.inf):
+    replicates = list(known or ())
+    tried = [next(run for run in order if np.array_equal(run.z, again.z)) for again in replicates]
+    for bound in (limit, limit + ALIKE, math.inf):
+        answer = _answer(tried, replicates)
+        if answer is not None and (holds(answer, replicates) or bound == math.inf):
+            break
         finalists: list[ScoredRun] = []
         for run in [search.best, *order]:
-            known = (*tried, *finalists)
-            apart = all(np.abs((run.z - other.z) / search.unit).max() > BASIN_DISTANCE for other in known)
+            others = (*tried, *finalists)
+            apart = all(np.abs((run.z - other.z) / search.unit).max() > BASIN_DISTANCE for other in others)
             if apart and len(finalists) < FINALISTS and surrogate.expected(run.z, LOCAL_WEIGHT) <= bound:
                 finalists.append(run)
-        if not finalists:
-            continue
         for first in range(0, len(finalists), search.options.batch):
             batch = finalists[first : first + search.options.batch]
             left = [run for run in batch if _may_win(run, surrogate, tried, replicates)]
@@ -183,25 +203,49 @@ def _best_of_finalists(search: Search, replicate: Evaluator) -> tuple[ScoredRun,
             found = sorted(replicate.evaluate(asked), key=lambda e: e.index)
             tried += left
             replicates += (search.objective.score(e, stage="replicate") for e in found)
-        sound = [(t.misfit + r.misfit, k) for k, (t, r) in enumerate(zip(tried, replicates, strict=True)) if r.ok]
-        if sound:
-            return tried[min(sound)[1]], replicates
-    return search.best, replicates
+    return _answer(tried, replicates) or search.best, replicates
+
+
+def _answer(tried: list[ScoredRun], replicates: list[ScoredRun]) -> ScoredRun | None:
+    """The run of least mean chi-square in both runs, if its second run has the same force or no other that the curve
+    does not tell from it has; else the best of those. None where every second run broke down."""
+    sound = [(t.misfit + r.misfit, k) for k, (t, r) in enumerate(zip(tried, replicates, strict=True)) if r.ok]
+    if not sound:
+        return None
+    alike = [(size, k) for size, k in sorted(sound) if size <= min(sound)[0] + 2 * ALIKE]
+    held = [k for _, k in alike if tried[k].change(replicates[k]) <= HELD_CHANGE]
+    return tried[held[0] if held else alike[0][1]]
+
+
+def holds(run: ScoredRun, replicates: Sequence[ScoredRun]) -> bool:
+    """Whether a run's second run has the same force.
+
+    Args:
+        run: The run.
+        replicates: Second runs, among which its own may be.
+
+    Returns:
+        That; False where there is none, or it broke down.
+    """
+    again = next((r for r in replicates if r.ok and np.array_equal(r.z, run.z)), None)
+    return again is not None and run.change(again) <= HELD_CHANGE
 
 
 def _may_win(run: ScoredRun, surrogate: Surrogate, tried: list[ScoredRun], replicates: list[ScoredRun]) -> bool:
     """Whether a second run of a finalist may make it the answer (a race: Maron & Moore 1994, NIPS 6:59).
 
     Not if it would have to gain more over what is expected of it than those run twice so far have gained, on average,
-    and the noise.
+    and the noise. Where the answer so far does not hold, one may win that the curve does not tell from it.
     """
-    sound = [(t, again) for t, again in zip(tried, replicates, strict=True) if again.ok]
-    if not sound:
+    answer = _answer(tried, replicates)
+    if answer is None:
         return True
+    sound = [(t, again) for t, again in zip(tried, replicates, strict=True) if again.ok]
     gain = float(np.mean([surrogate.expected(t.z, LOCAL_WEIGHT) - again.misfit for t, again in sound]))
     noise = FINALIST_MARGIN * max(surrogate.noise_misfit, 1.0)
     least = surrogate.expected(run.z, LOCAL_WEIGHT) - gain - noise
-    return run.misfit + least < min(t.misfit + again.misfit for t, again in sound)
+    leave = 0.0 if holds(answer, replicates) else 2 * ALIKE
+    return run.misfit + least < min(t.misfit + again.misfit for t, again in sound) + leave
 
 
 def _result(search: Search, status: str, best: ScoredRun, replicates: list[ScoredRun]) -> FitResult:

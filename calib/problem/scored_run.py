@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from calib.simulation.evaluation import Evaluation
 from mpm.arrays import FloatArray
 
@@ -44,6 +46,16 @@ class ScoredRun:
     def misfit(self) -> float:
         """Chi-square with priors [-]."""
         return float(self.residual @ self.residual)
+
+    def change(self, again: ScoredRun) -> float:
+        """Largest change of peak or work [-] in another run with the same parameters, of all traces.
+
+        Args:
+            again: The other run.
+        """
+        curves = [(one.curve, other.curve) for one, other in zip(self.each, again.each, strict=True)]
+        changes = [(np.max(new) / np.max(old) - 1, np.sum(new) / np.sum(old) - 1) for old, new in curves]
+        return float(np.max(np.abs(changes)))
 
     @property
     def ok(self) -> bool:

@@ -60,6 +60,7 @@ def analyse(
     fine: Evaluator | None = None,
     seed: int = 0,
     say: Callable[[str], None] = lambda text: None,
+    accepts: Callable[[ScoredRun], bool] = lambda run: True,
 ) -> UncertaintyAnalysis | None:
     """Intervals, profiles, nuisances and predictive bands of a fit.
 
@@ -73,6 +74,7 @@ def analyse(
             moved are simulated again.
         seed: Seed of the predictive draws.
         say: Called before each round of simulations, with one sentence.
+        accepts: Whether a run that is better than the answer may be the answer.
 
     Returns:
         The analysis; None where the fit ended before there were runs enough for one.
@@ -82,7 +84,7 @@ def analyse(
     with threadpool_limits(1, "blas"):
         runs, surrogate, found, profiles = _with_simulated_ends(objective, result, coarse, fine, say)
         better = _better(result, runs, surrogate.noise_misfit)
-        if better is not None:
+        if better is not None and accepts(better):
             result = replace(
                 result, best=better, parameters=result.parameters.with_values(better.evaluation.parameters)
             )

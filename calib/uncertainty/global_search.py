@@ -19,7 +19,7 @@ from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
 from calib.fit.budget import progress_of_all
-from calib.fit.multistart import FitResult, multistart_search
+from calib.fit.multistart import ALIKE, FitResult, holds, multistart_search
 from calib.fit.options import FitOptions
 from calib.fit.search import Search
 from calib.fit.surrogate import Surrogate
@@ -120,7 +120,15 @@ def fit_with_uncertainty(
         told.say(f"a second search, from another design, for a food with another {_names(claimed, ' or ')}")
         result = second = _second_search(objective, first, claimed, evaluators, options, told.progress)
     told.found(result)
-    analysis = analyse(objective, result, coarse=coarse, fine=fine, seed=options.seed, say=told.say)
+    analysis = analyse(
+        objective,
+        result,
+        coarse=coarse,
+        fine=fine,
+        seed=options.seed,
+        say=told.say,
+        accepts=lambda run: _may_follow(objective, result, run, replicate),
+    )
     if analysis is None:
         return result, None
     analysis = _reviewed(objective, analysis, _Searches(first, second, claimed), replicate, options.budget)
@@ -173,6 +181,17 @@ def _replicated(objective: Objective | JointObjective, fit: FitResult, replicate
     return replace(fit, replicates=(*fit.replicates, objective.score(run, stage="replicate")))
 
 
+def _may_follow(objective: Objective | JointObjective, fit: FitResult, run: ScoredRun, replicate: Evaluator) -> bool:
+    """Whether a run with a smaller chi-square may be the answer in place of one whose second run has the same force.
+
+    Not where the curve does not tell them apart and its own second run has another force, or breaks down.
+    """
+    if fit.best.misfit - run.misfit > ALIKE or not holds(fit.best, fit.replicates):
+        return True
+    again = objective.score(next(iter(replicate.evaluate([run.evaluation.parameters]))), stage="replicate")
+    return holds(run, [again])
+
+
 def _second_run(fit: FitResult) -> ScoredRun | None:
     """That of the answer, slower and with other particles."""
     return next((t for t in fit.replicates if np.array_equal(t.z, fit.best.z)), None)
@@ -205,7 +224,8 @@ def _second_search(
         runs = (*first.history, *more)
         assert first.surrogate is not None  # or nothing would be claimed
         found = min((t for t in more if t.cut and not t.coarse), key=lambda t: t.misfit, default=first.best)
-        best = found if found.misfit < first.best.misfit - first.surrogate.noise_misfit else first.best
+        better = found.misfit < first.best.misfit - first.surrogate.noise_misfit
+        best = found if better and _may_follow(objective, first, found, evaluators.replicate) else first.best
         surrogate = Surrogate(objective, runs, best, first.surrogate.hyper)
         parameters = first.parameters.with_values(best.evaluation.parameters)
         jacobian = surrogate.jacobian(best.z)
