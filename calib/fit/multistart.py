@@ -4,8 +4,8 @@ The best run ever made is returned, not the last one. Where simulations can be r
 particles, it is the best of the most promising ones run twice: the best of fifty noisy runs owes part of that to its
 noise (selection by replication: Bechhofer 1954, Ann. Math. Statist. 25:16), and a force that hangs on the simulated
 speed is not the food's. Of two that the curve does not tell apart, it is the one whose second run has the same force. A
-search that has stalled above what the right material would leave, or that has found none with the same force twice, is
-started once more from another design, with the budget as its stopping rule.
+search that has stalled above what the right material would leave is started once more from another design, with the
+budget as its stopping rule. So is one whose answer has another force in its second run, and sent away from that answer.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from threadpoolctl import threadpool_limits
 
 from calib.fit.acquisition import LOCAL_WEIGHT
 from calib.fit.budget import progress_of_all
+from calib.fit.deflation import DeflatedParameterSet
 from calib.fit.options import FitOptions
 from calib.fit.search import BASIN_DISTANCE, Search
 from calib.fit.surrogate import Surrogate
@@ -41,6 +42,9 @@ FINALIST_MARGIN = 2.0
 HELD_CHANGE = 0.035
 #: Chi-square that two runs may be apart if the curve does not tell them apart: that of an interval of 95 %.
 ALIKE = 3.84
+#: What is deflated of an answer that does not hold: the first of these parameters that is fitted, or the first at all,
+#: as far about it as its prior's standard deviation. Foods that draw one curve differ in stiffness before all else.
+TELLING = ("E", "R")
 #: Added to the seed of a search that is started once more.
 RESTART_SEED = 1_000_003
 
@@ -130,7 +134,7 @@ def multistart_search(
             if replicate is not None:
                 best, replicates = _best_of_finalists(search, replicate)
                 if not again and not holds(best, replicates):
-                    status = _restarted(search, status)
+                    status = _restarted(search, status, away_from=best)
                     best, replicates = _best_of_finalists(search, replicate, replicates)
         except KeyboardInterrupt:
             if not search.finished:
@@ -139,7 +143,7 @@ def multistart_search(
         return _result(search, status, best or search.best, replicates)
 
 
-def _restarted(search: Search, ended: str) -> str:
+def _restarted(search: Search, ended: str, away_from: ScoredRun | None = None) -> str:
     """Spend the rest of the budget of a search on one from another design, with nothing of what it has learnt.
 
     That is where the budget holds a search, and the first has not already looked elsewhere for long in vain. The runs
@@ -148,6 +152,7 @@ def _restarted(search: Search, ended: str) -> str:
     Args:
         search: The first search.
         ended: How it ended.
+        away_from: A run whose food is not to be found again.
 
     Returns:
         How the better of the two ended.
@@ -158,14 +163,23 @@ def _restarted(search: Search, ended: str) -> str:
         return ended
     first, told = search.best, progress_of_all(search.progress, search.runs, search.best, options)
     own = replace(options, budget=rest, seed=options.seed + RESTART_SEED)
-    other = Search(goal, search.fine, search.coarse, own, told)
+    sought = goal if away_from is None else replace(goal, parameters=_deflated(goal.parameters, away_from.z))
+    other = Search(sought, search.fine, search.coarse, own, told)
     try:
         status = other.run()
     except SimulationError:
         status = ended  # no run of the other design ended its stroke
     finally:
-        search.runs += other.runs
+        scored = (goal.score(run.evaluation, coarse=run.coarse, stage=run.stage) for run in other.runs)
+        search.runs += other.runs if away_from is None else scored
     return status if search.best is not first else ended
+
+
+def _deflated(parameters: ParameterSet, z: FloatArray) -> DeflatedParameterSet:
+    """The parameters with what lies about a point (p,) deflated."""
+    place = next((parameters.names.index(name) for name in TELLING if name in parameters.names), 0)
+    claim = (place, float(z[place]), float(parameters.prior_sd[place]))
+    return DeflatedParameterSet(parameters.items, parameters.correlations, (claim,))
 
 
 def _best_of_finalists(

@@ -19,6 +19,7 @@ from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
 from calib.fit.budget import progress_of_all
+from calib.fit.deflation import DeflatedParameterSet
 from calib.fit.multistart import ALIKE, FitResult, holds, multistart_search
 from calib.fit.options import FitOptions
 from calib.fit.search import Search
@@ -33,7 +34,6 @@ from calib.simulation.evaluation import Evaluator, Evaluators
 from calib.uncertainty.analysis import UncertaintyAnalysis, analyse, equally_good, search_uncertainty
 from calib.uncertainty.intervals import Interval
 from calib.uncertainty.profile_likelihood import RISE
-from mpm.arrays import FloatArray
 from mpm.scene.errors import SimulationError
 
 CLAIMABLE = ("R", "R_skin")
@@ -44,26 +44,6 @@ SECOND_SEED = 2_000_003
 STRETCH = 3.0
 """Claimed intervals are deflated this much longer about their middle: there chi-square has risen by 8.6, so that no
 food of the same valley draws the search away from another one that is as good."""
-DEFLATION = 10.0
-"""Residual in the middle of what is deflated [standard deviations]."""
-
-
-@dataclass(frozen=True)
-class DeflatedParameterSet(ParameterSet):
-    """Parameters whose prior has a row more: how deep a point lies within all claimed intervals at once.
-
-    Attributes:
-        claims: Place of each claimed parameter among the items, and the middle and the half width of what is deflated
-            of it, in internal coordinates.
-    """
-
-    claims: tuple[tuple[int, float, float], ...] = ()
-
-    def prior_residual(self, z: FloatArray) -> FloatArray:
-        """That of the parameters, and the depth: (p + 1,) of a point (p,), (q, p + 1) of many."""
-        depth = [1.0 - np.abs(z[..., place] - middle) / half for place, middle, half in self.claims]
-        row = DEFLATION * np.maximum(np.min(depth, axis=0), 0.0)
-        return np.concatenate([super().prior_residual(z), row[..., None]], axis=-1)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from scipy.stats import chi2
 from calib.errors import MaterialError
 from calib.fit import search
 from calib.fit.acquisition import LOCAL_WEIGHT
-from calib.fit.multistart import FINALIST_MARGIN, RESTART_SEED, FitResult, _may_win, multistart_search
+from calib.fit.multistart import ALIKE, FINALIST_MARGIN, RESTART_SEED, FitResult, _may_win, multistart_search
 from calib.fit.options import FitOptions
 from calib.fit.search import (
     DESCENT_BUDGET,
@@ -516,6 +516,34 @@ def test_an_answer_whose_repetition_breaks_down_is_not_chosen() -> None:
     )
     assert lost.best.misfit == min(t.misfit for t in lost.history if t.ok)
     assert lost.replicates and not any(t.ok for t in lost.replicates)
+
+
+def mirrored(p: Mapping[str, float]) -> np.ndarray:
+    """The quick fake with two valleys: R and 340^2 / R give the same curve."""
+    return two_terms({**p, "R": 340.0 * math.exp(abs(math.log(p["R"] / 340.0)))})
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_of_two_foods_that_draw_the_curve_the_answer_is_the_one_whose_force_stands(seed: int) -> None:
+    """In the valley that the answer lay in the force is now another when it is repeated. Looked for is another food, by
+    a second search if the first has not found it."""
+    objective, options = goal(TWO_TRUTH, TWO, mirrored), FitOptions(budget=80, design=12, seed=seed)
+    plain = multistart_search(objective, Fake(mirrored), replicate=Fake(mirrored), options=options)
+    low = values(plain)["R"] < 340.0
+
+    def shaken(p: Mapping[str, float]) -> np.ndarray:
+        return mirrored(p) * (1.06 if (p["R"] < 340.0) is low else 1.005)
+
+    held = multistart_search(objective, Fake(mirrored), replicate=Fake(shaken), options=options)
+    assert (values(held)["R"] < 340.0) is not low and held.best.misfit < plain.best.misfit + ALIKE
+
+
+def test_a_force_that_does_not_stand_is_the_answer_where_the_curve_tells_it_from_others() -> None:
+    """Numerics decide only between foods that draw the curve alike."""
+    result = multistart_search(
+        two_goal(), Fake(two_terms), replicate=Fake(lambda p: 1.06 * two_terms(p)), options=FitOptions(80, 3)
+    )
+    assert values(result) == pytest.approx(TWO_TRUTH, rel=0.1) and result.best.misfit < 40.0
 
 
 def test_a_finalist_that_cannot_win_is_not_run_twice() -> None:

@@ -204,6 +204,21 @@ def test_the_answer_is_always_run_twice():
     assert global_search._replicated(goal, once, fake) is once and once.simulations == fit.simulations + 1
 
 
+@pytest.mark.parametrize(
+    ("factor", "worse", "follows"), [(1.0, 0.5, True), (1.08, 0.5, False), (1.08, 8.0, True)], ids=str
+)
+def test_a_better_food_is_followed_unless_its_force_does_not_stand(factor, worse, follows):
+    """Where the curve tells the two apart, it is in any case."""
+    goal, fake = objective(onefold), Fake(onefold, noisy=0.0)
+    fit = global_search._replicated(goal, stuck(goal, fake, 1.01), fake)
+    other = replace(fit.best, z=fit.best.z + 0.1, residual=fit.best.residual * 0.0)
+    fit = replace(fit, best=replace(fit.best, residual=np.sqrt(worse) * np.eye(len(fit.best.residual))[0]))
+    again = Fake(lambda p: factor * onefold(p), noisy=0.0)
+    run = goal.score(next(iter(fake.evaluate([goal.parameters.to_dict(other.z)]))))
+    run = replace(run, residual=0.0 * run.residual)
+    assert global_search._may_follow(goal, fit, run, again) is follows
+
+
 def test_an_interrupted_search_simulates_nothing_more():
     """After Ctrl-C what there is has its intervals, without another run."""
     goal = objective(onefold)
