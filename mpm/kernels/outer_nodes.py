@@ -20,91 +20,106 @@ from mpm.state.state import NODE_ACROSS, NODE_LINES, NODE_ROWS
 from mpm.state.stencil import has_second_field, node_index, node_position
 from mpm.state.tables import EXTENSION, SECOND_BEGIN, SECOND_END, SECOND_OFFSET
 
+DEEP = 3  # nodes at the end of a line, from the outermost one with mass, that may follow
 BESIDE = 2  # node planes to either side of those with a second field whose columns are followed up and down
 # Across the cut plane a node has to be so much lighter yet: blade and ties act on the nodes outside as well, and one
 # that comes to rest in good time is better left to bear its part.
 ACROSS = 0.1
+ACROSS_PLANE, ALONG_PLANE, UPRIGHT = range(3)  # axes of the lines
 
 
 @ti.func
 def extend_interior(s: ti.template(), cut: ti.template()):
     """Let nodes with little mass beside the cut plane follow those inside, line by line: across the plane and upright,
-    in a turned grid along its third axis as well. From inside to outside, so that a node follows what is done already.
+    in a turned grid along its third axis as well; and then once more, all in reverse.
+
+    One projection after another is no projection any more. It would turn forces that have a potential into such as have
+    none, and those make energy. There and back it is symmetric, and they do not.
     """
-    for q in range(repetitions(s, cut, NODE_ACROSS)):
-        c, r, mine = locate_active(s, cut, q, NODE_ACROSS)
-        if mine:
-            deep = s.window[c, 5] - s.window[c, 2]
-            extend_across(s, c, s.window[c, 0] + r // deep, s.window[c, 2] + r % deep)
+    extend_lines(s, cut, ACROSS_PLANE, False)
     if ti.static(s.turned):
-        for q in range(repetitions(s, cut, NODE_LINES)):
-            c, r, mine = locate_active(s, cut, q, NODE_LINES)
-            if mine:
-                deep = s.window[c, 5] - s.window[c, 2]
-                extend_along(s, c, s.window[c, 1] + r // deep, s.window[c, 2] + r % deep)
-    for q in range(repetitions(s, cut, NODE_ROWS)):
-        c, r, mine = locate_active(s, cut, q, NODE_ROWS)
+        extend_lines(s, cut, ALONG_PLANE, False)
+    extend_lines(s, cut, UPRIGHT, False)
+    extend_lines(s, cut, UPRIGHT, True)
+    if ti.static(s.turned):
+        extend_lines(s, cut, ALONG_PLANE, True)
+    extend_lines(s, cut, ACROSS_PLANE, True)
+
+
+@ti.func
+def extend_lines(s: ti.template(), cut: ti.template(), axis: ti.template(), back: ti.template()):
+    """Nodes of all lines along an axis; ``back`` in the reverse order."""
+    kind = ti.static({ACROSS_PLANE: NODE_ACROSS, ALONG_PLANE: NODE_LINES, UPRIGHT: NODE_ROWS}[axis])
+    for q in range(repetitions(s, cut, kind)):
+        c, r, mine = locate_active(s, cut, q, kind)
         if mine:
-            extend_upright(s, c, r)
+            if ti.static(axis == UPRIGHT):
+                extend_column(s, c, r, back)
+            else:
+                deep = s.window[c, 5] - s.window[c, 2]
+                other, k = r // deep, s.window[c, 2] + r % deep
+                if ti.static(axis == ACROSS_PLANE):
+                    extend_line(s, c, axis, s.window[c, 0] + other, k, back)
+                else:
+                    extend_line(s, c, axis, s.window[c, 1] + other, k, back)
 
 
 @ti.func
-def extend_across(s: ti.template(), cut, i, k):
-    """Nodes of a line along the grid's y: those of each half that lie towards the other, or at either end."""
-    first, last = s.window[cut, 1], s.window[cut, 4]
-    low, high = ti.max(first, s.size[cut, SECOND_BEGIN]), ti.min(last, s.size[cut, SECOND_END])
-    for half in ti.static(range(1 if s.mirror_y else 2)):
-        if ti.static(half == 0 or s.turned):
-            for j in range(ti.max(low, first + 2), high):
+def extend_line(s: ti.template(), cut, axis: ti.template(), other, k, back: ti.template()):
+    """Nodes of a level line: those of each half that lie towards the other, in a turned grid those at either end.
+
+    Args:
+        axis: Along the grid's y, or along its x.
+        other: Index of the line along the other one.
+        k: Its index along z.
+        back: Whether from outside to inside, and the other half first.
+    """
+    for turn in ti.static(range(4)):
+        extend_half(s, cut, axis, other, k, back, (3 - turn) // 2 if back else turn // 2, (turn + back) % 2)
+
+
+@ti.func
+def extend_half(
+    s: ti.template(),
+    cut,
+    axis: ti.template(),
+    other,
+    k,
+    back: ti.template(),
+    half: ti.template(),
+    down: ti.template(),
+):
+    """As :func:`extend_line`, nodes of one half at the upper (``down`` 0) or the lower end (1) of the line."""
+    # the left half lies below the right one
+    if ti.static(half < (1 if s.mirror_y else 2) and (s.turned or down == half)):
+        first, last = s.window[cut, 1], s.window[cut, 4]
+        low, high = ti.max(first, s.size[cut, SECOND_BEGIN]), ti.min(last, s.size[cut, SECOND_END])
+        if ti.static(axis == ALONG_PLANE):
+            first, last = s.window[cut, 0], s.window[cut, 3]
+            low, high = first, last
+        inwards = ti.static(1 if down else -1)
+        outermost = low if ti.static(bool(down)) else high - 1
+        while low <= outermost < high and massless(s, line_node(s, cut, half, axis, other, outermost, k)):
+            outermost += inwards
+        for m in range(DEEP):
+            n = outermost + (m if ti.static(bool(back)) else DEEP - 1 - m) * inwards
+            if low <= n < high and first <= n + 2 * inwards < last:
                 follow(
                     s,
-                    field_node(s, cut, half, i, j, k),
-                    field_node(s, cut, half, i, j - 1, k),
-                    field_node(s, cut, half, i, j - 2, k),
-                    ACROSS * s.par[cut, EXTENSION],
-                )
-        if ti.static(half == 1 or s.turned):
-            for n in range(ti.max(0, ti.min(high, last - 2) - low)):
-                j = ti.min(high, last - 2) - 1 - n
-                follow(
-                    s,
-                    field_node(s, cut, half, i, j, k),
-                    field_node(s, cut, half, i, j + 1, k),
-                    field_node(s, cut, half, i, j + 2, k),
+                    line_node(s, cut, half, axis, other, n, k),
+                    line_node(s, cut, half, axis, other, n + inwards, k),
+                    line_node(s, cut, half, axis, other, n + 2 * inwards, k),
                     ACROSS * s.par[cut, EXTENSION],
                 )
 
 
 @ti.func
-def extend_along(s: ti.template(), cut, j, k):
-    """Nodes of a line along the grid's x, at either end of each half."""
-    first, last = s.window[cut, 0], s.window[cut, 3]
-    for half in ti.static(range(2)):
-        for i in range(first + 2, last):
-            follow(
-                s,
-                field_node(s, cut, half, i, j, k),
-                field_node(s, cut, half, i - 1, j, k),
-                field_node(s, cut, half, i - 2, j, k),
-                ACROSS * s.par[cut, EXTENSION],
-            )
-        for n in range(ti.max(0, last - 2 - first)):
-            i = last - 3 - n
-            follow(
-                s,
-                field_node(s, cut, half, i, j, k),
-                field_node(s, cut, half, i + 1, j, k),
-                field_node(s, cut, half, i + 2, j, k),
-                ACROSS * s.par[cut, EXTENSION],
-            )
-
-
-@ti.func
-def extend_upright(s: ti.template(), cut, r):
+def extend_column(s: ti.template(), cut, r, back: ti.template()):
     """Nodes of a column near the cut plane, at top and bottom of each half.
 
     Args:
         r: Place of the column in a loop over rows of nodes; on a GPU those of the other nodes of the column do nothing.
+        back: Whether from outside to inside, and the bottom first.
     """
     low, high = s.window[cut, 2], s.window[cut, 5]
     mine = True
@@ -118,11 +133,46 @@ def extend_upright(s: ti.template(), cut, r):
         for half in ti.static(range(1 if s.mirror_y else 2)):
             base = field_node(s, cut, half, i, j, 0)
             if base >= 0:
-                for k in range(low + 2, high):
-                    follow(s, base + k, base + k - 1, base + k - 2, s.par[cut, EXTENSION])
-                for n in range(ti.max(0, high - 2 - low)):
-                    k = high - 3 - n
-                    follow(s, base + k, base + k + 1, base + k + 2, s.par[cut, EXTENSION])
+                for turn in ti.static(range(2)):
+                    extend_end(s, cut, base, back, (turn + back) % 2)
+
+
+@ti.func
+def extend_end(s: ti.template(), cut, base, back: ti.template(), down: ti.template()):
+    """Nodes of a column at its top (``down`` 0) or its bottom (1).
+
+    Args:
+        base: Index of the column's node at k = 0.
+        back: Whether from outside to inside.
+    """
+    low, high = s.window[cut, 2], s.window[cut, 5]
+    inwards = ti.static(1 if down else -1)
+    outermost = low if ti.static(bool(down)) else high - 1
+    while low <= outermost < high and massless(s, base + outermost):
+        outermost += inwards
+    for m in range(DEEP):
+        n = outermost + (m if ti.static(bool(back)) else DEEP - 1 - m) * inwards
+        if low <= n < high and low <= n + 2 * inwards < high:
+            at = base + n
+            follow(s, at, at + inwards, at + 2 * inwards, s.par[cut, EXTENSION])
+
+
+@ti.func
+def massless(s: ti.template(), at):
+    """Whether a node, by its index in the velocities or -1, has no mass."""
+    out = True
+    if at >= 0:
+        out = s.u[at][3] <= 0
+    return out
+
+
+@ti.func
+def line_node(s: ti.template(), cut, half, axis: ti.template(), other, n, k):
+    """Index as :func:`field_node`, of a node of a level line."""
+    i, j = other, n
+    if ti.static(axis == ALONG_PLANE):
+        i, j = n, other
+    return field_node(s, cut, half, i, j, k)
 
 
 @ti.func
@@ -149,10 +199,11 @@ def follow(s: ti.template(), at, near, far, part):
         part: Of their mass, below which its own is small [-].
     """
     if at >= 0 and near >= 0 and far >= 0:
-        u, a, b = s.u[at], s.u[near], s.u[far]
-        if 0 < u[3] < part * ti.min(a[3], 2 * b[3]):
-            jump = (u - 2 * a + b) / (1 / u[3] + 4 / a[3] + 1 / b[3])
+        m, m_near, m_far = s.u[at][3], s.u[near][3], s.u[far][3]
+        if 0 < m < part * ti.min(m_near, 2 * m_far):
+            u, a, b = s.u[at], s.u[near], s.u[far]
+            jump = (u - 2 * a + b) / (1 / m + 4 / m_near + 1 / m_far)
             jump[3] = 0.0
-            s.u[at] = u - jump / u[3]
-            s.u[near] = a + 2 * jump / a[3]
-            s.u[far] = b - jump / b[3]
+            s.u[at] = u - jump / m
+            s.u[near] = a + 2 * jump / m_near
+            s.u[far] = b - jump / m_far
