@@ -49,14 +49,15 @@ def disagreeing(page: str, summary: Mapping[str, Any]) -> list[str]:
         if line["value"] is None:
             out += [] if re.search(rf"{name} not run", page) else [f"{line['name']}: not said to be not run"]
             continue
-        found = re.search(rf"{name}\s+([+−]?[\d.]+) ?(%|sd)? ", page)
+        found = re.search(rf"{name}\s+(< )?([+−]?[\d.]+) ?(%|sd)? ", page)
         if found is None:
             out.append(f"{line['name']}: not on the page")
             continue
-        shown, unit = found[1].replace("−", "-"), found[2] or ""
+        shown, unit = found[2].replace("−", "-"), found[3] or ""
         step = 10.0 ** -len(shown.partition(".")[2])  # of its last digit
-        if abs(abs(float(shown)) - UNITS[unit] * abs(line["value"])) > 0.51 * step:
-            out.append(f"{line['name']}: {found[1]} {unit} on the page, {line['value']:.4g} in the summary")
+        off = abs(abs(float(shown)) - UNITS[unit] * abs(line["value"]))
+        if off > (step if found[1] else 0.51 * step):  # less than the smallest number that is shown
+            out.append(f"{line['name']}: {found[2]} {unit} on the page, {line['value']:.4g} in the summary")
     word = "✓ PASSED" if summary["passed"] else "NOT PASSED"
     return out + ([] if word in page.upper() else [f"{word} is not on the page"])
 
