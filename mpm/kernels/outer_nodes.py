@@ -9,6 +9,8 @@ Moriguchi and Terada 2021, Int. J. Numer. Methods Eng. 122).
 
 Here the three velocities are projected on that condition, weighted by mass. The projection keeps momentum and its
 moment, and every velocity that is linear in space. It makes no energy, whatever the masses are.
+
+Not beside a stone: its nodes are projected on a rigid motion afterwards, and the two in turn would not be symmetric.
 """
 
 import taichi as ti

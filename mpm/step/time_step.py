@@ -38,7 +38,7 @@ def time_step(s: ti.template(), cut):
     update_grid(s, cut)
     if ti.static(s.cuts):
         apply_edge_law(s, cut)
-    if ti.static(s.cuts and not s.nodal):
+    if ti.static(s.cuts and not s.nodal and not s.stone):
         extend_interior(s, cut)
     if ti.static(s.stone):
         move_stone(s, cut)

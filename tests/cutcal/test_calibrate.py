@@ -77,6 +77,8 @@ def test_numerical_choices_are_checked(finished):
         "twice the contact stiffness",
         "half the band of the edge",
         "twice the band of the edge",
+        "half the nodes that follow",
+        "twice the nodes that follow",
         "half the least gap to a surface",
         "twice the least gap to a surface",
         "half the friction of the board",

@@ -177,14 +177,14 @@ def test_simulate_says_that_the_grid_weakens_a_strong_food(tmp_path: Path, capsy
 def test_simulate_has_an_option_for_each_constant(tmp_path: Path, capsys):
     """What was asked for stands in the document; the zone of a food without strength is nothing where it has one."""
     argv = ["simulate", "--food", "strawberry", "--knife", "edc", "--stroke", "0.001", "--threads", "1", "--json"]
-    given = ("edge_band=0.4", "least_gap=0.01", "cohesive_zone=5mm", "board_friction=0.8")
+    given = ("edge_band=0.4", "extension=0.05", "least_gap=0.01", "cohesive_zone=5mm", "board_friction=0.8")
     argv += [word for pair in given for word in ("--constant", pair)]
     argv += ["--zone", "4mm", "--slip", "2mm", "--contact-stiffness", "3", "--safety", "0.5"]
     main([*argv, "--out", str(tmp_path / "cut")])
     constants = valid(json.loads(capsys.readouterr().out))["constants"]
     assert constants.pop("loss_factor") > 0 and constants == {
-        "edge_band": 0.4, "layer_rows": 0.0, "least_gap": 0.01, "cohesive_zone": 0.0, "board_friction": 0.8,
-        "zone": 0.004, "bearing": 1.25, "slip": 0.002, "contact_stiffness": 3.0, "safety": 0.5,
+        "edge_band": 0.4, "extension": 0.05, "layer_rows": 0.0, "least_gap": 0.01, "cohesive_zone": 0.0,
+        "board_friction": 0.8, "zone": 0.004, "bearing": 1.25, "slip": 0.002, "contact_stiffness": 3.0, "safety": 0.5,
     }  # fmt: skip
 
 
