@@ -27,7 +27,7 @@ from calib.fit.surrogate import Surrogate
 from calib.io.progress import Progress
 from calib.problem.joint_objective import JointObjective
 from calib.problem.objective import Objective
-from calib.problem.parameters import ParameterSet
+from calib.problem.parameters import Z95, ParameterSet
 from calib.problem.scored_run import ScoredRun
 from calib.simulation.evaluation import Evaluator
 from mpm.arrays import FloatArray
@@ -41,7 +41,7 @@ FINALIST_MARGIN = 2.0
 #: speed, because it carries the change on to rest, and a hundredth for other particles.
 HELD_CHANGE = 0.035
 #: Chi-square that two runs may be apart if the curve does not tell them apart: that of an interval of 95 %.
-ALIKE = 3.84
+ALIKE = Z95**2
 #: What is deflated of an answer that does not hold: the first of these parameters that is fitted, or the first at all,
 #: as far about it as its prior's standard deviation. Foods that draw one curve differ in stiffness before all else.
 TELLING = ("E", "R")
@@ -198,8 +198,10 @@ def _best_of_finalists(
     surrogate = search.surrogate()
     order = sorted(search.finished, key=lambda run: surrogate.expected(run.z, LOCAL_WEIGHT))
     limit = surrogate.expected(order[0].z, LOCAL_WEIGHT) + FINALIST_MARGIN * max(surrogate.noise_misfit, 1.0)
-    replicates = list(known or ())
-    tried = [next(run for run in order if np.array_equal(run.z, again.z)) for again in replicates]
+    pairs = [(run, again) for again in known or () for run in order if np.array_equal(run.z, again.z)]
+    tried, replicates = [run for run, _ in pairs], [again for _, again in pairs]
+    # what did not cut the food is no finalist any more once something has
+    lost = [again for again in known or () if not any(again is kept for kept in replicates)]
     for bound in (limit, limit + ALIKE, math.inf):
         answer = _answer(tried, replicates)
         if answer is not None and (holds(answer, replicates) or bound == math.inf):
@@ -217,7 +219,7 @@ def _best_of_finalists(
             found = sorted(replicate.evaluate(asked), key=lambda e: e.index)
             tried += left
             replicates += (search.objective.score(e, stage="replicate") for e in found)
-    return _answer(tried, replicates) or search.best, replicates
+    return _answer(tried, replicates) or search.best, [*lost, *replicates]
 
 
 def _answer(tried: list[ScoredRun], replicates: list[ScoredRun]) -> ScoredRun | None:

@@ -445,15 +445,15 @@ def test_noise_is_not_fitted() -> None:
     assert set(statuses) == {"converged", "stalled"} and statuses.count("converged") > statuses.count("stalled")
 
 
-def stuck(monkeypatch: pytest.MonkeyPatch, start: Mapping[str, float]) -> None:
-    """Let the first search stall at given values."""
+def stuck(monkeypatch: pytest.MonkeyPatch, start: Mapping[str, float], status: str = "stalled") -> None:
+    """Let the first search end at given values."""
     whole = Search.run
 
     def run(search: Search) -> str:
         if search.options.seed >= RESTART_SEED:
             return whole(search)
         search._evaluate([search.parameters.to_vector(start)], "design")
-        return "stalled"
+        return status
 
     monkeypatch.setattr(Search, "run", run)
 
@@ -544,6 +544,21 @@ def test_a_force_that_does_not_stand_is_the_answer_where_the_curve_tells_it_from
         two_goal(), Fake(two_terms), replicate=Fake(lambda p: 1.06 * two_terms(p)), options=FitOptions(80, 3)
     )
     assert values(result) == pytest.approx(TWO_TRUTH, rel=0.1) and result.best.misfit < 40.0
+
+
+def test_an_answer_that_did_not_cut_gives_way_to_one_that_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the first search has cut nothing and its answer does not stand, one of the second is the answer; the second
+    run of the first stays among those that were made."""
+    stuck(monkeypatch, TWO_TRUTH, "converged")
+
+    def parted(p: Mapping[str, float]) -> float:
+        return 0.5 if p["R"] > 400.0 else 1.0
+
+    result = multistart_search(
+        two_goal(), Fake(two_terms, parted=parted), replicate=Fake(lambda p: 1.06 * two_terms(p)), options=QUICK
+    )
+    assert result.best.cut and not result.history[0].cut
+    assert any(np.array_equal(again.z, result.history[0].z) for again in result.replicates)
 
 
 def test_a_finalist_that_cannot_win_is_not_run_twice() -> None:
