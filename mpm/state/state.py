@@ -33,7 +33,8 @@ CPU_BLOCK = 512  # Taichi runs CPU loops shorter than this on one thread, so one
 FACE_POINTS = 4  # of a particle's face, one above another, at which it meets the blade and the other half
 IN_STONE = -2  # of State.adhering, where a particle is in a stone
 # What a loop goes over: each cut, rows of nodes in reach, lines of nodes across the mirror, parts of the particles,
-# slices along the edge, rows of nodes about what could be damaged, ties across the cut plane, points of the skin.
+# slices along the edge, rows of nodes about what could be damaged, ties across the cut plane, points of the skin, lines
+# of nodes across the cut plane.
 CUTS, NODE_ROWS, NODE_LINES, PARTS, SLICES, DAMAGE_ROWS, TIES, SKIN, NODE_ACROSS = range(9)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import taichi as ti
 
-from mpm.kernels.outer_nodes import extend_end, follow
+from mpm.kernels.outer_nodes import extend_end, extend_interior, follow
 from mpm.runtime import Runtime
 from mpm.scene import Board, EdgeLaw, Food, Knife, Motion, Numerics, Scene
 from mpm.scene.material import Material
@@ -136,3 +136,28 @@ def test_there_and_back_nodes_follow_without_making_energy(line):
     assert np.abs(both - np.eye(len(both))).max() > 0.1 and np.linalg.norm(both - one) > 1e-3
     kept = np.linalg.eigvalsh(mass - both.T @ mass @ both)
     assert kept.min() > -1e-14  # no kinetic energy is made
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4])
+def test_all_lines_of_a_cut_together_are_symmetric(turn):
+    """Across, upright and, in a turned grid, along: one after the other and then in reverse, on the nodes of a cut."""
+    numerics = replace(SCENE.numerics, extension=0.24, grid_turn=turn)
+    simulation = Simulation(replace(SCENE, motion=Motion(2e-3, 0.02), numerics=numerics), Runtime(threads=1))
+    simulation.run()
+    state = simulation.state
+    before = state.u.to_numpy()
+    mass = np.where(before[:, 3] > 0, before[:, 3], 0.0)
+
+    @ti.kernel
+    def extend(s: ti.template()):
+        extend_interior(s, 0)
+
+    def extended(velocity):
+        state.u.from_numpy(np.column_stack([velocity, velocity, velocity, before[:, 3]]))
+        extend(state)
+        return state.u.to_numpy()[:, 0]
+
+    one, other = np.random.default_rng(5).normal(size=(2, len(mass)))
+    there, back = (other * mass) @ extended(one), (one * mass) @ extended(other)
+    assert there == pytest.approx(back, rel=1e-9)
+    assert np.abs(extended(one) - one).max() > 0.1
