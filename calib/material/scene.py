@@ -336,9 +336,9 @@ def cut_scene(
     Raises:
         SceneError: The scene cannot be simulated as asked.
     """
-    zone = min(ZONE_M, min(shape.height, shape.width) / ZONE_PARTS)
-    cell = dx if dx is not None else CELL_PER_ZONE * zone
-    zone = max(zone, cell / CELL_PER_ZONE)
+    own = min(ZONE_M, min(shape.height, shape.width) / ZONE_PARTS)
+    cell = dx if dx is not None else CELL_PER_ZONE * own
+    zone = max(own, cell / CELL_PER_ZONE)
     mach = quasi_static_mach(knife, shape)
     thick = mach < MACH
     if coarse:
@@ -352,6 +352,6 @@ def cut_scene(
         motion=replace(
             motion, stroke=min(motion.stroke, shape.height), mach=mach, end_speed=END_SPEED if thick else 1.0
         ),
-        edge=EdgeLaw(zone=zone),
+        edge=EdgeLaw(zone=zone, dent_width=own),
         numerics=Numerics(dx=cell, far=FAR_PER_HEIGHT * shape.height, seed=seed),
     )

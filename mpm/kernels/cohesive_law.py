@@ -2,8 +2,19 @@
 
 import taichi as ti
 
-from mpm.state.tables import INITIATION_DEPTH, LAYERED, LEAST_WIDTH, LOCAL_DENT, R_START, SLIP, STATIONS, ZONE
+from mpm.state.tables import (
+    DENT_WIDTH,
+    INITIATION_DEPTH,
+    LAYERED,
+    LEAST_WIDTH,
+    LOCAL_DENT,
+    R_START,
+    SLIP,
+    STATIONS,
+    ZONE,
+)
 
+LEAST_DEPTH = 0.1  # of the indentation at which a cut starts, where the zone is narrower than the strip it is that of
 AT_ONCE = 1e-9  # length of a fall in bare flesh [m], of no way that a step takes
 
 
@@ -37,7 +48,9 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
     steep = e[1] / size if size > 0 else 0.0
     level = 0.0
     if s.start_force[cut, i] <= 0:
-        level = s.par[cut, R_START] * size / (s.par[cut, INITIATION_DEPTH] + hidden_dent(s, cut, i))
+        s.dent_over_width[cut, i] *= held
+        least = LEAST_DEPTH * s.par[cut, INITIATION_DEPTH]
+        level = s.par[cut, R_START] * size / ti.max(s.par[cut, INITIATION_DEPTH] + hidden_dent(s, cut, i), least)
         if level >= s.par[cut, R_START] or (s.started_beside[cut, i] > 0 and level >= flesh):
             s.start_force[cut, i] = ti.max(level, 1e-9)
             s.start_excess[cut, i] = ti.max(level - s.passed_mean[cut, i][1], 0.0)
@@ -61,10 +74,13 @@ def hidden_dent(s: ti.template(), cut, i):
     Contact Mechanics, section 2.4). The zone grows with the force beyond its width while it cuts, and to more than just
     bears the force. What the greater width hides of the dent the edge sinks into its zone, so that the stroke at which
     a cut starts does not hang on the width. A zone that is narrower than the food asks for hides nothing: there the
-    food flows.
+    food flows. Where the zone while it cuts is not as wide as the strip under which the food's indentation is told, the
+    dent between the two is as measured in the food (:func:`mpm.kernels.cutting_edge.follow_dent_over_width`).
     """
-    bears = ti.max(s.line[cut, i] * s.par[cut, LEAST_WIDTH], s.par[cut, ZONE])
-    return s.par[cut, LOCAL_DENT] * ti.log(ti.max(s.zone[cut, i] / bears, 1.0))
+    bears = s.line[cut, i] * s.par[cut, LEAST_WIDTH]
+    cuts, strip = ti.max(s.par[cut, ZONE], bears), ti.max(s.par[cut, DENT_WIDTH], bears)
+    grown = s.par[cut, LOCAL_DENT] * ti.log(ti.max(s.zone[cut, i] / cuts, 1.0))
+    return grown + s.dent_over_width[cut, i] * ti.log(cuts / strip)
 
 
 @ti.func

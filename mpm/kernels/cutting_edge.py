@@ -1,5 +1,7 @@
 """The cutting edge: a line that moves through the grid, slice by slice along the blade, and its reaction there."""
 
+import math
+
 import taichi as ti
 
 from mpm.kernels.cohesive_law import count_started_beside, line_force
@@ -10,6 +12,7 @@ from mpm.state.state import SLICES
 from mpm.state.stencil import bspline, has_second_field, node_index, node_position
 from mpm.state.tables import (
     CUTTING_WORK,
+    DENT_WIDTH,
     DX,
     EDGE,
     FIRST_STATION,
@@ -34,6 +37,11 @@ from mpm.state.tables import (
 # Kernel mass of the process zone of an edge that touches a flat surface, over rho dx zone^2 (exact: the zone is centred
 # half a zone below the edge).
 SURFACE_FILL = 5 / 6
+# What material sinks less over another width than over the zone that bears a line force, of what it sinks less per
+# e-fold: logarithm of the root mean square distance between load and point. A zone has a variance of width^2 / 4 along
+# both axes and is centred half its width below the edge.
+LESS_OVER_TWICE = 0.5 * math.log((1 + 2**2) / 2 + (2 - 1) ** 2 / 4)
+LESS_OVER_HALF = 0.5 * math.log((1 + 0.5**2) / 2 + (0.5 - 1) ** 2 / 4)
 EMPTY_ZONE = 0.15  # filled less than this the zone carries no edge; at the board it is still filled to 0.2
 
 
@@ -74,13 +82,7 @@ def find_reaction(s: ti.template(), cut, i, dt):
     place = s.par[cut, FIRST_STATION] + i * s.par[cut, DX]
     tip = edge_height(s, cut, place)
     over = covered_part(s, cut, place)
-    box = zone_nodes(s, cut, i)
-    mass = 0.0
-    for a in range(box[0], box[3]):
-        for j in range(box[1], box[4]):
-            for k in range(box[2], box[5]):
-                mass += zone_weight(s, cut, i, a, j, k) * node_momentum(s, cut, a, j, k)[3]
-    mass *= ti.static(2.0 if s.mirror_y else 1.0)
+    mass = zone_momentum(s, cut, i, s.zone[cut, i])[3] * ti.static(2.0 if s.mirror_y else 1.0)
     # the zone reaches below the edge and beside the food, so the width that is cut is that of the outline
     begun = ti.math.clamp((s.top_high[cut, i] - tip) / (s.top_high[cut, i] - s.top_low[cut, i]), 0.0, 1.0)
     ended = ti.math.clamp((s.floor_high[cut, i] - tip) / (s.floor_high[cut, i] - s.floor_low[cut, i]), 0.0, 1.0)
@@ -128,12 +130,12 @@ def tied_width(s: ti.template(), cut, i):
 def apply_reaction(s: ti.template(), cut, i):
     """Give the grid the reaction of slice i."""
     if s.reaction[cut, i].norm_sqr() > 0:
-        box = zone_nodes(s, cut, i)
+        box = zone_nodes(s, cut, i, s.zone[cut, i])
         dv = to_grid_axes(s, cut, ti.Vector([s.reaction[cut, i][0], 0.0, s.reaction[cut, i][1]]))
         for a in range(box[0], box[3]):
             for j in range(box[1], box[4]):
                 for k in range(box[2], box[5]):
-                    w = zone_weight(s, cut, i, a, j, k)
+                    w = zone_weight(s, cut, i, s.zone[cut, i], a, j, k)
                     if w > 0:
                         add_velocity(s, cut, a, j, k, w * dv)
                         if ti.static(s.mirror_x):
@@ -151,23 +153,58 @@ def follow_material(s: ti.template(), cut, i):
     The zone has the width of the next step, for which the mean is.
     """
     s.zone[cut, i] = ti.math.clamp(s.line[cut, i] * s.par[cut, WIDTH_OF_FORCE], s.par[cut, ZONE], s.par[cut, ZONE_MOST])
-    box = zone_nodes(s, cut, i)
+    s.zone_velocity[cut, i] = mean_velocity(s, cut, zone_momentum(s, cut, i, s.zone[cut, i]))
+    if s.start_force[cut, i] <= 0 and s.par[cut, ZONE] != s.par[cut, DENT_WIDTH]:
+        follow_dent_over_width(s, cut, i)
+
+
+@ti.func
+def follow_dent_over_width(s: ti.template(), cut, i):
+    """How much less the material at slice i goes with the edge per e-fold of the width of its process zone.
+
+    A line force sinks the less the wider the strip that bears it, by the logarithm of the width. How much that is in
+    this food, with its layers and its flow, is seen from a zone of twice the width, or of half where twice is too much
+    for the food.
+    """
+    if s.line[cut, i] > 0:
+        zone = s.zone[cut, i]
+        other, less = 2.0 * zone, LESS_OVER_TWICE
+        if other > s.par[cut, ZONE_MOST]:
+            other, less = 0.5 * zone, LESS_OVER_HALF
+        apart = s.zone_velocity[cut, i] - mean_velocity(s, cut, zone_momentum(s, cut, i, other))
+        c, t = ti.cast(s.pose[cut, TILT_COS], float), ti.cast(s.pose[cut, TILT_SIN], float)
+        s.dent_over_width[cut, i] += (t * apart[0] - c * apart[2]) * step_size(s, cut) / less
+    else:
+        s.dent_over_width[cut, i] = 0.0
+
+
+@ti.func
+def mean_velocity(s: ti.template(), cut, total):
+    """Velocity of a momentum and mass, in the scene's axes [m/s]; 0 where there is no mass."""
+    v = ti.Vector.zero(float, 3)
+    if total[3] > 0:
+        v = to_scene_axes(s, cut, ti.Vector([total[0], total[1], total[2]]) / total[3])
+    return v
+
+
+@ti.func
+def zone_momentum(s: ti.template(), cut, i, zone):
+    """Momentum and mass of the nodes that slice i feels through a process zone of this width."""
+    box = zone_nodes(s, cut, i, zone)
     total = ti.Vector.zero(float, 4)
     for a in range(box[0], box[3]):
         for j in range(box[1], box[4]):
             for k in range(box[2], box[5]):
-                total += zone_weight(s, cut, i, a, j, k) * node_momentum(s, cut, a, j, k)
-    s.zone_velocity[cut, i] = ti.Vector.zero(float, 3)
-    if total[3] > 0:
-        s.zone_velocity[cut, i] = to_scene_axes(s, cut, ti.Vector([total[0], total[1], total[2]]) / total[3])
+                total += zone_weight(s, cut, i, zone, a, j, k) * node_momentum(s, cut, a, j, k)
+    return total
 
 
 @ti.func
-def zone_nodes(s: ti.template(), cut, i):
-    """Nodes whose velocity slice i feels, as the corners (low 3, high 3) of a box."""
-    reach = 1.5 * s.zone[cut, i]
+def zone_nodes(s: ti.template(), cut, i, zone):
+    """Nodes that slice i feels through a process zone of this width, as the corners (low 3, high 3) of a box."""
+    reach = 1.5 * zone
     place = s.par[cut, FIRST_STATION] + i * s.par[cut, DX]
-    mid = to_grid_axes(s, cut, ti.Vector([place, 0.0, s.crack_front[cut, i] - 0.5 * s.zone[cut, i]]))
+    mid = to_grid_axes(s, cut, ti.Vector([place, 0.0, s.crack_front[cut, i] - 0.5 * zone]))
     wide, deep = 0.0, reach
     if ti.static(s.turned):
         e = ti.abs(to_grid_axes(s, cut, ti.Vector([s.par[cut, DX], 0.0, 0.0])))
@@ -183,11 +220,10 @@ def zone_nodes(s: ti.template(), cut, i):
 
 
 @ti.func
-def zone_weight(s: ti.template(), cut, i, a, j, k):
-    """Weight of node (a, j, k) in the process zone of slice i, which is centred half a zone below the edge."""
-    z = s.zone[cut, i]
+def zone_weight(s: ti.template(), cut, i, zone, a, j, k):
+    """Weight of node (a, j, k) in a process zone of slice i, which is centred half its width below the edge."""
     at = to_scene_axes(s, cut, node_position(s, cut, a, j, k))
-    w = bspline(at[1] / z) * bspline((at[2] - s.crack_front[cut, i]) / z + 0.5)
+    w = bspline(at[1] / zone) * bspline((at[2] - s.crack_front[cut, i]) / zone + 0.5)
     if ti.static(s.turned):
         w *= ti.max(0.0, 1.0 - ti.abs(at[0] - s.par[cut, FIRST_STATION] - i * s.par[cut, DX]) * s.par[cut, INV_DX])
     return w

@@ -88,16 +88,21 @@ class EdgeLaw:
         bearing: Line force that a food that flows bears over that width, over the line force of the edge [-]. Below
             about 1 it flows along with the edge, and new surface is had for less than R.
         slip: Slip of the edge in the material at which the line force is fully developed [m].
+        dent_width: Width of the strip under the edge of which the food's ``initiation_depth`` is told [m]; None: the
+            zone's. It belongs to that property and does not change with the zone.
     """
 
     zone: float = 3e-3
     bearing: float = 1.25
     slip: float = 1e-3
+    dent_width: float | None = None
 
     def __post_init__(self) -> None:
         check_number("edge", "zone", self.zone, 1e-5, 0.05, "m")
         check_number("edge", "bearing", self.bearing, -1e-300, 100.0, "of R")
         check_number("edge", "slip", self.slip, 1e-5, 0.05, "m")
+        if self.dent_width is not None:
+            check_number("edge", "dent_width", self.dent_width, 1e-5, 0.05, "m")
 
 
 @dataclass(frozen=True)
@@ -241,7 +246,20 @@ class Scene:
         Args:
             material: Constants of the food.
         """
-        return max(self.edge.zone, min(material.R * self.width_of_force(material), self.widest_zone))
+        return max(self.edge.zone, self._width_of_cut(material))
+
+    def dent_width(self, material: Material) -> float:
+        """Width of the strip of which the indentation is told at which a cut starts [m].
+
+        It is ``edge.dent_width``, and wider where the food would flow under R on that (:meth:`process_zone`).
+
+        Args:
+            material: Constants of the food.
+        """
+        return max(self.edge.dent_width or self.edge.zone, self._width_of_cut(material))
+
+    def _width_of_cut(self, material: Material) -> float:
+        return min(material.R * self.width_of_force(material), self.widest_zone)
 
     def width_of_force(self, material: Material) -> float:
         """Width of food that bears a line force without flowing, over that force [m^2/N].

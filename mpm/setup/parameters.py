@@ -84,6 +84,7 @@ def _put_tool(table: np.ndarray, scene: Scene, material: Material) -> None:
     table[row.WIDTH_OF_FORCE], table[row.ZONE_MOST] = scene.width_of_force(material), scene.widest_zone
     table[row.LEAST_WIDTH] = material.punch_width
     table[row.LOCAL_DENT] = 2 * (1 - material.nu**2) / (math.pi * material.E) * material.start
+    table[row.DENT_WIDTH] = scene.dent_width(material)
     if isinstance(tool, Press):
         half, table[row.BLADE_MU], table[row.SPINE] = tool.half_angle, tool.mu, ENDLESS
     else:

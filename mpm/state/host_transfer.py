@@ -184,7 +184,7 @@ def _write(
         s.line[c, i], s.zone[c, i] = 0.0, s.par[c, ZONE]
         s.zone_velocity[c, i] = ti.Vector.zero(float, 3)
         s.cut_depth[c, i] = 0.0
-        s.front_drift[c, i] = 0.0
+        s.front_drift[c, i], s.dent_over_width[c, i] = 0.0, 0.0
         s.start_force[c, i] = row[STARTED]
         s.contact_part[c, i] = 0.0
         s.crack_front[c, i] = 1e3

@@ -139,6 +139,8 @@ class State:
         slip: Elastic slip of the edge in a slice, along the edge and forward [m], (cut, slice).
         line: Line force that the edge carries in a slice [N/m], (cut, slice).
         zone: Width over which it is spread [m], (cut, slice).
+        dent_over_width: How much less the material has gone with the edge, before the start, per e-fold of that width
+            [m], (cut, slice).
         reaction: Change of velocity that the edge gives in this step, along the cut and upwards [m/s], (cut, slice).
         zone_velocity: Mean velocity of the material at the edge, in the scene's axes [m/s], (cut, slice).
         crack_front: Height of the crack front [m], far up where nothing is cut, (cut, slice).
@@ -292,7 +294,7 @@ class State:
         self.slip, self.reaction = (vec2.field(shape=shape) for _ in range(2))
         self.zone_velocity = vec3.field(shape=shape)
         self.crack_front, self.front_drift, self.cut_depth = (ti.field(real, shape) for _ in range(3))
-        self.line, self.zone = (ti.field(real, shape) for _ in range(2))
+        self.line, self.zone, self.dent_over_width = (ti.field(real, shape) for _ in range(3))
         self.softening, self.start_force, self.contact_part = (ti.field(real, shape) for _ in range(3))
         self.top_toughness, self.top_power, self.floor_power = (ti.field(real, shape) for _ in range(3))
         self.started_beside = ti.field(ti.i32, shape)
