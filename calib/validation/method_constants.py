@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 
 from mpm.scene import Scene
+
+
+def _crack_is_sharp(scene: Scene) -> bool:
+    """Whether the process zone of the food's crack spans less than twice the least number of ties."""
+    return replace(scene, numerics=replace(scene.numerics, crack_ties=2 * scene.numerics.crack_ties)).weakened
 
 
 @dataclass(frozen=True)
@@ -22,6 +27,7 @@ class MethodConstant:
         unless: Property of the food in whose place the number is taken, so that it is nothing where the food has it.
         only: Property of the food without which it is nothing.
         field: Its name in that part of a scene; empty where it is the key.
+        where: Says of a scene whether the number has a part in it; by default it has.
     """
 
     name: str
@@ -33,11 +39,14 @@ class MethodConstant:
     unless: str = ""
     only: str = ""
     field: str = ""
+    where: Callable[[Scene], bool] | None = None
 
     def value(self, scene: Scene) -> float:
         """Its value in a scene [SI]; 0 where it has no part in it."""
         food = scene.food.material
         if (self.unless and getattr(food, self.unless) is not None) or (self.only and not getattr(food, self.only)):
+            return 0.0
+        if self.where is not None and not self.where(scene):
             return 0.0
         return float(getattr(self._holder(scene), self._field))
 
@@ -92,6 +101,11 @@ CONSTANTS = (
     MethodConstant(
         "nodes that follow", "numerics", "extension", (0.5, 2.0),
         "numerical: part of the mass of the nodes inside, below which a node follows them",
+    ),
+    MethodConstant(
+        "ties of a crack's process zone", "numerics", "crack_ties", (0.5, 2.0),
+        "numerical: where the food's own zone is shorter it is made weaker, at the same R (Turon et al. 2007)",
+        where=_crack_is_sharp,
     ),
     MethodConstant(
         "rows of a tie", "numerics", "layer_rows", (0.5, 2.0),

@@ -245,21 +245,25 @@ class Material:
             return self.strength
         return min(PARTS_BEFORE_IT_FLOWS * self.yield_stress, math.sqrt(self.E * self.R / self.cohesive_zone))
 
-    def tie_strength(self, spacing: float) -> float:
+    def tie_strength(self, spacing: float, ties: float) -> float:
         """Strength of ties across the cut plane [Pa]: the cohesive strength, and no more than their grid resolves.
 
-        A tie softens over E R / strength^2. Where that is shorter than half a spacing it would snap back, so it is
-        made weaker until it is not. The work R is the same (Turon et al. 2007, Eng. Fract. Mech. 74:1665). A tougher
-        rind or core is stronger in proportion, so that all layers end at the same opening; the toughest softens over
-        the shortest length.
+        The process zone of a crack is E R / strength^2 long. Where it spans fewer than some ties, they part one by one:
+        the crack is trapped between them and costs more than R. So the food is made weaker until its zone spans that
+        many, three as Turon et al. (2007, Eng. Fract. Mech. 74:1665) ask for. The work R is the same, and where the
+        zone is short against the food, strength has no part in the force. A tougher rind or core is stronger in
+        proportion, so that all layers end at the same opening. The toughest softens over the shortest length; under
+        half a spacing its ties would snap back.
 
         Args:
             spacing: Distance of the ties [m].
+            ties: How many of them the zone of the flesh spans at least [-].
         """
         if not self.R > 0:
             return 0.0
         shortest = self.R / self.toughest_for_mass  # of the softening lengths, over that of the flesh
-        return min(self.cohesion, math.sqrt(self.E * self.R * shortest / (spacing / 2)))
+        zone = max(ties * spacing, spacing / 2 / shortest)
+        return min(self.cohesion, math.sqrt(self.E * self.R / zone))
 
     def sticking_strength(self, spacing: float) -> float:
         """Largest normal traction of sticky faces on a grid [Pa]: ``adhesion``, and no more than the grid resolves.
@@ -272,9 +276,9 @@ class Material:
         """
         return min(self.adhesion, math.sqrt(self.E * self.adhesion_energy / (spacing / 2)))
 
-    def tie_opening(self, spacing: float) -> float:
-        """Half opening at which ties across the cut plane hold nothing any more [m]; ``spacing``: their distance."""
-        return self.R / self.tie_strength(spacing) if self.R > 0 else LEAST_OPENING
+    def tie_opening(self, spacing: float, ties: float) -> float:
+        """Half opening at which ties across the cut plane hold nothing any more [m] (:meth:`tie_strength`)."""
+        return self.R / self.tie_strength(spacing, ties) if self.R > 0 else LEAST_OPENING
 
     @property
     def damaged(self) -> bool:

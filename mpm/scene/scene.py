@@ -119,6 +119,8 @@ class Numerics:
         edge_band: Half height of what the edge is cutting, about the edge [cells].
         extension: Beside the cut plane a node above or below the food whose mass is less than this part of that of the
             next two inside follows them (:mod:`mpm.kernels.outer_nodes`) [-]; across the plane a tenth; 0 for none.
+        crack_ties: Ties that the process zone of a crack spans at least
+            (:meth:`mpm.scene.material.Material.tie_strength`).
         layer_rows: Rows of a tie across the cut plane, each with the toughness of the layer that it lies in.
         least_gap: Least distance of a particle's centre from the food's surface that squeezing leaves [cells].
         contact: ``cohesive`` (edge law and particle contact) or ``nodal`` (the plain projection of grid velocities).
@@ -141,6 +143,7 @@ class Numerics:
     contact_stiffness: float = 2.0
     edge_band: float = 0.125
     extension: float = 0.1
+    crack_ties: float = 3.0
     layer_rows: int = 8
     least_gap: float = 0.02
     grid_shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -166,6 +169,7 @@ class Numerics:
             check_number(w, "far", self.far, 0.0, 1.0, "m")
         check_number(w, "room", self.room, 0.0, 100.0, "of half the food's size")
         check_number(w, "contact_stiffness", self.contact_stiffness, 0.1, 100.0, "of a layer's")
+        check_number(w, "crack_ties", self.crack_ties, 0.5 * (1 - 1e-9), 50.0, "ties")
         check_number(w, "extension", self.extension, -1e-300, 0.25, "of the mass inside")
         check_number(w, "edge_band", self.edge_band, 0.01, 5.0, "cells")
         check_number(w, "least_gap", self.least_gap, 1e-6, 0.2, "cells")
@@ -224,7 +228,7 @@ class Scene:
     @property
     def tie_strength(self) -> float:
         """Strength of the ties on this grid [Pa] (Material.tie_strength)."""
-        return self.food.material.tie_strength(self.numerics.dx / self.numerics.ppc)
+        return self.food.material.tie_strength(self.numerics.dx / self.numerics.ppc, self.numerics.crack_ties)
 
     @property
     def weakened(self) -> bool:

@@ -61,7 +61,7 @@ def _put_material(table: np.ndarray, scene: Scene, material: Material, seeds: Se
     table[row.ETA_S], table[row.ETA_B] = beta * material.shear, beta * (material.lame + 2 / 3 * material.shear)
     table[row.CONTACT] = contact_stiffness(scene, material, seeds.spacing)
     if scene.tied:
-        table[row.TIE_OPENING] = material.tie_opening(seeds.spacing)
+        table[row.TIE_OPENING] = material.tie_opening(seeds.spacing, scene.numerics.crack_ties)
         table[row.EDGE_BAND] = scene.numerics.edge_band
         table[row.LAYERED] = material.layered
     table[row.SPACING] = seeds.spacing

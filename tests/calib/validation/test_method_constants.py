@@ -50,11 +50,21 @@ def test_the_zone_of_a_food_without_strength_is_varied_only_there():
     assert not any(name in other for other in varied(PRISM.with_material(tensile_strength=2e4)))
 
 
+SHARP = {"tensile_strength": 1e6, "yield_stress": 2e6}
+
+
+def test_the_ties_of_a_crack_are_varied_only_where_it_is_sharp():
+    """A process zone of many ties does not change with how many it has at least; one that is just long enough does."""
+    name = "ties of a crack's process zone"
+    assert not any(name in other for other in varied(PRISM.with_material(tensile_strength=1e5)))
+    assert {f"half the {name}", f"twice the {name}"} <= set(varied(PRISM.with_material(**SHARP)))
+
+
 @pytest.mark.parametrize("constant", [c for c in CONSTANTS if c.part == "numerics"], ids=lambda c: c.key)
 def test_a_constant_of_the_numerics_reaches_the_kernels(constant):
     """Each changes what the kernels read, or the time step."""
 
-    fruit = PRISM.with_material(R_rind=100.0, rind_thickness=2e-3)
+    fruit = PRISM.with_material(R_rind=100.0, rind_thickness=2e-3, **SHARP)
 
     def read(scene: Scene) -> tuple[float, ...]:
         setup = Setup(scene, Runtime(threads=1))

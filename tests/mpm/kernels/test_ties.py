@@ -109,12 +109,12 @@ def test_impossible_cracks_are_refused():
 
 
 def test_ties_are_no_stronger_than_the_grid_resolves():
-    """Ties that would snap back are weakened until their process zone is as long as they are stiff; R stays."""
+    """A food whose crack is sharper than its ties is weakened until its process zone spans three of them; R stays."""
     strong = SPLIT.with_material(tensile_strength=3e6)
     food = strong.food.material
-    assert strong.weakened and not SPLIT.weakened and TUBER.tie_strength(1.5e-3) == TUBER.cohesion
-    assert food.E * food.R / food.tie_strength(1.5e-3) ** 2 == pytest.approx(0.75e-3)
-    assert food.tie_opening(1.5e-3) * food.tie_strength(1.5e-3) == pytest.approx(food.R)
+    assert strong.weakened and not SPLIT.weakened and TUBER.tie_strength(1.5e-3, 3.0) == TUBER.cohesion
+    assert food.E * food.R / food.tie_strength(1.5e-3, 3.0) ** 2 == pytest.approx(4.5e-3)
+    assert food.tie_opening(1.5e-3, 3.0) * food.tie_strength(1.5e-3, 3.0) == pytest.approx(food.R)
 
 
 def test_the_strength_of_a_food_that_has_none_is_derived():

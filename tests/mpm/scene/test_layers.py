@@ -108,9 +108,10 @@ def test_the_toughest_layer_sets_what_a_grid_resolves():
     """Ties of tough rind soften over the same opening at a higher stress, and must not snap back either."""
     spacing = 1.5e-3
     strong = replace(FRUIT, tensile_strength=1e7)
-    rind = strong.tie_strength(spacing) * 500 / 80
+    rind = strong.tie_strength(spacing, 0.5) * 500 / 80
     assert strong.E * 500 / rind**2 == pytest.approx(spacing / 2)
-    assert FLESH.tie_strength(spacing) == min(1e5, math.sqrt(1e6 * 80 / (spacing / 2)))
+    assert FLESH.tie_strength(spacing, 0.5) == min(1e5, math.sqrt(1e6 * 80 / (spacing / 2)))
+    assert strong.E * 80 / strong.tie_strength(spacing, 5.0) ** 2 == pytest.approx(5 * spacing)
 
 
 @pytest.mark.parametrize(
