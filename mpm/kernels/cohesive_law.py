@@ -48,7 +48,6 @@ def line_force(s: ti.template(), cut, i, tangential, forward, part):
     steep = e[1] / size if size > 0 else 0.0
     level = 0.0
     if s.start_force[cut, i] <= 0:
-        s.dent_over_width[cut, i] *= held
         least = LEAST_DEPTH * s.par[cut, INITIATION_DEPTH]
         level = s.par[cut, R_START] * size / ti.max(s.par[cut, INITIATION_DEPTH] + hidden_dent(s, cut, i), least)
         if level >= s.par[cut, R_START] or (s.started_beside[cut, i] > 0 and level >= flesh):
