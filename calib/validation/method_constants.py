@@ -24,8 +24,6 @@ class MethodConstant:
         factors: By how much it is varied; a factor that cannot be simulated is left out, and ``why`` says so.
         source: Where its value is from.
         why: Why not both half and twice; empty where it is both.
-        unless: Property of the food in whose place the number is taken, so that it is nothing where the food has it.
-        only: Property of the food without which it is nothing.
         field: Its name in that part of a scene; empty where it is the key.
         where: Says of a scene whether the number has a part in it; by default it has.
     """
@@ -36,16 +34,11 @@ class MethodConstant:
     factors: tuple[float, ...]
     source: str
     why: str = ""
-    unless: str = ""
-    only: str = ""
     field: str = ""
     where: Callable[[Scene], bool] | None = None
 
     def value(self, scene: Scene) -> float:
         """Its value in a scene [SI]; 0 where it has no part in it."""
-        food = scene.food.material
-        if (self.unless and getattr(food, self.unless) is not None) or (self.only and not getattr(food, self.only)):
-            return 0.0
         if self.where is not None and not self.where(scene):
             return 0.0
         return float(getattr(self._holder(scene), self._field))
@@ -110,7 +103,7 @@ CONSTANTS = (
     MethodConstant(
         "rows of a tie", "numerics", "layer_rows", (0.5, 2.0),
         "numerical: parts of a particle's spacing in which the toughness of a food of layers is looked up",
-        only="layered",
+        where=lambda scene: scene.food.material.layered,
     ),
     MethodConstant(
         "least gap to a surface", "numerics", "least_gap", (0.5, 2.0),
@@ -119,7 +112,7 @@ CONSTANTS = (
     MethodConstant(
         "process zone of a food without strength", "material", "cohesive_zone", (0.5, 2.0),
         "assumed, where the food has no strength (materials.yaml has one for every food)",
-        unless="strength",
+        where=lambda scene: scene.food.material.strength is None,
     ),
     MethodConstant(
         "friction of the board", "board", "board_friction", (0.5, 2.0),

@@ -250,8 +250,8 @@ class Material:
 
         The process zone of a crack is E R / strength^2 long. Where it spans fewer than some ties, they part one by one:
         the crack is trapped between them and costs more than R. So the food is made weaker until its zone spans that
-        many, three as Turon et al. (2007, Eng. Fract. Mech. 74:1665) ask for. The work R is the same, and where the
-        zone is short against the food, strength has no part in the force. A tougher rind or core is stronger in
+        many, at the same work R (Turon et al. 2007, Eng. Fract. Mech. 74:1665). Where the zone is short against the
+        food, strength has no part in the force. A tougher rind or core is stronger in
         proportion, so that all layers end at the same opening. The toughest softens over the shortest length; under
         half a spacing its ties would snap back.
 
