@@ -208,7 +208,7 @@ def calibrate_modulus(
             git=git_commit(),
         )
         write_result(result, _curves(measured, found), out)
-        from reports.calibration.compression import write_figure
+        from reports.press.stress_strain import write_figure
         from reports.press.compression import write_report
 
         write_figure(result, read_curves(out), out)
