@@ -47,8 +47,9 @@ from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.uncertainty.intervals import Uncertainty
 from calib.uncertainty.limiting import limiting
-from calib.validation.acceptance import Conservation, Verdict, judge, limits
+from calib.validation.acceptance import Conservation, Verdict, judge
 from calib.validation.bounds import bound_word
+from calib.validation.not_shown import limits
 from mpm.files import write_atomic
 from mpm.output.record import ForceRecord
 from mpm.scene import Knife

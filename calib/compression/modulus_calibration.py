@@ -208,8 +208,8 @@ def calibrate_modulus(
             git=git_commit(),
         )
         write_result(result, _curves(measured, found), out)
-        from reports.press.stress_strain import write_figure
         from reports.press.compression import write_report
+        from reports.press.stress_strain import write_figure
 
         write_figure(result, read_curves(out), out)
         write_report(result, out)

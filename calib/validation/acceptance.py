@@ -1,4 +1,4 @@
-"""The lines of a report's verdict table: value, limit, passed; and in words what was not shown."""
+"""The lines of a report's verdict table: value, limit, passed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from calib.io.typed_document import ANY, FORMER, to_document
-from calib.material.properties import property_of
 from calib.problem.nuisance import OUTSIDE
 from calib.problem.objective import EXPLAINED
 from calib.simulation.evaluation import FULLY_PARTED, Evaluation
@@ -17,7 +16,6 @@ from calib.validation.bounds import AT_BOUND, AT_LIMIT, bound_word
 from calib.validation.metrics import Metrics
 from calib.validation.numerical_checks import (
     CHANGE_LIMIT,
-    FINER_GRID,
     HALF_SPEED,
     QUARTER_SPEED,
     VARIANTS,
@@ -26,7 +24,7 @@ from calib.validation.numerical_checks import (
 )
 from calib.validation.predictive_score import PredictiveScore
 from calib.validation.prior_conflict import PriorConflict
-from mpm.output.number_text import listed, quantity, uncertain
+from mpm.output.number_text import quantity, uncertain
 
 # Limits of a single in-sample calibration. Peak: the figure that published work quotes (CulinaryCut, "within 5 %").
 # Curve and shape: twice the target of a validated model (5 %), because absolute forces of the sensors that such traces
@@ -46,13 +44,9 @@ EXPLAINED_LINE, EXPLAINED_LIMIT = "curve explained by the food", round(1.0 - EXP
 CONFLICT_LINE, CONFLICT_LIMIT = "values those of the food", EXPLAINED_LIMIT
 SIZE_LINE = "specimen no larger than the food"
 BAND_LIMIT = 0.5  # a band wider than a quarter of the peak either way predicts nothing that anyone would use
-OPENING_REMARKED = 0.1  # part of the new surface that opens ahead of the edge, from which on it is said [-]
 NUISANCE_LINES = {"lag": "delay of the trace within its uncertainty", "gain": "sensor's gain within its uncertainty"}
 """Nuisances that the validation hangs on, and their lines: a trace that asks for more of one than its sensor leaves
 open fails."""
-HELD_WEAK = {"R": 0.92, "R_skin": 0.90, "E": 0.88, "yield_stress": 0.80, "initiation_depth": 0.84}
-"""Part of the weak 95 % intervals that held the truth on 100 made-up bananas, where it is less and there are
-more than ten (docs/pitfalls.md, how far to trust an interval)."""
 
 
 @dataclass(frozen=True)
@@ -295,106 +289,8 @@ def _bounds(fitted: Mapping[str, FittedParameter]) -> Verdict:
     return Verdict("parameters at a bound", len(stuck), 0, "", not stuck, note)
 
 
-def limits(
-    label: str,
-    stroke_source: str,
-    baseline_kind: str,
-    verdicts: Sequence[Verdict],
-    fitted: Mapping[str, FittedParameter],
-    assumptions: Sequence[str],
-    fracture: Mapping[str, float] | None = None,
-) -> list[str]:
-    """What the calibration does not show.
-
-    Args:
-        label: Whether the trace was ``measured`` or ``reconstructed``.
-        stroke_source: What its stroke rests on: ``position``, ``speed`` or ``height``.
-        baseline_kind: What was subtracted: ``constant``, ``linear``, ``zero`` or ``air``.
-        verdicts: The verdict table.
-        fitted: Fitted parameters by name.
-        assumptions: What was assumed of the specimen and the sensor, each a sentence without capital and full stop.
-        fracture: Energy of new surface at the edge and by opening ahead of it [J/m^2]; None where nothing was cut.
-
-    Returns:
-        One sentence for each.
-    """
-    said = []
-    if label != "measured":
-        said.append(f"The trace is {label}, not a measurement: agreement with it says nothing about a real food.")
-    said.append("All figures are in-sample: the same trace was fitted and compared. Nothing here is validated.")
-    said += [f"{v.name}: failed; see the first page." for v in verdicts if v.passed is False]
-    said += _limits_of_parameters(fitted)
-    said += _limits_of_measurement(stroke_source, baseline_kind)
-    said += [a[0].upper() + a[1:] + "." for a in assumptions]
-    said += _limits_of_simulation(fracture)
-    said += [f"{remedy[0].upper()}{remedy[1:]}." for remedy in map(remedied, verdicts) if remedy]
-    return said
-
-
-def _limits_of_parameters(fitted: Mapping[str, FittedParameter]) -> list[str]:
-    said = []
-    unseen = [n for n, p in fitted.items() if p.verdict in ("not_seen", "weak", "one_sided")]
-    if unseen:
-        said.append(
-            f"The trace hardly sees {', '.join(unseen)}: these values are the literature's as much as the trace's."
-        )
-    weak = [n for n, p in fitted.items() if p.verdict == "weak" and property_of(n) in HELD_WEAK]
-    if weak:
-        held = listed([f"{quantity(HELD_WEAK[property_of(n)], 'fraction')} for {n}" for n in weak])
-        said.append(f"Weak intervals hold the truth less often than in 95 %: of 100 made-up banana cuts in {held}.")
-    return said
-
-
-def _limits_of_measurement(stroke_source: str, baseline_kind: str) -> list[str]:
-    said = []
-    if stroke_source != "position":
-        how = (
-            "one constant speed" if stroke_source == "speed" else "one constant speed and a stroke of the food's height"
-        )
-        said.append(f"The trace has no position: its stroke axis rests on {how}.")
-    if baseline_kind == "constant":
-        said.append("A constant baseline was subtracted: drift of the sensor along the stroke is in the force.")
-    if baseline_kind == "linear":
-        said.append("The drift before contact was removed: one that was not steady along the stroke is in the force.")
-    if baseline_kind == "zero":
-        said.append("The machine's own zero was taken: what it was off by is in the force.")
-    return said
-
-
-def _limits_of_simulation(fracture: Mapping[str, float] | None) -> list[str]:
-    said = []
-    if fracture is not None and "opening_J_m2" in fracture:
-        edge, opening = fracture["edge_J_m2"], fracture["opening_J_m2"]
-        if opening > OPENING_REMARKED * (edge + opening):
-            part = quantity(opening / (edge + opening), "fraction")
-            said.append(
-                f"The blade opens the food ahead of its edge: of R {part} went there, "
-                "against the tensile strength, which then trades with R and the yield stress."
-            )
-    return [
-        *said,
-        "One cut of one specimen says nothing about the scatter between specimens.",
-        "The laws are independent of rate; relaxation, adhesion and moisture were not simulated, and the lower skin of "
-        "a whole fruit is not cut.",
-        "The blade lay on a plane of the grid's nodes. Between two planes the same values give other work, by 1 to 2 % "
-        "(cutcal converge --material --offset 0.5 measures it).",
-        "One finer grid was tried, which gives a difference but neither an order nor an uncertainty (cutcal converge "
-        "--material measures both; calibrate --u-num takes them into the likelihood).",
-    ]
-
-
 def identified_words(fitted: Mapping[str, FittedParameter]) -> str:
     """How many of the fitted parameters the trace identifies, and which."""
     names = [name for name, p in fitted.items() if p.verdict == "identified"]
     which = f": {', '.join(names)}" if names else ""
     return f"{len(names)} of {len(fitted)} parameters identified{which}"
-
-
-def remedied(line: Verdict) -> str:
-    """What to do about a line of the table that failed, where a command does it; empty for all others."""
-    if line.name != FINER_GRID or line.passed is not False:
-        return ""
-    return (
-        "values and intervals answer for these cells alone: cutcal converge --material measures what they leave out, "
-        "and the same calibration with --u-num takes it into the likelihood"
-    )

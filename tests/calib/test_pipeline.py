@@ -43,9 +43,10 @@ from calib.simulation.workers import DIED, Errand, SceneEvaluator, evaluation_of
 from calib.trace.conditioning import condition
 from calib.trace.trace import Trace
 from calib.uncertainty.estimates import FittedParameter
-from calib.validation.acceptance import Conservation, balances, changes, judge, limits, remedied
+from calib.validation.acceptance import Conservation, balances, changes, judge
 from calib.validation.method_constants import varied
 from calib.validation.metrics import compare
+from calib.validation.not_shown import limits, remedied
 from calib.validation.null_models import null_models
 from calib.validation.numerical_checks import (
     HALF_SPEED,

@@ -17,7 +17,8 @@ from calib.problem.request import Request
 from calib.problem.target import ErrorModel
 from calib.trace.baselines import BASELINES, CONSTANT
 from calib.trace.cuts import WHOLE
-from calib.validation.acceptance import identified_words, remedied
+from calib.validation.acceptance import identified_words
+from calib.validation.not_shown import remedied
 from cutcal.commands.calibration.describe import description
 from cutcal.options import (
     RESUME_HELP,
