@@ -81,6 +81,7 @@ class Calibration:
         dx: Cell size [m], or None.
         budget: Largest number of simulations.
         sample: Whether all plausible foods are sampled, in place of a search for one; the budget does not bound it.
+        withdrawal: Whether the way up is fitted beside the way down: it tells R, friction and adhesion apart.
         workers: Simulations at a time; None for 2, of a cluster for all.
         seed: Seed of the particles and of the search.
         arch: Device of the simulations.
@@ -122,6 +123,7 @@ class Calibration:
     dx: float | None = None
     budget: float = 100
     sample: bool = False
+    withdrawal: bool = False
     workers: int | None = None
     seed: int = 0
     arch: str = "cpu"
@@ -227,6 +229,7 @@ class Calibration:
             dx=self.dx,
             budget=self.budget,
             sample=self.sample,
+            withdrawal=self.withdrawal,
             gain_sd=self.gain_sd,
             lag_sd=self.lag_sd,
             bandwidth=self.bandwidth,

@@ -209,8 +209,8 @@ def print_json(document: Any) -> None:
 def add_workers(p: Group, what: str) -> None:
     """Options that say how many at a time, and on which machines."""
     p = titled(p, RUN)
-    p.add_argument("--workers", type=int, metavar="N", help=f"{what} at a time (default 2; of a cluster all)")
-    p.add_argument("--scheduler", metavar="ADDRESS", help="Dask cluster that runs them, such as tcp://host:8786")
+    p.add_argument("--workers", type=int, metavar="N", help=f"{what} at a time (2); on a Dask --scheduler")
+    p.add_argument("--scheduler", metavar="ADDRESS", help=argparse.SUPPRESS)
 
 
 def workers_of(args: argparse.Namespace, say: Callable[[str], None]) -> Workers:

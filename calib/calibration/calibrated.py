@@ -13,8 +13,13 @@ from calib.fit.multistart import FitResult
 from calib.material.food import FoodSpec
 from calib.material.form import ROUNDNESS, with_roundness
 from calib.posterior.posterior import SampledPosterior
+from calib.problem.joint_objective import JointObjective
+from calib.problem.objective import Objective
+from calib.problem.scored_run import ScoredRun
 from calib.problem.setup import Setup
+from calib.problem.withdrawal import BothWays, Withdrawal
 from calib.uncertainty.analysis import UncertaintyAnalysis
+from calib.uncertainty.predictive import Band
 from calib.uncertainty.sobol import Indices, sensitivity
 from calib.validation.metrics import Metrics, compare
 from calib.validation.null_models import NullModel, null_models
@@ -23,6 +28,34 @@ from calib.validation.predictive_score import PredictiveScore, predictive_score
 from calib.validation.prior_conflict import PriorConflict, prior_conflict, probability_of_size
 from mpm.arrays import FloatArray
 from mpm.output.record import ForceRecord
+
+
+@dataclass(frozen=True, eq=False)
+class FittedWithdrawal:
+    """The way up of the best run.
+
+    Attributes:
+        measured: That of the trace.
+        curve: Simulated pull on its grid, filtered as it was [N], shape (n,).
+        band: Its 95 % band; None where the fit ended too early.
+    """
+
+    measured: Withdrawal
+    curve: FloatArray
+    band: Band | None
+
+    @property
+    def nrmse(self) -> float:
+        """Root mean square difference over the largest measured pull [-]."""
+        way, pull = self.measured.way, self.measured.pull
+        square = np.trapezoid((self.curve - pull) ** 2, way) / (way[-1] - way[0])
+        return float(np.sqrt(square) / pull.max())
+
+    def columns(self) -> dict[str, FloatArray]:
+        """Columns of withdrawal.csv, all on the way up."""
+        way, pull = self.measured.way, self.measured.pull
+        found = {"way_m": way, "real_N": pull, "sim_N": self.curve, "residual_N": self.curve - pull}
+        return found if self.band is None else {**found, "band_low_N": self.band.low, "band_high_N": self.band.high}
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +70,7 @@ class Calibrated:
         checks: What numerical choices change; none where the search was interrupted.
         start: Smoothed curve of the literature's values [N] (n,), NaN where that run broke down or was not made.
         posterior: The posterior over all plausible foods, where it was sampled.
+        both: The way up that was fitted beside the way down, if it was.
     """
 
     setup: Setup
@@ -46,12 +80,31 @@ class Calibrated:
     checks: list[Check]
     start: FloatArray
     posterior: SampledPosterior | None = None
+    both: BothWays | None = None
+
+    @property
+    def objective(self) -> Objective | JointObjective:
+        """What was fitted: the way down, or both ways."""
+        return self.setup.objective if self.both is None else self.both.objective
+
+    @property
+    def best(self) -> ScoredRun:
+        """The best run, its way down."""
+        return self.fit.best.each[0]
+
+    @property
+    def withdrawal(self) -> FittedWithdrawal | None:
+        """The way up, where it was fitted."""
+        if self.both is None:
+            return None
+        bands = () if self.analysis is None else self.analysis.bands
+        return FittedWithdrawal(self.both.withdrawal, self.fit.best.each[1].curve, bands[1] if bands else None)
 
     @cached_property
     def metrics(self) -> Metrics:
         """The best curve against the trace."""
         curve = self.setup.curve
-        return compare(curve.stroke, curve.curve, self.fit.best.curve)
+        return compare(curve.stroke, curve.curve, self.best.curve)
 
     @cached_property
     def nulls(self) -> dict[str, NullModel]:
@@ -86,7 +139,7 @@ class Calibrated:
         assert self.analysis is not None
         return min(
             self.analysis.uncertainty.probability,
-            float(chi2.sf(self.fit.best.misfit, self.setup.objective.effective_rows)),
+            float(chi2.sf(self.fit.best.misfit, self.objective.effective_rows)),
         )
 
     @cached_property
@@ -96,7 +149,7 @@ class Calibrated:
 
     def curves(self) -> dict[str, FloatArray]:
         """Columns of curves.csv, all on the trace's stroke grid."""
-        curve, best, record = self.setup.curve, self.fit.best.curve, self.record
+        curve, best, record = self.setup.curve, self.best.curve, self.record
         columns = {"stroke_m": curve.stroke, "real_N": curve.curve, "sim_N": best, "residual_N": best - curve.curve}
         smooth = self.setup.objective.target.smooth
         columns["edge_N"] = smooth(curve.stroke, record.stroke, record.edge[:, 2])

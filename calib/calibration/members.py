@@ -127,7 +127,7 @@ def _member(
     result: CalibrationResult, entry: StoredEvaluation, stroke: FloatArray, real: FloatArray, felt: Smoother
 ) -> Member | None:
     """A stored run as a member, as the sensor would have felt it; None where it is none of the search or broke down."""
-    run = entry.evaluation
+    run = entry.evaluation.down
     if entry.fidelity not in GRIDS or not run.ok:
         return None
     try:

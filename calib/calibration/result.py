@@ -25,6 +25,7 @@ from calib.calibration.result_parts import (
     SimulatedCut,
     SobolIndices,
     TraceSource,
+    WithdrawalAgreement,
 )
 from calib.errors import CurveError, DocumentError, OutputError
 from calib.io import typed_document
@@ -43,7 +44,7 @@ from calib.validation.acceptance import Verdict
 from calib.validation.metrics import Metrics, compare
 from calib.validation.numerical_checks import Check
 
-SUMMARY = "summary.json"
+SUMMARY, CURVES, WITHDRAWAL_CURVES = "summary.json", "curves.csv", "withdrawal.csv"
 REMEDY = "run the same calibrate command again with --resume"
 """What to do about a folder that is not whole."""
 RATED = {
@@ -90,6 +91,7 @@ class CalibrationResult:
         sensitivity: Sobol indices over the prior, by quantity (peak, work, initial_slope) and parameter; empty where
             the fit ended too early.
         sampled: The posterior over all plausible foods, with --sample; left out without.
+        withdrawal: The way up against the trace, with --withdrawal; left out without.
         wall_s: Run time [s].
         at_literature: The simulation at the literature's values against the trace. It is not in the document but
             follows from the curves; None where that simulation did not end.
@@ -99,7 +101,7 @@ class CalibrationResult:
     KEYS: ClassVar[tuple[str, ...]] = (
         *("food", "created", "status", "search", "passed", "verdicts", "trace", "trace_sha256", "air", "conditioning"),
         *("agreement", "fitted", "nuisances", "posterior", "fixed_parameters", "history", "cut", "software"),
-        *("invocation", "numerical_checks", "warnings", "limits", "sensitivity", "sampled", "wall_s"),
+        *("invocation", "numerical_checks", "warnings", "limits", "sensitivity", "sampled", "withdrawal", "wall_s"),
     )
 
     folder: Path = Path()
@@ -130,6 +132,7 @@ class CalibrationResult:
     limits: Annotated[tuple[str, ...], Shared("limits")]
     sensitivity: Mapping[str, Mapping[str, SobolIndices]] = field(default_factory=dict)
     sampled: PosteriorSummary | None = None
+    withdrawal: WithdrawalAgreement | None = None
     wall_s: Annotated[NotNegative | None, ALWAYS]
     at_literature: NullRating | None = None
 
@@ -171,13 +174,18 @@ class CalibrationResult:
         Raises:
             OutputError: curves.csv is missing or damaged.
         """
-        path = self.folder / "curves.csv"
-        try:
-            return pd.read_csv(path)
-        except (OSError, ValueError) as error:
-            raise OutputError(
-                f"{path}: cannot be read ({brief(str(error))}); run the calibration with resume=True"
-            ) from None
+        return _table(self.folder / CURVES)
+
+    @property
+    def withdrawal_curves(self) -> pd.DataFrame:
+        """Measured and simulated pull over the way up, with the 95 % band [m, N].
+
+        Raises:
+            OutputError: No way up was fitted, or withdrawal.csv is missing or damaged.
+        """
+        if self.withdrawal is None:
+            raise OutputError(f"{self.folder}: no withdrawal was fitted; calibrate with withdrawal=True")
+        return _table(self.folder / WITHDRAWAL_CURVES)
 
     @property
     def evaluations(self) -> pd.DataFrame:
@@ -358,6 +366,20 @@ def read_summary(path: Path, remedy: str = REMEDY) -> Any:
         raise DocumentError(f"{path}: {what}; {remedy}") from None
     except ValueError as e:
         raise DocumentError(f"{path}: damaged, not JSON ({brief(str(e))}); {remedy}") from None
+
+
+def _table(path: Path) -> pd.DataFrame:
+    """A table of curves.
+
+    Raises:
+        OutputError: It is missing or damaged.
+    """
+    try:
+        return pd.read_csv(path)
+    except (OSError, ValueError) as error:
+        raise OutputError(
+            f"{path}: cannot be read ({brief(str(error))}); run the calibration with resume=True"
+        ) from None
 
 
 def _rated(result: CalibrationResult) -> NullRating | None:

@@ -20,7 +20,7 @@ import numpy as np
 from calib.calibration.calibrated import Calibrated
 from calib.calibration.credibility import write_credibility
 from calib.calibration.report import write_reports_of
-from calib.calibration.result import SUMMARY, CalibrationResult, read_result, to_document
+from calib.calibration.result import CURVES, SUMMARY, WITHDRAWAL_CURVES, CalibrationResult, read_result, to_document
 from calib.calibration.run_clock import RunClock, earlier_runs
 from calib.calibration.summary import add_conditioning, summarise
 from calib.fit.multistart import FitResult
@@ -33,6 +33,7 @@ from calib.posterior.posterior import SampledPosterior
 from calib.posterior.sampling import check_installed
 from calib.problem.request import Request
 from calib.problem.setup import FINE, Setup, set_up
+from calib.problem.withdrawal import BothWays
 from calib.simulation.evaluation import Evaluators
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore
 from calib.simulation.record_file import read_record, record_errands
@@ -76,6 +77,7 @@ def run(
     say = say or (lambda text: None)
     began = time.monotonic()
     setup = set_up(request)
+    both = BothWays.of(setup) if request.withdrawal else None
     for text in setup.notes:
         say(text)
     options = FitOptions(budget=request.budget, batch=pool.batch, seed=request.seed)
@@ -86,7 +88,7 @@ def run(
     with prepare(out, "calibrate", resume=resume):
         with EvaluationStore(out / STORE, setup.header, resume=resume, say=say) as store:
             clock = RunClock(progress, earlier_runs(out, pool.batch) if progress else [])
-            work = _Calibration(setup, pool, store, out, say, clock)
+            work = _Calibration(setup, both, pool, store, out, say, clock)
             found = work.fitted(options)
             calibrated = work.repeated(found)
         add_conditioning(out / STORE, setup.curve)
@@ -106,11 +108,12 @@ class _Found:
 class _Calibration:
     """A calibration while its simulations run.
 
-    Attributes: what was decided; where the simulations run and where they are kept; the output folder; and who is told
-    of each stage, in words and as a part of all.
+    Attributes: what was decided, and of the way up where that is fitted too; where the simulations run and where they
+    are kept; the output folder; and who is told of each stage, in words and as a part of all.
     """
 
     setup: Setup
+    both: BothWays | None
     pool: Workers
     store: EvaluationStore
     out: Path
@@ -120,11 +123,12 @@ class _Calibration:
     def fitted(self, options: FitOptions) -> _Found:
         """The fit, and its uncertainty."""
         setup = self.setup
-        evaluators = setup.evaluators(self.pool, self.store)
+        problem = self.both or setup
+        evaluators = problem.evaluators(self.pool, self.store)
         if setup.request.sample:
             return self._sampled(evaluators)
         listener = Listener(self.clock.search, self._said, self._begin_longest_check)
-        return _Found(*fit_with_uncertainty(setup.objective, evaluators, options, listener))
+        return _Found(*fit_with_uncertainty(problem.objective, evaluators, options, listener))
 
     def _said(self, text: str) -> None:
         """A stage of the intervals, told to both listeners."""
@@ -151,7 +155,7 @@ class _Calibration:
     def repeated(self, found: _Found) -> Calibrated:
         """The best values simulated once more, whole and otherwise, and those of the literature."""
         fit = found.fit
-        setup, best, path = self.setup, fit.best.evaluation, self.out / RECORD
+        setup, best, path = self.setup, fit.best.each[0].evaluation, self.out / RECORD
         scene, ended = setup.scene(best.parameters), fit.status != "interrupted"
         errands = record_errands(scene, path)
         if ended:
@@ -167,7 +171,8 @@ class _Calibration:
             self.pool.errands(self._counted(more))
         checks = check(scene, best, self.store, way, self._fitted) if ended else []
         start = self._start_curve() if ended else np.full_like(setup.curve.stroke, np.nan)
-        return Calibrated(setup.sized(best.parameters), fit, found.analysis, record, checks, start, found.posterior)
+        sized = setup.sized(best.parameters)
+        return Calibrated(sized, fit, found.analysis, record, checks, start, found.posterior, self.both)
 
     def _counted(self, errands: Sequence[Errand]) -> list[Errand]:
         """The same errands, each of which tells when it is made."""
@@ -203,10 +208,12 @@ class _Calibration:
 
 
 def _write(done: Calibrated, out: Path, began: float) -> CalibrationResult:
-    """Write curves.csv, material.yaml, summary.json, credibility.json, report.pdf and report.html; returns the result,
-    as the folder has it."""
+    """Write curves.csv, withdrawal.csv where the way up was fitted, material.yaml, summary.json, credibility.json,
+    report.pdf and report.html; returns the result, as the folder has it."""
     document = to_document(summarise(done, out, began))
-    write_csv(out / "curves.csv", done.curves())
+    write_csv(out / CURVES, done.curves())
+    if done.withdrawal is not None:
+        write_csv(out / WITHDRAWAL_CURVES, done.withdrawal.columns())
     provenance = {key: document[key] for key in PROVENANCE} | {"trace": done.setup.curve.trace.label}
     dump_material(done.food(), out / "material.yaml", provenance)
     write_json(out / SUMMARY, document)

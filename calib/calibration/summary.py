@@ -11,8 +11,9 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 import h5py
+import numpy as np
 
-from calib.calibration.calibrated import Calibrated
+from calib.calibration.calibrated import Calibrated, FittedWithdrawal
 from calib.calibration.result import CalibrationResult
 from calib.calibration.result_parts import (
     Agreement,
@@ -28,6 +29,7 @@ from calib.calibration.result_parts import (
     SobolIndices,
     Tally,
     TraceSource,
+    WithdrawalAgreement,
 )
 from calib.errors import OutputError
 from calib.fit.multistart import FitResult
@@ -47,13 +49,15 @@ from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.uncertainty.intervals import Uncertainty
 from calib.uncertainty.limiting import limiting
-from calib.validation.acceptance import Conservation, Verdict, judge
+from calib.validation.acceptance import FIT_NRMSE_LIMIT, Conservation, Verdict, judge
 from calib.validation.bounds import bound_word
 from calib.validation.not_shown import limits
 from mpm.files import write_atomic
+from mpm.output.number_text import quantity
 from mpm.output.record import ForceRecord
 from mpm.scene import Knife
 
+WITHDRAWAL_LINE = "curve error of the withdrawal (NRMSE)"
 WITH_WIDTH = 0.5
 """An interval that a measured width would make shorter than this part of it belongs to the product with the width."""
 
@@ -78,7 +82,7 @@ def summarise(done: Calibrated, folder: Path, began: float) -> CalibrationResult
     assert isinstance(scene.knife, Knife)  # a press has no trace of a cut
     narrow = blade_warnings(scene.food.shape, scene.knife)
     assumed = [*dict.fromkeys([*setup.assumed, *narrow]), *doubts_of_the_crack(scene)]
-    said = [*limits(label, source, kind, verdicts, fitted, assumed, record.fracture), *_no_better(done)]
+    said = [*limits(label, source, kind, verdicts, fitted, assumed, request.food, record.fracture), *_no_better(done)]
     nulls = {name: NullRating.of(model.metrics) for name, model in done.nulls.items()}
     return CalibrationResult(
         folder=folder,
@@ -105,6 +109,7 @@ def summarise(done: Calibrated, folder: Path, began: float) -> CalibrationResult
         limits=(*(() if analysis is None else analysis.remarks), *_limiting(setup, analysis), *said),
         sensitivity=_sensitivity(done),
         sampled=None if done.posterior is None else summarised(done.posterior),
+        withdrawal=_withdrawal(done),
         wall_s=time.monotonic() - began,
     )
 
@@ -119,7 +124,7 @@ def verdicts_of(done: Calibrated) -> list[Verdict]:
         All lines; those with ``passed`` None were not run and decide nothing.
     """
     record = done.record
-    return judge(
+    lines = judge(
         done.metrics,
         {name: model.metrics for name, model in done.nulls.items()},
         conservation=Conservation(record.momentum_residual, record.ke_over_ie, record.parted, record.lost),
@@ -128,10 +133,46 @@ def verdicts_of(done: Calibrated) -> list[Verdict]:
         nuisances=_nuisances(done),
         predictive=done.predictive,
     )
+    if done.withdrawal is not None:
+        lines.append(_withdrawal_line(done.withdrawal))
+    return lines
 
 
-def _nuisances(done: Calibrated) -> dict[str, FittedNuisance]:
-    return {} if done.analysis is None else {e.name: FittedNuisance.of(e) for e in done.analysis.nuisances}
+def _withdrawal_line(up: FittedWithdrawal) -> Verdict:
+    """The line of the way up. A pull is small, so what its level leaves open is a part of the limit."""
+    level, largest = up.measured.level_sd_N, float(up.measured.pull.max())
+    limit = math.hypot(FIT_NRMSE_LIMIT, level / largest)
+    note = f"of the largest pull, {quantity(largest, 'N')}; its level is known to {quantity(level, 'N', digits=2)}"
+    return Verdict(WITHDRAWAL_LINE, up.nrmse, limit, "fraction", bool(up.nrmse <= limit), note)
+
+
+def _nuisances(done: Calibrated, way: int = 0) -> dict[str, FittedNuisance]:
+    """What the fit says of the measurement, by name: on the way down (0), or on the way up (1)."""
+    if done.analysis is None:
+        return {}
+    counts = [len(term.objective.nuisances) for term in done.objective.terms]
+    first = sum(counts[:way])
+    return {e.name: FittedNuisance.of(e) for e in done.analysis.nuisances[first : first + counts[way]]}
+
+
+def _withdrawal(done: Calibrated) -> WithdrawalAgreement | None:
+    """The way up against the trace."""
+    found = done.withdrawal
+    if found is None:
+        return None
+    way, pull = found.measured.way, found.measured.pull
+    return WithdrawalAgreement(
+        from_m=float(way[0]),
+        to_m=float(way[-1]),
+        speed_m_s=found.measured.speed,
+        peak_real_N=float(pull.max()),
+        peak_sim_N=float(found.curve.max()),
+        nrmse=found.nrmse,
+        work_real_J=float(np.trapezoid(pull, way)),
+        work_sim_J=float(np.trapezoid(found.curve, way)),
+        predictive_inside=None if found.band is None else found.band.inside,
+        nuisances=_nuisances(done, 1),
+    )
 
 
 def _no_better(done: Calibrated) -> list[str]:

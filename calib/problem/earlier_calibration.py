@@ -94,6 +94,6 @@ def _searched(store: Path) -> list[Evaluation]:
         OutputError: It is missing or damaged.
     """
     try:
-        return [entry.evaluation for entry in read_runs(store) if entry.fidelity in SEARCHED]
+        return [entry.evaluation.down for entry in read_runs(store) if entry.fidelity in SEARCHED]
     except OSError as e:
         raise OutputError(f"--start-from: {store} cannot be read ({brief(str(e))}); name another folder") from None

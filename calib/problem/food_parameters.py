@@ -24,8 +24,30 @@ YIELD_STRAIN_FACTOR = 3.0
 """A food's yield stress over its E is this factor below or above that of the literature, at 95 % [-]. A critical strain
 has been proposed as what fruit tissue fails at (Segerlind and Dal Fabbro 1978); published single values lie between 5 %
 (kiwi) and 16 % (apple). The factor is assumed, materials.yaml, remark 8."""
+STICKS = {"adhesion": 5e3, "adhesion_energy": 1.0}
+"""How a food sticks to the blade where its withdrawal is fitted and nobody has said so [SI]. Assumed, and fitted over
+the range of a given value, a hundredfold for the energy."""
 Heights = tuple[float, float, float]
 """Lowest, likely and largest height of a specimen [m]."""
+
+
+def sticking(food: FoodSpec) -> tuple[FoodSpec, tuple[str, ...]]:
+    """The food as a withdrawal sees it, which may stick to the blade, and what was assumed of that.
+
+    Args:
+        food: The food.
+
+    Returns:
+        The food with an adhesion, and a sentence where it had none.
+    """
+    if food.value("adhesion_energy") is not None:  # then its adhesion is known, too
+        return food, ()
+    sticky = food.with_values(STICKS, source="assumed")
+    low, high = sticky.prior("adhesion_energy")
+    return sticky, (
+        f"nobody has measured how {food.name} sticks to a blade: its adhesion_energy is sought from {low:g} to "
+        f"{high:g} J/m^2, up to a traction of {sticky.value('adhesion'):g} Pa (assumed); --set gives other values",
+    )
 
 
 def fit_parameters(food: FoodSpec, names: tuple[str, ...], heights: Heights | None = None) -> ParameterSet:

@@ -36,6 +36,7 @@ class Request:
         gain_sd: Relative standard deviation of the sensor's gain [-]; None for what its kind suggests.
         lag_sd: Standard deviation of the sensor's delay [s], or None.
         bandwidth: Cut-off of the low-pass that the force went through [Hz]; None for what its kind suggests.
+        withdrawal: Whether the way up is fitted beside the way down.
         scaled: Whether the search has a factor for the width of the specimen, as it has in a fit of several.
         u_num: Folder of a convergence study whose numerical uncertainty enters the likelihood, or None.
         start_from: Folder of an earlier calibration of the same food and knife, or of several, at whose closest foods
@@ -64,6 +65,7 @@ class Request:
     gain_sd: float | None = None
     lag_sd: float | None = None
     bandwidth: float | None = None
+    withdrawal: bool = False
     scaled: bool = False
     u_num: Path | None = None
     start_from: Path | None = None

@@ -23,7 +23,7 @@ from calib.material.scene import (
     with_other_particles,
 )
 from calib.problem.earlier_calibration import earlier_guesses
-from calib.problem.food_parameters import Heights, fit_parameters, size_relative_sd
+from calib.problem.food_parameters import Heights, fit_parameters, size_relative_sd, sticking
 from calib.problem.layer_guess import layer_guesses
 from calib.problem.nuisance import Sensor, nuisances, real_speed, sensor_of
 from calib.problem.numerical_uncertainty import numerical_uncertainty
@@ -146,14 +146,14 @@ def set_up(request: Request) -> Setup:
         CutcalError: Anything wrong with the input.
     """
     curve, air_sha256 = conditioned(request)
-    request = with_height(request, curve)
+    request, sticks = _with_adhesion(with_height(request, curve))
     heights = height_range(request.food, curve, request.sizing)
     fine, coarse, assumed = _scenes(request, curve, heights)
     if not request.scaled:  # several are judged together
         check_speeds(_names(request, heights), {curve.trace.source: real_speed(curve)})
     sensor, said = sensor_of(curve, request.gain_sd, request.lag_sd, request.bandwidth)
     objective = _objective(request, curve, fine, sensor, heights)
-    return Setup(request, curve, fine, coarse, objective, (*assumed, *said), air_sha256, sensor.bandwidth)
+    return Setup(request, curve, fine, coarse, objective, (*assumed, *said, *sticks), air_sha256, sensor.bandwidth)
 
 
 def conditioned(request: Request) -> tuple[Conditioned, str | None]:
@@ -185,6 +185,14 @@ def with_height(request: Request, curve: Conditioned) -> Request:
         return request
     height = board_stroke(curve.trace, curve.onset_s, request.board_z)
     return replace(request, sizing=replace(request.sizing, height=height))
+
+
+def _with_adhesion(request: Request) -> tuple[Request, tuple[str, ...]]:
+    """The request with a food that may stick to the blade where its withdrawal is fitted, and what was assumed."""
+    if not request.withdrawal:
+        return request, ()
+    food, said = sticking(request.food)
+    return replace(request, food=food), said
 
 
 def _scenes(request: Request, curve: Conditioned, heights: Heights | None) -> tuple[Scene, Scene, list[str]]:
@@ -219,7 +227,8 @@ def _names(request: Request, heights: Heights | None) -> tuple[str, ...]:
             raise MaterialError("--fit roundness beside --shape or --outline, which says it; leave one of both out")
         return request.fit
     height = () if heights is None else ("height",)
-    return (*food.default_fit, *height, *((ROUNDNESS,) if form_is_open(food, sizing) else ()))
+    sticks = ("adhesion_energy",) if request.withdrawal else ()
+    return (*food.default_fit, *sticks, *height, *((ROUNDNESS,) if form_is_open(food, sizing) else ()))
 
 
 def _objective(

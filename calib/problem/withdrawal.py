@@ -92,7 +92,7 @@ def withdrawal_of(curve: Conditioned, release: float) -> Withdrawal:
     if not pull.max() > 0.0:
         raise TraceError(
             f"{source}: the food pushes the knife out over all of the withdrawal: nothing in it tells friction from "
-            "adhesion; leave it out"
+            "adhesion; leave --withdrawal out"
         )
     inside = (way >= release) & (way <= end)
     seconds = float(np.ptp(curve.time[turn:][inside]))
@@ -136,10 +136,9 @@ def both_ways(evaluation: Evaluation) -> Evaluation:
     """
     e = evaluation
     turn = e.scalars.get("turn_m", math.inf)
-    down = e.stroke <= turn
-    cut = replace(e, stroke=e.stroke[down], force=e.force[down])
-    pull = replace(e, stroke=e.stroke[~down] - turn, force=-e.force[~down], scalars={})
-    return replace(e, stroke=np.empty(0), force=np.empty(0), parts=(cut, pull))
+    up = e.stroke > turn
+    pull = replace(e, stroke=e.stroke[up] - turn, force=-e.force[up], scalars={})
+    return replace(e, stroke=np.empty(0), force=np.empty(0), parts=(e.down, pull))
 
 
 class BothWaysEvaluator:
@@ -213,8 +212,8 @@ class BothWays:
         """
         if math.isfinite(setup.bandwidth):
             raise TraceError(
-                f"{setup.curve.trace.source}: the force went through a low-pass of {setup.bandwidth:g} Hz, which a "
-                "withdrawal is not compared through; leave the withdrawal out"
+                f"{setup.curve.trace.source}: its force went through a low-pass of {setup.bandwidth:g} Hz, through "
+                "which a withdrawal is not compared; leave --withdrawal out"
             )
         found = withdrawal_of(setup.curve, RELEASE_SLIPS * setup.fine.edge.slip)
         target = Target(found.way, found.pull, found.noise_sd_N, found.noise_sd_N, smooth_pull)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -139,6 +139,12 @@ class Evaluation:
     def ok(self) -> bool:
         """Whether the run reached the end of its stroke."""
         return self.status == "ok"
+
+    @property
+    def down(self) -> Evaluation:
+        """The way down of a run whose blade is withdrawn; any other run as it is."""
+        below = self.stroke <= self.scalars.get("turn_m", math.inf)
+        return self if below.all() else replace(self, stroke=self.stroke[below], force=self.force[below])
 
     def until(self, stroke: float) -> tuple[float, float]:
         """Largest force [N] and work [J] up to a stroke [m]: a simulation may be longer than its trace."""

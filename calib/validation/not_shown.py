@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from calib.material.properties import property_of
+from calib.material.food import FoodSpec
+from calib.material.properties import ADHESION, property_of
 from calib.uncertainty.estimates import FittedParameter
 from calib.validation.acceptance import Verdict
 from calib.validation.numerical_checks import FINER_GRID
@@ -23,6 +24,7 @@ def limits(
     verdicts: Sequence[Verdict],
     fitted: Mapping[str, FittedParameter],
     assumptions: Sequence[str],
+    food: FoodSpec,
     fracture: Mapping[str, float] | None = None,
 ) -> list[str]:
     """What the calibration does not show.
@@ -34,6 +36,7 @@ def limits(
         verdicts: The verdict table.
         fitted: Fitted parameters by name.
         assumptions: What was assumed of the specimen and the sensor, each a sentence without capital and full stop.
+        food: The food, as it was simulated.
         fracture: Energy of new surface at the edge and by opening ahead of it [J/m^2]; None where nothing was cut.
 
     Returns:
@@ -47,7 +50,7 @@ def limits(
     said += _limits_of_parameters(fitted)
     said += _limits_of_measurement(stroke_source, baseline_kind)
     said += [a[0].upper() + a[1:] + "." for a in assumptions]
-    said += _limits_of_simulation(fracture)
+    said += _limits_of_simulation(food, fracture)
     said += [f"{remedy[0].upper()}{remedy[1:]}." for remedy in map(remedied, verdicts) if remedy]
     return said
 
@@ -82,7 +85,25 @@ def _limits_of_measurement(stroke_source: str, baseline_kind: str) -> list[str]:
     return said
 
 
-def _limits_of_simulation(fracture: Mapping[str, float] | None) -> list[str]:
+def not_simulated(food: FoodSpec) -> str:
+    """What of a food was left out of its simulation, in a sentence.
+
+    Args:
+        food: The food, as it was simulated.
+    """
+    has = food.properties
+    left = ["moisture"]
+    if not any(name in has for name in ADHESION):
+        left.insert(0, "adhesion")
+    if "relaxing_share" not in has or has["relaxing_share"].value == 0.0:
+        left.insert(0, "relaxation")
+    rate = "" if food.rate_dependent else "The laws are independent of rate. "
+    under_it = has["skin_thickness"].value > 0.0 and "R_rind" not in has
+    skin = "; of a whole fruit only the upper skin is cut" if under_it else ""
+    return f"{rate}Not simulated: {listed(left)}{skin}."
+
+
+def _limits_of_simulation(food: FoodSpec, fracture: Mapping[str, float] | None) -> list[str]:
     said = []
     if fracture is not None and "opening_J_m2" in fracture:
         edge, opening = fracture["edge_J_m2"], fracture["opening_J_m2"]
@@ -95,8 +116,7 @@ def _limits_of_simulation(fracture: Mapping[str, float] | None) -> list[str]:
     return [
         *said,
         "One cut of one specimen says nothing about the scatter between specimens.",
-        "The laws are independent of rate; relaxation, adhesion and moisture were not simulated, and the lower skin of "
-        "a whole fruit is not cut.",
+        not_simulated(food),
         "The blade lay on a plane of the grid's nodes. Between two planes the same values give other work, by 1 to 2 % "
         "(cutcal converge --material --offset 0.5 measures it).",
         "One finer grid was tried, which gives a difference but neither an order nor an uncertainty (cutcal converge "

@@ -27,6 +27,7 @@ CURVE_COLUMNS = ("stroke_m", "real_N", "sim_N", "residual_N", "edge_N", "face_N"
 COMPLETE = CURVE_COLUMNS[:4]
 #: These may be left out, by an interrupted run and by older versions.
 BAND_COLUMNS = ("band_low_N", "band_high_N")
+WITHDRAWAL_COLUMNS = ("way_m", "real_N", "sim_N", "residual_N")
 RECORD = ("time_s", "raw_N", "tared_N")
 REMEDY = "run the same calibrate command again with --resume"
 
@@ -58,6 +59,7 @@ class Finished:
         tared: Force less its baseline [N], shape (k,).
         runs: The simulations, none where the store has no table of them.
         section: The food across the blade's middle; None where the record has none.
+        withdrawal: Columns of ``withdrawal.csv`` by name, shape (m,); empty where no way up was fitted.
     """
 
     result: CalibrationResult
@@ -68,6 +70,7 @@ class Finished:
     tared: np.ndarray
     runs: Runs
     section: Section | None = None
+    withdrawal: dict[str, np.ndarray] = field(default_factory=dict)
 
 
 def read_finished(result: CalibrationResult) -> Finished:
@@ -87,7 +90,8 @@ def read_finished(result: CalibrationResult) -> Finished:
     curves = _read_curves(folder / "curves.csv")
     store = folder / "evaluations.h5"
     section = read_section(folder / "record.h5")
-    return Finished(result, created, curves, *_read_record(store), _read_runs(store), section)
+    up = {} if result.withdrawal is None else _read_withdrawal(folder / "withdrawal.csv")
+    return Finished(result, created, curves, *_read_record(store), _read_runs(store), section, up)
 
 
 def read_json(path: Path) -> Any:
@@ -157,13 +161,20 @@ def _read_curves(path: Path) -> dict[str, np.ndarray]:
     return {name: x for name, x in columns.items() if name in CURVE_COLUMNS or set(BAND_COLUMNS) <= set(columns)}
 
 
-def read_columns(path: Path, needed: Sequence[str], complete: Sequence[str]) -> dict[str, np.ndarray]:
+def _read_withdrawal(path: Path) -> dict[str, np.ndarray]:
+    return read_columns(path, WITHDRAWAL_COLUMNS, WITHDRAWAL_COLUMNS, over="way_m")
+
+
+def read_columns(
+    path: Path, needed: Sequence[str], complete: Sequence[str], over: str = "stroke_m"
+) -> dict[str, np.ndarray]:
     """Curves over a stroke that rises.
 
     Args:
         path: A table with a line of names; an empty cell is NaN.
-        needed: Columns that must be there, ``stroke_m`` and ``real_N`` among them.
+        needed: Columns that must be there, that of the stroke and ``real_N`` among them.
         complete: Those that must be finite.
+        over: Column of the stroke.
 
     Returns:
         All its columns by name, each (n,).
@@ -190,7 +201,7 @@ def read_columns(path: Path, needed: Sequence[str], complete: Sequence[str]) -> 
     gaps = [name for name in complete if not np.all(np.isfinite(curves[name]))]
     if gaps:
         raise ReportError(f"{path}: column {gaps[0]} has a value that is not finite; {REMEDY}")
-    if np.any(np.diff(curves["stroke_m"]) <= 0.0) or not np.max(curves["real_N"]) > 0.0:
+    if np.any(np.diff(curves[over]) <= 0.0) or not np.max(curves["real_N"]) > 0.0:
         raise ReportError(f"{path}: damaged, the stroke does not rise or no real force is positive; {REMEDY}")
     return curves
 

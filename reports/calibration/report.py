@@ -26,6 +26,7 @@ from reports.calibration import (
     parameter_figures,
     parameter_page,
     posterior_page,
+    withdrawal_page,
 )
 from reports.web.calibration import calibration_page, write_page
 
@@ -83,7 +84,7 @@ def write_report(result: CalibrationResult, members: Members | None = None) -> P
     pictures = _pictures(done)
     content = {**_content(done), "figures": sorted(pictures)}
     target = result.folder / "report.pdf"
-    page = calibration_page(done, content, members, pictures.get("forces.svg", b""))
+    page = calibration_page(done, content, members, {name.removesuffix(".svg"): p for name, p in pictures.items()})
     publish(target, "calibration.typ", content, pictures, date=done.created)
     write_page(target.with_suffix(".html"), page)
     return target
@@ -122,6 +123,8 @@ def _pictures(done: Finished) -> dict[str, bytes]:
     apart = failures.splits(done.runs, fitted)
     if apart:
         found["breakdowns.svg"] = failures.picture(done.runs, apart)
+    if done.withdrawal:
+        found["withdrawal.svg"] = withdrawal_page.figure(done.withdrawal, trace)
     if result.history.misfit_history:
         found["misfit.svg"] = figures.misfit(result.history.misfit_history)
     return found
@@ -215,6 +218,7 @@ def _content(done: Finished) -> Data:
         "broke_down": failures.sentence(done.runs, broken),
         "failures": numerics_page.failures(result.history.failures),
         "credibility": credibility_page.credibility(result.folder),
+        "withdrawal": None if result.withdrawal is None else withdrawal_page.withdrawal(result.withdrawal),
         "provenance": numerics_page.provenance(result),
         "model": model_page.model(result),
         "limits": [capital(text) for text in result.limits],

@@ -5,6 +5,7 @@ Its numbers are the texts of ``report.pdf``: what this module gets is what the t
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,17 +21,18 @@ if TYPE_CHECKING:
     from calib.calibration.members import Members
 
 FORCES = "Measured and simulated force over stroke with the 95 % band, and the residual below"
+WITHDRAWAL = "Measured and simulated pull on the knife over its way up"
 PAPER = "Measured and simulated force over stroke, with the edge and face parts of the simulation"
 
 
-def calibration_page(done: Finished, content: Data, members: Members | None, forces: bytes) -> str:
+def calibration_page(done: Finished, content: Data, members: Members | None, pictures: Mapping[str, bytes]) -> str:
     """The page of a calibration.
 
     Args:
         done: The run and its curves.
         content: What the PDF prints, as text.
         members: Simulations to choose from; None where they were not read.
-        forces: The main figure of the PDF, an SVG document for readers without scripts; empty where there is none.
+        pictures: Figures of the PDF by name, SVG documents: the main one is for readers without scripts.
 
     Returns:
         The HTML document.
@@ -38,7 +40,8 @@ def calibration_page(done: Finished, content: Data, members: Members | None, for
     shown = () if members is None else members.shown
     sections = [
         _verdict(content),
-        _forces(done, content, members, forces),
+        _forces(done, content, members, pictures.get("forces", b"")),
+        _withdrawal(content["withdrawal"], pictures.get("withdrawal", b"")),
         members_section(done.result.fitted, members),
         _parameters(content),
         limits_section(content),
@@ -101,6 +104,20 @@ def _forces(done: Finished, c: Data, members: Members | None, forces: bytes) -> 
         element("p", " ".join(c["errors"]), class_="note") if c["errors"] else None,
         id="forces",
     )  # fmt: skip
+
+
+def _withdrawal(found: Data | None, drawn: bytes) -> Markup | None:
+    """The way up, where it was fitted."""
+    if found is None:
+        return None
+    return element(
+        "section",
+        element("h2", "The withdrawal of the blade"),
+        element("p", found["told"]),
+        picture(drawn, WITHDRAWAL) if drawn else None,
+        pairs(found["rows"]),
+        id="withdrawal",
+    )
 
 
 def _parameters(c: Data) -> Markup:

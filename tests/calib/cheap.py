@@ -25,15 +25,25 @@ ROWS = 200
 
 
 def cut(scene: Scene) -> ForceRecord:
-    """A plateau for R, a ramp for E and a little that depends on everything else [N]; the knife is 1 m/s fast."""
+    """A plateau for R, a ramp for E and a little that depends on everything else [N]; the knife is 1 m/s fast.
+
+    A blade that is withdrawn is held back by friction, in proportion to what its faces felt, and by adhesion.
+    """
     m, shape = scene.food.material, scene.food.shape
     stroke = np.linspace(scene.motion.stroke / ROWS, scene.motion.stroke, ROWS)
     noise = np.random.default_rng(int(key_of(scene.as_dict())[:8], 16)).normal(0, 0.02)
     edge = shape.width * m.R * (1 - np.exp(-stroke / 2e-3)) + noise
     face = 2e-4 * shape.width * m.E * stroke / shape.height
-    zero, up, nothing = np.zeros(ROWS), np.array([0.0, 0.0, 1.0]), np.zeros((ROWS, 3))
+    path = stroke
+    if scene.motion.retract > 0.0:
+        way = np.linspace(stroke[0], scene.motion.retract, ROWS)
+        path, stroke = np.append(path, path[-1] + way), np.append(stroke, stroke[-1] - way)
+        edge = np.append(edge, -30.0 * shape.width * m.adhesion_energy * np.ones(ROWS))
+        face = np.append(face, -m.mu * 2e-4 * shape.width * m.E * stroke[ROWS:] / shape.height)
+    rows = len(stroke)
+    zero, up, nothing = np.zeros(rows), np.array([0.0, 0.0, 1.0]), np.zeros((rows, 3))
     return ForceRecord(
-        **{name: stroke for name in ("stroke", "command", "time")},
+        **{"stroke": stroke, "command": stroke, "time": path, "rows_down": ROWS if rows > ROWS else None},
         **{
             name: zero
             for name in ("slide", "kinetic", "elastic", "plastic", "damage", "viscous", "friction", "moment", "tilt")
@@ -41,7 +51,7 @@ def cut(scene: Scene) -> ForceRecord:
         **{name: nothing for name in ("board", "gravity", "momentum", "residual")},
         edge=edge[:, None] * up,
         face=face[:, None] * up,
-        parting=np.cumsum((edge + face) * stroke[0]),
+        parting=np.cumsum((edge + face) * path[0]),
         **{"mass": 0.1, "lagging": True, "cell": scene.numerics.dx, "speed": 1.0, "dt": 1e-5},
         **{"steps": 1000, "particles": 100, "images": 4, "cells": 1000, "severed_area": 0.0, "pieces": None},
         **{"counters": {"inverted": 0, "outside": 0}, "wall": float(os.environ.get(SECONDS, 0.0))},

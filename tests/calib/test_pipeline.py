@@ -68,6 +68,8 @@ from tests.calib.cheap import cut as cheap_cut
 from tests.data_dir import ROOT
 from tests.mpm.scenes import PRISM
 
+BANANA = load_food("banana")
+
 
 def recorded(loaded: bool) -> Trace:
     """A cut with a position over 40 mm that ends under load or released."""
@@ -378,7 +380,7 @@ def test_verdicts_fail_what_fails():
     most = {"mu": fitted("at_bound", 1.19, 0.0, 1.2)}
     assert [v.note for v in judged(fitted=most) if v.name == bounds.name] == ["mu"]
     fracture = {"edge_J_m2": 60.0, "opening_J_m2": 40.0, "released_J_m2": 2.0}
-    said = limits("measured", "speed", "constant", lines, parameters, ["the width is assumed"], fracture)
+    said = limits("measured", "speed", "constant", lines, parameters, ["the width is assumed"], BANANA, fracture)
     for word in (
         "peak force error",
         "no position",
@@ -388,11 +390,11 @@ def test_verdicts_fail_what_fails():
         "of R 40.0\xa0% went there",
     ):
         assert any(word in text for text in said)
-    small = limits("measured", "speed", "constant", lines, parameters, [], {**fracture, "opening_J_m2": 4.0})
+    small = limits("measured", "speed", "constant", lines, parameters, [], BANANA, {**fracture, "opening_J_m2": 4.0})
     assert not any("ahead of its edge" in text for text in small)
     assert not any("Weak intervals" in text for text in small)
     shaky = parameters | {"yield_stress": fitted("weak", 1e4, 1e4, 2e4)}
-    told = limits("measured", "speed", "constant", lines, shaky, [])
+    told = limits("measured", "speed", "constant", lines, shaky, [], BANANA)
     assert any("Weak intervals" in text and "for yield_stress" in text and "for R" not in text for text in told)
 
 
@@ -402,7 +404,7 @@ def test_a_force_that_hangs_on_the_cells_says_what_to_do(change):
     lines = changes(
         [Check("half the simulated speed", None, 0.01, -0.03), Check("cells of two thirds", None, 0.01, change)]
     )
-    said = limits("measured", "position", "air", lines, {}, [])
+    said = limits("measured", "position", "air", lines, {}, [], BANANA)
     assert [remedied(line) != "" for line in lines] == [False, change < -0.05]
     assert any("Values and intervals answer for these cells alone" in text for text in said) == (change < -0.05)
 

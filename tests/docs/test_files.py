@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calib.calibration.calibrated import Calibrated
+from calib.calibration.calibrated import Calibrated, FittedWithdrawal
 from calib.compression import result as compression
 from calib.io.folder import OWN_FILES, RUN_FILES
 from calib.io.schema import names, schema, tag
@@ -87,13 +87,20 @@ def of_calibration() -> set[str]:
     )
     done: Any = SimpleNamespace(
         setup=setup,
-        fit=SimpleNamespace(best=SimpleNamespace(curve=S)),
+        best=SimpleNamespace(curve=S),
         record=withdrawn(),
         start=S,
         nulls=null_models(S, curve.curve),
         analysis=SimpleNamespace(bands=[band]),
     )
     return set(Calibrated.curves(done))
+
+
+def of_withdrawal() -> set[str]:
+    """Columns of a way up with a band."""
+    measured: Any = SimpleNamespace(way=S, pull=S)
+    band: Any = SimpleNamespace(low=S, high=S)
+    return set(FittedWithdrawal(measured, S, band).columns())
 
 
 def of_study() -> set[str]:
@@ -137,6 +144,7 @@ def calls_of_write_csv(tree: ast.AST) -> list[ast.Call]:
 
 PLAIN: dict[str, Callable[[], set[str]]] = {
     "curves.csv of calibrate": of_calibration,
+    "withdrawal.csv of calibrate": of_withdrawal,
     "curves-NAME.csv of a study": of_study,
     "curves.csv of predict": of_prediction,
     "force.csv of simulate": lambda: set(withdrawn().columns()),

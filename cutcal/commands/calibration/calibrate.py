@@ -70,6 +70,7 @@ def add_args(p: argparse.ArgumentParser) -> None:
         metavar="PART",
         help="how far a right model may be, of the peak (0.03)",
     )
+    fit.add_argument("--withdrawal", action="store_true", help="fit the way up too: it tells R, friction and adhesion")
     fit.add_argument("--sample", action="store_true", help="sample all plausible foods (needs dynesty)")
     fit.add_argument("--u-num", metavar="DIR", help="a converge study whose uncertainty the fit heeds")
     fit.add_argument("--start-from", metavar="DIR", help="begin at the foods of earlier calibrations there")
@@ -151,6 +152,7 @@ def request_of(args: argparse.Namespace, command: Sequence[str]) -> Request:
         u_num=u_num,
         start_from=None if args.start_from is None else Path(args.start_from),
         sample=args.sample,
+        withdrawal=args.withdrawal,
     )
 
 
@@ -190,11 +192,11 @@ def run(args: argparse.Namespace) -> int:
     from calib.calibration.run import run as calibrate
 
     command = ["calibrate", *(a for a in sys.argv[1:] if a != "calibrate")]
-    of_one = [name.replace("_", "-") for name in ("sample", "start_from") if getattr(args, name)]
+    of_one = [name.replace("_", "-") for name in ("sample", "withdrawal", "start_from") if getattr(args, name)]
     if of_one and (args.all or args.config is not None):
         raise CutcalError(f"--{of_one[0]} is for one trace; leave it out of a fit of several, or name one with --cut")
-    if len(of_one) > 1:
-        raise CutcalError("--sample beside --start-from, which is where a search begins; give one of them")
+    if args.sample and len(of_one) > 1:
+        raise CutcalError(f"--sample beside --{of_one[1]}, which is for a search of one food; give one of them")
     if args.config is not None:
         return run_study(args, command)
     missing = [f"--{name}" for name in ("food", "trace") if getattr(args, name) is None]

@@ -8,6 +8,7 @@ from calib.errors import OutputError
 from calib.material.remarks import notes
 from calib.problem.request import Request
 from calib.problem.setup import set_up
+from calib.problem.withdrawal import BothWays
 from calib.trace.conditioning import Conditioned
 from mpm.scene import Knife
 
@@ -52,6 +53,10 @@ def description(request: Request, png: Path | None = None) -> str:
         ("fitted", ", ".join(p.name for p in setup.objective.parameters)),
         ("budget", f"{request.budget:g} simulations at most, one of screening is a quarter"),
     ]
+    if request.withdrawal:
+        up = BothWays.of(setup).withdrawal
+        way = f"from {1e3 * up.way[0]:.3g} to {1e3 * up.way[-1]:.3g} mm above the lowest point"
+        lines.append(("withdrawal", f"{way}, largest pull {up.pull.max():.4g} N, level known to {up.level_sd_N:.2g} N"))
     if png is not None:
         draw_record(request, c, png)
         lines.append(("picture", f"{png}, the record as it was read"))

@@ -1,0 +1,74 @@
+"""The way up of a calibration: what was compared, in words, and its figure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from reports.base.figures import BLACK, MEASURED, SIMULATED, predictive, svg
+from reports.base.format import quantity
+from reports.base.run_folder import Data
+from reports.calibration import measurement
+
+if TYPE_CHECKING:
+    from calib.calibration.result_parts import WithdrawalAgreement
+
+TOLD = (
+    "On the way up nothing is parted: friction has turned round, and what sticks is taken off. So this curve tells "
+    "friction and adhesion from the cutting resistance. In the fit the pull and the force on the way down weigh alike: "
+    "each is compared to a part of its own largest value. The pull cannot exceed what holds the food on the board."
+)
+
+
+def withdrawal(found: WithdrawalAgreement) -> Data:
+    """What a report says of the way up.
+
+    Args:
+        found: The way up against the trace.
+
+    Returns:
+        ``told``, a sentence; ``rows``, pairs of a name and a value; ``left_open``, lines of
+        :func:`reports.calibration.measurement.left_open`.
+    """
+    inside = found.predictive_inside
+    return {
+        "told": TOLD,
+        "rows": [
+            ["Compared", f"from {quantity(found.from_m, 'm')} to {quantity(found.to_m, 'm')} above the lowest point"],
+            ["Speed", f"{quantity(found.speed_m_s, 'm/s')} on average"],
+            ["Largest pull", f"measured {quantity(found.peak_real_N, 'N')}, simulated "
+                             f"{quantity(found.peak_sim_N, 'N')}"],
+            ["Work", f"measured {quantity(found.work_real_J, 'J')}, simulated {quantity(found.work_sim_J, 'J')}"],
+            ["Curve error (NRMSE)", quantity(found.nrmse, "fraction")],
+            ["Within the 95 % band", "not determined" if inside is None else quantity(inside, "fraction", digits=2)],
+        ],
+        "left_open": [measurement.left_open(name, n) for name, n in found.nuisances.items()],
+    }  # fmt: skip
+
+
+def figure(curves: Mapping[str, np.ndarray], trace: str) -> bytes:
+    """Measured and simulated pull over the way up.
+
+    Args:
+        curves: Columns of ``withdrawal.csv``, each (n,).
+        trace: What the real curve is called: measured or reconstructed.
+
+    Returns:
+        An SVG document.
+    """
+
+    def draw(figure: Figure) -> None:
+        axes, way = figure.subplots(), 1e3 * curves["way_m"]
+        axes.axhline(0.0, color=BLACK, lw=0.5)
+        predictive(axes, way, dict(curves), "band_low_N", "band_high_N", "95 % predictive band")
+        axes.plot(way, curves["real_N"], label=trace, **MEASURED)
+        axes.plot(way, curves["sim_N"], label="simulated", **SIMULATED)
+        axes.set_xlim(0.0, float(way[-1]))
+        axes.set_xlabel("way up from the lowest point [mm]")
+        axes.set_ylabel("pull on the knife [N]")
+        figure.legend(loc="outside upper left", ncols=3)
+
+    return svg(draw, 60.0)
