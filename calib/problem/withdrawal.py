@@ -36,6 +36,10 @@ CUT, WITHDRAWAL = "cut", "withdrawal"
 RELEASE_SLIPS = 2.0
 """Way after the turn that is left out, over the slip of the edge's law [-]: within one slip the edge gives it back
 (docs/theory.md, "Withdrawal of the blade")."""
+PULL_DISCREPANCY = 0.1
+"""How far the pull of a right model may be from the trace at least, part of the largest pull [-]. Other cells and other
+particles move it by 3 to 10 % (docs/theory.md, "Friction, adhesion and R told apart"): it is a small difference of what
+rubs and what is pushed out."""
 LEAST_WAY = 0.2
 """Least part of the stroke that a withdrawal must have been recorded over [-]: less is little but the turn."""
 
@@ -168,7 +172,8 @@ def with_withdrawal(cut: Objective, target: Target, nuisances: tuple[Nuisance, .
     Returns:
         The joint objective, over the parameters of the cut.
     """
-    up = Objective(target, cut.parameters, cut.errors, nuisances)
+    errors = replace(cut.errors, discrepancy=max(cut.errors.discrepancy, PULL_DISCREPANCY))
+    up = Objective(target, cut.parameters, errors, nuisances)
     joint = JointObjective.of({CUT: cut, WITHDRAWAL: up}, cut.parameters.names)
     return replace(joint, guesses=cut.guesses)
 

@@ -165,14 +165,14 @@ def at_the_truth(objective: Objective | JointObjective) -> tuple[ScoredRun, Unce
 
 def test_the_withdrawal_tells_friction_adhesion_and_resistance_apart():
     """Of a formula in which they are known: down alone says nothing of adhesion and next to nothing of friction. With
-    the way up adhesion is known to a tenth of its prior, and friction and R better by a quarter."""
+    the way up adhesion is known to an eighth of its prior, and friction and R better by a quarter."""
     alone, both = ways()
     (first, cut_only), (second, with_up) = at_the_truth(alone), at_the_truth(both)
     assert first.misfit < 1e-3 + float(FOUR.prior_residual(FOUR.start) @ FOUR.prior_residual(FOUR.start))
     assert second.misfit == pytest.approx(first.misfit, abs=1e-3)
     sd = {name: np.sqrt(np.diag(u.covariance)) / FOUR.prior_sd for name, u in (("cut", cut_only), ("both", with_up))}
     where = FOUR.names.index
-    assert sd["cut"][where("adhesion_energy")] > 0.99 and sd["both"][where("adhesion_energy")] < 0.1
+    assert sd["cut"][where("adhesion_energy")] > 0.99 and sd["both"][where("adhesion_energy")] < 0.15
     for name in ("mu", "R"):
         assert sd["both"][where(name)] < 0.75 * sd["cut"][where(name)]
     verdicts = [{i.parameter.name: i.verdict for i in found.intervals} for found in (cut_only, with_up)]
