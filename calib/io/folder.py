@@ -50,8 +50,16 @@ RUN_FILES = (
 SUMMARY = "summary.json"  # which several commands write; its schema says whose it is
 STORE_FILES = ("evaluations.h5", "evaluations.h5.journal")
 OWN_FILES: Mapping[str, tuple[str, ...]] = {
-    "calibrate": (SUMMARY, "material.yaml", "curves.csv", "withdrawal.csv", "report.pdf", "report.html", "record.h5",
-                  *STORE_FILES),
+    "calibrate": (
+        SUMMARY,
+        "material.yaml",
+        "curves.csv",
+        "withdrawal.csv",
+        "report.pdf",
+        "report.html",
+        "record.h5",
+        *STORE_FILES,
+    ),
     "study": (SUMMARY, "material.yaml", "report.pdf", "report.html", *STORE_FILES),
     "converge": ("converge.json", "curves.csv", "report.pdf", *STORE_FILES),
     "stress": ("stress.json", "report.pdf", *STORE_FILES),

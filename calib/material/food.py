@@ -28,6 +28,7 @@ from calib.material.properties import (
     PROPERTIES,
     RATE_EXPONENT,
     RELAXATION,
+    RELAXING_BULK,
     SYNONYMS,
     Property,
     Source,
@@ -50,7 +51,16 @@ FILES = (".yaml", ".yml")
 """How the name of a food's file ends."""
 _STRENGTHS = ("strength_ratio", "tensile_strength")  # a food has one of them at most
 _LAYERS = (*LAYERS, *LAYERS.values(), *LAYER_STIFFNESS.values())
-_OPTIONAL = (*_LAYERS, "skin_stiffness", BOARD_FRICTION, *ADHESION, *RELAXATION, RATE_EXPONENT, *_STRENGTHS)
+_OPTIONAL = (
+    *_LAYERS,
+    "skin_stiffness",
+    BOARD_FRICTION,
+    *ADHESION,
+    *RELAXATION,
+    RELAXING_BULK,
+    RATE_EXPONENT,
+    *_STRENGTHS,
+)
 _NULLABLE = ("R_skin", "fracture_energy", *_OPTIONAL)  # a file may leave the optional ones out
 
 
@@ -106,6 +116,8 @@ class FoodSpec:
             if len(have) == 1:
                 other = resistance if have[0] == size else size
                 raise here.at("properties").error(f"{have[0]} needs {other}; give both, or neither")
+        if RELAXING_BULK in self.properties and "relaxing_share" not in self.properties:
+            raise here.at("properties").error(f"{RELAXING_BULK} is a part of relaxing_share; give that too")
         for size, stiffness in LAYER_STIFFNESS.items():
             if stiffness in self.properties and size not in self.properties:
                 raise here.at("properties").error(f"{stiffness} needs {size}; give it, and {LAYERS[size]}")

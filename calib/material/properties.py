@@ -63,6 +63,9 @@ class Rule:
     why: str = "anything else is a slip of the unit"
 
 
+RELAXING_BULK = "relaxing_bulk"
+"""How much the volume relaxes beside the shape. Only foods of which it is known have it; others' volume is elastic."""
+
 PROPERTIES: dict[str, Rule] = {
     "rho": Rule("kg/m^3", 50.0, 5e3, "density"),
     "E": Rule("Pa", 1e2, 1e10, "Young's modulus"),
@@ -96,6 +99,10 @@ PROPERTIES: dict[str, Rule] = {
         "a solid keeps some of its stiffness",
     ),
     "relaxation_time": Rule("s", 1e-4, 1e6, "time in which that part relaxes to 1/e"),
+    RELAXING_BULK: Rule(
+        "-", 0.0, 1.0, "relaxing share of the bulk stiffness over that of the shear stiffness, 0 = none",
+        "at 1 the volume relaxes as much as the shape",
+    ),
     "rate_exponent": Rule(
         "-", -LARGEST_RATE_EXPONENT, LARGEST_RATE_EXPONENT,
         f"power of the real speed, over {1e3 * REFERENCE_SPEED:g} mm/s, in all resistances, 0 = none",
@@ -287,6 +294,8 @@ def given_range(name: str, value: float) -> tuple[float, float]:
     """
     rule = rule_of(name)
     ends = (value / GIVEN_SPREAD, value * GIVEN_SPREAD)
+    if name == RELAXING_BULK:
+        ends = (rule.low, rule.high)
     if name == RATE_EXPONENT:
         ends = (value - GIVEN_RATE_RANGE, value + GIVEN_RATE_RANGE)
     return max(ends[0], rule.low), min(ends[1], rule.high)

@@ -17,6 +17,7 @@ BOUND_FACTOR = 5.0
 LINEAR = {
     "nu": (0.0, 0.49),
     "mu": (0.0, 1.2),
+    "relaxing_bulk": (0.0, 1.0),
     "rate_exponent": (-LARGEST_RATE_EXPONENT, LARGEST_RATE_EXPONENT),
 }
 """Properties that are fitted on a linear scale, with their hard bounds."""

@@ -2,7 +2,17 @@
 
 import taichi as ti
 
-from mpm.kernels.constitutive.laws import damage_of, deviatoric_energy, left_cauchy_green, left_stretch, unit
+from mpm.kernels.constitutive.laws import (
+    branch_energy,
+    cofactor,
+    damage_of,
+    deviatoric_energy,
+    full,
+    left_cauchy_green,
+    left_stretch,
+    trace,
+    unit,
+)
 from mpm.kernels.crack import IN_CONTACT
 from mpm.kernels.membrane import membrane_energy
 from mpm.state.accessors import deformation_gradient, velocity_gradient
@@ -28,6 +38,7 @@ from mpm.state.tables import (
     NODES,
     PLANE_Y,
     PLASTIC,
+    RELAXING_BULK,
     SKIN_COUNT,
     VOLUME,
 )
@@ -140,14 +151,39 @@ def momentum_and_energy(s: ti.template(), cut, p):
     vol = 0.5 * s.par[cut, LAM] * (j - 1) ** 2
     dev = deviatoric_energy(v, s.par[cut, MU])
     if ti.static(s.branches > 0):
-        held = 1.0
-        stored = 0.0
-        for b in ti.static(range(s.branches)):
-            held -= s.prony_share[cut, b]
-            stored += s.prony_stress[cut, b, p].norm_sqr() / (4 * s.par[cut, MU] * s.prony_share[cut, b])
-        dev = held * dev + stored
+        dev, vol = relaxed_energy(s, cut, p, f, v, j, dev, vol)
     keep = 1.0 - d
     given = s.contact_moment[cut, p, 0][3] if s.visibility[cut, p] & IN_CONTACT else 0.0
     kinetic = m * (0.5 * u.norm_sqr() - given + 0.125 * s.par[cut, DX] * s.par[cut, DX] * spin)
     energy = s.par[cut, VOLUME] * s.volume_ratio[cut, p] * (keep * dev + (keep if j > 1 else 1.0) * vol)
     return ti.Vector([m * u[0], m * u[1], m * u[2], kinetic, energy])
+
+
+@ti.func
+def relaxed_energy(s: ti.template(), cut, p, f, v, j, dev, vol):
+    """Elastic energy of a particle that relaxes, with that of its branches.
+
+    Args:
+        f: Deformation gradient.
+        v: Its left stretch V.
+        j: Its determinant.
+        dev: Energy of its stretch without relaxation, mu |V - 1|^2 [J/m^3].
+        vol: That of its change of volume [J/m^3].
+
+    Returns:
+        Energy of shape and of volume [J/m^3].
+    """
+    mu, volume = s.par[cut, MU], s.par[cut, RELAXING_BULK]
+    bulk = s.par[cut, LAM] + 2 * mu / 3
+    u = full(cofactor(v)) @ f / j  # rotation, then the stretch in the unrotated frame
+    u = u.transpose() @ f
+    swell = mu / 3 * (trace(v) - 3) ** 2  # the part of the first one that belongs to the volume, too
+    shape, whole = dev - swell, vol + swell
+    shape_now, whole_now = shape, whole  # of both, without what the branches have lost
+    for b in ti.static(range(s.branches)):
+        share, h = s.prony_share[cut, b], s.prony_stress[cut, b, p]
+        own_shape, own_whole = branch_energy(h, u, j, mu, bulk)
+        shape_now += own_shape / share - share * shape
+        if volume > 0:
+            whole_now += own_whole / (volume * share) - volume * share * bulk / 2 * (j - 1) ** 2
+    return shape_now, whole_now

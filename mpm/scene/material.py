@@ -67,6 +67,8 @@ class Material:
             the shares add up to less than 1 (Simo 1987). Empty = rate-independent, the default.
         relaxing_share: Share [-] of one branch beside those of ``prony``: what a fit moves. 0 = none, the default.
         relaxation_time: Its time [s]; nothing uses it without a share.
+        relaxing_bulk: Relaxing share of the bulk stiffness over that of the shear stiffness, in every branch [-]: 0 =
+            the volume does not relax, the default; 1 = Poisson's ratio stays as it is.
         rate_exponent: Power n [-] of the real speed v of the knife in all resistances of the edge, those of layers,
             skin and start too: each is its value times (v / :data:`REFERENCE_SPEED`)^n. 0 = none, the default.
         adhesion: Largest normal traction of the food on the blade's faces [Pa]; 0 = none, the default. A face that has
@@ -99,6 +101,7 @@ class Material:
     prony: tuple[tuple[float, float], ...] = ()
     relaxing_share: float = 0.0
     relaxation_time: float = 1.0
+    relaxing_bulk: float = 0.0
     rate_exponent: float = 0.0
     adhesion: float = 0.0
     adhesion_energy: float = 0.0
@@ -121,6 +124,7 @@ class Material:
             ("rind_thickness", "m"),
             ("mu", ""),
             ("loss_factor", ""),
+            ("relaxing_bulk", ""),
             ("adhesion", "Pa"),
             ("adhesion_energy", "J/m^2"),
         ):
@@ -153,6 +157,11 @@ class Material:
         if self.skin_thickness > 0 and self.R_skin is None:
             raise SceneError(
                 "material: skin_thickness > 0 needs R_skin, the force per width that goes through the skin"
+            )
+        if self.relaxing_bulk > 1.0:
+            raise SceneError(
+                f"material: relaxing_bulk = {self.relaxing_bulk!r} must lie in [0, 1]; at 1 the volume relaxes as much "
+                "as the shape"
             )
         self._check_layers(w)
         beyond = LARGEST_RATE_EXPONENT * (1 + 1e-9)
@@ -209,6 +218,11 @@ class Material:
     def shear(self) -> float:
         """Shear modulus mu = E / (2 (1 + nu)) [Pa]."""
         return self.E / (2 * (1 + self.nu))
+
+    @property
+    def bulk(self) -> float:
+        """Bulk modulus E / (3 (1 - 2 nu)) [Pa]."""
+        return self.E / (3 * (1 - 2 * self.nu))
 
     @property
     def lame(self) -> float:

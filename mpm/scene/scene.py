@@ -393,4 +393,6 @@ class Scene:
                 del out["food"]["material"][name]
         if not out["food"]["material"]["relaxing_share"]:
             del out["food"]["material"]["relaxing_share"], out["food"]["material"]["relaxation_time"]
+        if not out["food"]["material"]["relaxing_bulk"]:
+            del out["food"]["material"]["relaxing_bulk"]
         return out

@@ -51,6 +51,7 @@ def _put_material(table: np.ndarray, scene: Scene, material: Material, seeds: Se
     """Constants of the bulk, its damage, its ties across the cut plane and its sticky faces."""
     table[row.MU], table[row.LAM] = material.shear, material.lame
     table[row.YIELD] = min(material.yield_stress, UNBOUNDED)
+    table[row.RELAXING_BULK] = material.relaxing_bulk
     table[row.MASS], table[row.VOLUME] = material.rho * seeds.volume, seeds.volume
     if material.strength is not None and material.fracture_energy is not None:
         eps0 = material.strength / material.E

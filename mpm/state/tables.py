@@ -16,8 +16,8 @@ DX, INV_DX, ORIGIN_X, ORIGIN_Y, ORIGIN_Z, FIRST_STATION = range(31, 37)
 SPACING, TIE_OPENING, CONTACT, LAYERED = range(37, 41)
 EDGE_BAND, LEAST_GAP = range(41, 43)
 SKIN_STIFFNESS, SKIN_POISSON, WIDTH_OF_FORCE, ZONE_MOST, LEAST_WIDTH, LOCAL_DENT = range(43, 49)
-EXTENSION, DENT_WIDTH = 49, 50
-N_PARAMETERS = 51
+EXTENSION, DENT_WIDTH, RELAXING_BULK = 49, 50, 51
+N_PARAMETERS = 52
 
 # Rows of the table of sizes: particles, blocks of them, nodes along x, y, z, slices along the edge, the node plane
 # along y that is nearest to y = 0, the first and last + 1 node plane along y whose nodes have a second field, how far

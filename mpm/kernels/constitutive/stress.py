@@ -9,6 +9,7 @@ import taichi as ti
 from mpm.kernels.constitutive.damage import update_damage
 from mpm.kernels.constitutive.laws import (
     STRETCH_TOLERANCE,
+    branch_energy,
     cofactor,
     cofactors,
     damage_of,
@@ -40,6 +41,7 @@ from mpm.state.tables import (
     LAM,
     MU,
     PLASTIC_LOSS,
+    RELAXING_BULK,
     STRETCH,
     STRETCH_AT_REST,
     VISCOUS_LOSS,
@@ -78,22 +80,24 @@ def constitutive_update(
 
 
 @ti.func
-def prony_stress(s: ti.template(), cut, p, f, v, j, mu):
-    """Prony series on the deviator in the unrotated frame (Simo 1987).
+def prony_stress(s: ti.template(), cut, p, f, v, j, mu, lam):
+    """Prony series on the deviator, and on a part of the pressure, in the unrotated frame (Simo 1987).
 
     Args:
         f: Deformation gradient.
         v: Its left stretch.
         j: Its determinant.
         mu: Shear modulus [Pa].
+        lam: First Lame constant [Pa].
 
     Returns:
         Stress to add [Pa], and loss per volume [J/m^3].
     """
+    volume, bulk = s.par[cut, RELAXING_BULK], lam + 2 * mu / 3
     r = full(cofactor(v)) @ f / j
     u = r.transpose() @ f
     now = 2 * mu * (u @ u - u)
-    now -= now.trace() / 3 * ti.Matrix.identity(float, 3)
+    now += (volume * bulk * j * (j - 1) - now.trace() / 3) * ti.Matrix.identity(float, 3)
     add, lost = ti.Matrix.zero(float, 3, 3), 0.0
     for b in ti.static(range(s.branches)):
         share, rate = s.prony_share[cut, b], s.prony_rate[cut, b]
@@ -101,7 +105,10 @@ def prony_stress(s: ti.template(), cut, p, f, v, j, mu):
         h = decay * s.prony_stress[cut, b, p] + share * (1 - decay) / rate * (now - s.prony_before[cut, p])
         s.prony_stress[cut, b, p] = h
         add += h - share * now
-        lost += h.norm_sqr() * rate / (2 * mu * share)
+        shape, whole = branch_energy(h, u, j, mu, bulk)
+        lost += 2 * rate * shape / share
+        if volume > 0:
+            lost += 2 * rate * whole / (volume * share)
     s.prony_before[cut, p] = now
     return upper(r @ add @ r.transpose()), lost
 
@@ -249,7 +256,7 @@ def particle_stress(s: ti.template(), cut, p, block, lane, dt):
             tau = ti.Vector([txx, tyy, tzz, tyz, txz, txy])
         tau += lam * j * (j - 1) * unit()
         if ti.static(s.branches > 0):
-            add, loss = prony_stress(s, cut, p, f, v, j, mu)
+            add, loss = prony_stress(s, cut, p, f, v, j, mu, lam)
             tau += add
             heat += loss
         if ti.static(s.damage):

@@ -29,6 +29,7 @@ from calib.material.properties import (
     PROPERTIES,
     RATE_EXPONENT,
     RELAXATION,
+    RELAXING_BULK,
     Property,
     Source,
     check_override,
@@ -92,6 +93,7 @@ def test_shipped_foods(foods: dict[str, FoodSpec]) -> None:
             "skin_stiffness",
             *ADHESION,
             *RELAXATION,
+            RELAXING_BULK,
             RATE_EXPONENT,
             *LAYER_STIFFNESS.values(),
             *LAYERS,
@@ -669,5 +671,10 @@ def test_a_food_that_relaxes_is_asked_for() -> None:
     assert relaxing.as_dict()["properties"]["relaxation_time"]["value"] == 0.5
     with pytest.raises(MaterialError, match="relaxing_share needs relaxation_time; give both, or neither"):
         plain.with_values({"relaxing_share": 0.4})
+    whole = relaxing.with_values({RELAXING_BULK: 0.5})
+    assert whole.to_scene_food().material.relaxing_bulk == 0.5 and whole.prior(RELAXING_BULK) == (0.0, 1.0)
+    assert material.relaxing_bulk == 0.0 and RELAXING_BULK not in relaxing.as_dict()["properties"]
+    with pytest.raises(MaterialError, match="relaxing_bulk is a part of relaxing_share; give that too"):
+        plain.with_values({RELAXING_BULK: 0.5})
     with pytest.raises(MaterialError, match="1 cannot be the part of the instantaneous shear stiffness"):
         check_override("relaxing_share", 1.0)
