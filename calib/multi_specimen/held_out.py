@@ -148,7 +148,8 @@ def _own_fit(specimens: Specimens, shared: Mapping[str, float], name: str) -> _O
     setup, chosen = specimens.setups[name], specimens.own_parameters(name)
     if not chosen:
         return None
-    objective = replace(setup.objective, parameters=setup.objective.parameters.only(chosen))
+    # guesses are of the flesh, which is held
+    objective = replace(setup.objective, parameters=setup.objective.parameters.only(chosen), guesses=())
     fine, coarse = (
         specimens.evaluator(sized.with_material(**flesh), name, fidelity)
         for (sized, flesh), fidelity in (

@@ -90,7 +90,8 @@ class JointObjective:
             shared: Which of them are the same for all traces; priors and start values are the first one's.
 
         Returns:
-            The joint objective.
+            The joint objective. Its guesses are those of the traces, the first of each together and so on, with the
+            mean of what they share.
         """
         places: dict[str, int] = {}
         items: list[Parameter] = []
@@ -107,7 +108,21 @@ class JointObjective:
             terms.append(ObjectiveTerm(trace, objective, np.array(index)))
             own = dict(zip(objective.parameters.names, (items[k].name for k in index), strict=True))
             correlations |= {(own[c.first], own[c.second]): c.value for c in objective.parameters.correlations}
-        return cls(ParameterSet(tuple(items), _with_common(correlations)), tuple(terms))
+        joint = cls(ParameterSet(tuple(items), _with_common(correlations)), tuple(terms))
+        return replace(joint, guesses=joint._joined_guesses())
+
+    def _joined_guesses(self) -> tuple[FloatArray, ...]:
+        """Guesses from those of the traces: the first of each together, with the mean of what they share, and so on."""
+        most = max(len(t.objective.guesses) for t in self.terms)
+        out = []
+        for k in range(most):
+            total, count = np.zeros(len(self.parameters)), np.zeros(len(self.parameters))
+            for term in self.terms:
+                if k < len(term.objective.guesses):
+                    total[term.index] += term.objective.guesses[k]
+                    count[term.index] += 1
+            out.append(np.where(count > 0, total / np.maximum(count, 1), self.parameters.start))
+        return tuple(out)
 
     @property
     def effective_rows(self) -> float:

@@ -173,9 +173,8 @@ def with_withdrawal(cut: Objective, target: Target, nuisances: tuple[Nuisance, .
         The joint objective, over the parameters of the cut.
     """
     errors = replace(cut.errors, discrepancy=max(cut.errors.discrepancy, PULL_DISCREPANCY))
-    up = Objective(target, cut.parameters, errors, nuisances)
-    joint = JointObjective.of({CUT: cut, WITHDRAWAL: up}, cut.parameters.names)
-    return replace(joint, guesses=cut.guesses)
+    up = Objective(target, cut.parameters, errors, nuisances, guesses=cut.guesses)
+    return JointObjective.of({CUT: cut, WITHDRAWAL: up}, cut.parameters.names)
 
 
 def withdrawn(scene: Scene, stroke: float, way: float) -> Scene:

@@ -3,6 +3,7 @@ itself."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,6 +17,7 @@ from calib.material.food import load_food
 from calib.material.knife import load_knife
 from calib.material.scene import Sizing, cut_scene, specimen
 from calib.multi_specimen.held_out import _adapted, _drawn, _own_fit, _OwnFit
+from calib.problem.objective import Objective
 from calib.problem.parameters import ParameterSet
 from mpm.scene import Scene
 from tests.calib.fake import FIVE, Fake, goal, three_terms
@@ -102,9 +104,14 @@ def test_a_size_that_a_study_shares_is_no_property_of_the_flesh(monkeypatch: pyt
     shape, _ = specimen(food, None, Sizing(), open_form=True)
     scene = cut_scene(food, shape, load_knife("kitchen"))
     done = SimpleNamespace(status="done")
-    monkeypatch.setattr(calib.multi_specimen.held_out, "multistart_search", lambda *given, **options: done)
+    searched: list[Objective] = []
+    monkeypatch.setattr(
+        calib.multi_specimen.held_out,
+        "multistart_search",
+        lambda objective, *given, **options: searched.append(objective) or done,
+    )
     cut: list[Scene] = []
-    objective = goal(FLESH | {"R_skin": SKIN}, ParameterSet((FIVE.items[3],)))
+    objective = replace(goal(FLESH | {"R_skin": SKIN}), guesses=(FIVE.start,))
     specimens: Any = SimpleNamespace(
         setups={"c": SimpleNamespace(objective=objective, fine=scene, coarse=scene, kept=())},
         own_parameters=lambda name: (FIVE.items[3].name,),
@@ -114,6 +121,8 @@ def test_a_size_that_a_study_shares_is_no_property_of_the_flesh(monkeypatch: pyt
         staged=lambda stage: None,
     )
     assert _own_fit(specimens, {"R": 300.0, "height": 0.06, "roundness": 0.2}, "c") is not None
+    assert searched[0].parameters.names == (FIVE.items[3].name,)
+    assert searched[0].guesses == ()  # those of the whole food have other coordinates
     for one in cut:
         assert one.food.material.R == 300.0
         assert (one.food.shape.height, one.food.shape.roundness) == (0.06, 0.2)

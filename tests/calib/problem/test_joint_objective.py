@@ -57,6 +57,18 @@ def test_chi_square_is_the_sum_of_the_traces_and_each_prior_once() -> None:
     assert joint.effective_rows == pytest.approx(sum(o.effective_rows for o in objectives().values()))
 
 
+def test_guesses_of_the_traces_are_joined() -> None:
+    """The first of each together: the mean of what they share, to each its own skin; a trace without a second guess
+    leaves its skin at the start; without any there is none."""
+    a, b = objectives().values()
+    one, other, more = FIVE.start - 0.4, FIVE.start + 0.2, FIVE.start + 0.1
+    joint = JointObjective.of({"a": replace(a, guesses=(one, more)), "b": replace(b, guesses=(other,))}, SHARED)
+    first, second = joint.guesses
+    np.testing.assert_allclose(first - joint.parameters.start, [-0.1, -0.1, -0.1, -0.4, -0.1, 0.2])
+    np.testing.assert_allclose(second - joint.parameters.start, [0.1, 0.1, 0.1, 0.1, 0.1, 0.0])
+    assert JointObjective.of(objectives(), SHARED).guesses == ()
+
+
 def test_a_joint_run_is_as_good_as_its_worst_part() -> None:
     """One specimen breaks down at 40 %: the joint run failed, its part counts and its reason is kept."""
     joint = JointObjective.of(objectives(), SHARED)
