@@ -12,6 +12,7 @@ the model is used for, how much of a decision rests on it, and what a wrong deci
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
@@ -22,7 +23,7 @@ from calib.io import typed_document
 from calib.io.folder import write_json
 from calib.io.type_schema import NotNegative, Positive, Shared
 from calib.io.typed_document import FLAT, NULL
-from calib.io.yaml_checks import check_keys, read_yaml, text
+from calib.io.yaml_checks import check_keys, mapping, read_yaml, text
 from calib.validation.numerical_checks import HALF_SPEED, VARIANTS, Check, at_rest
 
 NAME = "credibility.json"
@@ -41,17 +42,20 @@ NOT_COUNTED = (
 
 @dataclass(frozen=True)
 class Context:
-    """What the calibration is for, in the words of V&V 40.
+    """What the calibration is for, in the words of V&V 40, and what was cut and measured under which conditions.
 
     Attributes:
         context_of_use: What is decided with the model, for which foods and cuts.
         model_influence: How much of the decision rests on the model.
         decision_consequence: What a wrong decision costs.
+        conditions: Of specimen and measurement, such as temperature, moisture, ripeness, sensor or operator, in words;
+            empty where nobody has stated any. Nothing is computed with them.
     """
 
     context_of_use: str = NOT_STATED
     model_influence: str = NOT_STATED
     decision_consequence: str = NOT_STATED
+    conditions: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -197,15 +201,22 @@ def read_context(path: Path | str) -> Context:
     """What a YAML file says that a calibration is for.
 
     Args:
-        path: A file with any of ``context_of_use``, ``model_influence`` and ``decision_consequence``.
+        path: A file with any of ``context_of_use``, ``model_influence``, ``decision_consequence`` and ``conditions``,
+            which has names of its own.
 
     Returns:
         The context; what the file does not say is not stated.
 
     Raises:
-        MaterialError: The file cannot be read, or has another key.
+        MaterialError: The file cannot be read, has another key, or a value that is no text.
     """
     top, content = read_yaml(path, kind=MaterialError)
     known = tuple(f.name for f in fields(Context))
     check_keys(top, content, (), known)
-    return Context(**{name: text(top.at(name), value) for name, value in content.items()})
+    place, stated = top.at("conditions"), content.pop("conditions", {})
+    conditions = {}
+    for name, value in mapping(place, stated).items():
+        if isinstance(value, (int, float)) and not isinstance(value, bool):
+            raise place.at(name).error(f'is {value!r}, a number without a unit; give it in words, such as "{value} C"')
+        conditions[str(name)] = text(place.at(name), value)
+    return Context(**{name: text(top.at(name), value) for name, value in content.items()}, conditions=conditions)

@@ -8,7 +8,7 @@ from typing import Any
 
 from reports import ReportError
 from reports.base.format import breakable, interval, quantity
-from reports.base.labels import capital
+from reports.base.labels import capital, in_words
 from reports.base.run_folder import REMEDY, Data, read_json
 
 FILE = "credibility.json"
@@ -43,6 +43,7 @@ def credibility(folder: Path) -> Data | None:
             "factor": f"{found['coverage_factor']:g}",
             "rows": [[label, *_row(found[key], found["coverage_factor"])] for key, label in VALUES.items()],
             "context": [[capital(label), breakable(found[key])] for key, label in CONTEXT.items()],
+            "conditions": [[capital(in_words(n)), breakable(x)] for n, x in found.get("conditions", {}).items()],
             "stated": any(found[key] != "not stated" for key in CONTEXT),
             "not_counted": list(found["not_counted"]),
         }

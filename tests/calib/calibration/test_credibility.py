@@ -68,6 +68,13 @@ def test_the_context_is_stated_or_said_not_to_be(tmp_path: Path, capsys: pytest.
     write_credibility(read_result(folder), read_context(file))
     write_credibility(read_result(folder))
     assert read_credibility(folder).context.model_influence == "low"
+    file.write_text("model_influence: high\nconditions: {temperature: 8 C, sensor: at the wrist}\n")
+    write_credibility(read_result(folder), read_context(file))
+    assert read_credibility(folder).context.conditions == {"temperature": "8 C", "sensor": "at the wrist"}
+    for conditions, said in (("{temperature: 8}", "a number without a unit"), ("8 C", "a mapping of names")):
+        file.write_text(f"conditions: {conditions}\n")
+        with pytest.raises(MaterialError, match=said):
+            read_context(file)
     file.write_text("influence: low\n")
     with pytest.raises(MaterialError, match="influence"):
         read_context(file)

@@ -46,6 +46,9 @@ def test_what_is_not_known_is_said(tmp_path: Path) -> None:
     assert page is not None and page["rows"][1][-2] == "not known" and not page["stated"]
     stated = credibility(write(tmp_path, Context(context_of_use="slice bananas")))
     assert stated is not None and stated["stated"] and stated["context"][0] == ["Context of use", "slice bananas"]
+    assert stated["conditions"] == []
+    cold = credibility(write(tmp_path, Context(conditions={"time_in_store": "9 days"})))
+    assert cold is not None and cold["conditions"] == [["Time in store", "9 days"]]
 
 
 def test_a_folder_without_the_file_has_no_page_and_a_damaged_one_is_an_error(tmp_path: Path) -> None:
@@ -63,7 +66,9 @@ def test_the_report_has_the_section_where_there_is_the_file(tmp_path: Path) -> N
     assert heading not in text(write_report(folder))
     write(tmp_path)
     found = text(write_report(folder))
-    assert found.count(heading) == 1 and answer in found
+    assert found.count(heading) == 1 and answer in found and "as stated" not in found
+    write(tmp_path, Context(conditions={"temperature": "8 C"}))
+    assert "Specimen and measurement, as stated Temperature 8 C" in text(write_report(folder))
 
 
 def text(report: Path) -> str:
