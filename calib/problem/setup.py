@@ -23,7 +23,7 @@ from calib.material.scene import (
     with_other_particles,
 )
 from calib.problem.earlier_calibration import earlier_guesses
-from calib.problem.food_parameters import Heights, fit_parameters, size_relative_sd, sticking
+from calib.problem.food_parameters import STICKS, Heights, fit_parameters, size_relative_sd, sticking
 from calib.problem.layer_guess import layer_guesses
 from calib.problem.nuisance import Sensor, nuisances, real_speed, sensor_of
 from calib.problem.numerical_uncertainty import numerical_uncertainty
@@ -188,8 +188,10 @@ def with_height(request: Request, curve: Conditioned) -> Request:
 
 
 def _with_adhesion(request: Request) -> tuple[Request, tuple[str, ...]]:
-    """The request with a food that may stick to the blade where its withdrawal is fitted, and what was assumed."""
-    if not request.withdrawal:
+    """The request with a food that may stick to the blade, where a withdrawal is fitted and adhesion with it, and what
+    was assumed."""
+    held = request.fit is not None and not set(STICKS) & set(request.fit)
+    if not request.withdrawal or held:
         return request, ()
     food, said = sticking(request.food)
     return replace(request, food=food), said

@@ -112,6 +112,8 @@ def test_what_is_read_is_said_before():
     """--check names the way that would be compared, and what is assumed of adhesion; a given one is left as it is."""
     text = description(request_of(made()))
     assert "withdrawal  from 2 to 26" in text and "adhesion_energy is sought from 0.1 to 10 J/m^2" in text
+    held = set_up(replace(request_of(made()), fit=("E", "R", "mu")))
+    assert held.request.food.value("adhesion") is None  # nobody asked for it
     given = load_food("banana").with_values({"adhesion": 2e3, "adhesion_energy": 0.5})
     assert sticking(given) == (given, ())
 
