@@ -49,7 +49,7 @@ from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.uncertainty.intervals import Uncertainty
 from calib.uncertainty.limiting import limiting
-from calib.validation.acceptance import FIT_NRMSE_LIMIT, Conservation, Verdict, judge
+from calib.validation.acceptance import CURVE_LINE, FIT_NRMSE_LIMIT, Conservation, Verdict, judge
 from calib.validation.bounds import bound_word
 from calib.validation.not_shown import limits
 from mpm.files import write_atomic
@@ -134,7 +134,7 @@ def verdicts_of(done: Calibrated) -> list[Verdict]:
         predictive=done.predictive,
     )
     if done.withdrawal is not None:
-        lines.append(_withdrawal_line(done.withdrawal))
+        lines.insert(1 + [line.name for line in lines].index(CURVE_LINE), _withdrawal_line(done.withdrawal))
     return lines
 
 
