@@ -40,7 +40,14 @@ from calib.simulation.record_file import read_record, record_errands
 from calib.simulation.workers import Errand, Workers
 from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.global_search import Listener, fit_with_uncertainty
-from calib.validation.numerical_checks import QUARTER_SPEED, VARIED, check, check_errands, further_errands
+from calib.validation.numerical_checks import (
+    QUARTER_SPEED,
+    VARIED,
+    FinerCells,
+    check,
+    check_errands,
+    further_errands,
+)
 from mpm.arrays import FloatArray
 
 STORE, RECORD = "evaluations.h5", "record.h5"
@@ -125,6 +132,8 @@ class _Calibration:
         setup = self.setup
         problem = self.both or setup
         evaluators = problem.evaluators(self.pool, self.store)
+        if self.both is None:
+            evaluators = replace(evaluators, finer=FinerCells(setup.scene, self.pool, self.store))
         if setup.request.sample:
             return self._sampled(evaluators)
         listener = Listener(self.clock.search, self._said, self._begin_longest_check)

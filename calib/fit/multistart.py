@@ -5,7 +5,8 @@ particles, it is the best of the most promising ones run twice: the best of fift
 noise (selection by replication: Bechhofer 1954, Ann. Math. Statist. 25:16), and a force that hangs on the simulated
 speed is not the food's. Of two that the curve does not tell apart, it is the one whose second run has the same force. A
 search that has stalled above what the right material would leave is started once more from another design, with the
-budget as its stopping rule. So is one whose answer has another force in its second run, and sent away from that answer.
+budget as its stopping rule. So is one whose answer has another force in its second run or on finer cells, and sent away
+from that answer.
 """
 
 from __future__ import annotations
@@ -40,6 +41,8 @@ FINALIST_MARGIN = 2.0
 #: Largest change of peak or work in a second run that has the same force [-]: half of what the verdict allows for the
 #: speed, because it carries the change on to rest, and a hundredth for other particles.
 HELD_CHANGE = 0.035
+#: Largest change of peak or work on finer cells of an answer that stands there [-]: what the verdict allows.
+STANDING_CHANGE = 0.05
 #: Chi-square that two runs may be apart if the curve does not tell them apart: that of an interval of 95 %.
 ALIKE = Z95**2
 #: What is deflated of an answer that does not hold: the first of these parameters that is fitted, or the first at all,
@@ -97,6 +100,7 @@ def multistart_search(
     *,
     coarse: Evaluator | None = None,
     replicate: Evaluator | None = None,
+    finer: Evaluator | None = None,
     options: FitOptions | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> FitResult:
@@ -108,6 +112,8 @@ def multistart_search(
         coarse: Runs cheaper simulations for the design.
         replicate: Runs the simulations of ``evaluator`` with what should not matter changed (speed, particles); with it
             the answer is the best of the most promising runs made twice.
+        finer: Runs the simulations of ``evaluator`` on finer cells; with it, and with ``replicate``, a search whose
+            answer does not stand there is started once more, as far as the budget goes.
         options: Budget and the like.
         progress: Called after each simulation.
 
@@ -133,14 +139,23 @@ def multistart_search(
                 status = _restarted(search, status)
             if replicate is not None:
                 best, replicates = _best_of_finalists(search, replicate)
-                if not again and not holds(best, replicates):
+                if not again and _restartable(search) and not (holds(best, replicates) and stands(search, best, finer)):
+                    refuted = best if holds(best, replicates) else None  # by finer cells
                     status = _restarted(search, status, away_from=best)
-                    best, replicates = _best_of_finalists(search, replicate, replicates)
+                    other, replicates = _best_of_finalists(search, replicate, replicates, refuted)
+                    if refuted is None or other is refuted or stands(search, other, finer):
+                        best = other
         except KeyboardInterrupt:
             if not search.finished:
                 raise
             status = "interrupted"
         return _result(search, status, best or search.best, replicates)
+
+
+def _restartable(search: Search) -> bool:
+    """Whether the budget holds another search, and this one has not already looked elsewhere for long in vain."""
+    options = search.options
+    return options.budget - search.spent >= options.least(len(search.objective.parameters)) and not search.idle
 
 
 def _restarted(search: Search, ended: str, away_from: ScoredRun | None = None) -> str:
@@ -158,9 +173,9 @@ def _restarted(search: Search, ended: str, away_from: ScoredRun | None = None) -
         How the better of the two ended.
     """
     goal, options = search.objective, search.options
-    rest = options.budget - search.spent
-    if rest < options.least(len(goal.parameters)) or search.idle:
+    if not _restartable(search):
         return ended
+    rest = options.budget - search.spent
     first, told = search.best, progress_of_all(search.progress, search.runs, search.best, options)
     own = replace(options, budget=rest, seed=options.seed + RESTART_SEED)
     sought = goal if away_from is None else replace(goal, parameters=_deflated(goal.parameters, away_from.z))
@@ -183,7 +198,7 @@ def _deflated(parameters: ParameterSet, z: FloatArray) -> DeflatedParameterSet:
 
 
 def _best_of_finalists(
-    search: Search, replicate: Evaluator, known: list[ScoredRun] | None = None
+    search: Search, replicate: Evaluator, known: list[ScoredRun] | None = None, refuted: ScoredRun | None = None
 ) -> tuple[ScoredRun, list[ScoredRun]]:
     """Repeat the most promising runs, slower and with other particles; the answer among them, and the second runs.
 
@@ -194,6 +209,7 @@ def _best_of_finalists(
         search: With the runs.
         replicate: Runs them once more.
         known: Second runs that there are.
+        refuted: A run that has another force on finer cells: the answer only where the curve tells it from the others.
     """
     surrogate = search.surrogate()
     order = sorted(search.finished, key=lambda run: surrogate.expected(run.z, LOCAL_WEIGHT))
@@ -203,8 +219,8 @@ def _best_of_finalists(
     # what did not cut the food is no finalist any more once something has
     lost = [again for again in known or () if not any(again is kept for kept in replicates)]
     for bound in (limit, limit + ALIKE, math.inf):
-        answer = _answer(tried, replicates)
-        if answer is not None and (holds(answer, replicates) or bound == math.inf):
+        answer = _answer(tried, replicates, refuted)
+        if answer is not None and ((answer is not refuted and holds(answer, replicates)) or bound == math.inf):
             break
         finalists: list[ScoredRun] = []
         for run in [search.best, *order]:
@@ -214,22 +230,23 @@ def _best_of_finalists(
                 finalists.append(run)
         for first in range(0, len(finalists), search.options.batch):
             batch = finalists[first : first + search.options.batch]
-            left = [run for run in batch if _may_win(run, surrogate, tried, replicates)]
+            left = [run for run in batch if _may_win(run, surrogate, tried, replicates, refuted)]
             asked = [run.evaluation.parameters for run in left]
             found = sorted(replicate.evaluate(asked), key=lambda e: e.index)
             tried += left
             replicates += (search.objective.score(e, stage="replicate") for e in found)
-    return _answer(tried, replicates) or search.best, [*lost, *replicates]
+    return _answer(tried, replicates, refuted) or search.best, [*lost, *replicates]
 
 
-def _answer(tried: list[ScoredRun], replicates: list[ScoredRun]) -> ScoredRun | None:
-    """The run of least mean chi-square in both runs, if its second run has the same force or no other that the curve
-    does not tell from it has; else the best of those. None where every second run broke down."""
+def _answer(tried: list[ScoredRun], replicates: list[ScoredRun], refuted: ScoredRun | None = None) -> ScoredRun | None:
+    """The run of least mean chi-square in both runs, if its second run has the same force and it is not refuted, or no
+    other that the curve does not tell from it is such a one; else the best of those. None where every second run broke
+    down."""
     sound = [(t.misfit + r.misfit, k) for k, (t, r) in enumerate(zip(tried, replicates, strict=True)) if r.ok]
     if not sound:
         return None
     alike = [(size, k) for size, k in sorted(sound) if size <= min(sound)[0] + 2 * ALIKE]
-    held = [k for _, k in alike if tried[k].change(replicates[k]) <= HELD_CHANGE]
+    held = [k for _, k in alike if tried[k] is not refuted and tried[k].change(replicates[k]) <= HELD_CHANGE]
     return tried[held[0] if held else alike[0][1]]
 
 
@@ -247,20 +264,43 @@ def holds(run: ScoredRun, replicates: Sequence[ScoredRun]) -> bool:
     return again is not None and run.change(again) <= HELD_CHANGE
 
 
-def _may_win(run: ScoredRun, surrogate: Surrogate, tried: list[ScoredRun], replicates: list[ScoredRun]) -> bool:
+def stands(search: Search, run: ScoredRun, finer: Evaluator | None) -> bool:
+    """Whether a run has the same force on finer cells, to what the verdict allows.
+
+    Args:
+        search: The search.
+        run: The run.
+        finer: Runs it on finer cells; without it any run stands.
+
+    Returns:
+        That; False where the finer one breaks down.
+    """
+    if finer is None:
+        return True
+    again = search.objective.score(next(iter(finer.evaluate([run.evaluation.parameters]))), stage="finer")
+    return again.ok and run.change(again) <= STANDING_CHANGE
+
+
+def _may_win(
+    run: ScoredRun,
+    surrogate: Surrogate,
+    tried: list[ScoredRun],
+    replicates: list[ScoredRun],
+    refuted: ScoredRun | None = None,
+) -> bool:
     """Whether a second run of a finalist may make it the answer (a race: Maron & Moore 1994, NIPS 6:59).
 
     Not if it would have to gain more over what is expected of it than those run twice so far have gained, on average,
     and the noise. Where the answer so far does not hold, one may win that the curve does not tell from it.
     """
-    answer = _answer(tried, replicates)
+    answer = _answer(tried, replicates, refuted)
     if answer is None:
         return True
     sound = [(t, again) for t, again in zip(tried, replicates, strict=True) if again.ok]
     gain = float(np.mean([surrogate.expected(t.z, LOCAL_WEIGHT) - again.misfit for t, again in sound]))
     noise = FINALIST_MARGIN * max(surrogate.noise_misfit, 1.0)
     least = surrogate.expected(run.z, LOCAL_WEIGHT) - gain - noise
-    leave = 0.0 if holds(answer, replicates) else 2 * ALIKE
+    leave = 0.0 if answer is not refuted and holds(answer, replicates) else 2 * ALIKE
     return run.misfit + least < min(t.misfit + again.misfit for t, again in sound) + leave
 
 

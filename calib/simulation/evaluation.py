@@ -168,8 +168,10 @@ class Evaluators:
         fine: Simulations at the resolution that counts.
         coarse: Cheaper ones, on coarse cells.
         replicate: Those of ``fine`` with what should not matter changed: speed, particles and the place of the grid.
+        finer: Those of ``fine`` on finer cells; None where no answer is asked to stand on them.
     """
 
     fine: Evaluator
     coarse: Evaluator
     replicate: Evaluator
+    finer: Evaluator | None = None

@@ -86,7 +86,13 @@ def fit_with_uncertainty(
     told = listener or Listener()
     fine, coarse, replicate = evaluators.fine, evaluators.coarse, evaluators.replicate
     first = multistart_search(
-        objective, fine, coarse=coarse, replicate=replicate, options=options, progress=told.progress
+        objective,
+        fine,
+        coarse=coarse,
+        replicate=replicate,
+        finer=evaluators.finer,
+        options=options,
+        progress=told.progress,
     )
     if first.status == "interrupted":
         return first, analyse(objective, first, seed=options.seed)

@@ -523,10 +523,11 @@ def mirrored(p: Mapping[str, float]) -> np.ndarray:
     return two_terms({**p, "R": 340.0 * math.exp(abs(math.log(p["R"] / 340.0)))})
 
 
+@pytest.mark.parametrize("where", ["replicate", "finer"])
 @pytest.mark.parametrize("seed", range(3))
-def test_of_two_foods_that_draw_the_curve_the_answer_is_the_one_whose_force_stands(seed: int) -> None:
-    """In the valley that the answer lay in the force is now another when it is repeated. Looked for is another food, by
-    a second search if the first has not found it."""
+def test_of_two_foods_that_draw_the_curve_the_answer_is_the_one_whose_force_stands(seed: int, where: str) -> None:
+    """In the valley that the answer lay in the force is now another when it is repeated, or on finer cells. Looked for
+    is another food, by a second search if the first has not found it."""
     objective, options = goal(TWO_TRUTH, TWO, mirrored), FitOptions(budget=80, design=12, seed=seed)
     plain = multistart_search(objective, Fake(mirrored), replicate=Fake(mirrored), options=options)
     low = values(plain)["R"] < 340.0
@@ -534,16 +535,27 @@ def test_of_two_foods_that_draw_the_curve_the_answer_is_the_one_whose_force_stan
     def shaken(p: Mapping[str, float]) -> np.ndarray:
         return mirrored(p) * (1.06 if (p["R"] < 340.0) is low else 1.005)
 
-    held = multistart_search(objective, Fake(mirrored), replicate=Fake(shaken), options=options)
+    others = {"replicate": Fake(mirrored), where: Fake(shaken)}
+    held = multistart_search(objective, Fake(mirrored), **others, options=options)
     assert (values(held)["R"] < 340.0) is not low and held.best.misfit < plain.best.misfit + ALIKE
 
 
 def test_a_force_that_does_not_stand_is_the_answer_where_the_curve_tells_it_from_others() -> None:
     """Numerics decide only between foods that draw the curve alike."""
-    result = multistart_search(
-        two_goal(), Fake(two_terms), replicate=Fake(lambda p: 1.06 * two_terms(p)), options=FitOptions(80, 3)
-    )
-    assert values(result) == pytest.approx(TWO_TRUTH, rel=0.1) and result.best.misfit < 40.0
+    for where in ("replicate", "finer"):
+        others = {"replicate": Fake(two_terms), where: Fake(lambda p: 1.06 * two_terms(p))}
+        result = multistart_search(two_goal(), Fake(two_terms), **others, options=FitOptions(80, 3))
+        assert values(result) == pytest.approx(TWO_TRUTH, rel=0.1) and result.best.misfit < 40.0
+
+
+def test_finer_cells_are_asked_of_the_answer_alone_and_only_where_the_budget_holds_another_search() -> None:
+    """One run of an answer that stands; none where nothing could follow from it."""
+    for budget, runs in ((80, 1), (24, 0)):
+        finer = Fake(two_terms)
+        multistart_search(
+            two_goal(), Fake(two_terms), replicate=Fake(two_terms), finer=finer, options=FitOptions(budget, 3)
+        )
+        assert finer.runs == runs
 
 
 def test_an_answer_that_did_not_cut_gives_way_to_one_that_does(monkeypatch: pytest.MonkeyPatch) -> None:
