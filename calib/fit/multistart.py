@@ -139,8 +139,9 @@ def multistart_search(
                 status = _restarted(search, status)
             if replicate is not None:
                 best, replicates = _best_of_finalists(search, replicate)
-                if not again and _restartable(search) and not (holds(best, replicates) and stands(search, best, finer)):
-                    refuted = best if holds(best, replicates) else None  # by finer cells
+                held = holds(best, replicates)
+                if not again and not (held and (not _restartable(search) or stands(search, best, finer))):
+                    refuted = best if held else None  # by finer cells
                     status = _restarted(search, status, away_from=best)
                     other, replicates = _best_of_finalists(search, replicate, replicates, refuted)
                     if refuted is None or other is refuted or stands(search, other, finer):

@@ -220,11 +220,6 @@ class Material:
         return self.E / (2 * (1 + self.nu))
 
     @property
-    def bulk(self) -> float:
-        """Bulk modulus E / (3 (1 - 2 nu)) [Pa]."""
-        return self.E / (3 * (1 - 2 * self.nu))
-
-    @property
     def lame(self) -> float:
         """First Lame constant [Pa]."""
         return self.E * self.nu / ((1 + self.nu) * (1 - 2 * self.nu))
