@@ -51,18 +51,9 @@ FILES = (".yaml", ".yml")
 """How the name of a food's file ends."""
 _STRENGTHS = ("strength_ratio", "tensile_strength")  # a food has one of them at most
 _LAYERS = (*LAYERS, *LAYERS.values(), *LAYER_STIFFNESS.values())
-_OPTIONAL = (
-    *_LAYERS,
-    "skin_stiffness",
-    BOARD_FRICTION,
-    *ADHESION,
-    *RELAXATION,
-    RELAXING_BULK,
-    RATE_EXPONENT,
-    *_STRENGTHS,
-)
+_OPTIONAL = (*_LAYERS, "skin_stiffness", BOARD_FRICTION, *ADHESION, *RELAXATION, RELAXING_BULK, RATE_EXPONENT,
+             *_STRENGTHS)  # fmt: skip
 _NULLABLE = ("R_skin", "fracture_energy", *_OPTIONAL)  # a file may leave the optional ones out
-
 
 Sentences: TypeAlias = list[str]
 
