@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import chi2
 
+from calib.calibration.members import nrmse
 from calib.fit.multistart import FitResult
 from calib.material.food import FoodSpec
 from calib.material.form import ROUNDNESS, with_roundness
@@ -47,9 +48,7 @@ class FittedWithdrawal:
     @property
     def nrmse(self) -> float:
         """Root mean square difference over the largest measured pull [-]."""
-        way, pull = self.measured.way, self.measured.pull
-        square = np.trapezoid((self.curve - pull) ** 2, way) / (way[-1] - way[0])
-        return float(np.sqrt(square) / pull.max())
+        return nrmse(self.measured.way, self.measured.pull, self.curve)
 
     def columns(self) -> dict[str, FloatArray]:
         """Columns of withdrawal.csv, all on the way up."""

@@ -217,6 +217,6 @@ def read_context(path: Path | str) -> Context:
     conditions = {}
     for name, value in mapping(place, stated).items():
         if isinstance(value, (int, float)) and not isinstance(value, bool):
-            raise place.at(name).error(f'is {value!r}, a number without a unit; give it in words, such as "{value} C"')
+            raise place.at(name).error(f"is {value!r}, a number without a unit; give it in words, with its unit")
         conditions[str(name)] = text(place.at(name), value)
     return Context(**{name: text(top.at(name), value) for name, value in content.items()}, conditions=conditions)

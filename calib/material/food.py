@@ -220,7 +220,7 @@ class FoodSpec:
 
         Args:
             values: By property name.
-            status: ``given`` or ``fitted``.
+            status: ``given``, ``fitted`` or ``assumed``.
             source: Where the values come from.
 
         Returns:

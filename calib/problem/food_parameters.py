@@ -43,7 +43,7 @@ def sticking(food: FoodSpec) -> tuple[FoodSpec, tuple[str, ...]]:
     """
     if food.value("adhesion_energy") is not None:  # then its adhesion is known, too
         return food, ()
-    sticky = food.with_values(STICKS, source="assumed")
+    sticky = food.with_values(STICKS, status="assumed", source="of no measurement: as wide as any food may need")
     low, high = sticky.prior("adhesion_energy")
     return sticky, (
         f"nobody has measured how {food.name} sticks to a blade: its adhesion_energy is sought from {low:g} to "

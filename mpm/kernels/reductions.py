@@ -4,12 +4,11 @@ import taichi as ti
 
 from mpm.kernels.constitutive.laws import (
     branch_energy,
-    cofactor,
     damage_of,
     deviatoric_energy,
-    full,
     left_cauchy_green,
     left_stretch,
+    rotation,
     trace,
     unit,
 )
@@ -151,7 +150,8 @@ def momentum_and_energy(s: ti.template(), cut, p):
     vol = 0.5 * s.par[cut, LAM] * (j - 1) ** 2
     dev = deviatoric_energy(v, s.par[cut, MU])
     if ti.static(s.branches > 0):
-        dev, vol = relaxed_energy(s, cut, p, f, v, j, dev, vol)
+        if j > 0:  # an inverted one ends the run
+            dev, vol = relaxed_energy(s, cut, p, f, v, j, dev, vol)
     keep = 1.0 - d
     given = s.contact_moment[cut, p, 0][3] if s.visibility[cut, p] & IN_CONTACT else 0.0
     kinetic = m * (0.5 * u.norm_sqr() - given + 0.125 * s.par[cut, DX] * s.par[cut, DX] * spin)
@@ -175,14 +175,13 @@ def relaxed_energy(s: ti.template(), cut, p, f, v, j, dev, vol):
     """
     mu, volume = s.par[cut, MU], s.par[cut, RELAXING_BULK]
     bulk = s.par[cut, LAM] + 2 * mu / 3
-    u = full(cofactor(v)) @ f / j  # rotation, then the stretch in the unrotated frame
-    u = u.transpose() @ f
+    back = (rotation(f, v, j).transpose() @ f).inverse()
     swell = mu / 3 * (trace(v) - 3) ** 2  # the part of the first one that belongs to the volume, too
     shape, whole = dev - swell, vol + swell
     shape_now, whole_now = shape, whole  # of both, without what the branches have lost
     for b in ti.static(range(s.branches)):
         share, h = s.prony_share[cut, b], s.prony_stress[cut, b, p]
-        own_shape, own_whole = branch_energy(h, u, j, mu, bulk)
+        own_shape, own_whole = branch_energy(h, back, j, mu, bulk)
         shape_now += own_shape / share - share * shape
         if volume > 0:
             whole_now += own_whole / (volume * share) - volume * share * bulk / 2 * (j - 1) ** 2

@@ -224,20 +224,26 @@ def deviatoric_energy(v, mu):
 
 
 @ti.func
-def branch_energy(h, u, j, mu, bulk):
+def rotation(f, v, j):
+    """Rotation R of the polar decomposition F = V R, from F, V and J = det F > 0."""
+    return full(cofactor(v)) @ f / j
+
+
+@ti.func
+def branch_energy(h, back, j, mu, bulk):
     """Energy of the stress of a Prony branch of share 1, of shape and of volume [J/m^3].
 
     Its shape has the stress 2 mu (U^2 - U), so that the strain is U^-1 h / (2 mu); its pressure is K J (J - 1).
 
     Args:
         h: Kirchhoff stress of the branch in the unrotated frame [Pa].
-        u: Stretch U in that frame.
+        back: Inverse of the stretch U in that frame.
         j: Its determinant.
         mu: Shear modulus [Pa].
         bulk: Bulk modulus K [Pa].
     """
     pressure = h.trace() / 3
-    strain = u.inverse() @ (h - pressure * ti.Matrix.identity(float, 3))
+    strain = back @ (h - pressure * ti.Matrix.identity(float, 3))
     return strain.norm_sqr() / (4 * mu), (pressure / j) ** 2 / (2 * bulk)
 
 

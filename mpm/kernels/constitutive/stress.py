@@ -27,6 +27,7 @@ from mpm.kernels.constitutive.laws import (
     norm_squared,
     product_with_transpose,
     replace_stretch,
+    rotation,
     stretch_of,
     trace,
     unit,
@@ -94,8 +95,9 @@ def prony_stress(s: ti.template(), cut, p, f, v, j, mu, lam):
         Stress to add [Pa], and loss per volume [J/m^3].
     """
     volume, bulk = s.par[cut, RELAXING_BULK], lam + 2 * mu / 3
-    r = full(cofactor(v)) @ f / j
+    r = rotation(f, v, j)
     u = r.transpose() @ f
+    back = u.inverse()
     now = 2 * mu * (u @ u - u)
     now += (volume * bulk * j * (j - 1) - now.trace() / 3) * ti.Matrix.identity(float, 3)
     add, lost = ti.Matrix.zero(float, 3, 3), 0.0
@@ -105,7 +107,7 @@ def prony_stress(s: ti.template(), cut, p, f, v, j, mu, lam):
         h = decay * s.prony_stress[cut, b, p] + share * (1 - decay) / rate * (now - s.prony_before[cut, p])
         s.prony_stress[cut, b, p] = h
         add += h - share * now
-        shape, whole = branch_energy(h, u, j, mu, bulk)
+        shape, whole = branch_energy(h, back, j, mu, bulk)
         lost += 2 * rate * shape / share
         if volume > 0:
             lost += 2 * rate * whole / (volume * share)

@@ -75,6 +75,7 @@ def test_both_ways_are_fitted_and_told(done):
         assert done.fitted[name].value == pytest.approx(value, rel=0.2)
         assert done.fitted[name].low95 < value < done.fitted[name].high95
     up = done.withdrawal
+    assert done.material.properties["adhesion"].status == "assumed"  # and not given by anybody
     assert up is not None and up.nrmse < 0.05 and up.to_m == pytest.approx(STROKE, abs=3e-4)
     assert up.peak_sim_N == pytest.approx(up.peak_real_N, rel=0.05)
     assert up.work_sim_J == pytest.approx(up.work_real_J, rel=0.05) and up.predictive_inside > 0.9

@@ -15,7 +15,15 @@ from scipy.stats import chi2
 from calib.errors import MaterialError
 from calib.fit import search
 from calib.fit.acquisition import LOCAL_WEIGHT
-from calib.fit.multistart import ALIKE, FINALIST_MARGIN, RESTART_SEED, FitResult, _may_win, multistart_search
+from calib.fit.multistart import (
+    ALIKE,
+    FINALIST_MARGIN,
+    RESTART_SEED,
+    STANDING_CHANGE,
+    FitResult,
+    _may_win,
+    multistart_search,
+)
 from calib.fit.options import FitOptions
 from calib.fit.search import (
     DESCENT_BUDGET,
@@ -34,6 +42,7 @@ from calib.problem.target import Target
 from calib.simulation.evaluation import Evaluation, Evaluator
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, Header
 from calib.uncertainty.intervals import linearised_likelihood, uncertainty
+from calib.validation.numerical_checks import CHANGE_LIMIT
 from mpm.scene.errors import SimulationError
 from tests.calib.fake import (
     FIVE,
@@ -549,7 +558,8 @@ def test_a_force_that_does_not_stand_is_the_answer_where_the_curve_tells_it_from
 
 
 def test_finer_cells_are_asked_of_the_answer_alone_and_only_where_the_budget_holds_another_search() -> None:
-    """One run of an answer that stands; none where nothing could follow from it."""
+    """One run of an answer that stands; none where nothing could follow from it. Asked is what the verdict asks."""
+    assert STANDING_CHANGE == CHANGE_LIMIT
     for budget, runs in ((80, 1), (24, 0)):
         finer = Fake(two_terms)
         multistart_search(
