@@ -12,6 +12,9 @@ from mpm.arrays import FloatArray
 
 DEFLATION = 10.0
 """Residual in the middle of what is deflated [standard deviations]."""
+TELLING = ("E", "R")
+"""What is deflated of a food: the first of these parameters that is fitted, or the first at all, as far about its value
+as its prior's standard deviation. Foods that draw one curve differ in stiffness before all else."""
 
 
 @dataclass(frozen=True)
@@ -30,3 +33,10 @@ class DeflatedParameterSet(ParameterSet):
         depth = [1.0 - np.abs(z[..., place] - middle) / half for place, middle, half in self.claims]
         row = DEFLATION * np.maximum(np.min(depth, axis=0), 0.0)
         return np.concatenate([super().prior_residual(z), row[..., None]], axis=-1)
+
+
+def deflated_about(parameters: ParameterSet, z: FloatArray) -> DeflatedParameterSet:
+    """The parameters with the food at a point (p,) deflated."""
+    place = next((parameters.names.index(name) for name in TELLING if name in parameters.names), 0)
+    claim = (place, float(z[place]), float(parameters.prior_sd[place]))
+    return DeflatedParameterSet(parameters.items, parameters.correlations, (claim,))

@@ -12,7 +12,7 @@ from that answer.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,33 +21,22 @@ from threadpoolctl import threadpool_limits
 
 from calib.fit.acquisition import LOCAL_WEIGHT
 from calib.fit.budget import progress_of_all
-from calib.fit.deflation import DeflatedParameterSet
+from calib.fit.deflation import deflated_about
 from calib.fit.options import FitOptions
+from calib.fit.repeated_runs import ALIKE, FINALISTS, HELD_CHANGE, holds, stands
 from calib.fit.search import BASIN_DISTANCE, Search
 from calib.fit.surrogate import Surrogate
 from calib.io.progress import Progress
 from calib.problem.joint_objective import JointObjective
 from calib.problem.objective import Objective
-from calib.problem.parameters import Z95, ParameterSet
+from calib.problem.parameters import ParameterSet
 from calib.problem.scored_run import ScoredRun
 from calib.simulation.evaluation import Evaluator
 from mpm.arrays import FloatArray
 from mpm.scene.errors import SimulationError
 
-#: Runs among which the answer is chosen by a second run of each, slower and with other particles: two batches of two.
-FINALISTS = 4
 #: They may be expected to be worse than the best by the chi-square that the noise of so many runs makes.
 FINALIST_MARGIN = 2.0
-#: Largest change of peak or work in a second run that has the same force [-]: half of what the verdict allows for the
-#: speed, because it carries the change on to rest, and a hundredth for other particles.
-HELD_CHANGE = 0.035
-#: Largest change of peak or work on finer cells of an answer that stands there [-]: what the verdict allows.
-STANDING_CHANGE = 0.05
-#: Chi-square that two runs may be apart if the curve does not tell them apart: that of an interval of 95 %.
-ALIKE = Z95**2
-#: What is deflated of an answer that does not hold: the first of these parameters that is fitted, or the first at all,
-#: as far about it as its prior's standard deviation. Foods that draw one curve differ in stiffness before all else.
-TELLING = ("E", "R")
 #: Added to the seed of a search that is started once more.
 RESTART_SEED = 1_000_003
 
@@ -140,11 +129,11 @@ def multistart_search(
             if replicate is not None:
                 best, replicates = _best_of_finalists(search, replicate)
                 held = holds(best, replicates)
-                if not again and not (held and (not _restartable(search) or stands(search, best, finer))):
+                if not again and not (held and (not _restartable(search) or stands(objective, best, finer))):
                     refuted = best if held else None  # by finer cells
                     status = _restarted(search, status, away_from=best)
                     other, replicates = _best_of_finalists(search, replicate, replicates, refuted)
-                    if refuted is None or other is refuted or stands(search, other, finer):
+                    if refuted is None or other is refuted or stands(objective, other, finer):
                         best = other
         except KeyboardInterrupt:
             if not search.finished:
@@ -179,7 +168,7 @@ def _restarted(search: Search, ended: str, away_from: ScoredRun | None = None) -
     rest = options.budget - search.spent
     first, told = search.best, progress_of_all(search.progress, search.runs, search.best, options)
     own = replace(options, budget=rest, seed=options.seed + RESTART_SEED)
-    sought = goal if away_from is None else replace(goal, parameters=_deflated(goal.parameters, away_from.z))
+    sought = goal if away_from is None else replace(goal, parameters=deflated_about(goal.parameters, away_from.z))
     other = Search(sought, search.fine, search.coarse, own, told)
     try:
         status = other.run()
@@ -189,13 +178,6 @@ def _restarted(search: Search, ended: str, away_from: ScoredRun | None = None) -
         scored = (goal.score(run.evaluation, coarse=run.coarse, stage=run.stage) for run in other.runs)
         search.runs += other.runs if away_from is None else scored
     return status if search.best is not first else ended
-
-
-def _deflated(parameters: ParameterSet, z: FloatArray) -> DeflatedParameterSet:
-    """The parameters with what lies about a point (p,) deflated."""
-    place = next((parameters.names.index(name) for name in TELLING if name in parameters.names), 0)
-    claim = (place, float(z[place]), float(parameters.prior_sd[place]))
-    return DeflatedParameterSet(parameters.items, parameters.correlations, (claim,))
 
 
 def _best_of_finalists(
@@ -249,37 +231,6 @@ def _answer(tried: list[ScoredRun], replicates: list[ScoredRun], refuted: Scored
     alike = [(size, k) for size, k in sorted(sound) if size <= min(sound)[0] + 2 * ALIKE]
     held = [k for _, k in alike if tried[k] is not refuted and tried[k].change(replicates[k]) <= HELD_CHANGE]
     return tried[held[0] if held else alike[0][1]]
-
-
-def holds(run: ScoredRun, replicates: Sequence[ScoredRun]) -> bool:
-    """Whether a run's second run has the same force.
-
-    Args:
-        run: The run.
-        replicates: Second runs, among which its own may be.
-
-    Returns:
-        That; False where there is none, or it broke down.
-    """
-    again = next((r for r in replicates if r.ok and np.array_equal(r.z, run.z)), None)
-    return again is not None and run.change(again) <= HELD_CHANGE
-
-
-def stands(search: Search, run: ScoredRun, finer: Evaluator | None) -> bool:
-    """Whether a run has the same force on finer cells, to what the verdict allows.
-
-    Args:
-        search: The search.
-        run: The run.
-        finer: Runs it on finer cells; without it any run stands.
-
-    Returns:
-        That; False where the finer one breaks down.
-    """
-    if finer is None:
-        return True
-    again = search.objective.score(next(iter(finer.evaluate([run.evaluation.parameters]))), stage="finer")
-    return again.ok and run.change(again) <= STANDING_CHANGE
 
 
 def _may_win(

@@ -20,8 +20,9 @@ from threadpoolctl import threadpool_limits
 
 from calib.fit.budget import progress_of_all
 from calib.fit.deflation import DeflatedParameterSet
-from calib.fit.multistart import ALIKE, FitResult, holds, multistart_search
+from calib.fit.multistart import FitResult, multistart_search
 from calib.fit.options import FitOptions
+from calib.fit.repeated_runs import ALIKE, again, holds
 from calib.fit.search import Search
 from calib.fit.surrogate import Surrogate
 from calib.io.progress import Progress
@@ -163,8 +164,7 @@ def _replicated(objective: Objective | JointObjective, fit: FitResult, replicate
     """The fit with a second run of its answer, if there is none yet."""
     if _second_run(fit) is not None:
         return fit
-    run = next(iter(replicate.evaluate([fit.best.evaluation.parameters])))
-    return replace(fit, replicates=(*fit.replicates, objective.score(run, stage="replicate")))
+    return replace(fit, replicates=(*fit.replicates, again(objective, fit.best, replicate, "replicate")))
 
 
 def _may_follow(objective: Objective | JointObjective, fit: FitResult, run: ScoredRun, replicate: Evaluator) -> bool:
@@ -174,8 +174,7 @@ def _may_follow(objective: Objective | JointObjective, fit: FitResult, run: Scor
     """
     if fit.best.misfit - run.misfit > ALIKE or not holds(fit.best, fit.replicates):
         return True
-    again = objective.score(next(iter(replicate.evaluate([run.evaluation.parameters]))), stage="replicate")
-    return holds(run, [again])
+    return holds(run, [again(objective, run, replicate, "replicate")])
 
 
 def _second_run(fit: FitResult) -> ScoredRun | None:

@@ -15,16 +15,9 @@ from scipy.stats import chi2
 from calib.errors import MaterialError
 from calib.fit import search
 from calib.fit.acquisition import LOCAL_WEIGHT
-from calib.fit.multistart import (
-    ALIKE,
-    FINALIST_MARGIN,
-    RESTART_SEED,
-    STANDING_CHANGE,
-    FitResult,
-    _may_win,
-    multistart_search,
-)
+from calib.fit.multistart import FINALIST_MARGIN, RESTART_SEED, FitResult, _may_win, multistart_search
 from calib.fit.options import FitOptions
+from calib.fit.repeated_runs import ALIKE, STANDING_CHANGE
 from calib.fit.search import (
     DESCENT_BUDGET,
     FAR_OFF,
