@@ -35,8 +35,13 @@ class DeflatedParameterSet(ParameterSet):
         return np.concatenate([super().prior_residual(z), row[..., None]], axis=-1)
 
 
+def telling(parameters: ParameterSet) -> int:
+    """Place of the parameter in which foods that draw one curve differ: the first of :data:`TELLING`, or the first."""
+    return next((parameters.names.index(name) for name in TELLING if name in parameters.names), 0)
+
+
 def deflated_about(parameters: ParameterSet, z: FloatArray) -> DeflatedParameterSet:
     """The parameters with the food at a point (p,) deflated."""
-    place = next((parameters.names.index(name) for name in TELLING if name in parameters.names), 0)
+    place = telling(parameters)
     claim = (place, float(z[place]), float(parameters.prior_sd[place]))
     return DeflatedParameterSet(parameters.items, parameters.correlations, (claim,))

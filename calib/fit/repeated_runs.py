@@ -10,6 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from calib.fit.deflation import telling
+from calib.fit.search import BASIN_DISTANCE
+from calib.fit.surrogate import coordinate_unit
 from calib.problem.joint_objective import JointObjective
 from calib.problem.objective import Objective
 from calib.problem.parameters import Z95
@@ -25,6 +28,8 @@ HELD_CHANGE = 0.035
 STANDING_CHANGE = 0.05
 #: Chi-square that two runs may be apart if the curve does not tell them apart: that of an interval of 95 %.
 ALIKE = Z95**2
+#: Half width of an answer's own valley along what tells foods apart [standard deviations of its prior].
+OWN_VALLEY = 0.5
 
 
 def holds(run: ScoredRun, replicates: Sequence[ScoredRun]) -> bool:
@@ -68,6 +73,61 @@ def again(objective: Objective | JointObjective, run: ScoredRun, evaluator: Eval
         The second run.
     """
     return objective.score(next(iter(evaluator.evaluate([run.evaluation.parameters]))), stage=stage)
+
+
+def standing_in_its_place(
+    objective: Objective | JointObjective,
+    answer: ScoredRun,
+    runs: Sequence[ScoredRun],
+    finer: Evaluator | None,
+    replicate: Evaluator,
+) -> tuple[ScoredRun, ScoredRun] | None:
+    """A run that stands on finer cells and holds, in place of an answer that does not stand.
+
+    The curve must not tell them apart. As among finalists the chi-square is that of two runs; here the one on finer
+    cells is the second. Runs of the answer's own valley are not asked for, because they have its fault, nor is the
+    answer where there are no others.
+
+    Args:
+        objective: What was fitted.
+        answer: The answer.
+        runs: All runs of the fit.
+        finer: Runs them on finer cells; without it any answer stands.
+        replicate: Runs them slower and with other particles.
+
+    Returns:
+        The run and its second run; None where the answer stands, or where none of the best four elsewhere may take its
+        place.
+    """
+    others = _elsewhere(objective, answer, runs)
+    if finer is None or not others:
+        return None
+    refuting = again(objective, answer, finer, "finer")
+    if _unchanged(answer, refuting):
+        return None
+    limit = answer.misfit + (refuting.misfit if refuting.ok else answer.misfit) + 2 * ALIKE
+    for run in others:
+        on_finer = again(objective, run, finer, "finer")
+        if not _unchanged(run, on_finer) or run.misfit + on_finer.misfit > limit:
+            continue
+        second = again(objective, run, replicate, "replicate")
+        if holds(run, [second]):
+            return run, second
+    return None
+
+
+def _elsewhere(objective: Objective | JointObjective, answer: ScoredRun, runs: Sequence[ScoredRun]) -> list[ScoredRun]:
+    """Runs that the curve does not tell from the answer, out of its valley and apart from each other, the best ones
+    first."""
+    place, sd = telling(objective.parameters), objective.parameters.prior_sd
+    unit = coordinate_unit(objective.parameters)
+    found: list[ScoredRun] = []
+    for run in sorted(runs, key=lambda run: run.misfit):
+        alike = run.cut and not run.coarse and run.misfit <= answer.misfit + 2 * ALIKE
+        if alike and abs(run.z - answer.z)[place] > OWN_VALLEY * sd[place] and len(found) < FINALISTS:
+            if all(np.abs((run.z - other.z) / unit).max() > BASIN_DISTANCE for other in found):
+                found.append(run)
+    return found
 
 
 def _unchanged(run: ScoredRun, on_finer: ScoredRun) -> bool:

@@ -22,7 +22,7 @@ from calib.fit.budget import progress_of_all
 from calib.fit.deflation import DeflatedParameterSet
 from calib.fit.multistart import FitResult, multistart_search
 from calib.fit.options import FitOptions
-from calib.fit.repeated_runs import ALIKE, again, holds
+from calib.fit.repeated_runs import ALIKE, again, holds, standing_in_its_place
 from calib.fit.search import Search
 from calib.fit.surrogate import Surrogate
 from calib.io.progress import Progress
@@ -118,6 +118,7 @@ def fit_with_uncertainty(
     )
     if analysis is None:
         return result, None
+    analysis = _standing(objective, analysis, evaluators, options.seed)
     analysis = _reviewed(objective, analysis, _Searches(first, second, claimed), replicate, options.budget)
     for sentence in analysis.remarks:
         told.say(sentence[:-1])
@@ -158,6 +159,37 @@ def _reviewed(
         more = f"; a budget of {2 * budget:g} may hold one" if searches.claimed else ""
         return _without_claims(analysis, f"bounded by one search and not by a second one that might refute it{more}")
     return analysis
+
+
+def _standing(
+    objective: Objective | JointObjective, analysis: UncertaintyAnalysis, evaluators: Evaluators, seed: int
+) -> UncertaintyAnalysis:
+    """The uncertainty about a run that stands on finer cells, where the answer does not and the curve does not tell
+    them apart: the ends of the intervals may have found such a food after the answer was chosen."""
+    fit = analysis.result
+    found = standing_in_its_place(objective, fit.best, fit.history, evaluators.finer, evaluators.replicate)
+    if found is None:
+        return analysis
+    assert fit.surrogate is not None  # or nothing is analysed
+    best, second = found
+    with threadpool_limits(1, "blas"):
+        surrogate = Surrogate(objective, fit.history, best, fit.surrogate.hyper)
+        jacobian = surrogate.jacobian(best.z)
+    moved = replace(
+        fit,
+        best=best,
+        parameters=fit.parameters.with_values(best.evaluation.parameters),
+        replicates=(*fit.replicates, second),
+        surrogate=surrogate,
+        jacobian=jacobian,
+    )
+    again_analysed = analyse(objective, moved, seed=seed)
+    assert again_analysed is not None
+    remark = (
+        "The best fit has another force on finer cells: the values are those of a food that has not, and that the "
+        f"curve does not tell from it (chi-square {best.misfit:.3g} against {fit.best.misfit:.3g})."
+    )
+    return replace(again_analysed, remarks=(*analysis.remarks, remark))
 
 
 def _replicated(objective: Objective | JointObjective, fit: FitResult, replicate: Evaluator) -> FitResult:

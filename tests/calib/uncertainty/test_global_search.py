@@ -225,3 +225,43 @@ def test_an_interrupted_search_simulates_nothing_more():
     fake = Fake(onefold, noisy=0.002, interrupt_after=25)
     result, analysis = fit_with_uncertainty(goal, Evaluators(fake, fake, fake), FitOptions())
     assert result.status == "interrupted" and analysis is not None and fake.runs == 25
+
+
+def fit_with_both_valleys(goal: Objective, fake: Fake) -> FitResult:
+    """A fit in one valley of :func:`twofold` whose history has a run of the other, as the end of an interval has."""
+    fit = multistart_search(goal, fake, coarse=fake, replicate=fake, options=FitOptions(seed=0))
+    mirrored = fit.best.evaluation.parameters | {"E": MIDDLE**2 / fit.best.evaluation.parameters["E"]}
+    other = goal.score(next(iter(fake.evaluate([mirrored]))), stage="profile")
+    return replace(fit, history=(*(t for t in fit.history if abs(t.z[0] - fit.best.z[0]) < 0.5), other))
+
+
+@pytest.mark.parametrize(
+    ("own", "others", "moves", "finer_runs", "repeated"),
+    [(1.06, 1.005, True, 2, 1), (1.005, 1.06, False, 1, 0), (1.06, 1.06, False, 2, 0)],
+    ids=["the answer hangs on the cells", "the answer stands", "both hang on the cells"],
+)
+def test_an_answer_that_hangs_on_the_cells_gives_way_to_one_that_does_not(own, others, moves, finer_runs, repeated):
+    """Where the curve does not tell them apart; nothing else is simulated, and the intervals are about the new one."""
+    stiff = ParameterSet((replace(TWO.items[0], name="E", unit="Pa"), TWO.items[1]))
+
+    def force(p):
+        return twofold({"R_skin": p["E"], "R": p["R"]})
+
+    fake, replicate = Fake(force, noisy=0.002), Fake(force, noisy=0.002)
+    goal = Objective(Target(GRID, np.interp(GRID, STROKE, twofold(TRUTH)), 0.05, 0.05, np.interp), stiff)
+    fit = fit_with_both_valleys(goal, fake)
+    upper = fit.best.evaluation.parameters["E"] > MIDDLE
+    finer = Fake(lambda p: force(p) * (own if (p["E"] > MIDDLE) is upper else others), noisy=0.0)
+    analysis = analyse(goal, fit, seed=0)
+    assert analysis is not None
+    before = fake.runs
+    found = global_search._standing(goal, analysis, Evaluators(fake, fake, replicate, finer), 0)
+    assert (fake.runs - before, replicate.runs, finer.runs) == (0, repeated, finer_runs)
+    if not moves:
+        assert found is analysis
+        return
+    assert found.result.best is fit.history[-1] and found.result.surrogate.best is fit.history[-1]
+    assert found.result.parameters["E"].value == fit.history[-1].evaluation.parameters["E"]
+    assert found.uncertainty.intervals[0].parameter.value == found.result.parameters["E"].value
+    assert "another force on finer cells" in found.remarks[0]
+    assert global_search._standing(goal, analysis, Evaluators(fake, fake, replicate), 0) is analysis
