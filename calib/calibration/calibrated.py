@@ -20,6 +20,7 @@ from calib.problem.scored_run import ScoredRun
 from calib.problem.setup import Setup
 from calib.problem.withdrawal import BothWays, Withdrawal
 from calib.uncertainty.analysis import UncertaintyAnalysis
+from calib.uncertainty.nested_models import NestedModel
 from calib.uncertainty.predictive import Band
 from calib.uncertainty.sobol import Indices, sensitivity
 from calib.validation.metrics import Metrics, compare
@@ -70,6 +71,7 @@ class Calibrated:
         start: Smoothed curve of the literature's values [N] (n,), NaN where that run broke down or was not made.
         posterior: The posterior over all plausible foods, where it was sampled.
         both: The way up that was fitted beside the way down, if it was.
+        nested: The fit of both ways without R, without friction and without adhesion, where these were fitted.
     """
 
     setup: Setup
@@ -80,6 +82,7 @@ class Calibrated:
     start: FloatArray
     posterior: SampledPosterior | None = None
     both: BothWays | None = None
+    nested: tuple[NestedModel, ...] = ()
 
     @property
     def objective(self) -> Objective | JointObjective:

@@ -25,8 +25,8 @@ from calib.calibration.result_parts import (
     SimulatedCut,
     SobolIndices,
     TraceSource,
-    WithdrawalAgreement,
 )
+from calib.calibration.withdrawal_result import WithdrawalAgreement
 from calib.errors import CurveError, DocumentError, OutputError
 from calib.io import typed_document
 from calib.io.folder import finite

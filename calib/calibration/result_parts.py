@@ -9,7 +9,6 @@ from typing import Annotated, Any, ClassVar
 from calib.io.type_schema import ALWAYS, Count, Fraction, NotNegative, Positive, Shared, keywords, one_of
 from calib.io.typed_document import ANY, FORMER, NULL
 from calib.material.properties import PROPERTIES
-from calib.uncertainty.estimates import FittedNuisance
 from calib.validation.metrics import IsoRating, Metrics, SpragueGeers
 from mpm.scene import Knife
 from mpm.scene.shapes import Shape
@@ -176,36 +175,6 @@ class Agreement:
     def iso18571(self) -> Annotated[IsoRating, Shared("iso18571")]:
         """Rating in the style of ISO/TS 18571; 1 is perfect."""
         return self.metrics.iso18571
-
-
-@dataclass(frozen=True, kw_only=True)
-class WithdrawalAgreement:
-    """The way up: the pull on the knife, downwards positive, simulated against measured.
-
-    Attributes:
-        from_m: Way above the lowest point from which it is compared: before, the edge gives back its slip [m].
-        to_m: Way above the lowest point up to which it was recorded and is compared [m].
-        speed_m_s: Mean speed on it [m/s].
-        peak_real_N: Largest measured pull [N].
-        peak_sim_N: Largest simulated pull at the best values [N].
-        nrmse: Root mean square difference over the largest measured pull, a fraction.
-        work_real_J: Work of the measured pull [J].
-        work_sim_J: Work of the simulated pull [J].
-        predictive_inside: Part of the measured points within the 95 % band; null where the fit ended too early.
-        nuisances: What the fit says of the measurement on the way up, by name: tare, gain, width; empty where the fit
-            ended too early.
-    """
-
-    from_m: NotNegative
-    to_m: Positive
-    speed_m_s: NotNegative
-    peak_real_N: Positive
-    peak_sim_N: float
-    nrmse: NotNegative
-    work_real_J: float
-    work_sim_J: float
-    predictive_inside: Fraction | None = field(default=None, metadata=NULL)
-    nuisances: Mapping[str, Annotated[FittedNuisance, Shared("nuisance")]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

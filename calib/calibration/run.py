@@ -33,13 +33,14 @@ from calib.posterior.posterior import SampledPosterior
 from calib.posterior.sampling import check_installed
 from calib.problem.request import Request
 from calib.problem.setup import FINE, Setup, set_up
-from calib.problem.withdrawal import BothWays
+from calib.problem.withdrawal import TOLD_APART, BothWays
 from calib.simulation.evaluation import Evaluators
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore
 from calib.simulation.record_file import read_record, record_errands
 from calib.simulation.workers import Errand, Workers
 from calib.uncertainty.analysis import UncertaintyAnalysis
 from calib.uncertainty.global_search import Listener, fit_with_uncertainty
+from calib.uncertainty.nested_models import NestedModel, nested_models
 from calib.validation.numerical_checks import (
     QUARTER_SPEED,
     VARIED,
@@ -104,11 +105,13 @@ def run(
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """A fit, its uncertainty where it did not end too early for that, and the posterior where it was sampled."""
+    """A fit, its uncertainty where it did not end too early for that, the posterior where it was sampled, and where
+    both ways were fitted, the fit without R, without friction and without adhesion."""
 
     fit: FitResult
     analysis: UncertaintyAnalysis | None
     posterior: SampledPosterior | None = None
+    nested: tuple[NestedModel, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +140,14 @@ class _Calibration:
         if setup.request.sample:
             return self._sampled(evaluators)
         listener = Listener(self.clock.search, self._said, self._begin_longest_check)
-        return _Found(*fit_with_uncertainty(problem.objective, evaluators, options, listener))
+        fit, analysis = fit_with_uncertainty(problem.objective, evaluators, options, listener)
+        if self.both is None or analysis is None or fit.status == "interrupted":
+            return _Found(fit, analysis)
+        asked = [name for name in TOLD_APART if name in self._fitted]
+        if asked:
+            self._said(f"fitting again: without {', then without '.join(asked)}")
+        analysis, nested = nested_models(problem.objective, analysis, evaluators.fine, asked)
+        return _Found(analysis.result, analysis, nested=nested)
 
     def _said(self, text: str) -> None:
         """A stage of the intervals, told to both listeners."""
@@ -181,7 +191,7 @@ class _Calibration:
         checks = check(scene, best, self.store, way, self._fitted) if ended else []
         start = self._start_curve() if ended else np.full_like(setup.curve.stroke, np.nan)
         sized = setup.sized(best.parameters)
-        return Calibrated(sized, fit, found.analysis, record, checks, start, found.posterior, self.both)
+        return Calibrated(sized, fit, found.analysis, record, checks, start, found.posterior, self.both, found.nested)
 
     def _counted(self, errands: Sequence[Errand]) -> list[Errand]:
         """The same errands, each of which tells when it is made."""

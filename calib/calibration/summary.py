@@ -29,8 +29,8 @@ from calib.calibration.result_parts import (
     SobolIndices,
     Tally,
     TraceSource,
-    WithdrawalAgreement,
 )
+from calib.calibration.withdrawal_result import FitWithout, WithdrawalAgreement
 from calib.errors import OutputError
 from calib.fit.multistart import FitResult
 from calib.io.meaning import describe_sets
@@ -172,6 +172,7 @@ def _withdrawal(done: Calibrated) -> WithdrawalAgreement | None:
         work_sim_J=float(np.trapezoid(found.curve, way)),
         predictive_inside=None if found.band is None else found.band.inside,
         nuisances=_nuisances(done, 1),
+        without={m.name: FitWithout(m.value, m.chi_square, m.whole, m.evidence) for m in done.nested},
     )
 
 

@@ -33,6 +33,8 @@ from mpm.scene import Scene
 
 CUT, WITHDRAWAL = "cut", "withdrawal"
 """Names of the two terms."""
+TOLD_APART = ("R", "mu", "adhesion_energy")
+"""Properties that a way up tells apart, and of which a fit asks whether the trace needs them."""
 RELEASE_SLIPS = 2.0
 """Way after the turn that is left out, over the slip of the edge's law [-]: within one slip the edge gives it back
 (docs/theory.md, "Withdrawal of the blade")."""

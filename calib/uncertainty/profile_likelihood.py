@@ -18,9 +18,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
 
-from calib.fit.surrogate import JACOBIAN_STEP, Surrogate, slopes
+from calib.fit.surrogate import JACOBIAN_STEP, Surrogate
 from calib.problem.parameters import Z95, Parameter, ParameterSet
 from calib.uncertainty.intervals import IDENTIFIED, NOT_SEEN, Identifiability, Interval, Uncertainty
 from calib.uncertainty.posterior import Posterior
@@ -35,8 +34,6 @@ LONGEST = 6
 KNOWN = 0.10
 """Largest relative standard deviation of an identified parameter [-]: its median error is then below 7 %
 (docs/theory.md, "Measured choices")."""
-EVALUATIONS = 12
-"""Evaluations of the surrogate with which the others follow a step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,42 +116,13 @@ class _Profiler:
 
     def __init__(self, surrogate: Surrogate, parameters: ParameterSet, found: Uncertainty, i: int) -> None:
         self.surrogate, self.parameters, self.found, self.i = surrogate, parameters, found, i
-        self.others = np.array([k != i for k in range(len(parameters))])
         self.p = len(parameters)
         self.low, self.high = parameters.lower, parameters.upper
-        posterior = Posterior(surrogate, parameters, found)
-        self.rows, self.rows_all = posterior.rows, posterior.rows_all
-
-    def follow(self, z: FloatArray) -> FloatArray:
-        """The others' optimum from ``z`` with this parameter held."""
-        if not self.others.any():
-            return z
-
-        def rows(free: FloatArray) -> FloatArray:
-            whole = np.tile(z, (len(free), 1))
-            whole[:, self.others] = free
-            return self.rows_all(whole)
-
-        low, high = self.low[self.others], self.high[self.others]
-        edge = 1e-9 * self.surrogate.unit[self.others]
-        start = np.clip(z[self.others], low, high)
-        scale = self.surrogate.unit[self.others]
-        bounds = (low - edge, high + edge)
-        solved = least_squares(
-            lambda free: rows(free[None])[0],
-            start,
-            jac=lambda free: slopes(rows, free, scale),
-            bounds=bounds,
-            x_scale=scale,
-            max_nfev=EVALUATIONS,
-        )
-        out = z.copy()
-        out[self.others] = np.clip(solved.x, low, high)
-        return out
+        self.posterior = Posterior(surrogate, parameters, found)
 
     def profile(self) -> Profile:
         """Both sides from the best values."""
-        start = self.follow(self.parameters.start)
+        start = self.posterior.optimum(self.parameters.start, self.i)
         points, costs = [start], [self.cost(start)]
         sd = math.sqrt(self.found.covariance[self.i, self.i])
         for side in (-1.0, 1.0):
@@ -166,7 +134,7 @@ class _Profiler:
                     break
                 z = z.copy()
                 z[self.i] = v
-                z = self.follow(z)
+                z = self.posterior.optimum(z, self.i)
                 points.append(z)
                 costs.append(self.cost(z))
                 if costs[-1][1] - costs[0][1] > 2.0 * RISE:
@@ -182,7 +150,7 @@ class _Profiler:
 
     def cost(self, z: FloatArray) -> tuple[float, float]:
         """Chi-square with all priors, and without this parameter's own."""
-        rows = self.rows(z)
+        rows = self.posterior.rows(z)
         whole = float(rows @ rows)
         return whole, whole - float(self.own(z[self.i]))
 
@@ -192,7 +160,8 @@ class _Profiler:
 
     def feigned(self) -> float:
         """Curvature of the data's rise that the noise of the runs feigns: what the normal approximation leaves out."""
-        beside = self.rows_all(np.concatenate([self.parameters.start + self.steps, self.parameters.start - self.steps]))
+        ahead, back = self.parameters.start + self.steps, self.parameters.start - self.steps
+        beside = self.posterior.rows_all(np.concatenate([ahead, back]))
         raw = (beside[: self.p] - beside[self.p :]).T / (2.0 * np.diag(self.steps))
         naive = 1.0 / np.linalg.inv(raw.T @ raw)[self.i, self.i]
         return max(naive - 1.0 / float(self.found.covariance[self.i, self.i]), 0.0)

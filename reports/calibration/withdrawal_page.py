@@ -9,12 +9,20 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from reports.base.figures import BLACK, MEASURED, SIMULATED, predictive, svg
-from reports.base.format import quantity
+from reports.base.format import plain, quantity
 from reports.base.run_folder import Data
 from reports.calibration import measurement
 
 if TYPE_CHECKING:
-    from calib.calibration.result_parts import WithdrawalAgreement
+    from calib.calibration.withdrawal_result import FitWithout, WithdrawalAgreement
+
+NAMED = {"R": "the cutting resistance", "mu": "friction", "adhesion_energy": "adhesion"}
+STRENGTHS = ((10.0, "very strong"), (6.0, "strong"), (2.0, "positive"), (0.0, "not worth more than a mention"))
+"""Evidence from which on it is called so (Kass and Raftery 1995)."""
+EVIDENCE = (
+    "Evidence is the difference of Bayesian information criteria, without the property less with it. The property is "
+    "held at the least that it may have, and all others are fitted again."
+)
 
 TOLD = (
     "On the way up nothing is parted: friction has turned round, and what sticks is taken off. So this curve tells "
@@ -30,12 +38,12 @@ def withdrawal(found: WithdrawalAgreement) -> Data:
         found: The way up against the trace.
 
     Returns:
-        ``told``, a sentence; ``rows``, pairs of a name and a value; ``left_open``, lines of
+        ``told``, sentences; ``rows``, pairs of a name and a value; ``left_open``, lines of
         :func:`reports.calibration.measurement.left_open`.
     """
     inside = found.predictive_inside
     return {
-        "told": TOLD,
+        "told": f"{TOLD} {EVIDENCE}" if found.without else TOLD,
         "rows": [
             ["Compared", f"from {quantity(found.from_m, 'm')} to {quantity(found.to_m, 'm')} above the lowest point"],
             ["Speed", f"{quantity(found.speed_m_s, 'm/s')} on average"],
@@ -44,9 +52,17 @@ def withdrawal(found: WithdrawalAgreement) -> Data:
             ["Work", f"measured {quantity(found.work_real_J, 'J')}, simulated {quantity(found.work_sim_J, 'J')}"],
             ["Curve error (NRMSE)", quantity(found.nrmse, "fraction")],
             ["Within the 95 % band", "not determined" if inside is None else quantity(inside, "fraction", digits=2)],
+            *([f"Evidence for {NAMED[name]}", _evidence(one)] for name, one in found.without.items()),
         ],
         "left_open": [measurement.left_open(name, n) for name, n in found.nuisances.items()],
     }  # fmt: skip
+
+
+def _evidence(found: FitWithout) -> str:
+    """How strong it is, and what it is made of."""
+    size = next((word for least, word in STRENGTHS if found.evidence >= least), "the trace does not ask for it")
+    rise = plain(found.chi_square - found.whole, 3)
+    return f"{plain(found.evidence, 3)}, {size}: without it the least chi-square changes by {rise}"
 
 
 def figure(curves: Mapping[str, np.ndarray], trace: str) -> bytes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,11 +37,12 @@ def request_of(trace: Trace) -> Request:
                    budget=40, withdrawal=True)  # fmt: skip
 
 
-def made(pulls: float = 1.0) -> Trace:
+def made(pulls: float = 1.0, truth: Mapping[str, float] = TRUTH) -> Trace:
     """What the formula gives of the truth, at 20 mm/s, from 10 mm above the food until the edge is out of it.
 
     Args:
         pulls: Factor on the force of the way up.
+        truth: Its values [SI].
     """
     blank = Trace(np.arange(600) / RATE, np.zeros(600), None, "cut.csv", "", {"force": "F", "time": "t"}, "measured")
     ramp = np.clip(np.arange(600) / RATE * SPEED - 0.01, 0.0, STROKE)
@@ -48,7 +50,7 @@ def made(pulls: float = 1.0) -> Trace:
     scene = set_up(replace(request_of(still), withdrawal=False, fit=("E", "R"))).scene({})
     food, _ = sticking(load_food("banana"))
     motion = replace(scene.motion, stroke=STROKE, retract=STROKE)
-    scene = replace(scene.with_material(adhesion=food.value("adhesion"), **TRUTH), motion=motion)
+    scene = replace(scene.with_material(adhesion=food.value("adhesion"), **truth), motion=motion)
     record = cheap_cut(scene)
     time = np.arange(0.0, (0.01 + 2 * STROKE) / SPEED, 1 / RATE)
     path = time * SPEED - 0.01
@@ -88,6 +90,26 @@ def test_both_ways_are_fitted_and_told(done):
     line = done.verdicts[2]  # below that of the cut's curve
     assert line.name == "curve error of the withdrawal (NRMSE)"
     assert line.passed and line.value == up.nrmse and 0.08 < line.limit < 0.5
+
+
+def test_friction_adhesion_and_resistance_are_told_apart_by_evidence(done):
+    """The made-up cut has all three: without any of them the least chi-square rises by more than the criterion asks.
+    The runs are those of the fit, and counted."""
+    found, asked = done.withdrawal.without, BothWays.of(set_up(request_of(made())))
+    assert list(found) == ["R", "mu", "adhesion_energy"]
+    for name, one in found.items():
+        assert one.value == asked.objective.parameters[name].low
+        assert one.evidence == pytest.approx(one.chi_square - one.whole - np.log(asked.objective.effective_rows))
+        assert one.evidence > 2.0 and one.whole < 10.0
+
+
+def test_what_a_cut_does_not_have_has_no_evidence(tmp_path: Path, monkeypatch):
+    """A made-up cut of a food that does not stick."""
+    monkeypatch.setenv(LOG, str(tmp_path / "runs.log"))
+    dry = made(truth=TRUTH | {"adhesion_energy": 1e-3})
+    with CheapPool(2) as pool:
+        found = run(request_of(dry), tmp_path / "out", pool).withdrawal.without
+    assert found["adhesion_energy"].evidence < 0.0 < 2.0 < found["mu"].evidence
 
 
 def test_the_report_shows_both_ways(done):
