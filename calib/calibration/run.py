@@ -139,7 +139,7 @@ class _Calibration:
             evaluators = replace(evaluators, finer=FinerCells(setup.scene, self.pool, self.store))
         if setup.request.sample:
             return self._sampled(evaluators)
-        listener = Listener(self.clock.search, self._said, self._begin_longest_check)
+        listener = Listener(self.clock.search, self._said, self._begin_longest_check, self.say)
         fit, analysis = fit_with_uncertainty(problem.objective, evaluators, options, listener)
         if self.both is None or analysis is None or fit.status == "interrupted":
             return _Found(fit, analysis)

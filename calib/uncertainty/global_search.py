@@ -55,11 +55,13 @@ class Listener:
         progress: Called after each simulation of a search.
         say: Called with each stage, as one sentence.
         found: Called with the fit once it is found, before its uncertainty is: the fit will hardly change.
+        remark: Called with each remark on the answer; None for what is called with the stages.
     """
 
     progress: Callable[[Progress], None] | None = None
     say: Callable[[str], None] = lambda text: None
     found: Callable[[FitResult], None] = lambda result: None
+    remark: Callable[[str], None] | None = None
 
 
 def fit_with_uncertainty(
@@ -121,7 +123,7 @@ def fit_with_uncertainty(
     analysis = _standing(objective, analysis, evaluators, options.seed)
     analysis = _reviewed(objective, analysis, _Searches(first, second, claimed), replicate, options.budget)
     for sentence in analysis.remarks:
-        told.say(sentence[:-1])
+        (told.remark or told.say)(sentence[:-1])
     return analysis.result, analysis
 
 

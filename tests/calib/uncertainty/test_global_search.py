@@ -265,3 +265,19 @@ def test_an_answer_that_hangs_on_the_cells_gives_way_to_one_that_does_not(own, o
     assert found.uncertainty.intervals[0].parameter.value == found.result.parameters["E"].value
     assert "another force on finer cells" in found.remarks[0]
     assert global_search._standing(goal, analysis, Evaluators(fake, fake, replicate), 0) is analysis
+
+
+def test_remarks_are_no_stages():
+    """Whoever shows what is going on is told of stages; a remark on the answer is told apart, or with them."""
+    goal, fake = objective(onefold), Fake(onefold, noisy=0.002)
+    stages: list[str] = []
+    remarks: list[str] = []
+    for remark in (remarks.append, None):
+        _, analysis = fit_with_uncertainty(
+            goal,
+            Evaluators(fake, fake, fake),
+            FitOptions(budget=20, seed=0),
+            Listener(say=stages.append, remark=remark),
+        )
+        assert analysis is not None and [f"{said}." for said in remarks] == list(analysis.remarks) != []
+        assert (remarks[0] in stages) is (remark is None) and any(said.startswith("intervals") for said in stages)
