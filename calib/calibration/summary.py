@@ -36,7 +36,6 @@ from calib.fit.multistart import FitResult
 from calib.io.meaning import describe_sets
 from calib.io.provenance import Invocation, Software
 from calib.material.properties import property_of
-from calib.material.scene import blade_warnings
 from calib.posterior.estimates import summarised
 from calib.problem.parameters import STRESS_LIKE
 from calib.problem.request import Request
@@ -79,9 +78,7 @@ def summarise(done: Calibrated, folder: Path, began: float) -> CalibrationResult
     stopped = fit.status == "interrupted"
     label, source, kind = curve.trace.label, curve.stroke_source, curve.baseline_kind
     scene = setup.scene(fit.best.evaluation.parameters)
-    assert isinstance(scene.knife, Knife)  # a press has no trace of a cut
-    narrow = blade_warnings(scene.food.shape, scene.knife)
-    assumed = [*dict.fromkeys([*setup.assumed, *narrow]), *doubts_of_the_crack(scene)]
+    assumed = [*setup.assumptions, *doubts_of_the_crack(scene)]
     said = [*limits(label, source, kind, verdicts, fitted, assumed, request.food, record.fracture), *_no_better(done)]
     nulls = {name: NullRating.of(model.metrics) for name, model in done.nulls.items()}
     return CalibrationResult(
@@ -182,7 +179,7 @@ def _no_better(done: Calibrated) -> list[str]:
     if not better:
         return []
     named = " and ".join(name.replace("_", " ") for name in better)
-    return [f"In interval score the simulation is no better than what it should be better than: {named}, fitted alike."]
+    return [f"A curve without physics has the better band, by its interval score: {named}."]
 
 
 def _limiting(setup: Setup, analysis: UncertaintyAnalysis | None) -> list[str]:

@@ -200,7 +200,7 @@ def _warnings(of_food: Sequence[str], setups: Mapping[str, Setup]) -> list[str]:
     """Warnings of the food and of each trace, each once."""
     found = list(of_food)
     for name, setup in setups.items():
-        found += [f"{name}: {text}" for text in (*setup.curve.warnings, *setup.assumed)]
+        found += [f"{name}: {text}" for text in (*setup.curve.warnings, *setup.assumptions)]
     return found
 
 

@@ -38,7 +38,7 @@ from calib.trace.conditioning import Conditioned, condition
 from calib.trace.cuts import single_cut
 from calib.trace.filters import BandLimited
 from calib.trace.stroke import board_stroke
-from mpm.scene import Motion, Scene
+from mpm.scene import Knife, Motion, Scene
 
 FINE, COARSE, REPLICATED = "fine", "coarse", "again"
 """What the fidelities of a search are called in its store; a replicate is called ``again``."""
@@ -83,7 +83,13 @@ class Setup:
     @property
     def notes(self) -> list[str]:
         """The same as a run says it, and what is assumed of the specimen."""
-        return [*notes(self.request.food), *self.curve.warnings, *self.assumed]
+        return [*notes(self.request.food), *self.curve.warnings, *self.assumptions]
+
+    @property
+    def assumptions(self) -> list[str]:
+        """What was assumed of specimen and sensor, and what the blade leaves uncut of a specimen of this size."""
+        assert isinstance(self.fine.knife, Knife)  # a press has no trace of a cut
+        return [*self.assumed, *blade_warnings(self.fine.food.shape, self.fine.knife)]
 
     @property
     def warnings(self) -> list[str]:
@@ -207,7 +213,7 @@ def _scenes(request: Request, curve: Conditioned, heights: Heights | None) -> tu
         windowed(cut_scene(food, shape, knife, stroke=stroke, dx=dx, seed=seed, coarse=coarse), heights)
         for coarse in (False, True)
     )
-    return fine, screening, [*assumed, *blade_warnings(shape, knife)]
+    return fine, screening, assumed
 
 
 def way_of(food: FoodSpec, curve: Conditioned) -> float | Motion:

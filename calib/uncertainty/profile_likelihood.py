@@ -137,7 +137,8 @@ class _Profiler:
                 z = self.posterior.optimum(z, self.i)
                 points.append(z)
                 costs.append(self.cost(z))
-                if costs[-1][1] - costs[0][1] > 2.0 * RISE:
+                # a prior may pull the other way: the interval ends where both together have risen
+                if min(np.subtract(costs[-1], costs[0])) > 2.0 * RISE:
                     break
         order = np.argsort([z[self.i] for z in points])
         along = np.array([points[k][self.i] for k in order])

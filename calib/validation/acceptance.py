@@ -227,7 +227,7 @@ def _conflict(found: PriorConflict) -> Verdict:
     """The line of values that the literature does not expect of the food."""
     note = "probability of values as far from the food's literature"
     if found.furthest:
-        note += f"; furthest: {found.furthest}, by {abs(found.distance):.1f} sd"
+        note += f"; furthest: {found.furthest}, by {abs(found.distance):.1f} sd of what was to be expected"
     passed = bool(found.probability >= CONFLICT_LIMIT)
     return Verdict(CONFLICT_LINE, found.probability, CONFLICT_LIMIT, "fraction", passed, note)
 

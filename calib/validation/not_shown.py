@@ -16,6 +16,14 @@ HELD_WEAK = {"R": 0.92, "R_skin": 0.90, "E": 0.88, "yield_stress": 0.80, "initia
 """Part of the weak 95 % intervals that held the truth on 100 made-up bananas, where it is less and there are
 more than ten (docs/pitfalls.md, how far to trust an interval)."""
 
+HARDLY_KNOWN = {
+    "not_seen": "The trace says nothing of {}: these values are the literature's.",
+    "one_sided": "The trace bounds {} on one side; where it leaves the other open, the end is the literature's or that "
+    "of what is possible.",
+    "weak": "The trace bounds {} on both sides, but not closely, or not surely.",
+}
+"""What is said of parameters by the verdict on them; the names take the place of the braces."""
+
 
 def limits(
     label: str,
@@ -49,19 +57,24 @@ def limits(
     said += [f"{v.name}: failed; see the first page." for v in verdicts if v.passed is False]
     said += _limits_of_parameters(fitted)
     said += _limits_of_measurement(stroke_source, baseline_kind)
-    said += [a[0].upper() + a[1:] + "." for a in assumptions]
+    said += [f"{_as_sentence(a)}." for a in assumptions]
     said += _limits_of_simulation(food, fracture)
-    said += [f"{remedy[0].upper()}{remedy[1:]}." for remedy in map(remedied, verdicts) if remedy]
+    said += [f"{_as_sentence(remedy)}." for remedy in map(remedied, verdicts) if remedy]
     return said
+
+
+def _as_sentence(text: str) -> str:
+    """With a capital, unless it begins with a name of a file or column, which keeps its own."""
+    first = text.split(maxsplit=1)[0]
+    return text if any(mark in first for mark in "_./:") else text[0].upper() + text[1:]
 
 
 def _limits_of_parameters(fitted: Mapping[str, FittedParameter]) -> list[str]:
     said = []
-    unseen = [n for n, p in fitted.items() if p.verdict in ("not_seen", "weak", "one_sided")]
-    if unseen:
-        said.append(
-            f"The trace hardly sees {', '.join(unseen)}: these values are the literature's as much as the trace's."
-        )
+    for verdict, told in HARDLY_KNOWN.items():
+        names = [n for n, p in fitted.items() if p.verdict == verdict]
+        if names:
+            said.append(told.format(listed(names)))
     weak = [n for n, p in fitted.items() if p.verdict == "weak" and property_of(n) in HELD_WEAK]
     if weak:
         held = listed([f"{quantity(HELD_WEAK[property_of(n)], 'fraction')} for {n}" for n in weak])

@@ -63,6 +63,7 @@ class Panel:
         rise: Rise of chi-square with the literature (k,).
         alone: Rise by the trace alone (k,).
         value: Fitted value, None where it is not known.
+        ends: Ends of its 95 % interval, None where there is none.
         prior: The literature's range, None where there is none.
         log: Whether the axis is logarithmic.
     """
@@ -72,8 +73,14 @@ class Panel:
     rise: np.ndarray
     alone: np.ndarray
     value: float | None
+    ends: tuple[float, float] | None
     prior: tuple[float, float] | None
     log: bool
+
+    @property
+    def level(self) -> float:
+        """Rise at the fitted value [-], from which its interval is counted: 0 where it lies at the valley's bottom."""
+        return 0.0 if self.value is None else float(np.interp(self.value, self.x, self.rise))
 
 
 def ranges(rows: Sequence[ParameterRange]) -> bytes:
@@ -115,12 +122,15 @@ def profile_panels(panels: Sequence[Panel]) -> bytes:
         grid = figure.subplots(rows, ACROSS, sharey=True, squeeze=False)
         for axes, panel in zip(grid.flat, panels, strict=False):
             _profile(axes, panel)
+        grid[0, 0].set_ylim(-0.6, max(TOP, max(panel.level for panel in panels) + 1.3 * RISE))
         for axes in grid.flat[len(panels) :]:
             axes.set_visible(False)
         for axes in grid[:, 0]:
             axes.set_ylabel("rise of chi-square")
-        handles, labels = grid[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper left", ncols=3)
+        handles = {
+            label: one for axes in grid.flat for one, label in zip(*axes.get_legend_handles_labels(), strict=True)
+        }
+        figure.legend(list(handles.values()), list(handles), loc="outside upper left", ncols=3)
 
     return svg(draw, 14.0 + 31.0 * rows)
 
@@ -141,14 +151,17 @@ def _profile(axes: Axes, panel: Panel) -> None:
     if panel.prior is not None and panel.prior[0] < high and panel.prior[1] > low:
         axes.axvspan(max(panel.prior[0], low), min(panel.prior[1], high), 0.0, 0.06,
                      label="range of the literature", **HATCHED)  # fmt: skip
-    axes.axhline(RISE, color=GREY, lw=0.9, dashes=(1.0, 1.5), label=f"{RISE}: ends of a 95 % interval")
+    axes.axhline(panel.level + RISE, color=GREY, lw=0.9, dashes=(1.0, 1.5), label=f"{RISE} above the fitted value")
     axes.plot(panel.x, panel.alone, label="trace alone", **TRACE_ALONE)
     axes.plot(panel.x, panel.rise, label="with the literature", **WITH_PRIOR)
     if panel.value is not None:
-        axes.plot(panel.value, 0.0, marker="o", ms=4.5, color=BLACK, ls="none", zorder=4, clip_on=False,
+        axes.plot(panel.value, panel.level, marker="o", ms=4.5, color=BLACK, ls="none", zorder=4, clip_on=False,
                   label="fitted value")  # fmt: skip
+    if panel.ends is not None:
+        inside = [end for end in panel.ends if low <= end <= high]
+        axes.plot(inside, np.full(len(inside), panel.level + RISE), marker="|", ms=9.0, mew=1.4, color=BLACK, ls="none",
+                  zorder=4, label="ends of the 95 % interval")  # fmt: skip
     axes.set_xlim(low, high)
-    axes.set_ylim(-0.6, TOP)
     axes.set_title(panel.title)
 
 

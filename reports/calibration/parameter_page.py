@@ -136,8 +136,9 @@ def panels(profiles: Mapping[str, ProfileCurve], fitted: Mapping[str, FittedPara
         rise, alone = (np.array(column, dtype=float) for column in (profile.rise, profile.trace_alone))
         value = None if p is None else p.value / factor
         prior = None if low is None or high is None else (low / factor, high / factor)
+        ends = None if p is None or p.low95 is None or p.high95 is None else (p.low95 / factor, p.high95 / factor)
         title = f"{short(name, LABEL)} [{text}]" if text else short(name, LABEL)
-        out.append(Panel(title, x / factor, rise, alone, value, prior, unit != "-" and bool(np.all(x > 0.0))))
+        out.append(Panel(title, x / factor, rise, alone, value, ends, prior, unit != "-" and bool(np.all(x > 0.0))))
     return out
 
 

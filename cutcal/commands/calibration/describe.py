@@ -61,7 +61,7 @@ def description(request: Request, png: Path | None = None) -> str:
         draw_record(request, c, png)
         lines.append(("picture", f"{png}, the record as it was read"))
     words = [f"{name:12s}{text}" for name, text in lines]
-    warned = [*c.warnings, *setup.assumed, *notes(request.food)]
+    warned = [*c.warnings, *setup.assumptions, *notes(request.food)]
     return "\n".join([*words, *(f"note: {text}" for text in warned)])
 
 

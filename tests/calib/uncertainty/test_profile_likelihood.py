@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import combinations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from calib.simulation.evaluation import Evaluation
 from calib.uncertainty.analysis import CLOSE, END_ROUNDS, UncertaintyAnalysis, analyse
 from calib.uncertainty.intervals import linearised_likelihood
 from calib.uncertainty.predictive import error_draws, pointwise_band
-from calib.uncertainty.profile_likelihood import RISE, Profile, with_profile_intervals
+from calib.uncertainty.profile_likelihood import RISE, Profile, _Profiler, with_profile_intervals
 from tests.calib.fake import GRID, NOISE, STROKE, Fake, goal, noise, three_terms
 
 
@@ -122,6 +123,44 @@ def test_a_better_run_at_the_end_of_an_interval_becomes_the_best(
     assert best.stage == "profile" and best.misfit < poor.misfit - 5.0
     assert [i.parameter.value for i in after.uncertainty.intervals] == list(best.evaluation.parameters.values())
     assert after.result.surrogate is not None and after.result.surrogate.best is best
+
+
+class _Parabolas(_Profiler):
+    """The profiler of one parameter whose trace and literature are parabolas, five standard deviations apart."""
+
+    def __init__(self) -> None:
+        self.parameters = ParameterSet((Parameter("E", 5e5, 1.0, 1e9, "Pa", 1e4, 4e4),))
+        self.i, self.low, self.high = 0, self.parameters.lower, self.parameters.upper
+        self.found = SimpleNamespace(covariance=np.array([[self.parameters.prior_sd[0] ** 2]]))  # type: ignore[assignment]
+        self.posterior = SimpleNamespace(optimum=lambda z, held: z)  # type: ignore[assignment]
+        self.seen = self.parameters.prior_mean[0] + 5.0 * self.parameters.prior_sd[0]
+
+    def cost(self, z: np.ndarray) -> tuple[float, float]:
+        """The same width for both."""
+        alone = ((z[0] - self.seen) / self.parameters.prior_sd[0]) ** 2
+        return float(alone + self.own(z[0])), float(alone)
+
+    def feigned(self) -> float:
+        """No noise."""
+        return 0.0
+
+    def one_run(self) -> float:
+        """No noise."""
+        return 0.0
+
+
+def test_a_profile_goes_on_until_both_have_risen() -> None:
+    """The literature pulls down where the trace has long risen: the interval ends where their sum has, and not at the
+    hard bound, to which a profile that had stopped before would have left it."""
+    profiler = _Parabolas()
+    mean, sd = profiler.parameters.prior_mean[0], profiler.parameters.prior_sd[0]
+    p = replace(profiler.parameters.items[0], value=float(np.exp(profiler.seen)))
+    profiler.parameters = ParameterSet((p,))
+    profile = profiler.profile()
+    at = float(np.interp(profiler.seen, profile.z, profile.rise))
+    assert at == pytest.approx(2 * 2.5**2, abs=0.02)  # their common valley is in the middle
+    end = profile.end(-1, np.maximum(profile.rise - at, 0.0))
+    assert end == pytest.approx(mean + sd * (2.5 - math.sqrt((at + RISE) / 2)), abs=0.05 * sd)
 
 
 def test_an_interval_holds_the_best_value(one_sided: tuple[Objective, FitResult, UncertaintyAnalysis]) -> None:

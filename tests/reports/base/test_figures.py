@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -88,6 +89,20 @@ def test_profiles_are_in_the_units_that_people_use() -> None:
     assert panel.prior == (5.0, 200.0) and panel.value == 31.0 and panel.log and not panels["mu"].log
     assert panel.x[np.argmin(panel.rise)] == pytest.approx(31.0)
     assert parameter_figures.profile_panels(list(panels.values())).startswith(b"<?xml")
+
+
+def test_an_interval_is_drawn_where_the_table_has_it() -> None:
+    """Counted from the fitted value, also where that is not the valley's bottom; the line that it ends at is as far
+    above it."""
+    x = np.linspace(1.0, 9.0, 81)
+    panel = parameter_figures.Panel("R", x, (x - 4.0) ** 2, 0.5 * (x - 4.0) ** 2, 6.0, (1.7, 6.8), None, False)
+    assert panel.level == pytest.approx(4.0) and replace(panel, value=None).level == 0.0
+    axes = Figure().subplots()
+    parameter_figures._profile(axes, panel)
+    lines = {line.get_label(): line.get_xydata() for line in axes.get_lines()}
+    assert lines["fitted value"].tolist() == [[6.0, pytest.approx(4.0)]]
+    assert lines["3.84 above the fitted value"][:, 1] == pytest.approx(7.84)
+    assert lines["ends of the 95 % interval"][:, 0] == pytest.approx([1.7, 6.8])
 
 
 def test_profiles_and_indices_differ_without_colour() -> None:
