@@ -47,6 +47,16 @@ def test_it_is_fitted_where_nobody_said_it(record: Trace) -> None:
         assert "roundness" not in names(set_up(Calibration(other, record).request()))
 
 
+def test_what_the_blade_leaves_uncut_is_said_once(record: Trace) -> None:
+    """Of the specimen as it is: fitted, it is not said of its size before as well."""
+    setup = set_up(Calibration("potato", record, knife="edc", width=0.08).request())
+    shape = setup.fine.food.shape
+    for width in (0.08, 0.09):
+        fine = replace(setup.fine, food=replace(setup.fine.food, shape=replace(shape, width=width)))
+        (said,) = [text for text in replace(setup, fine=fine).assumptions if "stay uncut" in text]
+        assert f"{1e3 * width:.0f} mm wide" in said and said in replace(setup, fine=fine).notes
+
+
 def test_a_list_of_what_is_fitted_is_obeyed(record: Trace) -> None:
     """Without it the food's usual shape is cut; beside a shape that is said it is refused, as for a food without."""
     few = set_up(Calibration("potato", record, fit=["E", "R"]).request())
