@@ -66,7 +66,9 @@ class Profile:
         best = int(np.argmin(np.abs(self.z - self.best)))
         found: list[FloatArray] = []
         for side in (range(best, -1, -1), range(best, len(self.z))):
-            k = next((k for k in side if self.data[k] >= RISE), side[-1] if alone else best)
+            within = [place for place, k in enumerate(side) if self.data[k] < RISE]
+            last = within[-1] if within else 0
+            k = side[last + 1] if last + 1 < len(side) else side[-1] if alone else best
             if k != best:
                 z = self.points[best if alone else k].copy()
                 z[self.index] = self.z[k]
@@ -74,17 +76,16 @@ class Profile:
         return found
 
     def end(self, side: int, rise: FloatArray) -> float | None:
-        """Internal coordinate where ``rise`` (k,) reaches :data:`RISE` below (``side`` -1) or above (+1) the best
-        value, None if never."""
+        """Internal coordinate from which on ``rise`` (k,) stays above :data:`RISE`, below (``side`` -1) or above (+1)
+        the best value: behind the last of several valleys. None where it does not."""
         best = int(np.argmin(np.abs(self.z - self.best)))
-        order = range(best, -1, -1) if side < 0 else range(best, len(self.z))
-        last = None
-        for k in order:
-            if last is not None and rise[k] >= RISE > rise[last]:
-                part = (math.sqrt(RISE) - _root(rise[last])) / (_root(rise[k]) - _root(rise[last]))
-                return float(self.z[last] + part * (self.z[k] - self.z[last]))
-            last = k
-        return None
+        order = list(range(best, -1, -1) if side < 0 else range(best, len(self.z)))
+        last = max((place for place, k in enumerate(order) if rise[k] < RISE), default=0)
+        if last == len(order) - 1:
+            return None
+        inner, outer = order[last], order[last + 1]
+        part = (math.sqrt(RISE) - _root(rise[inner])) / (_root(rise[outer]) - _root(rise[inner]))
+        return float(self.z[inner] + min(max(part, 0.0), 1.0) * (self.z[outer] - self.z[inner]))
 
     @property
     def best(self) -> float:

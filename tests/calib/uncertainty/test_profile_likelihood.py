@@ -48,6 +48,18 @@ def test_a_side_that_does_not_rise_has_no_end() -> None:
     assert profile.end(1, data) is None
 
 
+def test_an_interval_reaches_behind_the_last_valley() -> None:
+    """A profile that falls below the limit once more has a second food there; where it stays there the side is open."""
+    profile = parabola(0.0, 1.0, 1.0)
+    second = np.minimum(profile.rise, 0.5 + ((profile.z - 3.0) / 0.2) ** 2)
+    assert profile.end(-1, second) == pytest.approx(-Z95, abs=1e-9)
+    assert profile.end(1, second) == pytest.approx(3.0 + 0.2 * math.sqrt(RISE - 0.5), abs=0.05)
+    assert profile.end(1, np.where(profile.z > 3.5, 1.0, profile.rise)) is None
+    both = replace(profile, data=second)
+    ends = [float(z[0]) for z in both.end_points()]
+    assert ends == pytest.approx([-2.0, 3.5], abs=0.26) and ends[1] > 3.2
+
+
 ONE_SIDED = ParameterSet(
     (
         Parameter("E", 5e5, 2e4, 1e7, "Pa", 1e5, 2e6),
