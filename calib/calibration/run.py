@@ -23,6 +23,7 @@ from calib.calibration.report import write_reports_of
 from calib.calibration.result import CURVES, SUMMARY, WITHDRAWAL_CURVES, CalibrationResult, read_result, to_document
 from calib.calibration.run_clock import RunClock, earlier_runs
 from calib.calibration.summary import add_conditioning, summarise
+from calib.errors import MaterialError
 from calib.fit.multistart import FitResult
 from calib.fit.options import FitOptions
 from calib.io.folder import prepare, write_csv, write_json
@@ -84,6 +85,8 @@ def run(
     """
     say = say or (lambda text: None)
     began = time.monotonic()
+    if request.sample and request.withdrawal:
+        raise MaterialError("--sample beside --withdrawal, which is for a search of one food; give one of them")
     setup = set_up(request)
     both = BothWays.of(setup) if request.withdrawal else None
     for text in setup.notes:
@@ -140,14 +143,10 @@ class _Calibration:
         if setup.request.sample:
             return self._sampled(evaluators)
         listener = Listener(self.clock.search, self._said, self._begin_longest_check, self.say)
-        fit, analysis = fit_with_uncertainty(problem.objective, evaluators, options, listener)
-        if self.both is None or analysis is None or fit.status == "interrupted":
-            return _Found(fit, analysis)
-        asked = [name for name in TOLD_APART if name in self._fitted]
-        if asked:
-            self._said(f"fitting again: without {', then without '.join(asked)}")
-        analysis, nested = nested_models(problem.objective, analysis, evaluators.fine, asked)
-        return _Found(analysis.result, analysis, nested=nested)
+        asked = [name for name in TOLD_APART if self.both is not None and name in self._fitted]
+        fit, analysis = fit_with_uncertainty(problem.objective, evaluators, options, listener, asked)
+        nested = () if analysis is None else nested_models(problem.objective, analysis.result, asked)
+        return _Found(fit if analysis is None else analysis.result, analysis, nested=nested)
 
     def _said(self, text: str) -> None:
         """A stage of the intervals, told to both listeners."""

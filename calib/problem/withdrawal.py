@@ -21,6 +21,7 @@ from calib.errors import TraceError
 from calib.problem.joint_objective import JointObjective
 from calib.problem.nuisance import Nuisance, nuisances_of_size
 from calib.problem.objective import Objective
+from calib.problem.parameters import Z95
 from calib.problem.setup import COARSE, FINE, REPLICATED, Setup, replicated
 from calib.problem.target import Target
 from calib.simulation.evaluation import Evaluation, Evaluator, Evaluators
@@ -179,18 +180,23 @@ def with_withdrawal(cut: Objective, target: Target, nuisances: tuple[Nuisance, .
     return JointObjective.of({CUT: cut, WITHDRAWAL: up}, cut.parameters.names)
 
 
-def withdrawn(scene: Scene, stroke: float, way: float) -> Scene:
+def withdrawn(scene: Scene, stroke: float, way: float, doubt: float = 0.0) -> Scene:
     """A scene whose blade turns where that of the trace did.
+
+    What is left uncut is at least as high as a tie of the crack, and holds the halves together. So a stroke that may as
+    well have been a whole one is one.
 
     Args:
         scene: The cut.
         stroke: Stroke at which the knife turned [m].
         way: Way up that is compared [m].
+        doubt: How far the stroke may be off [m].
 
     Returns:
         The scene, with half a cell more of the way up, for the mean over a cell.
     """
-    stroke = min(stroke, scene.food.shape.height)
+    height = scene.food.shape.height
+    stroke = height if stroke >= height - doubt else stroke
     up = way + 0.5 * scene.numerics.dx + scene.numerics.output
     return replace(scene, motion=replace(scene.motion, stroke=stroke, retract=up))
 
@@ -230,7 +236,8 @@ class BothWays:
 
     def scene(self, scene: Scene) -> Scene:
         """A cut of the set-up with its blade withdrawn."""
-        return withdrawn(scene, self.setup.curve.stroke_length_m, float(self.withdrawal.way[-1]))
+        lag = max((n.sd for n in self.setup.objective.nuisances if n.name == "lag"), default=0.0)
+        return withdrawn(scene, self.setup.curve.stroke_length_m, float(self.withdrawal.way[-1]), Z95 * lag)
 
     def evaluators(self, pool: Workers, store: EvaluationStore) -> Evaluators:
         """What runs the simulations of a search.

@@ -144,6 +144,11 @@ def _bridged(
         if stroke[i] >= end:
             return 0.0, []
         return 0.0, [f"{where}: {gap.why} for {trace.time[j] - trace.time[i]:.3g} s, before contact"]
+    if stroke[j] < stroke[i] and trace.position is not None:
+        return 0.0, [
+            f"{where}: {gap.why} for {trace.time[j] - trace.time[i]:.3g} s, {1e3 * (stroke[i] - stroke[j]):.3g} mm of "
+            "the way up; a line bridges it"
+        ]
     if stroke[i] < 0.0 and tared[j] > max(5.0 * noise, HIDDEN_PEAK * peak):
         raise TraceError(
             f"{where}: {gap.why} for {trace.time[j] - trace.time[i]:.3g} s, and contact is there; record the cut again"

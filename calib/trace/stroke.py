@@ -14,6 +14,9 @@ from calib.trace.trace import Trace
 DWELL_M = 0.1e-3
 """Height above the lowest position so far [m] at which the knife still counts as there: a robot arm's
 repeatability. The stroke is over where it comes that near to the lowest of all; higher, it is retracting."""
+BACKING_UP_M, BACKING_UP_SD = 1e-3, 5.0
+"""A knife goes up within its stroke if it does so by more than this, and than so many standard deviations of the change
+of its pace from sample to sample."""
 RELEASE_SD = 4.0
 """The force is released when it stays within this many noise standard deviations of the baseline ..."""
 RELEASE_FRACTION = 0.05
@@ -123,7 +126,18 @@ def _from_position(
             "or a depth (--depth-col); name another with --position-col, or none and give --speed"
         )
     unused = () if speed is None else ("the speed is not used: the stroke comes from the position column",)
-    return StrokeAxis(stroke, end, "position", unused)
+    return StrokeAxis(stroke, end, "position", (*unused, *_backing_up(stroke[(stroke >= 0.0).argmax() : last + 1])))
+
+
+def _backing_up(stroke: np.ndarray) -> tuple[str, ...]:
+    """A sentence on a knife that goes up within its way down (n,) [m], further than its position's own noise."""
+    back = float(np.max(np.maximum.accumulate(stroke) - stroke, initial=0.0))
+    if back <= max(BACKING_UP_M, BACKING_UP_SD * float(np.std(np.diff(stroke, n=2))) if len(stroke) > 2 else 0.0):
+        return ()
+    return (
+        f"the knife goes up by {1e3 * back:.1f} mm within the stroke: of the force, that is used with which the edge "
+        "came to each depth first",
+    )
 
 
 def _at_constant_speed(

@@ -34,6 +34,7 @@ from calib.problem.scored_run import ScoredRun
 from calib.simulation.evaluation import Evaluator, Evaluators
 from calib.uncertainty.analysis import UncertaintyAnalysis, analyse, equally_good, search_uncertainty
 from calib.uncertainty.intervals import Interval
+from calib.uncertainty.nested_models import with_nested_runs
 from calib.uncertainty.profile_likelihood import RISE
 from mpm.scene.errors import SimulationError
 
@@ -69,6 +70,7 @@ def fit_with_uncertainty(
     evaluators: Evaluators,
     options: FitOptions,
     listener: Listener | None = None,
+    without: Sequence[str] = (),
 ) -> tuple[FitResult, UncertaintyAnalysis | None]:
     """Fit, analyse the uncertainty of the fit, and search once more for what it calls identified.
 
@@ -77,6 +79,8 @@ def fit_with_uncertainty(
         evaluators: What runs the simulations.
         options: Budget and the like, of all that is searched.
         listener: What is told of it; None for nothing.
+        without: Parameters without which the fit is tried again, for :func:`calib.uncertainty.nested_models`. Their
+            intervals know these runs.
 
     Returns:
         The fit, and its uncertainty: None where it ended too early for that.
@@ -109,6 +113,7 @@ def fit_with_uncertainty(
         told.say(f"a second search, from another design, for a food with another {_names(claimed, ' or ')}")
         result = second = _second_search(objective, first, claimed, evaluators, options, told.progress)
     told.found(result)
+    result = with_nested_runs(objective, result, fine, without, told.say)
     analysis = analyse(
         objective,
         result,

@@ -9,18 +9,20 @@ independent data.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from calib.fit.multistart import FitResult
 from calib.fit.surrogate import Surrogate
 from calib.problem.joint_objective import JointObjective
 from calib.problem.objective import Objective
 from calib.problem.scored_run import ScoredRun
 from calib.simulation.evaluation import Evaluator
-from calib.uncertainty.analysis import CLOSE, UncertaintyAnalysis
+from calib.uncertainty.analysis import CLOSE, search_uncertainty
+from calib.uncertainty.intervals import Uncertainty
 from calib.uncertainty.posterior import Posterior
 from mpm.arrays import FloatArray
 
@@ -49,82 +51,108 @@ class NestedModel:
     evidence: float
 
 
-def nested_models(
-    objective: Objective | JointObjective, analysis: UncertaintyAnalysis, fine: Evaluator, names: Sequence[str]
-) -> tuple[UncertaintyAnalysis, tuple[NestedModel, ...]]:
-    """Fit again without each of some properties, and simulate what is found.
+def with_nested_runs(
+    objective: Objective | JointObjective,
+    fit: FitResult,
+    fine: Evaluator,
+    names: Sequence[str],
+    say: Callable[[str], None] = lambda text: None,
+) -> FitResult:
+    """A fit with the runs that show what it is worth without some properties.
 
     Args:
         objective: What was fitted.
-        analysis: Its uncertainty.
+        fit: The fit.
         fine: Runs simulations at the resolution that counts.
         names: Properties that were fitted.
+        say: Called before each round of simulations, with one sentence.
 
     Returns:
-        The analysis with the runs made here among those of its fit, and a model for each property; one whose
-        simulations all break down is left out.
+        The fit with these runs in its history and its surrogate; as it was where it ended too early for a surrogate.
     """
-    search = _Simpler(objective, analysis)
-    for _ in range(ROUNDS):
+    found = search_uncertainty(objective, fit)
+    if found is None or not names:
+        return fit
+    search = _Simpler(objective, fit, found)
+    for turn in range(ROUNDS):
         asked = {name: z for name in names if (z := search.next(name)) is not None}
         if not asked:
             break
+        say(f"without {' and without '.join(asked)}, round {turn + 1} of {ROUNDS} at most")
         batch = [objective.parameters.to_dict(z) for z in asked.values()]
-        search.runs += [
-            objective.score(e, stage="without") for e in sorted(fine.evaluate(batch), key=lambda e: e.index)
-        ]
-    found = [search.model(name) for name in names]
-    fit = replace(analysis.result, history=tuple(search.runs))
-    return replace(analysis, result=fit), tuple(model for model in found if model is not None)
+        made = sorted(fine.evaluate(batch), key=lambda e: e.index)
+        search.runs += [objective.score(e, stage="without") for e in made]
+    with threadpool_limits(1, "blas"):
+        surrogate = search.surrogate
+        jacobian = surrogate.jacobian(fit.best.z)
+    return replace(fit, history=tuple(search.runs), surrogate=surrogate, jacobian=jacobian)
+
+
+def nested_models(
+    objective: Objective | JointObjective, fit: FitResult, names: Sequence[str]
+) -> tuple[NestedModel, ...]:
+    """What a fit is worth without some properties, by the runs of :func:`with_nested_runs`.
+
+    Args:
+        objective: What was fitted.
+        fit: The fit with these runs.
+        names: The properties.
+
+    Returns:
+        A model for each property; one without a run that ended its stroke is left out.
+    """
+    found = []
+    for name in names:
+        sizes = [_size(objective, run, name) for run in _simulated(objective, fit.history, name) if run.ok]
+        if sizes:
+            least, whole = min(sizes), _size(objective, fit.best, name)
+            evidence = least - whole - math.log(objective.effective_rows)
+            found.append(NestedModel(name, objective.parameters[name].low, least, whole, evidence))
+    return tuple(found)
+
+
+def _simulated(objective: Objective | JointObjective, runs: Sequence[ScoredRun], name: str) -> list[ScoredRun]:
+    """Runs at the resolution that counts in which a property has the least value that it may have."""
+    at = objective.parameters.names.index(name)
+    return [run for run in runs if not run.coarse and run.z[at] <= objective.parameters.lower[at] + 1e-9]
+
+
+def _size(objective: Objective | JointObjective, run: ScoredRun, name: str) -> float:
+    """Chi-square of a run without the property's own prior [-]."""
+    at, parameters = objective.parameters.names.index(name), objective.parameters
+    own = (run.z[at] - parameters.prior_mean[at]) / parameters.prior_sd[at]
+    return float(run.misfit - own**2)
 
 
 class _Simpler:
     """Searches the simpler models on the surrogate of a fit."""
 
-    def __init__(self, objective: Objective | JointObjective, analysis: UncertaintyAnalysis) -> None:
-        self.objective, self.parameters, self.analysis = objective, analysis.result.parameters, analysis
-        self.runs: list[ScoredRun] = list(analysis.result.history)
+    def __init__(self, objective: Objective | JointObjective, fit: FitResult, found: Uncertainty) -> None:
+        self.objective, self.fit, self.found = objective, fit, found
+        self.runs: list[ScoredRun] = list(fit.history)
+
+    @property
+    def surrogate(self) -> Surrogate:
+        """That through all runs so far."""
+        assert self.fit.surrogate is not None  # or there is no uncertainty of it
+        return Surrogate(self.objective, self.runs, self.fit.best, self.fit.surrogate.hyper)
 
     def next(self, name: str) -> FloatArray | None:
         """Where this model may be best (p,), as the surrogate sees it by now; None where it is settled."""
-        fit, sizes = self.analysis.result, [run.misfit for run in self._simulated(name) if run.ok]
+        parameters = self.fit.parameters
+        simulated = _simulated(self.objective, self.runs, name)
+        sizes = [run.misfit for run in simulated if run.ok]
         if len(sizes) > 1 and min(sizes[:-1]) - sizes[-1] < SETTLED:
             return None
-        assert fit.surrogate is not None  # or nothing is analysed
+        at = parameters.names.index(name)
         with threadpool_limits(1, "blas"):
-            surrogate = Surrogate(self.objective, self.runs, fit.best, fit.surrogate.hyper)
-            posterior = Posterior(surrogate, self.parameters, self.analysis.uncertainty)
-            at = self.parameters.names.index(name)
-            known = [run.z for run in self._simulated(name)]
+            surrogate = self.surrogate
+            posterior = Posterior(surrogate, parameters, self.found)
             found = []
-            for z in (fit.best.z, *known):
+            for z in (self.fit.best.z, *(run.z for run in simulated)):
                 z = z.copy()
-                z[at] = self.parameters.lower[at]
+                z[at] = parameters.lower[at]
                 found.append(posterior.optimum(z, at))
             best = min(found, key=lambda z: float(np.sum(surrogate.residuals(z[None])[0] ** 2)))
-        near = CLOSE * self.parameters.prior_sd
-        return None if any(np.all(np.abs(best - z) <= near) for z in known) else best
-
-    def model(self, name: str) -> NestedModel | None:
-        """The simpler model as simulated; None where no run of it ended its stroke."""
-        sizes = [self._size(run, name) for run in self._simulated(name) if run.ok]
-        if not sizes:
-            return None
-        best = self.analysis.result.best
-        whole = self._size(best, name)
-        evidence = min(sizes) - whole - math.log(self.objective.effective_rows)
-        return NestedModel(name, self._least(name), min(sizes), whole, evidence)
-
-    def _least(self, name: str) -> float:
-        return self.parameters[name].low
-
-    def _simulated(self, name: str) -> list[ScoredRun]:
-        """Runs of this model at the resolution that counts."""
-        at = self.parameters.names.index(name)
-        return [run for run in self.runs if not run.coarse and run.z[at] <= self.parameters.lower[at] + 1e-9]
-
-    def _size(self, run: ScoredRun, name: str) -> float:
-        """Chi-square of a run without the property's own prior [-]."""
-        at = self.parameters.names.index(name)
-        own = (run.z[at] - self.parameters.prior_mean[at]) / self.parameters.prior_sd[at]
-        return float(run.misfit - own**2)
+        near = CLOSE * parameters.prior_sd
+        return None if any(np.all(np.abs(best - run.z) <= near) for run in simulated) else best

@@ -32,6 +32,9 @@ class SimulationError(CutcalError):
         self.fraction = fraction
 
 
+HAIR = 1e-200  # a lower limit this near below zero lets zero pass
+
+
 def check_number(where: str, name: str, value: float, low: float, high: float, unit: str) -> None:
     """Insist on a finite number between two limits, which it must not reach.
 
@@ -39,7 +42,7 @@ def check_number(where: str, name: str, value: float, low: float, high: float, u
         where: What the number belongs to, for the message.
         name: Its name.
         value: The number, in the unit.
-        low: Lower limit.
+        low: Lower limit; a hair below zero where zero is a value.
         high: Upper limit.
         unit: Its unit, for the message.
 
@@ -48,4 +51,5 @@ def check_number(where: str, name: str, value: float, low: float, high: float, u
     """
     ok = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
     if not ok or not low < value < high:
-        raise SceneError(f"{where}: {name} = {value!r} {unit} must be a number between {low:g} and {high:g} {unit}")
+        limits = f"from 0 to less than {high:g}" if -HAIR < low < 0.0 else f"between {low:g} and {high:g}"
+        raise SceneError(f"{where}: {name} = {value!r} {unit} must be a number {limits} {unit}")

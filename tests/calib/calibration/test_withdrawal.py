@@ -12,7 +12,7 @@ import pytest
 
 from calib.calibration.result import CalibrationResult, read_result
 from calib.calibration.run import run
-from calib.errors import OutputError, TraceError
+from calib.errors import MaterialError, OutputError, TraceError
 from calib.material.food import load_food
 from calib.material.scene import Sizing
 from calib.problem.food_parameters import sticking
@@ -150,6 +150,8 @@ def test_a_way_up_that_cannot_be_compared_is_refused(tmp_path: Path, capsys):
     with pytest.raises(TraceError, match="low-pass of 20 Hz.*leave --withdrawal out"):
         BothWays.of(set_up(replace(request_of(trace), bandwidth=20.0)))
     pd.DataFrame({"t": trace.time, "F": trace.force, "z": trace.position}).to_csv(tmp_path / "cut.csv", index=False)
+    with pytest.raises(MaterialError, match="--sample beside --withdrawal"), CheapPool(1) as pool:
+        run(replace(request_of(trace), sample=True), tmp_path / "out", pool)
     base = ["calibrate", "--food", "banana", "--trace", str(tmp_path / "cut.csv"), "--withdrawal"]
     for more, said in ((["--sample"], "--sample beside --withdrawal"), (["--all"], "--withdrawal is for one trace")):
         assert main([*base, *more]) == 1

@@ -82,6 +82,15 @@ def test_a_record_without_a_way_up_says_so():
         withdrawal_of(blind, RELEASE)
 
 
+def test_a_stroke_that_may_be_a_whole_one_is_one():
+    """A turn a little above the board leaves a tie that holds the halves together: not where the contact's own doubt
+    reaches to the board, as that of a cut to it does."""
+    height = PRISM.food.shape.height
+    for above, doubt, left in ((1e-4, 2e-4, 0.0), (3e-4, 2e-4, 3e-4), (-1e-4, 0.0, 0.0), (1e-4, 0.0, 1e-4)):
+        turned = withdrawn(PRISM, height - above, 4e-3, doubt)
+        assert turned.motion.stroke == pytest.approx(height - left, abs=1e-12)
+
+
 def test_one_simulation_brings_both_ways():
     """Its path goes on rising behind the turn, so that it is kept as any other; apart again, the ways have the forces
     of the record, and a run that broke down on its way down has no way up."""

@@ -215,6 +215,24 @@ def test_position_noise_does_not_fold_the_curve() -> None:
     np.testing.assert_allclose(noisy.curve[:200], truth(noisy.stroke[:200]), atol=0.6)
 
 
+@pytest.mark.parametrize(
+    ("back", "noise", "said"), [(0.0, 1e-3, 0), (1.2e-2, 0.0, 1), (1.2e-2, 1e-4, 1), (4e-3, 0.0, 0)]
+)
+def test_a_knife_that_goes_up_within_its_stroke_is_said(back: float, noise: float, said: int) -> None:
+    """By how much; a position that is as rough as that says nothing."""
+    trace = made(position=True)
+    assert trace.position is not None
+    within = (trace.time > 1.7) & (trace.time < 2.2)
+    turned = trace.position + back * np.sin(np.pi * (trace.time - 1.7) / 0.5) * within
+    way = noise * np.random.default_rng(0).normal(size=len(turned))
+    told = [text for text in condition(replace(trace, position=turned + way)).warnings if "goes up by" in text]
+    assert len(told) == said
+    if said and not noise:
+        smooth_way = 0.05 - SPEED * np.minimum(trace.time, CONTACT + CUT) + (turned - trace.position)
+        rise = np.max(smooth_way - np.minimum.accumulate(smooth_way))
+        assert f"goes up by {1e3 * rise:.1f} mm" in told[0]
+
+
 def test_strokes_with_a_withdrawal_keep_what_is_new() -> None:
     """A knife that draws back by 6 mm half-way and goes on shows the force of the advance alone."""
     time = np.arange(900) / 200.0

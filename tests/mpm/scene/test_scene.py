@@ -217,3 +217,12 @@ def test_the_last_bit_of_a_cell_does_not_change_the_outline(kind: str, cells: in
     for other in (found[0], found[2]):
         for exact, moved in zip(found[1], other, strict=True):
             np.testing.assert_allclose(moved, exact, atol=1e-9)
+
+
+def test_a_limit_of_zero_is_written_as_zero():
+    """Zero is a value of an adhesion, and the message says so in numbers that people write."""
+    for value in (-1.0, 1e6):
+        with pytest.raises(SceneError, match="must be a number from 0 to less than 1e\\+06 Pa"):
+            Material(1e6, 0.3, 1000.0, adhesion=value, adhesion_energy=1.0)
+    with pytest.raises(SceneError, match="must be a number between 0 and 1e"):
+        Material(1e6, 0.3, 1000.0, tensile_strength=-1.0)
