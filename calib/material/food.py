@@ -131,10 +131,10 @@ class FoodSpec:
         return pandas.DataFrame.from_dict(rows, orient="index")[kept].rename_axis("property")
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw the literature's range of each property over its value, on axes of matplotlib, or on new ones."""
+        """Draw the literature's range of each property over its value, but for 0, on axes of matplotlib or new ones."""
         from reports.base.interactive import range_axes
 
-        ranges = {f"{name} [{p.unit}]": (p.low, p.value, p.high) for name, p in self.properties.items()}
+        ranges = {name: (p.low, p.value, p.high, p.unit) for name, p in self.properties.items()}
         return range_axes(ranges, ax, self.name)
 
     def save(self, path: str | Path) -> None:

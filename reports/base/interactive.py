@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from mpm.output.number_text import quantity
 from reports.base.figures import GREY, MEASURED, PREDICTIVE, SIMULATED, log_ticks
 
 Curves = Mapping[str, Any]
 """Columns of ``curves.csv`` by name, each of shape (n,)."""
+ROOM = 1.2
+"""Room beside the widest range, as a factor on a log axis."""
 
 
 def fit_axes(curves: Curves, axes: Sequence[Axes] | None, title: str) -> tuple[Axes, Axes]:
@@ -36,7 +39,7 @@ def fit_axes(curves: Curves, axes: Sequence[Axes] | None, title: str) -> tuple[A
     upper.legend(frameon=False)
     lower.axhline(0.0, color=GREY, lw=0.8)
     lower.plot(x, curves["residual_N"], color=SIMULATED["color"], lw=1.2)
-    lower.set_ylabel("residual [N]")
+    lower.set_ylabel("simulated\n− trace [N]")
     lower.set_xlabel("stroke [mm]")
     return upper, lower
 
@@ -61,28 +64,33 @@ def trace_axes(time: np.ndarray, force: np.ndarray, axes: Axes | None, title: st
     return drawn
 
 
-def range_axes(ranges: Mapping[str, tuple[float, float, float]], axes: Axes | None, title: str) -> Axes:
-    """Draw ranges over their values on a log axis: 1 is the value.
+def range_axes(ranges: Mapping[str, tuple[float, float, float, str]], axes: Axes | None, title: str) -> Axes:
+    """Draw ranges over their values on a log axis: 1 is the value, and an arrow stands where a range begins at 0.
 
     Args:
-        ranges: Low end, value and high end, by name; values of 0 are left out.
+        ranges: Low end, value, high end and SI unit, by name; values of 0 are left out.
         axes: Where; None for a new figure.
         title: Title of the axes.
 
     Returns:
         The axes.
     """
-    shown = {name: r for name, r in ranges.items() if r[1] > 0.0 and r[0] > 0.0}
+    shown = {name: r for name, r in ranges.items() if r[1] > 0.0}
     drawn = _single(1.2 + 0.25 * len(shown)) if axes is None else axes
-    for row, (low, value, high) in enumerate(shown.values()):
-        drawn.plot([low / value, high / value], [row, row], color=GREY, lw=4.0, solid_capstyle="butt")
+    ends = [end / value for low, value, high, _ in shown.values() for end in (low, value, high) if end > 0.0]
+    left, right = min(ends, default=1.0) / ROOM, max(ends, default=1.0) * ROOM
+    for row, (low, value, high, _) in enumerate(shown.values()):
+        begin = low / value if low > 0.0 else left
+        drawn.plot([begin, high / value], [row, row], color=GREY, lw=4.0, solid_capstyle="butt")
         drawn.plot([1.0], [row], "o", color=MEASURED["color"], ms=4.0)
-    drawn.set_yticks(range(len(shown)), [f"{name} = {r[1]:.3g}" for name, r in shown.items()])
+        if low <= 0.0:
+            drawn.plot([left], [row], "<", color=GREY, ms=8.0, clip_on=False)
+    labels = [f"{name} = {quantity(value, unit, digits=None)}" for name, (_, value, _, unit) in shown.items()]
+    drawn.set_yticks(range(len(shown)), labels)
     drawn.invert_yaxis()
     drawn.set_xscale("log")
-    ends = [end / value for low, value, high in shown.values() for end in (low, high)]
-    if ends:
-        log_ticks(drawn.xaxis, min(ends), max(ends))
+    drawn.set_xlim(left, right)
+    log_ticks(drawn.xaxis, left, right)
     drawn.set_xlabel("95 % range of the literature, over the value [-]")
     drawn.set_title(title)
     return drawn

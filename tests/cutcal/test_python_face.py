@@ -159,9 +159,20 @@ def test_pictures(result: CalibrationResult) -> None:
     trace = Trace.read(BANANA)
     axes = trace.plot(upper)
     assert axes is upper and len(axes.lines) == 3
+    matplotlib.pyplot.close("all")
+
+
+def test_picture_of_a_food() -> None:
+    """Each property has a row with its value and unit; a range that begins at 0, as that of friction, has an arrow."""
     food = Food.load("banana")
-    drawn = food.plot()
-    assert len(drawn.get_yticklabels()) == sum(p.value > 0.0 and p.low > 0.0 for p in food.properties.values())
+    axes = food.plot()
+    labels = [label.get_text().replace("\xa0", " ") for label in axes.get_yticklabels()]
+    assert len(labels) == len(food.properties) and {"E = 300 kPa", "mu = 0.3", "skin_thickness = 3 mm"} <= set(labels)
+    row = labels.index("mu = 0.3")
+    drawn = [line for line in axes.lines if line.get_ydata()[0] == row]
+    np.testing.assert_allclose(drawn[0].get_xdata(), [axes.get_xlim()[0], 2.0])
+    assert [line.get_marker() for line in drawn].count("<") == 1
+    assert sum(line.get_marker() == "<" for line in axes.lines) == sum(p.low == 0.0 for p in food.properties.values())
     matplotlib.pyplot.close("all")
 
 
