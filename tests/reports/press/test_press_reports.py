@@ -1,4 +1,4 @@
-"""Reports of tests between two plates: what they say of modulus, law, numerics and files, and how they write numbers."""
+"""Reports of tests between two plates: what they say of modulus, law, numerics and files, and how numbers are set."""
 
 from __future__ import annotations
 
