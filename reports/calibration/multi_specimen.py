@@ -193,7 +193,8 @@ def content(done: FinishedStudy) -> Data:
     widths = {name: verdicts.band_width(curves, name in s["hold_out"]) for name, curves in done.curves.items()}
     held, fitted = s["hold_out"], s["traces"]
     lines = {name: verdicts.held_lines(p, widths[name]) for name, p in held.items()}
-    lines |= {name: verdicts.fitted_lines(t) for name, t in fitted.items() if name not in held}
+    each = [(_title(n, s, "held out"), p) for n, p in held.items()]
+    each += [(_title(n, s, "in-sample"), t) for n, t in fitted.items()]
     chi = SimpleNamespace(correlation_length_m=None, reduced_chi2=s.get("reduced_chi2"))
     return {
         "food": s["food"].replace("_", " ").capitalize(),
@@ -209,13 +210,14 @@ def content(done: FinishedStudy) -> Data:
         "held_notes": [text for n, p in held.items() if (text := verdicts.reason(n, p, lines[n]))],
         "fitted_notes": [text for n, t in fitted.items()
                          if (text := verdicts.reason(n, t, verdicts.fitted_lines(t)))],
-        "lines": [[breakable(name), rows] for name, rows in lines.items() if rows],
+        "lines": [[breakable(title), rows] for (title, _), rows in zip(
+            each, [*lines.values(), *map(verdicts.fitted_lines, fitted.values())], strict=True) if rows],
         "chi_square": " ".join(measurement.errors(chi, 0.0, 0)),  # type: ignore[arg-type]
         "ranking": [[breakable(name), _ranking(s, name)] for name in done.curves],
         "names": [breakable(name) for name in done.curves],
         "shown": list(done.curves).index(first(done)),
         "captions": [_caption(s, name) for name in done.curves],
-        "left_open": [row for name, cut in (*held.items(), *fitted.items()) for row in _left_open(name, cut)],
+        "left_open": [row for title, cut in each for row in _left_open(title, cut)],
         "shared": [_parameter(n, p, done.meanings) for n, p in s["parameters"].items() if p.get("shared", True)],
         "own": [_parameter(n, p, done.meanings) for n, p in s["parameters"].items() if not p.get("shared", True)],
         "checks": [[breakable(name), in_words(c["name"]), *verdicts.change(c)] for name, t in fitted.items()
@@ -270,6 +272,11 @@ def _parameter(name: str, p: Data, meanings: Mapping[str, str]) -> list[str]:
         interval(p["low95"], p["high95"], unit), interval(p["prior_low"], p["prior_high"], unit),
         in_words(p["verdict"]), breakable(cut),
     ]  # fmt: skip
+
+
+def _title(name: str, s: Data, how: str) -> str:
+    """What a cut is called that is held out in one fit and fitted in another: with which of the two is meant."""
+    return f"{name}, {how}" if name in s["hold_out"] and name in s["traces"] else name
 
 
 def _left_open(name: str, cut: Data) -> list[list[str]]:

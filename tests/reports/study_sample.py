@@ -84,7 +84,7 @@ def _fitted(name: str) -> dict[str, Any]:
     return {
         "trace": {"source": f"{name}.csv", "sha256": "3b5d5c3712955042212316173ccf37be" * 2, "label": "measured"},
         "shape": sample.summary()["shape"], "knife": sample.summary()["knife"], "in_sample": True, "passed": True,
-        "metrics": _compared(name).as_dict(), "factor": 1.04, "predictive_inside": 1.0, "verdicts": _lines(name),
+        "metrics": _compared(name).as_dict(), "factor": 1.04, "predictive_inside": 1.0, "verdicts": _lines(name), "predictive_width": _width(name),
         "scalars": {"particles": 5120.0}, "dx_m": 0.003, "conditioning": CONDITIONING,
         "nuisances": {"tare": {"value": 0.01, "sd": 0.02, "prior_sd": 0.03, "unit": "N", "outside": False},
                       "scale": {"value": 0.04, "sd": 0.06, "prior_sd": 0.15, "unit": "-", "outside": False}},
@@ -101,13 +101,19 @@ def _predicted() -> dict[str, Any]:
     return {
         "trace": {"source": f"{HELD}.csv", "sha256": "c0ffee00" * 8, "label": "measured"},
         "trained_on": [name for name in CUTS if name != HELD], "passed": True, "metrics": _compared(HELD).as_dict(),
-        "factor": 0.91, "fitted": {"R_skin": 510.0}, "predictive_inside": 1.0,
+        "factor": 0.91, "fitted": {"R_skin": 510.0}, "predictive_inside": 1.0, "predictive_width": _width(HELD),
         "limits": {"nrmse": 0.1, "rating": 0.8, "inside": 0.9, "width": 0.5}, "null_models": _nulls(HELD) | others,
         "beats": ["ramp", "half_sine"], "simulations": 31, "verdicts": _lines(HELD)[3:4], "dx_m": 0.003,
         "particles": 4096, "shape": sample.summary()["shape"], "knife": sample.summary()["knife"],
         "conditioning": CONDITIONING | {"bandwidth_Hz": 15.0},
         "nuisances": {"scale": {"value": -0.094, "sd": 0.02, "prior_sd": 0.15, "unit": "-", "outside": False}},
     }  # fmt: skip
+
+
+def _width(name: str) -> float:
+    """Mean width of its band over its peak."""
+    columns, start = curves(name), "predicted" if name == HELD else "band"
+    return float(np.mean(columns[f"{start}_high_N"] - columns[f"{start}_low_N"]) / columns["real_N"].max())
 
 
 def _lines(name: str) -> list[dict[str, Any]]:

@@ -80,6 +80,19 @@ def test_each_cut_says_why_it_failed(tmp_path: Path) -> None:
     assert [name for name, _ in older["lines"]] == ["third"] and older["fitted_limits"] == older["checks_note"] == ""
 
 
+def test_a_cut_that_is_held_out_and_fitted_has_both_lines(tmp_path: Path) -> None:
+    """Each cut in turn is predicted, and all are fitted in the end: lines and factor of either stand apart."""
+    s = sample.summary()
+    traces = s["traces"] | {"third": s["traces"]["first"]}
+    got = content(read_study(sample.write_study(tmp_path, traces=traces)))
+    assert [(name, len(rows)) for name, rows in got["lines"]] == [
+        ("third, held out", 5), ("first", 6), ("second", 6), ("third, in-sample", 6),
+    ]  # fmt: skip
+    factors = {row[0]: row[4].split()[0] for row in got["left_open"] if row[1] == "Factor"}
+    assert factors["third, held out"] == "0.910" and factors["third, in-sample"] == "1.04"
+    assert len(got["model"]["cuts"]) == 3
+
+
 def test_a_band_that_holds_any_curve_is_said_to_tell_little(tmp_path: Path) -> None:
     """A band wider than half of the peak is named beside the verdict; it fails the cut where the run had that limit."""
     run = sample.write_study(tmp_path)
