@@ -84,8 +84,9 @@ def _fitted(name: str) -> dict[str, Any]:
     return {
         "trace": {"source": f"{name}.csv", "sha256": "3b5d5c3712955042212316173ccf37be" * 2, "label": "measured"},
         "shape": sample.summary()["shape"], "knife": sample.summary()["knife"], "in_sample": True, "passed": True,
-        "metrics": _compared(name).as_dict(), "factor": 1.04, "predictive_inside": 1.0, "verdicts": _lines(name), "predictive_width": _width(name),
-        "scalars": {"particles": 5120.0}, "dx_m": 0.003, "conditioning": CONDITIONING,
+        "metrics": _compared(name).as_dict(), "factor": 1.04, "predictive_inside": 1.0, "verdicts": _lines(name),
+        "predictive_width": _width(name), "scalars": {"particles": 5120.0}, "dx_m": 0.003,
+        "conditioning": CONDITIONING,
         "nuisances": {"tare": {"value": 0.01, "sd": 0.02, "prior_sd": 0.03, "unit": "N", "outside": False},
                       "scale": {"value": 0.04, "sd": 0.06, "prior_sd": 0.15, "unit": "-", "outside": False}},
         "null_models": {n: {k: m[k] for k in ("R", "nrmse")} for n, m in _nulls(name).items()},
