@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar
@@ -9,6 +10,7 @@ from typing import Annotated, Any, ClassVar
 from calib.io.type_schema import ALWAYS, Count, Fraction, NotNegative, Positive, Shared, keywords, one_of
 from calib.io.typed_document import ANY, FORMER, NULL
 from calib.material.properties import PROPERTIES
+from calib.trace.conditioning import Conditioned
 from calib.validation.metrics import IsoRating, Metrics, SpragueGeers
 from mpm.scene import Knife
 from mpm.scene.shapes import Shape
@@ -84,6 +86,23 @@ class Conditioning:
     bandwidth_Hz: Positive | None = None
     baseline_window_s: tuple[float, float] | None = field(default=None, metadata=FORMER)
     end_sd_s: float | None = field(default=None, metadata=FORMER)
+
+    @classmethod
+    def of(cls, curve: Conditioned, bandwidth: float) -> Conditioning:
+        """That of a conditioned trace, whose sensor has a low-pass of this cut-off [Hz]; infinite for none."""
+        return cls(
+            baseline_N=curve.baseline_N,
+            baseline_sd_N=curve.baseline_sd_N,
+            baseline_kind=curve.baseline_kind,
+            onset_s=curve.onset_s,
+            onset_sd_s=curve.onset_sd_s,
+            end_s=curve.end_s,
+            stroke_m=curve.stroke_length_m,
+            stroke_source=curve.stroke_source,
+            noise_sd_N=curve.noise_sd_N,
+            filter_sd_m=curve.filter_sd_m,
+            bandwidth_Hz=bandwidth if math.isfinite(bandwidth) else None,
+        )
 
 
 @dataclass(frozen=True)

@@ -91,7 +91,7 @@ def summarise(done: Calibrated, folder: Path, began: float) -> CalibrationResult
         verdicts=tuple(verdicts),
         trace=_trace(curve),
         air=None if request.air is None else AirSource(request.air_source, setup.air_sha256),
-        conditioning=_conditioning(curve, setup.bandwidth),
+        conditioning=Conditioning.of(curve, setup.bandwidth),
         agreement=Agreement(done.metrics, nulls, curve.peak_sd_N),
         fitted=fitted,
         nuisances=nuisances,
@@ -200,22 +200,6 @@ def _trace(curve: Conditioned) -> TraceSource:
     trace = curve.trace
     duration = float(trace.time[-1] - trace.time[0])
     return TraceSource(trace.source, trace.label, trace.sha256, len(trace.time), duration, dict(trace.columns))
-
-
-def _conditioning(curve: Conditioned, bandwidth: float) -> Conditioning:
-    return Conditioning(
-        baseline_N=curve.baseline_N,
-        baseline_sd_N=curve.baseline_sd_N,
-        baseline_kind=curve.baseline_kind,
-        onset_s=curve.onset_s,
-        onset_sd_s=curve.onset_sd_s,
-        end_s=curve.end_s,
-        stroke_m=curve.stroke_length_m,
-        stroke_source=curve.stroke_source,
-        noise_sd_N=curve.noise_sd_N,
-        filter_sd_m=curve.filter_sd_m,
-        bandwidth_Hz=bandwidth if math.isfinite(bandwidth) else None,
-    )
 
 
 def _fitted(request: Request, fit: FitResult, analysis: UncertaintyAnalysis | None) -> dict[str, FittedParameter]:

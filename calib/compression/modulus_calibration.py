@@ -105,10 +105,10 @@ def acceptance_lines(found: ModulusFit, error: float | None, change: float | Non
     hint = "numerics; raise --cells"
     lines = [
         ("curve error (NRMSE)", found.nrmse, CURVE_ERROR_LIMIT, ""),
-        ("modulus 0-5 %, fitted against measured", found.slope_error, MODULUS_ERROR_LIMIT, ""),
+        ("slope over 0 to 5 % strain, fitted against measured", found.slope_error, MODULUS_ERROR_LIMIT, ""),
     ]
     if error is not None:
-        lines.append(("solver_error", error, SOLVER_ERROR_LIMIT, hint))
+        lines.append(("error of the solver against the closed form", error, SOLVER_ERROR_LIMIT, hint))
     if change is not None:
         lines.append(("change from a coarser grid", change, SOLVER_ERROR_LIMIT, hint))
     return [
@@ -130,7 +130,7 @@ def unshown(test: CompressionTest, bracket: bool, repeats: int) -> list[str]:
     """
     other = "" if bracket else f"; --bracket gives the modulus with {_plates(not test.bonded)} ones"
     out = [
-        f"nu = {test.nu:g} is assumed: a compression force alone does not tell E from nu",
+        f"Poisson's ratio nu = {test.nu:g} is assumed: a compression force alone does not tell E from nu",
         f"the plates are assumed to be {_plates(test.bonded)}: friction is not measured{other}",
         "the first sample of each repeat is taken as contact; no toe is corrected",
         "nothing is shown about yield, rate or fracture",

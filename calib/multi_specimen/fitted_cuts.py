@@ -62,8 +62,9 @@ class FittedCut:
 
     @property
     def nuisances(self) -> tuple[NuisanceEstimate, ...]:
-        """What the fit says of the measurement."""
-        return self.setup.objective.nuisance_estimates(self.run.curve)
+        """What the fit says of the measurement, the factor's logarithm with it."""
+        objective = self.setup.objective
+        return (*objective.nuisance_estimates(self.run.curve), *objective.factor_estimate(self.run.curve))
 
     @cached_property
     def verdicts(self) -> tuple[Verdict, ...]:

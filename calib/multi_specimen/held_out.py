@@ -19,17 +19,19 @@ from calib.fit.multistart import FitResult, multistart_search
 from calib.fit.options import FitOptions
 from calib.material.scene import of_specimen
 from calib.multi_specimen.specimens import JointFit, Specimens
+from calib.problem.nuisance import NuisanceEstimate
 from calib.problem.objective import Objective
 from calib.problem.parameters import is_shared
 from calib.problem.setup import COARSE, FINE
 from calib.simulation.evaluation import Evaluation
 from calib.uncertainty.intervals import linearised_likelihood, uncertainty
 from calib.uncertainty.predictive import Band, error_draws, pointwise_band, posterior_draws
-from calib.validation.acceptance import Conservation, Verdict, balances
+from calib.validation.acceptance import BAND_LIMIT, Conservation, Verdict, balances
 from calib.validation.metrics import Metrics, compare
 from calib.validation.null_models import null_models
 from calib.validation.prediction import PREDICTION_NRMSE_LIMIT, PREDICTION_RATING_LIMIT
 from mpm.arrays import FloatArray
+from mpm.scene import Scene
 from mpm.scene.errors import SimulationError
 
 SPECIMEN_BUDGET, SPECIMEN_DESIGN = 40.0, 5
@@ -59,6 +61,9 @@ class HeldOutPrediction:
         band: 95 % band.
         simulations: Number of simulations.
         balances: Momentum and kinetic energy of the predicted cut.
+        scene: The cut that was simulated for the prediction.
+        particles: Particles of it; None where the store does not say them.
+        nuisances: What the prediction says of the measurement, the factor's logarithm with it.
     """
 
     name: str
@@ -71,10 +76,21 @@ class HeldOutPrediction:
     band: Band
     simulations: int
     balances: tuple[Verdict, ...]
+    scene: Scene
+    particles: int | None
+    nuisances: tuple[NuisanceEstimate, ...]
+
+    @property
+    def width(self) -> float:
+        """Mean width of the band over the measured peak [-]."""
+        return mean_width(self.band, self.metrics)
 
     @property
     def passed(self) -> bool:
-        """Whether curve, rating and band are within their limits, and the simulation's balances close."""
+        """Whether curve, rating and band are within their limits, and the simulation's balances close.
+
+        A band of any width holds a curve where it is wide enough: so it has the limit of a single calibration's.
+        """
         m = self.metrics
         if any(v.passed is False for v in self.balances):
             return False
@@ -82,6 +98,7 @@ class HeldOutPrediction:
             m.nrmse <= PREDICTION_NRMSE_LIMIT
             and m.iso18571.R >= PREDICTION_RATING_LIMIT
             and self.band.inside >= INSIDE_LIMIT
+            and self.width <= BAND_LIMIT
         )
 
     @property
@@ -89,6 +106,11 @@ class HeldOutPrediction:
         """Null models that the prediction beats in both rating and shape."""
         m = self.metrics
         return tuple(n for n, x in self.nulls.items() if m.iso18571.R > x.iso18571.R and m.shape_error < x.shape_error)
+
+
+def mean_width(band: Band, metrics: Metrics) -> float:
+    """Mean width of a band over the measured peak [-]."""
+    return float(np.mean(band.high - band.low)) / metrics.peak_real_N
 
 
 def predict(specimens: Specimens, fit: JointFit, name: str) -> HeldOutPrediction:
@@ -127,6 +149,9 @@ def predict(specimens: Specimens, fit: JointFit, name: str) -> HeldOutPrediction
         band=_band(objective, [curve, *others_curves], fit, seed),
         simulations=len(runs) + (0 if own is None else len(own.result.history) + 1 + len(others)),
         balances=tuple(balances(Conservation.of(runs[0]))),
+        scene=of_specimen(specimens.setups[name].fine, {**shared, **best}, specimens.setups[name].kept)[0],
+        particles=None if (n := runs[0].scalars.get("particles")) is None else round(n),
+        nuisances=(*objective.nuisance_estimates(curve), *objective.factor_estimate(curve)),
     )
 
 

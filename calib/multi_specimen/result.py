@@ -10,19 +10,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, ClassVar
 
+from calib.calibration.result_parts import Conditioning
 from calib.io.folder import write_json
 from calib.io.provenance import Invocation, Software
 from calib.io.type_schema import Count, Fraction, NotNegative, Positive, Shared, keywords, one_of
-from calib.io.typed_document import FLAT, read_document, to_document
+from calib.io.typed_document import FLAT, NULL, read_document, to_document
 from calib.material.properties import Property
 from calib.multi_specimen.compression_modulus import CompressionModulus
 from calib.multi_specimen.fitted_cuts import FittedCut
-from calib.multi_specimen.held_out import INSIDE_LIMIT, HeldOutPrediction
+from calib.multi_specimen.held_out import INSIDE_LIMIT, HeldOutPrediction, mean_width
 from calib.problem.parameters import Parameter
 from calib.problem.setup import Setup
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.uncertainty.intervals import Interval
-from calib.validation.acceptance import Verdict
+from calib.validation.acceptance import BAND_LIMIT, Verdict
 from calib.validation.metrics import Metrics
 from calib.validation.numerical_checks import Check
 from calib.validation.prediction import PREDICTION_NRMSE_LIMIT, PREDICTION_RATING_LIMIT
@@ -92,11 +93,13 @@ class HeldOutLimits:
         nrmse: Largest curve error.
         rating: Least rating R.
         inside: Least part within the band.
+        width: Largest mean width of the band, over the measured peak; missing in older documents.
     """
 
     nrmse: Positive = PREDICTION_NRMSE_LIMIT
     rating: Positive = PREDICTION_RATING_LIMIT
     inside: Positive = INSIDE_LIMIT
+    width: Positive | None = field(default=None, metadata=NULL)
 
 
 @dataclass(frozen=True)
@@ -119,6 +122,8 @@ class InSampleCut:
         dx_m: Cell of the grid [m].
         shape: Specimen as it was simulated.
         knife: Knife as it was simulated.
+        predictive_width: Mean width of that band over the measured peak; null where the fit ended too early.
+        conditioning: How the record became a curve over the stroke; missing in older documents.
     """
 
     trace: CutSource
@@ -136,6 +141,8 @@ class InSampleCut:
     dx_m: Positive
     shape: Annotated[Shape, Shared("shape")]
     knife: Annotated[Knife, Shared("knife")]
+    predictive_width: NotNegative | None = field(default=None, metadata=NULL)
+    conditioning: Conditioning | None = None
 
     @classmethod
     def of(cls, cut: FittedCut) -> InSampleCut:
@@ -158,6 +165,8 @@ class InSampleCut:
             dx_m=cut.setup.fine.numerics.dx,
             shape=cut.scene.food.shape,
             knife=knife,
+            predictive_width=None if cut.band is None else mean_width(cut.band, cut.metrics),
+            conditioning=Conditioning.of(cut.setup.curve, cut.setup.bandwidth),
         )
 
 
@@ -168,7 +177,7 @@ class HeldOutCut:
     Attributes:
         trace: The record.
         trained_on: Cuts whose flesh it is predicted with.
-        passed: Whether curve, rating, band and balances are within their limits.
+        passed: Whether curve, rating, band, its width and balances are within their limits.
         metrics: A simulated curve against a measured one over the stroke.
         factor: Factor on the simulated force, for width and gain of this specimen: fitted to this cut.
         fitted: What the specimen has for itself [SI], fitted to this cut, by name.
@@ -178,6 +187,13 @@ class HeldOutCut:
         beats: Null models that it beats in rating and shape.
         simulations: Simulations it took.
         verdicts: Lines of its balances.
+        predictive_width: Mean width of that band over the measured peak; null in older documents.
+        nuisances: What the prediction says of the measurement, by name; null in older documents.
+        dx_m: Cell of the grid [m]; null in older documents.
+        particles: Particles of its simulation; null where nobody counted them.
+        shape: Specimen as it was simulated; missing in older documents.
+        knife: Knife as it was simulated; missing in older documents.
+        conditioning: How the record became a curve over the stroke; missing in older documents.
     """
 
     trace: CutSource
@@ -192,10 +208,19 @@ class HeldOutCut:
     beats: tuple[str, ...]
     simulations: Count
     verdicts: tuple[Annotated[Verdict, Shared("verdict")], ...]
+    predictive_width: NotNegative | None = field(default=None, metadata=NULL)
+    nuisances: Mapping[str, Annotated[FittedNuisance, Shared("nuisance")]] | None = field(default=None, metadata=NULL)
+    dx_m: Positive | None = field(default=None, metadata=NULL)
+    particles: Count | None = field(default=None, metadata=NULL)
+    shape: Annotated[Shape | None, Shared("shape")] = None
+    knife: Annotated[Knife | None, Shared("knife")] = None
+    conditioning: Conditioning | None = None
 
     @classmethod
     def of(cls, found: HeldOutPrediction, setup: Setup) -> HeldOutCut:
         """That of a prediction."""
+        knife = found.scene.knife
+        assert isinstance(knife, Knife)  # a study has no presses
         return cls(
             trace=CutSource.of(setup),
             trained_on=found.trained_on,
@@ -204,11 +229,18 @@ class HeldOutCut:
             factor=found.factor,
             fitted=found.fitted,
             predictive_inside=found.band.inside,
-            limits=HeldOutLimits(),
+            limits=HeldOutLimits(width=BAND_LIMIT),
             null_models={n: HeldOutNull(m.nrmse, m.shape_error, m.iso18571.R) for n, m in found.nulls.items()},
             beats=found.beats,
             simulations=found.simulations,
             verdicts=found.balances,
+            predictive_width=found.width,
+            nuisances={e.name: FittedNuisance.of(e) for e in found.nuisances},
+            dx_m=found.scene.numerics.dx,
+            particles=found.particles,
+            shape=found.scene.food.shape,
+            knife=knife,
+            conditioning=Conditioning.of(setup.curve, setup.bandwidth),
         )
 
 

@@ -142,7 +142,8 @@ class Finished:
         said = [f"{name}: {p.metrics.iso18571.caveat}." for name, p in held.items() if p.metrics.iso18571.caveat]
         if held:
             said.append(
-                f"The figures of {', '.join(held)} under hold_out are predictions; those under traces are in-sample."
+                f"The figures of {', '.join(held)} are predictions from the other cuts; all others are in-sample: of "
+                "cuts that were fitted."
             )
         if held and scatter > 0.0:
             said.append(

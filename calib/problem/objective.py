@@ -238,8 +238,7 @@ class Objective:
         """
         if not self.scale_sd > 0.0:
             return 1.0
-        simulated = self._whiten(np.append(self._weights * curve, float(curve.max()) / self.sigma_peak))
-        size, cross = float(simulated @ simulated), float(simulated @ self._measured)
+        size, cross = self._products(curve)
         if not (size > 0.0 and cross > 0.0):
             return 1.0
         log, pull = math.log(cross / size), self.scale_sd**-2
@@ -248,6 +247,28 @@ class Objective:
             slope, curvature = k * (k * size - cross) + pull * log, k * (2.0 * k * size - cross) + pull
             log -= min(max(slope / max(curvature, pull), -1.0), 1.0)
         return math.exp(log)
+
+    def _products(self, curve: FloatArray) -> tuple[float, float]:
+        """The square of the simulated rows, and their product with the measured ones [-]."""
+        simulated = self._whiten(np.append(self._weights * curve, float(curve.max()) / self.sigma_peak))
+        return float(simulated @ simulated), float(simulated @ self._measured)
+
+    def factor_estimate(self, curve: FloatArray) -> tuple[NuisanceEstimate, ...]:
+        """What a simulated curve says of the logarithm of its factor; nothing where there is no factor.
+
+        Args:
+            curve: Simulated force on the target's grid [N] (n,).
+
+        Returns:
+            The estimate called ``scale``, or none. Its standard deviation is that of Laplace's approximation: the
+            curvature of the chi-square at its least value, the material held.
+        """
+        if not self.scale_sd > 0.0:
+            return ()
+        size, cross = self._products(curve)
+        k = self.factor(curve)
+        curvature = max(k * (2.0 * k * size - cross), 0.0) + self.scale_sd**-2
+        return (NuisanceEstimate("scale", "-", self.scale_sd, math.log(k), curvature**-0.5),)
 
     def factors(self, curves: FloatArray) -> FloatArray:
         """The factors [-] (q,) of several simulated curves [N] (q, n)."""

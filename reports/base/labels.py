@@ -48,10 +48,34 @@ def shown(x: Any, unit: str, digits: int | None) -> str:
     return breakable(listed([str(i) for i in x]) if isinstance(x, list) else str(x))
 
 
+def related(value: Any, limit: Any, passed: bool | None) -> str:
+    """The sign between a value and its limit, as it follows from whether the value passes.
+
+    Args:
+        value: A number; anything else has no sign.
+        limit: Its limit.
+        passed: Whether it passes; None where nobody judged it.
+
+    Returns:
+        The sign with a blank; empty where nothing follows.
+    """
+    numbers = all(isinstance(x, (int, float)) and not isinstance(x, bool) for x in (value, limit))
+    if passed is None or not numbers:
+        return ""
+    if abs(value) == limit:
+        return "≤ " if passed else ""
+    return "≤ " if (abs(value) < limit) == passed else "≥ "
+
+
 def capital(text: str) -> str:
     """A sentence with a capital, unless it begins with a name: of a property, a file or a column."""
     first = text.split(" ", 1)[0]
     return text[:1].upper() + text[1:] if first.isalpha() and first not in SYMBOLS else text
+
+
+def as_sentence(text: str) -> str:
+    """A sentence with its capital and its full stop."""
+    return capital(text) + ("" if text.endswith((".", "!", "?")) else ".")
 
 
 def in_words(name: str) -> str:

@@ -18,9 +18,11 @@ from mpm.scene import Knife
 from reports import ReportError
 from reports.base.figures import BLACK, BLUE, MEASURED, SIMULATED, next_to, predictive, stroke_axis, svg
 from reports.base.format import breakable, count, duration, interval, listed, publish, quantity
-from reports.base.labels import capital, in_words
+from reports.base.labels import as_sentence, in_words
 from reports.base.run_folder import Data, check_kind, read_columns, read_date, read_json, read_section
-from reports.calibration import cut_figure, measurement
+from reports.calibration import cut_figure, measurement, model_page
+from reports.study import verdicts
+from reports.study.model import model
 from reports.web.calibration import write_page
 from reports.web.study import study_page
 
@@ -28,6 +30,12 @@ PREDICTED: dict[str, Any] = {"color": BLUE, "lw": 1.8, "dashes": (1.4, 1.2)}
 FIGURE_HEIGHT = 60.0  # of the figure of a trace [mm]
 BESIDE_HEIGHT = 78.0  # with the food under the blade beside it [mm]
 MORE_HEIGHT = 22.0  # added on the first page [mm]
+SIZES = {
+    "length": "size of the specimen across the blade",
+    "width": "size of the specimen along the blade",
+    "height": "height of the specimen",
+}
+"""What a fitted size is, in words."""
 
 _NUM, _OPT, _TEXT, _MAYBE = (int, float), (int, float, type(None)), (str,), (str, type(None))
 _METRICS: Data = {
@@ -182,33 +190,47 @@ def _source(s: Data, name: str) -> Data:
 def content(done: FinishedStudy) -> Data:
     """Everything the template prints, as text."""
     s = done.summary
+    widths = {name: verdicts.band_width(curves, name in s["hold_out"]) for name, curves in done.curves.items()}
+    held, fitted = s["hold_out"], s["traces"]
+    lines = {name: verdicts.held_lines(p, widths[name]) for name, p in held.items()}
+    each = [(_title(n, s, "held out"), p) for n, p in held.items()]
+    each += [(_title(n, s, "in-sample"), t) for n, t in fitted.items()]
+    chi = SimpleNamespace(correlation_length_m=None, reduced_chi2=s.get("reduced_chi2"))
     return {
         "food": s["food"].replace("_", " ").capitalize(),
         "study": breakable(Path(s["study"]).name),
         "created": done.created.strftime("%Y-%m-%d %H:%M"),
         "cutcal": str(s.get("versions", {}).get("cutcal", "")),
         "passed": s["passed"],
-        "sentence": sentence(s),
-        "held": [_line(name, p) for name, p in s["hold_out"].items()],
-        "fitted": [_line(name, t) for name, t in s["traces"].items()],
-        "held_limits": _limits(s["hold_out"]),
+        "sentence": verdicts.sentence(s, {name: widths[name] for name in held}),
+        "held": [verdicts.summary_line(name, p, widths[name]) for name, p in held.items()],
+        "fitted": [verdicts.summary_line(n, t, verdicts.band_width(done.curves[n], False)) for n, t in fitted.items()],
+        "held_limits": verdicts.held_limits(s),
+        "fitted_limits": verdicts.fitted_limits(s),
+        "held_notes": [text for n, p in held.items() if (text := verdicts.reason(n, p, lines[n]))],
+        "fitted_notes": [text for n, t in fitted.items()
+                         if (text := verdicts.reason(n, t, verdicts.fitted_lines(t)))],
+        "lines": [[breakable(title), rows] for (title, _), rows in zip(
+            each, [*lines.values(), *map(verdicts.fitted_lines, fitted.values())], strict=True) if rows],
+        "chi_square": " ".join(measurement.errors(chi, 0.0, 0)),  # type: ignore[arg-type]
         "ranking": [[breakable(name), _ranking(s, name)] for name in done.curves],
         "names": [breakable(name) for name in done.curves],
         "shown": list(done.curves).index(first(done)),
         "captions": [_caption(s, name) for name in done.curves],
-        "left_open": [[breakable(name), *measurement.left_open(n, SimpleNamespace(**row))]
-                      for name, t in s["traces"].items()
-                      for n, row in (t.get("nuisances") or {}).items()],
-        "parameters": [_parameter(name, p, done.meanings) for name, p in s["parameters"].items()],
-        "checks": [[breakable(name), in_words(c["name"]), *_change(c)] for name, t in s["traces"].items()
+        "left_open": [row for title, cut in each for row in _left_open(title, cut)],
+        "shared": [_parameter(n, p, done.meanings) for n, p in s["parameters"].items() if p.get("shared", True)],
+        "own": [_parameter(n, p, done.meanings) for n, p in s["parameters"].items() if not p.get("shared", True)],
+        "checks": [[breakable(name), in_words(c["name"]), *verdicts.change(c)] for name, t in fitted.items()
                    for c in t.get("numerical_checks") or []],
+        "checks_note": verdicts.carried_on(s),
+        "model": model(s, done.curves, model_page.REFERENCES, model_page.LIMIT_SOURCES),
         "traces": [[breakable(name), *_origin(_source(s, name))] for name in done.curves],
         "runs": _runs(s),
         "commit": s.get("git") or "",
         "command": [breakable(shlex.quote(word)) for word in s["command"]],
         "versions": ", ".join(f"{name}\u00a0{v}" for name, v in sorted(s.get("versions", {}).items())),
-        "limits": [capital(text) for text in s["limits"]],
-        "warnings": [capital(text) for text in s["warnings"]],
+        "limits": [as_sentence(text) for text in s["limits"]],
+        "warnings": [as_sentence(text) for text in s["warnings"]],
     }  # fmt: skip
 
 
@@ -216,52 +238,6 @@ def _origin(trace: Data) -> list[str]:
     """File, kind and the two halves of the hash of a trace."""
     digest = str(trace.get("sha256", ""))
     return [breakable(str(trace.get("source", "not recorded"))), str(trace.get("label", "")), digest[:32], digest[32:]]
-
-
-def sentence(s: Data) -> str:
-    """The verdict in plain words: what was predicted, and what was only fitted."""
-    failed = [name for name, p in s["hold_out"].items() if not p["passed"]]
-    held = len(s["hold_out"])
-    if not held:
-        text = "No cut was held out: every figure is in-sample, and nothing here is a prediction."
-    elif failed:
-        text = f"{held - len(failed)} of {held} held-out cuts were predicted within the limits; not {listed(failed)}."
-    else:
-        text = f"All {held} held-out cuts were predicted within the limits." if held > 1 else (
-            f"The held-out cut {next(iter(s['hold_out']))} was predicted within the limits.")  # fmt: skip
-    apart = [name for name, t in s["traces"].items() if not t["passed"]]
-    text += f" In-sample lines that failed: {listed(apart)}." if apart else " All in-sample lines passed."
-    unlike = [n for n, t in s["traces"].items() if t["trace"]["label"] != "measured"]
-    return breakable(text + (f" Reconstructed, not measured: {listed(unlike)}." if unlike else ""))
-
-
-def _line(name: str, t: Data) -> Data:
-    """One line of the verdict table."""
-    m = t["metrics"]
-    return {
-        "name": breakable(name),
-        "cells": [
-            quantity(m["nrmse"], "fraction"),
-            quantity(m["shape_error"], "fraction"),
-            quantity(m["iso18571"]["R"], "-"),
-            quantity(m["peak_error"], "fraction", signed=True),
-            quantity(m["work_error"], "fraction", signed=True),
-            quantity(t.get("predictive_inside"), "fraction", digits=2),
-            quantity(t["factor"], "-"),
-        ],
-        "mark": "yes" if t["passed"] else "no",
-    }
-
-
-def _limits(hold_out: Data) -> str:
-    """The limits of the predictions, which are the same for all."""
-    found: Data = next((p["limits"] for p in hold_out.values()), {})
-    texts = {
-        "nrmse": ("NRMSE ≤ ", "fraction"),
-        "rating": ("ISO rating ≥ ", "-"),
-        "inside": ("in band ≥ ", "fraction"),
-    }
-    return listed([start + quantity(found[k], unit, digits=None) for k, (start, unit) in texts.items() if k in found])
 
 
 def _ranking(s: Data, name: str) -> list[list[str]]:
@@ -280,33 +256,36 @@ def _ranking(s: Data, name: str) -> list[list[str]]:
 def _caption(s: Data, name: str) -> str:
     held = s["hold_out"].get(name)
     if held is None:
-        return "Fitted with the others: in-sample."
+        return f"Fitted with the others: in-sample. {verdicts.peaks(s['traces'][name], 'simulated')}"
     own = listed(list(held.get("fitted", {}))) or "nothing"
     return breakable(
         f"Predicted with the flesh of {listed(held['trained_on'])}. "
-        f"Fitted to this cut: {own}, and one factor on its force."
+        f"Fitted to this cut: {own}, and one factor on its force. {verdicts.peaks(held, 'predicted')}"
     )
 
 
-def _property_of(name: str) -> str:
-    """The property that a parameter is: one of a single specimen is called PROPERTY@SPECIMEN."""
-    return name.split("@")[0]
-
-
 def _parameter(name: str, p: Data, meanings: Mapping[str, str]) -> list[str]:
-    unit = p["unit"]
-    shared = "all cuts" if p.get("shared", True) else "one cut"
+    """Property, meaning, value, intervals and verdict of a parameter, and the cut that has it for itself."""
+    unit, of, cut = p["unit"], *name.partition("@")[::2]
     return [
-        breakable(name), meanings.get(_property_of(name), ""), quantity(p["value"], unit),
+        breakable(of), meanings.get(of) or SIZES.get(of, ""), quantity(p["value"], unit),
         interval(p["low95"], p["high95"], unit), interval(p["prior_low"], p["prior_high"], unit),
-        in_words(p["verdict"]), shared,
+        in_words(p["verdict"]), breakable(cut),
     ]  # fmt: skip
 
 
-def _change(c: Data) -> list[str]:
-    if c.get("reason"):
-        return [f"broke down: {in_words(c['reason'])}", ""]
-    return [quantity(c.get(key), "fraction", digits=2, signed=True) for key in ("peak_change", "work_change")]
+def _title(name: str, s: Data, how: str) -> str:
+    """What a cut is called that is held out in one fit and fitted in another: with which of the two is meant."""
+    return f"{name}, {how}" if name in s["hold_out"] and name in s["traces"] else name
+
+
+def _left_open(name: str, cut: Data) -> list[list[str]]:
+    """What a cut's measurement leaves open, its factor last."""
+    known = cut.get("nuisances") or {}
+    rows = [
+        [breakable(name), *measurement.left_open(n, SimpleNamespace(**row))] for n, row in known.items() if n != "scale"
+    ]
+    return [*rows, verdicts.factor_row(name, cut, measurement.LEFT_OPEN["scale"])]
 
 
 def _runs(s: Data) -> str:

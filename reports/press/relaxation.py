@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from reports.base.brief import Brief, ReportPart, ReportTable, typeset_brief
 from reports.base.figures import MEASURED, SIMULATED, log_ticks, svg
 from reports.base.format import breakable, interval, plain, quantity
-from reports.press.tables import MARKS, mean_and_sd, verdict_table
+from reports.press.tables import MARKS, mean_and_sd, sentences, verdict_table, with_sd
 
 if TYPE_CHECKING:
     from calib.relaxation.relaxation_result import HoldCurve, RelaxationResult
@@ -63,7 +63,7 @@ def write_report(result: RelaxationResult, curves: Sequence[HoldCurve], out: Pat
             ReportPart("How many branches", CRITERION, table=_criterion(result)),
             ReportPart("Each specimen", table=_specimens(result), apart=len(result.repeats) > 6),
         ],
-        limits=result.not_shown,
+        limits=sentences(result.not_shown),
     )
     return typeset_brief(out / "relax.json", brief, result)
 
@@ -112,19 +112,17 @@ def _specimens(result: RelaxationResult) -> ReportTable:
                 quantity(one.E0_Pa, "Pa"),
                 "remains",
                 "–",
-                _pm(one.equilibrium, one.equilibrium_sd),
+                with_sd(one.equilibrium, one.equilibrium_sd),
                 "",
             ]
         )
         for branch in one.branches:
             times = interval(branch.time_low_s, branch.time_high_s, "s")
-            rows.append(["", "", plain(branch.time_s), times, _pm(branch.share, branch.share_sd), branch.why or "told"])
+            rows.append(
+                ["", "", plain(branch.time_s), times, with_sd(branch.share, branch.share_sd), branch.why or "told"]
+            )
     head = ("Specimen", "Modulus", "Time [s]", "95 % interval", "Share", "Told by the hold")
     return ReportTable(head, ("1fr", "auto", "auto", "auto", "auto", "42mm"), rows)
-
-
-def _pm(value: float, sd: float) -> str:
-    return f"{plain(value)} ± {plain(sd, 2)}"
 
 
 def picture(curves: Sequence[HoldCurve]) -> bytes:

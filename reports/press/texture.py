@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 
 from reports.base.brief import Brief, ReportPart, ReportTable, typeset_brief
 from reports.base.figures import HATCHED, MEASURED, SIMULATED, svg
-from reports.base.format import breakable, interval, plain, quantity
+from reports.base.format import breakable, plain, quantity
 from reports.press.law import law_parts
-from reports.press.tables import mean_and_sd
+from reports.press.tables import between, mean_and_sd, sentences
 
 if TYPE_CHECKING:
     from calib.texture.texture_result import BiteCurves, TextureResult
@@ -71,7 +71,7 @@ def write_report(result: TextureResult, curves: Sequence[BiteCurves], out: Path)
             ("Seed of the draws", str(result.seed)),
         ],
         parts=parts,
-        limits=result.not_shown,
+        limits=sentences(result.not_shown),
     )
     return typeset_brief(out / "tpa.json", brief, result)
 
@@ -86,7 +86,7 @@ def _sentence(result: TextureResult) -> str:
         ratio = hardness[0].ratio
         return (
             f"The hardness along the fibres is {plain(ratio.value)} times that across them "
-            f"(95 % interval {interval(ratio.low, ratio.high, '')})."
+            f"(95 % interval {between(ratio.low, ratio.high)})."
         )
     first = result.groups[0]
     return (
@@ -114,17 +114,13 @@ def _ratios(result: TextureResult) -> ReportTable:
         [
             name,
             *(
-                f"{plain(r.value)} ({_ends(r.low, r.high)})" if r else "–"
+                f"{plain(r.value)} ({between(r.low, r.high)})" if r else "–"
                 for r in (cells.get((key, s)) for s in speeds)
             ),
         ]
         for key, (name, _) in NAMES.items()
     ]
     return ReportTable(("Quantity", *speeds), ("auto", *["1fr"] * len(speeds)), rows)
-
-
-def _ends(low: float, high: float) -> str:
-    return "–" if math.isnan(low) else f"{plain(low, 2)} to {plain(high, 2)}"
 
 
 def _speed(descent: float) -> str:

@@ -18,13 +18,12 @@ from reports.web.markup import Markup, data, document, element, joined, picture,
 from reports.web.parts import assets, chart, limits_section, mark, pairs, stamped
 
 FORCES = "Measured, simulated and predicted force over stroke with the 95 % band, and the residual below"
-HEAD = ("Cut", "NRMSE", "Shape", "ISO rating", "Peak", "Work", "In band", "Factor", "Verdict")
+HEAD = ("Cut", "NRMSE", "Shape", "ISO rating", "Peak", "Work", "In band", "Band width", "Factor", "Verdict")
 PREDICTED, FITTED = "predicted from the other cuts", "simulated, fitted to it too"
 WORDS = (
-    "Shape: difference of the curves over their own peaks. ISO rating: overall rating in the manner of ISO/TS 18571, 1 "
-    "is perfect. In band: part of the measured curve within the 95 % band. Factor: on the simulated force, for the "
-    "width of the specimen and the gain of its sensor. In-sample lines also fail where a numerical check moves their "
-    "peak or work."
+    "Shape: difference of the curves over their own peaks. ISO rating: overall rating in the manner of ISO/TS 18571, "
+    "1 is perfect. In band: part of the measured curve within the 95 % band. Band width: mean width of that band over "
+    "the measured peak. Factor: on the simulated force, for the width of the specimen and the gain of its sensor."
 )
 
 
@@ -44,10 +43,10 @@ def study_page(
     """
     body = joined([
         stamped("Study of several cuts", content["food"], content["study"], content["passed"],
-                {"forces": "Forces", "ranking": "Null models", "parameters": "What was fitted",
-                 "limits": "What this does not show"}),
-        element("main", _verdict(content), _forces(content, curves, held, figures), _ranking(content),
-                _parameters(content), limits_section(content), _provenance(content)),
+                {"forces": "Forces", "lines": "Lines of each cut", "model": "Model", "ranking": "Null models",
+                 "parameters": "What was fitted", "limits": "What this does not show"}),
+        element("main", _verdict(content), _forces(content, curves, held, figures), _lines(content), _model(content),
+                _ranking(content), _parameters(content), limits_section(content), _provenance(content)),
         element("footer", element("p", f"cutcal {content['cutcal']}, run of {content['created']}. ",
                                   element("a", "report.pdf", href="report.pdf"), " lies in the same folder.")),
         data("curves", {"cuts": [drawable(columns, name in held) for name, columns in curves.items()]}),
@@ -100,10 +99,11 @@ def _verdict(c: Data) -> Markup:
     for title, key, none in kinds:
         rows = [[r["name"], *r["cells"], mark(r["mark"])] for r in c[key]]
         parts.append(element("h2", title))
-        parts.append(table(HEAD, rows, range(1, 8), id=key, label=title) if rows else element("p", none))
-        if rows and key == "held":
-            parts.append(element("p", f"Limits: {c['held_limits']}.", class_="note"))
-    words = element("p", WORDS, class_="note")
+        parts.append(table(HEAD, rows, range(1, 9), id=key, label=title) if rows else element("p", none))
+        limits = f"Limits: {c[f'{key}_limits']}." if c[f"{key}_limits"] else ""
+        said = " ".join(text for text in (limits, *c[f"{key}_notes"]) if text)
+        parts.append(element("p", said, class_="note") if rows and said else Markup(""))
+    words = element("p", f"{WORDS} {c['chi_square']}", class_="note")
     return element("section", element("p", c["sentence"]), *parts, words, id="verdict")
 
 
@@ -131,6 +131,47 @@ def _forces(
     )
 
 
+def _lines(c: Data) -> Markup | None:
+    """The lines of each cut, with their limits."""
+    if not c["lines"]:
+        return None
+    parts = []
+    for name, rows in c["lines"]:
+        cells = [[v["name"], v["value"], v["limit"], mark(v["mark"]), v["note"]] for v in rows]
+        head = ("Line", "Value", "Limit", "Verdict", "Note")
+        parts += [element("h3", name), table(head, cells, (1, 2), label=f"Lines of {name}")]
+    said = element("p", "A cut passes where each of its lines does.")
+    return element("section", element("h2", "The lines of each cut"), said, *parts, id="lines")
+
+
+def _model(c: Data) -> Markup:
+    """The cuts as they were simulated, the laws, and where limits and ranges come from."""
+    w = c["model"]
+    head = ("Cut", "Specimen: across the blade, along it, height", "Knife", "Cells", "Particles", "Stroke", "Peak",
+            "Simulated")  # fmt: skip
+    laws = [[part, law, element("code", names)] for part, law, names in w["laws"]]
+    ranges = [[element("code", row[0]), *row[1:]] for row in w["ranges"]]
+    kept = ("Cut", "Subtracted", "Contact", "Stroke by", "Noise", "Filter", "Low-pass")
+    parts: list[Markup] = [
+        element("h2", "The model"),
+        element("p", w["method"]),
+        table(head, w["cuts"], (4, 5, 6, 7), id="cuts", label="The cuts as they were simulated"),
+        table(("Part", "Law", "Properties"), laws, label="Laws"),
+        element("p", w["fixed"]),
+    ]
+    if w["conditioning"]:
+        parts += [element("h3", "From record to curve"), table(kept, w["conditioning"], (2, 4, 5, 6), label="Records")]
+    parts += [element("h3", "What is minimised"), element("p", w["objective"])]
+    if w["limit_sources"]:
+        parts += [element("h3", "Where the limits come from")]
+        parts += [table(("Line", "Its limit"), w["limit_sources"], label="Where the limits come from")]
+    if ranges:
+        title, columns = "Where the ranges come from", ("Property", "Literature, 95 %", "Status", "Source")
+        parts += [element("h3", title), table(columns, ranges, label=title)]
+    listed = element("ol", *(element("li", text) for text in w["references"]), class_="note")
+    return element("section", *parts, element("h3", "References"), listed, id="model")
+
+
 def _ranking(c: Data) -> Markup:
     """Each cut among curves that explain nothing."""
     parts = []
@@ -144,27 +185,37 @@ def _ranking(c: Data) -> Markup:
 
 def _parameters(c: Data) -> Markup:
     """Values, what the measurements leave open, and what numerical choices change."""
-    head = ("Parameter", "Value", "95 % interval", "Literature, 95 %", "Identifiability", "Of")
-    rows = [
-        [joined([element("code", p[0]), element("small", p[1])]), element("strong", p[2]), *p[3:]]
-        for p in c["parameters"]
-    ]
-    parts = [table(head, rows, (1, 2, 3), id="values", label="Fitted parameters") if rows else
-             element("p", "No parameter was fitted.")]  # fmt: skip
+    head = ("Parameter", "Value", "95 % interval", "Literature, 95 %", "Identifiability")
+    parts: list[Markup] = []
+    for key, title, more in (("shared", "Of all cuts", ()), ("own", "Of each cut", ("Cut",))):
+        rows = [
+            [joined([element("code", p[0]), element("small", p[1])]), element("strong", p[2]), *p[3 : 6 + len(more)]]
+            for p in c[key]
+        ]
+        if rows:
+            parts += [
+                element("h3", title),
+                table((*head, *more), rows, (1, 2, 3), id=key, label=f"Parameters: {title}"),
+            ]
+    if not parts:
+        parts = [element("p", "No parameter was fitted.")]
     if c["left_open"]:
-        known_before = ("Cut", "", "What it is", "Known before", "What the fit says", "Within 3 sd")
+        known_before = ("Cut", "Quantity", "What it is", "Known before", "What the fit says", "Within 3 sd")
         open_ = [[*row[:5], mark_of(row[5])] for row in c["left_open"]]
         parts += [element("h3", "What the measurements leave open")]
         parts += [table(known_before, open_, (3, 4), label="What the measurements leave open")]
     if c["checks"]:
         parts += [element("h3", "What numerical choices change")]
         parts += [table(("Cut", "Choice", "Peak", "Work"), c["checks"], (2, 3), label="Numerical checks")]
+        parts += [element("p", c["checks_note"], class_="note")] if c["checks_note"] else []
     return element("section", element("h2", "What was fitted"), *parts, id="parameters")
 
 
 def mark_of(word: str) -> Markup:
     """Whether a value lies within what was known before."""
-    return element("span", "yes" if word == "yes" else "no: outside", class_="yes" if word == "yes" else "no")
+    kinds = {"yes": ("yes", "yes"), "no": ("no: outside", "no")}
+    text, kind = kinds.get(word, (word, "none"))
+    return element("span", text, class_=kind)
 
 
 def _provenance(c: Data) -> Markup:

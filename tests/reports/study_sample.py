@@ -13,6 +13,11 @@ from calib.validation.metrics import Metrics, compare
 from calib.validation.null_models import ThreeTermCurve, null_models
 from tests.reports import sample
 
+CONDITIONING = {
+    "baseline_N": 0.41, "baseline_sd_N": 0.02, "baseline_kind": "constant", "onset_s": 1.25, "onset_sd_s": 0.01,
+    "end_s": 2.9, "stroke_m": 0.033, "stroke_source": "position", "noise_sd_N": 0.05, "filter_sd_m": 0.0005,
+}  # fmt: skip
+SPEED = "peak +0.8 %, work −0.40 %, extrapolated to rest"
 STROKE = np.linspace(0.0, 0.033, 240)
 #: By cut: strength of its specimen, height of its skin peak [N], and the error of its simulation.
 CUTS = {"first": (1.0, 2.4, 0.02), "second": (1.15, 2.0, -0.03), "third": (0.9, 2.9, 0.06)}
@@ -79,7 +84,9 @@ def _fitted(name: str) -> dict[str, Any]:
     return {
         "trace": {"source": f"{name}.csv", "sha256": "3b5d5c3712955042212316173ccf37be" * 2, "label": "measured"},
         "shape": sample.summary()["shape"], "knife": sample.summary()["knife"], "in_sample": True, "passed": True,
-        "metrics": _compared(name).as_dict(), "factor": 1.04, "predictive_inside": 1.0,
+        "metrics": _compared(name).as_dict(), "factor": 1.04, "predictive_inside": 1.0, "verdicts": _lines(name),
+        "predictive_width": _width(name), "scalars": {"particles": 5120.0}, "dx_m": 0.003,
+        "conditioning": CONDITIONING,
         "nuisances": {"tare": {"value": 0.01, "sd": 0.02, "prior_sd": 0.03, "unit": "N", "outside": False},
                       "scale": {"value": 0.04, "sd": 0.06, "prior_sd": 0.15, "unit": "-", "outside": False}},
         "null_models": {n: {k: m[k] for k in ("R", "nrmse")} for n, m in _nulls(name).items()},
@@ -95,7 +102,29 @@ def _predicted() -> dict[str, Any]:
     return {
         "trace": {"source": f"{HELD}.csv", "sha256": "c0ffee00" * 8, "label": "measured"},
         "trained_on": [name for name in CUTS if name != HELD], "passed": True, "metrics": _compared(HELD).as_dict(),
-        "factor": 0.91, "fitted": {"R_skin": 510.0}, "predictive_inside": 1.0,
-        "limits": {"nrmse": 0.1, "rating": 0.8, "inside": 0.9}, "null_models": _nulls(HELD) | others,
-        "beats": ["ramp", "half_sine"], "simulations": 31,
+        "factor": 0.91, "fitted": {"R_skin": 510.0}, "predictive_inside": 1.0, "predictive_width": _width(HELD),
+        "limits": {"nrmse": 0.1, "rating": 0.8, "inside": 0.9, "width": 0.5}, "null_models": _nulls(HELD) | others,
+        "beats": ["ramp", "half_sine"], "simulations": 31, "verdicts": _lines(HELD)[3:4], "dx_m": 0.003,
+        "particles": 4096, "shape": sample.summary()["shape"], "knife": sample.summary()["knife"],
+        "conditioning": CONDITIONING | {"bandwidth_Hz": 15.0},
+        "nuisances": {"scale": {"value": -0.094, "sd": 0.02, "prior_sd": 0.15, "unit": "-", "outside": False}},
     }  # fmt: skip
+
+
+def _width(name: str) -> float:
+    """Mean width of its band over its peak."""
+    columns, start = curves(name), "predicted" if name == HELD else "band"
+    return float(np.mean(columns[f"{start}_high_N"] - columns[f"{start}_low_N"]) / columns["real_N"].max())
+
+
+def _lines(name: str) -> list[dict[str, Any]]:
+    """Lines of a verdict, of which none fails."""
+    m = _compared(name)
+    found = (("peak force error", m.peak_error, 0.1, ""), ("curve error (NRMSE)", m.nrmse, 0.08, ""),
+             ("normalised-shape error", m.shape_error, 0.08, ""),
+             ("kinetic over internal energy", 0.002, 0.1, ""), ("half the simulated speed", 0.008, 0.05, SPEED),
+             ("cells of two thirds", 0.012, 0.05, "peak −1.2 %, work +0.60 %"))  # fmt: skip
+    return [
+        {"name": n, "value": x, "limit": limit, "unit": "fraction", "passed": abs(x) <= limit, "note": note}
+        for n, x, limit, note in found
+    ]

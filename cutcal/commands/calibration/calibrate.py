@@ -272,15 +272,16 @@ def fit_study(args: argparse.Namespace, study: StudySpec, out: Path) -> int:
 
 def study_text(result: StudyResult, out: Path) -> str:
     """What the terminal shows at the end of a study."""
-    lines = [f"  {'':24s}{'peak':>8s}{'NRMSE':>8s}{'shape':>8s}{'ISO':>7s}{'in band':>9s}{'factor':>8s}"]
+    lines = [f"  {'':24s}{'peak':>8s}{'NRMSE':>8s}{'shape':>8s}{'ISO':>7s}{'in band':>9s}{'width':>7s}{'factor':>8s}"]
     rows: list[tuple[str, InSampleCut | HeldOutCut]] = [(f"{n}, in-sample", cut) for n, cut in result.traces.items()]
     rows += [(f"{n}, held out", cut) for n, cut in result.hold_out.items()]
     for name, cut in rows:
         m, inside = cut.metrics, cut.predictive_inside
         within = "" if inside is None else f"{inside:.0%}"
+        width = "" if cut.predictive_width is None else f"{cut.predictive_width:.0%}"
         lines.append(
             f"  {'pass' if cut.passed else 'FAIL'}  {name:18s}{m.peak_error:+8.1%}{m.nrmse:8.3f}{m.shape_error:8.3f}"
-            f"{m.iso18571.R:7.3f}{within:>9s}{cut.factor:8.3g}"
+            f"{m.iso18571.R:7.3f}{within:>9s}{width:>7s}{cut.factor:8.3g}"
         )
         lines += [f"        {m.iso18571.caveat}"] if m.iso18571.caveat else []
     lines.append(f"  {'fitted':24s}{'value':>10s} {'':6s}{'95 % interval':>24s}")

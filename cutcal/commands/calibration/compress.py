@@ -41,7 +41,7 @@ of load (load_N, force_kN, ...) and may have one of repeats (replicate,
 specimen). A machine that counts both negative is read with --sign -.
 
 Exit codes: 0 passed, 1 error in input or run, 2 fitted but not within the
-limits (curve error 5 %, modulus over 0-5 % strain 10 %, solver 3 %)."""
+limits (curve error 5 %, slope over 0 to 5 % strain 10 %, solver 3 %)."""
 
 
 def add_args(p: argparse.ArgumentParser) -> None:
@@ -141,7 +141,7 @@ def outline_of(args: argparse.Namespace) -> tuple[str, float, float]:
 def table(result: CompressionResult) -> str:
     """What the terminal shows at the end."""
     modulus, small, force = result.E, result.slope, result.force_error
-    window = f"over 0-{modulus.window[1]:.0%} strain"
+    window = f"over 0 to {100 * modulus.window[1]:g} % strain"
     spread = "one repeat, no interval"
     if modulus.repeats > 1:
         spread = (
@@ -150,8 +150,8 @@ def table(result: CompressionResult) -> str:
         )
     lines = [
         f"E = {modulus.mean_Pa / 1e3:.4g} kPa {window} ({spread})",
-        f"  modulus 0-5 %: measured {small.measured_Pa / 1e3:.4g} kPa, fitted {small.fitted_Pa / 1e3:.4g} kPa "
-        f"({small.error:+.1%})",
+        f"  slope over 0 to 5 % strain: measured {small.measured_Pa / 1e3:.4g} kPa, "
+        f"fitted {small.fitted_Pa / 1e3:.4g} kPa ({small.error:+.1%})",
         f"  largest force error beyond {force.from_strain:.0%} strain: {force.value:+.1%} at {force.strain:.1%}",
     ]
     for other in result.sensitivity or ():

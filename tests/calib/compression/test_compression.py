@@ -232,7 +232,13 @@ def test_a_calibration_end_to_end(tmp_path, capsys):
     command = ["press", "compress", "--trace", str(trace), *FAST, "--cells", "12", "--out", str(out)]
     assert main([*command, "--bracket"]) == 0
     text = capsys.readouterr().out
-    for word in ("kPa over 0-20% strain", "95 % interval", "modulus 0-5 %", "bonded plates", "nu = 0.4 is assumed"):
+    for word in (
+        "kPa over 0 to 20 % strain",
+        "95 % interval",
+        "slope over 0 to 5 %",
+        "bonded plates",
+        "nu = 0.4 is assumed",
+    ):
         assert word in text
     document = valid(json.loads((out / "compress.json").read_text()))
     keys = (
@@ -265,7 +271,7 @@ def test_a_curve_that_does_not_fit_is_exit_code_2(tmp_path, capsys, monkeypatch)
     assert "FAIL" in text and "one repeat, no interval" in text
     document = json.loads((tmp_path / "a/compress.json").read_text())
     failed = {line["name"] for line in document["verdicts"] if not line["passed"]}
-    assert {"curve error (NRMSE)", "modulus 0-5 %, fitted against measured"} <= failed
+    assert {"curve error (NRMSE)", "slope over 0 to 5 % strain, fitted against measured"} <= failed
     assert document["E"]["sd_Pa"] is None and not document["passed"]
     good = synthetic(tmp_path / "good.csv", (5e4,))
     monkeypatch.setattr("calib.compression.modulus_calibration.SOLVER_ERROR_LIMIT", 1e-6)

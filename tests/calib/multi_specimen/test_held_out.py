@@ -16,9 +16,11 @@ from calib.fit.options import FitOptions
 from calib.material.food import load_food
 from calib.material.knife import load_knife
 from calib.material.scene import Sizing, cut_scene, specimen
-from calib.multi_specimen.held_out import _adapted, _drawn, _own_fit, _OwnFit
+from calib.multi_specimen.held_out import HeldOutPrediction, _adapted, _drawn, _own_fit, _OwnFit
 from calib.problem.objective import Objective
 from calib.problem.parameters import ParameterSet
+from calib.uncertainty.predictive import Band
+from calib.validation.metrics import compare
 from mpm.scene import Scene
 from tests.calib.fake import FIVE, Fake, goal, three_terms
 
@@ -126,3 +128,15 @@ def test_a_size_that_a_study_shares_is_no_property_of_the_flesh(monkeypatch: pyt
     for one in cut:
         assert one.food.material.R == 300.0
         assert (one.food.shape.height, one.food.shape.roundness) == (0.06, 0.2)
+
+
+@pytest.mark.parametrize(("half", "passes"), [(0.2, True), (0.3, False)])
+def test_a_band_wider_than_half_of_the_peak_fails_the_cut(half: float, passes: bool) -> None:
+    """The curve is predicted to the last bit and lies in both bands: the wider one holds any curve, and fails."""
+    stroke = np.linspace(0.0, 0.03, 200)
+    curve = 20.0 * np.sin(np.pi * stroke / 0.03)
+    band = Band(curve - 20.0 * half, curve + 20.0 * half, 1.0)
+    found = HeldOutPrediction(
+        "c", ("a",), curve, {}, 1.0, compare(stroke, curve, curve), {}, band, 1, (), Scene.__new__(Scene), None, ()
+    )
+    assert found.width == pytest.approx(2.0 * half, rel=1e-3) and found.passed is passes

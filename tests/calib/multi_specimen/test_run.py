@@ -151,6 +151,10 @@ def test_each_cut_is_predicted_from_the_others(finished: tuple[Path, Path, int])
         assert held["metrics"]["nrmse"] < 0.03 and held["predictive_inside"] > 0.9
         assert {"ramp", "half_sine"} <= set(held["beats"]) and "mean of the others" in held["null_models"]
         assert set(held["fitted"]) == {"R_skin"}
+        assert 0.05 < held["predictive_width"] < held["limits"]["width"] == 0.5
+        scale = held["nuisances"]["scale"]
+        assert np.exp(scale["value"]) == pytest.approx(held["factor"]) and 0.0 < scale["sd"] < scale["prior_sd"]
+        assert held["shape"]["height"] == HEIGHT and held["conditioning"]["stroke_m"] == pytest.approx(HEIGHT, rel=0.1)
         trace = summary["traces"][name]
         assert trace["in_sample"] and trace["predictive_inside"] > 0.9
         assert trace["values"]["R_skin"] / trace["values"]["R"] == pytest.approx(skin / FLESH["R"], rel=0.15)
@@ -174,7 +178,7 @@ def test_what_is_written_can_be_read(finished: tuple[Path, Path, int]) -> None:
     assert (columns["band_low_N"] <= columns["band_high_N"]).all()
     assert all(read_section(out / f"record-{name}.h5") is not None for name in SPECIMENS)
     assert summary["traces"]["b"]["shape"]["height"] == HEIGHT and summary["traces"]["b"]["knife"]["name"] == "kitchen"
-    assert any("hold_out are predictions" in text for text in summary["limits"])
+    assert any("are predictions from the other cuts" in text for text in summary["limits"])
 
 
 @pytest.mark.slow

@@ -218,3 +218,27 @@ def test_impossible_error_models_and_evaluations_are_refused() -> None:
         run(wave(FINE), fraction=math.nan)
     with pytest.raises(ValueError, match="equal length"):
         run(wave(FINE), FINE[:-1])
+
+
+def test_the_factors_uncertainty_is_the_curvature_of_its_misfit() -> None:
+    """Value and standard deviation of the factor's logarithm against a parabola through the misfit by brute force; with
+    a trace that says nothing it is the prior, and without a factor there is no estimate."""
+    bare = objective(discrepancy=0.05)
+    curve = 1.3 * wave(GRID)
+    one = Objective(bare.target, PARAMETERS, bare.errors, scale_sd=0.15)
+    (found,) = one.factor_estimate(curve)
+
+    def misfit(log: float) -> float:
+        rows = bare.data_residual(math.exp(log) * curve, 1.0)
+        return float(rows @ rows) + (log / 0.15) ** 2
+
+    step = 1e-3
+    low, best, high = (misfit(found.value + k * step) for k in (-1, 0, 1))
+    assert found.name == "scale" and math.exp(found.value) == pytest.approx(one.factor(curve))
+    assert abs(high - low) < 0.01 * (high + low - 2.0 * best)  # the least value
+    assert found.sd == pytest.approx(math.sqrt(2.0 / ((high + low - 2.0 * best) / step**2)), rel=0.01)
+    assert found.sd < found.prior_sd == 0.15 and not found.outside
+    (blind,) = Objective(bare.target, PARAMETERS, ErrorModel(discrepancy=1e3, peak=1e3), scale_sd=0.15).factor_estimate(
+        curve
+    )
+    assert blind.sd == pytest.approx(0.15, rel=0.01) and bare.factor_estimate(curve) == ()

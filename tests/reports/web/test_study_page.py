@@ -66,10 +66,15 @@ def test_its_numbers_are_those_of_the_pdf(folder: Path, page: Page) -> None:
     """Cells of the verdict and of the parameters are the texts that the typesetter gets."""
     printed = content(read_study(folder))
     for key in ("held", "fitted"):
-        cells = [[spaced(text) for text in row[1:8]] for row in page.tables[key][1:]]
+        cells = [[spaced(text) for text in row[1:9]] for row in page.tables[key][1:]]
         assert cells == [[spaced(text) for text in row["cells"]] for row in printed[key]]
-    values = [spaced(row[1]) for row in page.tables["values"][1:]]
-    assert values == [spaced(p[2]) for p in printed["parameters"]] and values
+    for key in ("shared", "own"):
+        values = [spaced(row[1]) for row in page.tables[key][1:]]
+        assert values == [spaced(p[2]) for p in printed[key]] and values
+    cuts = [[spaced(text) for text in row] for row in page.tables["cuts"][1:]]
+    assert cuts == [[spaced(text) for text in row] for row in printed["model"]["cuts"]]
+    for _, rows in printed["lines"]:
+        assert all(spaced(row["limit"]) in spaced(page.text) for row in rows)
     assert "✓ passed" in page.text and printed["limits"][0] in page.text
 
 
