@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from reports.base.format import count, plain, quantity, uncertain
+from reports.base.format import before_and_after, count, plain, quantity
 from reports.base.labels import capital, in_words
 
 if TYPE_CHECKING:
@@ -22,22 +22,25 @@ LEFT_OPEN = {
     "width": "factor on the force: width of the specimen",
     "scale": "factor on the force: width and sensor",
 }
+#: What is another thing on the way up.
+LEFT_OPEN_UP = {"tare": "level of the force on the way up: that before contact, and the drift until then"}
 
 
-def left_open(name: str, n: FittedNuisance | Any) -> list[str]:
+def left_open(name: str, n: FittedNuisance | Any, *, up: bool = False) -> list[str]:
     """What was known of one thing that the measurement leaves open, what the fit says of it, and whether they agree.
 
     Args:
         name: Its name.
         n: Its value, standard deviations and unit.
+        up: Whether it is of the way up.
 
     Returns:
         Cells of a line: name, what it is, before, after, and ``yes`` or ``no``.
     """
     unit = "fraction" if n.unit == "-" else n.unit
-    before = f"0 ± {quantity(n.prior_sd, unit, digits=2)}"
-    said = "yes" if not n.outside else "no"
-    return [capital(in_words(name)), LEFT_OPEN.get(name, ""), before, uncertain(n.value, n.sd, unit), said]
+    before, after = before_and_after(n.value, n.sd, n.prior_sd, unit)
+    what = (LEFT_OPEN | LEFT_OPEN_UP if up else LEFT_OPEN).get(name, "")
+    return [capital(in_words(name)), what, before, after, "no" if n.outside else "yes"]
 
 
 def errors(posterior: Posterior, stroke: float, points: int) -> list[str]:

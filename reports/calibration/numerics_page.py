@@ -83,7 +83,7 @@ def failures(failures: Sequence[BrokenRun]) -> list[list[str]]:
     for reason in sorted({f.reason for f in failures}):
         same = [f for f in failures if f.reason == reason]
         parts = [f.fraction for f in same if f.fraction is not None]
-        span = interval(min(parts), max(parts), "fraction") if parts else ""
+        span = interval(min(parts), max(parts), "fraction", digits=2) if parts else ""
         units = same[0].units
         first = [f"{name} = {shown(x, units[name], 3)}" for name, x in same[0].parameters.items()]
         rows.append([breakable(in_words(reason)), str(len(same)), span, "; ".join(first)])
