@@ -61,6 +61,15 @@ def plain(x: float, digits: int | None = 3) -> str:
     return _grouped(rounded, max(0, digits - 1 - math.floor(math.log10(abs(rounded)))))
 
 
+def at_axis(x: float) -> str:
+    """A number at an axis: thousands set apart, and powers of ten where it is very large or small.
+
+    >>> at_axis(0.5), at_axis(2e4).replace(NBSP, " "), at_axis(1e7), at_axis(5e-6)
+    ('0.5', '20 000', '10⁷', '5 × 10⁻⁶')
+    """
+    return count(x) if GROUP_FROM <= abs(x) < PLAIN_RANGE[1] else plain(x, None).removeprefix("1 × ")
+
+
 def count(n: float | None) -> str:
     """A whole number, thousands set apart from ten thousand on; a dash where there is none.
 
