@@ -156,8 +156,8 @@ def influences(sensitivity: Mapping[str, Mapping[str, SobolIndices]]) -> list[st
 def influence_caption() -> str:
     """What the figure of the influences shows, with its citation."""
     return (
-        "What moves the curve: part of the variance of each quantity while all parameters range over the literature's ranges: of one alone "
-        "(first-order Sobol index), and with what it does together with others (total index) [@Sobol 2001]. Computed "
-        "on the surrogate, a statistical model of the curve between the simulated ones, which is an extrapolation far "
-        "from them."
+        "What moves the curve: part of the variance of each quantity while all parameters range over the literature's "
+        "ranges, of one alone (first-order Sobol index), and with what it does together with others (total index) "
+        "[@Sobol 2001]. Computed on the surrogate, a statistical model of the curve between the simulated ones, which "
+        "is an extrapolation far from them."
     )
