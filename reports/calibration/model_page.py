@@ -39,11 +39,7 @@ LIMIT_SOURCES = {
     "parameters at a bound": "an answer at the end of what was allowed is none",
 }
 ABBREVIATIONS = (
-    (
-        "NRMSE",
-        "root mean square difference of two curves over the measured peak; on the way up over the largest measured "
-        "pull",
-    ),
+    ("NRMSE", "root mean square difference of two curves over the measured peak"),
     ("Shape error", "the same with each curve over its own peak"),
     (
         "ISO rating",
@@ -67,13 +63,14 @@ def model(result: CalibrationResult) -> Data:
         Rows and sentences by name.
     """
     names = {v.name for v in result.verdicts if v.limit is not None}
+    more = {} if result.withdrawal is None else {"NRMSE": "; on the way up over the largest measured pull"}
     return {
         "method": _method(result),
         "laws": _laws(result),
         "conditions": _conditions(result),
         "objective": _objective(result),
         "limit_sources": _limit_sources(names),
-        "abbreviations": [list(pair) for pair in ABBREVIATIONS],
+        "abbreviations": [[name, text + more.get(name, "")] for name, text in ABBREVIATIONS],
         "food_references": [[breakable(name), breakable(text)] for name, text in result.references.items()],
     }
 

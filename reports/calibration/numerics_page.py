@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 KINDS = {
     "coarse": "on the screening grid",
     "fine": "on the grid that counts",
-    "again": "at the best values once more, at half the speed and with other particles",
+    "again": "as repeats (half the speed, other particles)",
     "check": "as checks of the numerics",
 }
 #: Part of the simulations from which on the first page says that they broke down [-].
