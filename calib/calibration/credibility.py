@@ -31,7 +31,7 @@ COVERAGE = 2.0
 """Coverage factor k: some 95 % of a normal distribution [-]."""
 NOT_STATED = "not stated"
 NOT_COUNTED = (
-    "The parameters were fitted to this very trace, so that E is small by construction: it is an error after "
+    "The parameters were fitted to this very trace, so that S - D is small by construction: it is an error after "
     "calibration, and a prediction of another cut (cutcal predict) is what validates.",
     "u_input is the width of the specimen where nobody measured it; other sizes and properties that were put in have "
     "no uncertainty here.",

@@ -10,7 +10,7 @@ from calib.errors import MaterialError
 from calib.io.wording import quoted
 from calib.io.yaml_checks import Place, check_keys, check_unit, choice, finite_number, mapping, suggest, text
 from calib.table.si_numbers import si_number
-from mpm.output.number_text import interval
+from mpm.output.number_text import interval, quantity
 from mpm.scene.material import LARGEST_RATE_EXPONENT, MAX_POISSON, REFERENCE_SPEED
 
 #: Where a literature value comes from: measured on this food; Table 2 of the CulinaryCut paper; another food,
@@ -236,8 +236,8 @@ class Property:
             said.append(self.flag)
         if not self.low <= self.value <= self.high:
             said.append(
-                f"{self.value:.4g} {self.unit} ({self.status}) is outside the literature's range "
-                f"{self.low:.3g} to {self.high:.3g} {self.unit}"
+                f"{quantity(self.value, self.unit, digits=None)} ({self.status}) is outside the literature's range "
+                f"{interval(self.low, self.high, self.unit, digits=None)}"
             )
         return said
 
@@ -248,7 +248,7 @@ class Property:
         if not (min(values, default=0.0) > 0.0 and max(values) > DISAGREEMENT * min(values)):
             return None
         apart = f"{max(values) / min(values):.3g} times"
-        return f"published values go from {interval(min(values), max(values), self.unit)}, {apart}"
+        return f"published values go from {interval(min(values), max(values), self.unit, digits=None)}, {apart}"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data in the layout of ``materials.yaml``."""

@@ -45,7 +45,7 @@ def check_speeds(
         return
     cuts = f"the speed of one cut ({', '.join(speeds)})" if len(speeds) == 1 else f"the speeds of {', '.join(speeds)}"
     raise MaterialError(
-        f"{where} {RATE_EXPONENT}: {cuts}, {interval(min(known), max(known), 'm/s')}, cannot tell it from R; fit cuts "
-        f"whose speeds are a factor of {LEAST_SPEED_RATIO:g} or more apart in one study (--config), or leave "
-        f"{RATE_EXPONENT} out"
+        f"{where} {RATE_EXPONENT}: {cuts}, {interval(min(known), max(known), 'm/s', digits=None)}, cannot tell it from "
+        f"R; fit cuts whose speeds are a factor of {LEAST_SPEED_RATIO:g} or more apart in one study (--config), or "
+        f"leave {RATE_EXPONENT} out"
     )

@@ -24,7 +24,7 @@ from calib.validation.numerical_checks import (
 )
 from calib.validation.predictive_score import PredictiveScore
 from calib.validation.prior_conflict import PriorConflict
-from mpm.output.number_text import quantity, uncertain
+from mpm.output.number_text import before_and_after, quantity
 
 # Limits of a single in-sample calibration. Peak: the figure that published work quotes (CulinaryCut, "within 5 %").
 # Curve and shape: twice the target of a validated model (5 %), because absolute forces of the sensors that such traces
@@ -147,7 +147,8 @@ def _constants(checks: Sequence[Check]) -> Verdict:
 def _nuisance(name: str, n: FittedNuisance) -> Verdict:
     size = abs(n.value) / n.prior_sd
     unit = "fraction" if n.unit == "-" else n.unit
-    note = f"{name} {uncertain(n.value, n.sd, unit)}, expected 0 ± {quantity(n.prior_sd, unit, digits=2)}"
+    before, after = before_and_after(n.value, n.sd, n.prior_sd, unit)
+    note = f"{name} {after}, expected {before}"
     return Verdict(NUISANCE_LINES[name], size, OUTSIDE, "sd", not n.outside, note)
 
 
@@ -220,7 +221,8 @@ def _seven_numbers(found: PredictiveScore) -> str:
     score = found.null_scores.get("three_term")
     if score is None:
         return ""
-    return f"; no better than seven numbers ({score:.2f})" if score < found.score else f"; seven numbers: {score:.2f}"
+    text = quantity(score, "fraction")
+    return f"; no better than seven numbers ({text})" if score < found.score else f"; seven numbers: {text}"
 
 
 def _conflict(found: PriorConflict) -> Verdict:

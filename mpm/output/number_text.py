@@ -30,8 +30,6 @@ LADDERS: dict[str, tuple[tuple[float, float, str], ...]] = {
 }
 #: Decimals of a per cent that are worth printing.
 PERCENT_PLACES = 2
-#: A range whose lower end is below this part of its unit gets a unit for each end: 50 kPa to 2 MPa.
-SMALL_END = 0.1
 #: A value this close to the next unit counts as reaching it: 1e-3 m is 1 mm whatever the last bit says.
 ROUNDING = 1e-9
 #: Outside this range a number is written with a power of ten.
@@ -63,6 +61,15 @@ def plain(x: float, digits: int | None = 3) -> str:
     return _grouped(rounded, max(0, digits - 1 - math.floor(math.log10(abs(rounded)))))
 
 
+def at_axis(x: float) -> str:
+    """A number at an axis: thousands set apart, and powers of ten where it is very large or small.
+
+    >>> at_axis(0.5), at_axis(2e4).replace(NBSP, " "), at_axis(1e7), at_axis(5e-6)
+    ('0.5', '20 000', '10⁷', '5 × 10⁻⁶')
+    """
+    return count(x) if GROUP_FROM <= abs(x) < PLAIN_RANGE[1] else plain(x, None).removeprefix("1 × ")
+
+
 def count(n: float | None) -> str:
     """A whole number, thousands set apart from ten thousand on; a dash where there is none.
 
@@ -72,7 +79,9 @@ def count(n: float | None) -> str:
     return DASH if n is None else _grouped(n, 0)
 
 
-def quantity(value: float | None, unit: str, *, digits: int | None = 3, signed: bool = False) -> str:
+def quantity(
+    value: float | None, unit: str, *, digits: int | None = 3, signed: bool = False, like: float | None = None
+) -> str:
     """A value in the unit people use for it; a dash where there is none.
 
     Args:
@@ -81,6 +90,7 @@ def quantity(value: float | None, unit: str, *, digits: int | None = 3, signed: 
             an unknown unit is kept.
         digits: Significant digits; None for the shortest text (limits, settings).
         signed: Whether a positive value gets its sign.
+        like: Value whose unit is used [SI unit]: numbers that stand side by side share one. None or zero: its own.
 
     Returns:
         Number and unit.
@@ -90,48 +100,52 @@ def quantity(value: float | None, unit: str, *, digits: int | None = 3, signed: 
     """
     if value is None or not math.isfinite(value):
         return DASH
-    factor, name = rung(unit, abs(value))
+    factor, name = rung(unit, abs(like or value))
     x = value / factor
     few = name == "%" and digits is not None and 0.0 < abs(x) < 10.0 ** (digits - PERCENT_PLACES)
     text = _grouped(x, PERCENT_PLACES) if few else plain(x, digits)
     return _with_unit(("+" if signed and text.strip("0.") and x > 0.0 else "") + text, name)
 
 
-def interval(low: float | None, high: float | None, unit: str) -> str:
-    """A range to three digits; a bound if one end is not known, a dash if neither is.
+def interval(
+    low: float | None, high: float | None, unit: str, *, digits: int | None = 3, like: float | None = None
+) -> str:
+    """A range with both ends to the same digits and in one unit; a bound if one end is not known, a dash if neither is.
 
     Args:
         low: Lower end in the SI unit, or None.
         high: Upper end in the SI unit, or None.
         unit: SI unit, as of :func:`quantity`.
+        digits: Significant digits of each end; None for the shortest text (settings, published values).
+        like: Value whose unit is used [SI unit], such as the one that the range is of. None or zero: the larger end.
 
     Returns:
-        Both numbers with one unit, or each with its own where they lie far apart.
+        Both numbers with one unit.
 
-    >>> interval(0.8e6, 2e6, "Pa").replace(NBSP, " "), interval(5e4, 2e6, "Pa").replace(NBSP, " ")
-    ('0.8 to 2 MPa', '50 kPa to 2 MPa')
+    >>> interval(0.8e6, 2e6, "Pa").replace(NBSP, " "), interval(5e4, 2e6, "Pa", like=3e5).replace(NBSP, " ")
+    ('0.800 to 2.00 MPa', '50.0 to 2000 kPa')
     """
     ends = [x if x is not None and math.isfinite(x) else None for x in (low, high)]
     known = [abs(x) for x in ends if x is not None]
     if not known:
         return DASH
-    own = ["" if x is None else quantity(x, unit, digits=None) for x in ends]
-    if not all(own):
-        return f"above {own[0]}" if own[0] else f"below {own[1]}"
-    factor, name = rung(unit, max(known))
-    if 0.0 < min(known) < SMALL_END * factor and rung(unit, min(known))[1] != name:
-        return f"{own[0]} to {own[1]}"
-    texts = [plain(x / factor, None) for x in ends if x is not None]
+    size = like or max(known)
+    if len(known) == 1:
+        side, end = ("above", ends[0]) if ends[0] is not None else ("below", ends[1])
+        return f"{side} {quantity(end, unit, digits=digits, like=size)}"
+    factor, name = rung(unit, abs(size))
+    texts = [plain(x / factor, digits) for x in ends if x is not None]
     return _with_unit(" to ".join(texts if texts[0] != texts[1] else texts[:1]), name)
 
 
-def uncertain(value: float | None, sd: float | None, unit: str) -> str:
+def uncertain(value: float | None, sd: float | None, unit: str, *, like: float | None = None) -> str:
     """A value with its standard uncertainty, both to the second digit of the uncertainty.
 
     Args:
         value: In the SI unit, or None.
         sd: Its standard uncertainty in the SI unit, or None.
         unit: SI unit, as of :func:`quantity`.
+        like: Value whose unit is used [SI unit]. None or zero: the larger one of the two.
 
     Returns:
         Both with one unit; the value alone where there is no uncertainty.
@@ -140,14 +154,34 @@ def uncertain(value: float | None, sd: float | None, unit: str) -> str:
     '12.53 ± 0.11 N'
     """
     if value is None or sd is None or not (math.isfinite(value) and math.isfinite(sd) and sd > 0.0):
-        return quantity(value, unit)
-    factor, name = rung(unit, max(abs(value), sd))
+        return quantity(value, unit, like=like)
+    factor, name = rung(unit, abs(like or max(abs(value), sd)))
     x, s = value / factor, sd / factor
     places = max(0, 1 - math.floor(math.log10(s)))
     if places > MOST_PLACES:
         return f"{quantity(value, unit)}{NBSP}±{NBSP}{quantity(sd, unit, digits=2)}"
     text = f"{_grouped(x, places)}{NBSP}±{NBSP}{_grouped(s, places)}"
     return _with_unit(f"({text})" if name in ("%", "°") else text, name)
+
+
+def before_and_after(value: float, sd: float | None, prior_sd: float, unit: str) -> tuple[str, str]:
+    """What was known of a number that should be zero, and what is known of it now, in one unit.
+
+    Args:
+        value: What it is now, in the SI unit.
+        sd: Standard uncertainty of that, or None.
+        prior_sd: Standard uncertainty before, about zero.
+        unit: SI unit, as of :func:`quantity`.
+
+    Returns:
+        Both, each with its uncertainty.
+
+    >>> [text.replace(NBSP, " ") for text in before_and_after(-8.3e-5, 8.8e-5, 5.6e-4, "m")]
+    ['0 ± 0.56 mm', '−0.083 ± 0.088 mm']
+    """
+    size = max(abs(value), sd or 0.0, prior_sd)
+    before = f"0{NBSP}±{NBSP}{quantity(prior_sd, unit, digits=2, like=size)}"
+    return before, uncertain(value, sd, unit, like=size)
 
 
 def rung(unit: str, size: float) -> tuple[float, str]:

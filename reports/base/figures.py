@@ -20,6 +20,8 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
+from mpm.output.number_text import at_axis
+
 MM = 1.0 / 25.4
 #: Width of a figure [mm]: the text width of the report, so that letters keep their size in print.
 WIDTH = 170.0
@@ -29,6 +31,9 @@ BESIDE = (2.0, 1.0)
 ENVELOPE_PARTS = 900
 #: Ratio of the ends of a log axis up to which 1, 2 and 5 of each decade have room for their numbers.
 FEW_DECADES = 1e3
+
+#: Room past the end of the stroke, part of it [-], where a mark may stand at the end.
+PAST_END = 0.03
 
 BLACK, GREY, LIGHT = "#000000", "#767676", "#dddddd"
 BLUE, SKY, GREEN, ORANGE, RED = "#0072B2", "#56B4E9", "#009E73", "#E69F00", "#D55E00"
@@ -326,7 +331,7 @@ def log_ticks(axis: Axis, low: float, high: float, few: float = FEW_DECADES) -> 
     """
     subs = (1.0, 2.0, 5.0) if high / low < few else (1.0,)
     axis.set_major_locator(LogLocator(subs=subs))
-    axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axis.set_major_formatter(FuncFormatter(lambda x, _: at_axis(x)))
     axis.set_minor_formatter(NullFormatter())
 
 
@@ -381,5 +386,6 @@ def _filtered(axes: Axes, r: ConditioningRecord, curves: Curves) -> None:
         axes.errorbar(x[np.argmax(y)], r.peak, yerr=r.peak_sd, color=RED, marker="o", ms=3.5, mfc="white",
                       capsize=2.5, lw=1.0, zorder=4)  # fmt: skip
     stroke_axis(axes, x)
+    axes.set_xlim(float(x[0]), float(x[-1]) + PAST_END * float(x[-1] - x[0]))  # a peak at the end has its whole circle
     axes.set_title("c  filtered, over stroke (circle: peak ± 1 sd)")
     axes.set_ylabel("force [N]")

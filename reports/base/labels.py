@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from reports.base.format import NBSP, breakable, count, listed, quantity
@@ -22,6 +23,9 @@ WORDS = {
 }
 #: Parts below which no number of per cent with two decimals is left.
 LEAST_PART = 5e-5
+_PER_CENT = re.compile(r"(?<=\d)%")
+_RAISED = re.compile(r"(?<=[A-Za-z])\^([23])(?!\d)")
+_EXPONENTS = str.maketrans("23", "²³")
 #: Properties of the material whose names are single words, which no capital changes.
 SYMBOLS = ("rho", "E", "nu", "R", "mu")
 
@@ -81,6 +85,12 @@ def as_sentence(text: str) -> str:
 def in_words(name: str) -> str:
     """A key of the files in words."""
     return WORDS.get(name, name.replace("_", " "))
+
+
+def in_type(text: str) -> str:
+    """A sentence of a run as a page prints it: a space before a per cent sign, and raised exponents of units."""
+    spaced = _PER_CENT.sub(f"{NBSP}%", text)
+    return _RAISED.sub(lambda m: m[1].translate(_EXPONENTS), spaced)
 
 
 def short(text: str, letters: int) -> str:

@@ -45,10 +45,15 @@ def credibility(folder: Path) -> Data | None:
             "context": [[capital(label), breakable(found[key])] for key, label in CONTEXT.items()],
             "conditions": [[capital(in_words(n)), breakable(x)] for n, x in found.get("conditions", {}).items()],
             "stated": any(found[key] != "not stated" for key in CONTEXT),
-            "not_counted": list(found["not_counted"]),
+            "not_counted": [_without_E(text) for text in found["not_counted"]],
         }
     except (KeyError, TypeError) as e:
         raise ReportError(f"{path}: damaged, incomplete ({e}); {REMEDY}") from None
+
+
+def _without_E(text: str) -> str:
+    """What older files call E, the comparison error, by its own name: E is Young's modulus."""
+    return text.replace("so that E is small", "so that S - D is small").replace("S - D", "S \u2212 D")
 
 
 def _row(one: Mapping[str, Any], factor: float) -> list[str]:

@@ -28,7 +28,8 @@ ABOUT = 0.8  # distance from the blade to which a glance goes, in heights of the
 MARGIN = 0.12  # room around the food, of its height
 FILLING = 1.2  # of a particle's square, so that there are no gaps where the food is stretched
 TALLEST = 52.0  # of one picture [mm]
-LAST = 30.0  # axes, labels and the scale of colours, of the last picture's height [mm]
+LABELS = 14.0  # title and numbers of the axes, of a picture's height [mm]
+SCALE = 18.0  # scale of colours at the right, of a picture's width [mm]
 
 
 Glance = Callable[[Axes], None]
@@ -65,16 +66,15 @@ def cut(section: Section, knife: Knife, height: float, stroke: np.ndarray, force
         force: Its forces [N], shape (n,).
 
     Returns:
-        SVG documents; the last one has the scale of the colours.
+        SVG documents; each has the scale of the colours, for they may stand on two pages.
     """
     shown = moments(section, stroke, force)
     half = float(np.abs(section.y[[k for k, _ in shown]]).max()) + MARGIN * height
     top = height * (1 + 3 * MARGIN)
-    tall = min((WIDTH - 14.0) * (top + MARGIN * height) / (2 * half), TALLEST)
-    most = float(np.percentile(section.mises[[k for k, _ in shown]], BRIGHT)) or 1.0
-    colour = ScalarMappable(Normalize(0.0, most / 1e3), COLOURS)
+    tall = min((WIDTH - SCALE - 14.0) * (top + MARGIN * height) / (2 * half), TALLEST)
+    colour = _colours(section, stroke, force)
 
-    def draw(figure: Figure, k: int, name: str, last: bool) -> None:
+    def draw(figure: Figure, k: int, name: str) -> None:
         axes = figure.subplots()
         _food(axes, section, k, colour)
         _tools(axes, knife, height - float(section.stroke[k]), top, half)
@@ -82,19 +82,16 @@ def cut(section: Section, knife: Knife, height: float, stroke: np.ndarray, force
         axes.set_title(f"{at:.1f} mm deep" + (f", {name}" if name else ""))
         axes.set(xlim=(-1e3 * half, 1e3 * half), ylim=(-1e3 * MARGIN * height, 1e3 * top), aspect="equal")
         axes.grid(visible=False)
-        axes.set_ylabel("height [mm]")
-        if last:
-            axes.set_xlabel("across the blade [mm]")
-            figure.colorbar(
-                colour, ax=axes, location="bottom", shrink=0.5, aspect=40, extend="max", label="von Mises stress [kPa]"
-            )
+        axes.set(xlabel="across the blade [mm]", ylabel="height [mm]")
+        figure.colorbar(colour, ax=axes, location="right", aspect=20, extend="max", label="von Mises stress [kPa]")
 
-    made = []
-    for n, (k, name) in enumerate(shown, 1):
-        last = n == len(shown)
-        height_mm = tall + (LAST if last else 9.0)
-        made.append(svg(partial(draw, k=k, name=name, last=last), height_mm))
-    return made
+    return [svg(partial(draw, k=k, name=name), tall + LABELS) for k, name in shown]
+
+
+def _colours(section: Section, stroke: np.ndarray, force: np.ndarray) -> ScalarMappable:
+    """The one scale of all pictures of a cut: to the stress that few particles of the moments shown exceed."""
+    most = float(np.percentile(section.mises[[k for k, _ in moments(section, stroke, force)]], BRIGHT)) or 1.0
+    return ScalarMappable(Normalize(0.0, most / 1e3), COLOURS)
 
 
 def glance(section: Section, knife: Knife, height: float, stroke: np.ndarray, force: np.ndarray) -> Glance:
@@ -112,12 +109,9 @@ def glance(section: Section, knife: Knife, height: float, stroke: np.ndarray, fo
     """
     k = int(np.argmin(np.abs(section.stroke - float(stroke[int(np.argmax(force))]))))
     half = min(float(np.abs(section.y[k]).max()) + MARGIN * height, ABOUT * height)
-    near = np.abs(section.y[k]) < half
+    colour = _colours(section, stroke, force)
 
     def draw(axes: Axes) -> None:
-        colour = ScalarMappable(
-            Normalize(0.0, (float(np.percentile(section.mises[k][near], BRIGHT)) or 1.0) / 1e3), COLOURS
-        )
         top = height * (1 + 3 * MARGIN)
         _food(axes, section, k, colour)
         _tools(axes, knife, height - float(section.stroke[k]), top, half)
@@ -125,9 +119,7 @@ def glance(section: Section, knife: Knife, height: float, stroke: np.ndarray, fo
         axes.set(xlabel="across the blade [mm]", ylabel="height [mm]")
         axes.set_title(f"largest force, {1e3 * float(section.stroke[k]):.1f} mm", loc="right")
         axes.grid(visible=False)
-        axes.figure.colorbar(
-            colour, ax=axes, location="bottom", shrink=0.9, aspect=25, extend="max", label="von Mises stress [kPa]"
-        )
+        axes.figure.colorbar(colour, ax=axes, location="right", aspect=20, extend="max", label="von Mises stress [kPa]")
 
     return draw
 

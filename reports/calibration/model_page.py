@@ -5,47 +5,27 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
-from mpm.scene.material import REFERENCE_SPEED
-from reports.base.format import breakable, count, quantity
+from mpm.scene.material import PARTS_BEFORE_IT_FLOWS, REFERENCE_SPEED
+from reports.base.format import breakable, count, plain, quantity
 from reports.base.run_folder import Data
 from reports.calibration import model_sketch
 
 if TYPE_CHECKING:
     from calib.calibration.result import CalibrationResult
 
-#: What is cited by its number on the page.
-REFERENCES = (
-    "Hu, Y., et al. (2018). A moving least squares material point method with displacement discontinuity and two-way "
-    "rigid body coupling. ACM Trans. Graph. 37(4):150. doi:10.1145/3197517.3201293",
-    "Stomakhin, A., Howes, R., Schroeder, C., Teran, J. M. (2012). Energetically consistent invertible elasticity. "
-    "Proc. Symp. Computer Animation, 25-32.",
-    "Nairn, J. A. (2003). Material point method calculations with explicit cracks. Comput. Model. Eng. Sci. 4:649-663.",
-    "Hillerborg, A., Modéer, M., Petersson, P.-E. (1976). Analysis of crack formation and crack growth in concrete. "
-    "Cem. Concr. Res. 6:773-781. doi:10.1016/0008-8846(76)90007-7",
-    "Atkins, T. (2009). The Science and Engineering of Cutting. Butterworth-Heinemann.",
-    "Chouly, F., Hild, P. (2013). A Nitsche-based method for unilateral contact problems. SIAM J. Numer. Anal. "
-    "51:1295-1307. doi:10.1137/12088344X",
-    "Kennedy, M. C., O'Hagan, A. (2001). Bayesian calibration of computer models. J. R. Statist. Soc. B 63:425-464. "
-    "doi:10.1111/1467-9868.00294",
-    "Raue, A., et al. (2009). Structural and practical identifiability analysis of partially observed dynamical models "
-    "by exploiting the profile likelihood. Bioinformatics 25:1923-1929. doi:10.1093/bioinformatics/btp358",
-    "ISO/TS 18571. Road vehicles: objective rating metric for non-ambiguous signals.",
-    "Schwer, L. E. (2007). Validation metrics for response histories. Eng. Comput. 23:295-309. "
-    "doi:10.1007/s00366-007-0070-1",
-    "Gneiting, T., Raftery, A. E. (2007). Strictly proper scoring rules, prediction, and estimation. "
-    "J. Am. Stat. Assoc. 102:359-378. doi:10.1198/016214506000001437",
-    "Sobol, I. M. (2001). Global sensitivity indices for nonlinear mathematical models. "
-    "Math. Comput. Simul. 55:271-280. doi:10.1016/S0378-4754(00)00270-6",
-)
 #: Where the limit of each line of the verdict comes from.
 LIMIT_SOURCES = {
-    "peak force error": "what published work on simulated cutting quotes as agreement",
+    "peak force error": "what published work on simulated cutting quotes as agreement [@Koh 2026]",
     "curve error (NRMSE)": "sensors of such traces are uncertain by 10 % and more",
     "normalised-shape error": "sensors of such traces are uncertain by 10 % and more",
-    "shape better than ramp and half sine": "the better of two curves without physics [11]",
+    "curve error of the withdrawal (NRMSE)": "root of the sum of two squares: the limit of the curve error, and the "
+    "uncertainty of the pull's level over the largest pull",
+    "shape better than ramp and half sine": "the better of two curves without physics",
     "curve explained by the food": "a right food fails once in a hundred cuts",
+    "values those of the food": "the right food has values as far out once in a hundred cuts",
+    "specimen no larger than the food": "one whole food in a hundred is larger",
     "width of the 95 % band": "a band wider than a quarter of the peak either way predicts nothing of use",
-    "interval score better than null models": "the better of two curves without physics [11]",
+    "interval score better than null models": "the better of two curves without physics [@Gneiting 2007]",
     "food pressed away, not parted": "measured: below, the force follows the width of the process zone, not R",
     "momentum balance residual": "rounding in a sound run; more is a defect of the program",
     "kinetic over internal energy": "practice of explicit quasi-static analysis: 5 to 10 %",
@@ -63,16 +43,18 @@ ABBREVIATIONS = (
     ("Shape error", "the same with each curve over its own peak"),
     (
         "ISO rating",
-        "overall rating after [9]: mean of Z (corridor, twice), EP (phase), EM (magnitude), ES (slope); 1 is best",
+        "overall rating after [@ISO 18571]: mean of Z (corridor, twice), EP (phase), EM (magnitude), ES (slope); 1 is "
+        "best",
     ),
-    ("Sprague–Geers M, P, C", "errors of magnitude and phase, and both combined [10]"),
+    ("Sprague–Geers M, P, C", "errors of magnitude and phase, and both combined [@Schwer 2007]"),
     ("95 % band, interval", "of the posterior: literature's ranges and trace together, unless *trace alone* is said"),
     ("±", "one standard uncertainty"),
 )
 
 
 def model(result: CalibrationResult) -> Data:
-    """What the template prints of the model.
+    """What the template prints of the model, in the order in which it is read; citations are names yet
+    (:class:`reports.base.references.Citations`).
 
     Args:
         result: The calibration.
@@ -81,14 +63,14 @@ def model(result: CalibrationResult) -> Data:
         Rows and sentences by name.
     """
     names = {v.name for v in result.verdicts if v.limit is not None}
+    more = {} if result.withdrawal is None else {"NRMSE": "; on the way up over the largest measured pull"}
     return {
         "method": _method(result),
         "laws": _laws(result),
         "conditions": _conditions(result),
         "objective": _objective(result),
         "limit_sources": _limit_sources(names),
-        "abbreviations": [list(pair) for pair in ABBREVIATIONS],
-        "references": list(REFERENCES),
+        "abbreviations": [[name, text + more.get(name, "")] for name, text in ABBREVIATIONS],
         "food_references": [[breakable(name), breakable(text)] for name, text in result.references.items()],
     }
 
@@ -132,39 +114,118 @@ def _method(result: CalibrationResult) -> str:
     )
     return (
         "The food is a three-dimensional continuum. Particles carry it and exchange momentum through a regular grid of "
-        f"cells of {quantity(cut.dx_m, 'm')} (moving least squares material point method [1], quadratic kernels): "
-        f"{count(cut.particles)} particles{lattice}.{steps} There is no artificial damping, no scaling of mass, and no "
-        "clamp on a force or a strain."
+        f"cells of {quantity(cut.dx_m, 'm')} (moving least squares material point method [@Hu 2018], quadratic "
+        f"kernels): {count(cut.particles)} particles{lattice}.{steps} There is no artificial damping, no scaling of "
+        "mass, and no clamp on a force or a strain."
     )
 
 
 def _laws(result: CalibrationResult) -> list[list[str]]:
-    """Part, law, and the values that it takes."""
-    mu = _part(result, "board", "mu")
-    zone, slip = (_part(result, "edge", key) for key in ("zone", "slip"))
-    loss = _known(result, "loss_factor")
+    """Part, law, and those of its properties that the tables of values have."""
     rows = [
-        ["Elasticity", "fixed-corotated, isotropic [2]", "E, nu, rho"],
-        ["Flow", "von Mises, no hardening, return to the yield surface of that law", "yield_stress"],
-        ["Loss", f"Kelvin–Voigt, loss factor {loss} at the first axial mode; else rate-independent", "loss_factor"],
-        ["Crack", "on the blade's plane alone [3]: ties that soften linearly [4]; their work per area is part of R",
-         "tensile_strength, R"],
-        ["Edge", "line force: starts at the resistance of skin or flesh, then needs what the opening has left of R [5]",
-         "R_skin, R_initiation, initiation_depth, R"],
-        ["Faces", "contact without adhesion (Nitsche [6]), Coulomb friction up to the shear yield stress", "mu"],
-    ]  # fmt: skip
-    if power := _known(result, "rate_exponent"):
-        at = quantity(REFERENCE_SPEED, "m/s", digits=None)
-        rows[4][1] += f"; resistances follow the real speed over {at} to the power {power}"
-    if zone is not None and slip is not None:
-        rows[4][1] += f"; acts over {quantity(zone, 'm')}, slip {quantity(slip, 'm')}"
+        ("Elasticity", "fixed-corotated, isotropic [@Stomakhin 2012]", "E nu rho"),
+        ("Flow", "von Mises, no hardening, return to the yield surface of that law", "yield_stress"),
+        _loss(result),
+        *_layers(result),
+        _crack(result),
+        _edge(result),
+        _faces(result),
+    ]
+    mu = _value(result, "board_friction")
+    mu = _part(result, "board", "mu") if mu is None else mu
     if mu is not None:
-        rows.append(["Board", f"contact without adhesion, Coulomb friction {quantity(mu, '-', digits=None)}", "–"])
+        law = f"contact without adhesion, Coulomb friction {quantity(mu, '-')}"
+        rows.append(("Board", law, "board_friction"))
+    return [[part, law, ", ".join(n for n in names.split() if _known(result, n)) or "–"] for part, law, names in rows]
+
+
+def _loss(result: CalibrationResult) -> tuple[str, str, str]:
+    """Loss factor, and relaxation where there is any."""
+    factor = _known(result, "loss_factor")
+    law = f"Kelvin–Voigt, loss factor {factor} at the first axial mode" if factor else "Kelvin–Voigt"
+    if _value(result, "relaxing_share"):
+        law += "; part of the stiffness relaxes (one Prony branch [@Simo 1987])"
+        return "Loss", law, "loss_factor relaxing_share relaxation_time relaxing_bulk"
+    return "Loss", f"{law}; else rate-independent", "loss_factor"
+
+
+def _layers(result: CalibrationResult) -> list[tuple[str, str, str]]:
+    """Rind, core and skin, where the food has them."""
+    rows = []
+    own = "laws of the flesh, with {} times its E and yield stress and a resistance of its own"
+    for name, part, factor, size in (
+        ("Rind", "layer of one thickness all round", "rind_stiffness", "rind_thickness"),
+        ("Core", "the section's outline shrunk in proportion", "core_stiffness", "core_ratio"),
+    ):
+        if _value(result, size):
+            times = own.format(_known(result, factor) or "1")
+            rows.append((name, f"{part}: {times}", f"R_{name.lower()} {size} {factor}"))
+    if _value(result, "skin_thickness"):
+        law = "what the edge has to go through first: a line force, then what the layer below needs"
+        law += "; bears tension in its plane" if _value(result, "skin_stiffness") else "; bears nothing else"
+        rows.append(("Skin", law, "R_skin skin_thickness skin_stiffness"))
     return rows
 
 
+def _crack(result: CalibrationResult) -> tuple[str, str, str]:
+    """The law of opening, and the tensile strength that it starts from."""
+    strength, ratio, stress = (_value(result, name) for name in ("tensile_strength", "strength_ratio", "yield_stress"))
+    if strength is not None:
+        start, names = quantity(strength, "Pa"), "tensile_strength R"
+    elif ratio is not None and stress is not None:
+        start, names = f"strength_ratio × yield_stress = {quantity(ratio * stress, 'Pa')}", "strength_ratio R"
+    else:
+        start, names = f"{quantity(PARTS_BEFORE_IT_FLOWS, '-', digits=None)} of the yield stress", "yield_stress R"
+        zone = _part(result, "food", "material", "cohesive_zone")
+        if zone is not None:
+            start += f", less where the process zone would be shorter than {quantity(zone, 'm', digits=None)}"
+    ties = _part(result, "numerics", "crack_ties")
+    least = "" if ties is None else f"{plain(ties, None)} ties"
+    less = f" (less where its process zone would be shorter than {least} [@Turon 2007])" if least else ""
+    law = (
+        "on the blade's plane alone [@Nairn 2003]: ties that soften linearly [@Hillerborg 1976] from the tensile "
+        f"strength, {start}{less}; their work per area is part of R"
+    )
+    return "Crack", law, names
+
+
+def _edge(result: CalibrationResult) -> tuple[str, str, str]:
+    """The line force at the edge."""
+    zone, slip = (_part(result, "edge", key) for key in ("zone", "slip"))
+    first = "skin" if _value(result, "skin_thickness") else "flesh"
+    law = (
+        f"line force: starts at the resistance of the {first}, then needs what the opening has left of R [@Atkins 2009]"
+    )
+    if power := _known(result, "rate_exponent"):
+        at = quantity(REFERENCE_SPEED, "m/s", digits=None)
+        law += f"; resistances follow the real speed over {at} to the power {power}"
+    if zone is not None and slip is not None:
+        law += f"; acts over {quantity(zone, 'm')}, slip {quantity(slip, 'm')}"
+    start = "R_skin" if first == "skin" else "R_initiation"
+    return "Edge", law, f"{start} initiation_depth R rate_exponent"
+
+
+def _faces(result: CalibrationResult) -> tuple[str, str, str]:
+    """Contact, friction and adhesion on the faces of the blade."""
+    rubs = "contact (Nitsche [@Chouly 2013]), Coulomb friction up to the shear yield stress"
+    traction = _known(result, "adhesion")
+    if not (_value(result, "adhesion_energy") and traction):
+        return "Faces", f"{rubs}; no adhesion", "mu"
+    law = (
+        f"{rubs}; what has been pressed on a face sticks, with a traction of {traction} at most, until adhesion_energy "
+        "per area is spent [@Raous 1999]"
+    )
+    return "Faces", law, "mu adhesion adhesion_energy"
+
+
+def _value(result: CalibrationResult, name: str) -> float | None:
+    """The value of a property [SI], fitted or not; None where the food has none."""
+    p = result.fitted.get(name) or result.fixed_parameters.get(name)
+    return None if p is None else p.value
+
+
 def _known(result: CalibrationResult, name: str) -> str:
-    """The value of a property, fitted or not."""
+    """The value of a property as text; empty where the food has none."""
     p = result.fitted.get(name) or result.fixed_parameters.get(name)
     return "" if p is None or p.value is None else quantity(p.value, p.unit)
 
@@ -174,10 +235,11 @@ def _conditions(result: CalibrationResult) -> list[list[str]]:
     cut = result.cut
     mach, real = quantity(cut.mach, "-"), cut.speed_real_m_s
     speed = "" if real is None else f" (the real one: {quantity(real, 'm/s')})"
+    up = "" if result.withdrawal is None else ", then up again at the same speed"
     gravity = _part(result, "numerics", "gravity")
     weight = "" if gravity is None else f", gravity of {quantity(gravity, '-')} m/s²"
     rows = [
-        ["A", f"blade: rigid, goes down at one speed, {mach} of that of pressure waves in the food{speed}"],
+        ["A", f"blade: rigid, goes down at one speed, {mach} of that of pressure waves in the food{speed}{up}"],
         ["B", "faces of the blade: contact and friction; their force is the *face part*"],
         ["C", "edge: its line force is the *edge part*"],
         ["D", "plane of the cut, whole at first: the crack runs here and nowhere else"],
@@ -195,10 +257,17 @@ def _objective(result: CalibrationResult) -> str:
     open_ = f" {words}" if result.nuisances else ""
     tied = {"E", "yield_stress"} <= set(result.fitted)
     ratio = " Yield stress over E is known to a factor of 3." if tied else ""
+    up = result.withdrawal is not None
+    what = "the force on the way down and the pull on the way up, each with its peak," if up else "curve and peak,"
+    pull = (
+        " On the way up it is 10 % of the largest pull at least, and the pull has a correlation length, a tare and a "
+        "gain of its own."
+    )
     return (
-        "The fit minimises the sum of squared residuals of curve and peak, whitened, and of the parameters against the "
+        f"The fit minimises the sum of squared residuals of {what} whitened, and of the parameters against the "
         "literature's ranges (central 95 % of normal priors, of the logarithm for stresses and resistances)."
         f"{ratio} "
         "A residual's variance is noise plus 3 % of the peak for what the model leaves out, unless another "
-        f"--discrepancy is in the command [7].{open_} Intervals are profile likelihoods whose ends were simulated [8]."
+        f"--discrepancy is in the command [@Kennedy 2001].{pull if up else ''}{open_} Intervals are profile "
+        "likelihoods whose ends were simulated [@Raue 2009]."
     )

@@ -223,7 +223,7 @@ def content(done: FinishedStudy) -> Data:
         "checks": [[breakable(name), in_words(c["name"]), *verdicts.change(c)] for name, t in fitted.items()
                    for c in t.get("numerical_checks") or []],
         "checks_note": verdicts.carried_on(s),
-        "model": model(s, done.curves, model_page.REFERENCES, model_page.LIMIT_SOURCES),
+        "model": model(s, done.curves, model_page.LIMIT_SOURCES),
         "traces": [[breakable(name), *_origin(_source(s, name))] for name in done.curves],
         "runs": _runs(s),
         "commit": s.get("git") or "",

@@ -19,9 +19,13 @@ if TYPE_CHECKING:
 KINDS = {
     "coarse": "on the screening grid",
     "fine": "on the grid that counts",
-    "again": "of these once more, slower and with other particles",
+    "again": "as repeats (half the speed, other particles)",
     "check": "as checks of the numerics",
 }
+#: Part of the simulations from which on the first page says that they broke down [-].
+MANY_FAILED = 0.1
+#: The line of the first page that has the energy that no law took.
+LOST = "energy lost by the discretisation"
 
 
 def numerics(result: CalibrationResult) -> Data:
@@ -34,13 +38,29 @@ def numerics(result: CalibrationResult) -> Data:
         "particles": count(cut.particles),
         "far": _far(cut.scene),
         "images": "none" if images in (None, False, 1) else "yes" if images is True else str(images),
-        "mach": quantity(cut.mach, "-"), "momentum": quantity(cut.momentum_residual, "fraction"),
+        "mach": quantity(cut.mach, "-"), "momentum": shown(cut.momentum_residual, "fraction", 3),
         "kinetic": quantity(cut.ke_over_ie, "fraction"), "ripple": quantity(ripple, "N"),
         "ripple_part": quantity(part, "fraction", digits=2), "wall": duration(result.wall_s),
-        **_energy(cut.energy_J or {}, cut.fracture),
+        **_energy(result),
         **_simulations(history),
         "counters": cut.counters,
     }  # fmt: skip
+
+
+def broke_down(history: SearchHistory) -> str:
+    """A sentence for the first page where many simulations broke down, with a space before it; else nothing."""
+    every, failed = _numbers(history)
+    if not failed or failed < MANY_FAILED * every:
+        return ""
+    return f" {count(failed)} of {count(every)} simulations broke down: where they lie the fit is blind."
+
+
+def _numbers(history: SearchHistory) -> tuple[int, int]:
+    """How many simulations there are, and how many of them failed; of older runs those of the search alone."""
+    kept = history.kept.values()
+    if not kept:
+        return history.simulations, history.failed_simulations
+    return sum(t.simulations for t in kept), sum(t.failed for t in kept)
 
 
 def _simulations(history: SearchHistory) -> Data:
@@ -48,8 +68,7 @@ def _simulations(history: SearchHistory) -> Data:
     kept = history.kept
     known = {kind: kept[kind] for kind in KINDS if kind in kept} | {k: t for k, t in kept.items() if k not in KINDS}
     kinds = [f"{count(t.simulations)} {KINDS.get(kind, kind)}" for kind, t in known.items()]
-    every = sum(t.simulations for t in kept.values()) if kept else history.simulations
-    failed = sum(t.failed for t in kept.values()) if kept else history.failed_simulations
+    every, failed = _numbers(history)
     of_search = f"the search made {count(history.simulations)} of them"
     return {
         "simulations": count(every),
@@ -65,12 +84,15 @@ def _far(scene: Mapping[str, Any]) -> str | None:
     return None if far is None else quantity(far, "m", digits=2)
 
 
-def _energy(energy: Mapping[str, float], fracture: Mapping[str, float] | None) -> Data:
-    """Part of the work that no law has taken, where the rest has gone, and both parts of the work of fracture; None
-    where it was not recorded."""
-    part, opening = unbooked(energy), None if fracture is None else fracture.get("opening_J_m2")
+def _energy(result: CalibrationResult) -> Data:
+    """Energy lost by the discretisation, where the rest has gone, and both parts of the work of fracture; None where it
+    was not recorded. What was lost is that of the first page where it has the line."""
+    energy, fracture = result.cut.energy_J or {}, result.cut.fracture
+    line = next((v.value for v in result.verdicts if v.name == LOST), None)
+    part = unbooked(energy) if line is None else line
+    opening = None if fracture is None else fracture.get("opening_J_m2")
     return {
-        "unbooked": None if part is None else quantity(part, "fraction", digits=2),
+        "unbooked": None if part is None else shown(part, "fraction", 3),
         "spent": spent(energy),
         "opened": None if opening is None else quantity(opening, "J/m^2", digits=3),
         "parted": None if fracture is None else quantity(fracture["edge_J_m2"], "J/m^2", digits=3),
@@ -83,7 +105,7 @@ def failures(failures: Sequence[BrokenRun]) -> list[list[str]]:
     for reason in sorted({f.reason for f in failures}):
         same = [f for f in failures if f.reason == reason]
         parts = [f.fraction for f in same if f.fraction is not None]
-        span = interval(min(parts), max(parts), "fraction") if parts else ""
+        span = interval(min(parts), max(parts), "fraction", digits=2) if parts else ""
         units = same[0].units
         first = [f"{name} = {shown(x, units[name], 3)}" for name, x in same[0].parameters.items()]
         rows.append([breakable(in_words(reason)), str(len(same)), span, "; ".join(first)])

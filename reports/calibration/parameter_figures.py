@@ -22,6 +22,8 @@ LARGEST_FACTOR = 1e3
 RISE, TOP = 3.84, 8.0
 #: Correlations from here on are bold: an interval is 2.3 times as wide as it would be if the other one were known.
 STRONG_PAIR = 0.9
+#: Height of a letter of a tilted name [mm].
+TILTED = 0.9
 #: Panels side by side.
 ACROSS = 4
 #: A log axis that spans less than this factor has the ticks of a linear one.
@@ -194,7 +196,7 @@ def influence(found: Mapping[str, Mapping[str, SobolIndices]], labels: Mapping[s
         figure.supxlabel("part of the variance", fontsize=7.5)
         figure.legend(*grid[0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
 
-    return svg(draw, 24.0 + 5.0 * len(names))
+    return svg(draw, 24.0 + max(4.0, 5.5 - 0.1 * len(names)) * len(names))
 
 
 def correlations(names: Sequence[str], matrix: np.ndarray) -> bytes:
@@ -216,16 +218,22 @@ def correlations(names: Sequence[str], matrix: np.ndarray) -> bytes:
         for (i, j), r in np.ndenumerate(shown):
             if np.isfinite(r):
                 strong = abs(r) >= STRONG_PAIR
-                axes.text(j, i, f"{r:+.2f}".replace("-", "\u2212"), ha="center", va="center",
+                axes.text(j, i, _correlation(r), ha="center", va="center",
                           fontweight="bold" if strong else "normal")  # fmt: skip
         axes.set_yticks(range(size - 1), names[1:])
-        axes.set_xticks(range(size - 1), names[:-1])
+        axes.set_xticks(range(size - 1), names[:-1], rotation=40.0, ha="right", rotation_mode="anchor")
         axes.tick_params(length=0)
         axes.grid(visible=False)
         for spine in axes.spines.values():
             spine.set_visible(False)
 
-    return svg(draw, 8.0 + 5.0 * size)
+    return svg(draw, 8.0 + 5.0 * size + TILTED * max(map(len, names[:-1])))
+
+
+def _correlation(r: float) -> str:
+    """A correlation with two decimals and its sign, which nought has not."""
+    text = f"{r:+.2f}".replace("-", "\u2212")
+    return text if text.strip("+\u22120.") else "0.00"
 
 
 def _number(row: SobolIndices | None, key: str) -> float:

@@ -69,8 +69,8 @@ def parameter(name: str, p: FittedParameter, meaning: str) -> Data:
         "name": breakable(name),
         "meaning": meaning,
         "value": quantity(value, unit),
-        "interval": interval(p.low95, p.high95, unit),
-        "literature": interval(low, high, unit),
+        "interval": interval(p.low95, p.high95, unit, like=value),
+        "literature": interval(low, high, unit, like=value),
         "verdict": in_words(p.verdict),
         "outside": (low is not None and value < low) or (high is not None and value > high),
         "status": in_words(p.status),
@@ -152,3 +152,13 @@ def influences(sensitivity: Mapping[str, Mapping[str, SobolIndices]]) -> list[st
             parts = [f"{name} ({quantity(totals[name], 'fraction', digits=2)})" for name in strong]
             said.append(f"{QUANTITIES.get(quantity_, in_words(quantity_)).capitalize()}: {listed(parts)}.")
     return said
+
+
+def influence_caption() -> str:
+    """What the figure of the influences shows, with its citation."""
+    return (
+        "What moves the curve: part of the variance of each quantity while all parameters range over the literature's "
+        "ranges, of one alone (first-order Sobol index), and with what it does together with others (total index) "
+        "[@Sobol 2001]. Computed on the surrogate, a statistical model of the curve between the simulated ones, which "
+        "is an extrapolation far from them."
+    )

@@ -71,4 +71,4 @@ def _mode(number: int, mode: ModeSummary) -> list[str]:
 def _values(mode: ModeSummary, name: str, unit: str) -> str:
     """Median and interval of a parameter in a mode."""
     r = mode.ranges[name]
-    return f"{quantity(r.median, unit)} ({interval(r.low95, r.high95, unit)})"
+    return f"{quantity(r.median, unit)} ({interval(r.low95, r.high95, unit, like=r.median)})"

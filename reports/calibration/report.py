@@ -14,7 +14,8 @@ from mpm.scene import Knife
 from mpm.scene.shapes import Shape
 from reports.base import figures
 from reports.base.format import breakable, count, listed, plain, publish, quantity, uncertain
-from reports.base.labels import capital, in_words, shown
+from reports.base.labels import LEAST_PART, capital, in_type, in_words, shown
+from reports.base.references import Citations
 from reports.base.run_folder import Data, Finished, read_finished
 from reports.calibration import (
     credibility_page,
@@ -62,6 +63,8 @@ INTERRUPTED = (
     "missing or too narrow. Continue with --resume.",
 )
 USE = "for simulating cuts of this food with this knife; the values are constants of the simulation, fitted to one cut"
+#: Parts that cite, in the order in which they are read.
+CITING = ("model", "withdrawal", "influence_caption")
 RELATIONS = {"<=": "≤ ", ">=": "≥ "}
 
 
@@ -184,7 +187,7 @@ def _content(done: Finished) -> Data:
     """Everything the template prints, as text."""
     result, broken = done.result, failures.splits(done.runs, done.result.fitted)
     fitted, fixed, correlations = result.fitted, result.fixed_parameters, result.posterior.correlations
-    return {
+    content = {
         "food": result.food.replace("_", " ").capitalize(),
         "cutcal": result.software.versions.get("cutcal", ""),
         "created": done.created.strftime("%Y-%m-%d %H:%M"),
@@ -204,7 +207,7 @@ def _content(done: Finished) -> Data:
         "curves": {**_legend(result), "inside": _inside(result)},
         "conditioning": _conditioning(done),
         "left_open": [measurement.left_open(name, n) for name, n in result.nuisances.items()],
-        "errors": measurement.errors(result.posterior, result.conditioning.stroke_m, len(done.curves["stroke_m"])),
+        "errors": measurement.errors(result, len(done.curves["stroke_m"])),
         "null_rows": _null_rows(result),
         "null_sentences": _null_sentences(result.agreement),
         "metrics": _metrics(result.agreement),
@@ -212,18 +215,23 @@ def _content(done: Finished) -> Data:
         "legend": parameter_page.legend(fitted),
         "posterior": posterior_page.posterior(result.sampled, fitted),
         "influences": parameter_page.influences(result.sensitivity),
+        "influence_caption": parameter_page.influence_caption() if result.sensitivity else "",
         "correlations": parameter_page.correlations(correlations) if correlations else None,
         "fixed": [parameter_page.fixed(name, p, result.meaning(name)) for name, p in fixed.items()],
         "numerics": numerics_page.numerics(result),
         "broke_down": failures.sentence(done.runs, broken),
+        "misfit_data": count(measurement.assumed_data(result, len(done.curves["stroke_m"]))),
         "failures": numerics_page.failures(result.history.failures),
         "credibility": credibility_page.credibility(result.folder),
         "withdrawal": None if result.withdrawal is None else withdrawal_page.withdrawal(result.withdrawal),
         "provenance": numerics_page.provenance(result),
         "model": model_page.model(result),
-        "limits": [capital(text) for text in result.limits],
-        "warnings": [capital(text) for text in result.warnings],
+        "limits": [capital(in_type(text)) for text in result.limits],
+        "warnings": [capital(in_type(text)) for text in result.warnings],
     }
+    citations = Citations()
+    content |= {name: citations.numbered(content[name]) for name in CITING}
+    return {**content, "references": citations.listed}
 
 
 def _specimen(shape: Shape) -> str:
@@ -293,19 +301,19 @@ def _sentence(result: CalibrationResult) -> str:
     failed = [v.name for v in result.verdicts if v.value is not None and v.passed is False]
     ran = sum(v.value is not None for v in result.verdicts)
     absent = [v.name for v in result.verdicts if v.value is None]
-    lines = "the line" if len(failed) == 1 else f"{len(failed)} of {ran} lines"
     if result.passed:
         text = "Passed: the simulated force stays within every limit of the table that was tested"
         text += f", except in {listed(failed)}, which does not decide." if failed else "."
     elif failed:
-        text = f"Not passed: {lines} of the table failed ({listed(failed)})."
+        text = f"Not passed: {len(failed)} of {ran} lines of the table failed ({listed(failed)})."
     elif result.status == "interrupted":
         text = "Not passed: the fit was interrupted. No line of the table has failed so far."
     else:
         text = "Not passed: no line of the table failed, but not all that decides was tested."
     if result.trace.label == "reconstructed":
         text += " The trace is a reconstruction, so this says nothing about a real cut."
-    return breakable(text + (f" Not run: {listed(absent)}." if absent else ""))
+    text += f" Not run: {listed(absent)}." if absent else ""
+    return breakable(text + numerics_page.broke_down(result.history))
 
 
 def _verdict_line(v: Verdict) -> Data:
@@ -337,7 +345,8 @@ def _null_rows(result: CalibrationResult) -> list[list[str]]:
 
 
 def _rating(m: NullRating | Agreement) -> list[str]:
-    signed = [quantity(x, "fraction", signed=True) for x in (m.peak_error, m.work_error)]
+    errors = (0.0 if x is not None and abs(x) < LEAST_PART else x for x in (m.peak_error, m.work_error))
+    signed = [quantity(x, "fraction", signed=True) for x in errors]
     return [quantity(getattr(m, key), unit) for key, _, unit, _ in MEASURES] + signed
 
 

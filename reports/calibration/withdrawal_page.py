@@ -20,8 +20,8 @@ NAMED = {"R": "the cutting resistance", "mu": "friction", "adhesion_energy": "ad
 STRENGTHS = ((10.0, "very strong"), (6.0, "strong"), (2.0, "positive"), (0.0, "not worth more than a mention"))
 """Evidence from which on it is called so (Kass and Raftery 1995)."""
 EVIDENCE = (
-    "Evidence is the difference of Bayesian information criteria, without the property less with it. The property is "
-    "held at the least that it may have, and all others are fitted again."
+    "Evidence is the difference of Bayesian information criteria [@Schwarz 1978], without the property less with it, "
+    "in the words of [@Kass 1995]. The property is held at the least that it may have, and all others are fitted again."
 )
 
 TOLD = (
@@ -50,19 +50,20 @@ def withdrawal(found: WithdrawalAgreement) -> Data:
             ["Largest pull", f"measured {quantity(found.peak_real_N, 'N')}, simulated "
                              f"{quantity(found.peak_sim_N, 'N')}"],
             ["Work", f"measured {quantity(found.work_real_J, 'J')}, simulated {quantity(found.work_sim_J, 'J')}"],
-            ["Curve error (NRMSE)", quantity(found.nrmse, "fraction")],
+            ["Curve error (NRMSE)", f"{quantity(found.nrmse, 'fraction')}, over the largest measured pull"],
             ["Within the 95 % band", "not determined" if inside is None else quantity(inside, "fraction", digits=2)],
             *([f"Evidence for {NAMED[name]}", _evidence(one)] for name, one in found.without.items()),
         ],
-        "left_open": [measurement.left_open(name, n) for name, n in found.nuisances.items()],
+        "left_open": [measurement.left_open(name, n, up=True) for name, n in found.nuisances.items()],
     }  # fmt: skip
 
 
 def _evidence(found: FitWithout) -> str:
     """How strong it is, and what it is made of."""
     size = next((word for least, word in STRENGTHS if found.evidence >= least), "the trace does not ask for it")
-    rise = plain(found.chi_square - found.whole, 3)
-    return f"{plain(found.evidence, 3)}, {size}: without it the least chi-square changes by {rise}"
+    rise = found.chi_square - found.whole
+    how = f"{'rises' if rise >= 0.0 else 'falls'} by {plain(abs(rise))}"
+    return f"{plain(found.evidence)}, {size}: without it the least chi-square {how}"
 
 
 def figure(curves: Mapping[str, np.ndarray], trace: str) -> bytes:

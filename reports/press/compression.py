@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from reports.base.brief import Brief, ReportPart, ReportTable, typeset_brief
 from reports.base.format import breakable, count, interval, plain, quantity, uncertain
-from reports.calibration.model_page import REFERENCES
+from reports.base.references import REFERENCES
 from reports.press.tables import sentences, verdict_table
 
 if TYPE_CHECKING:
@@ -168,6 +168,6 @@ def _files(result: CompressionResult) -> ReportTable:
 
 
 def _references() -> ReportTable:
-    texts = [next(text for text in REFERENCES if text.startswith(begin)) for begin in CITED]
+    texts = [REFERENCES[name] for name in CITED]
     rows = [[f"[{k}]", text] for k, text in enumerate(texts, start=1)]
     return ReportTable(("", "Cited"), ("auto", "1fr"), rows, left=2)

@@ -3,48 +3,45 @@ ranges come from."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from mpm.scene import Knife
 from reports.base.format import DASH, breakable, count, interval, plain, quantity, uncertain
 from reports.base.labels import in_words
+from reports.base.references import Citations
 from reports.base.run_folder import Data
 
-CITED = ("Hu", "Stomakhin", "Nairn", "Hillerborg", "Atkins", "Chouly", "Kennedy", "Raue", "ISO/TS 18571")
-"""What the section cites, by how a reference begins."""
-_CITATION = re.compile(r"\{([^}]+)\}")
 METHOD = (
     "The food is a three-dimensional continuum. Particles carry it and exchange momentum through a regular grid of "
-    "cells (moving least squares material point method {Hu}, quadratic kernels). There is no artificial damping, no "
+    "cells (moving least squares material point method [@Hu 2018], quadratic kernels). There is no artificial damping, no "
     "scaling of mass, and no clamp on a force or a strain. The blade is rigid and goes down at one speed; the board "
     "is rigid."
 )
 LAWS = (
-    ("Elasticity", "fixed-corotated, isotropic {Stomakhin}", "E, nu, rho"),
+    ("Elasticity", "fixed-corotated, isotropic [@Stomakhin 2012]", "E, nu, rho"),
     ("Flow", "von Mises, no hardening", "yield_stress"),
     ("Loss", "Kelvin–Voigt, the loss factor at the first axial mode", "loss_factor"),
     (
         "Crack",
-        "on the blade's plane alone {Nairn}: ties that soften linearly {Hillerborg}; their work per area is part of R",
+        "on the blade's plane alone [@Nairn 2003]: ties that soften linearly [@Hillerborg 1976]; their work per area is part of R",
         "strength_ratio, R",
     ),
     (
         "Edge",
-        "line force: starts at the resistance of skin or flesh, then needs what the opening has left of R {Atkins}",
+        "line force: starts at the resistance of skin or flesh, then needs what the opening has left of R [@Atkins 2009]",
         "R_skin, initiation_depth, R",
     ),
-    ("Faces", "unilateral contact (Nitsche {Chouly}), Coulomb friction up to the shear yield stress", "mu"),
+    ("Faces", "unilateral contact (Nitsche [@Chouly 2013]), Coulomb friction up to the shear yield stress", "mu"),
 )
 LAYERS = ("Layers", "rind and core have a size, a resistance and a stiffness of their own", "R_rind, R_core")
 OBJECTIVE = (
     "The fit minimises one sum over all fitted cuts: squared residuals of curve and peak, whitened, and of the "
     "parameters against the literature's ranges (central 95 % of normal priors, of the logarithm for stresses and "
     "resistances). Each cut has one factor on its force, lognormal about 1; tare, drift, lag and bandwidth are "
-    "integrated out of the curve {Kennedy}. Intervals are profile likelihoods whose ends were simulated {Raue}. NRMSE "
-    "is the root mean square difference of two curves over the measured peak; the ISO rating follows {ISO/TS 18571}."
+    "integrated out of the curve [@Kennedy 2001]. Intervals are profile likelihoods whose ends were simulated [@Raue 2009]. NRMSE "
+    "is the root mean square difference of two curves over the measured peak; the ISO rating follows [@ISO 18571]."
 )
 FIXED = "Values that were not fitted are in material.yaml of the same folder, each with its source."
 BASELINES = {"constant": "constant", "linear": "line", "zero": "nothing", "air": "air run"}
@@ -53,7 +50,6 @@ BASELINES = {"constant": "constant", "linear": "line", "zero": "nothing", "air":
 def model(
     s: Data,
     curves: Mapping[str, Mapping[str, np.ndarray]],
-    references: Sequence[str],
     limit_sources: Mapping[str, str],
 ) -> Data:
     """What the report prints of the model.
@@ -61,29 +57,26 @@ def model(
     Args:
         s: ``summary.json``.
         curves: Columns of the curves of each cut, each (n,): stroke [m], forces [N].
-        references: References among which are those of CITED.
         limit_sources: Where the limit of each line of a verdict comes from.
 
     Returns:
         Sentences and rows by name.
     """
-    numbers = {begin: k for k, begin in enumerate(CITED, start=1)}
-
-    def numbered(text: str) -> str:
-        return _CITATION.sub(lambda found: f"[{numbers[found[1]]}]", text)
-
     layered = any(name.startswith(("R_rind", "R_core")) for name in s["parameters"])
-    return {
-        "method": numbered(METHOD),
-        "cuts": [_cut(name, s, columns) for name, columns in curves.items()],
-        "laws": [[part, numbered(law), names] for part, law, names in (*LAWS, *([LAYERS] if layered else []))],
-        "conditioning": [row for name in curves if (row := _conditioning(name, s))],
-        "objective": numbered(OBJECTIVE),
-        "fixed": FIXED,
-        "limit_sources": _limit_sources(s, limit_sources),
-        "ranges": _ranges(s["parameters"]),
-        "references": [next(r for r in references if r.startswith(begin)) for begin in CITED],
-    }
+    citations = Citations()
+    content: Data = citations.numbered(
+        {
+            "method": METHOD,
+            "cuts": [_cut(name, s, columns) for name, columns in curves.items()],
+            "laws": [[part, law, names] for part, law, names in (*LAWS, *([LAYERS] if layered else []))],
+            "conditioning": [row for name in curves if (row := _conditioning(name, s))],
+            "objective": OBJECTIVE,
+            "fixed": FIXED,
+            "limit_sources": _limit_sources(s, limit_sources),
+            "ranges": _ranges(s["parameters"]),
+        }
+    )
+    return {**content, "references": citations.listed}
 
 
 def _of(name: str, s: Data) -> Data:

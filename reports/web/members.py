@@ -98,7 +98,13 @@ def _chosen(fitted: Fitted) -> Markup:
     """Values of the chosen member, which the script fills in, beside those of the fit."""
     head = ("Parameter", "Member", "Fitted value", "95 % interval", "Member in the interval")
     rows = [
-        [element("code", name), None, quantity(p.value, p.unit), interval(p.low95, p.high95, p.unit), None]
+        [
+            element("code", name),
+            None,
+            quantity(p.value, p.unit),
+            interval(p.low95, p.high95, p.unit, like=p.value),
+            None,
+        ]
         for name, p in fitted.items()
     ]
     return element("div", table(head, rows, (1, 2, 3), id="chosen", label="The chosen member"), hidden=True)

@@ -258,7 +258,8 @@ def test_the_used_value_is_compared_too() -> None:
 def test_fitted_value_outside_its_range(foods: dict[str, FoodSpec]) -> None:
     """A fitted value may leave the literature's range, and a warning then says so."""
     food = foods["kiwi"].with_values({"E": 9e6}, status="fitted", source="a trace")
-    assert any("outside the literature's range" in w and w.startswith("kiwi.properties.E") for w in food.warnings())
+    (said,) = [w for w in food.warnings() if "outside the literature's range" in w]
+    assert said.startswith("kiwi.properties.E") and "e+" not in said and "\u00a0MPa" in said
 
 
 def test_half_of_bulk_damage(foods: dict[str, FoodSpec]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -103,6 +104,67 @@ def test_an_interval_is_drawn_where_the_table_has_it() -> None:
     assert lines["fitted value"].tolist() == [[6.0, pytest.approx(4.0)]]
     assert lines["3.84 above the fitted value"][:, 1] == pytest.approx(7.84)
     assert lines["ends of the 95 % interval"][:, 0] == pytest.approx([1.7, 6.8])
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
+    """The figures that are drawn, with their text laid out."""
+    found: list[Figure] = []
+
+    def keep(draw: Callable[[Figure], None], height: float) -> bytes:
+        figure = Figure(figsize=(figures.WIDTH * figures.MM, height * figures.MM), layout="constrained")
+        draw(figure)
+        figure.draw_without_rendering()
+        found.append(figure)
+        return b""
+
+    for module in (figures, parameter_figures):
+        monkeypatch.setattr(module, "svg", keep)
+    return found
+
+
+def test_names_of_correlations_do_not_overlap_and_nought_has_no_sign(drawn: list[Figure]) -> None:
+    """Sixteen long names stand under their columns, apart by more than the height of a letter across their slant."""
+    names = [f"long_name_of_one_{k}" for k in range(16)]
+    matrix = np.full((16, 16), -0.001) + np.diag(np.ones(16))
+    matrix[2, 1], matrix[3, 1] = -0.95, 0.25
+    parameter_figures.correlations(names, matrix)
+    (axes,) = drawn[0].axes
+    labels = axes.get_xticklabels()
+    apart = np.diff([label.get_transform().transform(label.get_position())[0] for label in labels])
+    letter = labels[0].get_fontsize() * drawn[0].dpi / 72.0
+    slant = np.radians([label.get_rotation() for label in labels])[1:]
+    assert np.all(apart * np.sin(slant) > 0.9 * letter)
+    assert {text.get_text() for text in axes.texts} == {"0.00", "\u22120.95", "+0.25"}
+
+
+def test_a_peak_at_the_end_of_the_stroke_is_drawn_whole(drawn: list[Figure]) -> None:
+    """The axis of the filtered curve goes beyond the stroke by more than half of the circle."""
+    s = sample.summary()
+    time, raw, tared = sample.record()
+    curves = sample.curves() | {"real_N": sample.curves()["stroke_m"]}
+    record = figures.ConditioningRecord(
+        time, raw, tared, s["onset_s"], None, s["end_s"], None, None, "constant", float(curves["real_N"][-1]), 0.1
+    )
+    figures.conditioning(record, curves)
+    axes = next(axes for axes in drawn[0].axes if "peak ±" in axes.get_title())
+    end = 1e3 * float(curves["stroke_m"][-1])
+    room = np.ptp(axes.transData.transform([[end, 0.0], [axes.get_xlim()[1], 0.0]])[:, 0])
+    assert room > 0.5 * 3.5 * drawn[0].dpi / 72.0
+
+
+@pytest.mark.parametrize(
+    ("ends", "ticks"),
+    [((1e6, 1e9), ["10⁶", "10⁷", "10⁸", "10⁹"]), ((1e4, 1.2e5), ["10 000", "20 000", "50 000", "100 000"])],
+)
+def test_numbers_at_a_log_axis_are_those_of_the_text(ends: tuple[float, float], ticks: list[str]) -> None:
+    """No computer's powers of ten, and thousands set apart."""
+    axes = Figure().subplots()
+    axes.set_xscale("log")
+    axes.set_xlim(*ends)
+    figures.log_ticks(axes.xaxis, *ends)
+    shown = [x for x in axes.get_xticks() if ends[0] <= x <= ends[1]]
+    assert [sample.spaced(axes.xaxis.get_major_formatter()(x)) for x in shown] == ticks
 
 
 def test_profiles_and_indices_differ_without_colour() -> None:

@@ -7,7 +7,18 @@ import math
 import numpy as np
 import pytest
 
-from reports.base.format import DASH, NBSP, breakable, count, duration, interval, listed, quantity, uncertain
+from reports.base.format import (
+    DASH,
+    NBSP,
+    before_and_after,
+    breakable,
+    count,
+    duration,
+    interval,
+    listed,
+    quantity,
+    uncertain,
+)
 from reports.base.labels import shown
 from tests.reports.sample import spaced
 
@@ -49,14 +60,28 @@ def test_signs_limits_and_digits() -> None:
 @pytest.mark.parametrize(
     ("low", "high", "unit", "text"),
     [
-        (8e5, 2e6, "Pa", "0.8 to 2 MPa"), (5e4, 2e6, "Pa", "50 kPa to 2 MPa"), (0.0, 0.6, "-", "0 to 0.6"),
-        (100.0, 1200.0, "J/m^2", "100 to 1200 J/m²"), (None, 2e6, "Pa", "below 2 MPa"),
-        (3.0, math.inf, "N", "above 3 N"), (None, None, "Pa", DASH), (0.1, 0.1, "fraction", "10 %"),
+        (8e5, 2e6, "Pa", "0.800 to 2.00 MPa"), (8e4, 2.51e7, "Pa", "0.0800 to 25.1 MPa"), (0.0, 0.6, "-", "0 to 0.600"),
+        (100.0, 1200.0, "J/m^2", "100 to 1200 J/m²"), (None, 2e6, "Pa", "below 2.00 MPa"),
+        (3.0, math.inf, "N", "above 3.00 N"), (None, None, "Pa", DASH), (0.1, 0.1, "fraction", "10.0 %"),
+        (-3.6, 3.79, "N", "−3.60 to 3.79 N"), (1.53e-3, 0.05, "m", "1.53 to 50.0 mm"),
+        (9.89e-5, 9.89e-4, "m", "0.0989 to 0.989 mm"),
     ],
 )  # fmt: skip
 def test_interval(low: float | None, high: float | None, unit: str, text: str) -> None:
-    """Both ends share a unit unless that hides the lower one; an open end is a bound."""
+    """Both ends share a unit and have three digits, also where one ends in noughts; an open end is a bound."""
     assert spaced(interval(low, high, unit)) == text
+
+
+def test_numbers_side_by_side_share_a_unit() -> None:
+    """A range, a value and its uncertainty take the unit of another number; a nought has none to give. What was written
+    short stays short."""
+    assert spaced(interval(59.5e3, 1.01e6, "Pa", like=5e5)) == "59.5 to 1010 kPa"
+    assert spaced(quantity(1.01e6, "Pa", like=5e5)) == "1010 kPa"
+    assert spaced(interval(None, 1.01e6, "Pa", like=5e5)) == "below 1010 kPa"
+    assert spaced(interval(0.0, 1.5e-3, "m", like=0.0)) == "0 to 1.50 mm"
+    assert spaced(uncertain(-8.3e-5, 8.8e-5, "m", like=5.6e-4)) == "−0.083 ± 0.088 mm"
+    assert [spaced(x) for x in before_and_after(2e-5, None, 5e-4, "m")] == ["0 ± 0.50 mm", "0.0200 mm"]
+    assert spaced(interval(7e3, 3e5, "Pa", digits=None)) == "7 to 300 kPa"
 
 
 @pytest.mark.parametrize(

@@ -40,6 +40,14 @@ def test_an_error_beyond_its_uncertainty_is_the_models(tmp_path: Path) -> None:
     assert page["factor"] == "2" and len(page["not_counted"]) == 3
 
 
+def test_E_is_no_error(tmp_path: Path) -> None:
+    """What older files call E is named S less D: E is a modulus."""
+    older = "The parameters were fitted to this very trace, so that E is small by construction"
+    for text in (older, older.replace("E is", "S - D is")):
+        page = credibility(write(tmp_path, not_counted=[text]))
+        assert page is not None and page["not_counted"][0].endswith("so that S \u2212 D is small by construction")
+
+
 def test_what_is_not_known_is_said(tmp_path: Path) -> None:
     """A repeated run that broke down leaves no interval; a context is what somebody stated."""
     page = credibility(write(tmp_path, work=UNKNOWN))

@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +18,14 @@ import numpy as np
 import pytest
 
 from calib.calibration.report import write_report
+from calib.calibration.result import from_document
+from calib.calibration.withdrawal_result import WithdrawalAgreement
 from calib.errors import OutputError
+from calib.problem.target import ErrorModel
+from calib.uncertainty.estimates import FittedNuisance
 from reports import ReportError
 from reports.base.format import DASH
-from reports.calibration import report
+from reports.calibration import measurement, report
 from tests.data_dir import ROOT
 from tests.reports import sample
 from tests.reports.sample import pages, spaced
@@ -172,6 +177,63 @@ def test_errors_are_counted_and_sized_in_words(content: Content) -> None:
     assert "14.2" in size and "3.8 times" in size and "were widened" in size
     assert "no interval was widened" in content(reduced_chi2=0.7)["errors"][1]
     assert content("interrupted")["errors"] == []
+
+
+def test_both_chi_squares_have_their_number_of_data(content: Content) -> None:
+    """That of the seen correlation length and that of the assumed one, which is the objective's own; two curves have
+    twice as many data. The figure of the search names the same number."""
+    assert measurement.ASSUMED_READINGS == round(1.0 / ErrorModel().correlation)
+    said = spaced(content()["errors"][1])
+    assert "Reduced chi-square 1.30 of the curve's 16 readings and the peak" in said
+    assert "is 18.5 for 21 independent data (curve and peak), 0.881 each" in said and "first page" not in said
+    assert content()["misfit_data"] == "21"
+    line = {**sample.summary()["verdicts"][0], "name": "curve explained by the food"}
+    assert "has the less probable of these two" in content(verdicts=[line])["errors"][1]
+    assert "independent data" not in content(misfit_history=[])["errors"][1]
+    up = WithdrawalAgreement(from_m=2e-3, to_m=0.02, speed_m_s=0.02, peak_real_N=0.3, peak_sim_N=0.3, nrmse=0.03,
+                             work_real_J=1e-3, work_sim_J=1e-3)  # fmt: skip
+    result = replace(from_document(sample.summary(), Path()), withdrawal=up)
+    assert measurement.assumed_data(result, 240) == 42
+    assert "42 independent data (curve and peak, down and up)" in spaced(measurement.errors(result, 240)[1])
+
+
+def test_the_level_on_the_way_up_is_another_thing() -> None:
+    """The tare of the pull has its own words; other names do not."""
+    tare = FittedNuisance(0.0, 0.01, 0.05, "N", False)
+    down, up = (measurement.left_open("tare", tare, up=way)[1] for way in (False, True))
+    assert down == "level of the force before contact" and "on the way up" in up
+    gain = FittedNuisance(0.0, 0.01, 0.02, "-", False)
+    assert measurement.left_open("gain", gain, up=True) == measurement.left_open("gain", gain)
+
+
+def test_many_failed_simulations_are_said_on_the_first_page(content: Content) -> None:
+    """21 of 70 are; 2 of 61 are not."""
+    assert "21 of 70 simulations broke down" in spaced(content("failed")["sentence"])
+    assert "broke down" not in content()["sentence"]
+
+
+def test_one_line_that_failed_is_counted_among_all(content: Content) -> None:
+    """One of nine that were run."""
+    verdicts = sample.summary()["verdicts"]
+    verdicts[0] |= {"passed": False, "value": -0.2}
+    said = content(verdicts=verdicts, passed=False)["sentence"]
+    assert said.startswith("Not passed: 1 of 9 lines of the table failed (Peak error).")
+
+
+def test_nought_is_written_one_way(content: Content) -> None:
+    """A null model's error of a rounding is that of one without any."""
+    nulls = sample.summary()["null_models"]
+    nulls["ramp"]["peak_error"], nulls["half_sine"]["peak_error"] = 0.0, -2.2e-5
+    rows = content(null_models=nulls)["null_rows"]
+    assert [spaced(row[4]) for row in rows[1:3]] == ["0 %", "0 %"]
+    assert spaced(content(momentum_residual=1e-6)["numerics"]["momentum"]) == "< 0.01 %"
+
+
+def test_units_in_sentences_of_a_run_are_typeset(content: Content) -> None:
+    """A space before a per cent sign and raised exponents; a power of ten stays."""
+    got = content(limits=["as wide as 83% of 10 J/m^2"], warnings=["from 930 to 1110 kg/m^3, x^20, 2^3"])
+    assert spaced(got["limits"][0]) == "As wide as 83 % of 10 J/m²"
+    assert got["warnings"] == ["From 930 to 1110 kg/m³, x^20, 2^3"]
 
 
 def test_verdicts_that_occur_are_explained(content: Content) -> None:

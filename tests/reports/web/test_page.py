@@ -160,7 +160,8 @@ def test_intervals_are_those_of_the_result(run: Path, whole: Page) -> None:
     """Value, interval and literature of each parameter, from the document to the cell."""
     rows = {row[0].split(" ")[0]: row for row in whole.tables["values"][1:]}
     for name, p in read_result(run).fitted.items():
-        ranges = interval(p.low95, p.high95, p.unit), interval(p.prior_low, p.prior_high, p.unit)
+        ends = (p.low95, p.high95), (p.prior_low, p.prior_high)
+        ranges = [interval(*pair, p.unit, like=p.value) for pair in ends]
         assert rows[name][1:4] == [quantity(p.value, p.unit), *ranges]
 
 
