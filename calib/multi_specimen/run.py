@@ -183,7 +183,7 @@ class Finished:
 
 def _write(done: Finished, out: Path, began: float) -> StudyResult:
     """Write curves-NAME.csv, material.yaml, summary.json and report.pdf; returns what summary.json holds."""
-    from reports.calibration.multi_specimen import write_report
+    from reports.multi_specimen.report import write_report
 
     for name in done.setups:
         write_csv(out / f"curves-{name}.csv", done.curves(name))

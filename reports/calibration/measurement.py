@@ -68,18 +68,28 @@ def errors(result: CalibrationResult, points: int) -> list[str]:
             f" points of the curve count as about {count(independent)} independent readings."
         )
     over = "" if result.withdrawal is not None else over
-    if reduced is not None and reduced > 1.0:
-        said.append(
-            f"Reduced chi-square {plain(reduced)}{over}: what is left is {plain(math.sqrt(reduced), 2)} times as large "
-            "as the stated errors of trace and simulation explain, and all intervals were widened by that."
-            f"{_assumed(result, points)}"
-        )
-    elif reduced is not None:
-        said.append(
-            f"Reduced chi-square {plain(reduced)}{over}: what is left is no larger than the stated errors of trace and "
-            f"simulation explain; no interval was widened or narrowed for it.{_assumed(result, points)}"
-        )
+    if reduced is not None:
+        said.append(f"{size_of_errors(reduced, over)}{_assumed(result, points)}")
     return said
+
+
+def size_of_errors(reduced: float, over: str = "") -> str:
+    """What a reduced chi-square says, in a sentence.
+
+    Args:
+        reduced: The reduced chi-square [-].
+        over: What it is taken over, with a blank before it; empty where that is not said.
+    """
+    begin = f"Reduced chi-square {plain(reduced)}{over}: what is left is"
+    if reduced > 1.0:
+        return (
+            f"{begin} {plain(math.sqrt(reduced), 2)} times as large as the stated errors of trace and simulation "
+            "explain, and all intervals were widened by that."
+        )
+    return (
+        f"{begin} no larger than the stated errors of trace and simulation explain; no interval was widened or "
+        "narrowed for it."
+    )
 
 
 def assumed_data(result: CalibrationResult, points: int) -> int:

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from calib.compression.result import CompressionResult
 
 ALT = "Measured and fitted stress over strain, and their difference"
-CITED = ("Hu", "Stomakhin")
-"""What the report cites as [1] and [2], by how a reference begins."""
+CITED = ("Hu 2018", "Stomakhin 2012")
+"""What the report cites as [1] and [2]."""
 LAW = (
     "fixed-corotated, isotropic elasticity [2]: stress is in proportion to Young's modulus, so that one simulated "
     "curve is scaled to each repeat by least squares"

@@ -38,7 +38,7 @@ END = re.compile(r"^[\w.*-]+\.(json|jsonl|csv|svg|pdf|html|yaml|h5|h5\.journal|m
 S = np.linspace(1e-3, 0.03, 60)
 NO_COMMANDS = (
     "studies/design/", "studies/discrimination/",  # studies of the project, which no command runs
-    "reports/calibration/report.py", "reports/calibration/multi_specimen.py", "reports/base/",  # pictures in a PDF
+    "reports/calibration/report.py", "reports/multi_specimen/report.py", "reports/base/",  # pictures in a PDF
     "calib/io/schema.py", "calib/formats/", "intsim/policy/", "intsim/data/lerobot.py", "intsim/data/rlds.py",
     "intsim/data/rdt.py",  # schemas, what is read, and the layouts of others
 )  # fmt: skip

@@ -60,7 +60,7 @@ def writer(folder: Path) -> Callable[[Path], Path]:
     """
     from calib.calibration import report as calibration
     from calib.material.properties import MEANINGS
-    from reports.calibration import multi_specimen
+    from reports.multi_specimen import report as multi_specimen
     from studies.convergence import report as convergence
     from studies.speed import report as bench
     from studies.stability import report as stability

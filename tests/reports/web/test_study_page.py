@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reports.calibration import multi_specimen
-from reports.calibration.multi_specimen import content, read_study, write_report
+from reports.multi_specimen import report as multi_specimen
+from reports.multi_specimen.report import content, read_study, write_report
 from reports.web.study import FITTED, PREDICTED, drawable
 from tests.reports import study_sample as sample
 from tests.reports.page_sample import Page

@@ -15,8 +15,8 @@ from reports.base.run_folder import Data
 
 METHOD = (
     "The food is a three-dimensional continuum. Particles carry it and exchange momentum through a regular grid of "
-    "cells (moving least squares material point method [@Hu 2018], quadratic kernels). There is no artificial damping, no "
-    "scaling of mass, and no clamp on a force or a strain. The blade is rigid and goes down at one speed; the board "
+    "cells (moving least squares material point method [@Hu 2018], quadratic kernels). There is no artificial damping, "
+    "no scaling of mass, and no clamp on a force or a strain. The blade is rigid and goes down at one speed; the board "
     "is rigid."
 )
 LAWS = (
@@ -25,12 +25,14 @@ LAWS = (
     ("Loss", "Kelvin–Voigt, the loss factor at the first axial mode", "loss_factor"),
     (
         "Crack",
-        "on the blade's plane alone [@Nairn 2003]: ties that soften linearly [@Hillerborg 1976]; their work per area is part of R",
+        "on the blade's plane alone [@Nairn 2003]: ties that soften linearly [@Hillerborg 1976]; their work per area "
+        "is part of R",
         "strength_ratio, R",
     ),
     (
         "Edge",
-        "line force: starts at the resistance of skin or flesh, then needs what the opening has left of R [@Atkins 2009]",
+        "line force: starts at the resistance of skin or flesh, then needs what the opening has left of R "
+        "[@Atkins 2009]",
         "R_skin, initiation_depth, R",
     ),
     ("Faces", "unilateral contact (Nitsche [@Chouly 2013]), Coulomb friction up to the shear yield stress", "mu"),
@@ -40,8 +42,9 @@ OBJECTIVE = (
     "The fit minimises one sum over all fitted cuts: squared residuals of curve and peak, whitened, and of the "
     "parameters against the literature's ranges (central 95 % of normal priors, of the logarithm for stresses and "
     "resistances). Each cut has one factor on its force, lognormal about 1; tare, drift, lag and bandwidth are "
-    "integrated out of the curve [@Kennedy 2001]. Intervals are profile likelihoods whose ends were simulated [@Raue 2009]. NRMSE "
-    "is the root mean square difference of two curves over the measured peak; the ISO rating follows [@ISO 18571]."
+    "integrated out of the curve [@Kennedy 2001]. Intervals are profile likelihoods whose ends were simulated "
+    "[@Raue 2009]. NRMSE is the root mean square difference of two curves over the measured peak; the ISO rating "
+    "follows [@ISO 18571]."
 )
 FIXED = "Values that were not fitted are in material.yaml of the same folder, each with its source."
 BASELINES = {"constant": "constant", "linear": "line", "zero": "nothing", "air": "air run"}

@@ -9,8 +9,8 @@ import pytest
 
 from calib.validation.acceptance import BAND_LIMIT
 from reports import ReportError
-from reports.calibration.multi_specimen import content, picture, read_study, write_report
-from reports.study import verdicts
+from reports.multi_specimen import verdicts
+from reports.multi_specimen.report import content, picture, read_study, write_report
 from tests.reports import study_sample as sample
 from tests.reports.base.test_figures import looked_at
 from tests.reports.sample import pages, spaced
@@ -129,7 +129,8 @@ def test_the_model_says_what_was_simulated(tmp_path: Path) -> None:
     assert [[spaced(cell) for cell in row] for row in w["conditioning"]][0] == [
         "third", "constant, 0.410 ± 0.020 N", "1.250 ± 0.010 s", "position", "0.050 N", "0.5 mm", "15.0 Hz",
     ]  # fmt: skip
-    assert len(w["references"]) == 9 and w["references"][6].startswith("Kennedy") and "[1]" in w["method"]
+    assert len(w["references"]) == 10 and w["references"][6].startswith("Kennedy") and "[1]" in w["method"]
+    assert any(text.startswith("Koh") for text in w["references"])  # of a limit
     assert "integrated out of the curve [7]" in w["objective"]
     assert {row[0] for row in w["ranges"]} == {name.split("@")[0] for name in s["parameters"]}
     reason = "practice of explicit quasi-static analysis: 5 to 10 %"

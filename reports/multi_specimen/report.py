@@ -21,8 +21,8 @@ from reports.base.format import breakable, count, duration, interval, listed, pu
 from reports.base.labels import as_sentence, in_words
 from reports.base.run_folder import Data, check_kind, read_columns, read_date, read_json, read_section
 from reports.calibration import cut_figure, measurement, model_page
-from reports.study import verdicts
-from reports.study.model import model
+from reports.multi_specimen import verdicts
+from reports.multi_specimen.model import model
 from reports.web.calibration import write_page
 from reports.web.study import study_page
 
@@ -195,7 +195,7 @@ def content(done: FinishedStudy) -> Data:
     lines = {name: verdicts.held_lines(p, widths[name]) for name, p in held.items()}
     each = [(_title(n, s, "held out"), p) for n, p in held.items()]
     each += [(_title(n, s, "in-sample"), t) for n, t in fitted.items()]
-    chi = SimpleNamespace(correlation_length_m=None, reduced_chi2=s.get("reduced_chi2"))
+    reduced = s.get("reduced_chi2")
     return {
         "food": s["food"].replace("_", " ").capitalize(),
         "study": breakable(Path(s["study"]).name),
@@ -212,7 +212,7 @@ def content(done: FinishedStudy) -> Data:
                          if (text := verdicts.reason(n, t, verdicts.fitted_lines(t)))],
         "lines": [[breakable(title), rows] for (title, _), rows in zip(
             each, [*lines.values(), *map(verdicts.fitted_lines, fitted.values())], strict=True) if rows],
-        "chi_square": " ".join(measurement.errors(chi, 0.0, 0)),  # type: ignore[arg-type]
+        "chi_square": "" if reduced is None else measurement.size_of_errors(reduced),
         "ranking": [[breakable(name), _ranking(s, name)] for name in done.curves],
         "names": [breakable(name) for name in done.curves],
         "shown": list(done.curves).index(first(done)),
