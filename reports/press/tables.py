@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from calib.texture.repeats import Scatter
     from calib.validation.acceptance import Verdict
 
-MARKS = {True: "yes", False: "no"}
+MARKS = {True: "yes", False: "no", None: "none"}
 
 
 def verdict_table(lines: Sequence[Verdict]) -> ReportTable:
@@ -24,7 +24,7 @@ def verdict_table(lines: Sequence[Verdict]) -> ReportTable:
             capital(line.name) + (f": {line.note}" if line.note else ""),
             quantity(line.value, line.unit or ""),
             quantity(line.limit, line.unit or "", digits=None),
-            MARKS[bool(line.passed)],
+            MARKS[line.passed],
         ]
         for line in lines
     ]
