@@ -32,6 +32,10 @@ BEYOND = 3.0
 FAINT = 3.0
 """Stiffness of a branch that is faster than the ramp over its standard uncertainty [-], below which its part of the
 load is within the noise: of many times that are tried, some fit noise at two."""
+DOUBT = 20.0
+"""By how much the criterion of a hold must be lower to take a branch within the noise [-]: twice what is very strong
+evidence (Kass and Raftery 1995, J. Am. Stat. Assoc. 90:773-795). A branch that lowers it by more is in the load, and is
+called not told."""
 SEEN = 5.0
 """Load of a branch over the noise of all samples [-] from which on it is seen: its time is searched, too."""
 
@@ -57,8 +61,9 @@ class BranchSearch:
 
 
 def most_branches(hold: Hold) -> int:
-    """Largest number of branches that a hold can tell: about one a decade from its first step to its duration [-]."""
-    return max(1, math.ceil(math.log10(hold.duration / hold.first_step)))
+    """Largest number of branches that a hold can tell [-]: about one a decade from its first step to its duration, with
+    one at both ends."""
+    return 1 + round(math.log10(hold.duration / hold.first_step))
 
 
 def search_branches(hold: Hold, most: int) -> BranchSearch:
@@ -82,7 +87,7 @@ def search_branches(hold: Hold, most: int) -> BranchSearch:
 def common_branches(searches: Sequence[BranchSearch]) -> int:
     """Number of branches that several holds need together: that of the smallest sum of their criteria.
 
-    A number is not taken where half of the holds or more have a branch of it that is within the noise.
+    A branch that is within the noise of a hold must lower the sum by more.
 
     Args:
         searches: The series of each hold, of the same numbers of branches.
@@ -91,8 +96,8 @@ def common_branches(searches: Sequence[BranchSearch]) -> int:
         The number.
     """
     sums = np.sum([one.bic for one in searches], axis=0)
-    faint = np.mean([one.faint for one in searches], axis=0) >= 0.5
-    return int(np.argmin(np.where(faint, np.inf, sums)))
+    faint = np.sum([one.faint for one in searches], axis=0)
+    return int(np.argmin(sums + DOUBT * faint))
 
 
 def tried_branches(holds: Sequence[Hold], branches: int | None) -> int:

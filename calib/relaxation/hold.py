@@ -123,13 +123,13 @@ def find_hold(record: PlateRecord, trigger: float | None = None) -> Hold:
 
 
 def _place(record: PlateRecord) -> tuple[int, int]:
-    """First sample at which the plate is at the place where it stays, and the first behind its stay."""
+    """First sample at which the plate is at the place where it stays, and the first behind its longest stay."""
     way = record.way
     deep = float(way.max())
-    near = way >= (1.0 - STAYS) * deep
-    first = int(np.argmax(near))
-    left = np.flatnonzero(~near[first:])
-    last = first + (int(left[0]) if len(left) else len(way) - first)
+    turns = np.diff(np.concatenate([[0], (way >= (1.0 - STAYS) * deep).astype(int), [0]]))
+    begins, ends = np.flatnonzero(turns > 0), np.flatnonzero(turns < 0)
+    longest = int(np.argmax(record.time[ends - 1] - record.time[begins]))
+    first, last = int(begins[longest]), int(ends[longest])
     stay = way[first:last]
     place = float(np.median(stay))
     scatter = 1.4826 * float(np.median(np.abs(stay - place)))  # standard deviation by the median deviation
@@ -156,7 +156,7 @@ def _thinned(record: PlateRecord, rise: slice, start: int, last: int) -> Hold:
     parts = [_even(record.time[a:b], touch, float(record.time[start])) for a, b in
              ((first, rise.start), (rise.start, rise.stop), (rise.stop, start))]  # fmt: skip
     since = record.time[start:last] - record.time[start]
-    parts.append(np.searchsorted(np.geomspace(since[1], since[-1], BINS), since))
+    parts.append(np.searchsorted(np.geomspace(since[1], since[-1], BINS)[:-1], since, side="right"))
     sizes = [len(np.unique(part)) for part in parts]
     bins = np.concatenate([
         np.unique(part, return_inverse=True)[1] + sum(sizes[:k]) for k, part in enumerate(parts)

@@ -88,18 +88,30 @@ def test_a_fast_branch_within_the_noise_is_not_told():
         assert not all(one.identified for one in asked.branches)
 
 
+def test_a_branch_that_the_load_asks_for_is_no_noise():
+    """Of a branch of 0.2 s in a record of two samples a second nobody knows the stiffness, but the load behind the ramp
+    has it, ten times above the noise. It is not left out: it is not told, and so the test does not pass."""
+    series = PronySeries((0.3, 0.3), (0.2, 8.0))
+    for seed in range(3):
+        fit = fit_relaxation(find_hold(held(series, ramp=5.0, hold=35.0, step=0.5, rest=0.5, noise=0.004, seed=seed)))
+        fast, slow = fit.branches
+        assert slow.identified and slow.time_s == pytest.approx(8.0, rel=0.02)
+        assert not fast.identified
+
+
 def test_the_hold_begins_where_the_way_stays():
-    """With noise that puts the largest load behind the ramp, and with noise of the way, the hold begins at the end of
-    the ramp, as it does without, within 1 % of the ramp."""
+    """With noise that puts the largest load behind the ramp, the hold begins at the end of the ramp, as it does
+    without, within 1 % of the ramp. With noise of the way of 0.2 %, three of whose standard deviations it lies within
+    the place, within 2 %."""
     series = PronySeries((0.1,), (20.0,))
     calm = find_hold(held(series, ramp=2.0, step=0.01, rest=0.5))
     assert calm.time[calm.start] == pytest.approx(2.0, abs=0.01)
     for seed in range(3):
         made = held(series, ramp=2.0, noise=0.2, step=0.01, rest=0.5, seed=seed)
         assert made.time[np.argmax(made.load)] > 2.6
-        shaken = made.way + 1e-6 * np.random.default_rng(seed).standard_normal(len(made.way))
-        for way in (made.way, shaken):
-            assert find_hold(record(made.time, way, made.load)).duration == pytest.approx(calm.duration, abs=0.02)
+        shaken = made.way + 6e-6 * np.random.default_rng(seed).standard_normal(len(made.way))
+        for way, within in ((made.way, 0.02), (shaken, 0.04)):
+            assert find_hold(record(made.time, way, made.load)).duration == pytest.approx(calm.duration, abs=within)
 
 
 def test_samples_count_by_their_noise():
