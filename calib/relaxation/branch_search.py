@@ -171,7 +171,7 @@ def faint_branches(hold: Hold, times: FloatArray, stiffness: FloatArray, covaria
         hold: The hold.
         times: Relaxation times [s], shape (branches,).
         stiffness: Of the spring and of the branches [N/m], shape (1 + branches,).
-        covariance: Covariance of stiffnesses and logarithms of times, shape (1 + 2 branches, 1 + 2 branches).
+        covariance: Covariance of stiffnesses [N/m] and logarithms of times [-], shape (1 + 2 branches, 1 + 2 branches).
 
     Returns:
         One for each branch.
