@@ -67,7 +67,9 @@ def number(low: float, high: float, unit: str) -> Callable[[str], float]:
         if not math.isfinite(value):
             raise argparse.ArgumentTypeError(f"{text} is not a finite number")
         if not low < value < high:
-            raise argparse.ArgumentTypeError(f"{text} must lie between {low:g} and {high:g} {unit}".rstrip(" -"))
+            raise argparse.ArgumentTypeError(
+                f"{text} must be more than {low:g} and less than {high:g} {unit}".rstrip(" -")
+            )
         return value
 
     return convert

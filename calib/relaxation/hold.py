@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib.errors import TraceError
+from calib.relaxation.contact import line_contact, rise_of, way_before_contact
 from calib.texture.bites import TRIGGER_PART, moving_mean
 from calib.texture.plate_record import PlateRecord
+from calib.texture.prony_series import PronySeries
 from calib.trace.recorded import MIN_SAMPLES
 from mpm.arrays import FloatArray
 
 STAYS = 0.02
 """Part of the way within which the plate stays [-]."""
+REACHED = 0.002
+"""Part of the way that is left where the hold begins [-]; more where the way is noisier."""
 LEAST_TIMES = 3.0
 """Least duration of a hold over that of its ramp [-]: shorter ones show no more than the ramp."""
 BINS = 150
 """Samples of the hold: as many means over equal steps of the logarithm of time."""
 RAMP = 200
-"""Samples of the ramp."""
+"""Samples of the ramp: as many means over equal steps of time."""
+SMOOTH = 3
+"""Degree of the polynomial in the logarithm of time by which the noise of the hold's second half is found."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +38,9 @@ class Hold:
         way: Way of the plate from contact [m], shape (n,).
         load: Load [N], shape (n,).
         start: First sample of the hold.
+        noise: Standard deviation of the loads of the hold, which are means of one sample or of many [N], shape
+            (n - start,).
+        rise: Samples of the ramp by which contact is found.
     """
 
     name: str
@@ -39,6 +48,8 @@ class Hold:
     way: FloatArray
     load: FloatArray
     start: int
+    noise: FloatArray
+    rise: slice
 
     @property
     def duration(self) -> float:
@@ -55,11 +66,26 @@ class Hold:
         """Samples of the hold."""
         return slice(self.start, None)
 
+    def touched(self, series: PronySeries) -> Hold:
+        """The same hold from the contact that a load of this series has.
+
+        Args:
+            series: The Prony series.
+
+        Returns:
+            The hold; its way is less by what the straight line had counted too much.
+        """
+        before = way_before_contact(self.time, self.way, self.load, self.rise, series)
+        way = np.maximum(self.way - before, 0.0)
+        touches = float(np.interp(before, np.maximum.accumulate(self.way), self.time))
+        return replace(self, time=self.time - touches, way=way)
+
 
 def find_hold(record: PlateRecord, trigger: float | None = None) -> Hold:
     """Ramp and hold of a record.
 
-    The hold begins with the largest load, and lasts until the plate has left its place or the record ends.
+    The hold begins where the way has come to the place at which it stays, and lasts until the plate has left it or the
+    record ends. Contact is where the load, continued by a straight line from just above the trigger, is zero.
 
     Args:
         record: The record.
@@ -69,24 +95,25 @@ def find_hold(record: PlateRecord, trigger: float | None = None) -> Hold:
         Ramp and hold, from contact on.
 
     Raises:
-        TraceError: The plate does not stay, or too few samples show the ramp or the hold.
+        TraceError: The plate does not stay, the load does not reach the trigger, or too few samples show the hold.
     """
-    name, top = record.file.name, int(np.argmax(record.load))
-    deep = float(record.way.max())
-    level = trigger if trigger is not None else TRIGGER_PART * float(record.load[top])
-    ramp = record.time[top] - record.time[int(np.argmax(record.way > STAYS * deep))]
-    smooth = moving_mean(record.time, record.load, 0.05 * max(float(ramp), 0.0))
-    below = np.flatnonzero(smooth[: top + 1] < level)
-    first = int(below[-1]) if len(below) else 0
-    near = np.abs(record.way - record.way[top:].max()) <= STAYS * deep
-    left = np.flatnonzero(~near[top:])
-    last = top + (int(left[0]) if len(left) else len(near) - top)
-    if last - top < MIN_SAMPLES:
+    name = record.file.name
+    start, last = _place(record)
+    if last - start < MIN_SAMPLES:
         raise TraceError(
-            f"{name}: {last - top} samples from the largest load on until the plate leaves its place, at least "
+            f"{name}: {last - start} samples from the end of the ramp until the plate leaves its place, at least "
             f"{MIN_SAMPLES} are needed; a relaxation test holds the plate (cutcal press tpa reads two bites)"
         )
-    hold = _thinned(record, first, top, last)
+    ramp = float(record.time[start] - record.time[int(np.argmax(record.way > STAYS * record.way[start]))])
+    smooth = moving_mean(record.time, record.load, 0.05 * max(ramp, 0.0))
+    peak = float(smooth[:last].max())
+    level = trigger if trigger is not None else TRIGGER_PART * peak
+    if not peak > level:
+        raise TraceError(
+            f"{name}: the hold reaches {peak:.4g} N, which is not above the trigger of {level:.4g} N; give a smaller "
+            "--trigger"
+        )
+    hold = _thinned(record, rise_of(smooth, level, start), start, last)
     if hold.duration < LEAST_TIMES * float(hold.time[hold.start]):
         raise TraceError(
             f"{name}: the hold of {hold.duration:.3g} s is shorter than {LEAST_TIMES:g} times its ramp of "
@@ -95,27 +122,75 @@ def find_hold(record: PlateRecord, trigger: float | None = None) -> Hold:
     return hold
 
 
-def _thinned(record: PlateRecord, first: int, top: int, last: int) -> Hold:
+def _place(record: PlateRecord) -> tuple[int, int]:
+    """First sample at which the plate is at the place where it stays, and the first behind its longest stay."""
+    way = record.way
+    deep = float(way.max())
+    turns = np.diff(np.concatenate([[0], (way >= (1.0 - STAYS) * deep).astype(int), [0]]))
+    begins, ends = np.flatnonzero(turns > 0), np.flatnonzero(turns < 0)
+    longest = int(np.argmax(record.time[ends - 1] - record.time[begins]))
+    first, last = int(begins[longest]), int(ends[longest])
+    stay = way[first:last]
+    place = float(np.median(stay))
+    scatter = 1.4826 * float(np.median(np.abs(stay - place)))  # standard deviation by the median deviation
+    reached = stay >= place - min(max(REACHED * deep, 3.0 * scatter), STAYS * deep)
+    return first + int(np.argmax(reached)), last
+
+
+def _thinned(record: PlateRecord, rise: slice, start: int, last: int) -> Hold:
     """Ramp and hold with few samples.
 
     Args:
         record: The record.
-        first: Sample of contact.
-        top: Sample of the largest load.
+        rise: Samples of the loading behind the trigger.
+        start: First sample of the hold.
         last: Sample behind the hold.
 
     Returns:
-        Samples of the ramp at equal times, and means of those of the hold over equal steps of log time.
+        Means of the samples of the ramp over equal steps of time, and of those of the hold over equal steps of log
+        time.
     """
-    time = record.time - record.time[first]
-    ramp = np.linspace(0.0, time[top], min(RAMP, top - first + 1))[:-1]
-    since = time[top:last] - time[top]
-    edges = np.geomspace(since[1], since[-1], BINS)
-    _, of = np.unique(np.searchsorted(edges, since), return_inverse=True)
-    counts = np.bincount(of)
+    touch, zero = line_contact(record, rise)
+    first = int(np.searchsorted(record.time[: rise.start], touch, side="right"))
+    # a bin for each part: before the rise, the rise, and behind it
+    parts = [_even(record.time[a:b], touch, float(record.time[start])) for a, b in
+             ((first, rise.start), (rise.start, rise.stop), (rise.stop, start))]  # fmt: skip
+    since = record.time[start:last] - record.time[start]
+    parts.append(np.searchsorted(np.geomspace(since[1], since[-1], BINS)[:-1], since, side="right"))
+    sizes = [len(np.unique(part)) for part in parts]
+    bins = np.concatenate([
+        np.unique(part, return_inverse=True)[1] + sum(sizes[:k]) for k, part in enumerate(parts)
+    ])  # fmt: skip
+    counts = np.bincount(bins)
 
-    def column(values: FloatArray) -> FloatArray:
-        held = np.bincount(of, weights=values[top:last]) / counts
-        return np.concatenate([np.interp(ramp, time[first : top + 1], values[first : top + 1]), held])
+    def column(values: FloatArray, contact: float) -> FloatArray:
+        return np.concatenate([[contact], np.bincount(bins, weights=values[first:last]) / counts])
 
-    return Hold(record.name, column(time), column(record.way - record.way[first]), column(record.load), len(ramp))
+    begins = 1 + sum(sizes[:3])
+    noise = _noise(since, record.load[start:last]) / np.sqrt(counts[begins - 1 :])
+    on = slice(1 + sizes[0], 1 + sizes[0] + sizes[1])
+    time, way = column(record.time, touch) - touch, column(record.way, zero) - zero
+    return Hold(record.name, time, way, column(record.load, 0.0), begins, noise, on)
+
+
+def _even(time: FloatArray, touch: float, end: float) -> FloatArray:
+    """Number of the step of the ramp in which each time lies; shape (n,) [-]."""
+    return np.floor((time - touch) / max(end - touch, 1e-300) * RAMP).astype(int)
+
+
+def _noise(since: FloatArray, load: FloatArray) -> float:
+    """Standard deviation of one load about the smooth course of the second half of a hold [N].
+
+    Args:
+        since: Times from the start of the hold [s], shape (n,).
+        load: Loads [N], shape (n,).
+
+    Returns:
+        The standard deviation, at least a billionth of the largest load.
+    """
+    half = len(load) // 2
+    x = np.log(since[half:] / since[-1])
+    degree = min(SMOOTH, len(x) // 4)
+    residual = load[half:] - np.polynomial.Polynomial.fit(x, load[half:], degree)(x)
+    spread = float(np.sqrt(residual @ residual / max(len(x) - degree - 1, 1)))
+    return max(spread, 1e-9 * float(np.abs(load).max()))

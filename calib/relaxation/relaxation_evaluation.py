@@ -12,8 +12,9 @@ from calib.compression.measured import area
 from calib.compression.result import SpecimenSizes
 from calib.io.folder import prepare
 from calib.io.provenance import git_commit, versions
-from calib.relaxation.hold import Hold, find_hold
-from calib.relaxation.relaxation_fit import MOST_BRANCHES, RelaxationFit, common_branches, fit_relaxation
+from calib.relaxation.branch_search import common_branches, fastest_seen, search_branches, tried_branches
+from calib.relaxation.hold import find_hold
+from calib.relaxation.relaxation_fit import RelaxationFit, fit_searched
 from calib.relaxation.relaxation_result import (
     BranchScatter,
     HoldCurve,
@@ -29,6 +30,8 @@ from mpm.scene.shapes import Shape
 
 NRMSE_LIMIT = 0.01
 """Largest residual of a hold, over the load with which it begins [-]."""
+UNSEEN_SHARE = 0.1
+"""Share of a branch of which it is said how fast it may be to be seen [-]."""
 Say = Callable[[str], None]
 
 
@@ -81,10 +84,12 @@ def evaluate_relaxation(test: RelaxationTest, out: Path, *, command: Sequence[st
         say(f"note: {text}")
     shapes = [test.shape(record) for record in records]
     holds = [find_hold(record, test.trigger) for record in records]
+    most = tried_branches(holds, test.branches)
     with prepare(out, "relax", resume=False):
-        count = common_branches(holds) if test.branches is None else test.branches
-        fits = [fit_relaxation(hold, MOST_BRANCHES, count) for hold in holds]
-        repeats = [_specimen(*each) for each in zip(shapes, holds, fits, strict=True)]
+        searches = [search_branches(hold, most) for hold in holds]
+        count = common_branches(searches) if test.branches is None else test.branches
+        fits = [fit_searched(search, count) for search in searches]
+        repeats = [_specimen(*each) for each in zip(shapes, fits, strict=True)]
         result = RelaxationResult(
             command=tuple(command),
             specimen=SpecimenSizes.of(shapes[0], area(shapes[0])),
@@ -95,12 +100,12 @@ def evaluate_relaxation(test: RelaxationTest, out: Path, *, command: Sequence[st
             equilibrium=scatter([one.equilibrium for one in repeats]),
             repeats=tuple(repeats),
             verdicts=tuple(_verdicts(fits)),
-            not_shown=(*_unshown(test, holds), *(text for record in records for text in record.notes)),
+            not_shown=(*_unshown(fits), *(text for record in records for text in record.notes)),
             files=tuple(record.file for record in records),
             versions=versions(),
             git=git_commit(),
         )
-        curves = [_curve(hold, fit) for hold, fit in zip(holds, fits, strict=True)]
+        curves = [_curve(fit) for fit in fits]
         write_result(result, curves, out)
         from reports.press.relaxation import write_report
 
@@ -108,8 +113,9 @@ def evaluate_relaxation(test: RelaxationTest, out: Path, *, command: Sequence[st
         return result
 
 
-def _specimen(shape: Shape, hold: Hold, fit: RelaxationFit) -> RelaxedSpecimen:
+def _specimen(shape: Shape, fit: RelaxationFit) -> RelaxedSpecimen:
     """The hold of one specimen as it is reported."""
+    hold = fit.hold
     return RelaxedSpecimen(
         name=hold.name,
         strain=float(hold.way[hold.held].mean()) / shape.height,
@@ -143,23 +149,27 @@ def _verdicts(fits: Sequence[RelaxationFit]) -> list[Verdict]:
     return lines
 
 
-def _curve(hold: Hold, fit: RelaxationFit) -> HoldCurve:
+def _curve(fit: RelaxationFit) -> HoldCurve:
+    hold = fit.hold
     return HoldCurve(hold.name, hold.time[hold.held] - hold.time[hold.start], hold.load[hold.held], fit.load)
 
 
-def _unshown(test: RelaxationTest, holds: Sequence[Hold]) -> list[str]:
+def _unshown(fits: Sequence[RelaxationFit]) -> list[str]:
     """What the result does not show, in words."""
-    longest = max(hold.duration for hold in holds)
-    fastest = min(hold.first_step for hold in holds)
+    longest = max(fit.hold.duration for fit in fits)
+    fastest = max(fastest_seen(fit.hold, fit.stiffness, UNSEEN_SHARE) for fit in fits)
     out = [
-        f"nothing is shown about times below {fastest:.2g} s and above {longest:.3g} s: what remains in the end is "
-        f"what remains then",
+        f"a branch with a share of {UNSEEN_SHARE:g} that is faster than {fastest:.2g} s would be within the noise: E0 "
+        f"has no part of it",
+        f"nothing is shown about times above {longest:.3g} s: what remains in the end is what remains then",
+        "contact is where the load just above the trigger, continued to zero, would begin; of a food that stiffens at "
+        "once the way before it is not counted",
         "during the ramp the load is taken as proportional to the way at each instant; of a food that stiffens, "
         "shares of branches faster than the ramp are too small",
         "one strain was held: that shares are the same at another one is not shown",
         "a compression tells no bulk from shear relaxation; water that is pressed out relaxes too, and more slowly in "
         "a larger specimen",
     ]
-    if len(holds) == 1:
+    if len(fits) == 1:
         out.append("one repeat: no standard deviation and no interval of repeats")
     return out

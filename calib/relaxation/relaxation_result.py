@@ -150,7 +150,7 @@ class HoldCurve:
 
     Attributes:
         name: Name of the specimen.
-        time: Time from the largest load [s], shape (n,).
+        time: Time from the start of the hold [s], shape (n,).
         measured: Load [N], shape (n,).
         fitted: Load of the Prony series [N], shape (n,).
     """
@@ -178,5 +178,5 @@ def write_result(result: RelaxationResult, curves: Sequence[HoldCurve], out: Pat
         "measured_N": np.concatenate([one.measured for one in curves]),
         "fitted_N": np.concatenate([one.fitted for one in curves]),
     }
-    write_csv(out / CURVES_FILE, columns, head=["time from the largest load"])
+    write_csv(out / CURVES_FILE, columns, head=["time from the start of the hold"])
     write_json(out / RESULT_FILE, to_document(result))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from calib.io.type_schema import Fraction, NotNegative, NumberOrNull, Positive, keywords
+from calib.io.type_schema import NotNegative, NumberOrNull, Positive, keywords
 
 ONE = keywords(description="One of them")
 
@@ -37,7 +37,7 @@ class PredictedQuantity:
         mean: Mean of the repeats.
         low: Lower end of the 95 % scatter: the interval of one more repeat; null for one repeat.
         high: Upper end; null for one repeat.
-        inside: Whether the prediction lies within the scatter.
+        inside: Whether the prediction lies within the scatter; null for one repeat, which has none.
         area_metric: Area between prediction and distribution of the repeats over their mean (Ferson and Oberkampf) [-].
         area_of_mean: The same for the mean of the repeats itself: what no law without scatter goes below [-].
     """
@@ -47,7 +47,7 @@ class PredictedQuantity:
     mean: float
     low: NumberOrNull
     high: NumberOrNull
-    inside: bool
+    inside: bool | None
     area_metric: NotNegative
     area_of_mean: NotNegative
 
@@ -62,18 +62,18 @@ class LeftOutSpeed:
         parameters: Law of the other speeds.
         quantities: Texture profile, predicted and measured.
         curve_inside: Part of the curve that lies within the scatter of the repeats, where the mean is above 5 % of its
-            peak [-].
+            peak [-]; null for one repeat.
         extrapolated: Whether the speed lies outside those that were fitted.
         factor: Factor of the group in the fit to all speeds [-]: how much stiffer its specimens are than the law.
         factor_sd: Standard deviation of the factor's logarithm that the scatter of the repeats lets expect [-].
-        why: Why the prediction fails; empty where it does not.
+        why: Why the prediction fails, or is not judged; empty where it passes.
     """
 
     group: str
     descent_s: Positive
     parameters: tuple[Annotated[LawParameter, ONE], ...]
     quantities: tuple[Annotated[PredictedQuantity, ONE], ...]
-    curve_inside: Fraction
+    curve_inside: NumberOrNull
     extrapolated: bool
     factor: Positive
     factor_sd: Positive

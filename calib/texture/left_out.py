@@ -15,7 +15,7 @@ from calib.texture.law_fit import PARAMETERS, LawFit, SpeedGroup, fit_law
 from calib.texture.law_result import LawParameter, LawResult, LeftOutSpeed, PredictedQuantity
 from calib.texture.plate_record import PlateRecord, RecordedFile
 from calib.texture.repeats import area_metric, scatter
-from calib.texture.texture_profile import TextureProfile, texture_profile
+from calib.texture.texture_profile import TextureProfile, in_words, texture_profile
 from mpm.arrays import FloatArray
 
 LOADED = 0.05
@@ -25,6 +25,8 @@ INSIDE = 0.95
 OTHER_BATCH = 2.0
 """Standard deviations of a group's factor beyond which its specimens are of another stiffness."""
 JUDGED = ("hardness_N", "cohesiveness", "springiness", "resilience")
+JUDGED_TOTAL = len(JUDGED) + 1
+"""Quantities of a speed that are judged: those, and the curve."""
 RESAMPLED = 4000
 """Samples of a predicted record, whose texture profile is taken as of a measured one."""
 
@@ -97,7 +99,7 @@ def _judged(group: SpeedGroup, predicted: FloatArray, profiles: Sequence[Texture
                 spread.mean,
                 spread.next_low,
                 spread.next_high,
-                spread.next_low <= value <= spread.next_high,
+                spread.next_low <= value <= spread.next_high if spread.repeats > 1 else None,
                 area_metric(value, values) / abs(spread.mean),
                 area_metric(spread.mean, values) / abs(spread.mean),
             )
@@ -109,10 +111,10 @@ def _judged(group: SpeedGroup, predicted: FloatArray, profiles: Sequence[Texture
 
 
 def _inside(group: SpeedGroup, predicted: FloatArray) -> float:
-    """Part of the loaded curve within the 95 % scatter of one more repeat [-]; none for one repeat."""
+    """Part of the loaded curve within Student's 95 % scatter of one more repeat [-]; NaN for one repeat."""
     n = len(group.stress)
     if n < 2:
-        return 0.0
+        return math.nan
     wide = float(student.ppf(0.975, n - 1)) * math.sqrt(1 + 1 / n) * group.stress.std(axis=0, ddof=1)
     loaded = group.mean > LOADED * group.mean.max()
     return float(np.mean(np.abs(predicted - group.mean)[loaded] <= wide[loaded]))
@@ -137,9 +139,18 @@ def predicted_profile(path: BitePath, stress: FloatArray, area: float) -> Textur
     return texture_profile(PlateRecord("prediction", fine - fine[0], way, load, 1.0, file))[0]
 
 
-def passes(one: LeftOutSpeed) -> bool:
-    """Whether all of a predicted speed lies within the scatter of its repeats."""
-    return all(each.inside for each in one.quantities) and one.curve_inside >= INSIDE
+def outside(one: LeftOutSpeed) -> int | None:
+    """How many of a predicted speed's quantities and its curve lie outside the scatter of its repeats; None for one
+    repeat, which has no scatter."""
+    if any(each.inside is None for each in one.quantities):
+        return None
+    return sum(not each.inside for each in one.quantities) + (one.curve_inside < INSIDE)
+
+
+def passes(one: LeftOutSpeed) -> bool | None:
+    """Whether all of a predicted speed lies within the scatter of its repeats; None for one repeat."""
+    count = outside(one)
+    return None if count is None else not count
 
 
 def _why(one: LeftOutSpeed, group: SpeedGroup, others: Sequence[SpeedGroup]) -> str:
@@ -151,11 +162,14 @@ def _why(one: LeftOutSpeed, group: SpeedGroup, others: Sequence[SpeedGroup]) -> 
         others: The other groups.
 
     Returns:
-        The reasons; empty where it does not fail.
+        The reasons; empty where it passes.
     """
-    if passes(one):
+    passed = passes(one)
+    if passed is None:
+        return "one repeat has no scatter"
+    if passed:
         return ""
-    out = [f"{each.quantity} is outside" for each in one.quantities if not each.inside]
+    out = [f"{in_words(each.quantity)} is outside" for each in one.quantities if not each.inside]
     if one.curve_inside < INSIDE:
         out.append(f"{1 - one.curve_inside:.0%} of the curve is outside")
     apart = math.log(one.factor) / one.factor_sd
@@ -182,15 +196,23 @@ def _disordered(group: SpeedGroup, other: SpeedGroup) -> bool:
     return rise > OTHER_BATCH * math.hypot(slow.factor_sd, fast.factor_sd)
 
 
-def check_gaps(records: Sequence[PlateRecord]) -> list[float]:
-    """Heights of specimens by their first gaps [m].
+def heights_of(records: Sequence[PlateRecord], given: float | None) -> list[float]:
+    """Heights of specimens [m].
+
+    Args:
+        records: Their records.
+        given: Height of every specimen [m]; None for the first gap of each record.
+
+    Returns:
+        A height for each record.
 
     Raises:
-        TraceError: A record has no gap.
+        TraceError: A record has no gap, and no height is given.
     """
     for record in records:
-        if record.gap is None:
+        if given is None and record.gap is None:
             raise TraceError(
-                f"{record.file.name}: a law needs the height of each specimen, which is the first value of a column gap"
+                f"{record.file.name}: a law needs the height of each specimen, which is the first value of a column "
+                "gap; give it with --height"
             )
-    return [record.height(None) for record in records]
+    return [record.height(given) for record in records]

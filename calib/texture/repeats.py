@@ -27,7 +27,8 @@ class Scatter:
         sd: Their standard deviation; null for one repeat.
         low: Lower end of the 95 % interval of the mean (Student); null for one repeat.
         high: Upper end; null for one repeat.
-        next_low: Lower end of the 95 % interval of one more repeat (Student); null for one repeat.
+        next_low: Lower end of the 95 % interval of one more repeat: Student's of the logarithms where all repeats are
+            above 0, else of the values; null for one repeat.
         next_high: Upper end; null for one repeat.
         repeats: Number of repeats.
     """
@@ -55,8 +56,18 @@ def scatter(values: Sequence[float] | FloatArray) -> Scatter:
     if n == 1:
         return Scatter(mean, math.nan, math.nan, math.nan, math.nan, math.nan, 1)
     sd, wide = float(x.std(ddof=1)), float(student.ppf(0.975, n - 1))
-    half, whole = wide * sd / math.sqrt(n), wide * sd * math.sqrt(1.0 + 1.0 / n)
-    return Scatter(mean, sd, mean - half, mean + half, mean - whole, mean + whole, n)
+    half = wide * sd / math.sqrt(n)
+    low, high = _one_more(np.log(x)) if x.min() > 0.0 else _one_more(x)
+    if x.min() > 0.0:
+        low, high = math.exp(low), math.exp(high)
+    return Scatter(mean, sd, mean - half, mean + half, low, high, n)
+
+
+def _one_more(x: FloatArray) -> tuple[float, float]:
+    """Student's 95 % interval of one more value; x is two values or more, shape (n,)."""
+    n = len(x)
+    wide = float(student.ppf(0.975, n - 1)) * float(x.std(ddof=1)) * math.sqrt(1.0 + 1.0 / n)
+    return float(x.mean()) - wide, float(x.mean()) + wide
 
 
 def area_metric(model: float | Sequence[float] | FloatArray, measured: Sequence[float] | FloatArray) -> float:

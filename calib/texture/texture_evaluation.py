@@ -15,7 +15,7 @@ from calib.texture.bite_path import path_of
 from calib.texture.bites import find_bites, plate_descent
 from calib.texture.law_fit import SpeedGroup
 from calib.texture.law_result import LawResult, LeftOutSpeed
-from calib.texture.left_out import INSIDE, check_gaps, law_of_direction, passes
+from calib.texture.left_out import JUDGED_TOTAL, heights_of, law_of_direction, outside, passes
 from calib.texture.plate_record import PlateColumns, PlateRecord, read_records
 from calib.texture.repeats import ratio_of_means, scatter
 from calib.texture.texture_profile import Remark, TextureProfile, texture_profile
@@ -53,6 +53,7 @@ class TextureTest:
         trigger: Load from which the plate touches the food [N]; None for 5 % of the first peak.
         seed: Seed of the draws of the bootstrap.
         area: Area of the specimens under the plate [m^2]; with it, a law of rate is fitted to each direction.
+        height: Height of every specimen [m]; None for the first gap of each record.
     """
 
     along: Sequence[str | Path]
@@ -61,6 +62,7 @@ class TextureTest:
     trigger: float | None = None
     seed: int = 0
     area: float | None = None
+    height: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,14 +95,15 @@ def evaluate_texture(test: TextureTest, out: Path, *, command: Sequence[str], sa
         say(f"note: {text}")
     groups = grouped(specimens)
     with prepare(out, "tpa", resume=False):
-        curves = [bite_curves(members) for members in groups]
+        names = names_of(groups)
+        curves = [bite_curves(members, name) for members, name in zip(groups, names, strict=True)]
         laws: list[LawResult] = []
         if test.area is not None:
-            laws, curves = _laws(groups, curves, test.area, say)
+            laws, curves = _laws(groups, curves, test, say)
         result = TextureResult(
             command=tuple(command),
             trigger_N=math.nan if test.trigger is None else test.trigger,
-            groups=tuple(_group(members) for members in groups),
+            groups=tuple(_group(members, name) for members, name in zip(groups, names, strict=True)),
             ratios=tuple(_ratios(groups, test.seed)),
             laws=tuple(laws),
             verdicts=tuple(_verdict(one) for law in laws for one in law.left_out),
@@ -126,13 +129,15 @@ def _specimens(test: TextureTest) -> tuple[list[Specimen], list[str]]:
     records = read_records([path for _, paths in directions for path in paths], test.columns)
     names = [direction for direction, paths in directions for _ in paths]
     for record, direction in zip(records, names, strict=True):
+        if test.height is not None:
+            record.height(test.height)
         profile, remarks = texture_profile(record, test.trigger)
         notes += record.notes
         told += remarks
         out.append(Specimen(record, direction, profile, plate_descent(record)))
     for kind in dict.fromkeys(remark.kind for remark in told):
         first, *others = [remark.text for remark in told if remark.kind == kind]
-        notes.append(first + (f" (and so in {len(others)} other records)" if others else ""))
+        notes.append(first + (f" (and so in {_several(len(others), 'other record')})" if others else ""))
     return out, notes
 
 
@@ -163,28 +168,67 @@ def descent_of(group: Sequence[Specimen]) -> float:
     return float(np.median([one.descent for one in group]))
 
 
-def name_of(group: Sequence[Specimen]) -> str:
-    """Name of a group: its direction, where there are two, and the time in which the plate goes down."""
-    speed = f"{descent_of(group):.2g} s"
-    return speed if group[0].direction == ONLY else f"{group[0].direction} {speed}"
+def common_descent(group: Sequence[Specimen], groups: Sequence[Sequence[Specimen]]) -> float:
+    """Time in which the plate goes down at the speed of a group [s]: the median of both directions that have it.
+
+    Args:
+        group: The group.
+        groups: All groups.
+
+    Returns:
+        The time.
+    """
+    other = _nearest(group, groups)
+    mutual = other and _nearest(other, groups) is group and _apart(group, other) < math.log(SAME_SPEED)
+    return descent_of([*group, *other] if mutual else group)
 
 
-def _group(group: Sequence[Specimen]) -> TextureGroup:
+def _apart(one: Sequence[Specimen], other: Sequence[Specimen]) -> float:
+    """How far the speeds of two groups are apart: logarithm of the ratio of their times, none below zero [-]."""
+    return abs(math.log(descent_of(one) / descent_of(other)))
+
+
+def _nearest(group: Sequence[Specimen], groups: Sequence[Sequence[Specimen]]) -> Sequence[Specimen]:
+    """The group of the other direction with the nearest speed; empty where there is none."""
+    others = [one for one in groups if one[0].direction != group[0].direction]
+    return min(others, key=lambda one: _apart(group, one), default=())
+
+
+def names_of(groups: Sequence[Sequence[Specimen]]) -> list[str]:
+    """Names of groups: the direction, where there are two, and the time in which the plate goes down at that speed.
+
+    Args:
+        groups: The groups of all directions.
+
+    Returns:
+        A name for each; one speed has the same time in both directions.
+    """
+    times = [f"{common_descent(group, groups):.2g} s" for group in groups]
+    return [
+        time if group[0].direction == ONLY else f"{group[0].direction} {time}"
+        for group, time in zip(groups, times, strict=True)
+    ]
+
+
+def _several(count: int, thing: str) -> str:
+    """A number of things in words."""
+    return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
+
+
+def _group(group: Sequence[Specimen], name: str) -> TextureGroup:
     """The group as it is reported."""
     values = {name: scatter([getattr(one.profile, name) for one in group]) for name in QUANTITIES}
     repeats = tuple(
         RepeatProfile(one.record.name, one.profile) for one in sorted(group, key=lambda one: one.record.name)
     )
-    return TextureGroup(
-        name=name_of(group), direction=group[0].direction, descent_s=descent_of(group), repeats=repeats, **values
-    )
+    return TextureGroup(name=name, direction=group[0].direction, descent_s=descent_of(group), repeats=repeats, **values)
 
 
 def _ratios(groups: Sequence[Sequence[Specimen]], seed: int) -> list[DirectionRatio]:
     """Along over across of each quantity at each speed that both directions have, and of those speeds together."""
     along, across = ([group for group in groups if group[0].direction == direction] for direction in (ALONG, ACROSS))
     pairs = [
-        (descent_of(one), one, other)
+        (common_descent(one, groups), one, other)
         for one in along
         for other in across
         if 1 / SAME_SPEED < descent_of(one) / descent_of(other) < SAME_SPEED
@@ -201,11 +245,12 @@ def _ratios(groups: Sequence[Sequence[Specimen]], seed: int) -> list[DirectionRa
     return out
 
 
-def bite_curves(group: Sequence[Specimen]) -> BiteCurves:
+def bite_curves(group: Sequence[Specimen], name: str) -> BiteCurves:
     """Load over time of each repeat of a group, the peaks of either bite at one time.
 
     Args:
         group: Specimens of one direction and speed.
+        name: Name of the group.
 
     Returns:
         Their loads on common times.
@@ -218,18 +263,19 @@ def bite_curves(group: Sequence[Specimen]) -> BiteCurves:
     for one, (first, second) in zip(group, bites, strict=True):
         clock = np.where(time < 0.5 * apart, first.peak + time, second.peak + time - apart)
         loads.append(np.interp(clock, one.record.time, one.record.load))
-    return BiteCurves(name_of(group), time, np.array(loads))
+    return BiteCurves(name, time, np.array(loads))
 
 
 def _laws(
-    groups: Sequence[Sequence[Specimen]], curves: Sequence[BiteCurves], area: float, say: Say
+    groups: Sequence[Sequence[Specimen]], curves: Sequence[BiteCurves], test: TextureTest, say: Say
 ) -> tuple[list[LawResult], list[BiteCurves]]:
     """The law of each direction, and the curves with what it predicts."""
     out, told = [], {}
+    area = float(test.area or 0.0)
     for direction in dict.fromkeys(group[0].direction for group in groups):
         own = [(group, one) for group, one in zip(groups, curves, strict=True) if group[0].direction == direction]
-        say(f"fitting a law of rate to {len(own)} speeds, direction: {direction}")
-        speeds = [_speed_group(group, one, area) for group, one in own]
+        say(f"fitting a law of rate to {_several(len(own), 'speed')}, direction: {direction}")
+        speeds = [_speed_group(group, one, area, test.height) for group, one in own]
         law, predicted = law_of_direction(direction, speeds, [[x.profile for x in group] for group, _ in own], area)
         out.append(law)
         for speed in speeds:
@@ -241,20 +287,21 @@ def _laws(
     return out, list(curves)
 
 
-def _speed_group(group: Sequence[Specimen], curves: BiteCurves, area: float) -> SpeedGroup:
+def _speed_group(group: Sequence[Specimen], curves: BiteCurves, area: float, height: float | None) -> SpeedGroup:
     """The group as a law is fitted to it."""
     records = [one.record for one in group]
-    path = path_of(records, check_gaps(records))
+    path = path_of(records, heights_of(records, height))
     time, _ = path.history()
     stress = np.array([np.interp(time, curves.time, load) for load in curves.loads]) / area
     return SpeedGroup(curves.group, path, stress)
 
 
 def _verdict(one: LeftOutSpeed) -> Verdict:
-    """The line of a speed that was left out: what of it is outside the scatter of its repeats."""
-    outside = sum(not each.inside for each in one.quantities) + (one.curve_inside < INSIDE)
-    name = f"{one.group} by the law of the other speeds: outside the scatter of its repeats"
-    return Verdict(name, outside, 0, "", passes(one), one.why)
+    """The line of a speed that was left out: how much of it is outside the scatter of its repeats."""
+    name = (
+        f"{one.group} by the law of the other speeds: quantities of {JUDGED_TOTAL} outside the scatter of the repeats"
+    )
+    return Verdict(name, outside(one), 0, "", passes(one), one.why)
 
 
 def _unshown(test: TextureTest, groups: Sequence[Sequence[Specimen]]) -> list[str]:

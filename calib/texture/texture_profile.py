@@ -71,6 +71,11 @@ class TextureProfile:
         return self.gumminess_N * self.springiness
 
 
+def in_words(quantity: str) -> str:
+    """Name of a quantity as it is said: its key without the unit."""
+    return quantity.removesuffix("_Ns").removesuffix("_N")
+
+
 @dataclass(frozen=True)
 class Remark:
     """What a reader of a profile should know of a record: of which kind it is, the same for many records, and a

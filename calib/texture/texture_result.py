@@ -124,8 +124,8 @@ class TextureResult:
 
     @property
     def passed(self) -> bool:
-        """Whether every line passed; true where nothing is judged."""
-        return all(line.passed for line in self.verdicts)
+        """Whether every line that is judged passed; true where nothing is judged."""
+        return all(line.passed is not False for line in self.verdicts)
 
     @property
     def device(self) -> str:

@@ -72,7 +72,9 @@ def _predictions(result: TextureResult) -> ReportTable:
                 name = each.quantity.removesuffix("_N") + (" [N]" if each.quantity.endswith("_N") else "")
                 row = [one.group if not k else "", name, plain(each.predicted), plain(each.mean), ends, area]
                 rows.append([*row, MARKS[each.inside]])
-            share = f"{100 * one.curve_inside:.0f} %"
-            rows.append(["", "curve inside", share, "", "95 % or more", "", MARKS[one.curve_inside >= 0.95]])
+            share = one.curve_inside
+            told = None if math.isnan(share) else share >= 0.95
+            text = "–" if told is None else f"{100 * share:.0f} %"
+            rows.append(["", "curve inside", text, "", "95 % or more", "", MARKS[told]])
     head = ("Left out", "Quantity", "Predicted", "Mean", "Scatter", "Area", "Inside")
     return ReportTable(head, ("auto", "1fr", "auto", "auto", "auto", "auto", "22mm"), rows, marked=6, left=2)

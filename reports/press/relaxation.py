@@ -146,7 +146,7 @@ def picture(curves: Sequence[HoldCurve]) -> bytes:
         ends = [one.time[one.time > 0.0] for one in curves]
         log_ticks(axes.xaxis, min(float(x[0]) for x in ends), max(float(x[-1]) for x in ends))
         axes.set_ylim(bottom=0.0)
-        axes.set_xlabel("time from the largest load [s]")
+        axes.set_xlabel("time from the start of the hold [s]")
         axes.set_ylabel("load [N]")
         figure.legend(loc="outside upper left", ncols=2)
 

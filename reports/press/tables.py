@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from calib.texture.repeats import Scatter
     from calib.validation.acceptance import Verdict
 
-MARKS = {True: "yes", False: "no"}
+MARKS = {True: "yes", False: "no", None: "none"}
 MOST_PLACES = 6  # decimals
 
 
@@ -25,7 +25,7 @@ def verdict_table(lines: Sequence[Verdict]) -> ReportTable:
             capital(line.name) + (f": {line.note}" if line.note else ""),
             shown(line.value, line.unit or "-", 3),
             related(line.value, line.limit, line.passed) + shown(line.limit, line.unit or "-", None),
-            MARKS[bool(line.passed)],
+            MARKS[line.passed],
         ]
         for line in lines
     ]

@@ -66,7 +66,7 @@ def write_report(result: TextureResult, curves: Sequence[BiteCurves], out: Path)
         passed=result.passed if result.verdicts else None,
         sentence=_sentence(result),
         facts=[
-            ("Specimens", f"{count} in {len(result.groups)} groups"),
+            ("Specimens", f"{count} in {len(result.groups)} {'group' if len(result.groups) == 1 else 'groups'}"),
             ("Contact", trigger),
             ("Seed of the draws", str(result.seed)),
         ],
@@ -88,11 +88,12 @@ def _sentence(result: TextureResult) -> str:
             f"The hardness along the fibres is {plain(ratio.value)} times that across them "
             f"(95 % interval {between(ratio.low, ratio.high)})."
         )
-    first = result.groups[0]
+    first, count = result.groups[0], len(result.groups[0].repeats)
+    of = "one specimen" if count == 1 else f"means of {count}"
     return (
         f"Hardness {quantity(first.hardness_N.mean, 'N')}, cohesiveness {plain(first.cohesiveness.mean)}, springiness "
         f"{plain(first.springiness.mean)}, resilience {plain(first.resilience.mean)} at a descent of "
-        f"{quantity(first.descent_s, 's')}: means of {len(first.repeats)}."
+        f"{quantity(first.descent_s, 's')}: {of}."
     )
 
 

@@ -127,6 +127,28 @@ def test_a_block_relaxes_as_linear_viscoelasticity(bulk):
     np.testing.assert_allclose(found, want, rtol=0.01)
 
 
+def test_two_branches_relax_as_their_closed_form():
+    """A block between slippery plates whose shape and volume relax by two branches, one five times as fast as the
+    press and one as slow as it: the ramp of the closed form, 1 less the shares and each share times
+    (1 - e^(-t/tau)) tau / t, within 1 % of the force without relaxation."""
+    branches = ((0.3, 0.2), (0.3, 1.0))
+    numerics = Numerics(dx=4e-3, gravity=0.0, output=1e-5)
+    shape = Shape("block", 0.02, 0.02, 0.02)
+    force = []
+    for prony in ((), branches):
+        material = Material(E=1e5, nu=0.35, rho=1000.0, loss_factor=0.05, prony=prony, relaxing_bulk=1.0)
+        scene = Scene(Food(shape, material), Press(), Motion(1e-3, 4e-3, speed=1e-3), Board(0.0), numerics=numerics)
+        record = pressed(scene)
+        middle = 0.5 * (record.stroke[1:] + record.stroke[:-1])
+        ways = np.array([5e-4, 7e-4, 9e-4])
+        force.append([np.polyfit(middle[near] - way, record.face[1:, 2][near], 1)[1] for way in ways
+                      for near in [abs(middle - way) < 1e-4]])  # fmt: skip
+    time = ways / 1e-3
+    gone = np.array([share * (1.0 + np.expm1(-time / tau) * tau / time) for share, tau in branches])
+    np.testing.assert_allclose(np.array(force[1]) / np.array(force[0]), 1.0 - gone.sum(axis=0), rtol=0.01)
+    assert gone.min() > 0.05  # so that either branch counts
+
+
 @pytest.mark.parametrize("bulk", [0.0, 1.0])
 def test_what_relaxes_is_booked(bulk):
     """In a glued block what is stored and what has been lost are the work of the plate within 2.5 %, whether the volume

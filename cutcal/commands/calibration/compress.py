@@ -168,8 +168,11 @@ def verdict_lines(verdicts: Sequence[Verdict]) -> list[str]:
     """The lines of a verdict as the terminal shows them."""
     out = []
     for line in verdicts:
-        word = "ok  " if line.passed else "FAIL"
         note = f": {line.note}" if line.note else ""
+        if line.passed is None:
+            out.append(f"  --   not judged  {line.name}{note}")
+            continue
+        word = "ok  " if line.passed else "FAIL"
         value, limit = (f"{x:6.1%}" if line.unit == "fraction" else f"{x:6g}" for x in (line.value or 0.0, line.limit))
         limit = f"{line.limit:.0%}" if line.unit == "fraction" else limit.strip()
         out.append(f"  {word} {value} (limit {limit})  {line.name}{note}")

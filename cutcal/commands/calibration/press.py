@@ -24,7 +24,8 @@ DESCRIPTION = """Evaluate tests between two plates. MODE is compress: Young's mo
 loading (the command compress is the same); relax: Prony series of a hold; tpa:
 texture profile of two bites. A trace of relax and tpa is one specimen and has
 columns of time, load and compression, or of a gap that closes, whose first
-value is then the height. Writes MODE.json, curves.csv and report.pdf to --out."""
+value is then the height, unless --height says another. Writes MODE.json,
+curves.csv and report.pdf to --out."""
 EPILOG = """examples:
   cutcal press compress --trace gel.csv --height 0.03 --diameter 0.05 --nu 0.49
   cutcal press relax --trace a.csv b.csv --diameter 0.02 --height 0.01
@@ -35,7 +36,6 @@ the limits."""
 OF_MODE = {
     "nu": (COMPRESS,), "strain": (COMPRESS,), "bonded": (COMPRESS,), "bracket": (COMPRESS,), "cells": (COMPRESS,),
     "branches": (RELAX,), "across": (TPA,), "law": (TPA,), "trigger": (RELAX, TPA), "time_col": (RELAX, TPA),
-    "height": (COMPRESS, RELAX),
 }  # fmt: skip
 """Modes of the options that not all have."""
 
@@ -101,7 +101,7 @@ def _texture(args: argparse.Namespace, out: Path) -> int:
     if args.law:
         kind, length, width = compress.outline_of(args)
         area = area_of(Shape(kind, length, width, length))
-    test = TextureTest(args.trace, args.across or (), _columns(args), args.trigger, args.seed, area)
+    test = TextureTest(args.trace, args.across or (), _columns(args), args.trigger, args.seed, area, args.height)
     result = evaluate_texture(test, out, command=compress.command_of("press"), say=say)
     if args.json:
         print_json(to_document(result))
@@ -126,6 +126,8 @@ def relaxation_table(result: RelaxationResult) -> str:
 
 def texture_table(result: TextureResult) -> str:
     """What the terminal shows at the end of a texture profile."""
+    from calib.texture.texture_profile import in_words
+
     lines = [f"{'group':<16}{'n':>3}  hardness [N]  cohesiveness  springiness    resilience"]
     for group in result.groups:
         cells = (group.hardness_N, group.cohesiveness, group.springiness, group.resilience)
@@ -134,9 +136,14 @@ def texture_table(result: TextureResult) -> str:
     for one in result.ratios:
         if one.descent_s != one.descent_s:  # of all speeds
             r = one.ratio
-            lines.append(f"  along / across, {one.quantity}: {r.value:.3g} (95 % interval {r.low:.3g} to {r.high:.3g})")
+            lines.append(
+                f"  along / across, {in_words(one.quantity)}: {r.value:.3g} (95 % interval {r.low:.3g} to {r.high:.3g})"
+            )
     for law in result.laws:
-        values = ", ".join(f"{one.name} {one.value:.3g}" for one in law.parameters)
+        values = ", ".join(
+            f"E {one.value / 1e3:.3g} kPa" if one.name == "E_Pa" else f"{one.name} {one.value:.3g}"
+            for one in law.parameters
+        )
         lines.append(f"  law ({law.direction}): {values}")
     lines += compress.verdict_lines(result.verdicts)
     return "\n".join(lines + [f"  note: {text}" for text in result.not_shown])

@@ -28,10 +28,12 @@ def two_bites(descent: float = 1.0, *, rest: float = 0.2, samples: int = 400):
     return time, np.interp(time, corners, ways)
 
 
-def held(series: PronySeries, *, stiffness=2000.0, ramp=0.2, hold=60.0, step=0.02, noise=0.0, seed=0) -> PlateRecord:
-    """A ramp and a hold of a body that relaxes."""
-    time = np.arange(0.0, ramp + hold, step)
-    way = 0.3 * HEIGHT * np.minimum(time / ramp, 1.0)
+def held(
+    series: PronySeries, *, stiffness=2000.0, ramp=0.2, hold=60.0, step=0.02, noise=0.0, seed=0, rest=0.0
+) -> PlateRecord:
+    """A rest, a ramp and a hold of a body that relaxes."""
+    time = np.arange(0.0, rest + ramp + hold, step)
+    way = 0.3 * HEIGHT * np.clip((time - rest) / ramp, 0.0, 1.0)
     load = series.stress(time, stiffness * way) + noise * np.random.default_rng(seed).standard_normal(len(time))
     return record(time, way, load)
 

@@ -97,7 +97,7 @@ def test_each_repeat_is_what_the_definitions_say(name):
 
 def test_both_directions_and_four_speeds(tmp_path):
     """Eight groups, hardness along 0.39 of that across with an interval below 1, and a law of each direction that
-    predicts the texture of a speed it has not seen within the scatter of its repeats in 29 of 32 quantities. The
+    predicts the texture of a speed it has not seen within the scatter of its repeats in 30 of 32 quantities. The
     report names those that fail, and for those of the 2, 4 and 8 s tests across that a slower one is harder, which no
     relaxation makes."""
     along, across = (
@@ -112,8 +112,10 @@ def test_both_directions_and_four_speeds(tmp_path):
     speeds = [one for law in result.laws for one in law.left_out]
     outside = {(one.group, each.quantity) for one in speeds for each in one.quantities if not each.inside}
     assert len(speeds) == 8 and outside == {
-        ("along 0.5 s", "hardness_N"), ("along 2 s", "resilience"), ("across 0.49 s", "hardness_N")
+        ("along 2 s", "resilience"), ("across 2 s", "hardness_N")
     }  # fmt: skip
     failed = {one.group: one.why for one in speeds if one.why}
+    low = [each.low for one in speeds for each in one.quantities]
+    assert min(low) > 0.0
     assert len(failed) == sum(not line.passed for line in result.verdicts) == 5 and not result.passed
     assert all("the slower one is harder" in failed[name] for name in failed if name.startswith("across"))

@@ -10,6 +10,7 @@ import pytest
 from calib.texture.bite_path import BitePath
 from calib.texture.prony_series import PronySeries
 from calib.texture.quasi_linear import QuasiLinearLaw
+from calib.texture.texture_evaluation import _several
 from cutcal.main import main
 from tests.calib.documents import valid
 from tests.calib.texture.made_bites import DEPTH, HEIGHT, held, record, two_bites, write
@@ -63,7 +64,7 @@ def test_a_law_end_to_end(tmp_path, capsys):
     out = tmp_path / "out"
     size = ["--diameter", str(np.sqrt(4 * 5e-5 / np.pi))]
     assert main(["press", "tpa", "--trace", *paths, *size, "--law", "--out", str(out)]) == 0
-    assert "law (only): E_Pa 1" in capsys.readouterr().out
+    assert "law (only): E 1" in capsys.readouterr().out
     document = valid(json.loads((out / "tpa.json").read_text()), "tpa")
     (found,) = document["laws"]
     assert [one["extrapolated"] for one in found["left_out"]] == [True, False, True] and document["passed"]
@@ -71,6 +72,59 @@ def test_a_law_end_to_end(tmp_path, capsys):
     assert parameters["E_Pa"]["value"] == pytest.approx(1e5, rel=0.2)
     assert parameters["E_Pa"]["low"] < 1e5 < parameters["E_Pa"]["high"]
     assert (out / "curves.csv").read_text().splitlines()[1].endswith("predicted_N")
+
+
+def one_repeat_a_speed(folder, descents=(0.5, 3.0, 20.0), *, gap=True, direction="s"):
+    """Files of one specimen a speed; without a gap they have a distance of the plate."""
+    law = QuasiLinearLaw(1e5, stiffening=4.0, equilibrium=0.1, power=0.3, damage=0.0)
+    paths = []
+    for descent in descents:
+        time, strain = BitePath(descent, 0.0, 2.2 * descent, 0.5).history()
+        fine = np.linspace(time[0] - 0.2 * descent, time[-1], 1500)
+        way, load = HEIGHT * np.interp(fine, time, strain), 5e-5 * np.interp(fine, time, law.stress(time, strain))
+        path = folder / f"{direction}{descent:g}.tsv"
+        if gap:
+            write(path, record(fine - fine[0], way, load))
+        else:
+            rows = "".join(
+                f"{t:.6g},{1e3 * x:.6g},{f:.6g}\n" for t, x, f in zip(fine - fine[0], way, load, strict=True)
+            )
+            path.write_text("time_s,compression_mm,load_N\n" + rows)
+        paths.append(str(path))
+    return paths
+
+
+def test_one_repeat_a_speed_is_not_judged(tmp_path, capsys):
+    """Exit code 0 and lines that say why; a height is needed where no gap is recorded, and --height gives it."""
+    words = ["press", "tpa", "--trace", *one_repeat_a_speed(tmp_path, gap=False), "--diameter", "8mm", "--law"]
+    assert main([*words, "--out", str(tmp_path / "none")]) == 1
+    assert "a law needs the height of each specimen" in capsys.readouterr().err
+    out = tmp_path / "out"
+    assert main([*words, "--height", "10mm", "--out", str(out)]) == 0
+    shown = capsys.readouterr().out
+    name = "by the law of the other speeds: quantities of 5 outside the scatter of the repeats"
+    assert shown.count("not judged") == shown.count(f"{name}: one repeat has no scatter") == 3 and "FAIL" not in shown
+    document = valid(json.loads((out / "tpa.json").read_text()), "tpa")
+    assert [line["passed"] for line in document["verdicts"]] == [None] * 3 and document["passed"]
+    assert (out / "report.pdf").read_bytes().startswith(b"%PDF")
+    assert main(["press", "tpa", *words[2:-1], "--height", "4mm", "--out", str(tmp_path / "low")]) == 1
+    assert "which is not less than the height of 0.004 m" in capsys.readouterr().err
+
+
+def test_words_agree_with_numbers(tmp_path, capsys):
+    """One speed and one other record are no plural, quantities have names, and a speed has one name in both
+    directions."""
+    along, across = (one_repeat_a_speed(tmp_path, times, direction=d) for d, times in
+                     (("a", (0.5, 3.0)), ("b", (0.48, 3.2))))  # fmt: skip
+    words = ["press", "tpa", "--trace", *along, "--across", *across, "--out", str(tmp_path / "out")]
+    assert main(words) == 0
+    captured = capsys.readouterr()
+    assert "along / across, hardness: " in captured.out and "hardness_N" not in captured.out
+    names = [one["name"] for one in json.loads((tmp_path / "out" / "tpa.json").read_text())["groups"]]
+    assert names == ["along 0.49 s", "along 3.1 s", "across 0.49 s", "across 3.1 s"]
+    one = ["press", "tpa", "--trace", along[0], "--diameter", "8mm", "--law", "--out", str(tmp_path / "one")]
+    assert main(one) == 1 and "a law of rate to 1 speed, direction" in capsys.readouterr().err
+    assert _several(1, "other record") == "1 other record" and _several(2, "other record") == "2 other records"
 
 
 def test_a_relaxation_end_to_end(tmp_path, capsys):

@@ -10,7 +10,7 @@ import pytest
 from calib.errors import CurveError
 from calib.texture.bite_path import BitePath, path_of
 from calib.texture.law_fit import SpeedGroup, fit_law
-from calib.texture.left_out import law_of_direction, passes, predicted_profile
+from calib.texture.left_out import law_of_direction, outside, passes, predicted_profile
 from calib.texture.quasi_linear import QuasiLinearLaw
 from tests.calib.texture.made_bites import DEPTH, HEIGHT, record, two_bites
 
@@ -114,9 +114,20 @@ def test_a_speed_of_another_batch_fails_and_says_why():
     groups = [made(LAW, 0.5), made(LAW, 2.0, factors=(2.7, 3.0, 3.3)), made(LAW, 20.0)]
     profiles = [[predicted_profile(g.path, s, AREA) for s in g.stress] for g in groups]
     told = law_of_direction("only", groups, profiles, AREA)[0].left_out[1]
-    assert not passes(told) and "hardness_N is outside" in told.why and "another batch" in told.why
+    assert not passes(told) and "hardness is outside" in told.why and "another batch" in told.why
     assert "of it and 0.5 s the slower one is harder" in told.why
     assert told.factor > 1.5
+
+
+def test_one_repeat_is_not_judged():
+    """A speed of one repeat has no scatter: neither passed nor failed, and the document says so; the others are
+    judged."""
+    groups = [made(LAW, 0.5), made(LAW, 2.0, factors=(3.0,)), made(LAW, 20.0)]
+    profiles = [[predicted_profile(g.path, s, AREA) for s in g.stress] for g in groups]
+    first, alone, last = law_of_direction("only", groups, profiles, AREA)[0].left_out
+    assert passes(alone) is None and outside(alone) is None and alone.why == "one repeat has no scatter"
+    assert [each.inside for each in alone.quantities] == [None] * 4 and np.isnan(alone.curve_inside)
+    assert passes(first) in (True, False) and passes(last) in (True, False)
 
 
 def test_one_speed_tells_no_law():

@@ -12,11 +12,17 @@ from calib.texture.repeats import area_metric, ratio_of_means, scatter
 
 
 def test_intervals_of_a_group():
-    """Student's interval of the mean, and of one more repeat, by hand; none of one repeat."""
+    """Student's interval of the mean, and of one more repeat, by hand; none of one repeat. One more repeat of what is
+    positive is judged by its logarithm: no interval reaches below zero."""
     one = scatter([1.0, 2.0, 3.0])
     assert (one.mean, one.sd, one.repeats) == (2.0, 1.0, 3)
     assert one.high - one.mean == pytest.approx(4.3027 / math.sqrt(3), rel=1e-4)
-    assert one.next_high - one.mean == pytest.approx(4.3027 * math.sqrt(4 / 3), rel=1e-4)
+    signed = scatter([-1.0, 0.0, 1.0])
+    assert signed.next_high == -signed.next_low == pytest.approx(4.3027 * math.sqrt(4 / 3), rel=1e-4)
+    doubled = scatter([1.0, 2.0, 4.0])
+    factor = math.exp(4.3027 * math.sqrt(4 / 3) * math.log(2.0))
+    assert (doubled.next_low, doubled.next_high) == pytest.approx((2.0 / factor, 2.0 * factor), rel=1e-3)
+    assert scatter([1.0, 5.0]).next_low > 0.0
     assert math.isnan(scatter([5.0]).sd) and math.isnan(scatter([5.0]).next_low)
     with pytest.raises(CurveError):
         scatter([])
