@@ -15,13 +15,11 @@ if TYPE_CHECKING:
     from calib.design_api import Design
     from calib.material.food import FoodSpec as Food
     from calib.trace.trace import Trace
-    from mpm.scene.errors import CutcalError
 
-__all__ = ["Calibration", "CutcalError", "Design", "Food", "Study", "Trace"]
+__all__ = ["Calibration", "Design", "Food", "Study", "Trace"]
 
 _PLACES = {
     "Calibration": ("calib.api", "Calibration"),
-    "CutcalError": ("mpm.scene.errors", "CutcalError"),
     "Design": ("calib.design_api", "Design"),
     "Food": ("calib.material.food", "FoodSpec"),
     "Study": ("calib.api", "Study"),

@@ -11,9 +11,9 @@ import calib
 from calib._version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from calib import Calibration, CutcalError, Design, Food, Study, Trace
+    from calib import Calibration, Design, Food, Study, Trace
 
-__all__ = ["Calibration", "CutcalError", "Design", "Food", "Study", "Trace"]
+__all__ = ["Calibration", "Design", "Food", "Study", "Trace"]
 
 
 def __getattr__(name: str) -> Any:
