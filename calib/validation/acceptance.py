@@ -161,7 +161,7 @@ def balances(kept: Conservation) -> list[Verdict]:
     Returns:
         The lines.
     """
-    note = f"edge and opening took {quantity(kept.parted, 'fraction')} of R times the new area"
+    note = f"{quantity(kept.parted, 'fraction')} of R times the new area was taken"
     cut = [] if math.isnan(kept.parted) else [_below(PRESSED, max(0.0, 1.0 - kept.parted), PRESSED_LIMIT, note=note)]
     lost = [] if math.isnan(kept.unbooked) else [_below(LOST, kept.unbooked, LOSS_LIMIT, note="of the work")]
     momentum = kept.momentum_residual
@@ -193,7 +193,7 @@ def discrimination(found: PredictiveScore) -> list[Verdict]:
     """
     name, limit = found.simple
     explained = bool(found.explained >= EXPLAINED_LIMIT)
-    note = "probability that the right food would leave a larger misfit"
+    note = "probability of a larger misfit"
     return [
         Verdict(EXPLAINED_LINE, found.explained, EXPLAINED_LIMIT, "fraction", explained, note),
         *([] if found.conflict is None else [_conflict(found.conflict)]),
@@ -205,14 +205,14 @@ def discrimination(found: PredictiveScore) -> list[Verdict]:
             limit,
             "fraction",
             found.score < limit,
-            f"best null model: {name.replace('_', ' ')}; of the peak{_seven_numbers(found)}",
+            f"{name.replace('_', ' ')}{_seven_numbers(found)}",
         ),
     ]
 
 
 def _size(probability: float) -> Verdict:
     """The line of a specimen that is larger than the food is."""
-    note = "probability of a whole food as large as the specimen"
+    note = "probability of a whole food as large"
     return Verdict(SIZE_LINE, probability, CONFLICT_LIMIT, "fraction", bool(probability >= CONFLICT_LIMIT), note)
 
 
@@ -227,9 +227,9 @@ def _seven_numbers(found: PredictiveScore) -> str:
 
 def _conflict(found: PriorConflict) -> Verdict:
     """The line of values that the literature does not expect of the food."""
-    note = "probability of values as far from the food's literature"
+    note = "probability of values as far out"
     if found.furthest:
-        note += f"; furthest: {found.furthest}, by {abs(found.distance):.1f} sd of what was to be expected"
+        note += f"; furthest: {found.furthest}, by {abs(found.distance):.1f} sd"
     passed = bool(found.probability >= CONFLICT_LIMIT)
     return Verdict(CONFLICT_LINE, found.probability, CONFLICT_LIMIT, "fraction", passed, note)
 

@@ -360,7 +360,7 @@ def test_verdicts_fail_what_fails():
     notes = {v.name: (v.value, v.note) for v in lines}
     assert notes["food pressed away, not parted"] == (
         pytest.approx(0.3),
-        "edge and opening took 70.0\xa0% of R times the new area",
+        "70.0\xa0% of R times the new area was taken",
     )
     assert [(v.name, v.passed) for v in balances(Conservation(0.0, 0.0, 1.2))][0] == (
         "food pressed away, not parted",
