@@ -22,8 +22,8 @@ LIMIT_SOURCES = {
     "uncertainty of the pull's level over the largest pull",
     "shape better than ramp and half sine": "the better of two curves without physics",
     "curve explained by the food": "a right food fails once in a hundred cuts",
-    "values those of the food": "the right food has values as far out once in a hundred cuts; sd are those of what was to "
-    "be expected",
+    "values those of the food": "the right food has values as far out once in a hundred cuts; sd are those of what was "
+    "to be expected",
     "specimen no larger than the food": "one whole food in a hundred is larger",
     "width of the 95 % band": "a band wider than a quarter of the peak either way predicts nothing of use",
     "interval score better than null models": "the better of two curves without physics [@Gneiting 2007]",
