@@ -71,7 +71,7 @@ def layer_guesses(
     best, found = np.inf, {}
     for sizes in itertools.product(*(_tried(parameters, size) for size in fitted)):
         given = dict(zip(fitted, sizes, strict=True))
-        height, chords = _chords(shape, replace(food, **given))
+        height, chords = layer_chords(shape, replace(food, **given))
         for dent in DENTS * shape.height:
             rows = np.array([np.interp(_reached(stroke, dent, shape.height), height, c) for c in chords])[:, used]
             values, misfit = nnls(rows.T, EDGE_PART * curve[used])
@@ -85,7 +85,7 @@ def layer_guesses(
     if "mu" in parameters.names:
         found["mu"] = FRICTION_PART * parameters["mu"].value
     reached = float(stroke[int(np.argmax(curve[: max(len(curve) // 3, 2)]))])
-    height, chords = _chords(shape, food)
+    height, chords = layer_chords(shape, food)
     chord = max(float(np.interp(reached, height, chords.sum(axis=0))), chords.max() / POINTS[1])
     line = EDGE_PART * float(np.interp(reached, stroke, curve)) / chord
     usual = {name: value for name, value in found.items() if name not in ("E", "yield_stress")}
@@ -113,7 +113,7 @@ def _reached(stroke: FloatArray, dent: float, height: float) -> FloatArray:
     return np.minimum(np.maximum(stroke - dent, 0.0) * height / max(height - dent, 1e-9), height)
 
 
-def _chords(shape: Shape, food: Material) -> tuple[FloatArray, FloatArray]:
+def layer_chords(shape: Shape, food: Material) -> tuple[FloatArray, FloatArray]:
     """Depths below the top [m] and the chords of flesh, rind and core there [m], shape (3, POINTS[0])."""
     depth = (np.arange(POINTS[0]) + 0.5) / POINTS[0] * shape.height
     x = ((np.arange(POINTS[1]) + 0.5) / POINTS[1] - 0.5) * shape.width

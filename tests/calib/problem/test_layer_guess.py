@@ -11,7 +11,7 @@ from calib.material.food import load_food
 from calib.material.knife import load_knife
 from calib.material.scene import cut_scene
 from calib.problem.food_parameters import fit_parameters
-from calib.problem.layer_guess import EDGE_PART, _chords, layer_guesses
+from calib.problem.layer_guess import EDGE_PART, layer_chords, layer_guesses
 from calib.problem.request import Request
 from calib.problem.setup import set_up
 from mpm.scene.shapes import Shape
@@ -28,7 +28,7 @@ def made() -> tuple[np.ndarray, np.ndarray]:
     """Stroke and force of a fruit of these layers that gives way by a dent, until there is nothing below it."""
     stroke = np.linspace(0.0, HEIGHT, 240)
     food = replace(SCENE.food.material, rind_thickness=TRUE["rind_thickness"], core_ratio=TRUE["core_ratio"])
-    depth, chords = _chords(SCENE.food.shape, food)
+    depth, chords = layer_chords(SCENE.food.shape, food)
     at = np.clip((stroke - DENT) * HEIGHT / (HEIGHT - DENT), 0.0, HEIGHT)
     force = sum(TRUE[name] * np.interp(at, depth, c) for name, c in zip(("R", "R_rind", "R_core"), chords, strict=True))
     return stroke, np.maximum(force, 0.3 * stroke / DENT) / EDGE_PART

@@ -1,0 +1,98 @@
+"""Where a search for a food without layers begins whose trace shows how its cut starts: with a peak, and a dip behind it.
+
+The peak says two numbers by itself: the force at which the cut starts, over the chord that the edge has met, and the
+dent under the edge. The rest of the force is new surface, or the wedge that presses on its faces, and the curve alone
+does not say how much of each. So there is a start for either: a food that costs the edge nearly all of the force, and a
+stiffer one that costs it a quarter. From values of the literature a search may end in a food whose cut starts without a
+peak, and whose R then has to pay for all of it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from calib.problem.layer_guess import EDGE_PART, FRICTION_PART, layer_chords
+from calib.problem.parameters import ParameterSet, is_shared
+from mpm.arrays import FloatArray
+from mpm.scene import Knife, Scene
+from mpm.scene.material import RESISTANCES
+
+DIP = 0.05
+"""Part of its height by which the force falls behind a peak that is the start of a cut."""
+NOISE_SD = 4.0
+"""The same in standard deviations of the curve's noise."""
+FACES_EDGE_PART, FACES_STIFFER = 0.25, 1.0
+"""Part of the force that the edge takes where the faces bear most of it, and by how many standard deviations of its
+prior such a food is stiffer than usual."""
+FACES_FRICTION_PART = 0.7
+"""Friction of such a food over the usual."""
+PLATEAU = (0.25, 0.85)
+"""Part of the food's height over which the force for each length of the edge is looked at."""
+LEAST_CHORD = 1e-3
+"""Chord that an edge on a round food has met at least [m]."""
+
+
+def start_of_cut(curve: FloatArray, noise_sd: float) -> int | None:
+    """Place of the peak with which a cut starts.
+
+    Args:
+        curve: Force over the stroke [N], shape (n,).
+        noise_sd: Standard deviation of its noise [N].
+
+    Returns:
+        Index of the first peak in the first third of the stroke that the force falls behind, before it rises above it;
+        None where there is none.
+    """
+    for i in range(1, len(curve) // 3):
+        if curve[i] < curve[: i + 1].max() or curve[i + 1] >= curve[i]:
+            continue
+        above = np.flatnonzero(curve[i:] > curve[i])
+        dip = curve[i] - curve[i : i + (int(above[0]) if len(above) else len(curve))].min()
+        if dip > max(DIP * curve[i], NOISE_SD * noise_sd):
+            return i
+    return None
+
+
+def peak_guesses(
+    scene: Scene, parameters: ParameterSet, stroke: FloatArray, curve: FloatArray, noise_sd: float
+) -> tuple[FloatArray, ...]:
+    """Starts for the fitted parameters of a food without layers whose trace shows the start of its cut.
+
+    Args:
+        scene: The cut with the food's values.
+        parameters: What is fitted.
+        stroke: Stroke of the trace [m], shape (n,).
+        curve: Its force [N], shape (n,).
+        noise_sd: Standard deviation of the force's noise [N].
+
+    Returns:
+        Internal coordinates, each (p,), those of the food's values where the trace says nothing; none without a peak,
+        or where R, E or the start of the cut are not fitted.
+    """
+    usual = {p.name: p.value for p in parameters}
+    starts = [name for name in ("R_skin", "R_initiation") if name in usual]
+    peak = start_of_cut(curve, noise_sd)
+    wanted = {"R", "E", "initiation_depth"} <= set(usual) and len(starts) > 0
+    if peak is None or not wanted or not all(is_shared(name) for name in parameters.names):
+        return ()
+    shape, knife = scene.food.shape, scene.knife
+    depth, each = layer_chords(shape, scene.food.material)
+    reach = knife.length if isinstance(knife, Knife) else np.inf
+    chord = np.maximum(np.interp(stroke, depth, np.minimum(each.sum(axis=0), reach)), LEAST_CHORD)
+    inside = (stroke > PLATEAU[0] * shape.height) & (stroke < PLATEAU[1] * shape.height)
+    line = float(np.median((curve / chord)[inside]))
+    pace = scene.food.material.rate_factor(scene.motion.speed)  # the force is that of the trace's speed
+    found = dict.fromkeys(starts, EDGE_PART * curve[peak] / chord[peak]) | {"initiation_depth": EDGE_PART * stroke[peak]}
+    stiffer = float(np.exp(FACES_STIFFER * parameters["E"].prior_sd))
+    faces = found | {name: stiffer * usual[name] for name in ("E", "yield_stress") if name in usual}
+    edge = found | {"R": EDGE_PART * line}
+    faces |= {"R": FACES_EDGE_PART * line}
+    if "mu" in usual:
+        edge["mu"], faces["mu"] = FRICTION_PART * usual["mu"], FACES_FRICTION_PART * usual["mu"]
+    return tuple(_vector(parameters, usual | values, pace) for values in (faces, edge))
+
+
+def _vector(parameters: ParameterSet, values: dict[str, float], pace: float) -> FloatArray:
+    """Internal coordinates of values within the bounds; resistances are those of the trace over ``pace`` [-]."""
+    at_reference = {name: value / (pace if name in RESISTANCES else 1.0) for name, value in values.items()}
+    return parameters.to_vector({p.name: min(max(at_reference[p.name], p.low), p.high) for p in parameters})
