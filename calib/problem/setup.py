@@ -24,14 +24,13 @@ from calib.material.scene import (
 )
 from calib.problem.earlier_calibration import earlier_guesses
 from calib.problem.food_parameters import STICKS, Heights, fit_parameters, size_relative_sd, sticking
-from calib.problem.layer_guess import layer_guesses
 from calib.problem.nuisance import Sensor, nuisances, real_speed, sensor_of
 from calib.problem.numerical_uncertainty import numerical_uncertainty
 from calib.problem.objective import Objective
-from calib.problem.peak_guess import peak_guesses
 from calib.problem.rate_exponent import check_speeds
 from calib.problem.request import Request
 from calib.problem.target import Target
+from calib.problem.trace_guess import trace_guesses
 from calib.simulation.evaluation import Evaluators
 from calib.simulation.evaluation_store import CachedEvaluator, EvaluationStore, Header
 from calib.simulation.workers import Workers
@@ -260,9 +259,7 @@ def _objective(
     if request.start_from is not None:
         guesses = earlier_guesses(request.start_from, objective, food.name, scene.knife.name)
     else:
-        guesses = layer_guesses(scene, parameters, curve.stroke, curve.curve) or peak_guesses(
-            scene, parameters, curve.stroke, curve.curve, curve.curve_noise_sd_N
-        )
+        guesses = trace_guesses(scene, parameters, curve.stroke, curve.curve, curve.curve_noise_sd_N)
     return replace(objective, guesses=guesses)
 
 

@@ -1,17 +1,22 @@
-"""Where a search for a food without layers begins whose trace shows how its cut starts: with a peak, and a dip behind it.
+"""Where a search begins: at foods that differ in what bears the force, and in how their cut starts.
 
-The peak says two numbers by itself: the force at which the cut starts, over the chord that the edge has met, and the
-dent under the edge. The rest of the force is new surface, or the wedge that presses on its faces, and the curve alone
-does not say how much of each. So there is a start for either: a food that costs the edge nearly all of the force, and a
-stiffer one that costs it a quarter. From values of the literature a search may end in a food whose cut starts without a
-peak, and whose R then has to pay for all of it.
+A curve may be that of an edge that pays for new surface, of faces that press the halves apart, or of faces that rub. A
+descent (:mod:`calib.fit.descent`) seldom leads from one to another. So it begins at several foods, goes one step from
+each, and follows the best:
+
+- The usual food, from the literature, and the same food with little friction. Friction multiplies what the other two
+  bear, so that much of it hides them: a descent finds its way to much friction, and not back.
+- What the trace itself says, where it says something: of layers (:mod:`calib.problem.layer_guess`), or of the start of
+  a cut. That is a peak with a dip behind it. It tells two numbers: the force at which the cut starts, over the chord
+  that the edge has met, and the dent under the edge. How much of the rest the edge bears it does not tell. So there is
+  a start for either: a food that costs the edge nearly all of the force, and a stiffer one that costs it a quarter.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from calib.problem.layer_guess import EDGE_PART, FRICTION_PART, layer_chords
+from calib.problem.layer_guess import EDGE_PART, FRICTION_PART, layer_chords, layer_guesses
 from calib.problem.parameters import ParameterSet, is_shared
 from mpm.arrays import FloatArray
 from mpm.scene import Knife, Scene
@@ -30,6 +35,29 @@ PLATEAU = (0.25, 0.85)
 """Part of the food's height over which the force for each length of the edge is looked at."""
 LEAST_CHORD = 1e-3
 """Chord that an edge on a round food has met at least [m]."""
+
+
+def trace_guesses(
+    scene: Scene, parameters: ParameterSet, stroke: FloatArray, curve: FloatArray, noise_sd: float
+) -> tuple[FloatArray, ...]:
+    """Starts for the fitted parameters of a food.
+
+    Args:
+        scene: The cut with the food's values.
+        parameters: What is fitted.
+        stroke: Stroke of the trace [m], shape (n,).
+        curve: Its force [N], shape (n,).
+        noise_sd: Standard deviation of the force's noise [N].
+
+    Returns:
+        Internal coordinates, each (p,).
+    """
+    seen = layer_guesses(scene, parameters, stroke, curve) or peak_guesses(scene, parameters, stroke, curve, noise_sd)
+    others = seen or (parameters.start,)
+    if "mu" not in parameters.names:
+        return others
+    usual = {p.name: p.value for p in parameters}
+    return _vector(parameters, usual | {"mu": FRICTION_PART * usual["mu"]}, 1.0), *others
 
 
 def start_of_cut(curve: FloatArray, noise_sd: float) -> int | None:
@@ -82,7 +110,9 @@ def peak_guesses(
     inside = (stroke > PLATEAU[0] * shape.height) & (stroke < PLATEAU[1] * shape.height)
     line = float(np.median((curve / chord)[inside]))
     pace = scene.food.material.rate_factor(scene.motion.speed)  # the force is that of the trace's speed
-    found = dict.fromkeys(starts, EDGE_PART * curve[peak] / chord[peak]) | {"initiation_depth": EDGE_PART * stroke[peak]}
+    found = dict.fromkeys(starts, EDGE_PART * curve[peak] / chord[peak]) | {
+        "initiation_depth": EDGE_PART * stroke[peak]
+    }
     stiffer = float(np.exp(FACES_STIFFER * parameters["E"].prior_sd))
     faces = found | {name: stiffer * usual[name] for name in ("E", "yield_stress") if name in usual}
     edge = found | {"R": EDGE_PART * line}

@@ -1,0 +1,110 @@
+"""Where a search begins."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calib.material.food import load_food
+from calib.material.knife import load_knife
+from calib.material.scene import cut_scene
+from calib.problem.food_parameters import fit_parameters
+from calib.problem.layer_guess import EDGE_PART, FRICTION_PART, layer_chords
+from calib.problem.trace_guess import FACES_EDGE_PART, peak_guesses, start_of_cut, trace_guesses
+from mpm.scene.shapes import Shape
+
+HEIGHT, PEAK, LINE = 0.04, 0.004, 600.0
+APPLE = load_food("apple")
+SCENE = cut_scene(APPLE, Shape("hemisphere", 0.08, 0.08, HEIGHT), load_knife("edc"))
+NAMES = ("E", "yield_stress", "R", "R_skin", "initiation_depth", "mu")
+STROKE = np.linspace(0.0, HEIGHT, 161)
+
+
+def chord() -> np.ndarray:
+    """What the edge has met, no longer than the blade [m]."""
+    depth, each = layer_chords(SCENE.food.shape, SCENE.food.material)
+    return np.interp(STROKE, depth, np.minimum(each.sum(axis=0), SCENE.knife.length))
+
+
+def made(skin: float = 900.0) -> np.ndarray:
+    """Force of a food that costs the same for each length of the edge, and more until its skin parts."""
+    return np.where(STROKE <= PEAK, skin * STROKE / PEAK, LINE) * chord()
+
+
+def test_the_peak_says_how_a_cut_starts() -> None:
+    """Force and dent of a peak at its true values, and the rest of the force by the edge or by the faces."""
+    parameters = fit_parameters(APPLE, NAMES)
+    faces, edge = (parameters.to_dict(z) for z in peak_guesses(SCENE, parameters, STROKE, made(), 0.1))
+    for found in (faces, edge):
+        assert found["R_skin"] == pytest.approx(EDGE_PART * 900.0, rel=0.01)
+        assert found["initiation_depth"] == pytest.approx(EDGE_PART * PEAK, rel=0.05)
+    assert edge["R"] == pytest.approx(EDGE_PART * LINE, rel=0.02)
+    assert faces["R"] == pytest.approx(FACES_EDGE_PART * LINE, rel=0.02)
+    usual = {p.name: p.value for p in parameters}
+    assert edge["E"] == pytest.approx(usual["E"]) and faces["E"] > 1.5 * usual["E"]
+    assert faces["yield_stress"] / faces["E"] == pytest.approx(usual["yield_stress"] / usual["E"])
+    assert edge["mu"] < faces["mu"] < usual["mu"]
+
+
+@pytest.mark.parametrize(
+    ("curve", "found"),
+    [
+        pytest.param(np.linspace(0.0, 40.0, 90), None, id="rises all the way"),
+        pytest.param(np.r_[np.linspace(0.0, 20.0, 20), np.linspace(18.0, 40.0, 70)], 19, id="peak and dip"),
+        pytest.param(np.r_[np.linspace(0.0, 20.0, 20), np.linspace(19.5, 40.0, 70)], None, id="a dip too small"),
+        pytest.param(np.r_[np.linspace(0.0, 40.0, 60), np.linspace(20.0, 10.0, 30)], None, id="behind the first third"),
+        pytest.param(np.r_[np.linspace(0.0, 20.0, 20), np.linspace(19.9, 5.0, 70)], 19, id="falls for good"),
+    ],
+)
+def test_where_a_cut_starts(curve: np.ndarray, found: int | None) -> None:
+    """The first peak that the force falls behind, if it is in the first third."""
+    assert start_of_cut(curve, 0.1) == found
+
+
+def test_noise_is_no_start_of_a_cut() -> None:
+    """A dip of 2 N in noise of 0.6 N."""
+    curve = np.r_[np.linspace(0.0, 20.0, 20), np.linspace(18.0, 40.0, 70)]
+    assert start_of_cut(curve, 0.6) is None
+
+
+def test_nothing_is_guessed_where_nothing_is_seen() -> None:
+    """Without a peak, or without what it would say."""
+    parameters = fit_parameters(APPLE, NAMES)
+    assert peak_guesses(SCENE, parameters, STROKE, made(skin=LINE), 0.1) == ()
+    assert peak_guesses(SCENE, fit_parameters(APPLE, ("E", "R", "mu")), STROKE, made(), 0.1) == ()
+
+
+def test_the_guess_of_a_fast_cut_is_at_the_reference_speed() -> None:
+    """At 40 mm/s and an exponent of a half the same force means half the resistances."""
+    parameters = fit_parameters(APPLE, NAMES)
+    fast = replace(SCENE, motion=replace(SCENE.motion, speed=0.04)).with_material(rate_exponent=0.5)
+    for plain, found in zip(
+        peak_guesses(SCENE, parameters, STROKE, made(), 0.1),
+        peak_guesses(fast, parameters, STROKE, made(), 0.1),
+        strict=True,
+    ):
+        usual, got = parameters.to_dict(plain), parameters.to_dict(found)
+        for name in ("R", "R_skin"):
+            assert got[name] == pytest.approx(max(usual[name] / 2, parameters[name].low)), name
+        assert got["E"] == pytest.approx(usual["E"])
+
+
+@pytest.mark.parametrize(("names", "seen"), [(NAMES, 2), (("E", "R", "mu"), 1)])
+def test_a_search_begins_at_little_friction_too(names: tuple[str, ...], seen: int) -> None:
+    """The usual food with a third of its friction comes first; the usual one where the trace says nothing."""
+    parameters = fit_parameters(APPLE, names)
+    first, *others = (parameters.to_dict(z) for z in trace_guesses(SCENE, parameters, STROKE, made(), 0.1))
+    usual = {p.name: p.value for p in parameters}
+    assert first == pytest.approx(usual | {"mu": FRICTION_PART * usual["mu"]})
+    assert len(others) == seen
+    if seen == 1:
+        assert others[0] == pytest.approx(usual)
+
+
+def test_a_search_begins_at_the_usual_food_where_no_friction_is_fitted() -> None:
+    """Nothing rubs less than what is held."""
+    parameters = fit_parameters(APPLE, ("E", "R"))
+    (only,) = trace_guesses(SCENE, parameters, STROKE, made(), 0.1)
+    assert parameters.to_dict(only) == pytest.approx({p.name: p.value for p in parameters})
