@@ -17,6 +17,8 @@ from calib.problem.parameters import ParameterSet
 from calib.problem.scored_run import ScoredRun
 from mpm.arrays import FloatArray
 
+#: Points of two basins are at least this far apart [coordinate units].
+BASIN_DISTANCE = 0.2
 #: Points are rounded to this part of a coordinate unit (0.1 % of a log parameter) [-]: far below the noise of a run,
 #: and a resumed fit asks for exactly the points that are in the store.
 LATTICE = 1e-3
@@ -62,6 +64,24 @@ def same_point(unit: FloatArray, one: FloatArray, other: FloatArray) -> bool:
         Whether they are no further apart than half a step of the lattice along any axis.
     """
     return bool(np.all(np.abs(one - other) <= 0.5 * (LATTICE * unit)))
+
+
+def apart(runs: Iterable[ScoredRun], unit: FloatArray, most: int) -> list[ScoredRun]:
+    """The best runs, each in a basin of its own.
+
+    Args:
+        runs: The runs.
+        unit: Coordinate units [-] (p,).
+        most: How many at most.
+
+    Returns:
+        They, the best first.
+    """
+    found: list[ScoredRun] = []
+    for run in sorted(runs, key=lambda run: run.misfit):
+        if len(found) < most and all(np.abs((run.z - other.z) / unit).max() > BASIN_DISTANCE for other in found):
+            found.append(run)
+    return found
 
 
 def local_optimum(surrogate: Surrogate) -> FloatArray:

@@ -19,12 +19,12 @@ import numpy as np
 from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
-from calib.fit.acquisition import LOCAL_WEIGHT
+from calib.fit.acquisition import BASIN_DISTANCE, LOCAL_WEIGHT
 from calib.fit.budget import progress_of_all
 from calib.fit.deflation import deflated_about
 from calib.fit.options import FitOptions
 from calib.fit.repeated_runs import ALIKE, FINALISTS, HELD_CHANGE, holds, stands
-from calib.fit.search import BASIN_DISTANCE, Search
+from calib.fit.search import Search
 from calib.fit.surrogate import Surrogate
 from calib.io.progress import Progress
 from calib.problem.joint_objective import JointObjective

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from calib.fit.acquisition import apart
 from calib.fit.deflation import telling
-from calib.fit.search import BASIN_DISTANCE
 from calib.fit.surrogate import coordinate_unit
 from calib.problem.joint_objective import JointObjective
 from calib.problem.objective import Objective
@@ -116,18 +116,17 @@ def standing_in_its_place(
     return None
 
 
-def _elsewhere(objective: Objective | JointObjective, answer: ScoredRun, runs: Sequence[ScoredRun]) -> list[ScoredRun]:
+def _elsewhere(
+    objective: Objective | JointObjective, answer: ScoredRun, runs: Sequence[ScoredRun]
+) -> Sequence[ScoredRun]:
     """Runs that the curve does not tell from the answer, out of its valley and apart from each other, the best ones
     first."""
     place, sd = telling(objective.parameters), objective.parameters.prior_sd
     unit = coordinate_unit(objective.parameters)
-    found: list[ScoredRun] = []
-    for run in sorted(runs, key=lambda run: run.misfit):
-        alike = run.cut and not run.coarse and run.misfit <= answer.misfit + 2 * ALIKE
-        if alike and abs(run.z - answer.z)[place] > OWN_VALLEY * sd[place] and len(found) < FINALISTS:
-            if all(np.abs((run.z - other.z) / unit).max() > BASIN_DISTANCE for other in found):
-                found.append(run)
-    return found
+    limit = answer.misfit + 2 * ALIKE
+    alike = [t for t in runs if t.cut and not t.coarse and t.misfit <= limit]
+    far = [t for t in alike if abs(t.z - answer.z)[place] > OWN_VALLEY * sd[place]]
+    return apart(far, unit, FINALISTS)
 
 
 def _unchanged(run: ScoredRun, on_finer: ScoredRun) -> bool:

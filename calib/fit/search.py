@@ -35,7 +35,17 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.stats import chi2, qmc
 
-from calib.fit.acquisition import beside, expected_gain, global_optimum, local_optimum, on_lattice, probes, same_point
+from calib.fit.acquisition import (
+    BASIN_DISTANCE,
+    apart,
+    beside,
+    expected_gain,
+    global_optimum,
+    local_optimum,
+    on_lattice,
+    probes,
+    same_point,
+)
 from calib.fit.budget import longest_time_left, progress_of_all
 from calib.fit.descent import descend
 from calib.fit.options import FitOptions
@@ -43,13 +53,10 @@ from calib.fit.surrogate import Surrogate, coordinate_unit
 from calib.io.progress import Progress
 from calib.problem.joint_objective import JointObjective, residual
 from calib.problem.objective import EXPLAINED, Objective
-from calib.problem.scored_run import ScoredRun
+from calib.problem.scored_run import ScoredRun, none_ended
 from calib.simulation.evaluation import Evaluation, Evaluator
 from mpm.arrays import FloatArray
-from mpm.scene.errors import SimulationError
 
-#: A promising point elsewhere must be this far from the one nearby [coordinate units].
-BASIN_DISTANCE = 0.2
 #: Coarse runs of a round, for each worker.
 COARSE_PER_WORKER = 2
 #: Part of the chi-square that the noise of one run makes which a round must bring [-].
@@ -77,6 +84,8 @@ SCREENING_BUDGET = 0.15
 DESCENT_BUDGET = 0.7
 #: Coarse runs for each parameter that a further screening may take.
 DESCENT_RUNS = 12
+#: Best runs of such a design, each in a place of its own, from which it takes a step; the best of them is followed.
+REDESIGN_STARTS = 2
 #: Largest joint scaling of the design's materials, as a logarithm: a factor 20 either way.
 LARGEST_SCALE = 3.0
 
@@ -193,7 +202,7 @@ class Search:
         while not self.finished and self.designs and self._affordable() > self.options.design + 2 * self.options.batch:
             self._design([])
         if not self.finished:
-            raise self._all_failed()
+            raise none_ended(self.runs)
         if self.coarse is None:
             self._differences()
 
@@ -206,7 +215,8 @@ class Search:
                 return []
             if downhill:
                 how = self._descended, self.parameters.steps, self.parameters.prior_mean
-                for start in self._descended(self.objective.guesses if given else ()):
+                starts = self._descended(self.objective.guesses) if given else []
+                for start in starts or apart(self.finished, self.unit, REDESIGN_STARTS):
                     if start.ok:
                         descend(*how, start, most=1)
                 descend(*how, self.best)
@@ -256,17 +266,6 @@ class Search:
         lines = sorted((self._best_scaled(run) for run in self.runs[first:] if run.ok), key=lambda line: line[0])
         coarse = bool(self.finished) and any(run.coarse for run in self.runs[first:])
         self._evaluate([z for _, z in lines[: self.options.batch]], "scaled", coarse=coarse)
-
-    def _all_failed(self) -> SimulationError:
-        """The error that no run reached the end of its stroke."""
-        furthest = max((run.evaluation for run in self.runs), key=lambda e: e.fraction)
-        return SimulationError(
-            f"none of {len(self.runs)} simulations led to one that ends its stroke; the furthest got to "
-            f"{furthest.fraction:.0%} ({furthest.reason}) at {furthest.parameters}; check the scene, or "
-            "narrow the prior ranges.",
-            reason=furthest.reason,
-            fraction=furthest.fraction,
-        )
 
     def _best_scaled(self, run: ScoredRun) -> tuple[float, FloatArray]:
         """Least chi-square that jointly scaled stress-like parameters would give, and the point of it."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from calib.simulation.evaluation import Evaluation
 from mpm.arrays import FloatArray
+from mpm.scene.errors import SimulationError
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,3 +68,15 @@ class ScoredRun:
     def cut(self) -> bool:
         """Whether it cut the food all the way, that of each trace."""
         return all(part.evaluation.completed == 1.0 for part in self.each)
+
+
+def none_ended(runs: Sequence[ScoredRun]) -> SimulationError:
+    """The error that no run reached the end of its stroke."""
+    furthest = max((run.evaluation for run in runs), key=lambda e: e.fraction)
+    return SimulationError(
+        f"none of {len(runs)} simulations led to one that ends its stroke; the furthest got to "
+        f"{furthest.fraction:.0%} ({furthest.reason}) at {furthest.parameters}; check the scene, or "
+        "narrow the prior ranges.",
+        reason=furthest.reason,
+        fraction=furthest.fraction,
+    )

@@ -85,7 +85,9 @@ def test_a_calibration_begins_there(tmp_path: Path) -> None:
     """Its search is given the earlier food, and without one nothing of it."""
     trace = Path(__file__).parents[3] / "force_data" / "banana_reconstructed.csv"
     asked = {"food": "banana", "trace": trace, "fit": ["E", "R"]}
-    assert set_up(Calibration(**asked).request()).objective.guesses == ()
+    alone = set_up(Calibration(**asked).request()).objective
+    (usual,) = alone.guesses
+    assert alone.parameters.to_dict(usual) == pytest.approx({p.name: p.value for p in alone.parameters})
     earlier(tmp_path / "one", (2e5, 300.0, 1.0))
     objective = set_up(Calibration(**asked, start_from=tmp_path / "one").request()).objective
     (guess,) = objective.guesses
