@@ -92,7 +92,7 @@ def layer_guesses(
     firm = usual | {"initiation_depth": PARTS_AT * shape.height}
     dented = usual | {"initiation_depth": reached, "R_skin": max(line, outer), "R_initiation": max(line, outer)}
     pace = food.rate_factor(scene.motion.speed)  # the force is that of the trace's speed
-    return _vector(parameters, firm, pace), _vector(parameters, found, pace), _vector(parameters, dented, pace)
+    return guess_at(parameters, firm, pace), guess_at(parameters, found, pace), guess_at(parameters, dented, pace)
 
 
 def _tried(parameters: ParameterSet, size: str) -> FloatArray:
@@ -114,7 +114,16 @@ def _reached(stroke: FloatArray, dent: float, height: float) -> FloatArray:
 
 
 def layer_chords(shape: Shape, food: Material) -> tuple[FloatArray, FloatArray]:
-    """Depths below the top [m] and the chords of flesh, rind and core there [m], shape (3, POINTS[0])."""
+    """Chords of the layers of a section over its depth.
+
+    Args:
+        shape: The specimen.
+        food: Its layers.
+
+    Returns:
+        Depths below the top [m], shape (POINTS[0],), and the chords of flesh, rind and core there [m], shape
+        (3, POINTS[0]).
+    """
     depth = (np.arange(POINTS[0]) + 0.5) / POINTS[0] * shape.height
     x = ((np.arange(POINTS[1]) + 0.5) / POINTS[1] - 0.5) * shape.width
     up, along = (axis.ravel() for axis in np.meshgrid(shape.height - depth, x, indexing="ij"))
@@ -124,9 +133,17 @@ def layer_chords(shape: Shape, food: Material) -> tuple[FloatArray, FloatArray]:
     return depth, np.array([(there & (marked == k)).sum(axis=1) for k in (1, 2, 3)]) * shape.width / POINTS[1]
 
 
-def _vector(parameters: ParameterSet, found: Mapping[str, float], pace: float) -> FloatArray:
-    """Internal coordinates of what was found within the bounds, of the present values where nothing was; resistances
-    are those found over ``pace`` [-]."""
+def guess_at(parameters: ParameterSet, found: Mapping[str, float], pace: float = 1.0) -> FloatArray:
+    """A start for a search.
+
+    Args:
+        parameters: What is fitted.
+        found: Values [SI] by name that are known of it; of the others the present ones are taken.
+        pace: Resistances at the speed of the trace over those at the reference speed [-].
+
+    Returns:
+        Internal coordinates (p,) of these values within the bounds.
+    """
     found = {name: value / (pace if name in RESISTANCES else 1.0) for name, value in found.items()}
     values = {p.name: min(max(found.get(p.name, p.value), p.low), p.high) for p in parameters}
     return parameters.to_vector(values)

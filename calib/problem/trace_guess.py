@@ -16,11 +16,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from calib.problem.layer_guess import EDGE_PART, FRICTION_PART, layer_chords, layer_guesses
+from calib.problem.layer_guess import EDGE_PART, FRICTION_PART, guess_at, layer_chords, layer_guesses
 from calib.problem.parameters import ParameterSet, is_shared
 from mpm.arrays import FloatArray
 from mpm.scene import Knife, Scene
-from mpm.scene.material import RESISTANCES
 
 DIP = 0.05
 """Part of its height by which the force falls behind a peak that is the start of a cut."""
@@ -32,7 +31,7 @@ prior such a food is stiffer than usual."""
 FACES_FRICTION_PART = 0.7
 """Friction of such a food over the usual."""
 PLATEAU = (0.25, 0.85)
-"""Part of the food's height over which the force for each length of the edge is looked at."""
+"""Part of the stroke over which the force for each length of the edge is looked at."""
 LEAST_CHORD = 1e-3
 """Chord that an edge on a round food has met at least [m]."""
 
@@ -52,12 +51,11 @@ def trace_guesses(
     Returns:
         Internal coordinates, each (p,).
     """
-    seen = layer_guesses(scene, parameters, stroke, curve) or peak_guesses(scene, parameters, stroke, curve, noise_sd)
+    seen = layer_guesses(scene, parameters, stroke, curve) or _peak_guesses(scene, parameters, stroke, curve, noise_sd)
     others = seen or (parameters.start,)
     if "mu" not in parameters.names:
         return others
-    usual = {p.name: p.value for p in parameters}
-    return _vector(parameters, usual | {"mu": FRICTION_PART * usual["mu"]}, 1.0), *others
+    return guess_at(parameters, {"mu": FRICTION_PART * parameters["mu"].value}), *others
 
 
 def start_of_cut(curve: FloatArray, noise_sd: float) -> int | None:
@@ -81,22 +79,11 @@ def start_of_cut(curve: FloatArray, noise_sd: float) -> int | None:
     return None
 
 
-def peak_guesses(
+def _peak_guesses(
     scene: Scene, parameters: ParameterSet, stroke: FloatArray, curve: FloatArray, noise_sd: float
 ) -> tuple[FloatArray, ...]:
-    """Starts for the fitted parameters of a food without layers whose trace shows the start of its cut.
-
-    Args:
-        scene: The cut with the food's values.
-        parameters: What is fitted.
-        stroke: Stroke of the trace [m], shape (n,).
-        curve: Its force [N], shape (n,).
-        noise_sd: Standard deviation of the force's noise [N].
-
-    Returns:
-        Internal coordinates, each (p,), those of the food's values where the trace says nothing; none without a peak,
-        or where R, E or the start of the cut are not fitted.
-    """
+    """The starts that a peak tells of, by the faces and by the edge: none without one, or where R, E or the start of
+    the cut are not fitted."""
     usual = {p.name: p.value for p in parameters}
     starts = [name for name in ("R_skin", "R_initiation") if name in usual]
     peak = start_of_cut(curve, noise_sd)
@@ -107,8 +94,8 @@ def peak_guesses(
     depth, each = layer_chords(shape, scene.food.material)
     reach = knife.length if isinstance(knife, Knife) else np.inf
     chord = np.maximum(np.interp(stroke, depth, np.minimum(each.sum(axis=0), reach)), LEAST_CHORD)
-    inside = (stroke > PLATEAU[0] * shape.height) & (stroke < PLATEAU[1] * shape.height)
-    line = float(np.median((curve / chord)[inside]))
+    first, last = (int(part * len(stroke)) for part in PLATEAU)
+    line = float(np.median((curve / chord)[first : last + 1]))
     pace = scene.food.material.rate_factor(scene.motion.speed)  # the force is that of the trace's speed
     found = dict.fromkeys(starts, EDGE_PART * curve[peak] / chord[peak]) | {
         "initiation_depth": EDGE_PART * stroke[peak]
@@ -119,10 +106,4 @@ def peak_guesses(
     faces |= {"R": FACES_EDGE_PART * line}
     if "mu" in usual:
         edge["mu"], faces["mu"] = FRICTION_PART * usual["mu"], FACES_FRICTION_PART * usual["mu"]
-    return tuple(_vector(parameters, usual | values, pace) for values in (faces, edge))
-
-
-def _vector(parameters: ParameterSet, values: dict[str, float], pace: float) -> FloatArray:
-    """Internal coordinates of values within the bounds; resistances are those of the trace over ``pace`` [-]."""
-    at_reference = {name: value / (pace if name in RESISTANCES else 1.0) for name, value in values.items()}
-    return parameters.to_vector({p.name: min(max(at_reference[p.name], p.low), p.high) for p in parameters})
+    return tuple(guess_at(parameters, values, pace) for values in (faces, edge))

@@ -12,7 +12,7 @@ from calib.material.knife import load_knife
 from calib.material.scene import cut_scene
 from calib.problem.food_parameters import fit_parameters
 from calib.problem.layer_guess import EDGE_PART, FRICTION_PART, layer_chords
-from calib.problem.trace_guess import FACES_EDGE_PART, peak_guesses, start_of_cut, trace_guesses
+from calib.problem.trace_guess import FACES_EDGE_PART, start_of_cut, trace_guesses
 from mpm.scene.shapes import Shape
 
 HEIGHT, PEAK, LINE = 0.04, 0.004, 600.0
@@ -36,7 +36,7 @@ def made(skin: float = 900.0) -> np.ndarray:
 def test_the_peak_says_how_a_cut_starts() -> None:
     """Force and dent of a peak at its true values, and the rest of the force by the edge or by the faces."""
     parameters = fit_parameters(APPLE, NAMES)
-    faces, edge = (parameters.to_dict(z) for z in peak_guesses(SCENE, parameters, STROKE, made(), 0.1))
+    _, faces, edge = (parameters.to_dict(z) for z in trace_guesses(SCENE, parameters, STROKE, made(), 0.1))
     for found in (faces, edge):
         assert found["R_skin"] == pytest.approx(EDGE_PART * 900.0, rel=0.01)
         assert found["initiation_depth"] == pytest.approx(EDGE_PART * PEAK, rel=0.05)
@@ -72,8 +72,8 @@ def test_noise_is_no_start_of_a_cut() -> None:
 def test_nothing_is_guessed_where_nothing_is_seen() -> None:
     """Without a peak, or without what it would say."""
     parameters = fit_parameters(APPLE, NAMES)
-    assert peak_guesses(SCENE, parameters, STROKE, made(skin=LINE), 0.1) == ()
-    assert peak_guesses(SCENE, fit_parameters(APPLE, ("E", "R", "mu")), STROKE, made(), 0.1) == ()
+    assert len(trace_guesses(SCENE, parameters, STROKE, made(skin=LINE), 0.1)) == 2
+    assert len(trace_guesses(SCENE, fit_parameters(APPLE, ("E", "R", "mu")), STROKE, made(), 0.1)) == 2
 
 
 def test_the_guess_of_a_fast_cut_is_at_the_reference_speed() -> None:
@@ -81,8 +81,8 @@ def test_the_guess_of_a_fast_cut_is_at_the_reference_speed() -> None:
     parameters = fit_parameters(APPLE, NAMES)
     fast = replace(SCENE, motion=replace(SCENE.motion, speed=0.04)).with_material(rate_exponent=0.5)
     for plain, found in zip(
-        peak_guesses(SCENE, parameters, STROKE, made(), 0.1),
-        peak_guesses(fast, parameters, STROKE, made(), 0.1),
+        trace_guesses(SCENE, parameters, STROKE, made(), 0.1)[1:],
+        trace_guesses(fast, parameters, STROKE, made(), 0.1)[1:],
         strict=True,
     ):
         usual, got = parameters.to_dict(plain), parameters.to_dict(found)
@@ -108,3 +108,22 @@ def test_a_search_begins_at_the_usual_food_where_no_friction_is_fitted() -> None
     parameters = fit_parameters(APPLE, ("E", "R"))
     (only,) = trace_guesses(SCENE, parameters, STROKE, made(), 0.1)
     assert parameters.to_dict(only) == pytest.approx({p.name: p.value for p in parameters})
+
+
+def test_a_stroke_that_ends_early_has_guesses_too() -> None:
+    """A trace of the first fifth of the food's height tells the force for each length of the edge as well."""
+    parameters = fit_parameters(APPLE, NAMES)
+    early = np.linspace(0.0, 0.2 * HEIGHT, 161)
+    force = np.interp(early, [0.0, 0.002, 0.0022, early[-1]], [0.0, 16.0, 12.0, 30.0])
+    _, faces, edge = (parameters.to_dict(z) for z in trace_guesses(SCENE, parameters, early, force, 0.1))
+    assert all(np.isfinite(list(found.values())).all() for found in (faces, edge))
+    assert edge["R"] > 2 * faces["R"]
+
+
+def test_what_the_trace_does_not_tell_stays_usual_at_any_speed() -> None:
+    """Only resistances that were read off the trace are those of its speed."""
+    parameters = fit_parameters(APPLE, NAMES)
+    fast = replace(SCENE, motion=replace(SCENE.motion, speed=0.04)).with_material(rate_exponent=0.5)
+    first, *_ = (parameters.to_dict(z) for z in trace_guesses(fast, parameters, STROKE, made(), 0.1))
+    usual = {p.name: p.value for p in parameters}
+    assert first["R"] == pytest.approx(usual["R"]) and first["R_skin"] == pytest.approx(usual["R_skin"])
