@@ -63,7 +63,7 @@ class Calibrated:
     """What a calibration has found, before it is written.
 
     Attributes:
-        setup: What was decided before; its fine cut has the fitted height and roundness.
+        setup: What was decided before; its fine cut has the fitted sizes and roundness.
         fit: The search and its best run.
         analysis: Its uncertainty; None where it ended too early for that.
         record: Whole record of the best values.
@@ -168,12 +168,12 @@ class Calibrated:
         """The food with the fitted values, and the specimen's sizes and roundness where these were fitted."""
         setup, values = self.setup, dict(self.fit.best.evaluation.parameters)
         fitted = {"status": "fitted", "source": f"fitted to {setup.curve.trace.source}"}
-        height, roundness = values.pop("height", None), values.pop(ROUNDNESS, None)
+        fitted_sizes = {name for name in ("height", "width") if values.pop(name, None) is not None}
+        roundness = values.pop(ROUNDNESS, None)
         food = setup.request.food.with_values(values, **fitted)
         if roundness is not None:
             food = with_roundness(food, roundness, **fitted)
-        if height is None:
-            return food
+        if "height" in fitted_sizes and "width" not in setup.kept:
+            fitted_sizes.add("width")
         shape = setup.fine.food.shape
-        sizes = {name: getattr(shape, name) for name in ("height", "width") if name not in setup.kept}
-        return food.with_sizes(sizes, **fitted)
+        return food.with_sizes({name: getattr(shape, name) for name in sorted(fitted_sizes)}, **fitted)

@@ -13,7 +13,7 @@ from calib.errors import OutputError
 from calib.io.schema import tag
 from calib.material.food import FoodSpec
 from calib.material.scene import Sizing, specimen
-from calib.problem.food_parameters import fit_parameters
+from calib.problem.food_parameters import KNOWN, fit_parameters
 from calib.problem.nuisance import GAIN_SD
 from calib.problem.parameters import Z95, ParameterSet
 from calib.problem.target import ErrorModel
@@ -160,11 +160,12 @@ def _schema(path: Path) -> str:
 
 def _fitted_parameters(result: CalibrationResult) -> ParameterSet:
     """The parameters of a calibration with their values and the literature's ranges."""
-    height = result.fitted.get("height")
-    heights = None
-    if height is not None and height.prior_low is not None and height.prior_high is not None:
-        heights = (height.prior_low, height.value, height.prior_high)
-    parameters = fit_parameters(result.material, tuple(result.fitted), heights)
+    sizes = {
+        name: (p.prior_low, p.value, p.prior_high)
+        for name, p in result.fitted.items()
+        if name in KNOWN and p.prior_low is not None and p.prior_high is not None
+    }
+    parameters = fit_parameters(result.material, tuple(result.fitted), sizes)
     held = {p.name: float(np.clip(result.fitted[p.name].value, p.low, p.high)) for p in parameters}
     return parameters.with_values(held)
 

@@ -31,7 +31,7 @@ class CutScene:
 
     Attributes:
         scene: The cut at any values.
-        fitted: Whether its specimen is the one whose height and roundness are fitted; else both are known and no
+        fitted: Whether its specimen is the one whose sizes and roundness are fitted; else they are known and no
             parameters of it.
         kept: Sizes that do not follow a fitted height.
     """

@@ -43,13 +43,17 @@ LENGTH_PER_HEIGHT = 4.0
 """Largest simulated length across the blade of a food with parallel sides, over its height. The blade bends its halves
 apart like the arms of a double cantilever beam (Gurney and Hunt 1967), so the force on its faces grows with the length
 (docs/theory.md, "Measured choices")."""
-FITTED_SIZES = ("height", "roundness")
+FITTED_SIZES = ("height", "width", "roundness")
 """What may be fitted of a specimen beside its material."""
 MID_LENGTH = 0.5
 """Where the blade cuts when nothing else is said, in parts of the length."""
 FAR_PER_HEIGHT = 0.25
 """Distance from the cut from which on there are fewer particles, over the height (docs/theory.md, "Measured
 choices")."""
+
+
+SizeRange = tuple[float, float, float]
+"""Lowest, likely and largest size of a specimen [m]."""
 
 
 @dataclass(frozen=True)
@@ -81,20 +85,21 @@ class Sizing:
 
 
 def specimen(
-    food: FoodSpec, trace: Conditioned | None, sizing: Sizing, *, open_form: bool = False
+    food: FoodSpec, trace: Conditioned | None, sizing: Sizing, *, open_form: bool = False, knife: Knife | None = None
 ) -> tuple[Shape, list[str]]:
     """Shape of the specimen, and what had to be assumed about it.
 
     Real traces rarely come with the specimen's size. Where the trace has a position and ends released or on the board,
     the height is the stroke; where it ends under load it lies in :func:`height_range`. Width and length that are not
     given keep the food's proportions. The force is proportional to the width, so only the product of resistance and
-    width is seen by one trace.
+    width is seen by one trace, unless the food is wider than its blade is long (:func:`width_range`).
 
     Args:
         food: The food with its usual sizes.
         trace: The measured cut, None where there is none: then a height that is not given is the usual one.
         sizing: What is known of the specimen.
         open_form: Whether its form is fitted (:func:`form_is_open`).
+        knife: The blade, where a width that it does not reach across is fitted.
 
     Returns:
         The shape, and what had to be assumed, one sentence each.
@@ -136,10 +141,6 @@ def specimen(
     width = sizing.width
     if width is None:
         width = default.width * height / default.height * spread(default.kind)
-        said.append(
-            "the specimen's width is not known: it keeps the proportions of the food; resistances are only identified "
-            "as their product with it; give --width if you measured it"
-        )
     whole, most = sizing.length, math.inf
     if whole is None:
         whole = default.length * height / default.height
@@ -154,7 +155,17 @@ def specimen(
             f"the specimen's length across the blade is not known: {size} keep the proportions of the "
             "food; the blade bends longer halves apart with more force; give --length if you measured it"
         )
-    return replace(default, length=length, width=width, height=height, cut=(left - right) / 2), said
+    shape = replace(default, length=length, width=width, height=height, cut=(left - right) / 2)
+    if sizing.width is None:
+        short = None if knife is None else width_range(food, shape, knife, sizing)
+        said.append(
+            "the specimen's width is not known: it keeps the proportions of the food; resistances are only identified "
+            "as their product with it; give --width if you measured it"
+            if short is None
+            else f"the specimen's width is not known: {short[0] * 1e3:.0f} to {short[2] * 1e3:.0f} mm are possible at "
+            "its likely height, and the blade may not reach across it; give --width if you measured it"
+        )
+    return shape, said
 
 
 def form_is_open(food: FoodSpec, sizing: Sizing) -> bool:
@@ -184,7 +195,7 @@ def blade_warnings(shape: Shape, knife: Knife) -> list[str]:
     ]
 
 
-def height_range(food: FoodSpec, trace: Conditioned, sizing: Sizing) -> tuple[float, float, float] | None:
+def height_range(food: FoodSpec, trace: Conditioned, sizing: Sizing) -> SizeRange | None:
     """Range of the height of a specimen whose trace ends under load.
 
     The edge then stopped on the board or above it: the food is as high as the stroke at least. Its likely height is the
@@ -210,10 +221,39 @@ def height_range(food: FoodSpec, trace: Conditioned, sizing: Sizing) -> tuple[fl
     return low, max(likely, clear), high
 
 
+def width_range(
+    food: FoodSpec, shape: Shape, knife: Knife, sizing: Sizing, heights: SizeRange | None = None
+) -> SizeRange | None:
+    """Range of the width of a specimen that its blade does not reach across.
+
+    What lies beside the blade does not load it: the force stops growing where the chord becomes longer than the blade,
+    and the width says when. Under a longer blade a width scales the curve and does not shape it.
+
+    Args:
+        food: The food with its usual width and the literature's range of it.
+        shape: The specimen at its likely sizes.
+        knife: The blade.
+        sizing: What is known of the specimen.
+        heights: As :func:`height_range` gives them [m]; the width grows with a height that is fitted.
+
+    Returns:
+        Lowest, likely and largest width [m]: about the likely one the literature's range, and that of the height. None
+        where the width is given, or the blade reaches across the likely one.
+    """
+    if sizing.width is not None or sizing.outline is not None or not blade_warnings(shape, knife):
+        return None
+    known, likely = food.dims["width"], shape.width
+    middle, reach = likely, math.log(known.high / known.low) / 2
+    if heights is not None:
+        low, usual, high = heights
+        middle, reach = likely * math.sqrt(low * high) / usual, math.hypot(reach, math.log(high / low) / 2)
+    return middle * math.exp(-reach), likely, middle * math.exp(reach)
+
+
 def of_specimen(
     scene: Scene, values: Mapping[str, float], kept: Collection[str] = ()
 ) -> tuple[Scene, dict[str, float]]:
-    """The scene at a fitted height, roundness and friction of the board, and the values left: those of the material.
+    """The scene at fitted sizes, roundness and friction of the board, and the values left: those of the material.
 
     The cell grows with the height, so that every height has the same particles and nodes: on a fixed cell each height
     would draw other particles, and the force would jump by several per cent from one to the next. The stroke ends at
@@ -221,7 +261,8 @@ def of_specimen(
 
     Args:
         scene: The scene with any height.
-        values: Fitted values by name, ``height`` [m], ``roundness`` [-] and ``board_friction`` [-] among them or not.
+        values: Fitted values by name, ``height`` [m], ``width`` [m], ``roundness`` [-] and ``board_friction`` [-] among
+            them or not.
         kept: Which of ``width`` and ``length`` do not grow with the height, because they were measured.
 
     Returns:
@@ -234,6 +275,10 @@ def of_specimen(
     roundness = rest.pop("roundness", None)
     if roundness is not None:
         scene = replace(scene, food=replace(scene.food, shape=replace(scene.food.shape, roundness=roundness)))
+    width = rest.pop("width", None)
+    if width is not None:
+        scene = replace(scene, food=replace(scene.food, shape=replace(scene.food.shape, width=width)))
+        kept = (*kept, "width")
     height = rest.pop("height", None)
     if height is None:
         return scene, rest
@@ -255,7 +300,7 @@ def of_specimen(
     )
 
 
-def windowed(scene: Scene, heights: tuple[float, float, float] | None = None) -> Scene:
+def windowed(scene: Scene, heights: SizeRange | None = None) -> Scene:
     """The scene with half a cell more of stroke, where the food is that high.
 
     The simulated force is a mean over a cell of the way. With half a cell more, that mean has its whole window up to

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 from calib.errors import MaterialError
 from calib.material.food import FoodSpec
 from calib.material.form import ROUNDNESS, open_shape
 from calib.material.properties import rule_of
+from calib.material.scene import SizeRange
 from calib.problem.parameters import Z95, Parameter, ParameterSet, PriorCorrelation
 from mpm.scene.material import LARGEST_RATE_EXPONENT
 
@@ -25,11 +28,14 @@ YIELD_STRAIN_FACTOR = 3.0
 """A food's yield stress over its E is this factor below or above that of the literature, at 95 % [-]. A critical strain
 has been proposed as what fruit tissue fails at (Segerlind and Dal Fabbro 1978); published single values lie between 5 %
 (kiwi) and 16 % (apple). The factor is assumed, materials.yaml, remark 8."""
+KNOWN = {
+    "height": "the height is known (given, or the trace ends released)",
+    "width": "the width is known (given, or proportional to the height of a food that the blade reaches across)",
+}
+"""Why a size cannot be fitted, by name."""
 STICKS = {"adhesion": 5e3, "adhesion_energy": 1.0}
 """How a food sticks to the blade where its withdrawal is fitted and nobody has said so [SI]. Assumed, and fitted over
 the range of a given value, a hundredfold for the energy."""
-Heights = tuple[float, float, float]
-"""Lowest, likely and largest height of a specimen [m]."""
 
 
 def sticking(food: FoodSpec) -> tuple[FoodSpec, tuple[str, ...]]:
@@ -51,29 +57,29 @@ def sticking(food: FoodSpec) -> tuple[FoodSpec, tuple[str, ...]]:
     )
 
 
-def fit_parameters(food: FoodSpec, names: tuple[str, ...], heights: Heights | None = None) -> ParameterSet:
+def fit_parameters(
+    food: FoodSpec, names: tuple[str, ...], sizes: Mapping[str, SizeRange] = MappingProxyType({})
+) -> ParameterSet:
     """The fitted properties with start value, hard bounds and literature prior, in which E and yield stress are tied.
 
     Args:
         food: The food.
-        names: Properties, and ``height`` and ``roundness`` for the specimen's.
-        heights: Lowest, likely and largest height of the specimen [m]; None where it is known.
+        names: Properties, and ``height``, ``width`` and ``roundness`` for the specimen's.
+        sizes: Ranges of the sizes of the specimen that nobody knows, by name.
 
     Returns:
         The parameters, in the order of their names.
 
     Raises:
-        MaterialError: An unknown or repeated name, a property without a literature range, a height that is known, or
+        MaterialError: An unknown or repeated name, a property without a literature range, a size that is known, or
             a roundness that the food does not leave open.
     """
     chosen = []
     for name in names:
-        if name == "height":
-            if heights is None:
-                raise MaterialError(
-                    "--fit height: the height is known (given, or the trace ends released); leave one of both out"
-                )
-            low, likely, high = heights
+        if name in KNOWN:
+            if name not in sizes:
+                raise MaterialError(f"--fit {name}: {KNOWN[name]}; leave one of both out")
+            low, likely, high = sizes[name]
             chosen.append(Parameter(name, likely, low, high, "m", low, high))
             continue
         if name == ROUNDNESS:
@@ -87,7 +93,16 @@ def fit_parameters(food: FoodSpec, names: tuple[str, ...], heights: Heights | No
         assert value is not None  # prior() has a range only where there is a value
         bottom, top = LINEAR[name]
         chosen.append(Parameter(name, value, bottom, top, rule.unit, low, high, scale="linear"))
-    return with_yield_strain(ParameterSet(tuple(chosen)), food)
+    return with_yield_strain(_with_proportions(ParameterSet(tuple(chosen))), food)
+
+
+def _with_proportions(parameters: ParameterSet) -> ParameterSet:
+    """The parameters with a width that grows with the height, as :func:`calib.material.scene.width_range` has it: the
+    prior of the width is that of the height times that of their ratio, both normal in the logarithm."""
+    if not {"height", "width"} <= set(parameters.names):
+        return parameters
+    grows = PriorCorrelation("height", "width", parameters["height"].prior_sd / parameters["width"].prior_sd)
+    return replace(parameters, correlations=(*parameters.correlations, grows))
 
 
 def with_yield_strain(parameters: ParameterSet, food: FoodSpec) -> ParameterSet:
@@ -114,7 +129,8 @@ def with_yield_strain(parameters: ParameterSet, food: FoodSpec) -> ParameterSet:
     low, high = math.exp(mean - Z95 * sd), math.exp(mean + Z95 * sd)
     tied = replace(parameters["yield_stress"], prior_low=low, prior_high=high)
     items = tuple(tied if p.name == "yield_stress" else p for p in parameters)
-    return ParameterSet(items, (PriorCorrelation("E", "yield_stress", pulled * E.prior_sd / sd),))
+    tie = PriorCorrelation("E", "yield_stress", pulled * E.prior_sd / sd)
+    return ParameterSet(items, (*parameters.correlations, tie))
 
 
 def fitted_range(name: str, food: FoodSpec) -> Parameter:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 from calib.errors import MaterialError, TraceError
@@ -13,20 +13,23 @@ from calib.material.form import ROUNDNESS
 from calib.material.knife import load_knife
 from calib.material.remarks import notes
 from calib.material.scene import (
+    SizeRange,
     blade_warnings,
     cut_scene,
     form_is_open,
     height_range,
     of_specimen,
     specimen,
+    width_range,
     windowed,
     with_other_particles,
 )
 from calib.problem.earlier_calibration import earlier_guesses
-from calib.problem.food_parameters import STICKS, Heights, fit_parameters, size_relative_sd, sticking
+from calib.problem.food_parameters import STICKS, fit_parameters, size_relative_sd, sticking
 from calib.problem.nuisance import Sensor, nuisances, real_speed, sensor_of
 from calib.problem.numerical_uncertainty import numerical_uncertainty
 from calib.problem.objective import Objective
+from calib.problem.parameters import ParameterSet
 from calib.problem.rate_exponent import check_speeds
 from calib.problem.request import Request
 from calib.problem.target import Target
@@ -102,7 +105,7 @@ class Setup:
         return Header(self.curve.trace.sha256, key_of(self.fine.as_dict()))
 
     def sized(self, values: Mapping[str, float]) -> Setup:
-        """The set-up with the specimen of its fine cut as high and as round as ``values`` say, if they do."""
+        """The set-up with the specimen of its fine cut as large and as round as ``values`` say, if they do."""
         scene, _ = of_specimen(self.fine, values, self.kept)
         return replace(self, fine=scene)
 
@@ -153,12 +156,12 @@ def set_up(request: Request) -> Setup:
     """
     curve, air_sha256 = conditioned(request)
     request, sticks = _with_adhesion(with_height(request, curve))
-    heights = height_range(request.food, curve, request.sizing)
-    fine, coarse, assumed = _scenes(request, curve, heights)
+    fine, coarse, sizes, assumed = _scenes(request, curve)
+    names = _names(request, sizes)
     if not request.scaled:  # several are judged together
-        check_speeds(_names(request, heights), {curve.trace.source: real_speed(curve)})
+        check_speeds(names, {curve.trace.source: real_speed(curve)})
     sensor, said = sensor_of(curve, request.gain_sd, request.lag_sd, request.bandwidth)
-    objective = _objective(request, curve, fine, sensor, heights)
+    objective = _objective(request, curve, fine, sensor, fit_parameters(request.food, names, sizes))
     return Setup(request, curve, fine, coarse, objective, (*assumed, *said, *sticks), air_sha256, sensor.bandwidth)
 
 
@@ -203,17 +206,20 @@ def _with_adhesion(request: Request) -> tuple[Request, tuple[str, ...]]:
     return replace(request, food=food), said
 
 
-def _scenes(request: Request, curve: Conditioned, heights: Heights | None) -> tuple[Scene, Scene, list[str]]:
-    """The fine and the coarse cut of a request, and what was assumed of the specimen."""
-    food = request.food
-    shape, assumed = specimen(food, curve, request.sizing, open_form=ROUNDNESS in _names(request, heights))
+def _scenes(request: Request, curve: Conditioned) -> tuple[Scene, Scene, dict[str, SizeRange], list[str]]:
+    """The fine and the coarse cut of a request, the sizes that nobody knows, and what was assumed of the specimen."""
+    food, sizing = request.food, request.sizing
     knife = load_knife(request.knife)
+    shape, assumed = specimen(food, curve, sizing, open_form=ROUNDNESS in _names(request, ()), knife=knife)
+    heights = height_range(food, curve, sizing)
+    widths = width_range(food, shape, knife, sizing, heights)
+    sizes = {name: size for name, size in (("height", heights), ("width", widths)) if size is not None}
     stroke, dx, seed = way_of(food, curve), request.dx, request.seed
     fine, screening = (
         windowed(cut_scene(food, shape, knife, stroke=stroke, dx=dx, seed=seed, coarse=coarse), heights)
         for coarse in (False, True)
     )
-    return fine, screening, assumed
+    return fine, screening, sizes, assumed
 
 
 def way_of(food: FoodSpec, curve: Conditioned) -> float | Motion:
@@ -222,8 +228,12 @@ def way_of(food: FoodSpec, curve: Conditioned) -> float | Motion:
     return Motion(length, speed=real_speed(curve)) if food.rate_dependent else length
 
 
-def _names(request: Request, heights: Heights | None) -> tuple[str, ...]:
+def _names(request: Request, sizes: Collection[str]) -> tuple[str, ...]:
     """Names of what is fitted: what was asked for, else the food's, and of its specimen what nobody said.
+
+    Args:
+        request: What was asked.
+        sizes: Names of the sizes that nobody knows.
 
     Raises:
         MaterialError: The roundness of a specimen whose shape is said.
@@ -234,21 +244,20 @@ def _names(request: Request, heights: Heights | None) -> tuple[str, ...]:
         if ROUNDNESS in request.fit and said:
             raise MaterialError("--fit roundness beside --shape or --outline, which says it; leave one of both out")
         return request.fit
-    height = () if heights is None else ("height",)
     sticks = ("adhesion_energy",) if request.withdrawal else ()
-    return (*food.default_fit, *sticks, *height, *((ROUNDNESS,) if form_is_open(food, sizing) else ()))
+    return (*food.default_fit, *sticks, *sizes, *((ROUNDNESS,) if form_is_open(food, sizing) else ()))
 
 
 def _objective(
-    request: Request, curve: Conditioned, scene: Scene, sensor: Sensor, heights: Heights | None
+    request: Request, curve: Conditioned, scene: Scene, sensor: Sensor, parameters: ParameterSet
 ) -> Objective:
-    """Target, parameters, error model and nuisances of a request."""
+    """Target, error model and nuisances of a request, with its parameters."""
     food = request.food
-    width_sd = 0.0 if request.sizing.width is not None else size_relative_sd(food, "width")
+    known = request.sizing.width is not None or "width" in parameters.names
+    width_sd = 0.0 if known else size_relative_sd(food, "width")
     u_num = 0.0 if request.u_num is None else numerical_uncertainty(request.u_num, food.name, scene, curve)
     smooth = BandLimited(sensor.bandwidth, curve.stroke, curve.clock)
     target = Target(curve.stroke, curve.curve, curve.curve_noise_sd_N, curve.peak_sd_N, smooth, u_num)
-    parameters = fit_parameters(food, _names(request, heights), heights)
     objective = Objective(
         target,
         parameters,

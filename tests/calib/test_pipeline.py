@@ -254,7 +254,7 @@ def test_height_is_fitted_only_where_it_is_free():
     """Its bounds are what is possible; a height that is known cannot be fitted as well."""
     food = load_food("cucumber")
     heights = height_range(food, trace(loaded=True), Sizing())
-    item = fit_parameters(food, ("E", "height"), heights)["height"]
+    item = fit_parameters(food, ("E", "height"), {"height": heights})["height"]
     assert (item.low, item.value, item.high, item.unit) == (*heights, "m")
     with pytest.raises(MaterialError, match="height is known"):
         fit_parameters(food, ("E", "height"))
