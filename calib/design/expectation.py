@@ -17,7 +17,7 @@ from calib.design.linear import LinearTest, gained_bits, information, posterior
 from calib.design.measurement import CutTest, compression_measurement, cut_measurement, sizes_measurement
 from calib.design.start import Start
 from calib.design.stencil import Stencil
-from calib.multi_specimen.spec import SPECIMEN_PROPERTIES
+from calib.multi_specimen.spec import KNIFE_PROPERTIES, SPECIMEN_PROPERTIES
 from mpm.arrays import FloatArray
 
 FIRST = "first"
@@ -91,7 +91,8 @@ def first_test(start: Start, width_sd: float) -> CutTest:
 
 
 def next_cut(start: Start, test: Candidate) -> CutTest:
-    """How a cut of another specimen is measured; its skin and start are its own where one was cut before.
+    """How a cut of another specimen is measured; its skin and start are its own where one was cut before, and
+    the friction of another knife.
 
     Args:
         start: What is known.
@@ -100,8 +101,10 @@ def next_cut(start: Start, test: Candidate) -> CutTest:
     Returns:
         The measurement.
     """
-    own = () if start.run is None else tuple(n for n in SPECIMEN_PROPERTIES if n in start.parameters.names)
     assert test.scene is not None
+    others = KNIFE_PROPERTIES if test.scene.knife.name != start.knife.name else ()
+    chosen = (*SPECIMEN_PROPERTIES, *others)
+    own = () if start.run is None else tuple(n for n in chosen if n in start.parameters.names)
     stroke = min(start.stroke, test.scene.motion.stroke)
     return CutTest(test.name, stroke, WIDTH_SD, own, FIRST if test.same_model else "")
 

@@ -1,10 +1,11 @@
 """A held-out cut predicted with the flesh of the others.
 
-Fitted to it is only what its own specimen has for itself: its skin, its size, one factor for width and sensor. The band
-comes from simulating materials drawn from the posterior of the flesh and moved as far as specimens lie apart, and from
-errors of the size and correlation that the fit of the others showed. Each material has its own factor, and what the
-specimen has for itself is fitted to each: by a Gauss-Newton step from the best values, with what the material changes
-of the curve on coarse cells, and drawn about that.
+Fitted to it is only what its own specimen has for itself: its skin, its size, one factor for width and sensor, and the
+friction of a knife that cut none of the others. The band comes from simulating materials drawn from the posterior of
+the flesh and moved as far as specimens lie apart, and from errors of the size and correlation that the fit of the
+others showed. Each material has its own factor, and what the specimen has for itself is fitted to each: by a
+Gauss-Newton step from the best values, with what the material changes of the curve on coarse cells, and drawn about
+that.
 """
 
 from __future__ import annotations
@@ -128,10 +129,11 @@ def predict(specimens: Specimens, fit: JointFit, name: str) -> HeldOutPrediction
         CutcalError: No simulation of it reached the end of its stroke.
     """
     objective, seed = specimens.setups[name].objective, specimens.study.seed
-    shared = fit.shared_values()
+    knife = specimens.knives[name]
+    shared = fit.shared_values(knife)
     own = _own_fit(specimens, shared, name)
     best = {} if own is None else own.values
-    others = _drawn(fit, specimens.study.scatter, seed)
+    others = _drawn(fit, knife, specimens.study.scatter, seed)
     drawn = [{**x, **y} for x, y in zip(others, _adapted(specimens, own, shared, others, name), strict=True)]
     runs = _simulated(specimens, name, [{**shared, **best}, *drawn])
     curve, *others_curves = (objective.target.smooth(objective.target.stroke, e.stroke, e.force) for e in runs if e.ok)
@@ -170,7 +172,7 @@ class _OwnFit:
 
 def _own_fit(specimens: Specimens, shared: Mapping[str, float], name: str) -> _OwnFit | None:
     """The specimen's own values with the flesh held; None where it has none."""
-    setup, chosen = specimens.setups[name], specimens.own_parameters(name)
+    setup, chosen = specimens.setups[name], specimens.own_parameters(name, shared)
     if not chosen:
         return None
     # guesses are of the flesh, which is held
@@ -242,7 +244,7 @@ def _simulated(specimens: Specimens, name: str, batch: list[dict[str, float]]) -
     return runs
 
 
-def _drawn(fit: JointFit, scatter: float, seed: int) -> list[dict[str, float]]:
+def _drawn(fit: JointFit, knife: str, scatter: float, seed: int) -> list[dict[str, float]]:
     """Flesh of another specimen: materials from the posterior of a fit, each moved by the scatter.
 
     The fitted flesh is the mean of n specimens, from which another one differs by a variance of 1 + 1/n of theirs.
@@ -256,7 +258,7 @@ def _drawn(fit: JointFit, scatter: float, seed: int) -> list[dict[str, float]]:
     moved = np.array([p.log and is_shared(p.name) for p in parameters])
     apart = scatter * math.sqrt(1.0 + 1.0 / len(fit.names))
     steps = apart * random.standard_normal(points.shape) * moved
-    return [fit.shared_values(parameters.clip(z)) for z in points + steps]
+    return [fit.shared_values(knife, parameters.clip(z)) for z in points + steps]
 
 
 def _mean_curve(specimens: Specimens, names: tuple[str, ...], held: str) -> FloatArray:

@@ -16,6 +16,7 @@ from pathlib import Path
 from calib.io.folder import prepare, write_csv
 from calib.io.progress import Progress
 from calib.io.provenance import Invocation, Software, key_of
+from calib.io.wording import listed
 from calib.material.food import FoodSpec
 from calib.material.food_file import dump_material
 from calib.material.properties import MEANINGS, property_of
@@ -25,7 +26,7 @@ from calib.multi_specimen.fitted_cuts import FittedCut, fitted_cuts
 from calib.multi_specimen.held_out import HeldOutPrediction, predict
 from calib.multi_specimen.result import HeldOutCut, InSampleCut, StudyParameter, StudyResult, write_result
 from calib.multi_specimen.spec import StudySpec
-from calib.multi_specimen.specimens import JointFit, Specimens, set_ups
+from calib.multi_specimen.specimens import JointFit, Specimens, own_of_knives, set_ups
 from calib.problem.parameters import is_shared
 from calib.problem.setup import Setup
 from calib.simulation.evaluation_store import EvaluationStore, Header
@@ -157,6 +158,11 @@ class Finished:
             "Each specimen has one factor on its force, for its width and the gain of its sensor, and its own skin and "
             "size: the flesh is known in proportions, and absolutely only as well as the widths and the sensors are."
         )
+        by_knife = own_of_knives(self.study, self.setups)
+        fitted = sorted(by_knife & {property_of(p.name) for p in self.fit.result.parameters})
+        if fitted:
+            first = self.setups[self.fit.names[0]].fine.knife.name
+            said.append(f"Each knife has its own {listed(fitted)}; material.yaml has that of the knife {first}.")
         said.append(f"{len(self.setups)} cuts say little of the scatter between specimens.")
         return said
 
@@ -176,7 +182,8 @@ class Finished:
     def food(self) -> FoodSpec:
         """The food with the flesh of the fit."""
         food = self.study.food
-        flesh = {n: x for n, x in self.fit.shared_values().items() if n in food.properties}
+        knife = self.setups[self.fit.names[0]].fine.knife.name
+        flesh = {n: x for n, x in self.fit.shared_values(knife).items() if n in food.properties}
         source = f"fitted to {', '.join(self.fit.names)} of {self.study.source}"
         return food.with_values(flesh, status="fitted", source=source)
 

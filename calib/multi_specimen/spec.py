@@ -17,6 +17,8 @@ CUT, COMPRESSION = "cut", "compression"
 SPECIMEN_PROPERTIES = ("R_skin", "skin_thickness", "initiation_depth", "height", "width", "roundness")
 """What each specimen has of its own unless the study says otherwise: its skin, how its surface gives way, its size and
 form. The rest is flesh and blade, which are the same."""
+KNIFE_PROPERTIES = ("mu",)
+"""What each knife has of its own where a study has several, unless it says otherwise: friction is of food and blade."""
 SCATTER = 0.25
 """Standard deviation of the logarithm of each stiffness, strength and resistance of flesh among specimens [-]
 (docs/theory.md, "Measured choices"). What all of them have in common is in the specimen's own factor."""
@@ -53,6 +55,7 @@ class StudySpec:
         budget: Largest number of simulations of each trace, in each fit.
         seed: Seed of particles and search.
         scatter: Standard deviation of the logarithm of each property of the flesh among specimens [-].
+        knife_properties: Properties that all cuts of a knife share, and no others.
     """
 
     source: str
@@ -64,6 +67,7 @@ class StudySpec:
     budget: float
     seed: int
     scatter: float = SCATTER
+    knife_properties: tuple[str, ...] = KNIFE_PROPERTIES
 
     @property
     def first(self) -> Request:

@@ -1,14 +1,16 @@
 """The specimens of a study: cuts of one food, fitted together.
 
-Flesh and blade are shared; skin, size and the one factor of width and sensor belong to each specimen. A fit to one
-trace is no test: a held-out cut is predicted with the flesh of the others (:mod:`calib.multi_specimen.held_out`).
+Flesh is shared, and friction by the cuts of a knife; skin, size and the one factor of width and sensor belong to each
+specimen. A fit to one trace is no test: a held-out cut is predicted with the flesh of the others
+(:mod:`calib.multi_specimen.held_out`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from calib.errors import TraceError
 from calib.fit.multistart import FitResult
 from calib.fit.options import FitOptions
 from calib.io.progress import Progress
@@ -55,15 +57,26 @@ class JointFit:
         """Posterior predictive band of one trace, None where the fit ended too early."""
         return None if self.analysis is None else self.analysis.bands[self.names.index(name)]
 
-    def shared_values(self, z: FloatArray | None = None) -> dict[str, float]:
-        """Values [SI] of flesh and blade by property: the best ones, or those at internal coordinates ``z`` (p,)."""
+    def shared_values(self, knife: str, z: FloatArray | None = None) -> dict[str, float]:
+        """Values [SI] of the flesh by property, and of what a knife has of its own where it made one of the cuts.
+
+        Args:
+            knife: Name of the knife.
+            z: Internal coordinates (p,); the best ones by default.
+
+        Returns:
+            The values.
+        """
         values = self.result.best.evaluation.parameters if z is None else self.objective.parameters.to_dict(z)
-        return {name: x for name, x in values.items() if is_shared(name)}
+        return {
+            property_of(n): x for n, x in values.items() if is_shared(n) or n == parameter_of(property_of(n), knife)
+        }
 
     def values(self, name: str) -> dict[str, float]:
         """All values [SI] of one trace by property."""
-        values = self.result.best.evaluation.parameters
-        return {property_of(n): x for n, x in values.items() if is_shared(n) or n == parameter_of(property_of(n), name)}
+        parameters, values = self.objective.parameters.names, self.result.best.evaluation.parameters
+        own = (parameters[k] for k in self.objective.terms[self.names.index(name)].index)
+        return {property_of(n): values[n] for n in own}
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +101,22 @@ class Specimens:
     progress: Callable[[Progress], None] | None = None
     say: Callable[[str], None] = field(default=lambda text: None)
 
-    def own_parameters(self, name: str) -> tuple[str, ...]:
-        """Names of the parameters that the specimen of a trace has of its own."""
-        chosen = self.study.specimen_properties
+    @property
+    def knives(self) -> dict[str, str]:
+        """Names of the knives by trace."""
+        return {name: setup.fine.knife.name for name, setup in self.setups.items()}
+
+    def own_parameters(self, name: str, known: Collection[str]) -> tuple[str, ...]:
+        """Names of the parameters that a held-out trace has of its own.
+
+        Args:
+            name: The trace.
+            known: Properties that the fit of the others knows for it.
+
+        Returns:
+            The specimen's, and those of a knife that made none of the other cuts.
+        """
+        chosen = {*self.study.specimen_properties, *(set(self.study.knife_properties) - set(known))}
         return tuple(p for p in self.setups[name].objective.parameters.names if p in chosen)
 
     def evaluator(self, scene: Scene, name: str, fidelity: str) -> CachedEvaluator:
@@ -135,12 +161,20 @@ class Specimens:
             food = self.setups[name].request.food
             objectives[name] = replace(own, parameters=with_measured_modulus(own.parameters, self.moduli, food))
         properties = {p.name for o in objectives.values() for p in o.parameters}
-        return JointObjective.of(objectives, sorted(properties - set(self.study.specimen_properties)))
+        by_knife = own_of_knives(self.study, self.setups)
+        groups = {name: dict.fromkeys(sorted(by_knife), self.knives[name]) for name in names}
+        return JointObjective.of(objectives, sorted(properties - {*self.study.specimen_properties, *by_knife}), groups)
 
     def staged(self, stage: str) -> Callable[[Progress], None] | None:
         """The progress callback with what is being fitted before each stage."""
         call = self.progress
         return None if call is None else lambda p: call(replace(p, stage=f"{stage}: {p.stage}"))
+
+
+def own_of_knives(study: StudySpec, setups: Mapping[str, Setup]) -> set[str]:
+    """Properties that each knife has of its own in a study; none where there is one knife."""
+    several = len({setup.fine.knife.name for setup in setups.values()}) > 1
+    return set(study.knife_properties) - set(study.specimen_properties) if several else set()
 
 
 def set_ups(study: StudySpec) -> dict[str, Setup]:
@@ -151,6 +185,8 @@ def set_ups(study: StudySpec) -> dict[str, Setup]:
             a cut from the others, is asked for a rate exponent that its cuts cannot tell.
     """
     setups = {name: set_up(request) for name, request in study.requests.items()}
+    for name in sorted({setup.fine.knife.name for setup in setups.values()} & set(setups)):
+        raise TraceError(f"{study.source}: a trace has the name of the knife {name}; give it another one")
     fits = [study.fitted, *(tuple(n for n in study.fitted if n != held) for held in study.hold_out)]
     for names in fits:
         fitted = {p for n in names for p in setups[n].objective.parameters.names}

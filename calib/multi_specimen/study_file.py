@@ -24,7 +24,15 @@ from calib.io.yaml_checks import Place, check_keys, choice, finite_number, mappi
 from calib.material.food import FoodSpec, load_food, load_material_file
 from calib.material.properties import OF_TRACE, check_override
 from calib.material.scene import MID_LENGTH, Sizing
-from calib.multi_specimen.spec import COMPRESSION, CUT, SCATTER, SPECIMEN_PROPERTIES, CompressionSpec, StudySpec
+from calib.multi_specimen.spec import (
+    COMPRESSION,
+    CUT,
+    KNIFE_PROPERTIES,
+    SCATTER,
+    SPECIMEN_PROPERTIES,
+    CompressionSpec,
+    StudySpec,
+)
 from calib.outline.outline_file import OutlineFile
 from calib.problem.request import Request
 
@@ -32,7 +40,7 @@ LARGEST_SCATTER = 1.0
 """Standard deviation of a logarithm [-]: a factor of seven either way."""
 EACH = "each"
 """What ``hold_out`` says where each cut is held out in turn."""
-TOP = ("material", "knife", "fit", "own", "hold_out", "scatter", "budget", "seed", "dx", "set")
+TOP = ("material", "knife", "fit", "own", "by_knife", "hold_out", "scatter", "budget", "seed", "dx", "set")
 SENSOR = ("gain_sd", "lag_sd", "bandwidth")
 NUMBERS = ("speed", "board_z", "t_end", "height", "width", "length", "at", *SENSOR, "rate", "cut")
 TEXTS = ("time_col", "force_col", "position_col", "depth_col", "sign", "decimal", "baseline", "shape", "knife")
@@ -68,7 +76,7 @@ def read_study(path: Path | str) -> StudySpec:
     )
     requests, compressions = _traces(top.at("traces"), content["traces"], folder, base)
     hold_out = _hold_out(top.at("hold_out"), content.get("hold_out"), tuple(requests))
-    own = _names(top.at("own"), content.get("own"))
+    own, by_knife = (_names(top.at(key), content.get(key)) for key in ("own", "by_knife"))
     return StudySpec(
         source=Path(path).name,
         food=food,
@@ -79,6 +87,7 @@ def read_study(path: Path | str) -> StudySpec:
         budget=base.budget,
         seed=base.seed,
         scatter=_scatter(top.at("scatter"), content.get("scatter", SCATTER)),
+        knife_properties=KNIFE_PROPERTIES if by_knife is None else by_knife,
     )
 
 

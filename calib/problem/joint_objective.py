@@ -1,6 +1,7 @@
 """Traces fitted together: shared flesh, and what each specimen has of its own.
 
-A parameter named ``R_skin@cut2`` belongs to the trace ``cut2`` alone; one without ``@`` is shared by all. Data rows of
+A parameter named ``R_skin@cut2`` belongs to the trace ``cut2`` alone, and ``mu@edc`` to the cuts of the knife ``edc``;
+one without ``@`` is shared by all. Data rows of
 the traces stand one after the other, then the priors of all parameters, each once. A joint evaluation is one
 simulation for each trace.
 """
@@ -11,6 +12,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from types import MappingProxyType
 
 import numpy as np
 
@@ -82,12 +84,18 @@ class JointObjective:
     guesses: tuple[FloatArray, ...] = ()
 
     @classmethod
-    def of(cls, objectives: Mapping[str, Objective], shared: Sequence[str]) -> JointObjective:
+    def of(
+        cls,
+        objectives: Mapping[str, Objective],
+        shared: Sequence[str],
+        groups: Mapping[str, Mapping[str, str]] = MappingProxyType({}),
+    ) -> JointObjective:
         """Join objectives by the name of their trace.
 
         Args:
             objectives: Each over the properties that its simulation takes.
             shared: Which of them are the same for all traces; priors and start values are the first one's.
+            groups: What some traces share with each other alone: by trace the name of its group, by property.
 
         Returns:
             The joint objective. Its guesses are those of the traces, the first of each together and so on, with the
@@ -100,7 +108,8 @@ class JointObjective:
         for trace, objective in objectives.items():
             index = []
             for p in objective.parameters:
-                name = p.name if p.name in shared else parameter_of(p.name, trace)
+                owner = groups.get(trace, {}).get(p.name, trace)
+                name = p.name if p.name in shared else parameter_of(p.name, owner)
                 if name not in places:
                     places[name] = len(items)
                     items.append(replace(p, name=name))

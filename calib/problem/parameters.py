@@ -43,13 +43,13 @@ LINEAR_STEP = 0.1
 STRESS_LIKE = ("E", "yield_stress", *RESISTANCES, "tensile_strength", "fracture_energy")
 
 
-def parameter_of(name: str, trace: str) -> str:
-    """Name of the parameter that a property is for one trace alone.
+def parameter_of(name: str, owner: str) -> str:
+    """Name of the parameter that a property is for one trace alone, or for the cuts of one knife.
 
     >>> parameter_of("R_skin", "cut2")
     'R_skin@cut2'
     """
-    return f"{name}{OF_TRACE}{trace}"
+    return f"{name}{OF_TRACE}{owner}"
 
 
 def is_shared(name: str) -> bool:

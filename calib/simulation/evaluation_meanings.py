@@ -67,5 +67,7 @@ def _of_parameter(name: str) -> Meaning:
     rule = {**PROPERTIES, **DIMENSIONS, **FORM}.get(property_of(name))
     if rule is None:
         return UNKNOWN
-    _, _, trace = name.partition(OF_TRACE)
-    return Meaning(rule.unit, f"{rule.meaning}; of the trace {trace} alone" if trace else rule.meaning, "(n,)")
+    _, _, owner = name.partition(OF_TRACE)
+    return Meaning(
+        rule.unit, f"{rule.meaning}; of {owner} alone, a trace or a knife" if owner else rule.meaning, "(n,)"
+    )

@@ -187,7 +187,7 @@ def _parameters(c: Data) -> Markup:
     """Values, what the measurements leave open, and what numerical choices change."""
     head = ("Parameter", "Value", "95 % interval", "Literature, 95 %", "Identifiability")
     parts: list[Markup] = []
-    for key, title, more in (("shared", "Of all cuts", ()), ("own", "Of each cut", ("Cut",))):
+    for key, title, more in (("shared", "Of all cuts", ()), ("own", "Of one cut, or of one knife", ("Of",))):
         rows = [
             [joined([element("code", p[0]), element("small", p[1])]), element("strong", p[2]), *p[3 : 6 + len(more)]]
             for p in c[key]

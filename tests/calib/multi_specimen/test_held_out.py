@@ -37,7 +37,7 @@ def fitted(specimens: int) -> Any:
         analysis=SimpleNamespace(uncertainty=None),
         result=SimpleNamespace(surrogate=object(), best=SimpleNamespace(z=z)),
         objective=SimpleNamespace(parameters=FIVE),
-        shared_values=lambda point: {n: x for n, x in FIVE.to_dict(point).items() if n in FLESH},
+        shared_values=lambda knife, point: {n: x for n, x in FIVE.to_dict(point).items() if n in FLESH},
     )
 
 
@@ -49,13 +49,13 @@ def test_flesh_of_another_specimen_scatters_about_the_mean_of_the_fitted_ones(
     scatter nothing moves."""
     monkeypatch.setattr(calib.multi_specimen.held_out, "PREDICTIVE_MATERIALS", 4000)
     monkeypatch.setattr(calib.multi_specimen.held_out, "posterior_draws", lambda s, z, u, random: np.tile(z, (4000, 1)))
-    drawn = _drawn(fitted(specimens), 0.25, 0)
+    drawn = _drawn(fitted(specimens), "edc", 0.25, 0)
     assert len(drawn) == 4000 and {d["mu"] for d in drawn} == {FLESH["mu"]}
     for name in ("E", "yield_stress", "R"):
         logs = np.log([d[name] for d in drawn])
         assert logs.std() == pytest.approx(0.25 * np.sqrt(1.0 + 1.0 / specimens), rel=0.05)
         assert logs.mean() == pytest.approx(np.log(FLESH[name]), abs=0.02)
-    assert all(d == pytest.approx(FLESH) for d in _drawn(fitted(specimens), 0.0, 0))
+    assert all(d == pytest.approx(FLESH) for d in _drawn(fitted(specimens), "edc", 0.0, 0))
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -116,7 +116,7 @@ def test_a_size_that_a_study_shares_is_no_property_of_the_flesh(monkeypatch: pyt
     objective = replace(goal(FLESH | {"R_skin": SKIN}), guesses=(FIVE.start,))
     specimens: Any = SimpleNamespace(
         setups={"c": SimpleNamespace(objective=objective, fine=scene, coarse=scene, kept=())},
-        own_parameters=lambda name: (FIVE.items[3].name,),
+        own_parameters=lambda name, known: (FIVE.items[3].name,),
         evaluator=lambda scene, name, fidelity: cut.append(scene),
         pool=SimpleNamespace(batch=1),
         study=SimpleNamespace(seed=0),

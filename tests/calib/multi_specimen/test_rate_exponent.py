@@ -99,7 +99,7 @@ def test_two_speeds_tell_resistance_and_exponent(tmp_path: Path) -> None:
     assert [s.fine.motion.speed for s in setups.values()] == pytest.approx([SLOW, FAST], rel=0.02)
     with EvaluationStore(tmp_path / "runs.h5", Header("two", "cuts"), resume=False, say=print) as store:
         fit = Specimens(study, setups, (), Formula(), store).fit(study.fitted)
-    found = fit.shared_values()
+    found = fit.shared_values("kitchen")
     assert found["R"] == pytest.approx(R, rel=0.1) and found["rate_exponent"] == pytest.approx(N, rel=0.1)
     assert fit.analysis is not None
     names = [p.name for p in fit.result.parameters]
