@@ -168,12 +168,14 @@ class Calibrated:
         """The food with the fitted values, and the specimen's sizes and roundness where these were fitted."""
         setup, values = self.setup, dict(self.fit.best.evaluation.parameters)
         fitted = {"status": "fitted", "source": f"fitted to {setup.curve.trace.source}"}
-        fitted_sizes = {name for name in ("height", "width") if values.pop(name, None) is not None}
+        height, aspect = (values.pop(name, None) for name in ("height", "aspect"))
         roundness = values.pop(ROUNDNESS, None)
         food = setup.request.food.with_values(values, **fitted)
         if roundness is not None:
             food = with_roundness(food, roundness, **fitted)
-        if "height" in fitted_sizes and "width" not in setup.kept:
-            fitted_sizes.add("width")
-        shape = setup.fine.food.shape
-        return food.with_sizes({name: getattr(shape, name) for name in sorted(fitted_sizes)}, **fitted)
+        shape, new = setup.fine.food.shape, set()
+        if height is not None:
+            new |= {"height", "width"} - set(setup.kept)
+        if aspect is not None:
+            new.add("width")
+        return food.with_sizes({name: getattr(shape, name) for name in sorted(new)}, **fitted)

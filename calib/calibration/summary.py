@@ -35,6 +35,7 @@ from calib.errors import OutputError
 from calib.fit.multistart import FitResult
 from calib.io.meaning import describe_sets
 from calib.io.provenance import Invocation, Software
+from calib.material.form import known_of
 from calib.material.properties import property_of
 from calib.posterior.estimates import summarised
 from calib.problem.parameters import STRESS_LIKE
@@ -209,7 +210,7 @@ def _fitted(request: Request, fit: FitResult, analysis: UncertaintyAnalysis | No
     products = set() if found is None else _products(found)
     out = {}
     for k, p in enumerate(fit.parameters):
-        known = {**request.food.properties, **request.food.sizes}[p.name]
+        known = known_of(request.food, p.name)
         one = FittedParameter.of(p if found is None else found.intervals[k], known, sampled.get(p.name))
         product = p.name in products and one.verdict in ("identified", "weak")
         out[p.name] = replace(one, verdict="only_as_product" if product else bound_word(p.name, one))

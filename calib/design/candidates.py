@@ -33,8 +33,8 @@ SLICE_RATIO = 1.0
 """Speed along the edge over the speed down of a slicing cut [-]."""
 WIDTH_SD, PHOTOGRAPH_WIDTH_SD = 0.02, 0.05
 """Relative standard deviations of a width by caliper or weight, and by a photograph with a scale [-]. Assumed."""
-PHOTOGRAPH_SIZES_SD: Mapping[str, float] = {"height": 0.03, "width": PHOTOGRAPH_WIDTH_SD, "roundness": 0.05}
-"""The same by a photograph, of height and width (relative) and of the roundness of an outline [-]. Assumed."""
+PHOTOGRAPH_SIZES_SD: Mapping[str, float] = {"height": 0.03, "aspect": PHOTOGRAPH_WIDTH_SD, "roundness": 0.05}
+"""The same by a photograph: of height and aspect, relative [-], and of the roundness of an outline [-]. Assumed."""
 CALIBRATE, STUDY, RANGES, NONE = "calibrate", "calibrate --config", "calibrate --material", "none"
 """What takes the record of a test: a calibration, a fit of several traces, a food with narrower ranges, nothing yet."""
 
@@ -126,7 +126,7 @@ def _sizes(start: Start, found: list[Candidate], out: list[LeftOut]) -> None:
         return
     names = {"height": "height", "roundness": "shape"}
     fitted = [word for name, word in names.items() if name in start.parameters.names]
-    open_width = start.width_sd > 0.0 or "width" in start.parameters.names
+    open_width = start.width_sd > 0.0 or "aspect" in start.parameters.names
     if open_width:
         what = "measure the width of the specimen that was cut, by caliper or by weight"
         found.append(Candidate("width", "width", what, CALIBRATE))

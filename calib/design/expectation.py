@@ -119,7 +119,7 @@ def _together(
         return [*before, compression_measurement(start, z)]
     spread = {"width": WIDTH_SD, "photograph": PHOTOGRAPH_WIDTH_SD}[test.kind]
     width = start.width_sd * spread / np.hypot(start.width_sd, spread) if start.width_sd > 0.0 else 0.0
-    sizes = PHOTOGRAPH_SIZES_SD if test.kind == "photograph" else {"width": WIDTH_SD}
+    sizes = PHOTOGRAPH_SIZES_SD if test.kind == "photograph" else {"aspect": WIDTH_SD}
     seen = sizes_measurement(start.parameters, z, sizes)
     return [first_cut(start, about[FIRST], float(width)), *([] if seen is None else [seen])]
 

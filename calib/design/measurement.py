@@ -165,7 +165,7 @@ def sizes_measurement(parameters: ParameterSet, z: FloatArray, sd: Mapping[str, 
     Args:
         parameters: The parameters.
         z: Internal coordinates of the point [-], (p,).
-        sd: Standard deviations of ``height`` and ``width``, relative [-], and of ``roundness`` [-], by name.
+        sd: Standard deviations of ``height`` and ``aspect``, relative [-], and of ``roundness`` [-], by name.
 
     Returns:
         The measurement; None where none of them is a parameter.

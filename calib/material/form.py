@@ -10,10 +10,29 @@ from dataclasses import replace
 
 from calib.errors import MaterialError
 from calib.material.food import FoodSpec
+from calib.material.properties import Property
 from mpm.scene.profiles import FAMILY
 
-ROUNDNESS = "roundness"
-"""Name of the parameter."""
+ROUNDNESS, ASPECT = "roundness", "aspect"
+"""Names of the parameters."""
+
+
+def known_of(food: FoodSpec, name: str) -> Property:
+    """What the literature says of a property of a food, of a size, or of its width over its height.
+
+    Args:
+        food: The food.
+        name: What may be fitted.
+
+    Returns:
+        The property; the aspect's range is that of the width.
+    """
+    if name != ASPECT:
+        return {**food.properties, **food.sizes}[name]
+    width, height = food.dims["width"], food.dims["height"].value
+    low, high = width.low / height, width.high / height
+    source = f"width over height; width: {width.source}"
+    return Property(ASPECT, width.value / height, low, high, "-", source, width.status)
 
 
 def open_shape(food: FoodSpec) -> str:

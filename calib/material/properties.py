@@ -148,7 +148,10 @@ DIMENSIONS: dict[str, Rule] = {
 FORM: dict[str, Rule] = {"roundness": Rule("-", 0.0, 1.0, "roundness along y, 0 a cylinder and 1 an ellipsoid")}
 """What a shape has beside its size, where the food's anatomy leaves it open."""
 
-MEANINGS = {name: rule.meaning for name, rule in {**PROPERTIES, **FORM}.items()}
+SPECIMEN: dict[str, Rule] = {"aspect": Rule("-", 0.1, 10.0, "width of the specimen over its height")}
+"""What else may be fitted of a specimen."""
+
+MEANINGS = {name: rule.meaning for name, rule in {**PROPERTIES, **FORM, **SPECIMEN}.items()}
 """What each property is, in words, and what else may be fitted."""
 
 INCLUSIONS = ("stone", "cavity")
@@ -205,7 +208,7 @@ class Property:
 
     def __post_init__(self) -> None:
         here = Place("", (self.name,))
-        rule = rule_of(self.name, PROPERTIES | DIMENSIONS | FORM)
+        rule = rule_of(self.name, PROPERTIES | DIMENSIONS | FORM | SPECIMEN)
         for key in ("value", "low", "high"):
             object.__setattr__(self, key, finite_number(here.at(key), getattr(self, key)))
         check_unit(here, self.unit, rule.unit, self.value)

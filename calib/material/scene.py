@@ -43,7 +43,7 @@ LENGTH_PER_HEIGHT = 4.0
 """Largest simulated length across the blade of a food with parallel sides, over its height. The blade bends its halves
 apart like the arms of a double cantilever beam (Gurney and Hunt 1967), so the force on its faces grows with the length
 (docs/theory.md, "Measured choices")."""
-FITTED_SIZES = ("height", "width", "roundness")
+FITTED_SIZES = ("height", "aspect", "roundness")
 """What may be fitted of a specimen beside its material."""
 MID_LENGTH = 0.5
 """Where the blade cuts when nothing else is said, in parts of the length."""
@@ -53,7 +53,7 @@ choices")."""
 
 
 SizeRange = tuple[float, float, float]
-"""Lowest, likely and largest size of a specimen [m]."""
+"""Lowest, likely and largest size of a specimen [m], or of a ratio of two [-]."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def specimen(
     Real traces rarely come with the specimen's size. Where the trace has a position and ends released or on the board,
     the height is the stroke; where it ends under load it lies in :func:`height_range`. Width and length that are not
     given keep the food's proportions. The force is proportional to the width, so only the product of resistance and
-    width is seen by one trace, unless the food is wider than its blade is long (:func:`width_range`).
+    width is seen by one trace, unless the food is wider than its blade is long (:func:`aspect_range`).
 
     Args:
         food: The food with its usual sizes.
@@ -157,13 +157,13 @@ def specimen(
         )
     shape = replace(default, length=length, width=width, height=height, cut=(left - right) / 2)
     if sizing.width is None:
-        short = None if knife is None else width_range(food, shape, knife, sizing)
+        short = None if knife is None else aspect_range(food, shape, knife, sizing)
         said.append(
             "the specimen's width is not known: it keeps the proportions of the food; resistances are only identified "
             "as their product with it; give --width if you measured it"
             if short is None
-            else f"the specimen's width is not known: {short[0] * 1e3:.0f} to {short[2] * 1e3:.0f} mm are possible at "
-            "its likely height, and the blade may not reach across it; give --width if you measured it"
+            else f"the specimen's width is not known: {short[0]:.2g} to {short[2]:.2g} of its heights are possible, "
+            "and the blade may not reach across it; give --width if you measured it"
         )
     return shape, said
 
@@ -221,10 +221,8 @@ def height_range(food: FoodSpec, trace: Conditioned, sizing: Sizing) -> SizeRang
     return low, max(likely, clear), high
 
 
-def width_range(
-    food: FoodSpec, shape: Shape, knife: Knife, sizing: Sizing, heights: SizeRange | None = None
-) -> SizeRange | None:
-    """Range of the width of a specimen that its blade does not reach across.
+def aspect_range(food: FoodSpec, shape: Shape, knife: Knife, sizing: Sizing) -> SizeRange | None:
+    """Range of the width over the height of a specimen that its blade does not reach across.
 
     What lies beside the blade does not load it: the force stops growing where the chord becomes longer than the blade,
     and the width says when. Under a longer blade a width scales the curve and does not shape it.
@@ -234,20 +232,16 @@ def width_range(
         shape: The specimen at its likely sizes.
         knife: The blade.
         sizing: What is known of the specimen.
-        heights: As :func:`height_range` gives them [m]; the width grows with a height that is fitted.
 
     Returns:
-        Lowest, likely and largest width [m]: about the likely one the literature's range, and that of the height. None
-        where the width is given, or the blade reaches across the likely one.
+        Lowest, likely and largest ratio [-]: the likely one times and over half of the literature's range of a width
+        (in the logarithm). None where the width is given, or the blade reaches across the likely one.
     """
     if sizing.width is not None or sizing.outline is not None or not blade_warnings(shape, knife):
         return None
-    known, likely = food.dims["width"], shape.width
-    middle, reach = likely, math.log(known.high / known.low) / 2
-    if heights is not None:
-        low, usual, high = heights
-        middle, reach = likely * math.sqrt(low * high) / usual, math.hypot(reach, math.log(high / low) / 2)
-    return middle * math.exp(-reach), likely, middle * math.exp(reach)
+    known, likely = food.dims["width"], shape.width / shape.height
+    reach = math.sqrt(known.high / known.low)
+    return likely / reach, likely, likely * reach
 
 
 def of_specimen(
@@ -261,8 +255,8 @@ def of_specimen(
 
     Args:
         scene: The scene with any height.
-        values: Fitted values by name, ``height`` [m], ``width`` [m], ``roundness`` [-] and ``board_friction`` [-] among
-            them or not.
+        values: Fitted values by name, ``height`` [m], ``aspect`` [-], ``roundness`` [-] and ``board_friction`` [-]
+            among them or not.
         kept: Which of ``width`` and ``length`` do not grow with the height, because they were measured.
 
     Returns:
@@ -275,10 +269,10 @@ def of_specimen(
     roundness = rest.pop("roundness", None)
     if roundness is not None:
         scene = replace(scene, food=replace(scene.food, shape=replace(scene.food.shape, roundness=roundness)))
-    width = rest.pop("width", None)
-    if width is not None:
-        scene = replace(scene, food=replace(scene.food, shape=replace(scene.food.shape, width=width)))
-        kept = (*kept, "width")
+    aspect = rest.pop("aspect", None)
+    if aspect is not None:
+        own = scene.food.shape
+        scene = replace(scene, food=replace(scene.food, shape=replace(own, width=aspect * own.height)))
     height = rest.pop("height", None)
     if height is None:
         return scene, rest

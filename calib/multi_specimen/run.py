@@ -19,6 +19,7 @@ from calib.io.provenance import Invocation, Software, key_of
 from calib.io.wording import listed
 from calib.material.food import FoodSpec
 from calib.material.food_file import dump_material
+from calib.material.form import known_of
 from calib.material.properties import MEANINGS, property_of
 from calib.material.remarks import notes
 from calib.multi_specimen.compression_modulus import CompressionModulus, compression_modulus
@@ -133,7 +134,7 @@ class Finished:
         out = {}
         for k, p in enumerate(self.fit.result.parameters):
             found = p if analysis is None else analysis.uncertainty.intervals[k]
-            known = {**food.properties, **food.sizes}[property_of(p.name)]
+            known = known_of(food, property_of(p.name))
             out[p.name] = StudyParameter.of_study(found, known, shared=is_shared(p.name))
         return out
 

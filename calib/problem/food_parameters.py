@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 from calib.errors import MaterialError
 from calib.material.food import FoodSpec
-from calib.material.form import ROUNDNESS, open_shape
+from calib.material.form import ASPECT, ROUNDNESS, open_shape
 from calib.material.properties import rule_of
 from calib.material.scene import SizeRange
 from calib.problem.parameters import Z95, Parameter, ParameterSet, PriorCorrelation
@@ -30,7 +30,7 @@ has been proposed as what fruit tissue fails at (Segerlind and Dal Fabbro 1978);
 (kiwi) and 16 % (apple). The factor is assumed, materials.yaml, remark 8."""
 KNOWN = {
     "height": "the height is known (given, or the trace ends released)",
-    "width": "the width is known (given, or proportional to the height of a food that the blade reaches across)",
+    "aspect": "the width is given, or the blade reaches across the food, and then it only scales the force",
 }
 """Why a size cannot be fitted, by name."""
 STICKS = {"adhesion": 5e3, "adhesion_energy": 1.0}
@@ -64,7 +64,7 @@ def fit_parameters(
 
     Args:
         food: The food.
-        names: Properties, and ``height``, ``width`` and ``roundness`` for the specimen's.
+        names: Properties, and ``height``, ``aspect`` and ``roundness`` for the specimen's.
         sizes: Ranges of the sizes of the specimen that nobody knows, by name.
 
     Returns:
@@ -80,7 +80,7 @@ def fit_parameters(
             if name not in sizes:
                 raise MaterialError(f"--fit {name}: {KNOWN[name]}; leave one of both out")
             low, likely, high = sizes[name]
-            chosen.append(Parameter(name, likely, low, high, "m", low, high))
+            chosen.append(Parameter(name, likely, low, high, "-" if name == ASPECT else "m", low, high))
             continue
         if name == ROUNDNESS:
             chosen.append(_roundness(food))
@@ -93,16 +93,7 @@ def fit_parameters(
         assert value is not None  # prior() has a range only where there is a value
         bottom, top = LINEAR[name]
         chosen.append(Parameter(name, value, bottom, top, rule.unit, low, high, scale="linear"))
-    return with_yield_strain(_with_proportions(ParameterSet(tuple(chosen))), food)
-
-
-def _with_proportions(parameters: ParameterSet) -> ParameterSet:
-    """The parameters with a width that grows with the height, as :func:`calib.material.scene.width_range` has it: the
-    prior of the width is that of the height times that of their ratio, both normal in the logarithm."""
-    if not {"height", "width"} <= set(parameters.names):
-        return parameters
-    grows = PriorCorrelation("height", "width", parameters["height"].prior_sd / parameters["width"].prior_sd)
-    return replace(parameters, correlations=(*parameters.correlations, grows))
+    return with_yield_strain(ParameterSet(tuple(chosen)), food)
 
 
 def with_yield_strain(parameters: ParameterSet, food: FoodSpec) -> ParameterSet:
@@ -129,8 +120,7 @@ def with_yield_strain(parameters: ParameterSet, food: FoodSpec) -> ParameterSet:
     low, high = math.exp(mean - Z95 * sd), math.exp(mean + Z95 * sd)
     tied = replace(parameters["yield_stress"], prior_low=low, prior_high=high)
     items = tuple(tied if p.name == "yield_stress" else p for p in parameters)
-    tie = PriorCorrelation("E", "yield_stress", pulled * E.prior_sd / sd)
-    return ParameterSet(items, (*parameters.correlations, tie))
+    return ParameterSet(items, (PriorCorrelation("E", "yield_stress", pulled * E.prior_sd / sd),))
 
 
 def fitted_range(name: str, food: FoodSpec) -> Parameter:

@@ -14,13 +14,13 @@ from calib.material.knife import load_knife
 from calib.material.remarks import notes
 from calib.material.scene import (
     SizeRange,
+    aspect_range,
     blade_warnings,
     cut_scene,
     form_is_open,
     height_range,
     of_specimen,
     specimen,
-    width_range,
     windowed,
     with_other_particles,
 )
@@ -212,8 +212,8 @@ def _scenes(request: Request, curve: Conditioned) -> tuple[Scene, Scene, dict[st
     knife = load_knife(request.knife)
     shape, assumed = specimen(food, curve, sizing, open_form=ROUNDNESS in _names(request, ()), knife=knife)
     heights = height_range(food, curve, sizing)
-    widths = width_range(food, shape, knife, sizing, heights)
-    sizes = {name: size for name, size in (("height", heights), ("width", widths)) if size is not None}
+    ranges = {"height": heights, "aspect": aspect_range(food, shape, knife, sizing)}
+    sizes = {name: size for name, size in ranges.items() if size is not None}
     stroke, dx, seed = way_of(food, curve), request.dx, request.seed
     fine, screening = (
         windowed(cut_scene(food, shape, knife, stroke=stroke, dx=dx, seed=seed, coarse=coarse), heights)
@@ -253,7 +253,7 @@ def _objective(
 ) -> Objective:
     """Target, error model and nuisances of a request, with its parameters."""
     food = request.food
-    known = request.sizing.width is not None or "width" in parameters.names
+    known = request.sizing.width is not None or "aspect" in parameters.names
     width_sd = 0.0 if known else size_relative_sd(food, "width")
     u_num = 0.0 if request.u_num is None else numerical_uncertainty(request.u_num, food.name, scene, curve)
     smooth = BandLimited(sensor.bandwidth, curve.stroke, curve.clock)

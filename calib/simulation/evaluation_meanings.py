@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from calib.io.meaning import NO_UNIT, UNKNOWN, Meaning
-from calib.material.properties import DIMENSIONS, FORM, OF_TRACE, PROPERTIES, property_of
+from calib.material.properties import DIMENSIONS, FORM, OF_TRACE, PROPERTIES, SPECIMEN, property_of
 
 WHAT = "Simulations of a run of cutcal, one entry each along the first axis"
 ATTRIBUTES = {
@@ -64,7 +64,7 @@ def meaning_of(path: str) -> Meaning:
 
 
 def _of_parameter(name: str) -> Meaning:
-    rule = {**PROPERTIES, **DIMENSIONS, **FORM}.get(property_of(name))
+    rule = {**PROPERTIES, **DIMENSIONS, **FORM, **SPECIMEN}.get(property_of(name))
     if rule is None:
         return UNKNOWN
     _, _, owner = name.partition(OF_TRACE)

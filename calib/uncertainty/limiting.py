@@ -27,6 +27,7 @@ REMEDIES = {
         "friction of the board",
         "a tilted board would tell it (--set; --fit without it)",
     ),
+    "aspect": ("width", "a calliper or a photograph would tell it (--width)"),
     "width": ("width", "a calliper or a photograph would tell it (--width)"),
     "gain": ("gain of the sensor", "a hung mass would tell it (--gain-sd)"),
 }
@@ -40,7 +41,7 @@ class Limiting:
     Attributes:
         name: The parameter whose interval it is.
         parts: Its width over what it is [-], by what would be known: ``roundness``, ``height``,
-            ``board_friction``, ``width``, ``gain``.
+            ``aspect``, ``board_friction``, ``width``, ``gain``.
     """
 
     name: str

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-import math
+from types import SimpleNamespace
+from typing import Any
 
-import numpy as np
 import pytest
 
 from calib.api import Calibration
+from calib.calibration.calibrated import Calibrated
 from calib.errors import MaterialError
 from calib.material.food import load_food
+from calib.material.form import known_of
 from calib.material.knife import load_knife
-from calib.material.scene import Sizing, cut_scene, of_specimen, specimen, width_range
+from calib.material.scene import Sizing, aspect_range, cut_scene, of_specimen, specimen
 from calib.problem.food_parameters import fit_parameters, size_relative_sd
 from calib.problem.setup import Setup, set_up
 from calib.trace.trace import Trace
+from mpm.discretisation.particles import seed
 from tests.calib.made_cuts import made_cut
 
 APPLE = load_food("apple")
@@ -40,7 +43,7 @@ def unsearched(setup: Setup) -> set[str]:
 def test_it_is_fitted_where_the_blade_is_short(record: Trace) -> None:
     """It is then no factor of the curve. A given width, a longer blade and a smaller food leave nothing to fit."""
     short = set_up(Calibration("apple", record, knife="edc", height=0.04).request())
-    assert "width" in fitted(short) and "width" not in unsearched(short)
+    assert "aspect" in fitted(short) and "width" not in unsearched(short)
     assert any("the blade may not reach across it" in text and "--width" in text for text in short.assumed)
     for other in (
         Calibration("apple", record, knife="edc", height=0.04, width=0.08),
@@ -48,43 +51,58 @@ def test_it_is_fitted_where_the_blade_is_short(record: Trace) -> None:
         Calibration("apple", record, knife="edc", height=0.03),
     ):
         setup = set_up(other.request())
-        assert "width" not in fitted(setup)
+        assert "aspect" not in fitted(setup)
         assert ("width" in unsearched(setup)) == (other.width is None)
         assert not any("may not reach across" in text for text in setup.assumed)
 
 
 def test_it_cannot_be_fitted_where_it_is_known(record: Trace) -> None:
     """The error says why."""
-    with pytest.raises(MaterialError, match="--fit width: the width is known"):
-        set_up(Calibration("apple", record, knife="kitchen", fit=("R", "width")).request())
+    with pytest.raises(MaterialError, match="--fit aspect: the width is given, or the blade reaches across"):
+        set_up(Calibration("apple", record, knife="kitchen", fit=("R", "aspect")).request())
 
 
 def test_its_prior_is_that_of_the_proportions() -> None:
-    """At any height the likely width is in proportion, with the spread that the literature gives for a width."""
-    shape, _ = specimen(APPLE, None, Sizing(height=0.044))
-    heights = (0.04, 0.044, 0.05)
-    widths = width_range(APPLE, shape, SHORT, Sizing(), heights)
-    assert widths is not None and width_range(APPLE, shape, LONG, Sizing(), heights) is None
-    parameters = fit_parameters(APPLE, ("R", "height", "width"), {"height": heights, "width": widths})
-    covariance, mean = parameters.prior_covariance, parameters.prior_mean
-    slope = covariance[1, 2] / covariance[1, 1]
-    assert slope == pytest.approx(1.0)
-    left = math.sqrt(covariance[2, 2] - slope * covariance[1, 2])
-    assert left == pytest.approx(size_relative_sd(APPLE, "width"))
-    at = mean[2] + math.log(heights[1]) - mean[1]
-    assert math.exp(at) == pytest.approx(shape.width)
-    alone = width_range(APPLE, shape, SHORT, Sizing(height=0.044))
-    assert alone is not None and np.prod(alone[::2]) == pytest.approx(shape.width**2)
-    assert math.log(alone[2] / alone[0]) == pytest.approx(2 * 1.959964 * left)
+    """About the likely ratio, with the spread that the literature gives for a width, whatever the height."""
+    for height in (0.044, 0.05):
+        shape, _ = specimen(APPLE, None, Sizing(height=height))
+        ratios = aspect_range(APPLE, shape, SHORT, Sizing())
+        assert ratios is not None and aspect_range(APPLE, shape, LONG, Sizing()) is None
+        (aspect,) = fit_parameters(APPLE, ("aspect",), {"aspect": ratios})
+        assert (aspect.unit, aspect.value) == ("-", pytest.approx(2.0))
+        assert aspect.prior_centre == pytest.approx(2.0)
+        assert aspect.prior_sd == pytest.approx(size_relative_sd(APPLE, "width"))
 
 
 def test_a_candidate_has_its_width() -> None:
-    """It does not follow the height then; cells and length do."""
+    """A height changes all sizes alike, so that the particles stay; an aspect changes the width alone."""
     shape, _ = specimen(APPLE, None, Sizing(height=0.044))
     scene = cut_scene(APPLE, shape, SHORT)
-    placed, rest = of_specimen(scene, {"E": 3e6, "height": 0.0484, "width": 0.07})
+    placed, rest = of_specimen(scene, {"E": 3e6, "height": 0.0484, "aspect": 1.5})
     assert rest == {"E": 3e6}
-    assert (placed.food.shape.width, placed.food.shape.height) == (0.07, 0.0484)
+    assert (placed.food.shape.width, placed.food.shape.height) == (pytest.approx(0.0726), 0.0484)
     assert placed.food.shape.length == pytest.approx(1.1 * shape.length)
     assert placed.numerics.dx == pytest.approx(1.1 * scene.numerics.dx)
-    assert of_specimen(scene, {"width": 0.07})[0].numerics == scene.numerics
+    lower, _ = of_specimen(scene, {"height": 0.042, "aspect": 1.5})
+    assert len(seed(placed).x) == len(seed(lower).x)
+    assert of_specimen(scene, {"aspect": 1.5})[0].numerics == scene.numerics
+
+
+def test_the_food_that_is_written_has_the_fitted_width(record: Trace) -> None:
+    """So that another cut of it is predicted at that width."""
+    setup = set_up(Calibration("apple", record, knife="edc", height=0.04).request())
+    values = setup.start_values | {"aspect": 1.6}
+    fit: Any = SimpleNamespace(best=SimpleNamespace(evaluation=SimpleNamespace(parameters=values)))
+    made: Any = SimpleNamespace(setup=setup.sized(values), fit=fit)
+    food = Calibrated.food(made)
+    assert food.dims["width"].value == pytest.approx(0.064)
+    assert (food.dims["width"].status, food.dims["height"].status) == ("fitted", APPLE.dims["height"].status)
+
+
+def test_what_is_known_of_it_is_the_range_of_the_width() -> None:
+    """The report shows it beside the fitted value; any other property is the food's own."""
+    known, width = known_of(APPLE, "aspect"), APPLE.dims["width"]
+    assert (known.value, known.low, known.high) == pytest.approx(
+        [x / APPLE.dims["height"].value for x in (width.value, width.low, width.high)]
+    )
+    assert known_of(APPLE, "R") == APPLE.properties["R"] and known_of(APPLE, "height") == APPLE.dims["height"]
