@@ -10,7 +10,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from calib.io.meaning import Meaning
-from calib.material.properties import DIMENSIONS, FORM, PROPERTIES
+from calib.material.properties import DIMENSIONS, FORM, PROPERTIES, SPECIMEN
 from calib.simulation.evaluation_meanings import ATTRIBUTES, FIXED, SCALARS
 from calib.simulation.record_file import CHECKSUM, record_meanings
 from intsim.data.shard_meanings import COLUMNS, GROUP_ATTRIBUTES, SURFACE
@@ -35,7 +35,10 @@ def attributes(meanings: Mapping[str, Meaning]) -> str:
 
 def tables() -> dict[str, str]:
     """Every table of the page by its name."""
-    known = {name: Meaning(rule.unit, rule.meaning, "(n,)") for name, rule in (PROPERTIES | DIMENSIONS | FORM).items()}
+    known = {
+        name: Meaning(rule.unit, rule.meaning, "(n,)")
+        for name, rule in (PROPERTIES | DIMENSIONS | FORM | SPECIMEN).items()
+    }
     record = record_meanings()
     arrays = {f.name for f in fields(ForceRecord) if "ndarray" in str(f.type)}
     whole = {name: one for name, one in record.items() if name in arrays or name.startswith("section/")}

@@ -16,7 +16,7 @@ from calib.calibration.summary import add_conditioning
 from calib.io.meaning import ATTRIBUTE_MEANINGS, DESCRIPTION, UNIT, UNKNOWN
 from calib.material.food import load_food
 from calib.material.knife import load_knife
-from calib.material.properties import DIMENSIONS, FORM, PROPERTIES
+from calib.material.properties import DIMENSIONS, FORM, PROPERTIES, SPECIMEN
 from calib.material.scene import Sizing, cut_scene, specimen
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_meanings import FIXED, SCALARS, meaning_of
@@ -31,7 +31,7 @@ from tests.calib.cheap import cut
 from tests.calib.simulation.test_evaluation_store import assert_same
 from tests.calib.simulation.test_flipped_bits import HEADER
 
-KNOWN = PROPERTIES | DIMENSIONS | FORM
+KNOWN = PROPERTIES | DIMENSIONS | FORM | SPECIMEN
 TRACE = "R_skin@cut2"
 
 
