@@ -32,13 +32,15 @@ from intsim.sim.severing import PANDA_ARM, SeveringOutcome, simulate_severing
 from intsim.sim.world import World
 from intsim.task.kinematic_table import KinematicTable
 from intsim.task.rollout import Policy, Rollout
+from intsim.task.selection import TrainingTasks
 from intsim.task.success import GeometricOutcome, judge_geometry
-from intsim.task.suites import FIRST_TEST_SEED, Episode, sample_episode
+from intsim.task.suites import FIRST_TEST_SEED, Episode, FixedTask, sample_episode
 from intsim.task.targets import target
 from mpm.scene import Arm
 from mpm.scene.errors import CutcalError
 
 TABLE_STEPS = 2000  # of an episode on the plain table, at most: 100 s
+TASK_SEEDS = 10_000  # seeds of each task that is asked for in place of what a suite draws
 ROWS_FILE, RESULT_FILE = "evaluate.jsonl", "evaluate.json"
 
 
@@ -58,6 +60,9 @@ class PolicyEvaluation:
         knife: Name of the knife.
         arm: What holds it in the solver, on the table.
         world: Where the episodes take place: in IntSim, in closed loop with the food; None for the plain table.
+        paper: Figure of the paper whose tasks are asked for; None for the suites as they are.
+        tasks: What is asked for, suite and task; ``episodes`` of each. Empty for what the suites draw.
+        trained: What the policy has learnt from; None where it has not learnt, or does not say.
     """
 
     policy: Policy
@@ -71,6 +76,13 @@ class PolicyEvaluation:
     knife: str = "kitchen"
     arm: Arm = PANDA_ARM
     world: World | None = None
+    paper: str | None = None
+    tasks: Sequence[tuple[str, FixedTask]] = ()
+    trained: TrainingTasks | None = None
+
+    def __post_init__(self) -> None:
+        if self.tasks and self.episodes > TASK_SEEDS:
+            raise CutcalError(f"evaluate: {self.episodes} episodes of a task; at most {TASK_SEEDS}")
 
     @property
     def settings(self) -> EvaluationSettings:
@@ -84,13 +96,25 @@ class PolicyEvaluation:
             severing=self.severing,
             arm=ArmSettings.of(self.arm),
             world=WorldSettings.of(self.world),
+            paper=self.paper,
+            trained=self.trained,
         )
 
     @property
     def tests(self) -> list[tuple[str, int]]:
         """Suite and seed of every episode."""
         first = FIRST_TEST_SEED + self.seed
+        if self.tasks:
+            starts = [(suite, first + TASK_SEEDS * n) for n, (suite, _) in enumerate(self.tasks)]
+            return [(suite, start + k) for k in range(self.episodes) for suite, start in starts]
         return [(suite, first + k) for suite in self.suites for k in range(self.episodes)]
+
+    def episode(self, suite: str, seed: int) -> Episode:
+        """The episode of one of :attr:`tests`."""
+        if not self.tasks:
+            return sample_episode(suite, seed, dict(self.foods))
+        _, task = self.tasks[(seed - FIRST_TEST_SEED - self.seed) // TASK_SEEDS]
+        return sample_episode(suite, seed, dict(self.foods), task)
 
 
 def roll_out(policy: Policy, episode: Episode) -> tuple[Rollout, KinematicTable]:
@@ -191,23 +215,23 @@ def _outcomes(
         yield from _in_world(evaluation, evaluation.world, todo, pool)
         return
     for suite, seed in todo:
-        yield run_episode(evaluation, sample_episode(suite, seed, dict(evaluation.foods)))
+        yield run_episode(evaluation, evaluation.episode(suite, seed))
 
 
 def _in_world(
     evaluation: PolicyEvaluation, world: World, todo: Sequence[tuple[str, int]], pool: Workers
 ) -> Iterator[EpisodeOutcome]:
     """Episodes in IntSim, in order of completion."""
-    foods = dict(evaluation.foods)
-    jobs = [(evaluation.policy, suite, seed, foods, world) for suite, seed in todo]
+    foods, episodes = dict(evaluation.foods), [evaluation.episode(suite, seed) for suite, seed in todo]
+    jobs = [(evaluation.policy, episode, foods, world) for episode in episodes]
     for k, result in pool.each(closed_loop_episode, jobs):
-        suite, seed = todo[k]
+        episode = episodes[k]
         if result is None:
             raise OutputError(
-                f"{suite} {seed}: its process was killed twice, perhaps for lack of memory; free some and add --resume"
+                f"{episode.suite} {episode.seed}: its process was killed twice, perhaps for lack of memory; free some "
+                "and add --resume"
             )
         rollout, after, found = result
-        episode = sample_episode(suite, seed, foods)
         judged = judge_geometry(episode.spec, episode.item, rollout, after)
         yield EpisodeOutcome.of(episode, rollout.clipped, judged, found if world.coupled else None)
 
@@ -225,13 +249,47 @@ def _read_rows(path: Path, settings: EvaluationSettings) -> list[EpisodeOutcome]
     path.write_text("".join(whole), encoding="utf-8")
     if not whole:
         return []
-    try:
-        before = from_document(EvaluationSettings, json.loads(whole[0]))
-        rows = [from_document(EpisodeOutcome, json.loads(line)) for line in whole[1:]]
-    except (ValueError, DocumentError) as e:
-        raise OutputError(f"{path}: damaged ({e}); choose another folder") from None
+    before, rows = _parsed(path, whole)
     if before != settings:
         raise OutputError(
             f"--out {path.parent}: holds an evaluation of something else ({path.name}); choose another folder"
         )
     return rows
+
+
+def _parsed(path: Path, lines: Sequence[str]) -> tuple[EvaluationSettings, list[EpisodeOutcome]]:
+    """Settings and episodes of the whole lines of evaluate.jsonl."""
+    try:
+        settings = from_document(EvaluationSettings, json.loads(lines[0]))
+        return settings, [from_document(EpisodeOutcome, json.loads(line)) for line in lines[1:]]
+    except (ValueError, DocumentError) as e:
+        raise OutputError(f"{path}: damaged ({e}); choose another folder") from None
+
+
+def read_evaluation(folder: Path) -> tuple[EvaluationSettings, list[EpisodeOutcome]]:
+    """Settings and episodes of a finished evaluation.
+
+    Args:
+        folder: Its folder.
+
+    Returns:
+        What was evaluated, and its episodes.
+
+    Raises:
+        OutputError: There is none, it is not finished, or it is damaged.
+    """
+    path = folder / ROWS_FILE
+    if not (folder / RESULT_FILE).exists():
+        state = (
+            "an evaluation that is not finished; add --resume to the command that began it"
+            if path.exists()
+            else (f"no evaluation ({RESULT_FILE}); name a folder of cutcal evaluate")
+        )
+        raise OutputError(f"{folder}: holds {state}")
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    except (OSError, UnicodeDecodeError) as e:
+        raise OutputError(f"{path}: cannot be read ({e})") from None
+    if not lines:
+        raise OutputError(f"{path}: is empty; make the evaluation again")
+    return _parsed(path, lines)

@@ -10,6 +10,7 @@ from typing import ClassVar
 from calib.io.typed_document import FLAT
 from intsim.sim.severing import SeveringOutcome
 from intsim.sim.world import World
+from intsim.task.selection import TrainingTasks
 from intsim.task.success import CRITERIA, PLACE_TOLERANCE, GeometricOutcome, wilson
 from intsim.task.suites import SUITES, Episode
 from mpm.scene import Arm
@@ -64,6 +65,8 @@ class EvaluationSettings:
         severing: Whether single cuts were simulated.
         arm: What holds the knife in the solver.
         world: Where the episodes took place in IntSim; None on the plain table.
+        paper: Figure of the paper whose tasks were asked for; None for the suites as they are.
+        trained: What the policy has learnt from; None where it has not learnt, or does not say.
     """
 
     policy: str
@@ -74,6 +77,8 @@ class EvaluationSettings:
     severing: bool
     arm: ArmSettings
     world: WorldSettings | None
+    paper: str | None = None
+    trained: TrainingTasks | None = None
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ import numpy as np
 
 from calib.errors import OutputError
 from intsim.task.planner import GRIPPER_CLOSED, HOME
+from intsim.task.selection import TaskFilter, TrainingTasks
 from intsim.task.targets import Item
 
 ACTION_CHUNK = 8  # commanded poses in one piece: 0.4 s
@@ -142,6 +143,26 @@ class Clone:
         """The food that is named, else the first."""
         said = set(tokens(instruction))
         return next((i for i in items if set(i.name.split("_")) <= said), items[0])
+
+    @property
+    def trained(self) -> TrainingTasks | None:
+        """What it has learnt from; None for a file of an older version, which does not say."""
+        if "foods" not in self.about:
+            return None
+        about = self.about
+        return TrainingTasks(
+            about["demos"], about["ratio"], about["side"], tuple(about["without"]), tuple(about["foods"])
+        )
+
+    @property
+    def name(self) -> str:
+        """What results call it: what it has learnt from."""
+        about, trained = self.about, self.trained
+        kind = about["keep"]
+        if trained is not None:
+            tasks = TaskFilter(trained.ratio, trained.side, trained.without).words()
+            kind = ", ".join(filter(None, (kind, tasks, f"seed {about['seed']}" if about["seed"] else "")))
+        return f"clone of {about['trajectories']} trajectories of {about['dataset']} ({kind})"
 
     def save(self, path: Path) -> None:
         """Write it as numbers (npz) with its vocabulary.

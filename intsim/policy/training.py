@@ -18,19 +18,28 @@ from intsim.policy.behaviour_cloning import (
     to_food_frame,
     tokens,
 )
+from intsim.task.selection import EVERY_TASK, TaskFilter
 from intsim.task.targets import TaskError
 
 HIDDEN_WIDTH, LAYER_COUNT = 256, 3
 TRAINING_STEPS, BATCH_SIZE, LEARNING_RATE = 4000, 256, 1e-3  # Adam with a rate that falls to nothing (cosine)
 
 
-def train(folder: Path, *, keep: str = "severed", most: int | None = None, seed: int = 0) -> Clone:
+def train(
+    folder: Path,
+    *,
+    keep: str = "severed",
+    tasks: TaskFilter = EVERY_TASK,
+    most: int | None = None,
+    seed: int = 0,
+) -> Clone:
     """Train a clone on the trajectories of a dataset.
 
     Args:
         folder: The dataset.
         keep: Which trajectories: those that meet the ``published`` criteria, those in pieces too (``severed``), or
             ``all``.
+        tasks: Which tasks: one ratio, one side, a food left out.
         most: Of those, at most so many.
         seed: Of weights and batches.
 
@@ -45,7 +54,7 @@ def train(folder: Path, *, keep: str = "severed", most: int | None = None, seed:
         import torch
     except ImportError:
         raise OutputError("dataset clone: torch is not installed; pip install 'cutcal[robot]'") from None
-    examples = _examples(folder, keep, most)
+    examples = _examples(folder, keep, tasks, most)
     vocabulary = tuple(sorted({word for group in examples.sentences for s in group for word in tokens(s)}))
     before = torch.get_num_threads()
     torch.set_num_threads(1)
@@ -60,6 +69,11 @@ def train(folder: Path, *, keep: str = "severed", most: int | None = None, seed:
         "steps": TRAINING_STEPS,
         "seed": seed,
         "loss": loss,
+        "demos": examples.demos.pop() if len(examples.demos) == 1 else None,
+        "ratio": tasks.ratio,
+        "side": tasks.side,
+        "without": list(tasks.without),
+        "foods": sorted(examples.foods),
     }
     return Clone(vocabulary, weights, about)
 
@@ -72,11 +86,15 @@ class _Examples:
         inputs: What is seen (T, 13).
         goals: The next commanded poses as seen from the food (T, 5 ACTION_CHUNK).
         sentences: Its sentences.
+        demos: Kinds of demonstration, of all.
+        foods: Foods that are asked for, of all.
     """
 
     inputs: list[np.ndarray]
     goals: list[np.ndarray]
     sentences: list[list[str]]
+    demos: set[str]
+    foods: set[str]
 
 
 def _fit(
@@ -111,10 +129,10 @@ def _fit(
     return weights, float(loss.detach())
 
 
-def _examples(folder: Path, keep: str, most: int | None) -> _Examples:
+def _examples(folder: Path, keep: str, tasks: TaskFilter, most: int | None) -> _Examples:
     """Those of the trajectories that are kept."""
-    out = _Examples([], [], [])
-    for stored in _kept(folder, keep):
+    out = _Examples([], [], [], set(), set())
+    for stored in _kept(folder, keep, tasks):
         if most is not None and len(out.inputs) == most:
             break
         item = stored_item(stored.entry["items"][0])
@@ -124,11 +142,15 @@ def _examples(folder: Path, keep: str, most: int | None) -> _Examples:
         out.inputs.append(observed_features(edge[:-1], edge[np.maximum(np.arange(n) - 1, 0)], item))
         out.goals.append(to_food_frame(command, item)[ahead].reshape(n, -1))
         out.sentences.append(list(stored.entry["instructions"]))
+        out.demos.add(stored.entry["demos"])
+        out.foods.add(item.name)
     if not out.inputs:
-        raise TaskError(f"clone: no trajectory of {folder} is kept ({keep}); make more, or keep others")
+        kind = ", ".join(filter(None, (keep, tasks.words())))
+        raise TaskError(f"clone: no trajectory of {folder} is kept ({kind}); make more, or keep others")
     return out
 
 
-def _kept(folder: Path, keep: str) -> Iterator[StoredTrajectory]:
+def _kept(folder: Path, keep: str, tasks: TaskFilter) -> Iterator[StoredTrajectory]:
     """Those of the trajectories whose simulation did not break down."""
-    return (s for s in trajectories(folder) if s.entry["status"] == "done" and is_kept(s.entry, keep))
+    done = (s for s in trajectories(folder) if s.entry["status"] == "done")
+    return (s for s in done if is_kept(s.entry, keep) and tasks.keeps(s.entry))

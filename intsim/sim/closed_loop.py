@@ -15,7 +15,7 @@ from intsim.task.kinematic_table import limit_command
 from intsim.task.motion import at_rest
 from intsim.task.planner import CONTROL_RATE, GRIPPER_CLOSED
 from intsim.task.rollout import Policy, Rollout
-from intsim.task.suites import sample_episode
+from intsim.task.suites import Episode
 from mpm.scene.errors import CutcalError
 
 _environments: dict[str, Any] = {}
@@ -55,13 +55,13 @@ def make_environment(world: World) -> Any:
 
 
 def closed_loop_episode(
-    policy: Policy, suite: str, seed: int, foods: dict[str, FoodSpec], world: World, arch: str, threads: int
+    policy: Policy, episode: Episode, foods: dict[str, FoodSpec], world: World, arch: str, threads: int
 ) -> tuple[Rollout, Any, SeveringOutcome]:
     """One episode, in a worker.
 
     Args:
         policy: The policy.
-        suite, seed: Of the episode.
+        episode: What is on the table, and what is asked for.
         foods: Foods that may be asked for, by name.
         world: Where.
         arch, threads: Device of the solver; only CPUs are used.
@@ -72,9 +72,8 @@ def closed_loop_episode(
     del arch, threads
     env = make_environment(world)
     env.foods = foods
-    episode = sample_episode(suite, seed, foods)
-    env.reset(seed=seed, options={"episode": episode})
-    found = roll_out_closed_loop(env, policy, zlib.crc32(f"{suite} {seed}".encode()))
+    env.reset(seed=episode.seed, options={"episode": episode})
+    found = roll_out_closed_loop(env, policy, zlib.crc32(f"{episode.suite} {episode.seed}".encode()))
     return env.table.rollout, env.table.items[0], found
 
 

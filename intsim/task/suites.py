@@ -49,6 +49,31 @@ class Episode:
     instruction: str
 
 
+@dataclass(frozen=True)
+class FixedTask:
+    """What is asked for in place of what a suite would draw; place and size of the food are still drawn.
+
+    Attributes:
+        food: Name of the food.
+        ratio: Part that is cut off; None to leave the cut to the suite.
+        side: From where it is measured; None to leave that to the suite.
+        pieces: Into how many equal pieces, in place of ratio and side; 0 for one cut.
+    """
+
+    food: str
+    ratio: Fraction | float | None = None
+    side: str | None = None
+    pieces: int = 0
+
+    def spec(self, drawn: CutSpec) -> CutSpec:
+        """What is asked for, with what it leaves open as it was drawn."""
+        if self.pieces:
+            return CutSpec(self.food, pieces=self.pieces)
+        if self.ratio is None:
+            return drawn
+        return CutSpec(self.food, self.ratio, self.side or drawn.side)
+
+
 def random_item(food: FoodSpec, rng: np.random.Generator) -> Item:
     """A food of a random size, place and direction; its ends can be told apart in the front camera's picture."""
     scale = 1 + rng.uniform(-SIZE_VARIATION, SIZE_VARIATION)
@@ -140,13 +165,14 @@ SUITES = {
 """Suites by name. Leave one food out by naming it: a suite of a policy that was trained without it."""
 
 
-def sample_episode(suite: str, seed: int, foods: dict[str, FoodSpec]) -> Episode:
+def sample_episode(suite: str, seed: int, foods: dict[str, FoodSpec], fixed: FixedTask | None = None) -> Episode:
     """The episode of a suite with a seed; the same seed is the same episode.
 
     Args:
         suite: Name in ``SUITES``.
         seed: From ``TEST`` on for a test.
         foods: Foods that may be asked for, by name.
+        fixed: What is asked for in place of what the suite draws.
 
     Returns:
         What is on the table, what is asked for, and in which words.
@@ -159,8 +185,11 @@ def sample_episode(suite: str, seed: int, foods: dict[str, FoodSpec]) -> Episode
     kind = SUITES[suite]
     rng = np.random.default_rng([seed, *suite.encode()])
     names = list(foods)
-    name = names[rng.integers(len(names))]
+    drawn = names[rng.integers(len(names))]
+    name = drawn if fixed is None else fixed.food
     item, spec = random_item(foods[name], rng), kind.task(rng, name)
+    if fixed is not None:
+        spec = fixed.spec(spec)
     others: tuple[Item, ...] = ()
     if kind.distractors:
         item = replace(item, x=float(np.clip(item.x, -0.05, 0.05)), y=float(np.clip(item.y, -0.05, 0.05)))

@@ -80,6 +80,9 @@ def add_args(p: Group) -> None:
     p.add_argument(
         "--keep", choices=KEEP, metavar="KIND", help="severed (default of clone), published, all (default of export)"
     )
+    p.add_argument("--ratio", type=number(0, 1, "-"), metavar="R", help="clone: from cuts of this part alone")
+    p.add_argument("--side", metavar="NAME", help="clone: from cuts measured from left, right or centre alone")
+    p.add_argument("--without", action="append", metavar="FOOD", help="clone: leave a food out, or several")
     p.add_argument("--most", type=whole(1), metavar="N", help="clone: learn from at most so many")
     p.add_argument("--pixels", type=whole(16), default=128, metavar="N", help="of the pictures (default 128)")
     add_workers(p, "trajectories")
@@ -181,8 +184,10 @@ def _clone(args: argparse.Namespace) -> dict[str, Any]:
     if path.exists():
         raise CutcalError(f"--out {path}: exists and is never overwritten; choose another file")
     from intsim.policy.training import train
+    from intsim.task.selection import TaskFilter
 
-    clone = train(Path(args.folder), keep=args.keep or "severed", most=args.most, seed=args.seed)
+    tasks = TaskFilter(args.ratio, args.side, tuple(args.without or ()))
+    clone = train(Path(args.folder), keep=args.keep or "severed", tasks=tasks, most=args.most, seed=args.seed)
     clone.save(path)
     if not args.json:
         about = clone.about

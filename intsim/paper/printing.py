@@ -1,0 +1,80 @@
+"""A figure of the paper beside ours, as text for a terminal."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping, Sequence
+
+from intsim.outcomes import SuccessRate
+from intsim.paper.tables import PaperComparison, PaperTable
+
+WIDTH = 100  # of a line of sentences
+INDENT, GAP = 2, 3  # before a table, and between its columns
+NOT_PRINTED = "not printed as numbers"
+
+
+def percent(rate: float) -> str:
+    """A rate in percent."""
+    return f"{100 * rate:.0f} %"
+
+
+def rate_words(found: SuccessRate | None) -> str:
+    """A rate of ours with its interval; a dash where there is no episode."""
+    if found is None:
+        return "-"
+    return f"{found.successes} of {found.trials} ({100 * found.low95:.0f} to {100 * found.high95:.0f} %)"
+
+
+def printed_words(printed: Mapping[str, float] | None) -> str:
+    """What the paper prints of a row; a dash where it has no such row."""
+    if printed is None:
+        return NOT_PRINTED
+    return ", ".join(f"{model} {percent(rate)}" for model, rate in printed.items()) or "-"
+
+
+def text(found: PaperComparison) -> str:
+    """All tables of a figure, and the sentences below them.
+
+    Args:
+        found: The figure.
+
+    Returns:
+        Lines for a terminal.
+    """
+    name = found.figure.replace("fig", "Fig. ").replace("table", "Table ")
+    lines = [f"{name} of the paper: {found.title}"]
+    for table in found.tables:
+        lines += ["", f"{table.policy}; {table.world}; {_foods(table.foods)}", *_grid(table), ""]
+        lines += _sentences("What differs from the paper:", table.differs)
+    lines += ["", *_wrapped("Brackets hold 95 % intervals (Wilson 1927).", 2)]
+    if found.words:
+        lines += _wrapped(f"The paper in words: {found.words}.", 2)
+    return "\n".join([*lines, *_wrapped(f"Printed numbers: CulinaryCut, {found.source}.", 2)])
+
+
+def _foods(foods: Sequence[str]) -> str:
+    return f"{len(foods)} foods" if len(foods) > 3 else ", ".join(foods)
+
+
+def _grid(table: PaperTable) -> list[str]:
+    """Rows and columns, the paper's last."""
+    columns = list(dict.fromkeys(name for row in table.rows for name in row.ours))
+    cells = [["", *(f"ours: {name}" for name in columns), "paper"]]
+    cells += [
+        [row.label, *(rate_words(row.ours.get(name)) for name in columns), printed_words(row.paper)]
+        for row in table.rows
+    ]
+    widths = [max(map(len, column)) + GAP for column in zip(*cells, strict=True)]
+    return [
+        (" " * INDENT + "".join(f"{cell:{width}s}" for cell, width in zip(line, widths, strict=True))).rstrip()
+        for line in cells
+    ]
+
+
+def _sentences(head: str, said: Sequence[str]) -> list[str]:
+    return [f"{' ' * INDENT}{head}", *(line for one in said for line in _wrapped(one, INDENT, "- "))]
+
+
+def _wrapped(said: str, indent: int, mark: str = "") -> list[str]:
+    first = " " * indent + mark
+    return textwrap.wrap(said, WIDTH, initial_indent=first, subsequent_indent=" " * len(first))
