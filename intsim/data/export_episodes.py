@@ -14,6 +14,7 @@ from calib.io.progress import Countdown
 from calib.simulation.workers import Workers
 from intsim.data.pictures import check_backgrounds, load_pictures, render_dataset
 from intsim.data.shards import StoredTrajectory, is_kept, trajectories
+from intsim.task.selection import EVERY_TASK, TaskFilter
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +79,7 @@ def export_episodes(
     pool: Workers | None = None,
     say: Callable[[str], None] = lambda text: None,
     keep: str = "all",
+    tasks: TaskFilter = EVERY_TASK,
 ) -> Iterator[ExportEpisode]:
     """Each trajectory for each background; its sentences come in turn. What has to be rendered is, before this returns.
 
@@ -88,6 +90,7 @@ def export_episodes(
         pool: Where those are rendered that are not in the folder yet; they are kept there.
         say: Called with a line after each.
         keep: Which trajectories, in :data:`intsim.data.shards.KEEP_KINDS`.
+        tasks: Which of them by what they ask for.
 
     Returns:
         The episodes, one background after the other.
@@ -96,22 +99,26 @@ def export_episodes(
         CutcalError: There is no renderer, or the folder holds no dataset, none that is kept, or not the
             pictures and there is no pool.
     """
-    if not any(is_kept(stored.entry, keep) for stored in trajectories(folder)):
-        raise OutputError(f"dataset export: no trajectory of {folder} is kept ({keep}); make more, or keep others")
+    kept = [
+        k for k, stored in enumerate(trajectories(folder)) if is_kept(stored.entry, keep) and tasks.keeps(stored.entry)
+    ]
+    if not kept:
+        kind = ", ".join(filter(None, (keep, tasks.words())))
+        raise OutputError(f"dataset export: no trajectory of {folder} is kept ({kind}); make more, or keep others")
     if backgrounds and pool is not None:
         render_dataset(folder, backgrounds, pixels, pool, say)
-    return _each(folder, backgrounds, pixels, say, keep)
+    return _each(folder, backgrounds, pixels, say, set(kept))
 
 
 def _each(
-    folder: Path, backgrounds: Sequence[int], pixels: int, say: Callable[[str], None], keep: str
+    folder: Path, backgrounds: Sequence[int], pixels: int, say: Callable[[str], None], kept: set[int]
 ) -> Iterator[ExportEpisode]:
-    kept = sum(is_kept(stored.entry, keep) for stored in trajectories(folder))
-    total = kept * max(len(backgrounds), 1)
-    rest, done = Countdown(max(total, 1)), 0
+    """Those trajectories whose numbers are kept."""
+    total = len(kept) * max(len(backgrounds), 1)
+    rest, done = Countdown(total), 0
     for turn, background in enumerate(backgrounds or [None]):
         for k, stored in enumerate(trajectories(folder)):
-            if not is_kept(stored.entry, keep):
+            if k not in kept:
                 continue
             sentences = stored.entry["instructions"]
             pictures = {} if background is None else load_pictures(folder, stored, background, pixels)

@@ -20,6 +20,7 @@ from intsim.data.export_episodes import ExportEpisode, check_target, export_epis
 from intsim.data.shards import StoredTrajectory
 from intsim.task.gym_action import to_gym_action
 from intsim.task.planner import CONTROL_RATE, GRIPPER_CLOSED
+from intsim.task.selection import EVERY_TASK, TaskFilter
 
 CODEBASE_VERSION = "v3.0"
 FILE_FRAMES = 50_000  # frames of a file of data or video
@@ -126,6 +127,7 @@ def export_lerobot(
     pool: Workers | None = None,
     say: Callable[[str], None] = lambda text: None,
     keep: str = "all",
+    tasks: TaskFilter = EVERY_TASK,
 ) -> dict[str, Any]:
     """Write a LeRobotDataset v3.0.
 
@@ -141,6 +143,7 @@ def export_lerobot(
         pool: Where pictures are rendered that the dataset does not have yet.
         say: Called with a line after each episode.
         keep: Which trajectories, in :data:`intsim.data.shards.KEEP_KINDS`.
+        tasks: Which of them by what they ask for.
 
     Returns:
         The content of meta/info.json.
@@ -155,7 +158,7 @@ def export_lerobot(
         raise OutputError(f"dataset export: {e.name} is not installed; pip install 'cutcal[data]'") from None
     check_target(out, backgrounds)
     writer = _Writer(out, pixels if backgrounds else 0)
-    for episode in export_episodes(folder, backgrounds, pixels, pool, say, keep):
+    for episode in export_episodes(folder, backgrounds, pixels, pool, say, keep, tasks):
         writer.add(episode)
     return writer.close()
 

@@ -27,6 +27,7 @@ from calib.simulation.workers import Workers
 from intsim.data.export_episodes import ExportEpisode, check_pictured_target, export_episodes
 from intsim.data.shard_meanings import meaning_of
 from intsim.data.shards import is_kept, trajectories
+from intsim.task.selection import EVERY_TASK, TaskFilter
 
 CAMERA_NAME = "front"
 STATE_SIZE = 8  # of the state that RDT is given: the second finger does what the first does
@@ -45,6 +46,7 @@ def export_rdt(
     pool: Workers | None = None,
     say: Callable[[str], None] = lambda text: None,
     keep: str = "all",
+    tasks: TaskFilter = EVERY_TASK,
 ) -> dict[str, Any]:
     """Write a folder for each task, tasks.json and statistics.json.
 
@@ -56,6 +58,7 @@ def export_rdt(
         pool: Where pictures are rendered that the dataset does not have yet.
         say: Called with a line after each episode.
         keep: Which trajectories, in :data:`intsim.data.shards.KEEP_KINDS`.
+        tasks: Which of them by what they ask for.
 
     Returns:
         The content of tasks.json: by task its ``instruction``, all sentences for it in ``instructions``, and how many
@@ -68,11 +71,11 @@ def export_rdt(
     check_pictured_target(out, backgrounds, "RDT's input", "PIL")
     from PIL import Image
 
-    tasks: dict[str, dict[str, Any]] = {}
-    for episode in export_episodes(folder, backgrounds, pixels, pool, say, keep):
+    listed: dict[str, dict[str, Any]] = {}
+    for episode in export_episodes(folder, backgrounds, pixels, pool, say, keep, tasks):
         name = task_name(episode.stored.entry["food"], episode.stored.entry["task"])
         home = out / name / "motionplanning"
-        known = tasks.setdefault(name, {"instruction": episode.sentence, "instructions": [], "episodes": 0})
+        known = listed.setdefault(name, {"instruction": episode.sentence, "instructions": [], "episodes": 0})
         known["instructions"] = sorted({*known["instructions"], *episode.stored.entry["instructions"]})
         k = known["episodes"]
         shown = home / str(k // FOLDER_EPISODES) / str(k % FOLDER_EPISODES)
@@ -86,9 +89,9 @@ def export_rdt(
         except OSError as e:
             raise OutputError(f"{home}: cannot be written ({e}); free some space and export again elsewhere") from None
         known["episodes"] = k + 1
-    (out / STATISTICS_FILE).write_text(json.dumps(_statistics(folder, keep), indent=1) + "\n", encoding="utf-8")
-    (out / TASKS_FILE).write_text(json.dumps(tasks, indent=1) + "\n", encoding="utf-8")
-    return tasks
+    (out / STATISTICS_FILE).write_text(json.dumps(_statistics(folder, keep, tasks), indent=1) + "\n", encoding="utf-8")
+    (out / TASKS_FILE).write_text(json.dumps(listed, indent=1) + "\n", encoding="utf-8")
+    return listed
 
 
 def _trajectory(path: Path, k: int, episode: ExportEpisode) -> None:
@@ -110,10 +113,10 @@ def _opened(stored: h5py.Group) -> tuple[np.ndarray, np.ndarray]:
     return actions, joints
 
 
-def _statistics(folder: Path, keep: str) -> dict[str, list[float]]:
+def _statistics(folder: Path, keep: str, tasks: TaskFilter) -> dict[str, list[float]]:
     """Smallest and largest state and action of the trajectories, the gripper's of its mechanism."""
     ends: dict[str, list[float]] = {}
-    for stored in (one for one in trajectories(folder) if is_kept(one.entry, keep)):
+    for stored in (one for one in trajectories(folder) if is_kept(one.entry, keep) and tasks.keeps(one.entry)):
         for kind, name in (("state", "obs/agent/qpos"), ("action", "actions")):
             values = stored.group[name][()][:, :STATE_SIZE]
             for end, pick in (("min", np.min), ("max", np.max)):

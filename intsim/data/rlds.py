@@ -20,6 +20,7 @@ from intsim.data.cameras import CAMERA_NAMES
 from intsim.data.export_episodes import ExportEpisode, check_pictured_target, export_episodes
 from intsim.data.lerobot import episode_columns
 from intsim.task.language import SENTENCES_PER_TASK
+from intsim.task.selection import EVERY_TASK, TaskFilter
 
 DATASET_NAME, DATASET_VERSION = "cutcal", "1.0.0"
 VALIDATION_STRIDE = 20  # every so many-th trajectory is kept for validation
@@ -39,6 +40,7 @@ def export_rlds(
     pool: Workers | None = None,
     say: Callable[[str], None] = lambda text: None,
     keep: str = "all",
+    tasks: TaskFilter = EVERY_TASK,
 ) -> dict[str, Any]:
     """Write ``cutcal/1.0.0`` with the splits train and val.
 
@@ -56,6 +58,7 @@ def export_rlds(
         pool: Where pictures are rendered that the dataset does not have yet.
         say: Called with a line after each episode.
         keep: Which trajectories, in :data:`intsim.data.shards.KEEP_KINDS`.
+        tasks: Which of them by what they ask for.
 
     Returns:
         The content of dataset_info.json.
@@ -65,7 +68,7 @@ def export_rlds(
             dataset.
     """
     check_pictured_target(out, backgrounds, "RLDS", "google_crc32c", "PIL")
-    shown = export_episodes(folder, backgrounds, pixels, pool, say, keep)
+    shown = export_episodes(folder, backgrounds, pixels, pool, say, keep, tasks)
     home = out / DATASET_NAME / DATASET_VERSION
     home.mkdir(parents=True)
     counts, sizes = {"train": 0, "val": 0}, {"train": 0, "val": 0}

@@ -10,7 +10,8 @@ from intsim.paper.tables import PaperComparison, PaperTable
 
 WIDTH = 100  # of a line of sentences
 INDENT, GAP = 2, 3  # before a table, and between its columns
-NOT_PRINTED = "not printed as numbers"
+MISSING, NOT_PRINTED = "-", "not printed as numbers"
+DASH = " A dash: no such episode of ours, or no such row in the paper."
 
 
 def percent(rate: float) -> str:
@@ -21,7 +22,7 @@ def percent(rate: float) -> str:
 def rate_words(found: SuccessRate | None) -> str:
     """A rate of ours with its interval; a dash where there is no episode."""
     if found is None:
-        return "-"
+        return MISSING
     return f"{found.successes} of {found.trials} ({100 * found.low95:.0f} to {100 * found.high95:.0f} %)"
 
 
@@ -29,7 +30,7 @@ def printed_words(printed: Mapping[str, float] | None) -> str:
     """What the paper prints of a row; a dash where it has no such row."""
     if printed is None:
         return NOT_PRINTED
-    return ", ".join(f"{model} {percent(rate)}" for model, rate in printed.items()) or "-"
+    return ", ".join(f"{model} {percent(rate)}" for model, rate in printed.items()) or MISSING
 
 
 def text(found: PaperComparison) -> str:
@@ -46,24 +47,33 @@ def text(found: PaperComparison) -> str:
     for table in found.tables:
         lines += ["", f"{table.policy}; {table.world}; {_foods(table.foods)}", *_grid(table), ""]
         lines += _sentences("What differs from the paper:", table.differs)
-    lines += ["", *_wrapped("Brackets hold 95 % intervals (Wilson 1927).", 2)]
+    dash = any(cell == MISSING for table in found.tables for line in _cells(table) for cell in line)
+    lines += ["", *_wrapped("Brackets hold 95 % intervals (Wilson 1927)." + DASH * dash, INDENT)]
     if found.words:
-        lines += _wrapped(f"The paper in words: {found.words}.", 2)
-    return "\n".join([*lines, *_wrapped(f"Printed numbers: CulinaryCut, {found.source}.", 2)])
+        lines += _wrapped(f"The paper in words: {found.words}.", INDENT)
+    return "\n".join([*lines, *_wrapped(f"Printed numbers: CulinaryCut, {found.source}.", INDENT)])
 
 
 def _foods(foods: Sequence[str]) -> str:
     return f"{len(foods)} foods" if len(foods) > 3 else ", ".join(foods)
 
 
-def _grid(table: PaperTable) -> list[str]:
-    """Rows and columns, the paper's last."""
+def _cells(table: PaperTable) -> list[list[str]]:
+    """Rows and columns, the paper's last, under their heads."""
     columns = list(dict.fromkeys(name for row in table.rows for name in row.ours))
-    cells = [["", *(f"ours: {name}" for name in columns), "paper"]]
-    cells += [
-        [row.label, *(rate_words(row.ours.get(name)) for name in columns), printed_words(row.paper)]
-        for row in table.rows
+    head = ["", *(f"ours: {name}" for name in columns), "paper"]
+    return [
+        head,
+        *(
+            [row.label, *(rate_words(row.ours.get(name)) for name in columns), printed_words(row.paper)]
+            for row in table.rows
+        ),
     ]
+
+
+def _grid(table: PaperTable) -> list[str]:
+    """The same, each column as wide as it has to be."""
+    cells = _cells(table)
     widths = [max(map(len, column)) + GAP for column in zip(*cells, strict=True)]
     return [
         (" " * INDENT + "".join(f"{cell:{width}s}" for cell, width in zip(line, widths, strict=True))).rstrip()

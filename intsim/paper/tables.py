@@ -246,7 +246,7 @@ def _printed(trained: TrainingTasks | None, judged: str) -> dict[str, float]:
     own = None if trained is None or trained.demos is None else TRAINED_IN.get(trained.demos)
     printed = PUBLISHED["table4"].rates
     return {
-        f"RDT of {demos}": printed[training_row(demos, judged)]["RDT"]
+        f"RDT trained in {demos}": printed[training_row(demos, judged)]["RDT"]
         for demos in ("ManiSkill", "IntSim")
         if own in (None, demos)
     }

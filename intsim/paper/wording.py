@@ -61,7 +61,7 @@ def world_differs(settings: EvaluationSettings) -> str:
         gains = "libfranka's example gains" if stiffness is None else f"{stiffness:g} N m/rad in every joint"
         return f"Ours moves a Panda in ManiSkill, as the paper's does, with {gains}; the paper does not say its gains."
     if settings.severing:
-        arm = "a rigid arm" if settings.arm.stiffness is None else f"an arm of {settings.arm.stiffness:g} N/m"
+        arm = "a rigid arm" if settings.arm.stiffness is None else f"an arm of {settings.arm.stiffness:.0f} N/m"
         return (
             "Ours moves the edge over a plain table, without a robot, and the cut is simulated afterwards behind "
             f"{arm}; the paper's arm is a Panda in ManiSkill."

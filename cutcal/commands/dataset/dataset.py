@@ -15,6 +15,7 @@ from mpm.scene.errors import CutcalError
 
 if TYPE_CHECKING:
     from intsim.data.dataset_document import DatasetDocument, DatasetSpec
+    from intsim.task.selection import TaskFilter
 
 HELP = "a robot's cuts with force, in shards that learning code loads"
 DESCRIPTION = """generate: a Panda in ManiSkill cuts what it is told, in words; the food is in
@@ -80,9 +81,9 @@ def add_args(p: Group) -> None:
     p.add_argument(
         "--keep", choices=KEEP, metavar="KIND", help="severed (default of clone), published, all (default of export)"
     )
-    p.add_argument("--ratio", type=number(0, 1, "-"), metavar="R", help="clone: from cuts of this part alone")
-    p.add_argument("--side", metavar="NAME", help="clone: from cuts measured from left, right or centre alone")
-    p.add_argument("--without", action="append", metavar="FOOD", help="clone: leave a food out, or several")
+    p.add_argument("--ratio", type=number(0, 1, "-"), metavar="R", help="export, clone: cuts of this part alone")
+    p.add_argument("--side", metavar="NAME", help="export, clone: from left, right or centre alone")
+    p.add_argument("--without", action="append", metavar="FOOD", help="export, clone: leave a food out, or several")
     p.add_argument("--most", type=whole(1), metavar="N", help="clone: learn from at most so many")
     p.add_argument("--pixels", type=whole(16), default=128, metavar="N", help="of the pictures (default 128)")
     add_workers(p, "trajectories")
@@ -133,6 +134,11 @@ def _spec(args: argparse.Namespace) -> DatasetSpec:
 
     if args.folder is not None:
         raise CutcalError(f"dataset generate: {args.folder!r} is too much; the folder of the results is --out")
+    said = [f"--{name}" for name in ("ratio", "side", "without") if getattr(args, name) is not None]
+    if said:
+        raise CutcalError(
+            f"{said[0]}: chooses among trajectories that are there (export, clone); --food and --task make them"
+        )
     unknown = [name for name in args.food or () if name not in FOODS]
     if unknown:
         raise CutcalError(f"--food {unknown[0]}: not one of {', '.join(FOODS)}")
@@ -184,10 +190,8 @@ def _clone(args: argparse.Namespace) -> dict[str, Any]:
     if path.exists():
         raise CutcalError(f"--out {path}: exists and is never overwritten; choose another file")
     from intsim.policy.training import train
-    from intsim.task.selection import TaskFilter
 
-    tasks = TaskFilter(args.ratio, args.side, tuple(args.without or ()))
-    clone = train(Path(args.folder), keep=args.keep or "severed", tasks=tasks, most=args.most, seed=args.seed)
+    clone = train(Path(args.folder), keep=args.keep or "severed", tasks=_tasks(args), most=args.most, seed=args.seed)
     clone.save(path)
     if not args.json:
         about = clone.about
@@ -196,6 +200,13 @@ def _clone(args: argparse.Namespace) -> dict[str, Any]:
             f"mean error {about['loss']:.4f}"
         )
     return clone.about
+
+
+def _tasks(args: argparse.Namespace) -> TaskFilter:
+    """Which tasks are exported or learnt from."""
+    from intsim.task.selection import TaskFilter
+
+    return TaskFilter(args.ratio, args.side, tuple(args.without or ()))
 
 
 def _export(args: argparse.Namespace) -> dict[str, Any]:
@@ -216,7 +227,14 @@ def _export(args: argparse.Namespace) -> dict[str, Any]:
     args.arch = "cpu"
     with workers_of(args, say) if backgrounds else nullcontext() as pool:
         found = exports[args.format](
-            folder, out, backgrounds=backgrounds, pixels=args.pixels, pool=pool, say=say, keep=args.keep or "all"
+            folder,
+            out,
+            backgrounds=backgrounds,
+            pixels=args.pixels,
+            pool=pool,
+            say=say,
+            keep=args.keep or "all",
+            tasks=_tasks(args),
         )
     if not args.json and args.format == "rlds":
         print(", ".join(f"{s['shardLengths'][0]} episodes to {s['name']}" for s in found["splits"]))

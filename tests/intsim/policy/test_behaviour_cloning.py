@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ from intsim.policy.behaviour_cloning import (
 )
 from intsim.task.language import instructions
 from intsim.task.planner import HOME, plan_cut
+from intsim.task.selection import TaskFilter, TrainingTasks
 from intsim.task.suites import sample_episode
 from intsim.task.targets import Item, TaskError, target
 
@@ -152,6 +154,8 @@ def dataset(folder, count: int) -> None:
             "status": "done" if k else "broken",
             "published": True,
             "severed": k % 2 == 0,
+            "demos": "planned",
+            "task": {**asdict(episode.spec), "ratio": float(episode.spec.ratio)},
             "items": [{"name": i.name, "x": i.x, "y": i.y, "yaw": i.yaw, **vars(i.shape)}],
             "instructions": instructions(episode.spec, k),
         }
@@ -180,8 +184,16 @@ def test_it_learns_to_do_what_is_demonstrated(tmp_path):
         roll_out(c, sample_episode("seeds", 1_000_001, ORANGE))[0] for c in (few, Clone.load(tmp_path / "few.npz"))
     )
     assert np.array_equal(one.pose, two.pose)
-    with pytest.raises(TaskError, match="keep"):
+    with pytest.raises(OutputError, match="keep"):
         train(tmp_path / "d", keep="most")
+    right = train(tmp_path / "d", keep="published", tasks=TaskFilter(side="right"))
+    asked = [sample_episode("seeds", k, ORANGE).spec.side for k in range(1, 60)]
+    assert right.about["trajectories"] == asked.count("right") and "left" not in right.vocabulary
+    assert right.trained == TrainingTasks("planned", None, "right", (), ("orange",)) and "side right" in right.name
+    right.save(tmp_path / "right.npz")
+    assert Clone.load(tmp_path / "right.npz").trained == right.trained
+    with pytest.raises(TaskError, match="published, without orange"):
+        train(tmp_path / "d", keep="published", tasks=TaskFilter(without=("orange",)))
     assert (
         main(["dataset", "clone", str(tmp_path / "d"), "--most", "2", "--out", str(tmp_path / "c.npz"), "--json"]) == 0
     )
