@@ -122,8 +122,9 @@ class Manifest:
     def trajectory(self, index: int) -> TrajectorySpec:
         """A trajectory: food and task in turn, all else from its seed."""
         seed = self.seed + index
-        name = self.foods[index % len(self.foods)]
-        suite = self.suites[(index + index // len(self.foods)) % len(self.suites)]
+        turn, place = divmod(index, len(self.foods))
+        name = self.foods[place]
+        suite = self.suites[(place + turn) % len(self.suites)]  # of each food every task comes, whatever their numbers
         food = load_food(name)
         rng = np.random.default_rng([seed, *b"dataset"])
         values = {}

@@ -54,7 +54,7 @@ class TaskFilter:
             return False
         if self.side is not None and task["side"] != self.side:
             return False
-        return not {item["name"] for item in entry["items"]} & set(self.without)
+        return not self.without or not {item["name"] for item in entry["items"]} & set(self.without)
 
     def words(self) -> str:
         """The filter in words; empty where everything is kept."""

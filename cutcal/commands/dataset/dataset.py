@@ -137,7 +137,7 @@ def _spec(args: argparse.Namespace) -> DatasetSpec:
     said = [f"--{name}" for name in ("ratio", "side", "without") if getattr(args, name) is not None]
     if said:
         raise CutcalError(
-            f"{said[0]}: chooses among trajectories that are there (export, clone); --food and --task make them"
+            f"{said[0]}: chooses among trajectories that are there (export, clone); generate makes by --food, --task"
         )
     unknown = [name for name in args.food or () if name not in FOODS]
     if unknown:

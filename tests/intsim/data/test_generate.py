@@ -65,6 +65,14 @@ def test_the_manifest_counts_the_whole_product_and_draws_each_once():
         whole[len(whole)]
 
 
+@pytest.mark.parametrize(("foods", "tasks"), [(1, 2), (1, 5), (3, 3), (4, 5), (9, 5), (15, 5)])
+def test_every_task_is_asked_of_every_food(foods, tasks):
+    """Whatever the numbers of foods and tasks: one of each pair in as many trajectories as there are pairs."""
+    m = Manifest(foods * tasks, foods=FOODS[:foods], suites=TRAINING_SUITES[:tasks])
+    made = [m.trajectory(k) for k in range(foods * tasks)]
+    assert len({(one.food.name, one.suite) for one in made}) == foods * tasks
+
+
 def test_a_trajectory_is_drawn_from_its_number_alone():
     """Same number, same episode; all foods and tasks come in turn; values stay within their ranges and differ; no seed
     of a test."""
@@ -130,6 +138,7 @@ def made(spec) -> g.PackedEpisode:
             "side": spec.episode.spec.side,
             "pieces": spec.episode.spec.pieces,
         },
+        "items": [{"name": spec.food.name}],
         "elapsed_steps": len(t.action),
         "food": spec.food.name,
         "style": spec.style,

@@ -16,6 +16,7 @@ from intsim.data.manifest import Manifest
 from intsim.data.rdt import STATISTICS_FILE, TASKS_FILE, export_rdt, task_name
 from intsim.data.shards import trajectories
 from intsim.task.language import parse_instruction, same_task
+from intsim.task.selection import TaskFilter
 from tests.calib.io.test_meaning import assert_told, sets
 from tests.intsim.data.test_generate import Inline
 from tests.intsim.painter import PIXELS, Here, Painter, paint_with
@@ -110,6 +111,18 @@ def test_a_task_is_one_cut_in_all_its_words(exported):
     assert len(set(meant.values())) == len(tasks) > 2
     assert task_name("plum", {"pieces": 3}) == "plum-in_3"
     assert task_name("plum", {"pieces": 0, "ratio": 1 / 3, "side": "left"}) == "plum-0_3333-left"
+
+
+def test_one_cut_alone_is_exported(exported, tmp_path):
+    """With a part and a side only the tasks that ask for them; with a food left out none of it."""
+    folder, _, tasks = exported
+    made = export_rdt(folder, tmp_path / "a", backgrounds=[0], pixels=PIXELS, tasks=TaskFilter(0.75, "right"))
+    wanted = {name: task["episodes"] // 2 for name, task in tasks.items() if name.endswith("0_75-right")}
+    assert {name: task["episodes"] for name, task in made.items()} == wanted != {}
+    made = export_rdt(folder, tmp_path / "b", backgrounds=[0], pixels=PIXELS, tasks=TaskFilter(without=("plum",)))
+    assert set(made) == {name for name in tasks if name.startswith("kiwi")}
+    with pytest.raises(OutputError, match="all, ratio 0.4"):
+        export_rdt(folder, tmp_path / "c", backgrounds=[0], pixels=PIXELS, tasks=TaskFilter(0.4))
 
 
 def test_what_cannot_be_exported_is_an_error(exported, tmp_path):

@@ -54,9 +54,10 @@ class FirstCutOnly(Oracle):
         return None if self._cuts and not self._todo else super().act(obs, instruction)
 
 
-def evaluations(
-    figure: str, policy: Any = None, name: str = "oracle", **more: Any
-) -> list[tuple[str, PolicyEvaluation]]:
+Parts = list[tuple[str, PolicyEvaluation]]
+
+
+def evaluations(figure: str, policy: Any = None, name: str = "oracle", **more: Any) -> Parts:
     """The evaluations of a figure on the plain table."""
     trained = more.get("trained")
     asked, needed = figure_foods(figure, more.pop("foods", None), trained)
@@ -256,9 +257,7 @@ def test_a_policy_of_one_cut_is_tested_on_it_and_its_counterpart(tmp_path):
         transfers_of(replace(trained, side="left"))
 
 
-def entry(
-    ratio: float = 0.25, side: str = "right", pieces: int = 0, foods: tuple[str, ...] = ("banana",)
-) -> dict[str, Any]:
+def entry(ratio: float = 0.25, side: str = "right", pieces: int = 0, foods: Any = ("banana",)) -> dict[str, Any]:
     """What a shard's JSON file says of a trajectory."""
     return {"task": {"ratio": ratio, "side": side, "pieces": pieces}, "items": [{"name": name} for name in foods]}
 
