@@ -23,7 +23,7 @@ from intsim.paper.published import (
     transfer_row,
 )
 from intsim.paper.runs import MET, MET_AND_SEVERED, PaperRun, rates
-from intsim.paper.wording import policy_differs, training_differs, world_differs, world_words
+from intsim.paper.wording import policy_differs, policy_words, training_differs, world_differs, world_words
 from intsim.task.selection import TrainingTasks
 from intsim.task.success import PLACE_TOLERANCE
 from intsim.task.suites import FOODS
@@ -133,7 +133,7 @@ def _group(figure: str, run: PaperRun) -> str:
 
 def _table(figure: str, runs: Sequence[PaperRun]) -> PaperTable:
     """The table of one group."""
-    policies = list(dict.fromkeys(run.settings.policy for run in runs))
+    policies = list(dict.fromkeys(policy_words(run.settings) for run in runs))
     first = runs[0].settings
     differs = [policy_differs(first, PUBLISHED[figure].models)]
     differs += [*filter(None, [training_differs(first, figure)]), world_differs(first)]

@@ -20,6 +20,12 @@ def world_words(settings: EvaluationSettings) -> str:
     return f"a robot{arm} and food that resists" if world.coupled else f"a robot{arm} and food that does not resist"
 
 
+def policy_words(settings: EvaluationSettings) -> str:
+    """Who moved the knife, with the error of the noisy oracle."""
+    sigma = "" if settings.sigma_m is None else f" (error of {1e3 * settings.sigma_m:g} mm)"
+    return f"{settings.policy}{sigma}"
+
+
 def policy_differs(settings: EvaluationSettings, models: Sequence[str]) -> str:
     """Who moved the knife in ours, and in the paper."""
     name = settings.policy

@@ -65,7 +65,7 @@ def test_the_manifest_counts_the_whole_product_and_draws_each_once():
         whole[len(whole)]
 
 
-@pytest.mark.parametrize(("foods", "tasks"), [(1, 2), (1, 5), (3, 3), (4, 5), (9, 5), (15, 5)])
+@pytest.mark.parametrize(("foods", "tasks"), [(1, 2), (2, 3)])
 def test_every_task_is_asked_of_every_food(foods, tasks):
     """Whatever the numbers of foods and tasks: one of each pair in as many trajectories as there are pairs."""
     m = Manifest(foods * tasks, foods=FOODS[:foods], suites=TRAINING_SUITES[:tasks])
