@@ -45,7 +45,7 @@ def text(found: PaperComparison) -> str:
     name = found.figure.replace("fig", "Fig. ").replace("table", "Table ")
     lines = [f"{name} of the paper: {found.title}"]
     for table in found.tables:
-        lines += ["", f"{table.policy}; {table.world}; {_foods(table.foods)}", *_grid(table), ""]
+        lines += ["", *_wrapped(f"{table.policy}; {table.world}; {_foods(table.foods)}", 0), *_grid(table), ""]
         lines += _sentences("What differs from the paper:", table.differs)
     dash = any(cell == MISSING for table in found.tables for line in _cells(table) for cell in line)
     lines += ["", *_wrapped("Brackets hold 95 % intervals (Wilson 1927)." + DASH * dash, INDENT)]

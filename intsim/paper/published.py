@@ -42,7 +42,16 @@ class PublishedFigure:
 
 
 def split_row(food: str, pieces: int, cut: int) -> str:
-    """Name of a row of Table 3."""
+    """Name of a row of Table 3.
+
+    Args:
+        food: Name of the food.
+        pieces: Equal pieces that are asked for.
+        cut: Number of the cut, from 1.
+
+    Returns:
+        The name.
+    """
     return f"{food} in {pieces}, cut {cut}"
 
 
@@ -52,7 +61,7 @@ def transfer_row(trained: str, tested: str) -> str:
 
 
 def training_row(demos: str, judged: str) -> str:
-    """Name of a cell of Table 4: RDT trained in ``ManiSkill`` or ``IntSim``, and how it was judged."""
+    """Name of a rate of Table 4: RDT trained in ``ManiSkill`` or ``IntSim``, and how it was judged."""
     return f"{demos}, {judged}"
 
 

@@ -57,7 +57,7 @@ def training_differs(settings: EvaluationSettings, figure: str) -> str:
         return ""
     few = len(trained.foods) <= MOST_NAMED
     foods = f"{', '.join(trained.foods)} alone" if few else f"{len(trained.foods)} foods"
-    return f"Ours has learnt from {foods}; the paper's from fifteen foods."
+    return f"Ours has learnt from {foods}."
 
 
 def world_differs(settings: EvaluationSettings) -> str:
