@@ -139,7 +139,7 @@ def _table(figure: str, runs: Sequence[PaperRun]) -> PaperTable:
     differs += [*filter(None, [training_differs(first, figure)]), world_differs(first)]
     return PaperTable(
         "; ".join(policies),
-        " and ".join(dict.fromkeys(world_words(run.settings) for run in runs)),
+        ", and ".join(dict.fromkeys(world_words(run.settings) for run in runs)),
         _foods(runs),
         ROWS[figure](runs),
         (*differs, *PUBLISHED[figure].differs),
