@@ -14,7 +14,7 @@ food, cells, works = Food.load("banana"), (3e-3, 2e-3, 1.5e-3), []
 figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.5), layout="constrained", width_ratios=(1.4, 1))
 for cell, style in zip(cells, (":", "--", "-"), strict=True):
     scene = cut_scene(food, food.to_scene_food().shape, load_knife("kitchen"), dx=cell)
-    record = simulate(replace(scene, motion=replace(scene.motion, mach=0.02)))  # twice as fast as usual
+    record = simulate(replace(scene, motion=replace(scene.motion, mach=0.04)))  # four times as fast as usual
     left.plot(1e3 * record.stroke, record.resolved, ls=style, label=f"cells of {1e3 * cell:g} mm")
     works.append(record.work)
 left.set(xlabel="stroke [mm]", ylabel="force on the knife [N]")
