@@ -54,6 +54,7 @@ from mpm.arrays import FloatArray
 
 STORE, RECORD = "evaluations.h5", "record.h5"
 """Files in the output folder: all evaluations, and the whole record of the best values."""
+WRITING = "drawing and writing the report"
 PROVENANCE = ("created", "trace_sha256", "passed", "peak_error", "nrmse", "shape_error", "git", "versions")
 """What material.yaml says of the calibration that it is from, as ``summary.json`` calls it."""
 
@@ -117,6 +118,28 @@ class _Found:
     nested: tuple[NestedModel, ...] = ()
 
 
+class _Stages:
+    """The rounds of the intervals, told in words and as a part of all.
+
+    Args:
+        clock: Tells how long all takes.
+        say: Who is told in words.
+    """
+
+    def __init__(self, clock: RunClock, say: Callable[[str], None]) -> None:
+        self._clock, self._say, self._words = clock, say, ""
+
+    def say(self, text: str) -> None:
+        """A round begins."""
+        self._say(text)
+        self._words = text.partition(":")[0]
+        self._clock.intervals(self._words)
+
+    def made(self, done: int, whole: int) -> None:
+        """A simulation of it is done."""
+        self._clock.intervals(f"{self._words}, {done} of {whole}")
+
+
 @dataclass(frozen=True, eq=False)
 class _Calibration:
     """A calibration while its simulations run.
@@ -142,16 +165,12 @@ class _Calibration:
             evaluators = replace(evaluators, finer=FinerCells(setup.scene, self.pool, self.store))
         if setup.request.sample:
             return self._sampled(evaluators)
-        listener = Listener(self.clock.search, self._said, self._begin_longest_check, self.say)
+        stages = _Stages(self.clock, self.say)
+        listener = Listener(self.clock.search, stages.say, self._begin_longest_check, self.say, stages.made)
         asked = [name for name in TOLD_APART if self.both is not None and name in self._fitted]
         fit, analysis = fit_with_uncertainty(problem.objective, evaluators, options, listener, asked)
         nested = () if analysis is None else nested_models(problem.objective, analysis.result, asked)
         return _Found(fit if analysis is None else analysis.result, analysis, nested=nested)
-
-    def _said(self, text: str) -> None:
-        """A stage of the intervals, told to both listeners."""
-        self.say(text)
-        self.clock.stage(text.partition(":")[0])
 
     def _sampled(self, evaluators: Evaluators) -> _Found:
         """The best food of the sampled posterior, and what is uncertain."""
@@ -195,13 +214,14 @@ class _Calibration:
     def _counted(self, errands: Sequence[Errand]) -> list[Errand]:
         """The same errands, each of which tells when it is made."""
         numbers, whole = itertools.count(1), len(errands)
-        self.clock.stage("last simulations", 0, whole)
+        self.clock.last("last simulations", 0, whole)
 
         def counted(errand: Errand) -> Errand:
             def keep(made: Any) -> None:
                 errand.keep(made)
                 number = next(numbers)
-                self.clock.stage(f"last simulations, {number} of {whole}", number, whole)
+                words = WRITING if number == whole else f"last simulations, {number} of {whole}"
+                self.clock.last(words, number, whole)
 
             return replace(errand, keep=keep)
 

@@ -14,12 +14,19 @@ from calib.errors import OutputError
 from calib.io.progress import Progress
 from calib.simulation.evaluation_frame import evaluation_frame
 
-FIRST_GUESS = 79.0
-"""Wall time of a calibration over that of a default simulation of a worker, where no earlier one is known [-]: 73 and
-85 in two calibrations of the bundled banana on two workers."""
+FIRST_GUESS = 74.0
+"""Wall time of a calibration over that of a default simulation of a worker, where no earlier one is known [-]: 63 to 85
+in four calibrations of the bundled banana on two workers, one of them on a busy machine."""
 LAST_RUNS = 24.0
 """Time of the simulations after the search, in default ones [-]: 16 checks, of which that on cells of two thirds takes
 five, the literature's values and the record."""
+INTERVAL_RUNS = 60.0
+"""Time of the intervals at most, in default simulations of a worker [-]: both ends of nine parameters in three rounds
+are 54 of them, and as many coarse ones."""
+SLOWER = 2.0
+"""How much slower than the simulations so far the rest may be: another job may take the machine [-]."""
+ALMOST = 0.99
+"""Part of a bar that is shown at most while something is left to do [-]."""
 MOST_READ = 8
 """Earlier calibrations that are looked at, the newest first."""
 
@@ -79,6 +86,7 @@ class RunClock:
         self._last: Progress | None = None
         self._each = math.nan
         self._part = 0.0
+        self._searched = self._last_began = math.nan  # when the search has ended, and the last simulations have begun
 
     def search(self, p: Progress) -> None:
         """A simulation of the search is done."""
@@ -86,26 +94,49 @@ class RunClock:
         if math.isfinite(p.eta_s) and rest > 0.0:
             self._each = p.eta_s / rest
         self._last = p
-        self._tell(p, p.eta_s + LAST_RUNS * self._each)
+        self._tell(p, self._typically(), p.eta_s + (INTERVAL_RUNS + LAST_RUNS) * self._each)
 
-    def stage(self, words: str, done: int = 0, whole: int = 1) -> None:
-        """A stage after the search has begun, or one of its simulations is done.
+    def intervals(self, words: str) -> None:
+        """A round of the intervals has begun, or one of its simulations is done.
 
         Args:
             words: What it is.
-            done: Its simulations that are done.
-            whole: All its simulations.
         """
-        if self._last is not None:
-            left = LAST_RUNS * self._each * (1.0 - done / whole)
-            self._tell(replace(self._last, stage=words), left)
+        if math.isnan(self._searched):
+            self._searched = self._now()
+        rest = max(INTERVAL_RUNS * self._each - (self._now() - self._searched), 0.0)
+        self._stage(words, self._typically(), rest + LAST_RUNS * self._each)
 
-    def _tell(self, p: Progress, most: float) -> None:
+    def last(self, words: str, done: int, whole: int) -> None:
+        """The last simulations have begun, or one of them is done.
+
+        Args:
+            words: What they are.
+            done: How many are done.
+            whole: All of them.
+        """
+        if not done:
+            self._last_began = self._now()
+        expected = LAST_RUNS * self._each * (1.0 - done / whole)
+        if done == whole:  # nothing tells how long figures and report take
+            self._part = ALMOST
+            self._stage(words, math.nan, math.nan)
+            return
+        typical = (self._now() - self._last_began) * (whole - done) / done if done else expected
+        self._stage(words, typical, max(expected, typical) * SLOWER)
+
+    def _typically(self) -> float:
+        """Time left in a typical run [s]: never less than the last simulations take."""
+        return max(self._typical * self._each - (self._now() - self._began), LAST_RUNS * self._each)
+
+    def _stage(self, words: str, typical: float, most: float) -> None:
+        if self._last is not None:
+            self._tell(replace(self._last, stage=words), typical, most)
+
+    def _tell(self, p: Progress, typical: float, most: float) -> None:
         if self._progress is None:
             return
         took = self._now() - self._began
-        typical = min(max(self._typical * self._each - took, 0.0), most)
         if math.isfinite(typical) and took + typical > 0.0:
             self._part = max(self._part, took / (took + typical))
-        known = typical if typical > 0.0 else math.nan
-        self._progress(replace(p, eta_s=most, typical_s=known, part=min(self._part, 0.99)))
+        self._progress(replace(p, eta_s=most, typical_s=min(typical, most), part=min(self._part, ALMOST)))

@@ -51,8 +51,9 @@ class Progress:
     part: float | None = None
 
     def line(self) -> str:
-        """One line of plain text without bar, such as ``12 simulations of 80, ...``."""
-        parts = [f"{self.done} simulations ({self.spent:.4g} of {self.budget:.4g})"]
+        """One line of plain text without bar, such as ``12 simulations, 3 of a budget of 80, ...``."""
+        many = "" if self.done == 1 else "s"
+        parts = [f"{self.done} simulation{many}, {self.spent:.4g} of a budget of {self.budget:.4g}"]
         if self.failed:
             parts.append(f"{self.failed} failed")
         parts.append(f"chi2 {self.misfit:.4g}" if math.isfinite(self.misfit) else "chi2 -")

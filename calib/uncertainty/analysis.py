@@ -60,6 +60,7 @@ def analyse(
     fine: Evaluator | None = None,
     seed: int = 0,
     say: Callable[[str], None] = lambda text: None,
+    made: Callable[[int, int], None] = lambda done, whole: None,
     accepts: Callable[[ScoredRun], bool] = lambda run: True,
 ) -> UncertaintyAnalysis | None:
     """Intervals, profiles, nuisances and predictive bands of a fit.
@@ -74,6 +75,7 @@ def analyse(
             moved are simulated again.
         seed: Seed of the predictive draws.
         say: Called before each round of simulations, with one sentence.
+        made: Called after each simulation of a round with how many of its are done, and how many it has.
         accepts: Whether a run that is better than the answer may be the answer.
 
     Returns:
@@ -82,7 +84,7 @@ def analyse(
     if result.jacobian is None or result.surrogate is None:
         return None
     with threadpool_limits(1, "blas"):
-        runs, surrogate, found, profiles = _with_simulated_ends(objective, result, coarse, fine, say)
+        runs, surrogate, found, profiles = _with_simulated_ends(objective, result, coarse, fine, say, made)
         better = _better(result, runs, surrogate.noise_misfit)
         if better is not None and accepts(better):
             result = replace(
@@ -118,6 +120,7 @@ def _with_simulated_ends(
     coarse: Evaluator | None,
     fine: Evaluator | None,
     say: Callable[[str], None],
+    made: Callable[[int, int], None],
 ) -> tuple[list[ScoredRun], Surrogate, Uncertainty, tuple[Profile, ...]]:
     """All runs with those at the ends of the profiles, and surrogate, normal approximation and profiles through them.
 
@@ -144,7 +147,7 @@ def _with_simulated_ends(
         if asked:
             turn += 1
             say(f"intervals, round {turn}: simulating {len(asked)} of their ends{' on coarse cells' if cheap else ''}")
-            runs += _run(objective, evaluator, asked, cheap)
+            runs += _run(objective, evaluator, asked, cheap, made)
             surrogate = Surrogate(objective, runs, result.best, surrogate.hyper)
             found, profiles = _profiled(objective, result, surrogate, surrogate.jacobian(result.best.z))
     return runs, surrogate, found, profiles
@@ -187,11 +190,18 @@ def _new(objective: Objective | JointObjective, points: list[FloatArray], runs: 
 
 
 def _run(
-    objective: Objective | JointObjective, evaluator: Evaluator, points: list[FloatArray], coarse: bool
+    objective: Objective | JointObjective,
+    evaluator: Evaluator,
+    points: list[FloatArray],
+    coarse: bool,
+    made: Callable[[int, int], None],
 ) -> list[ScoredRun]:
     """Trials at some points, in their order."""
-    batch = [objective.parameters.to_dict(z) for z in points]
-    found = sorted(evaluator.evaluate(batch), key=lambda e: e.index)
+    found = []
+    for run in evaluator.evaluate([objective.parameters.to_dict(z) for z in points]):
+        found.append(run)
+        made(len(found), len(points))
+    found.sort(key=lambda e: e.index)
     return [objective.score(e, coarse=coarse, stage="profile") for e in found]
 
 

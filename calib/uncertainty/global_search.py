@@ -57,12 +57,14 @@ class Listener:
         say: Called with each stage, as one sentence.
         found: Called with the fit once it is found, before its uncertainty is: the fit will hardly change.
         remark: Called with each remark on the answer; None for what is called with the stages.
+        made: Called after each simulation of a stage with how many of its are done, and how many it has.
     """
 
     progress: Callable[[Progress], None] | None = None
     say: Callable[[str], None] = lambda text: None
     found: Callable[[FitResult], None] = lambda result: None
     remark: Callable[[str], None] | None = None
+    made: Callable[[int, int], None] = lambda done, whole: None
 
 
 def fit_with_uncertainty(
@@ -121,6 +123,7 @@ def fit_with_uncertainty(
         fine=fine,
         seed=options.seed,
         say=told.say,
+        made=told.made,
         accepts=lambda run: _may_follow(objective, result, run, replicate),
     )
     if analysis is None:

@@ -23,6 +23,7 @@ WORDS = {
 }
 #: Parts below which no number of per cent with two decimals is left.
 LEAST_PART = 5e-5
+_REMARK = re.compile(r"\(remark (\d+)\)")
 _PER_CENT = re.compile(r"(?<=\d)%")
 _RAISED = re.compile(r"(?<=[A-Za-z])\^([23])(?!\d)")
 _EXPONENTS = str.maketrans("23", "²³")
@@ -91,6 +92,11 @@ def in_type(text: str) -> str:
     """A sentence of a run as a page prints it: a space before a per cent sign, and raised exponents of units."""
     spaced = _PER_CENT.sub(f"{NBSP}%", text)
     return _RAISED.sub(lambda m: m[1].translate(_EXPONENTS), spaced)
+
+
+def source_in_words(text: str) -> str:
+    """Where a value comes from, as a page prints it: a remark is one of a file that the page's reader has not."""
+    return in_type(_REMARK.sub(r"(remark \1 of materials.yaml)", text))
 
 
 def short(text: str, letters: int) -> str:

@@ -38,7 +38,7 @@ REFERENCES: dict[str, str] = {
     "arXiv:2601.06451",
     "Gneiting 2007": "Gneiting, T., Raftery, A. E. (2007). Strictly proper scoring rules, prediction, and estimation. "
     "J. Am. Stat. Assoc. 102:359-378. doi:10.1198/016214506000001437",
-    "ISO 18571": "ISO/TS 18571. Road vehicles: objective rating metric for non-ambiguous signals.",
+    "ISO 18571": "ISO/TS 18571 (2014). Road vehicles: objective rating metric for non-ambiguous signals.",
     "Schwer 2007": "Schwer, L. E. (2007). Validation metrics for response histories. Eng. Comput. 23:295-309. "
     "doi:10.1007/s00366-007-0070-1",
     "Schwarz 1978": "Schwarz, G. (1978). Estimating the dimension of a model. Ann. Statist. 6:461-464. "

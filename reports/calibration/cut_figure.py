@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -29,6 +29,8 @@ MARGIN = 0.12  # room around the food, of its height
 FILLING = 1.2  # of a particle's square, so that there are no gaps where the food is stretched
 TALLEST = 52.0  # of one picture [mm]
 LABELS = 14.0  # title and numbers of the axes, of a picture's height [mm]
+LEAST = 26.0  # of one picture of several in a row [mm]
+AXIS = 14.0  # numbers and label at the left of a picture [mm]
 SCALE = 18.0  # scale of colours at the right, of a picture's width [mm]
 
 
@@ -66,26 +68,32 @@ def cut(section: Section, knife: Knife, height: float, stroke: np.ndarray, force
         force: Its forces [N], shape (n,).
 
     Returns:
-        SVG documents; each has the scale of the colours, for they may stand on two pages.
+        SVG documents, each with the scale of the colours, for they may stand on two pages: one for each look of a long
+        food, one for all of a short one.
     """
     shown = moments(section, stroke, force)
     half = float(np.abs(section.y[[k for k, _ in shown]]).max()) + MARGIN * height
     top = height * (1 + 3 * MARGIN)
-    tall = min((WIDTH - SCALE - 14.0) * (top + MARGIN * height) / (2 * half), TALLEST)
+    slender = (top + MARGIN * height) / (2 * half)
     colour = _colours(section, stroke, force)
 
-    def draw(figure: Figure, k: int, name: str) -> None:
-        axes = figure.subplots()
-        _food(axes, section, k, colour)
-        _tools(axes, knife, height - float(section.stroke[k]), top, half)
-        at = 1e3 * float(section.stroke[k])
-        axes.set_title(f"{at:.1f} mm deep" + (f", {name}" if name else ""))
-        axes.set(xlim=(-1e3 * half, 1e3 * half), ylim=(-1e3 * MARGIN * height, 1e3 * top), aspect="equal")
-        axes.grid(visible=False)
-        axes.set(xlabel="across the blade [mm]", ylabel="height [mm]")
-        figure.colorbar(colour, ax=axes, location="right", aspect=20, extend="max", label="von Mises stress [kPa]")
+    def draw(figure: Figure, looks: Sequence[tuple[int, str]]) -> None:
+        panels = list(figure.subplots(1, len(looks), squeeze=False).flat)
+        for axes, (k, name) in zip(panels, looks, strict=True):
+            _food(axes, section, k, colour)
+            _tools(axes, knife, height - float(section.stroke[k]), top, half)
+            at = 1e3 * float(section.stroke[k])
+            axes.set_title(f"{at:.1f} mm deep" + (f", {name}" if name else ""))
+            axes.set(xlim=(-1e3 * half, 1e3 * half), ylim=(-1e3 * MARGIN * height, 1e3 * top), aspect="equal")
+            axes.grid(visible=False)
+            axes.set(xlabel="across the blade [mm]", ylabel="height [mm]")
+        figure.colorbar(colour, ax=panels, location="right", aspect=20, extend="max", label="von Mises stress [kPa]")
 
-    return [svg(partial(draw, k=k, name=name), tall + LABELS) for k, name in shown]
+    def tall(count: int) -> float:
+        return min((WIDTH - SCALE - AXIS * count) / count * slender, TALLEST)
+
+    rows = [shown] if tall(len(shown)) >= LEAST else [[look] for look in shown]
+    return [svg(partial(draw, looks=row), tall(len(row)) + LABELS) for row in rows]
 
 
 def _colours(section: Section, stroke: np.ndarray, force: np.ndarray) -> ScalarMappable:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reports.base.format import breakable, interval, listed, plain, quantity, rung
-from reports.base.labels import in_words, short
+from reports.base.labels import in_words, short, source_in_words
 from reports.base.run_folder import Data
 from reports.calibration.parameter_figures import Panel, ParameterRange
 
@@ -74,7 +74,7 @@ def parameter(name: str, p: FittedParameter, meaning: str) -> Data:
         "verdict": in_words(p.verdict),
         "outside": (low is not None and value < low) or (high is not None and value > high),
         "status": in_words(p.status),
-        "source": p.source or "",
+        "source": source_in_words(p.source or ""),
     }
 
 
@@ -90,7 +90,7 @@ def fixed(name: str, p: FixedParameter, meaning: str) -> list[str]:
         The cells.
     """
     value = "none" if p.value is None else quantity(p.value, p.unit)
-    return [breakable(name), meaning, value, in_words(p.status), p.source or ""]
+    return [breakable(name), meaning, value, in_words(p.status), source_in_words(p.source or "")]
 
 
 def correlations(correlations: Mapping[str, float | None]) -> list[str]:
@@ -115,6 +115,13 @@ def correlation_matrix(correlations: Mapping[str, float | None], names: Sequence
     seen = [name for name in names if any(name in pair for pair in known)]
     rows = [[1.0 if a == b else known.get(frozenset((a, b)), np.nan) for b in seen] for a in seen]
     return seen, np.array(rows, dtype=float).reshape(len(seen), len(seen))
+
+
+def pair(names: Sequence[str], matrix: np.ndarray) -> str:
+    """The correlation of two parameters in words; empty for more of them, which a figure shows, and for fewer."""
+    if len(names) != 2 or not np.isfinite(matrix[1, 0]):
+        return ""
+    return f"{listed(list(names))}, r = {quantity(float(matrix[1, 0]), '-', digits=2, signed=True)}"
 
 
 def legend(fitted: Mapping[str, FittedParameter]) -> list[list[str]]:

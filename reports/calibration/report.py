@@ -8,13 +8,13 @@ Numbers and the sentences that depend on them are made here, once for both; the 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeGuard
+from typing import TYPE_CHECKING
 
 from mpm.scene import Knife
 from mpm.scene.shapes import Shape
 from reports.base import figures
 from reports.base.format import breakable, count, listed, plain, publish, quantity, uncertain
-from reports.base.labels import LEAST_PART, capital, in_type, in_words, shown
+from reports.base.labels import LEAST_PART, capital, in_type, in_words, related, shown
 from reports.base.references import Citations
 from reports.base.run_folder import Data, Finished, read_finished
 from reports.calibration import (
@@ -113,7 +113,7 @@ def _pictures(done: Finished) -> dict[str, bytes]:
     if done.section is not None:
         found |= {f"cut{k}.svg": look for k, look in enumerate(cut_figure.cut(*of_cut))}
     names, matrix = parameter_page.correlation_matrix(result.posterior.correlations, list(fitted))
-    if len(names) > 1:
+    if len(names) > 2:  # of two the text says it
         found["correlations.svg"] = parameter_figures.correlations(names, matrix)
     ranges = [parameter_page.parameter_range(name, p) for name, p in fitted.items()]
     if ranges:
@@ -217,6 +217,7 @@ def _content(done: Finished) -> Data:
         "influences": parameter_page.influences(result.sensitivity),
         "influence_caption": parameter_page.influence_caption() if result.sensitivity else "",
         "correlations": parameter_page.correlations(correlations) if correlations else None,
+        "pair": parameter_page.pair(*parameter_page.correlation_matrix(correlations, list(fitted))),
         "fixed": [parameter_page.fixed(name, p, result.meaning(name)) for name, p in fixed.items()],
         "numerics": numerics_page.numerics(result),
         "broke_down": failures.sentence(done.runs, broken),
@@ -319,20 +320,13 @@ def _sentence(result: CalibrationResult) -> str:
 def _verdict_line(v: Verdict) -> Data:
     """One line of the verdict table; without a ``relation`` it follows from value, limit and outcome."""
     value, limit, unit, passed = v.value, v.limit, v.unit or "-", v.passed
-    relation = RELATIONS.get(v.relation or "", "")
-    if not relation and passed is not None and _is_number(value) and _is_number(limit) and abs(value) != limit:
-        relation = "≤ " if (abs(value) < limit) == passed else "≥ "
+    relation = RELATIONS.get(v.relation or "", "") or related(value, limit, passed)
     mark = "none" if value is None or passed is None else "yes" if passed else "no"
     return {
         "name": breakable(v.name), "value": "not run" if value is None else shown(value, unit, 3),
         "limit": relation + shown(limit, unit, None), "mark": mark,
         "note": "" if v.note in (None, "not run") else v.note,
     }  # fmt: skip
-
-
-def _is_number(x: object) -> TypeGuard[float]:
-    """Whether a value is a number; in older documents it may be a flag, a text or a list."""
-    return isinstance(x, (int, float)) and not isinstance(x, bool)
 
 
 def _null_rows(result: CalibrationResult) -> list[list[str]]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from mpm.scene import Knife
 from reports.base.format import DASH, breakable, count, interval, plain, quantity, uncertain
-from reports.base.labels import in_words
+from reports.base.labels import in_words, source_in_words
 from reports.base.references import Citations
 from reports.base.run_folder import Data
 
@@ -149,7 +149,7 @@ def _ranges(parameters: Data) -> list[list[str]]:
     """Where the literature's range of each property comes from, each once."""
     found: dict[tuple[str, ...], str] = {}
     for name, p in parameters.items():
-        ends, source = interval(p["prior_low"], p["prior_high"], p["unit"]), p.get("source") or ""
+        ends, source = interval(p["prior_low"], p["prior_high"], p["unit"]), source_in_words(p.get("source") or "")
         if source:
             found.setdefault((name.split("@")[0], ends, in_words(p.get("status") or ""), source), name)
     return [[breakable(row[0]), *row[1:]] for row in found]

@@ -18,7 +18,7 @@ from mpm.scene import Knife
 from reports import ReportError
 from reports.base.figures import BLACK, BLUE, MEASURED, SIMULATED, next_to, predictive, stroke_axis, svg
 from reports.base.format import breakable, count, duration, interval, listed, publish, quantity
-from reports.base.labels import as_sentence, in_words
+from reports.base.labels import as_sentence, in_type, in_words
 from reports.base.run_folder import Data, check_kind, read_columns, read_date, read_json, read_section
 from reports.calibration import cut_figure, measurement, model_page
 from reports.multi_specimen import verdicts
@@ -229,8 +229,8 @@ def content(done: FinishedStudy) -> Data:
         "commit": s.get("git") or "",
         "command": [breakable(shlex.quote(word)) for word in s["command"]],
         "versions": ", ".join(f"{name}\u00a0{v}" for name, v in sorted(s.get("versions", {}).items())),
-        "limits": [as_sentence(text) for text in s["limits"]],
-        "warnings": [as_sentence(text) for text in s["warnings"]],
+        "limits": [as_sentence(in_type(text)) for text in s["limits"]],
+        "warnings": [as_sentence(in_type(text)) for text in s["warnings"]],
     }  # fmt: skip
 
 

@@ -136,12 +136,12 @@ def _closeness(result: CompressionResult) -> ReportTable:
     rows = [
         [f"Slope over 0 to {end} % strain, measured", uncertain(slope.measured_Pa, slope.measured_sd_Pa, "Pa")],
         ["The same of the fitted curve", quantity(slope.fitted_Pa, "Pa")],
-        ["Fitted over measured, less 1", quantity(slope.error, "fraction", digits=2, signed=True)],
+        ["Fitted over measured, less 1", quantity(slope.error, "fraction", signed=True)],
         [
             f"Largest error of the force beyond {beyond} % strain",
-            f"{quantity(force.value, 'fraction', digits=2, signed=True)} at {plain(100 * force.strain, 2)} %",
+            f"{quantity(force.value, 'fraction', signed=True)} at {plain(100 * force.strain, 2)} %",
         ],
-        ["NRMSE", quantity(result.nrmse, "fraction", digits=2)],
+        ["NRMSE", quantity(result.nrmse, "fraction")],
     ]
     return ReportTable(("Quantity", "Value"), ("1fr", "auto"), rows)
 

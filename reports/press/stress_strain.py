@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from reports.base.figures import HATCHED, MEASURED, SIMULATED, svg
+from reports.base.format import quantity
 
 if TYPE_CHECKING:
     from calib.compression.result import CompressionResult, StressCurves
@@ -26,7 +27,6 @@ def write_figure(result: CompressionResult, curves: StressCurves, out: Path) -> 
     mean, fitted = curves.measured / 1e3, curves.fitted / 1e3
     repeats = np.array(list(curves.repeats.values())) / 1e3
     low, high = repeats.min(axis=0), repeats.max(axis=0)
-    modulus = result.E.mean_Pa / 1e3
     several = len(repeats) > 1
 
     def draw(figure: Figure) -> None:
@@ -35,7 +35,7 @@ def write_figure(result: CompressionResult, curves: StressCurves, out: Path) -> 
             top.fill_between(x, low, high, label=f"range of {len(repeats)} repeats", **HATCHED)
             below.fill_between(x, low - mean, high - mean, **HATCHED)
         top.plot(x, mean, label="measured, mean" if several else "measured", **MEASURED)
-        top.plot(x, fitted, label=f"fitted, E = {modulus:.4g} kPa over 0 to {x[-1]:g} % strain", **SIMULATED)
+        top.plot(x, fitted, label=f"fitted, E = {quantity(result.E.mean_Pa, 'Pa')} over 0 to {x[-1]:g} % strain", **SIMULATED)
         top.set_ylabel("force / first area [kPa]")
         top.set_ylim(bottom=0.0)
         below.axhline(0.0, **MEASURED)

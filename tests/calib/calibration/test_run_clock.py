@@ -10,7 +10,7 @@ from pathlib import Path
 import h5py
 import pytest
 
-from calib.calibration.run_clock import FIRST_GUESS, LAST_RUNS, RunClock, earlier_runs
+from calib.calibration.run_clock import FIRST_GUESS, INTERVAL_RUNS, LAST_RUNS, SLOWER, RunClock, earlier_runs
 from calib.io.progress import Progress
 
 TEXT = h5py.string_dtype()
@@ -56,15 +56,34 @@ def test_one_bar_from_the_first_simulation_to_the_last() -> None:
         now[0] = 2.0 * k
         clock.search(Progress(k, float(k), 100.0, 0, 9.0, 2.0 * (100.0 - k), "round"))
     assert seen[-1].typical_s == pytest.approx(160.0 - 60.0)
-    assert seen[-1].eta_s == pytest.approx(2.0 * (70.0 + LAST_RUNS))
-    clock.stage("intervals")
-    for k in range(1, 5):
+    assert seen[-1].eta_s == pytest.approx(2.0 * (70.0 + INTERVAL_RUNS + LAST_RUNS))
+    clock.intervals("intervals, round 1")
+    for k in range(1, 4):
+        now[0] += 10.0
+        clock.intervals(f"intervals, round 1, {k} of 3")
+        assert seen[-1].typical_s == pytest.approx(max(160.0 - now[0], 2.0 * LAST_RUNS))
+        assert seen[-1].eta_s == pytest.approx(2.0 * (INTERVAL_RUNS + LAST_RUNS) - 10.0 * k)
+    for k in range(5):
+        clock.last(f"last simulations, {k} of 4", k, 4)
         now[0] += 20.0
-        clock.stage(f"last simulations, {k} of 4", k, 4)
     parts = [p.part for p in seen]
     assert all(a <= b for a, b in zip(parts, parts[1:], strict=False))  # type: ignore[operator]
-    assert parts[-1] == pytest.approx(0.99) and seen[-1].eta_s == 0.0
-    assert seen[-1].stage == "last simulations, 4 of 4"
+    assert parts[-1] == pytest.approx(0.99) and seen[-1].stage == "last simulations, 4 of 4"
+    assert "left" not in seen[-1].line()  # what nobody knows
+
+
+def test_the_last_simulations_tell_their_own_time() -> None:
+    """Where they take four times what the search let expect, the time left follows them, and no more than twice that is
+    the most."""
+    seen: list[Progress] = []
+    now = [0.0]
+    clock = RunClock(seen.append, [80.0], lambda: now[0])
+    clock.search(Progress(1, 1.0, 100.0, 0, 9.0, 99.0, "round"))
+    clock.last("last simulations", 0, 4)
+    assert (seen[-1].typical_s, seen[-1].eta_s) == pytest.approx((LAST_RUNS, SLOWER * LAST_RUNS))
+    now[0] += LAST_RUNS
+    clock.last("last simulations, 1 of 4", 1, 4)
+    assert (seen[-1].typical_s, seen[-1].eta_s) == pytest.approx((3.0 * LAST_RUNS, SLOWER * 3.0 * LAST_RUNS))
 
 
 def test_nothing_is_said_of_a_time_that_is_not_known() -> None:

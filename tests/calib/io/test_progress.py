@@ -27,7 +27,7 @@ def progress(done: int, misfit: float = 12.3456, failed: int = 0) -> Progress:
 def test_line_tells_count_budget_failures_misfit_and_time() -> None:
     """Everything that a user wants to know is in the line, and nothing that is not known is made up."""
     assert progress(12, failed=2).line() == (
-        "12 simulations (12 of 80), 2 failed, chi2 12.35, at most 1:15 left, round"
+        "12 simulations, 12 of a budget of 80, 2 failed, chi2 12.35, at most 1:15 left, round"
     )
     assert "chi2 -" in progress(1, math.inf).line() and "failed" not in progress(1).line()
 

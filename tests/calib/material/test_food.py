@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -135,12 +136,12 @@ def test_values_said_to_be_of_table2_are(foods: dict[str, FoodSpec]) -> None:
 
 
 def test_banana_stiffness_is_not_the_papers(foods: dict[str, FoodSpec]) -> None:
-    """The paper's 7e3 Pa for banana is outside its range, flagged, and named in a warning."""
+    """The paper's 7 kPa for banana is outside its range, flagged, and named in a warning."""
     p = foods["banana"].properties["E"]
     assert 1e5 < p.value < 1e6 and p.low > 7e3
     assert any(s.value == 7e3 and "Table 2" in s.source for s in p.sources)
     said = [w for w in foods["banana"].warnings() if w.startswith("banana.properties.E:")]
-    assert any("7e3 Pa" in w for w in said) and any("42.9 times" in w for w in said)
+    assert any("7 kPa" in w for w in said) and any("42.9 times" in w for w in said)
 
 
 def test_kiwi_yield_and_potato_density(foods: dict[str, FoodSpec]) -> None:
@@ -679,3 +680,12 @@ def test_a_food_that_relaxes_is_asked_for() -> None:
         plain.with_values({RELAXING_BULK: 0.5})
     with pytest.raises(MaterialError, match="1 cannot be the part of the instantaneous shear stiffness"):
         check_override("relaxing_share", 1.0)
+
+
+def test_sources_write_their_numbers_with_a_unit() -> None:
+    """A report prints them beside values in kPa and mm: none has an exponent where a prefix of its unit would do."""
+    for name in FoodSpec.list():
+        food = FoodSpec.load(name)
+        for key, known in {**food.properties, **food.sizes}.items():
+            texts = (known.source, known.flag)
+            assert not [text for text in texts if text and re.search(r"(?<!x)\b\d+(?:\.\d+)?e[-+]?\d", text)], f"{name}.{key}"

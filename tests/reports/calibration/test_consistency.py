@@ -29,8 +29,8 @@ from calib.validation.prior_conflict import PriorConflict
 from mpm.output.section import Section
 from mpm.scene import Knife
 from reports.base.format import quantity
-from reports.base.labels import in_words
-from reports.calibration import cut_figure, model_page, report
+from reports.base.labels import in_words, source_in_words
+from reports.calibration import cut_figure, model_page, parameter_page, report
 from tests.reports import sample
 from tests.reports.sample import spaced
 
@@ -147,7 +147,7 @@ def test_a_parameter_at_a_bound_has_one_word(text: str) -> None:
     """Friction at zero is at its natural limit in table, figure, legend and note, and at no bound anywhere."""
     assert text.count("at its natural limit") >= 4
     assert "mu at its natural limit" in text and "at its bound" not in text
-    assert re.search(r"parameters at a bound 0 0 ✓ passed", text)
+    assert re.search(r"parameters at a bound 0 ≤ 0 ✓ passed", text)
 
 
 def test_R_is_a_resistance_only(text: str) -> None:
@@ -201,9 +201,9 @@ def test_the_figure_of_failures_counts_what_the_heading_counts(tmp_path: Path, m
 
 
 def test_looks_of_the_cut_share_their_scale() -> None:
-    """Three looks are three pictures, each with axis, unit and the one scale of colours; the glance at one of them has
-    that scale too, though its stress is the least."""
-    y = np.linspace(-0.02, 0.02, 9)
+    """Three looks at a long food are three pictures, each with axis, unit and the one scale of colours; the glance at
+    one of them has that scale too, though its stress is the least."""
+    y = np.linspace(-0.06, 0.06, 9)
     section = Section(
         np.array([0.005, 0.015, 0.03]), np.tile(y, (3, 1)), np.full((3, 9), 0.01),
         np.outer([3e3, 2e3, 9e3], np.ones(9)), np.full((2, 9), 4e-3), False,
@@ -323,3 +323,16 @@ def test_the_model_page_says_that_the_blade_is_withdrawn() -> None:
         assert ("up again at the same speed" in model_page._conditions(result)[0][1]) == (up is not None)
         said = model_page._objective(result)
         assert ("the pull on the way up" in said and "10 % of the largest pull" in said) == (up is not None)
+
+
+def test_two_parameters_have_their_correlation_in_words() -> None:
+    """A matrix of one number is no figure; more of them are, and fewer are nothing."""
+    of_two = parameter_page.correlation_matrix({"E,R": -0.314}, ["E", "R"])
+    assert spaced(parameter_page.pair(*of_two)) == "E and R, r = −0.31"
+    of_three = parameter_page.correlation_matrix({"E,R": -0.3, "E,mu": 0.2, "R,mu": 0.1}, ["E", "R", "mu"])
+    assert parameter_page.pair(*of_three) == "" == parameter_page.pair(*parameter_page.correlation_matrix({}, ["E"]))
+
+
+def test_a_source_names_the_file_of_its_remark() -> None:
+    """A reader of the report has no list of remarks beside it; units are raised."""
+    assert source_in_words("as apple (remark 5), 10 J/m^2") == "as apple (remark 5 of materials.yaml), 10 J/m²"

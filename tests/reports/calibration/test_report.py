@@ -288,7 +288,7 @@ def test_passed_with_a_failed_line_is_not_covered_up(content: Content) -> None:
         (0.85, 0.9, "-", False, None, "0.850", "≥ 0.9"),
         (0.95, 0.9, "-", True, None, "0.950", "≥ 0.9"),
         (2, 2, "-", True, ">=", "2", "≥ 2"),
-        (0, 0, "-", True, None, "0", "0"),
+        (0, 0, "-", True, None, "0", "≤ 0"),
         (True, True, None, True, None, "yes", "yes"),
         (["E", "mu"], None, "-", False, None, "E and mu", DASH),
         ("monotone", "monotone", "", True, None, "monotone", "monotone"),

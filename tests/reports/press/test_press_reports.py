@@ -135,7 +135,7 @@ def test_a_compression_says_slope_and_largest_error(told: Any) -> None:
     rows = tables(told(result()))
     assert rows["Modulus of each repeat"][-1] == ["Mean ± standard deviation", "96.30 ± 0.50 kPa", "100.20 ± 0.60 kPa"]
     assert [row[1] for row in rows["How close the fitted curve is"]] == [
-        "100.20 ± 0.60 kPa", "101 kPa", "+0.80 %", "+27 % at 2.1 %", "0.40 %",
+        "100.20 ± 0.60 kPa", "101 kPa", "+0.80 %", "+27.0 % at 2.1 %", "0.40 %",
     ]  # fmt: skip
     assert rows["If another assumption holds"] == [["Poisson's ratio 0.44", "102 kPa"], ["Bonded plates", "68.3 kPa"]]
 
