@@ -3,8 +3,8 @@
   const at = (id) => document.getElementById(id);
   const read = (id) => (at(id) ? JSON.parse(at(id).textContent) : null);
   const all = read("curves"), texts = read("texts");
-  const cuts = all.cuts || [all], cut = at("cut"); // a study has several
-  let curves, x, count, last;
+  const cuts = all.cuts || [all], cut = at("cut"); // a study has several, so have tests of several specimens
+  let curves, x, count, first, last;
   const chart = at("chart"), box = at("box"), tip = at("tip"), way = at("cursor"), said = at("at");
   const pick = at("member"), every = at("every"), space = "\u00a0";
   const shown = new Set();
@@ -15,8 +15,9 @@
   // Show another cut: its curves, and what belongs to it alone.
   function show(k) {
     curves = cuts[k];
-    x = curves.stroke_mm;
+    x = curves.x;
     count = x.length;
+    first = curves.log ? x[0] : Math.min(0, x[0]);
     last = x[count - 1];
     now = null;
     tip.hidden = true;
@@ -26,13 +27,13 @@
     document.querySelectorAll("[data-cut]").forEach((one) => { one.hidden = one.getAttribute("data-cut") !== String(k); });
     document.querySelectorAll("[data-curve]").forEach((one) => {
       const key = one.getAttribute("data-curve");
-      one.closest("li").hidden = !(key === "band" ? curves.band_N : key in curves.names);
+      one.closest("li").hidden = !(key === "band" ? curves.band : key in curves.names);
     });
   }
 
   const number = (value, places) => value.toFixed(places).replace("-", "\u2212");
-  const newtons = (value, kind) => (
-    value === null ? "\u2013" : number(value, curves.places[kind || "force"]) + space + "N");
+  const valued = (value, kind) => (
+    value === null ? "\u2013" : number(value, curves.places[kind || "force"]) + space + curves.axes.up[1]);
   const member = () => (chosen === null ? null : curves.members[chosen]);
 
   function make(parent, name, attributes, text) {
@@ -50,6 +51,15 @@
     const places = Math.max(0, -Math.floor(Math.log10(step) + 1e-9)), found = [];
     for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(k * step);
     return found.map((value) => ({ value, text: number(value, places) }));
+  }
+
+  // Powers of ten, where the way across is told by its logarithm.
+  function decades() {
+    const found = [];
+    for (let k = Math.ceil(Math.log10(first) - 1e-9); Math.pow(10, k) <= last * (1 + 1e-9); k++) {
+      found.push({ value: Math.pow(10, k), text: number(Math.pow(10, k), Math.max(0, -k)) });
+    }
+    return found;
   }
 
   function line(values, panel) {
@@ -78,10 +88,10 @@
       make(group, "line", { class: "grid", x1: left, x2: right, y1: y, y2: y });
       make(group, "text", { x: left - 6, y: y + 4, "text-anchor": "end" }, tick.text);
     });
-    ticks(0, last, (right - left) / 70).forEach((tick) => {
+    (curves.log ? decades() : ticks(first, last, (right - left) / 70)).forEach((tick) => {
       const place = frame.x(tick.value), low = panel.top + panel.height;
       make(group, "line", { class: "grid", x1: place, x2: place, y1: panel.top, y2: low });
-      if (panel === frame.lower) make(group, "text", { x: place, y: low + 16, "text-anchor": "middle" }, tick.text);
+      if (panel === frame.lowest) make(group, "text", { x: place, y: low + 16, "text-anchor": "middle" }, tick.text);
     });
     make(group, "line", { class: "axis", x1: left, x2: right, y1: panel.y(0), y2: panel.y(0) });
     make(group, "text", { x: left, y: panel.top - 7 }, title);
@@ -98,45 +108,49 @@
     const width = Math.max(box.clientWidth, 260), own = member();
     const tall = Math.min(Math.max(0.46 * width, 220), 380), low = Math.min(Math.max(0.2 * width, 100), 150);
     frame = { width, left: 46, right: 8 };
-    frame.x = (value) => frame.left + (width - frame.left - frame.right) * value / last;
+    const part = (value) => (curves.log ? Math.log(value / first) / Math.log(last / first) : (value - first) / (last - first));
+    frame.x = (value) => frame.left + (width - frame.left - frame.right) * part(value);
     const keys = Object.keys(curves.names).filter((key) => shown.has(key));
-    const lists = keys.map((key) => curves.forces_N[key]);
-    const banded = curves.band_N && shown.has("band");
-    const residual = own ? own.curve_N.map((value, k) => value - curves.forces_N.real_N[k]) : null;
+    const lists = keys.map((key) => curves.y[key]);
+    const banded = curves.band && shown.has("band");
+    const residual = own ? own.curve.map((value, k) => value - curves.y[curves.main[0]][k]) : null;
     // A curve of the report that leaves everything else far behind leaves the chart; a chosen member does not.
-    const normal = [curves.forces_N.real_N, curves.forces_N.sim_N].concat(banded ? Object.values(curves.band_N) : []);
+    const normal = curves.main.map((key) => curves.y[key]).concat(banded ? Object.values(curves.band) : []);
     const most = 1.5 * Math.max(...[].concat(...normal).map((value) => Math.abs(value || 0)));
-    const ownMost = own ? Math.max(...own.curve_N.map(Math.abs)) : 0;
-    frame.upper = scale(lists.concat(banded ? Object.values(curves.band_N) : [], own ? [own.curve_N] : []),
+    const ownMost = own ? Math.max(...own.curve.map(Math.abs)) : 0;
+    frame.upper = scale(lists.concat(banded ? Object.values(curves.band) : [], own ? [own.curve] : []),
       { most: Math.max(most, ownMost) }, 24, tall);
-    const spread = [curves.residual_N].concat(residual ? [residual] : []);
+    const spread = [curves.residual].concat(residual ? [residual] : []);
+    const bare = curves.residual.every((value) => value === null); // nothing to compare with
     frame.lower = scale(spread, { most: Infinity }, 24 + tall + 34, low);
-    const height = frame.lower.top + low + 40;
+    frame.lowest = bare ? frame.upper : frame.lower;
+    const height = frame.lowest.top + frame.lowest.height + 40;
     chart.replaceChildren();
     chart.setAttribute("viewBox", "0 0 " + width + " " + height);
     const back = make(chart, "g", {}), upper = clip("upper", frame.upper), lower = clip("lower", frame.lower);
     if (banded) {
-      const ends = curves.band_N.band_high_N, under = curves.band_N.band_low_N;
+      const ends = curves.band.high, under = curves.band.low;
       const edge = (values, k) => frame.x(x[k]).toFixed(1) + " " + frame.upper.y(values[k]).toFixed(1);
       const there = x.map((_, k) => k).filter((k) => ends[k] !== null && under[k] !== null);
       const around = there.map((k) => edge(ends, k)).concat(there.reverse().map((k) => edge(under, k)));
       make(upper, "path", { class: "band", d: "M" + around.join("L") + "Z" });
     }
-    const noise = curves.noise_sd_N, y = frame.lower.y;
-    make(lower, "rect", { class: "noise", x: frame.left, y: y(noise), width: width - frame.left - frame.right,
+    const noise = curves.noise, y = frame.lower.y;
+    if (noise > 0) make(lower, "rect", { class: "noise", x: frame.left, y: y(noise), width: width - frame.left - frame.right,
       height: Math.max(y(-noise) - y(noise), 0) });
-    axes(frame.upper, "force on the knife [N]", back);
-    axes(frame.lower, "residual [N]: " + curves.residual_name, back);
-    make(back, "text", { x: width - frame.right, y: height - 6, "text-anchor": "end" }, "stroke [mm]");
+    const across = curves.axes.across, up = curves.axes.up;
+    axes(frame.upper, up[0] + " [" + up[1] + "]", back);
+    if (!bare) axes(frame.lower, "residual [" + up[1] + "]: " + curves.residual_name, back);
+    make(back, "text", { x: width - frame.right, y: height - 6, "text-anchor": "end" }, across[0] + " [" + across[1] + "]");
     if (every && every.checked) {
-      curves.members.forEach((one) => make(upper, "path", { class: "line every", d: line(one.curve_N, frame.upper) }));
+      curves.members.forEach((one) => make(upper, "path", { class: "line every", d: line(one.curve, frame.upper) }));
     }
     keys.slice().reverse().forEach((key) => {
-      make(upper, "path", { class: "line " + key, d: line(curves.forces_N[key], frame.upper) });
+      make(upper, "path", { class: "line " + key, d: line(curves.y[key], frame.upper) });
     });
-    make(lower, "path", { class: "line residual", d: line(curves.residual_N, frame.lower) });
+    if (!bare) make(lower, "path", { class: "line residual", d: line(curves.residual, frame.lower) });
     if (own) {
-      make(upper, "path", { class: "line member", d: line(own.curve_N, frame.upper) });
+      make(upper, "path", { class: "line member", d: line(own.curve, frame.upper) });
       make(lower, "path", { class: "line member", d: line(residual, frame.lower) });
     }
     frame.keys = keys;
@@ -149,31 +163,33 @@
   function values() {
     const rows = [], own = member();
     frame.keys.forEach((key) => {
-      const value = curves.forces_N[key][now];
-      rows.push([key, curves.names[key], newtons(value), value === null ? null : frame.upper.y(value)]);
+      const value = curves.y[key][now];
+      rows.push([key, curves.names[key], valued(value), value === null ? null : frame.upper.y(value)]);
     });
     if (frame.banded) {
-      const ends = [curves.band_N.band_low_N[now], curves.band_N.band_high_N[now]];
-      rows.push(["band", "95" + space + "% band", newtons(ends[0]) + " to " + newtons(ends[1]), null]);
+      const ends = [curves.band.low[now], curves.band.high[now]];
+      rows.push(["band", curves.band_name, valued(ends[0]) + " to " + valued(ends[1]), null]);
     }
-    const rest = curves.residual_N[now];
-    rows.push(["residual", "residual", newtons(rest, "residual"), rest === null ? null : frame.lower.y(rest)]);
-    if (own) rows.push(["member", own.name, newtons(own.curve_N[now]), frame.upper.y(own.curve_N[now])]);
+    const rest = curves.residual[now];
+    if (frame.lowest === frame.lower) {
+      rows.push(["residual", "residual", valued(rest, "residual"), rest === null ? null : frame.lower.y(rest)]);
+    }
+    if (own) rows.push(["member", own.name, valued(own.curve[now]), frame.upper.y(own.curve[now])]);
     return rows;
   }
 
   function mark() {
     if (now === null) return;
     const place = frame.x(x[now]), rows = values();
-    const stroke = number(x[now], curves.places.stroke) + space + "mm";
+    const stroke = number(x[now], curves.places.stroke) + space + curves.axes.across[1];
     frame.mark.replaceChildren();
-    const ends = { y1: frame.upper.top, y2: frame.lower.top + frame.lower.height };
+    const ends = { y1: frame.upper.top, y2: frame.lowest.top + frame.lowest.height };
     make(frame.mark, "line", Object.assign({ class: "now", x1: place, x2: place }, ends));
     rows.forEach((row) => {
       if (row[3] !== null) make(frame.mark, "circle", { class: "dot " + row[0], cx: place, cy: row[3], r: 4.5 });
     });
     tip.replaceChildren();
-    [["head", "stroke", stroke]].concat(rows).forEach((row) => {
+    [["head", curves.axes.across[0], stroke]].concat(rows).forEach((row) => {
       const one = document.createElement("div");
       one.className = row[0] === "head" ? "head" : "";
       [row[1], row[2]].forEach((text) => { one.appendChild(document.createElement("span")).textContent = text; });
@@ -191,9 +207,8 @@
   function point(event) {
     const area = chart.getBoundingClientRect();
     const inside = (event.clientX - area.left) * frame.width / area.width;
-    const stroke = last * (inside - frame.left) / (frame.width - frame.left - frame.right);
     let best = 0;
-    x.forEach((value, k) => { if (Math.abs(value - stroke) < Math.abs(x[best] - stroke)) best = k; });
+    x.forEach((value, k) => { if (Math.abs(frame.x(value) - inside) < Math.abs(frame.x(x[best]) - inside)) best = k; });
     now = best;
     tip.hidden = false;
     mark();
@@ -206,7 +221,7 @@
     if (!every || !every.checked) return;
     let best = null, least = 12;
     curves.members.forEach((one, k) => {
-      const far = Math.abs(frame.upper.y(one.curve_N[now]) - height);
+      const far = Math.abs(frame.upper.y(one.curve[now]) - height);
       if (far < least) { least = far; best = k; }
     });
     if (best !== null) choose(best);

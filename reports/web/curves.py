@@ -25,6 +25,9 @@ PARTS = (
     ("three_term_N", "three-term curve"),
 )
 BAND = "95 % predictive band"
+BAND_SHORT = "95\u00a0% band"
+AXES = {"across": ("stroke", "mm"), "up": ("force on the knife", "N")}
+"""What is drawn over what, with their units."""
 DIGITS = 6
 """Significant digits of a member's curve."""
 MOST_PLACES = 4
@@ -43,20 +46,24 @@ def drawable(done: Finished, members: Sequence[Member]) -> dict[str, Any]:
     """
     curves, label = done.curves, done.result.trace.label
     names = {"real_N": label, "sim_N": "simulated"} | {key: name for key, name in PARTS if known(curves, key)}
-    band = {key: numbers(curves[key]) for key in BAND_COLUMNS} if known(curves, BAND_COLUMNS[0]) else None
+    ends = dict(zip(("low", "high"), BAND_COLUMNS, strict=True))
+    band = {end: numbers(curves[key]) for end, key in ends.items()} if known(curves, BAND_COLUMNS[0]) else None
     peak = max(float(np.max(curves[key])) for key in ("real_N", "sim_N"))
     force, residual = places(peak), places(float(np.max(np.abs(curves["residual_N"]))))
     decimals = {"stroke": places(1e3 * float(curves["stroke_m"][-1])), "force": force, "residual": max(force, residual)}
     return {
-        "stroke_mm": numbers(1e3 * curves["stroke_m"], 9),
+        "x": numbers(1e3 * curves["stroke_m"], 9),
         "names": names,
-        "forces_N": {key: numbers(curves[key]) for key in names},
-        "band_N": band,
-        "residual_N": numbers(curves["residual_N"]),
+        "y": {key: numbers(curves[key]) for key in names},
+        "band": band,
+        "band_name": BAND_SHORT,
+        "main": ["real_N", "sim_N"],
+        "axes": AXES,
+        "residual": numbers(curves["residual_N"]),
         "residual_name": f"simulated − {label}",
-        "noise_sd_N": done.result.conditioning.noise_sd_N,
+        "noise": done.result.conditioning.noise_sd_N,
         "places": decimals,
-        "members": [{"name": f"member {m.number}", "curve_N": numbers(m.curve, DIGITS)} for m in members],
+        "members": [{"name": f"member {m.number}", "curve": numbers(m.curve, DIGITS)} for m in members],
     }
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from mpm.arrays import FloatArray
 from reports.base.run_folder import Data
-from reports.web.curves import BAND, known, numbers, places, switches
+from reports.web.curves import AXES, BAND, BAND_SHORT, known, numbers, places, switches
 from reports.web.markup import Markup, data, document, element, joined, picture, table
 from reports.web.parts import assets, chart, limits_section, mark, pairs, stamped
 
@@ -78,15 +78,18 @@ def drawable(curves: Mapping[str, FloatArray], held: bool) -> dict[str, Any]:
     finest = force if ours is None else max(force, places(float(np.nanmax(np.abs(residual)))))
     decimals = {"stroke": places(1e3 * float(curves["stroke_m"][-1])), "force": force, "residual": finest}
     return {
-        "stroke_mm": numbers(1e3 * curves["stroke_m"], 9),
+        "x": numbers(1e3 * curves["stroke_m"], 9),
         "names": names,
-        "forces_N": {key: numbers(values) for key, values in forces.items()},
-        "band_N": {f"band_{end}_N": numbers(curves[key]) for end, key in zip(("low", "high"), ends, strict=True)}
+        "y": {key: numbers(values) for key, values in forces.items()},
+        "band": {end: numbers(curves[key]) for end, key in zip(("low", "high"), ends, strict=True)}
         if known(curves, ends[0])
         else None,
-        "residual_N": numbers(residual),
+        "band_name": BAND_SHORT,
+        "main": [key for key in ("real_N", "sim_N") if key in forces],
+        "axes": AXES,
+        "residual": numbers(residual),
         "residual_name": f"{'predicted' if foretold else 'simulated'} − trace",
-        "noise_sd_N": 0.0,
+        "noise": 0.0,
         "places": decimals,
         "members": [],
     }  # fmt: skip

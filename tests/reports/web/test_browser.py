@@ -114,10 +114,10 @@ def test_pointing_at_a_curve_shows_its_values(shown: Tab, run: Path) -> None:
     x, y = shown.place("#chart", 0.6, 0.3)
     shown.point(x, y)
     said, data = tip(shown), drawn(shown)
-    k = nearest(said, data["stroke_mm"])
-    assert 0.5 < number(said["stroke"]) / data["stroke_mm"][-1] < 0.65  # six tenths of the chart, its margins off
-    assert all(says(said[data["names"][key]], data["forces_N"][key][k]) for key in ("real_N", "sim_N"))
-    assert says(said["residual"], data["residual_N"][k])
+    k = nearest(said, data["x"])
+    assert 0.5 < number(said["stroke"]) / data["x"][-1] < 0.65  # six tenths of the chart, its margins off
+    assert all(says(said[data["names"][key]], data["y"][key][k]) for key in ("real_N", "sim_N"))
+    assert says(said["residual"], data["residual"][k])
     assert shown.ask("document.querySelectorAll('#chart .dot').length") == 3
     shown.point(2, 2)
     assert shown.ask("document.getElementById('tip').hidden") is True
@@ -131,7 +131,7 @@ def test_the_slider_moves_by_keys(shown: Tab, run: Path) -> None:
         shown.press("ArrowRight")
     said = tip(shown)
     assert shown.ask("document.getElementById('cursor').value") == "3"
-    assert says(said["stroke"], drawn(shown)["stroke_mm"][3])
+    assert says(said["stroke"], drawn(shown)["x"][3])
     heard = spaced(shown.ask("document.getElementById('cursor').getAttribute('aria-valuetext')"))
     assert heard.startswith(said["stroke"]) and said["residual"] in heard
 
@@ -176,8 +176,8 @@ def test_another_cut_is_chosen(shown: Tab, study: Path) -> None:
                   "cut.dispatchEvent(new Event('change')); })()")  # fmt: skip
         shown.point(*shown.place("#chart", 0.5, 0.3))
         said = tip(shown)
-        near = nearest(said, cuts[k]["stroke_mm"])
-        assert says(said[cuts[k]["names"]["sim_N"]], cuts[k]["forces_N"]["sim_N"][near])
+        near = nearest(said, cuts[k]["x"])
+        assert says(said[cuts[k]["names"]["sim_N"]], cuts[k]["y"]["sim_N"][near])
         captions = "[...document.querySelectorAll('[data-cut]')].filter(one => one.offsetHeight).map(one => one.dataset.cut)"
         assert shown.ask(captions) == [str(k)]
 

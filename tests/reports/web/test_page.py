@@ -139,10 +139,10 @@ def test_a_page_that_cannot_be_written(tmp_path: Path) -> None:
 def test_the_curves_are_those_of_the_run(run: Path, whole: Page) -> None:
     """Stroke, forces, band and residual of the page are those of curves.csv, to the last digit."""
     curves, drawn = read_result(run).curves, whole.data["curves"]
-    assert np.allclose(drawn["stroke_mm"], 1e3 * curves["stroke_m"], rtol=1e-8, atol=0.0)
-    for name, values in {**drawn["forces_N"], **drawn["band_N"], "residual_N": drawn["residual_N"]}.items():
+    assert np.allclose(drawn["x"], 1e3 * curves["stroke_m"], rtol=1e-8, atol=0.0)
+    for name, values in {**drawn["y"], **{f"band_{end}_N": x for end, x in drawn["band"].items()}, "residual_N": drawn["residual"]}.items():
         assert values == curves[name].tolist(), name
-    assert {"real_N", "sim_N", "start_N", "edge_N"} <= set(drawn["forces_N"])
+    assert {"real_N", "sim_N", "start_N", "edge_N"} <= set(drawn["y"])
 
 
 def test_tables_have_the_texts_of_the_pdf(run: Path, whole: Page) -> None:
@@ -185,8 +185,8 @@ def test_what_is_not_known_is_left_out(tmp_path: Path) -> None:
     found = page(run)
     drawn = found.data["curves"]
     assert "start_N" not in drawn["names"] and "start_N" not in found.values("data-curve")
-    assert drawn["forces_N"]["edge_N"][:4] == [None, None, None, pytest.approx(float(lines[4][edge]))]
-    assert drawn["band_N"] is None and "band" not in found.values("data-curve")
+    assert drawn["y"]["edge_N"][:4] == [None, None, None, pytest.approx(float(lines[4][edge]))]
+    assert drawn["band"] is None and "band" not in found.values("data-curve")
 
 
 # ---- members
@@ -207,7 +207,7 @@ def test_members_have_their_curves_and_values(run: Path, whole: Page) -> None:
         own = max(int(row[0]) - 3, 0)  # the first three are the best, its repetition and the broken one
         curve = (1.0 + 0.03 * own) * filtered
         assert drawn[k]["name"] == f"member {row[0]}"
-        assert drawn[k]["curve_N"] == pytest.approx(curve, rel=1e-5, abs=1e-5)
+        assert drawn[k]["curve"] == pytest.approx(curve, rel=1e-5, abs=1e-5)
         said = [quantity((1.0 + 0.05 * own) * BEST[name], p.unit) for name, p in result.fitted.items()]
         assert texts["values"][k] == row[5:] == said
         agreement = compare(stroke, sample.curves()["real_N"], curve)

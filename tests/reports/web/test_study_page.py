@@ -54,9 +54,9 @@ def test_each_cut_has_its_own_curves(page: Page) -> None:
         columns, held = sample.curves(name), name == sample.HELD
         key, ends = ("predicted_N", "predicted_low_N") if held else ("sim_N", "band_low_N")
         assert cut["names"]["sim_N"] == (PREDICTED if held else FITTED)
-        np.testing.assert_allclose(cut["forces_N"]["sim_N"], columns[key], rtol=1e-6)
-        np.testing.assert_allclose(cut["band_N"]["band_low_N"], columns[ends], rtol=1e-6)
-        np.testing.assert_allclose(cut["residual_N"], columns[key] - columns["real_N"], atol=1e-6)
+        np.testing.assert_allclose(cut["y"]["sim_N"], columns[key], rtol=1e-6)
+        np.testing.assert_allclose(cut["band"]["low"], columns[ends], rtol=1e-6)
+        np.testing.assert_allclose(cut["residual"], columns[key] - columns["real_N"], atol=1e-6)
     assert page.values("data-cut") == ["0", "1", "2"]
     assert [row[0] for row in page.tables["held"][1:]] == ["third"]
     assert [row[0] for row in page.tables["fitted"][1:]] == ["first", "second"]
@@ -84,7 +84,7 @@ def test_a_cut_that_was_fitted_and_held_out_has_both_curves() -> None:
     both = drawable(third | {"sim_N": third["real_N"] * 1.1}, held=True)
     assert both["names"] == {"real_N": "trace", "sim_N": PREDICTED, "fitted_N": FITTED}
     alone = drawable({"stroke_m": third["stroke_m"], "real_N": third["real_N"]}, held=True)
-    assert set(alone["names"]) == {"real_N"} and alone["band_N"] is None and set(alone["residual_N"]) == {None}
+    assert set(alone["names"]) == {"real_N"} and alone["band"] is None and set(alone["residual"]) == {None}
 
 
 def test_names_are_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
