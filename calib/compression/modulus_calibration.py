@@ -154,7 +154,7 @@ def _plates(bonded: bool) -> str:
 def calibrate_modulus(
     test: CompressionTest, options: PressOptions, out: Path, *, command: Sequence[str], say: Say
 ) -> CompressionResult:
-    """Calibrate and write compress.json, curves.csv, compress.svg and report.pdf.
+    """Calibrate and write compress.json, curves.csv, compress.svg, report.pdf and report.html.
 
     Args:
         test: What was measured.
@@ -211,8 +211,9 @@ def calibrate_modulus(
         from reports.press.compression import write_report
         from reports.press.stress_strain import write_figure
 
-        write_figure(result, read_curves(out), out)
-        write_report(result, out)
+        curves = read_curves(out)
+        write_figure(result, curves, out)
+        write_report(result, curves, out)
         return result
 
 

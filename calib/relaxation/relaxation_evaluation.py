@@ -65,7 +65,7 @@ class RelaxationTest:
 
 
 def evaluate_relaxation(test: RelaxationTest, out: Path, *, command: Sequence[str], say: Say) -> RelaxationResult:
-    """Fit and write relax.json, curves.csv and report.pdf.
+    """Fit and write relax.json, curves.csv, report.pdf and report.html.
 
     Args:
         test: What was measured.

@@ -76,7 +76,7 @@ class Specimen:
 
 
 def evaluate_texture(test: TextureTest, out: Path, *, command: Sequence[str], say: Say) -> TextureResult:
-    """Evaluate and write tpa.json, curves.csv and report.pdf.
+    """Evaluate and write tpa.json, curves.csv, report.pdf and report.html.
 
     Args:
         test: What was measured.

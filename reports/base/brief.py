@@ -102,6 +102,27 @@ class Origin(Protocol):
         """Commit of the checkout, None where cutcal was installed."""
 
 
+def brief_content(document: Path, brief: Brief, origin: Origin) -> dict[str, Any]:
+    """What a report prints, as text.
+
+    Args:
+        document: The JSON file of the run; the report has its date.
+        brief: What the report holds.
+        origin: Where the run comes from.
+
+    Returns:
+        The brief by the names of its attributes, its pictures as file names, and where the run comes from.
+    """
+    parts = [{**asdict(part), "picture": f"part{k}.svg" if part.picture else ""} for k, part in enumerate(brief.parts)]
+    return {
+        **asdict(brief),
+        "parts": parts,
+        "provenance": provenance_lines(origin),
+        "cutcal": origin.versions.get("cutcal", ""),
+        "created": _date(document).strftime("%Y-%m-%d %H:%M"),
+    }
+
+
 def typeset_brief(document: Path, brief: Brief, origin: Origin) -> Path:
     """Write ``report.pdf`` beside a document; the same document gives the same bytes, apart from its date.
 
@@ -116,19 +137,15 @@ def typeset_brief(document: Path, brief: Brief, origin: Origin) -> Path:
     Raises:
         ReportError: The report cannot be written.
     """
-    date = datetime.fromtimestamp(int(document.stat().st_mtime), tz=timezone.utc)
     pictures = {f"part{k}.svg": part.picture for k, part in enumerate(brief.parts) if part.picture}
-    parts = [{**asdict(part), "picture": f"part{k}.svg" if part.picture else ""} for k, part in enumerate(brief.parts)]
-    content = {
-        **asdict(brief),
-        "parts": parts,
-        "provenance": provenance_lines(origin),
-        "cutcal": origin.versions.get("cutcal", ""),
-        "created": date.strftime("%Y-%m-%d %H:%M"),
-    }
     target = document.with_name("report.pdf")
-    publish(target, "brief.typ", content, pictures, date=date)
+    publish(target, "brief.typ", brief_content(document, brief, origin), pictures, date=_date(document))
     return target
+
+
+def _date(document: Path) -> datetime:
+    """When a document was written."""
+    return datetime.fromtimestamp(int(document.stat().st_mtime), tz=timezone.utc)
 
 
 def provenance_lines(origin: Origin) -> dict[str, Any]:

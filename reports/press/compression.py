@@ -7,14 +7,19 @@ from pathlib import Path
 from statistics import fmean, stdev
 from typing import TYPE_CHECKING
 
-from reports.base.brief import Brief, ReportPart, ReportTable, typeset_brief
+import numpy as np
+
+from reports.base.brief import Brief, ReportPart, ReportTable
 from reports.base.format import breakable, count, interval, plain, quantity, uncertain
 from reports.base.references import REFERENCES
 from reports.press.tables import sentences, verdict_table
+from reports.web.brief import Chart, Panel, publish_brief
 
 if TYPE_CHECKING:
-    from calib.compression.result import CompressionResult
+    from calib.compression.result import CompressionResult, StressCurves
 
+STRESS = "Stress"
+"""Title of the part that shows it."""
 ALT = "Measured and fitted stress over strain, and their difference"
 CITED = ("Hu 2018", "Stomakhin 2012")
 """What the report cites as [1] and [2]."""
@@ -34,15 +39,16 @@ SOLVER = (
 GRID = "Change from a coarser grid: largest relative change, beyond 2 % strain, on two thirds of the cells."
 
 
-def write_report(result: CompressionResult, out: Path) -> Path:
-    """Write ``report.pdf`` beside ``compress.json`` and ``compress.svg``.
+def write_report(result: CompressionResult, curves: StressCurves, out: Path) -> Path:
+    """Write ``report.pdf`` and ``report.html`` beside ``compress.json`` and ``compress.svg``.
 
     Args:
         result: The calibrated modulus.
+        curves: Stress over strain.
         out: The folder.
 
     Returns:
-        Path of the report.
+        Path of ``report.pdf``.
 
     Raises:
         ReportError: The report cannot be written.
@@ -56,7 +62,7 @@ def write_report(result: CompressionResult, out: Path) -> Path:
         facts=_facts(result),
         parts=[
             ReportPart("Verdict", explained, table=verdict_table(result.verdicts)),
-            ReportPart("Stress", picture=(out / "compress.svg").read_bytes(), alt=ALT),
+            ReportPart(STRESS, picture=(out / "compress.svg").read_bytes(), alt=ALT),
             ReportPart("Modulus of each repeat", table=_repeats(result)),
             ReportPart("How close the fitted curve is", table=_closeness(result)),
             *([ReportPart("If another assumption holds", table=_others(result))] if _other_rows(result) else []),
@@ -65,7 +71,19 @@ def write_report(result: CompressionResult, out: Path) -> Path:
         ],
         limits=sentences(result.not_shown),
     )
-    return typeset_brief(out / "compress.json", brief, _Origin(result))
+    return publish_brief(out / "compress.json", brief, _Origin(result), _chart(curves))
+
+
+def _chart(curves: StressCurves) -> Chart:
+    """Stress over strain to point at, with the range of the repeats and what is left."""
+    repeats = np.array(list(curves.repeats.values())) / 1e3
+    several = len(repeats) > 1
+    mean, fitted = curves.measured / 1e3, curves.fitted / 1e3
+    drawn = {"measured": ("measured, mean" if several else "measured", mean), "fitted": ("fitted", fitted)}
+    band = (repeats.min(axis=0), repeats.max(axis=0)) if several else None
+    panel = Panel("", 1e2 * curves.strain, drawn, band, fitted - mean)
+    of = f"range of {len(repeats)} repeats"
+    return Chart(STRESS, ("strain", "%"), ("stress", "kPa"), [panel], band=of, residual="fitted − measured")
 
 
 def _sentence(result: CompressionResult) -> str:

@@ -9,14 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from reports.base.brief import Brief, ReportPart, ReportTable, typeset_brief
+from reports.base.brief import Brief, ReportPart, ReportTable
 from reports.base.figures import MEASURED, SIMULATED, log_ticks, svg
 from reports.base.format import breakable, interval, plain, quantity
 from reports.press.tables import MARKS, mean_and_sd, sentences, verdict_table, with_sd
+from reports.web.brief import Chart, Panel, publish_brief
 
 if TYPE_CHECKING:
     from calib.relaxation.relaxation_result import HoldCurve, RelaxationResult
 
+HOLDS = "The holds"
+"""Title of the part that shows them."""
 ALT = "Load of each specimen over the logarithm of the time of the hold, measured and fitted"
 CRITERION = (
     "Bayesian information criterion of each number of branches, less that of the best, summed over the specimens; "
@@ -25,7 +28,7 @@ CRITERION = (
 
 
 def write_report(result: RelaxationResult, curves: Sequence[HoldCurve], out: Path) -> Path:
-    """Write ``report.pdf`` beside ``relax.json``.
+    """Write ``report.pdf`` and ``report.html`` beside ``relax.json``.
 
     Args:
         result: The relaxation.
@@ -33,7 +36,7 @@ def write_report(result: RelaxationResult, curves: Sequence[HoldCurve], out: Pat
         out: The folder.
 
     Returns:
-        Path of the report.
+        Path of ``report.pdf``.
 
     Raises:
         ReportError: The report cannot be written.
@@ -58,14 +61,26 @@ def write_report(result: RelaxationResult, curves: Sequence[HoldCurve], out: Pat
         ],
         parts=[
             ReportPart("Verdict", table=verdict_table(result.verdicts)),
-            ReportPart("The holds", picture=picture(curves), alt=ALT),
+            ReportPart(HOLDS, picture=picture(curves), alt=ALT),
             ReportPart("Prony series of the repeats", table=_series(result)),
             ReportPart("How many branches", CRITERION, table=_criterion(result)),
             ReportPart("Each specimen", table=_specimens(result), apart=len(result.repeats) > 6),
         ],
         limits=sentences(result.not_shown),
     )
-    return typeset_brief(out / "relax.json", brief, result)
+    return publish_brief(out / "relax.json", brief, result, _chart(curves))
+
+
+def _chart(curves: Sequence[HoldCurve]) -> Chart:
+    """The load of each specimen to point at, and what the series leaves."""
+    panels = []
+    for one in curves:
+        later = one.time > 0.0
+        measured, fitted = one.measured[later], one.fitted[later]
+        drawn = {"measured": ("measured", measured), "fitted": ("fitted", fitted)}
+        panels.append(Panel(one.name, one.time[later], drawn, residual=fitted - measured))
+    axes = ("time from the start of the hold", "s"), ("load", "N")
+    return Chart(HOLDS, *axes, panels, "Specimen", residual="fitted − measured", logarithmic=True)
 
 
 def _sentence(result: RelaxationResult) -> str:

@@ -35,7 +35,8 @@ def write_figure(result: CompressionResult, curves: StressCurves, out: Path) -> 
             top.fill_between(x, low, high, label=f"range of {len(repeats)} repeats", **HATCHED)
             below.fill_between(x, low - mean, high - mean, **HATCHED)
         top.plot(x, mean, label="measured, mean" if several else "measured", **MEASURED)
-        top.plot(x, fitted, label=f"fitted, E = {quantity(result.E.mean_Pa, 'Pa')} over 0 to {x[-1]:g} % strain", **SIMULATED)
+        modulus = f"E = {quantity(result.E.mean_Pa, 'Pa')} over 0 to {x[-1]:g} % strain"
+        top.plot(x, fitted, label=f"fitted, {modulus}", **SIMULATED)
         top.set_ylabel("force / first area [kPa]")
         top.set_ylim(bottom=0.0)
         below.axhline(0.0, **MEASURED)

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from reports.base.brief import Brief, ReportPart, ReportTable, typeset_brief
+from reports.base.brief import Brief, ReportPart, ReportTable
 from reports.base.figures import HATCHED, MEASURED, SIMULATED, svg
 from reports.base.format import breakable, plain, quantity
 from reports.press.law import law_parts
 from reports.press.tables import between, mean_and_sd, sentences
+from reports.web.brief import Chart, Panel, publish_brief
 
 if TYPE_CHECKING:
     from calib.texture.texture_result import BiteCurves, TextureResult
@@ -31,12 +32,14 @@ DEFINITIONS = (
     "behind its peak over that before it. Adhesiveness: area below load zero between the bites. Areas are of load over "
     "time, from contact until the load has fallen back to the trigger (Friedman et al. 1963, Bourne 1978)."
 )
+BITES = "The bites"
+"""Title of the part that shows them."""
 ALT = "Load over time of the two bites of each group: mean of the repeats and their range"
 COLUMNS, PANEL = 2, 40.0
 
 
 def write_report(result: TextureResult, curves: Sequence[BiteCurves], out: Path) -> Path:
-    """Write ``report.pdf`` beside ``tpa.json``.
+    """Write ``report.pdf`` and ``report.html`` beside ``tpa.json``.
 
     Args:
         result: The texture profiles.
@@ -44,7 +47,7 @@ def write_report(result: TextureResult, curves: Sequence[BiteCurves], out: Path)
         out: The folder.
 
     Returns:
-        Path of the report.
+        Path of ``report.pdf``.
 
     Raises:
         ReportError: The report cannot be written.
@@ -58,7 +61,7 @@ def write_report(result: TextureResult, curves: Sequence[BiteCurves], out: Path)
         parts.append(ReportPart("Along over across the fibres", RATIO, table=_ratios(result)))
     if result.laws:
         parts += law_parts(result)
-    parts.append(ReportPart("The bites", picture=picture(curves), alt=ALT))
+    parts.append(ReportPart(BITES, picture=picture(curves), alt=ALT))
     parts.append(ReportPart("Each specimen", table=_specimens(result), apart=count > 12))
     brief = Brief(
         kind="Texture profile",
@@ -73,7 +76,22 @@ def write_report(result: TextureResult, curves: Sequence[BiteCurves], out: Path)
         parts=parts,
         limits=sentences(result.not_shown),
     )
-    return typeset_brief(out / "tpa.json", brief, result)
+    return publish_brief(out / "tpa.json", brief, result, _chart(curves))
+
+
+def _chart(curves: Sequence[BiteCurves]) -> Chart:
+    """The load of each group to point at, and how far the law of the other speeds is from it."""
+    panels = []
+    for one in curves:
+        mean = one.loads.mean(axis=0)
+        drawn = {"measured": ("mean of the repeats" if len(one.loads) > 1 else "measured", mean)}
+        if one.predicted is not None:
+            drawn["fitted"] = ("law of the other speeds", one.predicted)
+        band = (one.loads.min(axis=0), one.loads.max(axis=0)) if len(one.loads) > 1 else None
+        left = None if one.predicted is None else one.predicted - mean
+        panels.append(Panel(one.group, one.time, drawn, band, left))
+    axes = ("time from the first peak", "s"), ("load", "N")
+    return Chart(BITES, *axes, panels, "Group", "range of the repeats", "law − mean of the repeats")
 
 
 RATIO = "Ratio of the means; the interval is that of the bootstrap over specimens."

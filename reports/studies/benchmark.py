@@ -11,9 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 from reports import ReportError
-from reports.base.brief import AGAIN, Brief, ReportPart, ReportTable, typeset_brief
+from reports.base.brief import AGAIN, Brief, ReportPart, ReportTable
 from reports.base.figures import BLACK, BLUE, GREY, svg
 from reports.base.format import breakable, count, duration, quantity
+from reports.web.brief import publish_brief
 
 if TYPE_CHECKING:
     from studies.speed.result import (
@@ -95,7 +96,7 @@ def write_figure(result: BenchmarkResult, out: Path) -> None:
 
 
 def write_report(result: BenchmarkResult, out: Path) -> Path:
-    """Write ``report.pdf`` beside ``bench.json``.
+    """Write ``report.pdf`` and ``report.html`` beside ``bench.json``.
 
     Args:
         result: The benchmark.
@@ -107,7 +108,7 @@ def write_report(result: BenchmarkResult, out: Path) -> Path:
     Raises:
         ReportError: Too little was measured, or the report cannot be written.
     """
-    return typeset_brief(out / "bench.json", _brief(result, _measured(result, out)), result)
+    return publish_brief(out / "bench.json", _brief(result, _measured(result, out)), result)
 
 
 def _measured(result: BenchmarkResult, out: Path) -> Measured:

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from reports.base.brief import Brief, ReportPart, ReportTable, typeset_brief
+from reports.base.brief import Brief, ReportPart, ReportTable
 from reports.base.figures import BLACK, BLUE, GREEN, GREY, LIGHT, ORANGE, RED, SKY, stroke_axis, svg
 from reports.base.format import count, duration, listed, quantity
 from reports.base.labels import capital, in_words
+from reports.web.brief import publish_brief
 
 if TYPE_CHECKING:
     from studies.convergence.gci import Estimate
@@ -69,7 +70,7 @@ def write_figure(result: ConvergenceResult, curves: ForceCurves, out: Path) -> N
 
 
 def write_report(result: ConvergenceResult, curves: ForceCurves, out: Path) -> Path:
-    """Write ``report.pdf`` beside ``converge.json``.
+    """Write ``report.pdf`` and ``report.html`` beside ``converge.json``.
 
     Args:
         result: The finished study.
@@ -82,7 +83,7 @@ def write_report(result: ConvergenceResult, curves: ForceCurves, out: Path) -> P
     Raises:
         ReportError: The report cannot be written.
     """
-    return typeset_brief(out / "converge.json", _brief(result, curves), result)
+    return publish_brief(out / "converge.json", _brief(result, curves), result)
 
 
 def _numbers(result: ConvergenceResult) -> list[tuple[str, str, Estimate]]:

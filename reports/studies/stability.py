@@ -12,10 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from reports import ReportError
-from reports.base.brief import AGAIN, Brief, ReportPart, ReportTable, typeset_brief
+from reports.base.brief import AGAIN, Brief, ReportPart, ReportTable
 from reports.base.figures import BLACK, BLUE, GREEN, GREY, ORANGE, RED, svg
 from reports.base.format import breakable, duration, quantity
 from reports.base.labels import capital, in_words
+from reports.web.brief import publish_brief
 
 if TYPE_CHECKING:
     from studies.stability.result import CellResult, StabilityMap
@@ -65,7 +66,7 @@ def write_figure(cells: Sequence[CellResult], out: Path) -> None:
 
 
 def write_report(result: StabilityMap, out: Path) -> Path:
-    """Write ``report.pdf`` beside ``stress.json``.
+    """Write ``report.pdf`` and ``report.html`` beside ``stress.json``.
 
     Args:
         result: The finished map.
@@ -77,7 +78,7 @@ def write_report(result: StabilityMap, out: Path) -> Path:
     Raises:
         ReportError: The report cannot be written.
     """
-    return typeset_brief(out / "stress.json", _brief(result), result)
+    return publish_brief(out / "stress.json", _brief(result), result)
 
 
 def _brief(result: StabilityMap) -> Brief:

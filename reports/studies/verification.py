@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, NullFormatter
 
-from reports.base.brief import Brief, ReportPart, ReportTable, typeset_brief
+from reports.base.brief import Brief, ReportPart, ReportTable
 from reports.base.figures import BLACK, BLUE, GREY, svg
 from reports.base.format import breakable, duration, plain
 from reports.base.labels import capital
+from reports.web.brief import publish_brief
 
 if TYPE_CHECKING:
     from studies.verification.result import Comparison, Verification
@@ -37,7 +38,7 @@ def write_figure(result: Verification, out: Path) -> None:
 
 
 def write_report(result: Verification, out: Path) -> Path:
-    """Write ``report.pdf`` beside ``verify.json``.
+    """Write ``report.pdf`` and ``report.html`` beside ``verify.json``.
 
     Args:
         result: The verification.
@@ -49,7 +50,7 @@ def write_report(result: Verification, out: Path) -> Path:
     Raises:
         ReportError: The report cannot be written.
     """
-    return typeset_brief(out / "verify.json", _brief(result), result)
+    return publish_brief(out / "verify.json", _brief(result), result)
 
 
 def _brief(result: Verification) -> Brief:

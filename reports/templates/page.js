@@ -181,7 +181,8 @@
   function mark() {
     if (now === null) return;
     const place = frame.x(x[now]), rows = values();
-    const stroke = number(x[now], curves.places.stroke) + space + curves.axes.across[1];
+    const plain = curves.log ? String(Number(x[now].toPrecision(3))) : number(x[now], curves.places.stroke);
+    const stroke = plain + space + curves.axes.across[1];
     frame.mark.replaceChildren();
     const ends = { y1: frame.upper.top, y2: frame.lowest.top + frame.lowest.height };
     make(frame.mark, "line", Object.assign({ class: "now", x1: place, x2: place }, ends));
@@ -251,7 +252,7 @@
     choose(chosen === null ? (by > 0 ? 0 : size - 1) : (chosen + by + size) % size);
   }
 
-  ["box", "legend", "choice"].map(at).filter(Boolean).concat(Array.from(document.querySelectorAll("#forces > p[hidden]")))
+  ["box", "legend", "choice"].map(at).filter(Boolean).concat(Array.from(document.querySelectorAll("p[hidden]")))
     .forEach((one) => { one.hidden = false; });
   show(0);
   if (cut) cut.addEventListener("change", () => { show(cut.selectedIndex); draw(); });

@@ -29,7 +29,7 @@ DESCRIPTION = """Calibrate Young's modulus on the force of a specimen that is co
 two plates. One simulation at a reference modulus gives the curve; each repeat
 is fitted by scaling it. Strain is compression / height, stress force / first
 area. The first sample of a repeat is its zero; no toe is corrected. Writes
-compress.json, curves.csv, compress.svg and report.pdf to --out."""
+compress.json, curves.csv, compress.svg, report.pdf and report.html to --out."""
 STRAIN = 0.4  # that is fitted where none is given
 EPILOG = """examples:
   cutcal compress --trace gel.csv --height 0.03 --diameter 0.05 --nu 0.49

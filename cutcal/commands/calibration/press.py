@@ -25,7 +25,7 @@ loading (the command compress is the same); relax: Prony series of a hold; tpa:
 texture profile of two bites. A trace of relax and tpa is one specimen and has
 columns of time, load and compression, or of a gap that closes, whose first
 value is then the height, unless --height says another. Writes MODE.json,
-curves.csv and report.pdf to --out."""
+curves.csv, report.pdf and report.html to --out."""
 EPILOG = """examples:
   cutcal press compress --trace gel.csv --height 0.03 --diameter 0.05 --nu 0.49
   cutcal press relax --trace a.csv b.csv --diameter 0.02 --height 0.01

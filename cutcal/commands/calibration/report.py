@@ -11,10 +11,9 @@ from calib.io.schema import tag
 from cutcal.options import add_json, print_json
 from reports import ReportError
 
-HELP = "write report.pdf of a finished run again"
-DESCRIPTION = """Typeset report.pdf again from the files that a calibration, a study of
-several cuts, converge, verify, stress or bench wrote; that of a calibration or
-a study with its report.html."""
+HELP = "write report.pdf and report.html of a finished run again"
+DESCRIPTION = """Write report.pdf and report.html again from the files that a calibration, a
+study of several cuts, converge, verify, stress or bench wrote."""
 EPILOG = "examples:\n  cutcal report runs/banana\n  cutcal report runs/banana --context context.yaml"
 
 

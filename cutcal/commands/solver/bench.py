@@ -28,7 +28,7 @@ DESCRIPTION = """Measure on this machine: the rate of the kernels beside that of
 solver with the same physics, the time of the default cut beside that of the
 published configuration (120^3 nodes, dt 2e-5 s), and time and error of the
 cut with one thing changed. Writes bench.json,
-bench.svg and report.pdf to --out.
+bench.svg, report.pdf and report.html to --out.
 
 Only the ratios mean something elsewhere: each is of runs that took turns."""
 EPILOG = """example:

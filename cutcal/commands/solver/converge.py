@@ -36,7 +36,8 @@ HELP = "repeat a cut on finer grids: order, numerical uncertainty"
 DESCRIPTION = """Repeat one cut on finer grids, and apart from that with other time steps,
 speeds and particles. Writes converge.json, curves.csv (with the standard
 numerical uncertainty over the stroke, u_num_N of the finest grid and
-u_num_coarsest_N of the coarsest), converge.svg and report.pdf to --out."""
+u_num_coarsest_N of the coarsest), converge.svg, report.pdf
+and report.html to --out."""
 EPILOG = """examples:
   cutcal converge --food banana
   cutcal converge --food potato --material runs/potato/material.yaml \\

@@ -28,7 +28,7 @@ range or past it: stiffness, Poisson's ratio, time step, cell, speed, density,
 yield stress, cutting resistance, blades that miss the food, food in the air or
 a hundred times too dense. Each must end stable, or refused or stopped for a
 reason that is named; momentum and energy are audited. Writes stress.json,
-stress.svg and report.pdf to --out."""
+stress.svg, report.pdf and report.html to --out."""
 EPILOG = """examples:
   cutcal stress --quick
   cutcal stress --out runs/stress --workers 4

@@ -28,7 +28,7 @@ DESCRIPTION = """Compare the solver with closed forms, and with finite elements 
 laws at a point, conservation, waves, vibration, friction, impact, a
 manufactured solution, presses, and the cutting force of a thin blade. The
 finite elements are themselves compared with known answers. Writes verify.json,
-verify.svg and report.pdf to --out."""
+verify.svg, report.pdf and report.html to --out."""
 EPILOG = """examples:
   cutcal verify --quick
   cutcal verify --only press --out runs/presses

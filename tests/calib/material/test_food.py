@@ -687,5 +687,5 @@ def test_sources_write_their_numbers_with_a_unit() -> None:
     for name in FoodSpec.list():
         food = FoodSpec.load(name)
         for key, known in {**food.properties, **food.sizes}.items():
-            texts = (known.source, known.flag)
-            assert not [text for text in texts if text and re.search(r"(?<!x)\b\d+(?:\.\d+)?e[-+]?\d", text)], f"{name}.{key}"
+            texts = " ".join(filter(None, (known.source, known.flag)))
+            assert not re.search(r"(?<!x)\b\d+(?:\.\d+)?e[-+]?\d", texts), f"{name}.{key}: {texts}"

@@ -242,7 +242,6 @@ def printed(pdf: Path) -> str:
     return " ".join(page.extract_text() for page in PdfReader(pdf).pages)
 
 
-
 @pytest.mark.parametrize(("height", "length"), [(0.024, 0.1), (0.03, 0.02)])
 def test_the_glance_on_the_first_page_is_the_food_about_the_blade_at_the_largest_force(
     height: float, length: float

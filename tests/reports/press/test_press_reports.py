@@ -70,6 +70,12 @@ def result(**changes: Any) -> CompressionResult:
     return replace(whole, **changes)
 
 
+def curves_of(*repeats: tuple[str, np.ndarray], fitted: np.ndarray) -> StressCurves:
+    """Stress over strain of repeats by name [Pa], and of a fit, each (41,)."""
+    all_of_them = np.array([stress for _, stress in repeats])
+    return StressCurves(STRAIN, all_of_them.mean(axis=0), all_of_them.std(axis=0), fitted, dict(repeats))
+
+
 @pytest.fixture
 def told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """What the report of a result holds; it is typeset all the same."""
@@ -82,10 +88,10 @@ def told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(brief, "publish", publish)
 
     def report(one: CompressionResult) -> dict[str, Any]:
-        curves = StressCurves(STRAIN, 1e5 * STRAIN, 0 * STRAIN, 1e5 * STRAIN, {"R0": 1e5 * STRAIN, "R1": 1e5 * STRAIN})
+        curves = curves_of(("R0", 1e5 * STRAIN), ("R1", 1e5 * STRAIN), fitted=1e5 * STRAIN)
         (tmp_path / "compress.json").write_text("{}")
         write_figure(one, curves, tmp_path)
-        write_report(one, tmp_path)
+        write_report(one, curves, tmp_path)
         content = json.loads(spaced(json.dumps(found[-1], ensure_ascii=False, default=lambda picture: "")))
         return dict(content)
 

@@ -1,4 +1,4 @@
-"""A browser without a window that a test drives: real pointer, real keys, and what the page has asked for or complained of.
+"""A browser without a window that a test drives: real pointer and keys, and what the page asked for or complained of.
 
 It speaks the DevTools protocol over two pipes, so that neither a driver nor a package is needed, only the browser.
 """
@@ -101,8 +101,9 @@ class Tab:
     def place(self, query: str, across: float = 0.5, down: float = 0.5) -> tuple[float, float]:
         """Where an element is [px], after it was scrolled into view: a part of its width and height."""
         box = self.ask(
-            f"(() => {{ const one = document.querySelector({json.dumps(query)}); one.scrollIntoView({{block: 'center', "
-            "behavior: 'instant'}); const b = one.getBoundingClientRect(); return [b.left, b.top, b.width, b.height]; })()"
+            f"(() => {{ const one = document.querySelector({json.dumps(query)}); "
+            "one.scrollIntoView({block: 'center', behavior: 'instant'}); const b = one.getBoundingClientRect(); "
+            "return [b.left, b.top, b.width, b.height]; })()"
         )
         return box[0] + across * box[2], box[1] + down * box[3]
 

@@ -37,7 +37,7 @@ global.document = {
   createElementNS: (space, tag) => new Element(tag),
   querySelectorAll: (query) => {
     const [, key] = query.match(/\[([\w-]+)\]/);
-    return all.filter((one) => key in one.attributes && (!query.startsWith("#forces") || one.tag === "p"));
+    return all.filter((one) => key in one.attributes && (!query.startsWith("p[") || one.tag === "p"));
   },
 };
 global.window = { addEventListener() {} };

@@ -10,9 +10,13 @@ from typing import Any
 import pytest
 
 from calib.calibration.report import write_report
+from reports.base import brief as base
 from reports.multi_specimen.report import write_report as write_study_report
+from reports.press.compression import write_report as write_compression
+from reports.press.stress_strain import write_figure
 from tests.reports import sample, study_sample
 from tests.reports.page_sample import Page, add_members
+from tests.reports.press.test_press_reports import STRAIN, curves_of, result
 from tests.reports.sample import spaced
 from tests.reports.web.browser import NAMES, Tab, found, tab
 
@@ -24,7 +28,8 @@ HIGHEST = """(() => {
   const chart = document.getElementById('chart'), b = chart.getBoundingClientRect();
   const points = document.querySelectorAll('#chart .every')[2].getAttribute('d').slice(1).split(/[ML]/)
     .map(one => one.split(' ').map(Number));
-  const top = points.reduce((best, one) => one[1] < best[1] ? one : best), scale = b.width / chart.viewBox.baseVal.width;
+  const top = points.reduce((best, one) => one[1] < best[1] ? one : best);
+  const scale = b.width / chart.viewBox.baseVal.width;
   return [b.left + scale * top[0], b.top + scale * top[1]];
 })()"""
 
@@ -58,7 +63,8 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def tip(shown: Tab) -> dict[str, str]:
     """What the box at the cursor says, by name."""
-    rows = shown.ask("[...document.querySelectorAll('#tip div')].map(row => [...row.children].map(one => one.innerText))")
+    texts = "[...row.children].map(one => one.innerText)"
+    rows = shown.ask(f"[...document.querySelectorAll('#tip div')].map(row => {texts})")
     return {name: spaced(text) for name, text in rows}
 
 
@@ -158,7 +164,8 @@ def test_a_member_is_picked_in_each_way(shown: Tab, run: Path) -> None:
     shown.ask("document.querySelector('details').open = true")
     shown.click(*shown.place("[data-member='4']"))
     assert shown.ask(chosen) == values[4] and shown.ask("document.getElementById('member').value") == "4"
-    assert shown.ask("[...document.querySelectorAll('#all tr.picked button')].map(one => one.innerText)") == [rows[4][0]]
+    picked = "[...document.querySelectorAll('#all tr.picked button')].map(one => one.innerText)"
+    assert shown.ask(picked) == [rows[4][0]]
     shown.click(*shown.place("#every"))
     assert lines(shown).count("line every") == len(rows)
     shown.place("#chart")
@@ -178,8 +185,8 @@ def test_another_cut_is_chosen(shown: Tab, study: Path) -> None:
         said = tip(shown)
         near = nearest(said, cuts[k]["x"])
         assert says(said[cuts[k]["names"]["sim_N"]], cuts[k]["y"]["sim_N"][near])
-        captions = "[...document.querySelectorAll('[data-cut]')].filter(one => one.offsetHeight).map(one => one.dataset.cut)"
-        assert shown.ask(captions) == [str(k)]
+        seen = "[...document.querySelectorAll('[data-cut]')].filter(one => one.offsetHeight)"
+        assert shown.ask(f"{seen}.map(one => one.dataset.cut)") == [str(k)]
 
 
 def test_without_scripts_the_figure_is_there(shown: Tab, run: Path) -> None:
@@ -203,3 +210,20 @@ def test_a_name_that_is_a_script_does_not_run(shown: Tab, tmp_path: Path) -> Non
     shown.open(write_report(folder).with_suffix(".html"))
     assert shown.dialogs == [] and shown.complaints == []
     assert "<script>alert(1)</script>" in shown.ask("document.querySelector('h1').innerText").lower()
+
+
+def test_stress_over_strain_is_read_off(shown: Tab, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The page of a compression is whole at each width, and its curve says strain and stress at the pointer."""
+    monkeypatch.setattr(base, "publish", lambda *_, **__: None)
+    (tmp_path / "compress.json").write_text("{}")
+    curves = curves_of(("R0", 1e5 * STRAIN), ("R1", 1.2e5 * STRAIN), fitted=1.1e5 * STRAIN)
+    write_figure(result(), curves, tmp_path)
+    path = write_compression(result(), curves, tmp_path).with_suffix(".html")
+    for width in WIDTHS:
+        shown.open(path, width)
+        assert shown.complaints == [] and shown.ask("document.documentElement.scrollWidth") <= width
+    shown.point(*shown.place("#chart", 0.5, 0.3))
+    said = tip(shown)
+    strain = number(said["strain"])
+    assert said["strain"].endswith(" %") and said["measured, mean"].endswith(" kPa")
+    assert says(said["measured, mean"], 1.1 * strain) and says(said["residual"], 0.0)

@@ -140,7 +140,8 @@ def test_the_curves_are_those_of_the_run(run: Path, whole: Page) -> None:
     """Stroke, forces, band and residual of the page are those of curves.csv, to the last digit."""
     curves, drawn = read_result(run).curves, whole.data["curves"]
     assert np.allclose(drawn["x"], 1e3 * curves["stroke_m"], rtol=1e-8, atol=0.0)
-    for name, values in {**drawn["y"], **{f"band_{end}_N": x for end, x in drawn["band"].items()}, "residual_N": drawn["residual"]}.items():
+    band = {f"band_{end}_N": values for end, values in drawn["band"].items()}
+    for name, values in {**drawn["y"], **band, "residual_N": drawn["residual"]}.items():
         assert values == curves[name].tolist(), name
     assert {"real_N", "sim_N", "start_N", "edge_N"} <= set(drawn["y"])
 
