@@ -69,7 +69,7 @@ def fit_report(result: Reported) -> str:
     lines += [f"    {name:28s}= {text}" for name, text in _statistics(result)]
     lines.append(f"[[Verdicts]] {identified_words(result.fitted).partition(':')[0]}")
     for v in result.verdicts:
-        limit = "" if v.limit is None else f"({_relation(v)} {v.limit:.3g})"
+        limit = "" if v.limit is None else f"({relation(v)} {v.limit:.3g})"
         lines.append(f"    {STATES[v.passed]:8s}{v.name:44s}{_number(v.value):>10s}  {limit}".rstrip())
     lines.append("[[Parameters]] value, 95 % interval, 95 % range of the literature")
     for name, p in result.fitted.items():
@@ -129,10 +129,19 @@ def _statistics(result: Reported) -> list[tuple[str, str]]:
     ]
 
 
-def _relation(v: Verdict) -> str:
-    """Whether the limit is the largest or the smallest value that passes: it follows from value and outcome."""
-    if v.relation or v.value is None or v.limit is None or v.passed is None or abs(v.value) == v.limit:
+def relation(v: Verdict) -> str:
+    """Whether the limit is the largest or the smallest value that passes: it follows from value and outcome.
+
+    Args:
+        v: A line with a limit.
+
+    Returns:
+        ``<=`` or ``>=``; the word limit where neither follows.
+    """
+    if v.relation or v.value is None or v.limit is None or v.passed is None:
         return v.relation or "limit"
+    if abs(v.value) == v.limit:
+        return "<=" if v.passed else "limit"
     return "<=" if (abs(v.value) < v.limit) == v.passed else ">="
 
 

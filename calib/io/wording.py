@@ -53,6 +53,8 @@ def listed(names: Sequence[object], letters: int = LETTERS) -> str:
 
 OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*[a-z])")
 """An option of the command line in a sentence."""
+COMMAND = re.compile(r"\b(?:cutcal [a-z]+|calibrate)(?: [A-Z]+)?(?: --[a-z-]+(?: [\w.]+)?)* $")
+"""What stands before an option that is part of a command to be typed, such as ``cutcal foods --template``."""
 ARGUMENTS = {"material": "food", "run": "start", "config": "Study.read", "resume": "resume=True"}
 """What an option is called in Python, where its name is another one."""
 
@@ -62,8 +64,16 @@ def as_arguments(sentence: str) -> str:
 
     >>> as_arguments("give --force-col, or add --resume (option --t-end)")
     'give force_col, or add resume=True (argument t_end)'
+    >>> as_arguments("give --food a file, which cutcal foods --template begins")
+    'give food a file, which cutcal foods --template begins'
     """
-    named = OPTION.sub(lambda m: ARGUMENTS.get(m[1], m[1].replace("-", "_")), sentence)
+
+    def named_in_python(option: re.Match[str]) -> str:
+        if COMMAND.search(sentence, 0, option.start()):
+            return option[0]
+        return ARGUMENTS.get(option[1], option[1].replace("-", "_"))
+
+    named = OPTION.sub(named_in_python, sentence)
     return re.sub(r"\boption (?=[a-z_]+\b)", "argument ", named) if named != sentence else sentence
 
 

@@ -35,6 +35,7 @@ from calib.multi_specimen.spec import (
 )
 from calib.outline.outline_file import OutlineFile
 from calib.problem.request import Request
+from calib.table.si_numbers import si_number
 
 LARGEST_SCATTER = 1.0
 """Standard deviation of a logarithm [-]: a factor of seven either way."""
@@ -45,6 +46,9 @@ SENSOR = ("gain_sd", "lag_sd", "bandwidth")
 NUMBERS = ("speed", "board_z", "t_end", "height", "width", "length", "at", *SENSOR, "rate", "cut")
 TEXTS = ("time_col", "force_col", "position_col", "depth_col", "sign", "decimal", "baseline", "shape", "knife")
 OUTLINES = tuple(one.name for one in fields(OutlineFile))
+UNITS = {"speed": "m/s", "board_z": "m", "t_end": "s", "height": "m", "width": "m", "length": "m", "diameter": "m"}
+UNITS |= {"dx": "m", "lag_sd": "s", "bandwidth": "/s", "rate": "/s"}
+"""What a number is in, where it may be written with a unit of its own."""
 COMPRESSION_SIZES = ("height", "diameter", "width", "length")
 
 
@@ -94,11 +98,17 @@ def read_study(path: Path | str) -> StudySpec:
 def _food(top: Place, content: Mapping[str, Any], folder: Path) -> FoodSpec:
     name = text(top.at("food"), content["food"])
     material = content.get("material")
+    own = is_file(name) and material is None
     try:
-        food = load_food(name) if material is None else load_material_file(folder / text(top.at("material"), material))
+        if own:
+            food = load_material_file(folder / name)
+        else:
+            food = (
+                load_food(name) if material is None else load_material_file(folder / text(top.at("material"), material))
+            )
     except MaterialError as e:
         raise top.at("food").error(str(e)) from None
-    if food.name != name:
+    if not own and food.name != name:
         raise top.at("material").error(f"holds {food.name}, but food is {name}; make them the same")
     given = content.get("set")
     if given is None:
@@ -168,14 +178,19 @@ def _sizing(
 
 def _knife(name: str, folder: Path) -> str:
     """A knife of knives.yaml by its name, or a file beside the study."""
-    return str(folder / name) if name.endswith((".yaml", ".yml")) else name
+    return str(folder / name) if is_file(name) else name
+
+
+def is_file(name: str) -> bool:
+    """Whether a food or a knife is named by a file beside the study."""
+    return name.endswith((".yaml", ".yml"))
 
 
 def _compression(place: Place, name: str, given: Mapping[str, Any], folder: Path) -> CompressionSpec:
     check_keys(place, given, ("kind", "trace", "height", "nu"), COMPRESSION_SIZES)
     raw = given["trace"] if isinstance(given["trace"], list) else [given["trace"]]
     files = tuple(folder / text(place.at("trace"), entry) for entry in raw)
-    sizes = {n: finite_number(place.at(n), given[n]) for n in COMPRESSION_SIZES if n in given}
+    sizes = {n: _finite(place, given, n) for n in COMPRESSION_SIZES if n in given}
     if ("diameter" in sizes) == ("width" in sizes and "length" in sizes):
         raise place.error("give height and diameter of an upright cylinder, or height, width and length of a block [m]")
     return CompressionSpec(name, files, sizes, finite_number(place.at("nu"), given["nu"]))
@@ -211,7 +226,18 @@ def _names(place: Place, given: Any) -> tuple[str, ...] | None:
 def _number(place: Place, given: Mapping[str, Any], name: str) -> float | None:
     if given.get(name) is None:
         return None
-    x = finite_number(place.at(name), given[name])
+    x = _finite(place, given, name)
     if not x > 0.0:
         raise place.at(name).error(f"is {x:g}; it must be positive")
     return x
+
+
+def _finite(place: Place, given: Mapping[str, Any], name: str) -> float:
+    """A number in SI, or with a unit of its own, as on the command line."""
+    value = given[name]
+    if isinstance(value, str) and name in UNITS:
+        try:
+            value = si_number(value, UNITS[name])
+        except ValueError as e:
+            raise place.at(name).error(str(e)) from None
+    return finite_number(place.at(name), value)

@@ -15,13 +15,14 @@ import matplotlib
 import numpy as np
 import pytest
 
-from calib.calibration.fit_report import strongest
+from calib.calibration.fit_report import relation, strongest
 from calib.calibration.result import CalibrationResult
 from calib.errors import OutputError
 from calib.io.progress import Progress, ProgressBar
 from calib.io.wording import as_arguments, in_arguments
 from calib.simulation.evaluation import Evaluation
 from calib.simulation.evaluation_file import Header, StoredEvaluation, hdf5_of
+from calib.validation.acceptance import Verdict
 from cutcal import Calibration, Food, Trace
 from cutcal.commands.calibration.calibrate import add_args
 from mpm.scene.errors import CutcalError
@@ -93,6 +94,15 @@ def test_options_become_arguments() -> None:
     """Options in a sentence, and nothing else: no dash between words, no line of a table."""
     assert as_arguments("add --resume (option --t-end)") == "add resume=True (argument t_end)"
     assert as_arguments("a -- b, force--col, option 3") == "a -- b, force--col, option 3"
+
+
+def test_a_command_to_be_typed_keeps_its_options() -> None:
+    """What a message says to type in a shell can be typed; what it says of a run is an argument."""
+    for typed in ("cutcal foods --template", "cutcal report DIR --context", "cutcal converge --material --offset 0.5"):
+        assert as_arguments(f"try --knife, or {typed} begins one") == f"try knife, or {typed} begins one"
+    assert as_arguments("run the same calibrate command again with --resume").endswith("again with resume=True")
+    with pytest.raises(CutcalError, match="file that cutcal foods --template begins"):
+        Calibration("tofu", BANANA)
 
 
 def test_stages_and_folders_speak_of_arguments(tmp_path: Path) -> None:
@@ -192,3 +202,10 @@ def test_packages_say_that_they_are_typed(name: str) -> None:
     """The mark of PEP 561 lies beside the package's first module."""
     found = importlib.util.find_spec(name)
     assert found is not None and found.origin is not None and (Path(found.origin).parent / "py.typed").is_file()
+
+
+def test_a_limit_is_the_largest_or_the_smallest_value() -> None:
+    """It follows from value and outcome; a value at its limit that passes is no larger."""
+    lines = {(0.3, 0.01, True): ">=", (0.02, 0.05, True): "<=", (0, 0, True): "<=", (0.2, 0.05, False): "<="}
+    assert {key: relation(Verdict("line", key[0], key[1], "-", key[2])) for key in lines} == lines
+    assert relation(Verdict("line", None, 0.05, "-", None)) == "limit"

@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from calib.calibration.fit_report import relation
 from calib.io.progress import ProgressBar
 from calib.multi_specimen.spec import StudySpec, study_of_cuts
 from calib.problem.request import Request
@@ -301,7 +302,7 @@ def verdict_text(result: CalibrationResult) -> str:
     for v in result.verdicts:
         mark = {True: "pass", False: "FAIL", None: "not run"}[v.passed]
         value = "" if v.value is None else f"{v.value:.3g}"
-        limit = "" if v.limit is None else f"limit {v.limit:.3g}"
+        limit = "" if v.limit is None else f"{relation(v)} {v.limit:.3g}"
         lines.append(f"  {mark:8s}{v.name:42s}{value:>10s}  {limit}")
         remedy = remedied(v)
         lines += [f"  {'':8s}{remedy}"] if remedy else []

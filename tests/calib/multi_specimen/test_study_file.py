@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from calib.material.food import load_food
+from calib.material.food_file import dump_material
 from calib.multi_specimen.compression_modulus import compression_modulus, with_measured_modulus
 from calib.multi_specimen.spec import SCATTER, SPECIMEN_PROPERTIES
 from calib.multi_specimen.study_file import read_study
@@ -61,6 +62,26 @@ def test_a_trace_of_a_study_has_its_own_outline(tmp_path: Path) -> None:
         read_study(written(tmp_path, text.replace("at: 0.25", "scale: 1mm/px")))
 
 
+def test_numbers_may_have_their_unit(tmp_path: Path) -> None:
+    """Sizes, speed, cells and those of a compression are written as on the command line."""
+    plain = read_study(written(tmp_path, GOOD + "dx: 0.004\n"))
+    text = GOOD.replace("width: 0.03", "width: 30 mm").replace("speed: 0.02", "speed: 20mm/s")
+    units = read_study(written(tmp_path, text.replace("diameter: 0.05", "diameter: 5cm") + "dx: 4mm\n"))
+    for name, request in plain.requests.items():
+        other = units.requests[name]
+        assert (other.sizing, other.speed, other.dx) == (request.sizing, request.speed, 0.004)
+    assert units.compressions[0].sizes == plain.compressions[0].sizes
+
+
+def test_a_food_of_ones_own_is_a_file_beside_the_study(tmp_path: Path) -> None:
+    """A file stands where a food's name does; its food has the name that it has there."""
+    dump_material(replace(load_food("banana"), name="mine"), tmp_path / "mine.yaml", {})
+    study = read_study(written(tmp_path, GOOD.replace("food: banana", "food: mine.yaml")))
+    assert study.food.name == "mine"
+    with pytest.raises(CutcalError, match=r"study.yaml: food: .*none.yaml"):
+        read_study(written(tmp_path, GOOD.replace("food: banana", "food: none.yaml")))
+
+
 def test_each_is_all_in_turn(tmp_path: Path) -> None:
     """hold_out: each names every cut, and no compression test."""
     study = read_study(written(tmp_path, GOOD.replace("hold_out: b", "hold_out: each")))
@@ -89,7 +110,11 @@ def test_the_command_line_says_how_to_run_it(tmp_path: Path) -> None:
         ("hold_out: b", "hold_out: c", "'c' is no trace of this study; known: a, b"),
         ("hold_out: b", "hold_out: [a, b]", "nothing would be left to fit"),
         ("width: 0.03", "widht: 0.03", "study.yaml: traces.a.widht: unknown key, did you mean 'width'"),
-        ("width: 0.03", "width: wide", "study.yaml: traces.a.width: is text 'wide'"),
+        (
+            "width: 0.03",
+            "width: wide",
+            "study.yaml: traces.a.width: 'wide' is not a length: write it in m, or with its unit",
+        ),
         ("speed: 0.02", "speed: -0.02", "study.yaml: traces.b.speed: is -0.02; it must be positive"),
         ("kind: compression", "kind: pull", "study.yaml: traces.gel.kind: unknown value 'pull'"),
         ("diameter: 0.05, ", "", "give height and diameter of an upright cylinder"),
