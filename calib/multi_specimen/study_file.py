@@ -98,14 +98,10 @@ def read_study(path: Path | str) -> StudySpec:
 def _food(top: Place, content: Mapping[str, Any], folder: Path) -> FoodSpec:
     name = text(top.at("food"), content["food"])
     material = content.get("material")
-    own = is_file(name) and material is None
+    own = material is None and is_file(name)
+    file = name if own else None if material is None else text(top.at("material"), material)
     try:
-        if own:
-            food = load_material_file(folder / name)
-        else:
-            food = (
-                load_food(name) if material is None else load_material_file(folder / text(top.at("material"), material))
-            )
+        food = load_food(name) if file is None else load_material_file(folder / file)
     except MaterialError as e:
         raise top.at("food").error(str(e)) from None
     if not own and food.name != name:
