@@ -25,11 +25,13 @@ FRAME = 1.15  # of the food beside the blade that a picture shows, in heights or
 EYE = np.array([1.0, -0.55, 0.45])  # from where it is seen
 BLADE = 1.4  # length of the blade that is drawn, in widths of the food, where it is longer
 STEEL, WOOD, PAPER, INK = "#8a9199", "#d9c4a0", "white", "black"
+STEPS = 3  # between the numbers at the scale of colours
+ROUND = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)  # what a step may begin with
 BAR = {
     "title": " ",
     "color": INK,
     "label_font_size": 20,
-    "n_labels": 4,
+    "n_labels": STEPS + 1,
     "fmt": "%.3g",
     "position_x": 0.55,
     "position_y": 0.015,
@@ -39,6 +41,16 @@ BAR = {
 MOMENTS = ("contact", "peak", "end")
 SAMPLES = 8  # colours found for a pixel
 RATE = 15  # pictures of a video in a second
+
+
+def round_up(value: float) -> float:
+    """The next round number that is no smaller.
+
+    >>> round_up(23.9), round_up(0.61), round_up(4.0)
+    (25.0, 0.8, 4.0)
+    """
+    power = 10.0 ** math.floor(math.log10(value))
+    return next(one * power for one in ROUND if one * power >= value * (1.0 - 1e-9))
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +75,9 @@ class Film:
 
     @cached_property
     def largest(self) -> float:
-        """Stress at the end of the colours [Pa]."""
+        """Stress at the end of the colours [Pa]: three steps of a round number."""
         values = [float(np.quantile(self.surface.values(look.mises), SHOWN)) for look in self.looks]
-        return max([*values, 1.0])
+        return STEPS * round_up(max([*values, 1.0]) / STEPS)
 
     def force_at(self, look: Snapshot) -> float:
         """Upward force on the knife at a look [N]."""

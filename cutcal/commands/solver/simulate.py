@@ -49,7 +49,7 @@ HELP = "simulate one cut"
 DESCRIPTION = "Simulate one cut and write force.csv and summary.json."
 LENGTHS = ("zone", "slip", "cohesive_zone")  # constants that may be written with a unit
 VIDEO_FRAMES = 72  # of a video: five seconds
-FRAMES_PER_PAGE_FRAME = 2  # frames of a video of which a page has one
+FRAMES_PER_PAGE_FRAME = 6  # frames of a video of which a page has one
 FRAMES_PER_LINE = 12  # pictures of a video after which a line says how many there are
 CRUSHED = (
     "the flesh between stone and board was crushed at {force:.0f} N, further than cells can follow; give a lower "

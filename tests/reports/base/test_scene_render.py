@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import builtins
+import gzip
 import json
 import math
 import re
@@ -22,7 +23,7 @@ from mpm.runtime import Runtime
 from mpm.scene import Knife, Motion
 from mpm.solver import Simulation
 from reports.base.html_page import page
-from reports.base.scene_render import MOMENTS, SIZE, Film, attempt, blade, blade_at, stills, video
+from reports.base.scene_render import MOMENTS, SIZE, STEPS, Film, attempt, blade, blade_at, round_up, stills, video
 from tests.mpm.scenes import PRISM
 
 BAR = 800  # row of a picture below which the scale of the colours stands
@@ -100,7 +101,9 @@ def test_a_page_needs_no_network_and_has_all_looks(film: Film, tmp_path: Path) -
     its force."""
     path = tmp_path / "cut.html"
     page(film, path, "prism, thin knife")
-    text = path.read_text(encoding="utf-8")
+    packed = path.read_text(encoding="utf-8")
+    text = gzip.decompress(base64.b64decode(re.search(r'packed = "(.*?)"', packed)[1])).decode()  # type: ignore[index]
+    assert "src=" not in packed and path.stat().st_size < 3_000_000
     assert not re.search(r"<(script|link|img)[^>]+(src|href)\s*=", text) and "prism, thin knife" in text
     frames = json.loads(re.search(r"Plotly\.addFrames\('[^']+', (\[.*?\])\);", text, re.DOTALL)[1])  # type: ignore[index]
     assert len(frames) == len(film.looks)
@@ -111,7 +114,9 @@ def test_a_page_needs_no_network_and_has_all_looks(film: Film, tmp_path: Path) -
 
     look = film.looks[3]
     np.testing.assert_allclose(numbers(food["z"]) * 1e-5, film.surface.points(look)[:, 2], atol=0.51e-5)
-    np.testing.assert_allclose(numbers(food["intensity"]), film.surface.values(look.mises) / 1e3, atol=1e-3)
+    np.testing.assert_allclose(
+        numbers(food["intensity"]), film.surface.values(look.mises) / 1e3, atol=2.1e-6 * film.largest
+    )
     assert numbers(knife["z"]).min() == pytest.approx(1e5 * (0.024 - look.stroke), abs=1)
     assert now["y"] == [pytest.approx(film.force_at(look))]
 
@@ -156,3 +161,12 @@ def test_where_nothing_can_be_drawn_or_written_it_is_one_line(film: Film, tmp_pa
 def test_a_ball_is_drawn_where_these_tests_run() -> None:
     """What ``cutcal doctor`` tries."""
     assert "drawn without a screen" in attempt()
+
+
+def test_the_scale_of_colours_has_round_numbers(film: Film) -> None:
+    """Each of its numbers has three digits at most, and its end is no more than half again the stress that it shows."""
+    for value in (23.9e3, 0.61, 4.0, 9.5e5):
+        rounded = round_up(value)
+        assert value * (1.0 - 1e-9) <= rounded <= 1.5 * value and float(f"{rounded:.2g}") == pytest.approx(rounded)
+    numbers = [k * film.largest / STEPS for k in range(STEPS + 1)]
+    assert all(float(f"{x:.3g}") == pytest.approx(x, rel=1e-12) for x in numbers)
