@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from calib.material.food import FoodSpec, load_food
-from intsim.sim.background import BACKGROUNDS
+from intsim.render.background import BACKGROUNDS
 from intsim.task.language import SENTENCES_PER_TASK
 from intsim.task.planner import STYLES
 from intsim.task.suites import FIRST_TEST_SEED, FOODS, SUITES, Episode, sample_episode

@@ -26,7 +26,7 @@ from intsim.data.dataset_document import DatasetDocument, PictureTotals
 from intsim.data.manifest import PUBLISHED_TRAJECTORIES
 from intsim.data.shard_meanings import picture_meaning
 from intsim.data.shards import StoredTrajectory, merge_parts, shard_entries, shard_number, shard_paths, write_part
-from intsim.sim.background import BACKGROUNDS
+from intsim.render.background import BACKGROUNDS
 
 PICTURE_FILE = "pictures-{:d}-{:02d}-{:04d}.h5"  # pixels, background, shard
 PICTURE_PART = "picture-{:d}-{:02d}-{:06d}.h5"  # pixels, background, trajectory: until the file is complete

@@ -22,7 +22,7 @@ from mani_skill.utils.structs.types import SimConfig
 from scipy.spatial.transform import Rotation
 
 from calib.material.food import FoodSpec, load_food
-from intsim.sim.background import Background
+from intsim.render.background import Background
 from intsim.sim.coupling import Coupling
 from intsim.sim.panda import (
     BASE_POSITION,
@@ -77,7 +77,7 @@ class CutFoodEnv(BaseEnv):
             pieces in the solver, ``published`` for the published criteria alone. ``severed`` where the food resists.
         guardrail: Whether commands beyond the arm's speeds are clipped, as they are in every published evaluation.
         pixels: Width and height of the cameras' pictures.
-        scenery: Which background, see :mod:`intsim.sim.background`.
+        scenery: Which background, see :mod:`intsim.render.background`.
 
     Attributes:
         solver_s: Time that the solver has taken so far [s].

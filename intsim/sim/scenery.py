@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import sapien
 
-from intsim.sim.background import Background
+from intsim.render.background import Background
 from intsim.sim.coupling import Coupling
 from intsim.sim.piece_mesh import item_mesh
 from intsim.task.targets import Item

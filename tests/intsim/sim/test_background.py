@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from intsim.sim.background import BACKGROUNDS, Background
+from intsim.render.background import BACKGROUNDS, Background
 from intsim.task.targets import TaskError
 
 
