@@ -158,6 +158,6 @@ def _places(item: Item, points: np.ndarray) -> np.ndarray:
     at = np.linspace(-half, half, SECTIONS)
     wide = np.array([half_width(item.shape, float(place)) for place in at[1:-1]])
     width = np.interp(y, at[1:-1], wide)
-    z = points[:, 2] - tall
+    z = points[:, 2] - points[:, 2].min() - tall
     part = width / max(item.shape.width / 2, 1e-9)
     return np.column_stack([x, y, z, x / np.maximum(width, 1e-4), z / np.maximum(tall * part, 1e-4)])

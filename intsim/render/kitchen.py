@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,14 +11,16 @@ import numpy as np
 from intsim.render.background import Background
 from intsim.render.mesh import Drawn, Paint, box, lathe
 from intsim.render.texture import PLAIN, SPECKLED, TILES, WOOD
+from intsim.task.targets import BOARD_SIZE, Item
+from intsim.task.targets import BOARD_THICKNESS as THICKNESS
 
-BOARD_SIZE, THICKNESS = (0.4, 0.5), 0.02  # sizes of the board along x and y, and its thickness [m]
 COUNTER = ((-0.85, -0.95), (0.45, 0.95))  # corners of the worktop, x and y [m]
 FLOOR = -0.9  # height of the floor [m], the board's top being at 0
 WALLS = (-1.5, 1.6)  # places of the wall behind the robot (x) and of that at its left (y) [m]
 REACH = 3.0  # how far walls and floor go [m]
-KEEP_CLEAR = 0.06  # between the board and what stands beside it [m]
+KEEP_CLEAR = (0.32, 0.48)  # part of the worktop, from the middle of the board along x and y, on which nothing stands [m]
 CLUTTER_TRIES = 60
+MIN_CLEAR, MOST_ON_BOARD = 0.13, 4  # around the food that is cut [m], and things on the board at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,13 +28,15 @@ class Kitchen:
     """What is around robot and food before one background.
 
     Attributes:
-        drawn: Board, worktop, walls, furniture and what stands about; where it is in the world [m].
+        drawn: Board, worktop and what stands about, which cast shadows; where it is in the world [m].
+        around: Walls and furniture, which are too far away for it.
         lamp: Direction in which the lamp shines, shape (3,).
         lamps: Colour of the lamp, and of the light from above and from below, shape (9,).
         standing: Places and radii x, y, r [m] of what stands on the worktop, shape (n, 3).
     """
 
     drawn: Drawn
+    around: Drawn
     lamp: np.ndarray
     lamps: np.ndarray
     standing: np.ndarray
@@ -43,13 +49,15 @@ class Kitchen:
             TaskError: There is none of this number.
         """
         look, rng = Background.of(number), np.random.default_rng([number, 0x6B17])
-        parts = [*_board(look, rng), *_worktop(look, rng), *_walls(look, rng), *_cupboards(look, rng)]
+        parts = [*_board(look, rng), *_worktop(look, rng)]
+        around = Drawn.all([*_walls(look, rng), *_cupboards(look, rng)])
         things, standing = _clutter(rng)
         warm = rng.uniform(-1.0, 1.0)
         tint = np.array([1.0 + 0.12 * warm, 1.0, 1.0 - 0.18 * warm])
         sky = np.array([1.0 - 0.06 * warm, 1.0, 1.0 + 0.08 * warm])
         lamps = np.concatenate([look.strength * tint, 1.3 * look.ambient * sky, 0.6 * look.ambient * look.table])
-        return Kitchen(Drawn.all([*parts, *things]), look.direction / np.linalg.norm(look.direction), lamps, standing)
+        lamp = look.direction / np.linalg.norm(look.direction)
+        return Kitchen(Drawn.all([*parts, *things]), around, lamp, lamps, standing)
 
 
 def _shade(colour: np.ndarray, by: float) -> tuple[float, float, float]:
@@ -160,10 +168,9 @@ def _clutter(rng: np.random.Generator) -> tuple[list[Drawn], np.ndarray]:
         thing, radius = makers[rng.integers(len(makers))](rng)
         (x0, y0), (x1, y1) = COUNTER
         at = np.array([rng.uniform(x0 + radius, x1 - radius), rng.uniform(y0 + radius, y1 - radius)])
-        clear = radius + KEEP_CLEAR
-        beside = abs(at[0]) > BOARD_SIZE[0] / 2 + clear or abs(at[1]) > BOARD_SIZE[1] / 2 + clear
-        arm = at[0] < 0.1 and abs(at[1]) < 0.3 + clear  # where the arm reaches over
-        view = at[0] > 0.1 and abs(at[1]) < 0.3 + clear or (at[1] < -0.3 and abs(at[0]) < 0.3)  # before a camera
+        beside = any(abs(place) > keep + radius for place, keep in zip(at, KEEP_CLEAR, strict=True))
+        arm = at[0] < 0.1 and abs(at[1]) < 0.3 + radius  # where the arm reaches over
+        view = (at[0] > 0.1 and abs(at[1]) < 0.3 + radius) or (at[1] < 0 and abs(at[0]) < 0.3)  # before a camera
         apart = all(np.hypot(*(at - other[:2])) > radius + other[2] + 0.02 for other in standing)
         if beside and apart and not arm and not view:
             out.append(thing.moved((float(at[0]), float(at[1]), -THICKNESS), float(rng.uniform(0, 2 * np.pi))))
@@ -173,6 +180,48 @@ def _clutter(rng: np.random.Generator) -> tuple[list[Drawn], np.ndarray]:
             thing, _ = makers[rng.integers(4)](rng)
             out.append(thing.moved((WALLS[0] + 0.2, float(place + rng.uniform(-0.08, 0.08)), -0.02)))
     return out, np.array(standing).reshape(-1, 3)
+
+
+def board_clutter(items: Sequence[Item], seed: int) -> list[Drawn]:
+    """What lies on the board beside the foods of an episode: crumbs, leaves, a spoon or a small bowl; or nothing.
+
+    Args:
+        items: The foods, the first of which is cut: nothing lies where blade and arm come.
+        seed: Of the episode.
+    """
+    rng, out = np.random.default_rng([seed, 0xC1A7]), []
+    reach = [max(math.hypot(item.shape.length, item.shape.width) / 2, MIN_CLEAR * (k == 0)) for k, item in enumerate(items)]
+    taken = [(item.x, item.y, r) for item, r in zip(items, reach, strict=True)]
+    for _ in range(int(rng.integers(0, MOST_ON_BOARD + 1))):
+        thing, radius = (_leaf, _crumb, _spoon, _dish)[rng.integers(4)](rng)
+        at = [float(rng.uniform(-size / 2 + radius, size / 2 - radius)) for size in BOARD_SIZE]
+        if all(math.hypot(at[0] - x, at[1] - y) > radius + r for x, y, r in taken):
+            out.append(thing.moved((*at, 0.0), float(rng.uniform(0, 2 * np.pi))))
+            taken.append((*at, radius))
+    return out
+
+
+def _leaf(rng: np.random.Generator) -> tuple[Drawn, float]:
+    r = float(rng.uniform(0.008, 0.018))
+    green = _shade(np.array([0.25, 0.5, 0.18]), float(rng.uniform(0.7, 1.3)))
+    return lathe([(r, 0.0), (0.7 * r, 0.004), (0.0, 0.005)], Paint(green), 7), r
+
+
+def _crumb(rng: np.random.Generator) -> tuple[Drawn, float]:
+    r = float(rng.uniform(0.004, 0.01))
+    return lathe([(r, 0.0), (0.8 * r, r), (0.0, 1.3 * r)], Paint(_shade(_colour(rng), 1.0)), 6), r
+
+
+def _spoon(rng: np.random.Generator) -> tuple[Drawn, float]:
+    steel = Paint((0.75, 0.76, 0.78), gloss=1.0) if rng.random() < 0.5 else Paint((0.55, 0.38, 0.22), gloss=0.1)
+    head = lathe([(0.014, 0.0), (0.017, 0.004), (0.0, 0.006)], steel, 12).moved((0.05, 0.0, 0.0))
+    return Drawn.all([head, box((-0.06, -0.004, 0.002), (0.05, 0.004, 0.006), steel)]), 0.068
+
+
+def _dish(rng: np.random.Generator) -> tuple[Drawn, float]:
+    r = float(rng.uniform(0.022, 0.032))
+    paint = Paint(_shade(_colour(rng), 1.15), gloss=0.6)
+    return lathe([(0.6 * r, 0.0), (r, 0.02), (0.9 * r, 0.02), (0.0, 0.006)], paint), r
 
 
 def _bottle(rng: np.random.Generator) -> tuple[Drawn, float]:

@@ -156,7 +156,7 @@ def lit_parts(view: ti.template(), lamp: ti.template(), lamps: ti.template(), y:
     v = (ti.cast(y, ti.f32) + 0.5 - view[13]) / view[12]
     ray = ti.Vector([view[3 + m] * u + view[6 + m] * v + view[9 + m] for m in ti.static(range(3))], ti.f32)
     far = 1 / ti.max(w, 1e-6)
-    place = ti.Vector([view[0], view[1], view[2]], ti.f32) + ray * far + n * 2e-3
+    place = ti.Vector([view[0], view[1], view[2]], ti.f32) + ray * far + n * lamps[9]
     there = seen(lamp, place)
     ray = ray / ray.norm()
     face = ti.max(n.dot(to), 0.0)

@@ -92,7 +92,7 @@ class Room:
 
     def __init__(self, number: int, pixels: int) -> None:
         kitchen = Kitchen.of(number)
-        self._geometry = Geometry(kitchen.drawn)
+        casting, self._geometry = Geometry(kitchen.drawn), Geometry(Drawn.all([kitchen.drawn, kitchen.around]))
         self._kept: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self._moving = Buffer(pixels)
         wide = min(LAMP_PIXELS * pixels, MOST_LAMP_PIXELS)
@@ -100,7 +100,7 @@ class Room:
         self.lamps = np.array([*kitchen.lamps, SHADOW_TOLERANCE * 2 * LAMP_REACH / wide], np.float32)
         self._cast = np.full((wide, wide), FAR, np.float32)
         self._which = np.full(self._cast.shape, -1, np.int32)
-        self._geometry.draw(self.lamp, self._cast, self._which)
+        casting.draw(self.lamp, self._cast, self._which)
         self._shadow = np.empty_like(self._cast)
 
     def seen(self, camera: str, view: View, before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,6 +8,8 @@ import numpy as np
 
 from intsim.task.targets import CAMERAS
 
+PICTURE_CAMERAS = ("front", "side", "wrist", "work")
+"""Cameras of the pictures: the three of the published datasets, and a close one."""
 NEAR = 0.01  # distance before a camera from which on it sees [m]
 FIELD = 0.9  # field of view of the cameras that stand [rad]
 WRIST_FIELD, WRIST_PLACE = 1.57, np.array([0.07, 0.0, 0.0])  # that of the hand [rad], and where it is in its frame [m]

@@ -22,34 +22,25 @@ _environments: dict[str, Any] = {}
 
 
 def make_environment(world: World) -> Any:
-    """The environment of a world; a process keeps the last one.
-
-    Raises:
-        CutcalError: Pictures are asked for and there is no renderer.
-    """
+    """The environment of a world; a process keeps the last one."""
     import gymnasium
 
-    import intsim.sim.environment  # noqa: F401
+    from intsim.sim.environment import PIXELS
 
     key = repr(world)
     if key not in _environments:
         _environments.clear()
-        seen = {"render_backend": "cpu", "obs_mode": "rgb", "pixels": world.pixels}
-        blind = {"render_backend": "none", "obs_mode": "state"}
-        try:
-            made = gymnasium.make(
-                ENV_ID,
-                sim_backend="physx_cpu",
-                control_mode="pd_joint_pos",
-                knife=world.knife,
-                coupled=world.coupled,
-                stiffness=world.stiffness,
-                **(seen if world.pixels else blind),
-            )
-        except RuntimeError as e:
-            if not world.pixels:
-                raise
-            raise CutcalError(f"no pictures without a renderer ({e}); cutcal doctor says what is missing") from None
+        made = gymnasium.make(
+            ENV_ID,
+            sim_backend="physx_cpu",
+            render_backend="none",
+            obs_mode="rgb" if world.pixels else "state",
+            control_mode="pd_joint_pos",
+            knife=world.knife,
+            coupled=world.coupled,
+            stiffness=world.stiffness,
+            pixels=world.pixels or PIXELS,
+        )
         _environments[key] = made.unwrapped
     return _environments[key]
 
@@ -176,7 +167,5 @@ def _outcome(env: Any, peak: float, short: float) -> SeveringOutcome:
 
 
 def _images(env: Any) -> dict[str, np.ndarray]:
-    """What the cameras see now (h, w, 3), by name; empty without a renderer."""
-    if env.obs_mode != "rgb":
-        return {}
-    return {name: seen["rgb"][0].numpy() for name, seen in env.get_obs()["sensor_data"].items()}
+    """What the cameras see now (h, w, 3), by name; empty where no pictures are asked for."""
+    return dict(env.pictures()) if env.obs_mode == "rgb" else {}

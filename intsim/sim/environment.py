@@ -1,8 +1,8 @@
 """IntSim: a ManiSkill environment in which a Panda cuts food of the cutting solver; needs the extra ``[robot]``.
 
 The robot's physics (100 Hz) and the solver take turns: the solver follows the edge to where the robot has brought it,
-and the mean force of that interval acts on the knife in the next. Without a renderer it runs all the same, and gives
-states.
+and the mean force of that interval acts on the knife in the next. Pictures are those of a dataset
+(:mod:`intsim.sim.stage`), which need no renderer of ManiSkill's.
 """
 
 from __future__ import annotations
@@ -24,8 +24,9 @@ from scipy.spatial.transform import Rotation
 from calib.material.food import FoodSpec, load_food
 from intsim.render.background import Background
 from intsim.sim.coupling import Coupling
+from intsim.render.arm import BASE_POSITION
+from intsim.render.view import PICTURE_CAMERAS
 from intsim.sim.panda import (
-    BASE_POSITION,
     BLADE_LINK,
     EDGE_LINK,
     MANISKILL_DAMPING,
@@ -34,6 +35,7 @@ from intsim.sim.panda import (
     edge_pose,
 )
 from intsim.sim.scenery import Scenery
+from intsim.sim.stage import Stage
 from intsim.sim.world import ENV_ID, EPISODE_STEPS
 from intsim.task.guardrail import Guardrail
 from intsim.task.kinematic_table import KinematicTable, axis_crossing
@@ -116,6 +118,7 @@ class CutFoodEnv(BaseEnv):
         self.criterion, self.pixels, self._guarded = criterion, pixels, guardrail
         self.scenery = Scenery(Background.of(scenery))
         self.solver_s = 0.0
+        self._stage: Stage | None = None
         if stiffness is not None and damping is None:
             damping = MANISKILL_DAMPING
         self._gains = {k: v for k, v in (("arm_stiffness", stiffness), ("arm_damping", damping)) if v is not None}
@@ -189,6 +192,7 @@ class CutFoodEnv(BaseEnv):
         self.motion = MotionEnd(self._steps)
         self.guardrail = Guardrail(self.agent.control_mode, joints[:7], self._hand())
         self.scenery.serve(self.scene, items)
+        self._stage_serves = False
 
     @property
     def _steps(self) -> int:
@@ -280,6 +284,28 @@ class CutFoodEnv(BaseEnv):
             **{name: torch.tensor([bool(value)]) for name, value in flags.items()},
             **{name: torch.tensor(np.array([value]), dtype=torch.float32) for name, value in numbers.items()},
         }
+
+    def _get_obs_sensor_data(self, apply_texture_transforms: bool = True) -> dict[str, Any]:
+        """Pictures of the cameras, as a dataset has them; what else is asked for (depth, say) is ManiSkill's."""
+        visual = vars(self.obs_mode_struct.visual)
+        others = {name for name, asked in visual.items() if asked} - {"rgb"}
+        if others or not visual["rgb"]:
+            return dict(super()._get_obs_sensor_data(apply_texture_transforms))
+        return {name: {"rgb": torch.tensor(seen[None])} for name, seen in self.pictures().items()}
+
+    def pictures(self) -> dict[str, np.ndarray]:
+        """What each camera sees now (:data:`intsim.render.view.PICTURE_CAMERAS`), 8 bits, shape (h, w, 3) each."""
+        assert self.episode is not None
+        if self._stage is None:
+            self._stage = Stage(self.pixels, PICTURE_CAMERAS, self.knife)
+        if not self._stage_serves:
+            self._stage.serve([self.episode.item, *self.episode.others], self.episode.seed)
+            self._stage_serves = True
+        mesh = self.coupling.mesh()
+        if mesh is not None:
+            self._stage.show(len(self.coupling.done), *mesh)
+        self._stage.place(self.agent.robot.get_qpos()[0].numpy().astype(float))
+        return self._stage.pictures(self.scenery.background.number)
 
     def _get_obs_extra(self, info: dict[str, Any]) -> dict[str, torch.Tensor]:
         """Pose of the edge, and the food's state where states are observed."""

@@ -16,10 +16,9 @@ from mani_skill.agents.registration import register_agent
 from mani_skill.agents.robots import Panda
 
 from calib.material.knife import load_knife
+from intsim.render.arm import BLADE_OFFSET
 
 URDF_SOURCE = Path(PACKAGE_ASSET_DIR) / "robots" / "panda" / "panda_v2.urdf"
-BASE_POSITION = (-0.615, 0.0, 0.0)  # where ManiSkill's table scenes put the arm [m]
-BLADE_OFFSET = 0.12  # from the hand to the back of the blade [m]: beyond the fingertips
 STEEL_DENSITY = 7850.0  # kg/m^3
 JOINT_IMPEDANCE = np.array([3000.0, 3000.0, 3000.0, 2500.0, 2500.0, 2000.0, 2000.0])
 """Stiffness of a Franka arm's joints [N m/rad]: what libfranka's examples set (setJointImpedance)."""

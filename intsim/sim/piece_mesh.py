@@ -80,6 +80,12 @@ def item_mesh(item: Item, without: int | None = None) -> Mesh:
     return Mesh.of([piece_mesh(item, k) for k in range(len(item.pieces)) if k != without])
 
 
+def standing_mesh(item: Item) -> Mesh:
+    """The surfaces of all pieces of a food where it stands [m, world]: on the board or on the table beside it."""
+    mesh = item_mesh(item)
+    return replace(mesh, points=mesh.points + [0.0, 0.0, item.base or 0.0])
+
+
 def rigid_motion(rest: np.ndarray, now: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The turn and shift that bring points nearest to where they are now (Kabsch 1976, Acta Cryst. A 32:922).
 

@@ -1,4 +1,7 @@
-"""What there is to see beside the robot: board, table, light, and the deformed food; needs the extra ``[robot]``."""
+"""What SAPIEN shows a person beside the robot: board, table, light, and the deformed food; needs the extra ``[robot]``.
+
+Pictures of the cameras are not made by it (:mod:`intsim.sim.stage`).
+"""
 
 from __future__ import annotations
 
@@ -9,33 +12,14 @@ import numpy as np
 import sapien
 
 from intsim.render.background import Background
+from intsim.render.food import FOOD_LOOKS, OTHER_LOOKS
 from intsim.sim.coupling import Coupling
-from intsim.sim.piece_mesh import item_mesh
-from intsim.task.targets import Item
+from intsim.sim.piece_mesh import standing_mesh
+from intsim.task.targets import BOARD_SIZE, Item
+from intsim.task.targets import BOARD_THICKNESS as THICKNESS
 
-TABLE_SIZE, BOARD_SIZE, THICKNESS = (0.8, 1.2), (0.4, 0.5), 0.02  # sizes along x, y and the board's thickness [m]
+TABLE_SIZE = (0.8, 1.2)  # along x and y [m]
 WALL_DISTANCE = 3.0  # of the walls from the board [m]
-#: Skin and flesh by food, red, green, blue: for the eye only.
-FOOD_COLOURS = {
-    "banana": ((0.88, 0.75, 0.2), (0.96, 0.92, 0.72)),
-    "cucumber": ((0.15, 0.4, 0.15), (0.8, 0.9, 0.65)),
-    "apple": ((0.75, 0.12, 0.12), (0.96, 0.93, 0.8)),
-    "peach": ((0.95, 0.6, 0.4), (0.98, 0.8, 0.5)),
-    "melon": ((0.7, 0.75, 0.45), (0.98, 0.75, 0.45)),
-    "orange": ((0.95, 0.5, 0.1), (0.98, 0.65, 0.2)),
-    "strawberry": ((0.85, 0.1, 0.15), (0.98, 0.7, 0.7)),
-    "pear": ((0.75, 0.78, 0.3), (0.96, 0.95, 0.82)),
-    "kiwi": ((0.45, 0.33, 0.18), (0.55, 0.75, 0.25)),
-    "tomato": ((0.85, 0.15, 0.1), (0.92, 0.4, 0.3)),
-    "lemon": ((0.95, 0.87, 0.2), (0.98, 0.95, 0.65)),
-    "grape": ((0.35, 0.12, 0.35), (0.7, 0.75, 0.5)),
-    "shine_muscat": ((0.65, 0.78, 0.3), (0.85, 0.9, 0.6)),
-    "plum": ((0.4, 0.1, 0.3), (0.9, 0.7, 0.3)),
-    "cherry": ((0.55, 0.03, 0.1), (0.75, 0.2, 0.25)),
-    "potato": ((0.7, 0.55, 0.35), (0.95, 0.9, 0.7)),
-}
-OTHER_COLOURS = ((0.8, 0.6, 0.4), (0.95, 0.9, 0.8))
-
 
 class Scenery:
     """What is around the robot before one background.
@@ -94,7 +78,7 @@ class Scenery:
         for item in items:
             entity = sapien.Entity()
             entity.name = f"food {item.name}"
-            mesh = item_mesh(item)
+            mesh = standing_mesh(item)
             body = _body(mesh.points, mesh.triangles, mesh.flesh, item.name)
             entity.add_component(body)
             own.add_entity(entity)
@@ -134,7 +118,8 @@ def dull_material(colour: np.ndarray) -> sapien.render.RenderMaterial:
 
 def _body(points: np.ndarray, triangles: np.ndarray, flesh: np.ndarray, name: str) -> sapien.render.RenderBodyComponent:
     """What SAPIEN shows of a mesh: a palette of two colours, skin and flesh."""
-    skin, inner = FOOD_COLOURS.get(name, OTHER_COLOURS)
+    looks = FOOD_LOOKS.get(name, OTHER_LOOKS)
+    skin, inner = looks.skin.first, looks.flesh.first
     palette = np.zeros((2, 4, 4), np.uint8)
     palette[:, :2] = [*(round(255 * c) for c in skin), 255]
     palette[:, 2:] = [*(round(255 * c) for c in inner), 255]

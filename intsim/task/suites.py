@@ -85,7 +85,7 @@ def random_item(food: FoodSpec, rng: np.random.Generator) -> Item:
 
 
 def distractors(item: Item, foods: dict[str, FoodSpec], count: int, rng: np.random.Generator) -> tuple[Item, ...]:
-    """Other foods beside one, no two of a kind and none touching another.
+    """Other foods beside one, no two of a kind and none touching another: on the board or beside it, none on its rim.
 
     Args:
         item: The food that is there.
@@ -107,7 +107,9 @@ def distractors(item: Item, foods: dict[str, FoodSpec], count: int, rng: np.rand
             break
         new = random_item(foods[names[len(out)]], rng)
         new = replace(new, x=float(rng.uniform(-0.2, 0.2)), y=float(rng.uniform(-0.35, 0.35)))
-        if all(math.hypot(new.x - o.x, new.y - o.y) > _reach(new) + _reach(o) + FOOD_SPACING for o in (item, *out)):
+        if new.base is not None and all(
+            math.hypot(new.x - o.x, new.y - o.y) > _reach(new) + _reach(o) + FOOD_SPACING for o in (item, *out)
+        ):
             out.append(new)
     if len(out) < count:
         raise TaskError(f"suite: no room for {count} foods beside the {item.name}")

@@ -20,6 +20,8 @@ Nearer to it the two ends lie behind each other, and left and right say nothing.
 """
 VOLUME_SECTIONS = 64  # sections from which the volume of a piece is found
 CUT_OPENING = 4e-3  # way that the two sides of a cut slide apart [m]
+BOARD_SIZE, BOARD_THICKNESS = (0.4, 0.5), 0.02
+"""Sizes of the cutting board along x and y, its middle at the origin and its top at z = 0, and its thickness [m]."""
 
 
 class TaskError(CutcalError):
@@ -114,6 +116,14 @@ class Item:
         c, s = abs(math.cos(self.yaw)), abs(math.sin(self.yaw))
         long, wide = self.shape.length, self.shape.width
         return c * long + s * wide, s * long + c * wide
+
+    @property
+    def base(self) -> float | None:
+        """Height of what it stands on [m]: 0 on the board, less the board's thickness beside it, None across its rim."""
+        gaps = [abs(at) - half / 2 for at, half in zip((self.x, self.y), BOARD_SIZE, strict=True)]
+        if all(gap + own / 2 <= 0 for gap, own in zip(gaps, self.box, strict=True)):
+            return 0.0
+        return -BOARD_THICKNESS if any(gap - own / 2 >= 0 for gap, own in zip(gaps, self.box, strict=True)) else None
 
     def along(self, point: np.ndarray) -> float:
         """Where a point (2,) of the table lies along the axis, from the middle of the food [m]."""

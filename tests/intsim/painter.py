@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from types import ModuleType
 from typing import Any
 
@@ -12,7 +12,7 @@ import pytest
 
 from calib.simulation.workers import Workers
 from intsim.data import pictures
-from intsim.data.cameras import CAMERA_NAMES
+from intsim.render.view import PICTURE_CAMERAS
 
 PIXELS = 32
 
@@ -39,18 +39,24 @@ class Here(Workers):
 class Painter:
     """Pictures that tell scene and step by their colour."""
 
-    def __init__(self, scene: int, pixels: int) -> None:
-        self.scene, self.pixels = scene, pixels
+    def __init__(self, pixels: int, threads: int = 1) -> None:
+        self.pixels = pixels
 
-    def close(self) -> None:
-        """Nothing to give back."""
-
-    def pictures(self, stored: Any) -> dict[str, np.ndarray]:
+    def frames(self, stored: Any, backgrounds: Sequence[int]) -> Iterator[dict[int, dict[str, np.ndarray]]]:
         """One colour a picture; the food's surface must be there."""
         n = len(stored.group["obs/agent/qpos"]) - 1
         assert len(stored.group["mpm/surface"]) == 2
-        shades = (10 * np.arange(n) + 40 * self.scene).astype(np.uint8)[:, None, None, None]
-        return {view: np.broadcast_to(shades, (n, self.pixels, self.pixels, 3)).copy() for view in CAMERA_NAMES}
+        for t in range(n):
+            yield {k: {view: self.painted(k, t) for view in PICTURE_CAMERAS} for k in backgrounds}
+
+    def painted(self, background: int, step: int) -> np.ndarray:
+        """The picture of a step before a background."""
+        return np.full((self.pixels, self.pixels, 3), (10 * step + 40 * background) % 256, np.uint8)
+
+    def pictures(self, stored: Any, background: int) -> dict[str, np.ndarray]:
+        """All of a trajectory before a background (T, h, w, 3)."""
+        n = len(stored.group["obs/agent/qpos"]) - 1
+        return {view: np.array([self.painted(background, t) for t in range(n)]) for view in PICTURE_CAMERAS}
 
 
 def paint_with(painter: type, patch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,6 @@ from calib.errors import OutputError
 from calib.io.typed_document import to_document
 from cutcal.main import main
 from intsim.data import generate as g
-from intsim.data.cameras import CAMERA_NAMES
 from intsim.data.dataset_document import DATASET_FILE, DatasetDocument, DatasetSpec
 from intsim.data.export_episodes import export_episodes
 from intsim.data.lerobot import export_lerobot
@@ -22,6 +21,7 @@ from intsim.data.pictures import load_pictures, render_dataset, require_renderer
 from intsim.data.rdt import export_rdt
 from intsim.data.rlds import export_rlds
 from intsim.data.shards import trajectories
+from intsim.render.view import PICTURE_CAMERAS
 from mpm.scene.errors import CutcalError
 from tests.calib.documents import valid
 from tests.calib.io.test_meaning import assert_told, sets
@@ -54,24 +54,24 @@ def test_what_was_rendered_comes_back_pixel_by_pixel(made):
     document = valid(json.loads((made / DATASET_FILE).read_text()))
     steps = document["steps"]
     assert document["pictures"] == to_document(found)
-    assert found.scenes == (0, 2) and found.number == 2 * 3 * steps
+    assert found.scenes == (0, 2) and found.number == 2 * len(PICTURE_CAMERAS) * steps
     assert found.core_hours_of_315000 == pytest.approx(21_000 * 15 * found.seconds_per_episode / 3600)
     assert found.bytes > 0 and DatasetDocument.read(made).pictures == found
     for stored in trajectories(made):
         for scene in (0, 2):
-            wanted = Painter(scene, PIXELS).pictures(stored)
+            wanted = Painter(PIXELS).pictures(stored, scene)
             seen = load_pictures(made, stored, scene, PIXELS)
-            assert set(seen) == set(CAMERA_NAMES) and all(
-                np.array_equal(seen[view], wanted[view]) for view in CAMERA_NAMES
+            assert set(seen) == set(PICTURE_CAMERAS) and all(
+                np.array_equal(seen[view], wanted[view]) for view in PICTURE_CAMERAS
             )
 
 
-@pytest.mark.parametrize("stop", [1, COUNT - 1, COUNT, 2 * COUNT - 1])
+@pytest.mark.parametrize("stop", [1, SHARD, COUNT - 1])
 def test_stopped_anywhere_it_goes_on_and_renders_nothing_twice(made, stop):
     """Parts outlive a stop and are gone afterwards; a part that was left beside its complete file as well."""
     with pytest.raises(KeyboardInterrupt):
         render_dataset(made, [0, 2], PIXELS, Here(stop))
-    rest = Here(2 * COUNT - stop)
+    rest = Here(COUNT - stop)
     render_dataset(made, [0, 2], PIXELS, rest)
     assert rest.most == 0 and len(files(made)) == 6
     (made / "picture-32-02-000004.h5").touch()  # killed before it was removed
@@ -123,7 +123,7 @@ def test_one_command_makes_trajectories_and_pictures(tmp_path, monkeypatch, caps
     words = ["dataset", "generate", "--episodes", "3", "--scenes", "0,2,0", "--pixels", "32", "--out", str(out)]
     assert main(words) == 0
     told = capsys.readouterr().out
-    assert "216 pictures before 2 backgrounds" in told and "core hours" in told
+    assert "288 pictures before 2 backgrounds" in told and "core hours" in told
     assert main([*words, "--resume", "--json"]) == 0
     assert valid(json.loads(capsys.readouterr().out))["pictures"]["scenes"] == [0, 2]
     monkeypatch.setattr("cutcal.commands.dataset.dataset.workers_of", lambda args, say: Here(0))
@@ -156,7 +156,7 @@ def test_without_a_renderer_nothing_is_simulated(made, monkeypatch, tmp_path, ca
     class Blind(Painter):
         """There is nothing to render with."""
 
-        def __init__(self, scene: int, pixels: int) -> None:
+        def __init__(self, pixels: int, threads: int = 1) -> None:
             raise CutcalError("dataset: no pictures without a renderer")
 
     class Killed(Here):
