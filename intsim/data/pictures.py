@@ -33,7 +33,7 @@ from intsim.sim.world import World
 
 PICTURE_FILE = "pictures-{:d}-{:02d}-{:04d}.h5"  # pixels, background, shard
 PICTURE_PART = "picture-{:d}-{:02d}-{:06d}.h5"  # pixels, background, trajectory: until the file is complete
-RENDERED_GROUPS = ("obs/agent/qpos", "mpm/surface")  # of a trajectory, for its pictures
+RENDERED_GROUPS = ("obs/agent/qpos", "obs/extra/edge", "mpm/pieces", "mpm/surface")  # for pictures
 PNG_EFFORT = 1  # zlib's level: 6, Pillow's, takes eight times as long and saves a sixth
 PNG_UP = 2  # filter of a row: less the one above (ISO/IEC 15948, 9.2)
 

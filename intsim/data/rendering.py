@@ -11,6 +11,7 @@ from intsim.data.shards import StoredTrajectory, stored_item
 from intsim.render.view import PICTURE_CAMERAS
 from intsim.sim.stage import Stage
 from intsim.sim.world import World
+from intsim.task.kinematic_table import axis_crossing
 
 
 class Renderer:
@@ -48,22 +49,35 @@ class Renderer:
         Raises:
             TaskError: There is no such background.
         """
-        stage = self._stage(str(stored.group["mpm"].attrs.get("knife", World.knife)))
-        stage.serve([stored_item(one) for one in stored.entry["items"]], int(stored.entry["episode_seed"]))
-        qpos, meshes = stored.group["obs/agent/qpos"][()], _meshes(stored.group)
+        group = stored.group
+        stage = self._stage(str(group["mpm"].attrs.get("knife", World.knife)))
+        items = [stored_item(one) for one in stored.entry["items"]]
+        stage.serve(items, int(stored.entry["episode_seed"]))
+        qpos, edge, pieces = (group[name][()] for name in ("obs/agent/qpos", "obs/extra/edge", "mpm/pieces"))
+        cuts = {int(cut["step"][0]): _Cut(number, cut) for number, cut in enumerate(group.get("mpm/surface", {}).values())}
+        cut: _Cut | None = None
         for t in range(len(qpos) - 1):
-            if t in meshes:
-                stage.show(*meshes[t])
+            cut = cuts.get(t, cut)
+            if cut is not None and t in cut.frames:
+                stage.show(cut.number, cut.which, *cut.mesh(t))
+            elif cut is not None and cut.which == 0 and pieces[t - 1] > len(items[0].pieces):
+                along = axis_crossing(items[0], edge[cut.first])
+                items[0] = items[0] if along is None else items[0].cut_at(along)
+                stage.rest(0, items[0])
             stage.place(qpos[t])
             yield {background: stage.pictures(background) for background in backgrounds}
 
 
-def _meshes(group: h5py.Group) -> dict[int, tuple[int, int, np.ndarray, np.ndarray, np.ndarray]]:
-    """The food under the knife before each step in which it was kept: number of the cut, which
-    food, vertices [m], triangles, flesh."""
-    out: dict[int, tuple[int, int, np.ndarray, np.ndarray, np.ndarray]] = {}
-    for number, cut in enumerate(group.get("mpm/surface", {}).values()):
-        which, triangles, flesh = int(cut.attrs["food"]), cut["triangles"][()], cut["flesh"][()]
-        points = cut["vertices"][()].astype(float) + cut.attrs["origin"]
-        out |= {int(step): (number, which, points[k], triangles, flesh) for k, step in enumerate(cut["step"][()])}
-    return out
+class _Cut:
+    """The food under the knife in one cut, as it was kept: which food, after which steps, and its surface."""
+
+    def __init__(self, number: int, group: h5py.Group) -> None:
+        self.number, self.which = number, int(group.attrs["food"])
+        steps = group["step"][()]
+        self.first, self.frames = int(steps[0]), {int(step): k for k, step in enumerate(steps)}
+        self._triangles, self._flesh = group["triangles"][()], group["flesh"][()]
+        self._vertices, self._origin = group["vertices"], group.attrs["origin"]
+
+    def mesh(self, step: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Vertices [m], triangles and flesh before a step."""
+        return self._vertices[self.frames[step]].astype(float) + self._origin, self._triangles, self._flesh

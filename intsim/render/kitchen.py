@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from intsim.render.background import Background
+from intsim.render.background import PLASTICS, STONES, WOODS, Background, beside
+from intsim.render.background import WALLS as WALL_COLOURS
 from intsim.render.mesh import Drawn, Paint, box, lathe
 from intsim.render.texture import PLAIN, SPECKLED, TILES, WOOD
 from intsim.task.targets import BOARD_SIZE, Item
@@ -67,8 +68,10 @@ def _shade(colour: np.ndarray, by: float) -> tuple[float, float, float]:
 
 
 def _material(colour: np.ndarray, rng: np.random.Generator, kinds: tuple[int, ...], gloss: float) -> Paint:
-    """Wood, stone, tiles or paint of a colour."""
-    kind = int(kinds[rng.integers(len(kinds))])
+    """Wood where the colour is one of wood; else stone, tiles or paint of that colour."""
+    kind = WOOD if colour[0] > colour[1] > colour[2] > colour[0] - 0.45 and colour[0] - colour[2] > 0.15 else PLAIN
+    if kind != WOOD:
+        kind = int(kinds[rng.integers(len(kinds))])
     other = _shade(colour, float(rng.uniform(0.6, 0.85)))
     first = _shade(colour, 1.0)
     if kind == WOOD:
@@ -84,17 +87,16 @@ def _material(colour: np.ndarray, rng: np.random.Generator, kinds: tuple[int, ..
 def _board(look: Background, rng: np.random.Generator) -> list[Drawn]:
     """The cutting board, its top at z = 0."""
     x, y = (s / 2 for s in BOARD_SIZE)
-    kind = (WOOD,) if look.number == 0 else (WOOD, WOOD, PLAIN, SPECKLED)
-    paint = _material(look.board, rng, kind, 0.15)
+    paint = _material(look.board, rng, (PLAIN,), 0.15)
     return [box((-x, -y, -THICKNESS), (x, y, 0.0), paint)]
 
 
 def _worktop(look: Background, rng: np.random.Generator) -> list[Drawn]:
     """The worktop that board and robot stand on, with the cupboards' fronts below."""
     (x0, y0), (x1, y1) = COUNTER
-    kind = (PLAIN,) if look.number == 0 else (WOOD, SPECKLED, SPECKLED, PLAIN, TILES)
+    kind = (PLAIN,) if look.number == 0 else (SPECKLED, SPECKLED, PLAIN, TILES)
     top = _material(look.table, rng, kind, float(rng.uniform(0.1, 0.6)))
-    front = _material(_colour(rng), rng, (WOOD, PLAIN), 0.2)
+    front = _material(_front(rng), rng, (PLAIN,), 0.2)
     foot = box((-0.76, -0.14, -THICKNESS), (-0.47, 0.14, 0.0), Paint((0.25, 0.25, 0.27), gloss=0.2))
     return [
         box((x0, y0, -THICKNESS - 0.04), (x1, y1, -THICKNESS), top),
@@ -106,7 +108,7 @@ def _worktop(look: Background, rng: np.random.Generator) -> list[Drawn]:
 def _walls(look: Background, rng: np.random.Generator) -> list[Drawn]:
     """Floor and walls, their lower part tiled in some kitchens."""
     x, y = WALLS
-    floor = _material(_colour(rng), rng, (WOOD, TILES, SPECKLED), 0.1)
+    floor = _material(beside(rng, (*WOODS, *STONES)), rng, (TILES, SPECKLED), 0.1)
     wall = Paint(_shade(look.wall, 1.0))
     low = _material(look.wall * 0.95, rng, (TILES, TILES, PLAIN), 0.4)
     out = [
@@ -128,8 +130,8 @@ def _walls(look: Background, rng: np.random.Generator) -> list[Drawn]:
 def _cupboards(look: Background, rng: np.random.Generator) -> list[Drawn]:
     """Cupboards along both walls, with doors and handles, a refrigerator or a shelf among them."""
     x, y = WALLS
-    paint = _material(_colour(rng), rng, (WOOD, PLAIN, PLAIN), 0.25)
-    top = _material(look.table, rng, (WOOD, SPECKLED, PLAIN), 0.3)
+    paint = _material(_front(rng), rng, (PLAIN,), 0.25)
+    top = _material(look.table, rng, (SPECKLED, PLAIN), 0.3)
     steel = Paint((0.75, 0.76, 0.78), gloss=0.8)
     out = []
     wide = float(rng.uniform(0.4, 0.7))
@@ -151,8 +153,13 @@ def _cupboards(look: Background, rng: np.random.Generator) -> list[Drawn]:
     return out
 
 
+def _front(rng: np.random.Generator) -> np.ndarray:
+    """A colour of cupboards."""
+    return beside(rng, (*WOODS, *PLASTICS, *WALL_COLOURS))
+
+
 def _colour(rng: np.random.Generator) -> np.ndarray:
-    """A colour of furniture."""
+    """A colour of a thing."""
     base = rng.uniform(0.25, 0.9)
     return np.clip(base + rng.uniform(-0.18, 0.18, 3) * np.array([1.0, 0.6, 1.2]), 0.08, 0.95)
 

@@ -13,8 +13,8 @@ from intsim.render.mesh import Drawn
 from intsim.render.view import View
 
 HAND = "panda_hand"  # link that the wrist camera is fixed to
-LAMP_REACH = 0.8  # how far around the board shadows are cast [m]
-LAMP_PIXELS, MOST_LAMP_PIXELS = 2, 512  # pixels of what a lamp sees over those of a picture, and at most
+LAMP_REACH = 0.65  # how far around the board shadows are cast [m]
+LAMP_PIXELS, MOST_LAMP_PIXELS = 2, 640  # pixels of what a lamp sees over those of a picture, and at most
 SHADOW_TOLERANCE = 1.0  # depth by which a surface may lie behind what the lamp sees, over the width of a pixel of that
 FAR = -1e9  # how near nothing is to a lamp
 STANDING = ("front", "side", "work")  # cameras that do not move

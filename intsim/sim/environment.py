@@ -304,6 +304,9 @@ class CutFoodEnv(BaseEnv):
         mesh = self.coupling.mesh()
         if mesh is not None:
             self._stage.show(len(self.coupling.done), *mesh)
+        else:
+            for which, item in enumerate((self.coupling if self.coupled else self.table).items):
+                self._stage.rest(which, item)
         self._stage.place(self.agent.robot.get_qpos()[0].numpy().astype(float))
         return self._stage.pictures(self.scenery.background.number)
 

@@ -73,6 +73,20 @@ class Stage:
             self._studio.serve([*(food.drawn for food in self._foods), *self._beside])
         self._shown[which] = points
 
+    def rest(self, which: int, item: Item) -> None:
+        """Show a food at rest as it has become: in pieces that have slid apart, with the faces of its cuts.
+
+        Args:
+            which: Its place among the foods of the episode.
+            item: The food.
+        """
+        if item is self._items[which]:
+            return
+        mesh, self._items[which] = standing_mesh(item), item
+        self._foods[which] = FoodMesh.of(item, mesh.points, mesh.triangles, mesh.flesh, self._cell)
+        self._shown[which] = mesh.points
+        self._studio.serve([*(food.drawn for food in self._foods), *self._beside])
+
     def place(self, qpos: np.ndarray) -> None:
         """Bring the arm to joints (9,) [rad, m], and find what each camera sees."""
         foods = [food.at(points) for food, points in zip(self._foods, self._shown, strict=True)]
