@@ -167,9 +167,9 @@ def _packed(views: Mapping[str, Sequence[bytes]], seconds: float) -> bytes:
     out = io.BytesIO()
     with h5py.File(out, "w") as file:
         for camera, frames in views.items():
-            column = file.create_dataset(camera, (len(frames),), h5py.vlen_dtype(np.uint8))
-            for t, frame in enumerate(frames):
-                column[t] = np.frombuffer(frame, np.uint8)
+            column = np.empty(len(frames), object)
+            column[:] = [np.frombuffer(frame, np.uint8) for frame in frames]
+            file.create_dataset(camera, data=column, dtype=h5py.vlen_dtype(np.uint8))
         describe_sets(file, picture_meaning)
         file.attrs["seconds"] = seconds
     return out.getvalue()

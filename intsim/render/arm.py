@@ -141,12 +141,12 @@ def _outside(mesh: Drawn) -> Drawn:
     points = np.ascontiguousarray(mesh.points - (mesh.points.min(0) + mesh.points.max(0)) / 2, np.float32)
     triangles = np.ascontiguousarray(mesh.triangles, np.int32)
     reach = float(np.linalg.norm(points, axis=1).max())
-    there, seen = np.empty_like(points), np.zeros(len(triangles), bool)
-    for direction in SIDES:
-        view = View.lamp(np.array(direction), reach, PROBE_PIXELS)
-        near, which = (np.full((PROBE_PIXELS, PROBE_PIXELS), value) for value in (np.float32(-1e9), np.int32(-1)))
-        raster.draw(points, triangles, view.row, there, near, which)
-        seen[which[which >= 0]] = True
+    views = np.array([View.lamp(np.array(direction), reach, PROBE_PIXELS).row for direction in SIDES])
+    shape = len(SIDES), PROBE_PIXELS, PROBE_PIXELS
+    near, which = np.full(shape, np.float32(-1e9)), np.full(shape, np.int32(-1))
+    raster.draw(points, triangles, views, np.empty((len(SIDES), *points.shape), np.float32), near, which)
+    seen = np.zeros(len(triangles), bool)
+    seen[which[which >= 0]] = True
     used = np.unique(mesh.triangles[seen])
     index = np.full(len(mesh.points), -1)
     index[used] = np.arange(len(used))

@@ -25,6 +25,9 @@ class Geometry:
 
     Args:
         drawn: The mesh.
+
+    Attributes:
+        points: Its vertices [m], shape (n, 3).
     """
 
     def __init__(self, drawn: Drawn) -> None:
@@ -34,52 +37,39 @@ class Geometry:
         self._paints = np.array([paint.row for paint in drawn.paints], np.float32)
         self._ref = np.ascontiguousarray(drawn.ref, np.float32)
         self._normals = np.zeros_like(self.points)
-        self._there = np.zeros_like(self.points)
+        self._there = np.zeros((0, *self.points.shape), np.float32)
         self.turned()
 
     def turned(self) -> None:
         """Find the normals anew: the points have changed."""
         raster.turn_normals(self.points, self._triangles, self._normals)
 
-    def draw(self, view: View, near: np.ndarray, which: np.ndarray) -> None:
-        """Find what is seen, over what is there already."""
-        raster.draw(self.points, self._triangles, view.row, self._there, near, which)
+    def _room(self, count: int) -> np.ndarray:
+        """Room for the points of so many views."""
+        if len(self._there) < count:
+            self._there = np.zeros((count, *self.points.shape), np.float32)
+        return self._there
 
-    def see(self, view: View, buffer: Buffer, before: np.ndarray | None = None) -> None:
-        """Find what is seen and how it looks; ``before`` it is what is that near already (h, w)."""
-        buffer.near[:] = 0.0 if before is None else before
-        buffer.which.fill(-1)
-        self.draw(view, buffer.near, buffer.which)
-        raster.resolve(
-            buffer.which,
-            buffer.near,
-            view.row,
-            self._there,
+    def draw(self, views: np.ndarray, near: np.ndarray, which: np.ndarray) -> None:
+        """Find what is seen in views (c, 16), over what is there already: ``near`` and ``which`` (c, h, w)."""
+        raster.draw(self.points, self._triangles, views, self._room(len(views)), near, which)
+
+    def see(self, views: np.ndarray, near: np.ndarray, which: np.ndarray, seen_as: np.ndarray) -> None:
+        """The same, and how it looks (c, h, w, 7 or more)."""
+        which.fill(-1)
+        raster.see(
+            self.points,
             self._triangles,
+            views,
+            self._room(len(views)),
+            near,
+            which,
             self._paint_of,
             self._normals,
             self._ref,
             self._paints,
-            buffer.seen_as,
+            seen_as,
         )
-
-
-class Buffer:
-    """What is seen in each pixel.
-
-    Args:
-        pixels: Width and height.
-
-    Attributes:
-        near: One over the distance [1/m], 0 for nothing, shape (h, w).
-        which: Number of the triangle, -1 for none, shape (h, w).
-        seen_as: Colour, normal and gloss, shape (h, w, 7).
-    """
-
-    def __init__(self, pixels: int) -> None:
-        self.near = np.zeros((pixels, pixels), np.float32)
-        self.which = np.full((pixels, pixels), -1, np.int32)
-        self.seen_as = np.zeros((pixels, pixels, 7), np.float32)
 
 
 class Room:
@@ -87,38 +77,43 @@ class Room:
 
     Args:
         number: Of the background.
+        views: The cameras, those that stand first, shape (c, 16).
         pixels: Width and height of the pictures.
+
+    Attributes:
+        near: One over the distance of what each camera sees of it [1/m], shape (c, h, w).
+        look: Of cameras that stand the light on it, of others what it looks like, shape (c, h, w, 9).
+        lamp: The lamp as a view, shape (1, 16).
+        lamps: Colours of the light and the tolerance of shadows, shape (10,).
     """
 
-    def __init__(self, number: int, pixels: int) -> None:
-        kitchen = Kitchen.of(number)
+    def __init__(self, number: int, views: np.ndarray, pixels: int) -> None:
+        kitchen, shape = Kitchen.of(number), (len(views), pixels, pixels)
         casting, self._geometry = Geometry(kitchen.drawn), Geometry(Drawn.all([kitchen.drawn, kitchen.around]))
-        self._kept: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-        self._moving = Buffer(pixels)
         wide = min(LAMP_PIXELS * pixels, MOST_LAMP_PIXELS)
-        self.lamp = View.lamp(kitchen.lamp, LAMP_REACH, wide)
+        self.lamp = View.lamp(kitchen.lamp, LAMP_REACH, wide).row[None]
         self.lamps = np.array([*kitchen.lamps, SHADOW_TOLERANCE * 2 * LAMP_REACH / wide], np.float32)
-        self._cast = np.full((wide, wide), FAR, np.float32)
-        self._which = np.full(self._cast.shape, -1, np.int32)
-        casting.draw(self.lamp, self._cast, self._which)
+        self._cast = np.full((1, wide, wide), FAR, np.float32)
+        self._cast_which = np.full(self._cast.shape, -1, np.int32)
+        casting.draw(self.lamp, self._cast, self._cast_which)
         self._shadow = np.empty_like(self._cast)
+        self.near, self._which = np.zeros(shape, np.float32), np.zeros(shape, np.int32)
+        self.look = np.zeros((*shape, 9), np.float32)
+        self._standing = int(views[:, 15].sum())
+        still = slice(0, self._standing)
+        self._geometry.see(views[still], self.near[still], self._which[still], self.look[still])
+        raster.settle(views[still], self.near[still], self.look[still], self.lamp, self.lamps)
 
-    def seen(self, camera: str, view: View, before: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How near a camera sees it behind what is ``before`` it, and how; of one that stands with the light on it."""
-        if camera not in STANDING:
-            self._geometry.see(view, self._moving, before)
-            return self._moving.near, self._moving.seen_as
-        if camera not in self._kept:
-            found, settled = Buffer(view.pixels), np.zeros((view.pixels, view.pixels, 9), np.float32)
-            self._geometry.see(view, found)
-            raster.settle(view.row, found.near, found.seen_as, self.lamp.row, self.lamps, settled)
-            self._kept[camera] = found.near, settled
-        return self._kept[camera]
+    def follow(self, views: np.ndarray, before: np.ndarray) -> None:
+        """See it anew with the cameras that move, behind what is ``before`` it (c, h, w)."""
+        moving = slice(self._standing, None)
+        self.near[moving] = before[moving]
+        self._geometry.see(views[moving], self.near[moving], self._which[moving], self.look[moving])
 
     def shadow(self, scene: Geometry) -> np.ndarray:
-        """How near to the lamp is what it sees, of room and scene."""
+        """How near to the lamp is what it sees, of room and scene, shape (1, ., .)."""
         np.copyto(self._shadow, self._cast)
-        scene.draw(self.lamp, self._shadow, self._which)
+        scene.draw(self.lamp, self._shadow, self._cast_which)
         return self._shadow
 
 
@@ -132,12 +127,18 @@ class Studio:
     """
 
     def __init__(self, arm: Arm, cameras: Sequence[str], pixels: int) -> None:
-        self._arm, self._pixels = arm, pixels
-        self._views = {name: View.standing(name, pixels) for name in cameras if name in STANDING}
-        self._views |= {name: View(np.zeros(3), np.eye(3), 1.0, pixels) for name in cameras if name not in STANDING}
-        self._buffers = {name: Buffer(pixels) for name in cameras}
+        self._arm, self._pixels, self._cameras = arm, pixels, tuple(cameras)
+        self._order = sorted(cameras, key=lambda name: name not in STANDING)
+        self._moving = [k for k, name in enumerate(self._order) if name not in STANDING]
+        hand = np.eye(4)
+        self._views = np.array(
+            [(View.standing(name, pixels) if name in STANDING else View.wrist(hand, pixels)).row for name in self._order]
+        )
+        shape = len(cameras), pixels, pixels
+        self._near, self._which = np.zeros(shape, np.float32), np.zeros(shape, np.int32)
+        self._seen_as = np.zeros((*shape, 7), np.float32)
+        self._out = np.zeros((*shape, 3), np.uint8)
         self._rooms: dict[int, Room] = {}
-        self._out = np.zeros((pixels, pixels, 3), np.uint8)
         self._scene = Geometry(arm.drawn)
 
     def serve(self, foods: Sequence[Drawn]) -> None:
@@ -158,10 +159,10 @@ class Studio:
             self._scene.points[first : first + len(food.points)] = food.points
             first += len(food.points)
         self._scene.turned()
-        for name in self._views:
-            if name not in STANDING:
-                self._views[name] = View.wrist(links[HAND], self._pixels)
-            self._scene.see(self._views[name], self._buffers[name])
+        for k in self._moving:
+            self._views[k] = View.wrist(links[HAND], self._pixels).row
+        self._near.fill(0.0)
+        self._scene.see(self._views, self._near, self._which, self._seen_as)
 
     def pictures(self, background: int) -> dict[str, np.ndarray]:
         """What each camera sees before a background, 8 bits, shape (pixels, pixels, 3) each.
@@ -170,24 +171,12 @@ class Studio:
             TaskError: There is no such background.
         """
         if background not in self._rooms:
-            self._rooms[background] = Room(background, self._pixels)
+            self._rooms[background] = Room(background, self._views, self._pixels)
         room = self._rooms[background]
-        shadow, out = room.shadow(self._scene), {}
-        for name, view in self._views.items():
-            seen = self._buffers[name]
-            near, around = room.seen(name, view, seen.near)
-            standing = int(name in STANDING)
-            raster.light(
-                view.row,
-                seen.near,
-                seen.seen_as,
-                near,
-                around,
-                room.lamp.row,
-                shadow,
-                room.lamps,
-                standing,
-                self._out,
-            )
-            out[name] = self._out.copy()
-        return out
+        room.follow(self._views, self._near)
+        shadow = room.shadow(self._scene)
+        raster.light(
+            self._views, self._near, self._seen_as, room.near, room.look, room.lamp, shadow, room.lamps, self._out
+        )
+        seen = dict(zip(self._order, self._out.copy(), strict=True))
+        return {name: seen[name] for name in self._cameras}

@@ -26,6 +26,7 @@ class View:
         focal: Pixels a unit of the tangent of the angle, or a metre where it is ``flat`` [px or px/m].
         pixels: Width and height of the picture.
         flat: Whether it looks along parallel lines, as a lamp far away does.
+        stands: Whether it stays where it is.
     """
 
     eye: np.ndarray
@@ -33,6 +34,7 @@ class View:
     focal: float
     pixels: int
     flat: bool = False
+    stands: bool = True
 
     @staticmethod
     def towards(eye: np.ndarray, target: np.ndarray, field: float, pixels: int) -> View:
@@ -62,12 +64,14 @@ class View:
             np.stack([-turn[:, 1], turn[:, 0], turn[:, 2]]),
             _focal(WRIST_FIELD, pixels),
             pixels,
+            stands=False,
         )
 
     @property
     def row(self) -> np.ndarray:
-        """As the kernels take it: eye, turn by rows, focal, half the picture, 1 where it is flat; shape (15,)."""
-        return np.array([*self.eye, *self.turn.ravel(), self.focal, self.pixels / 2, float(self.flat)], np.float32)
+        """As the kernels take it: eye, turn by rows, focal, half the picture, 1 where flat, 1 where it stands; (16,)."""
+        own = (*self.eye, *self.turn.ravel(), self.focal, self.pixels / 2, float(self.flat), float(self.stands))
+        return np.array(own, np.float32)
 
 
 def _focal(field: float, pixels: int) -> float:
