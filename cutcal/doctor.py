@@ -166,14 +166,15 @@ def pictures() -> Finding:
 
 
 def robot() -> Finding:
-    """Whether the robot simulator runs, and whether it renders."""
+    """Whether the robot simulator runs, and whether it renders by itself, which no picture of a dataset needs."""
     name = "robot simulator"
     if not _installed("mani_skill"):
         return Finding(
             name, "absent", "ManiSkill is not installed; everything else works (pip install 'cutcal[robot]')"
         )
     remedy = (
-        "states and forces work, pictures do not: SAPIEN needs Vulkan with descriptorBindingPartiallyBound. Mesa 25 "
+        "states, forces and pictures of the cameras work, ManiSkill's viewer and its depth pictures do not: SAPIEN "
+        "needs Vulkan with descriptorBindingPartiallyBound. Mesa 25 "
         "has it (mesa-vulkan-drivers of Debian 13, or of Debian 12's backports), Debian 12's own 22.3 has not"
     )
     code = "import sapien; sapien.render.RenderMaterial(); print('ManiSkill is installed and SAPIEN renders')"

@@ -12,6 +12,7 @@ import numpy as np
 from calib.errors import OutputError
 from calib.io.progress import Countdown
 from calib.simulation.workers import Workers
+from intsim.data.cameras import CAMERA_NAMES
 from intsim.data.pictures import check_backgrounds, load_pictures, render_dataset
 from intsim.data.shards import StoredTrajectory, is_kept, trajectories
 from intsim.task.selection import EVERY_TASK, TaskFilter
@@ -80,6 +81,7 @@ def export_episodes(
     say: Callable[[str], None] = lambda text: None,
     keep: str = "all",
     tasks: TaskFilter = EVERY_TASK,
+    cameras: Sequence[str] = CAMERA_NAMES,
 ) -> Iterator[ExportEpisode]:
     """Each trajectory for each background; its sentences come in turn. What has to be rendered is, before this returns.
 
@@ -91,6 +93,7 @@ def export_episodes(
         say: Called with a line after each.
         keep: Which trajectories, in :data:`intsim.data.shards.KEEP_KINDS`.
         tasks: Which of them by what they ask for.
+        cameras: Names of the cameras whose pictures they have.
 
     Returns:
         The episodes, one background after the other.
@@ -107,11 +110,16 @@ def export_episodes(
         raise OutputError(f"dataset export: no trajectory of {folder} is kept ({kind}); make more, or keep others")
     if backgrounds and pool is not None:
         render_dataset(folder, backgrounds, pixels, pool, say)
-    return _each(folder, backgrounds, pixels, say, set(kept))
+    return _each(folder, backgrounds, pixels, say, set(kept), cameras)
 
 
 def _each(
-    folder: Path, backgrounds: Sequence[int], pixels: int, say: Callable[[str], None], kept: set[int]
+    folder: Path,
+    backgrounds: Sequence[int],
+    pixels: int,
+    say: Callable[[str], None],
+    kept: set[int],
+    cameras: Sequence[str],
 ) -> Iterator[ExportEpisode]:
     """Those trajectories whose numbers are kept."""
     total = len(kept) * max(len(backgrounds), 1)
@@ -121,7 +129,7 @@ def _each(
             if k not in kept:
                 continue
             sentences = stored.entry["instructions"]
-            pictures = {} if background is None else load_pictures(folder, stored, background, pixels)
+            pictures = {} if background is None else load_pictures(folder, stored, background, pixels, cameras)
             yield ExportEpisode(stored, background, sentences[(k + turn) % len(sentences)], pictures)
             done += 1
             say(f"episode {done} of {total}, {rest.left(1)}")

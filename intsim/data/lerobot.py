@@ -1,4 +1,4 @@
-"""Export as a LeRobotDataset v3.0; needs the extra ``[data]``, for pictures ``[robot]`` and Vulkan too.
+"""Export as a LeRobotDataset v3.0; needs the extra ``[data]``, for pictures ``[robot]`` too.
 
 LeRobot takes every ``observation*`` for an input of the policy and every ``action*`` for its output. The force is
 therefore ``contact.*``, and joints are ``extra.*``: in the data, and in no policy that was not told to look at them.
@@ -15,7 +15,7 @@ import numpy as np
 
 from calib.errors import OutputError
 from calib.simulation.workers import Workers
-from intsim.data.cameras import CAMERA_NAMES
+from intsim.data.cameras import CAMERA_NAMES, WORK_CAMERA
 from intsim.data.export_episodes import ExportEpisode, check_target, export_episodes
 from intsim.data.shards import StoredTrajectory
 from intsim.task.gym_action import to_gym_action
@@ -128,6 +128,7 @@ def export_lerobot(
     say: Callable[[str], None] = lambda text: None,
     keep: str = "all",
     tasks: TaskFilter = EVERY_TASK,
+    work_camera: bool = False,
 ) -> dict[str, Any]:
     """Write a LeRobotDataset v3.0.
 
@@ -144,6 +145,7 @@ def export_lerobot(
         say: Called with a line after each episode.
         keep: Which trajectories, in :data:`intsim.data.shards.KEEP_KINDS`.
         tasks: Which of them by what they ask for.
+        work_camera: Whether the close camera's pictures are there, beside those of the published three.
 
     Returns:
         The content of meta/info.json.
@@ -157,8 +159,9 @@ def export_lerobot(
     except ImportError as e:
         raise OutputError(f"dataset export: {e.name} is not installed; pip install 'cutcal[data]'") from None
     check_target(out, backgrounds)
-    writer = _Writer(out, pixels if backgrounds else 0)
-    for episode in export_episodes(folder, backgrounds, pixels, pool, say, keep, tasks):
+    cameras = (*CAMERA_NAMES, WORK_CAMERA) if work_camera else CAMERA_NAMES
+    writer = _Writer(out, pixels, cameras if backgrounds else ())
+    for episode in export_episodes(folder, backgrounds, pixels, pool, say, keep, tasks, cameras):
         writer.add(episode)
     return writer.close()
 
@@ -168,11 +171,12 @@ class _Writer:
 
     Args:
         out: Its folder.
-        pixels: Width and height of its pictures, 0 without any.
+        pixels: Width and height of its pictures.
+        cameras: Names of the cameras, none without pictures.
     """
 
-    def __init__(self, out: Path, pixels: int) -> None:
-        self.out, self.pixels = out, pixels
+    def __init__(self, out: Path, pixels: int, cameras: Sequence[str]) -> None:
+        self.out, self.pixels, self.cameras = out, pixels, cameras
         self.tasks: dict[str, int] = {}
         self.episodes: list[dict[str, Any]] = []
         self.side: list[dict[str, Any]] = []
@@ -267,8 +271,7 @@ class _Writer:
             name: {"dtype": kind, "shape": [len(names) if names else 1], "names": list(names) if names else None}
             for name, (kind, names) in FEATURES.items()
         }
-        if self.pixels:
-            features |= {f"observation.images.{camera}": self._video_feature() for camera in CAMERA_NAMES}
+        features |= {f"observation.images.{camera}": self._video_feature() for camera in self.cameras}
         videos = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
         return {
             "codebase_version": CODEBASE_VERSION,
@@ -282,7 +285,7 @@ class _Writer:
             "fps": round(CONTROL_RATE),
             "splits": {"train": f"0:{len(self.episodes)}"},
             "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
-            "video_path": videos if self.pixels else None,
+            "video_path": videos if self.cameras else None,
             "features": features,
         }
 

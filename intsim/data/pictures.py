@@ -1,9 +1,9 @@
 """Pictures of a dataset: each trajectory before each background, rendered in worker processes and kept beside it.
 
 ``pictures-128-01-0000.h5`` belongs to ``shard-0000.h5`` (128 pixels, background 1). For trajectory k it has a group
-``traj_k`` with ``front``, ``side``, ``wrist`` and ``work`` (T,), a PNG of what each camera sees before each step, and the
-attribute ``seconds``, what rendering took: of what several backgrounds took together each has the same part. Nothing is
-simulated for it.
+``traj_k`` with ``front``, ``side``, ``wrist`` and ``work`` (T,), a PNG of what each camera sees before each step, and
+the attribute ``seconds``, what rendering took: of what several backgrounds took together each has the same part.
+Nothing is simulated for it.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from intsim.data.manifest import PUBLISHED_TRAJECTORIES
 from intsim.data.shard_meanings import picture_meaning
 from intsim.data.shards import StoredTrajectory, merge_parts, shard_entries, shard_number, shard_paths, write_part
 from intsim.render.background import BACKGROUNDS
+from intsim.render.view import PICTURE_CAMERAS
 from intsim.sim.world import World
 
 PICTURE_FILE = "pictures-{:d}-{:02d}-{:04d}.h5"  # pixels, background, shard
@@ -91,9 +92,7 @@ def render_dataset(
                 write_part(folder / PICTURE_PART.format(pixels, background, index), content)
             done += len(made)
             before = ", ".join(map(str, todo[n][k]))
-            say(
-                f"pictures of trajectory {index} before background {before}: {done} of {count}, {rest.left(len(made))}"
-            )
+            say(f"pictures of trajectory {index} before background {before}: {done} of {count}, {rest.left(len(made))}")
         for background in backgrounds:
             _merge(folder, pixels, background, n, entries)
     found = _totals(folder, backgrounds, pixels)
@@ -197,7 +196,13 @@ def png_bytes(frame: np.ndarray) -> bytes:
     )
 
 
-def load_pictures(folder: Path, stored: StoredTrajectory, background: int, pixels: int) -> dict[str, np.ndarray]:
+def load_pictures(
+    folder: Path,
+    stored: StoredTrajectory,
+    background: int,
+    pixels: int,
+    cameras: Sequence[str] = PICTURE_CAMERAS,
+) -> dict[str, np.ndarray]:
     """Load the pictures of a trajectory that were made.
 
     Args:
@@ -205,6 +210,7 @@ def load_pictures(folder: Path, stored: StoredTrajectory, background: int, pixel
         stored: The trajectory.
         background: Number of the background.
         pixels: Width and height.
+        cameras: Names of the cameras.
 
     Returns:
         Pictures by camera, 8 bits, shape (T, pixels, pixels, 3).
@@ -220,7 +226,7 @@ def load_pictures(folder: Path, stored: StoredTrajectory, background: int, pixel
             group = file[f"traj_{stored.entry['episode_id']}"]
             return {
                 camera: np.array([np.asarray(Image.open(io.BytesIO(png.tobytes()))) for png in group[camera][()]])
-                for camera in group
+                for camera in cameras
             }
     except (OSError, KeyError, ValueError) as e:
         raise OutputError(f"{path}: not there or damaged ({e}); remove it and have it rendered again") from None

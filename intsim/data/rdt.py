@@ -1,4 +1,4 @@
-"""Export in the layout that RDT's ManiSkill loader reads; needs the extras ``[data]`` and ``[robot]``, and Vulkan.
+"""Export in the layout that RDT's ManiSkill loader reads; needs the extras ``[data]`` and ``[robot]``.
 
     TASK/motionplanning/TASK.h5           traj_K/actions (T, 8), traj_K/obs/agent/qpos (T + 1, 9)
     TASK/motionplanning/K//100/K%100/S.png    what the front camera sees before step S, from 1

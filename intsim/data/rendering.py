@@ -36,7 +36,9 @@ class Renderer:
             self._stages = {knife: Stage(self._pixels, PICTURE_CAMERAS, knife, self._threads)}
         return self._stages[knife]
 
-    def frames(self, stored: StoredTrajectory, backgrounds: Sequence[int]) -> Iterator[dict[int, dict[str, np.ndarray]]]:
+    def frames(
+        self, stored: StoredTrajectory, backgrounds: Sequence[int]
+    ) -> Iterator[dict[int, dict[str, np.ndarray]]]:
         """What each camera sees before every step, before each background: the geometry is found once for all.
 
         Args:
@@ -54,7 +56,9 @@ class Renderer:
         items = [stored_item(one) for one in stored.entry["items"]]
         stage.serve(items, int(stored.entry["episode_seed"]))
         qpos, edge, pieces = (group[name][()] for name in ("obs/agent/qpos", "obs/extra/edge", "mpm/pieces"))
-        cuts = {int(cut["step"][0]): _Cut(number, cut) for number, cut in enumerate(group.get("mpm/surface", {}).values())}
+        cuts = {
+            int(cut["step"][0]): _Cut(number, cut) for number, cut in enumerate(group.get("mpm/surface", {}).values())
+        }
         cut: _Cut | None = None
         for t in range(len(qpos) - 1):
             cut = cuts.get(t, cut)

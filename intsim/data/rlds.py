@@ -1,4 +1,4 @@
-"""Export as RLDS, the TFDS layout that OpenVLA and Octo read; needs the extras ``[data]`` and ``[robot]``, and Vulkan.
+"""Export as RLDS, the TFDS layout that OpenVLA and Octo read; needs the extras ``[data]`` and ``[robot]``.
 
 It needs no TensorFlow. A record is a ``tf.train.Example`` for each episode, its steps end to end, written here by hand:
 a message of one map from names to lists, and TFRecord's frame of length and checksum. The force is not in it.

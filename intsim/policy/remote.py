@@ -153,7 +153,7 @@ class Remote:
         except KeyError:
             raise CutcalError(
                 f"--server {self.address}: {self.name} wants pictures of the camera {name!r}; evaluate it with "
-                "--world intsim and --pixels N, which needs Vulkan"
+                "--world intsim and --pixels N"
             ) from None
         return image
 

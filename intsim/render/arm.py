@@ -61,7 +61,10 @@ class Arm:
         parts, self._spans, first = [], [], 0
         for link in root.iter("link"):
             name = link.get("name", "")
-            own = [*_meshes(link, description.parent, cell * (1.0 if name in NEAR_LINKS else FAR_CELLS)), *([beside[name]] if name in beside else [])]
+            own = [
+                *_meshes(link, description.parent, cell * (1.0 if name in NEAR_LINKS else FAR_CELLS)),
+                *([beside[name]] if name in beside else []),
+            ]
             for mesh in [_outside(Drawn.all(own))] if own else []:
                 parts.append(mesh)
                 self._spans.append((name, first, first + len(mesh.points)))

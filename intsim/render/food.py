@@ -142,7 +142,9 @@ def _surface(points: np.ndarray, triangles: np.ndarray, cell: float) -> tuple[np
     if not len(triangles):
         return np.zeros(0, int), triangles
     edges = np.concatenate([triangles[:, :2], triangles[:, 1:]])
-    _, body = connected_components(coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), (n, n)), directed=False)
+    _, body = connected_components(
+        coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), (n, n)), directed=False
+    )
     used = np.unique(triangles)
     index = np.full(n, -1)
     index[used] = np.arange(len(used))
@@ -151,7 +153,7 @@ def _surface(points: np.ndarray, triangles: np.ndarray, cell: float) -> tuple[np
 
 
 def _places(item: Item, points: np.ndarray) -> np.ndarray:
-    """Where on the food points of the world are [m], and where on its section over half its width and height, (n, 5)."""
+    """Where on the food points of the world are [m], and on its section over half its width and height, (n, 5)."""
     off = points[:, :2] - [item.x, item.y]
     x, y = off @ item.across, off @ item.axis
     half, tall = item.shape.length / 2, item.shape.height / 2

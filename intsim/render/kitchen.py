@@ -19,7 +19,10 @@ COUNTER = ((-0.85, -0.95), (0.45, 0.95))  # corners of the worktop, x and y [m]
 FLOOR = -0.9  # height of the floor [m], the board's top being at 0
 WALLS = (-1.5, 1.6)  # places of the wall behind the robot (x) and of that at its left (y) [m]
 REACH = 3.0  # how far walls and floor go [m]
-KEEP_CLEAR = (0.32, 0.48)  # part of the worktop, from the middle of the board along x and y, on which nothing stands [m]
+KEEP_CLEAR = (
+    0.32,
+    0.48,
+)  # part of the worktop, from the middle of the board along x and y, on which nothing stands [m]
 CLUTTER_TRIES = 60
 MIN_CLEAR, MOST_ON_BOARD = 0.13, 4  # around the food that is cut [m], and things on the board at most
 
@@ -197,7 +200,9 @@ def board_clutter(items: Sequence[Item], seed: int) -> list[Drawn]:
         seed: Of the episode.
     """
     rng, out = np.random.default_rng([seed, 0xC1A7]), []
-    reach = [max(math.hypot(item.shape.length, item.shape.width) / 2, MIN_CLEAR * (k == 0)) for k, item in enumerate(items)]
+    reach = [
+        max(math.hypot(item.shape.length, item.shape.width) / 2, MIN_CLEAR * (k == 0)) for k, item in enumerate(items)
+    ]
     taken = [(item.x, item.y, r) for item, r in zip(items, reach, strict=True)]
     for _ in range(int(rng.integers(0, MOST_ON_BOARD + 1))):
         thing, radius = (_leaf, _crumb, _spoon, _dish)[rng.integers(4)](rng)
@@ -241,7 +246,15 @@ def _bottle(rng: np.random.Generator) -> tuple[Drawn, float]:
 def _bowl(rng: np.random.Generator) -> tuple[Drawn, float]:
     r, h = float(rng.uniform(0.05, 0.085)), float(rng.uniform(0.04, 0.065))
     paint = Paint(_shade(_colour(rng), 1.1), gloss=0.6)
-    profile = [(0.0, 0.0), (0.5 * r, 0.0), (0.9 * r, 0.6 * h), (r, h), (0.93 * r, h), (0.8 * r, 0.5 * h), (0.0, 0.2 * h)]
+    profile = [
+        (0.0, 0.0),
+        (0.5 * r, 0.0),
+        (0.9 * r, 0.6 * h),
+        (r, h),
+        (0.93 * r, h),
+        (0.8 * r, 0.5 * h),
+        (0.0, 0.2 * h),
+    ]
     return lathe(profile, paint, 20), r
 
 

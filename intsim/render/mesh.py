@@ -113,7 +113,9 @@ def lathe(profile: list[tuple[float, float]], paint: Paint, around: int = 16) ->
         around: Vertices of a ring.
     """
     angle = 2 * np.pi * np.arange(around) / around
-    points = np.concatenate([np.stack([r * np.cos(angle), r * np.sin(angle), np.full(around, z)], 1) for r, z in profile])
+    points = np.concatenate(
+        [np.stack([r * np.cos(angle), r * np.sin(angle), np.full(around, z)], 1) for r, z in profile]
+    )
     k = np.arange(around)
     after = np.roll(k, -1)
     rows = []
@@ -123,7 +125,9 @@ def lathe(profile: list[tuple[float, float]], paint: Paint, around: int = 16) ->
     return Drawn.of(points, np.concatenate(rows), paint)
 
 
-def clustered(points: np.ndarray, triangles: np.ndarray, parts: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
+def clustered(
+    points: np.ndarray, triangles: np.ndarray, parts: np.ndarray, cell: float
+) -> tuple[np.ndarray, np.ndarray]:
     """A coarser mesh: vertices in one cell of a lattice become one of them (Rossignac and Borrel 1993).
 
     Args:

@@ -83,8 +83,8 @@ def draw(
 ):
     """Find which triangle is seen in each pixel of each of c views.
 
-    ``points`` (n, 3) and ``triangles`` (t, 3) are the mesh, ``views`` (c, 16) as :attr:`intsim.render.view.View.row` has
-    them, and ``there`` (c, n, 3) is room for as many points. ``near`` and ``which`` (c, h, w) are updated: how near it
+    ``points`` (n, 3) and ``triangles`` (t, 3) are the mesh, ``views`` (c, 16) as
+    :attr:`intsim.render.view.View.row` has them, and ``there`` (c, n, 3) is room for as many points. ``near`` and ``which`` (c, h, w) are updated: how near it
     is, and its number.
     """
     ti.loop_config(serialize=True)
@@ -128,9 +128,12 @@ def see(
                     la = 1 - lb - lc
                     far = 1 / near[c, y, x]  # in the picture one over the distance is linear, not the place
                     la, lb, lc = la * there[c, i, 2] * far, lb * there[c, j, 2] * far, lc * there[c, k, 2] * far
-                    at = ti.Vector([la * ref[i, m] + lb * ref[j, m] + lc * ref[k, m] for m in ti.static(range(5))], ti.f32)
+                    at = ti.Vector(
+                        [la * ref[i, m] + lb * ref[j, m] + lc * ref[k, m] for m in ti.static(range(5))], ti.f32
+                    )
                     n = ti.Vector(
-                        [la * normals[i, m] + lb * normals[j, m] + lc * normals[k, m] for m in ti.static(range(3))], ti.f32
+                        [la * normals[i, m] + lb * normals[j, m] + lc * normals[k, m] for m in ti.static(range(3))],
+                        ti.f32,
                     )
                     n = n / ti.max(n.norm(), 1e-12)
                     p = paint_of[t]
@@ -169,8 +172,8 @@ def turn_normals(points: array(ti.f32, 2), triangles: array(ti.i32, 2), normals:
 def lit_parts(
     views: ti.template(), c: ti.i32, lamp: ti.template(), lamps: ti.template(), y: ti.i32, x: ti.i32, w: ti.f32, look
 ):
-    """Light of a surface: what the lamp does not give and what it gives, three colours each; and its place in the lamp's
-    view (3,). ``look`` (7,) is its colour, normal and gloss."""
+    """Light of a surface: what the lamp does not give and what it gives, three colours each; and its place in the
+    lamp's view (3,). ``look`` (7,) is its colour, normal and gloss."""
     n = ti.Vector([look[3], look[4], look[5]], ti.f32)
     to = -ti.Vector([lamp[0, 9], lamp[0, 10], lamp[0, 11]], ti.f32)
     u = (ti.cast(x, ti.f32) + 0.5 - views[c, 13]) / views[c, 12]
@@ -201,7 +204,11 @@ def lit_parts(
 
 @ti.kernel
 def settle(
-    views: array(ti.f32, 2), near: array(ti.f32, 3), room: array(ti.f32, 4), lamp: array(ti.f32, 2), lamps: array(ti.f32, 1)
+    views: array(ti.f32, 2),
+    near: array(ti.f32, 3),
+    room: array(ti.f32, 4),
+    lamp: array(ti.f32, 2),
+    lamps: array(ti.f32, 1),
 ):
     """The light on what does not move, for cameras that do not.
 
@@ -236,8 +243,8 @@ def light(
     """Light what is seen: the nearer of scene and room.
 
     ``near`` and ``seen_as`` are as :func:`see` has filled them for c views, of scene and room; for a camera that stands
-    ``room`` is what :func:`settle` has made of that. ``lamp`` (1, 16) is the lamp as a view and ``shadow`` (1, ., .) how
-    near to it what it sees is; ``lamps`` (10,) its colour, the colour from above and from below, and the tolerance of a
+    ``room`` is what :func:`settle` has made of that. ``lamp`` (1, 16) is the lamp as a view and ``shadow`` (1, ., .)
+    how near to it what it sees is; ``lamps`` (10,) its colour, the colour from above and from below, and the tolerance of a
     shadow [m]. ``out`` (c, h, w, 3) is filled, 8 bits.
     """
     ti.loop_config(serialize=True)

@@ -132,7 +132,10 @@ class Studio:
         self._moving = [k for k, name in enumerate(self._order) if name not in STANDING]
         hand = np.eye(4)
         self._views = np.array(
-            [(View.standing(name, pixels) if name in STANDING else View.wrist(hand, pixels)).row for name in self._order]
+            [
+                (View.standing(name, pixels) if name in STANDING else View.wrist(hand, pixels)).row
+                for name in self._order
+            ]
         )
         shape = len(cameras), pixels, pixels
         self._near, self._which = np.zeros(shape, np.float32), np.zeros(shape, np.int32)

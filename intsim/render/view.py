@@ -69,7 +69,7 @@ class View:
 
     @property
     def row(self) -> np.ndarray:
-        """As the kernels take it: eye, turn by rows, focal, half the picture, 1 where flat, 1 where it stands; (16,)."""
+        """As the kernels take it: eye, turn by rows, focal, half the picture, 1 if flat, 1 if it stands; (16,)."""
         own = (*self.eye, *self.turn.ravel(), self.focal, self.pixels / 2, float(self.flat), float(self.stands))
         return np.array(own, np.float32)
 

@@ -16,7 +16,6 @@ from intsim.task.motion import at_rest
 from intsim.task.planner import CONTROL_RATE, GRIPPER_CLOSED
 from intsim.task.rollout import Policy, Rollout
 from intsim.task.suites import Episode
-from mpm.scene.errors import CutcalError
 
 _environments: dict[str, Any] = {}
 

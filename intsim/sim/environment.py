@@ -22,10 +22,10 @@ from mani_skill.utils.structs.types import SimConfig
 from scipy.spatial.transform import Rotation
 
 from calib.material.food import FoodSpec, load_food
-from intsim.render.background import Background
-from intsim.sim.coupling import Coupling
 from intsim.render.arm import BASE_POSITION
+from intsim.render.background import Background
 from intsim.render.view import PICTURE_CAMERAS
+from intsim.sim.coupling import Coupling
 from intsim.sim.panda import (
     BLADE_LINK,
     EDGE_LINK,

@@ -21,6 +21,7 @@ from intsim.task.targets import BOARD_THICKNESS as THICKNESS
 TABLE_SIZE = (0.8, 1.2)  # along x and y [m]
 WALL_DISTANCE = 3.0  # of the walls from the board [m]
 
+
 class Scenery:
     """What is around the robot before one background.
 

@@ -1,4 +1,4 @@
-"""Robot and foods of an episode before the cameras; needs the extra ``[robot]`` for the arm's meshes, and no renderer."""
+"""Robot and foods of an episode before the cameras; needs the extra ``[robot]`` for the arm's meshes, no renderer."""
 
 from __future__ import annotations
 

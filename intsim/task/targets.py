@@ -119,7 +119,7 @@ class Item:
 
     @property
     def base(self) -> float | None:
-        """Height of what it stands on [m]: 0 on the board, less the board's thickness beside it, None across its rim."""
+        """Height of what it stands on [m]: 0 on the board, less its thickness beside it, None across its rim."""
         gaps = [abs(at) - half / 2 for at, half in zip((self.x, self.y), BOARD_SIZE, strict=True)]
         if all(gap + own / 2 <= 0 for gap, own in zip(gaps, self.box, strict=True)):
             return 0.0

@@ -30,7 +30,7 @@ EPILOG = """examples:
   cutcal dataset export runs/cuts --scenes 0,1,2 --out runs/lerobot
 
 generate and clone need pip install 'cutcal[robot]', export 'cutcal[data]', its
-pictures both and Vulkan (cutcal doctor). Exit codes: 0 done, 1 error."""
+pictures both. Exit codes: 0 done, 1 error."""
 WHAT, FORMATS = ("generate", "export", "clone"), ("lerobot", "rlds", "rdt")
 KEEP = ("severed", "published", "all")
 
@@ -86,6 +86,7 @@ def add_args(p: Group) -> None:
     p.add_argument("--without", action="append", metavar="FOOD", help="export, clone: leave a food out, or several")
     p.add_argument("--most", type=whole(1), metavar="N", help="clone: learn from at most so many")
     p.add_argument("--pixels", type=whole(16), default=128, metavar="N", help="of the pictures (default 128)")
+    p.add_argument("--work-camera", action="store_true", help="of a lerobot export: the close camera's pictures too")
     add_workers(p, "trajectories")
     p.add_argument("--out", metavar="DIR", help="folder of the results, file of a clone; never overwritten")
     p.add_argument("--resume", action="store_true", help=RESUME_HELP)
@@ -224,6 +225,9 @@ def _export(args: argparse.Namespace) -> dict[str, Any]:
         "rlds": export_rlds,
         "rdt": export_rdt,
     }
+    if args.work_camera and args.format != "lerobot":
+        raise CutcalError(f"--work-camera: the layout of {args.format} has no place for it; leave it out")
+    more = {"work_camera": True} if args.work_camera else {}
     args.arch = "cpu"
     with workers_of(args, say) if backgrounds else nullcontext() as pool:
         found = exports[args.format](
@@ -235,6 +239,7 @@ def _export(args: argparse.Namespace) -> dict[str, Any]:
             say=say,
             keep=args.keep or "all",
             tasks=_tasks(args),
+            **more,
         )
     if not args.json and args.format == "rlds":
         print(", ".join(f"{s['shardLengths'][0]} episodes to {s['name']}" for s in found["splits"]))
