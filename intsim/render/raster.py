@@ -84,7 +84,8 @@ def draw(
     """Find which triangle is seen in each pixel of each of c views.
 
     ``points`` (n, 3) and ``triangles`` (t, 3) are the mesh, ``views`` (c, 16) as
-    :attr:`intsim.render.view.View.row` has them, and ``there`` (c, n, 3) is room for as many points. ``near`` and ``which`` (c, h, w) are updated: how near it
+    :attr:`intsim.render.view.View.row` has them, and ``there`` (c, n, 3) is room for as many points. ``near`` and
+    ``which`` (c, h, w) are updated: how near it
     is, and its number.
     """
     ti.loop_config(serialize=True)
@@ -244,7 +245,8 @@ def light(
 
     ``near`` and ``seen_as`` are as :func:`see` has filled them for c views, of scene and room; for a camera that stands
     ``room`` is what :func:`settle` has made of that. ``lamp`` (1, 16) is the lamp as a view and ``shadow`` (1, ., .)
-    how near to it what it sees is; ``lamps`` (10,) its colour, the colour from above and from below, and the tolerance of a
+    how near to it what it sees is; ``lamps`` (10,) its colour, the colour from above and from below, and the
+    tolerance of a
     shadow [m]. ``out`` (c, h, w, 3) is filled, 8 bits.
     """
     ti.loop_config(serialize=True)

@@ -13,7 +13,7 @@ PICTURE_CAMERAS = ("front", "side", "wrist", "work")
 NEAR = 0.01  # distance before a camera from which on it sees [m]
 FIELD = 0.9  # field of view of the cameras that stand [rad]
 WRIST_FIELD, WRIST_PLACE = 1.57, np.array([0.07, 0.0, 0.0])  # that of the hand [rad], and where it is in its frame [m]
-WORK_EYE, WORK_TARGET, WORK_FIELD = (0.30, -0.24, 0.20), (0.0, 0.0, 0.02), 0.75  # the close one [m, rad]
+WORK_EYE, WORK_TARGET, WORK_FIELD = (0.36, -0.20, 0.26), (-0.02, 0.0, 0.02), 0.85  # the close one [m, rad]
 
 
 @dataclass(frozen=True, eq=False)

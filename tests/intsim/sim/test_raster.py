@@ -30,7 +30,8 @@ def seen(mesh: Drawn, view: View):
 
 
 def test_a_square_is_where_the_pinhole_puts_it_as_far_as_it_is():
-    """A face of a metre at two metres, seen by a camera of 90 degrees whose picture is four metres wide there: a quarter
+    """A face of a metre at two metres, seen by a camera of 90 degrees whose picture is four metres wide
+    there: a quarter
     of it, and every pixel of that one over two near."""
     view = View.towards(np.array([0.0, -2.5, 0.0]), np.zeros(3), np.pi / 2, PIXELS)
     near, which, look = seen(box((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5), Paint((0.2, 0.4, 0.6))), view)
