@@ -70,7 +70,7 @@ class Background:
 
 def beside(rng: np.random.Generator, colours: Sequence[tuple[float, float, float]]) -> np.ndarray:
     """A colour (3,) beside one of several."""
-    return np.clip(np.array(colours[rng.integers(len(colours))]) + rng.uniform(-NEARBY, NEARBY, 3), 0.03, 0.97)
+    return np.clip(np.array(colours[int(rng.integers(len(colours)))]) + rng.uniform(-NEARBY, NEARBY, 3), 0.03, 0.97)
 
 
 def _direction(azimuth: float, down: float) -> np.ndarray:

@@ -169,7 +169,8 @@ def _colour(rng: np.random.Generator) -> np.ndarray:
 
 def _clutter(rng: np.random.Generator) -> tuple[list[Drawn], np.ndarray]:
     """What stands about: on the worktop beside the board, and along the wall behind the robot."""
-    out, standing = [], []
+    out: list[Drawn] = []
+    standing: list[list[float]] = []
     makers = (_bottle, _bowl, _pot, _jar, _cloth, _mug)
     count = int(rng.integers(4, 9))
     for _ in range(CLUTTER_TRIES):
@@ -206,10 +207,10 @@ def board_clutter(items: Sequence[Item], seed: int) -> list[Drawn]:
     taken = [(item.x, item.y, r) for item, r in zip(items, reach, strict=True)]
     for _ in range(int(rng.integers(0, MOST_ON_BOARD + 1))):
         thing, radius = (_leaf, _crumb, _spoon, _dish)[rng.integers(4)](rng)
-        at = [float(rng.uniform(-size / 2 + radius, size / 2 - radius)) for size in BOARD_SIZE]
-        if all(math.hypot(at[0] - x, at[1] - y) > radius + r for x, y, r in taken):
-            out.append(thing.moved((*at, 0.0), float(rng.uniform(0, 2 * np.pi))))
-            taken.append((*at, radius))
+        x0, y0 = (float(rng.uniform(-size / 2 + radius, size / 2 - radius)) for size in BOARD_SIZE)
+        if all(math.hypot(x0 - x, y0 - y) > radius + r for x, y, r in taken):
+            out.append(thing.moved((x0, y0, 0.0), float(rng.uniform(0, 2 * np.pi))))
+            taken.append((x0, y0, radius))
     return out
 
 
