@@ -117,7 +117,8 @@ def _in_order(joints: list[_Joint]) -> tuple[str, list[_Joint]]:
     """The first link, and the joints so that each comes after the one that its parent hangs on."""
     children = {joint.child for joint in joints}
     first = next(joint.parent for joint in joints if joint.parent not in children)
-    known, out = {first}, []
+    known = {first}
+    out: list[_Joint] = []
     while len(out) < len(joints):
         for joint in joints:
             if joint.parent in known and joint.child not in known:
