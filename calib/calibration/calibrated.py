@@ -173,9 +173,11 @@ class Calibrated:
         food = setup.request.food.with_values(values, **fitted)
         if roundness is not None:
             food = with_roundness(food, roundness, **fitted)
-        shape, new = setup.fine.food.shape, set()
-        if height is not None:
-            new |= {"height", "width"} - set(setup.kept)
+        shape = setup.fine.food.shape
+        if aspect is not None and height is None:  # or the fitted width would be that of another height
+            source = f"of the specimen of {setup.curve.trace.source}"
+            food = food.with_sizes({"height": shape.height}, status="given", source=source)
+        new = set() if height is None else {"height", "width"} - set(setup.kept)
         if aspect is not None:
             new.add("width")
         return food.with_sizes({name: getattr(shape, name) for name in sorted(new)}, **fitted)

@@ -89,14 +89,15 @@ def test_a_candidate_has_its_width() -> None:
 
 
 def test_the_food_that_is_written_has_the_fitted_width(record: Trace) -> None:
-    """So that another cut of it is predicted at that width."""
+    """And the height that it belongs to, so that another cut of it is predicted in these proportions."""
     setup = set_up(Calibration("apple", record, knife="edc", height=0.04).request())
     values = setup.start_values | {"aspect": 1.6}
     fit: Any = SimpleNamespace(best=SimpleNamespace(evaluation=SimpleNamespace(parameters=values)))
     made: Any = SimpleNamespace(setup=setup.sized(values), fit=fit)
     food = Calibrated.food(made)
     assert food.dims["width"].value == pytest.approx(0.064)
-    assert (food.dims["width"].status, food.dims["height"].status) == ("fitted", APPLE.dims["height"].status)
+    assert (food.dims["height"].value, food.dims["height"].status) == (0.04, "given")
+    assert food.dims["width"].status == "fitted"
 
 
 def test_what_is_known_of_it_is_the_range_of_the_width() -> None:
