@@ -93,3 +93,11 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path):
     """A megabyte is no list of foods."""
     with pytest.raises(MaterialError, match="at most 1 MB are read"):
         content_of(tmp_path, "#" * (MOST_BYTES + 1))
+
+
+def test_what_is_read_belongs_to_the_reader(tmp_path):
+    """A file is parsed once, and yet each reader may change what it got; a file that was changed is read anew."""
+    text = "a: {b: 1}"
+    content_of(tmp_path, text)["a"]["b"] = 2
+    assert content_of(tmp_path, text) == {"a": {"b": 1}}
+    assert content_of(tmp_path, text.replace("1", "3")) == {"a": {"b": 3}}
