@@ -9,8 +9,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from intsim.render.mesh import Drawn, Paint, clustered
-from intsim.render.texture import CITRUS, FLESH, SEEDED, SKIN, SPOTTED, STRIPED
+from intsim.render.texture import CITRUS, FLESH, PLAIN, SEEDED, SKIN, SPOTTED, STRIPED
 from intsim.task.targets import Item
+from mpm.output.food_colours import food_colours
 from mpm.scene.shapes import half_width
 
 SECTIONS = 65  # places along a food at which its width is found
@@ -25,73 +26,34 @@ class FoodLooks:
     flesh: Paint
 
 
+def _looks(name: str, skin: tuple[float, ...], flesh: tuple[float, ...]) -> FoodLooks:
+    """Looks of a food from its colours and the patterns of skin and flesh: kind, scale, b, c and gloss of a paint."""
+    own = food_colours(name)
+    return FoodLooks(
+        Paint(own.skin, own.skin_marks, int(skin[0]), *skin[1:]),
+        Paint(own.flesh, own.flesh_marks, int(flesh[0]), *flesh[1:]),
+    )
+
+
 FOOD_LOOKS = {
-    "banana": FoodLooks(
-        Paint((0.93, 0.80, 0.22), (0.40, 0.26, 0.10), SPOTTED, 120, 0.25, 0.12, gloss=0.15),
-        Paint((0.98, 0.94, 0.76), (0.72, 0.60, 0.38), SEEDED, 3, 0.16, 0.06),
-    ),
-    "cucumber": FoodLooks(
-        Paint((0.13, 0.36, 0.13), (0.33, 0.55, 0.22), STRIPED, 9, 0.55, 0.25, gloss=0.4),
-        Paint((0.80, 0.90, 0.62), (0.95, 0.96, 0.80), SEEDED, 12, 0.45, 0.10, gloss=0.3),
-    ),
-    "apple": FoodLooks(
-        Paint((0.75, 0.10, 0.12), (0.90, 0.70, 0.28), SKIN, 60, 0.25, 0.55, gloss=0.6),
-        Paint((0.98, 0.95, 0.80), (0.36, 0.20, 0.10), SEEDED, 5, 0.24, 0.07, gloss=0.2),
-    ),
-    "peach": FoodLooks(
-        Paint((0.97, 0.68, 0.40), (0.80, 0.22, 0.20), SKIN, 45, 0.65, 0.35),
-        Paint((0.99, 0.82, 0.50), (0.72, 0.25, 0.18), FLESH, 0, 0.42, 0.75, gloss=0.2),
-    ),
-    "melon": FoodLooks(
-        Paint((0.72, 0.76, 0.46), (0.88, 0.86, 0.70), SKIN, 160, 0.85, 0.15, gloss=0.1),
-        Paint((0.98, 0.72, 0.42), (0.96, 0.86, 0.58), FLESH, 0, 0.40, 0.85, gloss=0.2),
-    ),
-    "orange": FoodLooks(
-        Paint((0.97, 0.52, 0.08), (0.80, 0.36, 0.04), SPOTTED, 420, 0.8, 0.25, gloss=0.35),
-        Paint((0.99, 0.60, 0.12), (0.99, 0.90, 0.72), CITRUS, 10, 0.88, 0.0, gloss=0.4),
-    ),
-    "strawberry": FoodLooks(
-        Paint((0.85, 0.08, 0.12), (0.95, 0.80, 0.40), SPOTTED, 260, 0.85, 0.05, gloss=0.5),
-        Paint((0.96, 0.36, 0.36), (0.99, 0.86, 0.82), FLESH, 0, 0.45, 0.9, gloss=0.3),
-    ),
-    "pear": FoodLooks(
-        Paint((0.74, 0.78, 0.28), (0.55, 0.42, 0.18), SPOTTED, 260, 0.5, 0.4, gloss=0.3),
-        Paint((0.98, 0.96, 0.84), (0.50, 0.34, 0.18), SEEDED, 5, 0.22, 0.06, gloss=0.2),
-    ),
-    "kiwi": FoodLooks(
-        Paint((0.46, 0.34, 0.18), (0.30, 0.21, 0.10), SKIN, 300, 0.9, 0.3),
-        Paint((0.50, 0.74, 0.22), (0.08, 0.08, 0.05), SEEDED, 22, 0.42, 0.05, gloss=0.4),
-    ),
-    "tomato": FoodLooks(
-        Paint((0.85, 0.13, 0.08), (0.93, 0.36, 0.12), SKIN, 40, 0.3, 0.25, gloss=0.8),
-        Paint((0.92, 0.33, 0.25), (0.97, 0.72, 0.42), SEEDED, 7, 0.55, 0.20, gloss=0.6),
-    ),
-    "lemon": FoodLooks(
-        Paint((0.96, 0.86, 0.16), (0.82, 0.70, 0.08), SPOTTED, 420, 0.8, 0.2, gloss=0.35),
-        Paint((0.98, 0.92, 0.52), (0.99, 0.98, 0.86), CITRUS, 9, 0.84, 0.0, gloss=0.4),
-    ),
-    "grape": FoodLooks(
-        Paint((0.32, 0.10, 0.32), (0.52, 0.36, 0.52), SKIN, 120, 0.6, 0.2, gloss=0.5),
-        Paint((0.74, 0.76, 0.48), (0.45, 0.30, 0.16), SEEDED, 2, 0.22, 0.09, gloss=0.5),
-    ),
-    "shine_muscat": FoodLooks(
-        Paint((0.64, 0.78, 0.28), (0.82, 0.88, 0.50), SKIN, 120, 0.6, 0.2, gloss=0.6),
-        Paint((0.88, 0.92, 0.66), (0.72, 0.80, 0.46), FLESH, 0, 0.3, 0.7, gloss=0.5),
-    ),
-    "plum": FoodLooks(
-        Paint((0.36, 0.08, 0.26), (0.58, 0.42, 0.58), SKIN, 70, 0.6, 0.35, gloss=0.4),
-        Paint((0.92, 0.70, 0.28), (0.62, 0.32, 0.18), FLESH, 0, 0.40, 0.8, gloss=0.4),
-    ),
-    "cherry": FoodLooks(
-        Paint((0.52, 0.02, 0.08), (0.70, 0.10, 0.14), SKIN, 120, 0.5, 0.2, gloss=1.0),
-        Paint((0.78, 0.20, 0.26), (0.80, 0.62, 0.46), FLESH, 0, 0.45, 0.8, gloss=0.5),
-    ),
-    "potato": FoodLooks(
-        Paint((0.70, 0.56, 0.36), (0.45, 0.33, 0.20), SPOTTED, 150, 0.5, 0.6),
-        Paint((0.96, 0.91, 0.68), (0.90, 0.82, 0.52), FLESH, 0, 0.7, 0.4, gloss=0.2),
-    ),
+    "banana": _looks("banana", (SPOTTED, 120, 0.25, 0.12, 0.15), (SEEDED, 3, 0.16, 0.06)),
+    "cucumber": _looks("cucumber", (STRIPED, 9, 0.55, 0.25, 0.4), (SEEDED, 12, 0.45, 0.10, 0.3)),
+    "apple": _looks("apple", (SKIN, 60, 0.25, 0.55, 0.6), (SEEDED, 5, 0.24, 0.07, 0.2)),
+    "peach": _looks("peach", (SKIN, 45, 0.65, 0.35), (FLESH, 0, 0.42, 0.75, 0.2)),
+    "melon": _looks("melon", (SKIN, 160, 0.85, 0.15, 0.1), (FLESH, 0, 0.40, 0.85, 0.2)),
+    "orange": _looks("orange", (SPOTTED, 420, 0.8, 0.25, 0.35), (CITRUS, 10, 0.88, 0.0, 0.4)),
+    "strawberry": _looks("strawberry", (SPOTTED, 260, 0.85, 0.05, 0.5), (FLESH, 0, 0.45, 0.9, 0.3)),
+    "pear": _looks("pear", (SPOTTED, 260, 0.5, 0.4, 0.3), (SEEDED, 5, 0.22, 0.06, 0.2)),
+    "kiwi": _looks("kiwi", (SKIN, 300, 0.9, 0.3), (SEEDED, 22, 0.42, 0.05, 0.4)),
+    "tomato": _looks("tomato", (SKIN, 40, 0.3, 0.25, 0.8), (SEEDED, 7, 0.55, 0.20, 0.6)),
+    "lemon": _looks("lemon", (SPOTTED, 420, 0.8, 0.2, 0.35), (CITRUS, 9, 0.84, 0.0, 0.4)),
+    "grape": _looks("grape", (SKIN, 120, 0.6, 0.2, 0.5), (SEEDED, 2, 0.22, 0.09, 0.5)),
+    "shine_muscat": _looks("shine_muscat", (SKIN, 120, 0.6, 0.2, 0.6), (FLESH, 0, 0.3, 0.7, 0.5)),
+    "plum": _looks("plum", (SKIN, 70, 0.6, 0.35, 0.4), (FLESH, 0, 0.40, 0.8, 0.4)),
+    "cherry": _looks("cherry", (SKIN, 120, 0.5, 0.2, 1.0), (FLESH, 0, 0.45, 0.8, 0.5)),
+    "potato": _looks("potato", (SPOTTED, 150, 0.5, 0.6), (FLESH, 0, 0.7, 0.4, 0.2)),
 }
-OTHER_LOOKS = FoodLooks(Paint((0.80, 0.60, 0.40), (0.6, 0.42, 0.26), SKIN, 90, 0.6, 0.2), Paint((0.95, 0.90, 0.80)))
+OTHER_LOOKS = _looks("", (SKIN, 90, 0.6, 0.2), (PLAIN,))
 
 
 @dataclass(frozen=True, eq=False)
