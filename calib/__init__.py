@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 from calib._version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from calib.api import Calibration, Study
+    from calib.api import Calibration
     from calib.design_api import Design
     from calib.material.food import FoodSpec as Food
+    from calib.study_api import Study
     from calib.trace.trace import Trace
 
 __all__ = ["Calibration", "Design", "Food", "Study", "Trace"]
@@ -22,7 +23,7 @@ _PLACES = {
     "Calibration": ("calib.api", "Calibration"),
     "Design": ("calib.design_api", "Design"),
     "Food": ("calib.material.food", "FoodSpec"),
-    "Study": ("calib.api", "Study"),
+    "Study": ("calib.study_api", "Study"),
     "Trace": ("calib.trace.trace", "Trace"),
 }
 

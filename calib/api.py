@@ -1,4 +1,4 @@
-"""Calibrating from Python as from the command line: one trace, what a finished folder holds, and several cuts."""
+"""Calibrating from Python as from the command line: one trace, and what a finished folder holds."""
 
 from __future__ import annotations
 
@@ -14,14 +14,10 @@ import pandas as pd
 from calib.calibration.result import SUMMARY, read_result, read_summary
 from calib.calibration.result import CalibrationResult as CalibrationResult
 from calib.errors import OutputError
-from calib.io.folder import finite
 from calib.io.progress import Progress, ProgressBar
-from calib.io.typed_document import to_document
 from calib.io.wording import brief, in_arguments, speaking_of_arguments
 from calib.material.food import FoodSpec
 from calib.material.scene import MID_LENGTH, Sizing
-from calib.multi_specimen.spec import StudySpec
-from calib.multi_specimen.study_file import read_study
 from calib.outline.outline_file import OutlineFile
 from calib.problem.request import Request
 from calib.problem.target import ErrorModel
@@ -309,58 +305,6 @@ class Calibration:
             elif value != item.default:
                 words.append(f"{item.name}={str(value) if isinstance(value, Path) else value!r}")
         return f"Calibration({', '.join(words)})"
-
-
-@dataclass(frozen=True, eq=False)
-class Study:
-    """Several cuts of one food, with what they share and what is held out; :meth:`run` fits and predicts them.
-
-    Attributes:
-        spec: What the file of the study says.
-    """
-
-    spec: StudySpec
-
-    @staticmethod
-    def read(path: str | Path) -> Study:
-        """The study of a YAML file, as ``calibrate --config`` takes it.
-
-        Raises:
-            CutcalError: Anything wrong with the file; the message names the place in it.
-        """
-        with speaking_of_arguments():
-            return Study(read_study(path))
-
-    def run(
-        self,
-        out: str | Path,
-        *,
-        workers: int = 2,
-        resume: bool = False,
-        progress: Callable[[Progress], None] | None = None,
-        say: Callable[[str], None] | None = None,
-    ) -> dict[str, Any]:
-        """Fit and predict, and write what ``calibrate --config`` writes.
-
-        Args:
-            out: Output folder, which is made and never overwritten.
-            workers: Simulations at a time.
-            resume: Go on with the study in ``out``; nothing is simulated twice.
-            progress: Called after each simulation.
-            say: Called with each warning and stage, as one sentence.
-
-        Returns:
-            The content of ``summary.json``.
-
-        Raises:
-            CutcalError: Anything wrong with the input; nothing that was computed is lost.
-        """
-        from calib.multi_specimen.run import run
-        from calib.simulation.process_pool import Pool
-
-        with speaking_of_arguments(), script_hidden(), Pool(workers, self.spec.first.arch) as pool:
-            result = run(self.spec, Path(out), pool, resume=resume, progress=progress, say=in_arguments(say))
-        return dict(finite(to_document(result)))
 
 
 def workers_for(workers: int | None, arch: str, scheduler: str | None, say: Callable[[str], None] | None) -> Workers:
