@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from calib.calibration.fit_report import fit_report, html_table
+from calib.calibration.parameter_table import ParameterTable, parameter_table
 from calib.calibration.result_parts import (
     Agreement,
     AirSource,
@@ -163,9 +164,9 @@ class CalibrationResult:
         return self.agreement.peak_real_sd_N or 0.0, gain, sd.get("drift", 0.0)
 
     @property
-    def parameters(self) -> pd.DataFrame:
+    def parameters(self) -> ParameterTable:
         """Fitted values by name: value, unit, 95 % interval, literature range, verdict, status, source."""
-        return pd.DataFrame.from_dict(self.summary["parameters"], orient="index")
+        return parameter_table(self.summary["parameters"])
 
     @property
     def curves(self) -> pd.DataFrame:

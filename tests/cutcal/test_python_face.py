@@ -51,6 +51,20 @@ def result(tmp_path: Path) -> CalibrationResult:
     return Calibration.load(folder)
 
 
+@pytest.mark.parametrize("columns", [40, 72])
+def test_a_narrow_terminal_shows_every_column(
+    result: CalibrationResult, monkeypatch: pytest.MonkeyPatch, columns: int
+) -> None:
+    """Each name of a column and each value stands in the text; a part of the table is a table of the same kind."""
+    monkeypatch.setenv("COLUMNS", str(columns))
+    table = result.parameters
+    text = repr(table)
+    words = text.split()
+    assert len(table.columns) > 8 and set(table.columns) <= set(words) and set(table.index) <= set(words)
+    assert "..." not in text and len(text.splitlines()[0]) <= columns
+    assert repr(table[["value", "unit"]]).splitlines()[0].split() == ["value", "unit"]
+
+
 def test_every_option_is_an_argument_of_the_same_name() -> None:
     """None is missing on either side."""
     parser = argparse.ArgumentParser()

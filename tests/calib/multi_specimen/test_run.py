@@ -199,16 +199,26 @@ def test_the_result_is_read_back_as_it_was_written(finished: tuple[Path, Path, i
 
 
 @pytest.mark.slow
-def test_a_study_runs_from_python(study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two lines of a script do what the command does: the folder holds the document that they return."""
+def test_a_study_runs_from_python(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two lines of a script do what the command does: without an argument the folder has the name of the study's file,
+    it holds the document that they return, a bar is shown, and the folder gives the same again."""
     monkeypatch.setattr("calib.simulation.process_pool.Pool", lambda workers, arch: FakePool())
+    monkeypatch.chdir(tmp_path)
     text = study.read_text().replace("hold_out: each\n", "budget: 30\n")
     study.write_text("\n".join(line for line in text.splitlines() if not line.startswith("  c:")))
     said: list[str] = []
-    summary = Study.read(study).run(tmp_path / "out", say=said.append)
-    assert summary == json.loads((tmp_path / "out" / "summary.json").read_text()) == valid(summary)
-    assert list(summary["traces"]) == ["a", "b"] and not summary["hold_out"]
-    assert "fitting a, b together" in said
+    found = Study.read(study).run(say=said.append, progress=True)
+    assert found.folder == Path(f"cutcal-{study.stem}")
+    assert found.summary == json.loads((found.folder / "summary.json").read_text()) == valid(found.summary)
+    assert list(found.result.traces) == ["a", "b"] and not found.result.hold_out
+    assert "fitting a, b together" in said and capsys.readouterr().err
+    again = Study.load(found.folder)
+    assert again.summary == found.summary and again.material.name == found.material.name == found.result.food
+    table = found.parameters
+    assert list(table.index) == list(found.result.parameters)
+    assert table["value"].to_dict() == {name: p.value for name, p in found.result.parameters.items()}
 
 
 @pytest.mark.slow
