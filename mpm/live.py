@@ -20,7 +20,6 @@ from mpm.setup.setup import CLEARANCE
 from mpm.solver import Simulation
 from mpm.state.host_transfer import of_particles
 
-ON_FACE = 1e-9  # distance from the plane of the cut at which a vertex lies on its face [m]
 CLEAR = 2.0  # height of the edge above the uncut food at which nothing touches the blade any more [cells]
 
 
@@ -192,7 +191,7 @@ class LiveCut:
         """The food's surface now: vertices [m] (m, 3) in the scene's axes, triangles (t, 3), and whether each vertex is
         flesh (m,): of the face of the cut."""
         own = self._drawn
-        return own.points(self.snapshot()), own.triangles, np.abs(own.rest[:, 1]) < ON_FACE
+        return own.points(self.snapshot()), own.triangles, own.face
 
     @property
     def rest(self) -> np.ndarray:

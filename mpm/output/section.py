@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -57,6 +58,25 @@ class SectionRecorder(SnapshotRecorder):
             return None
         y, z, mises = np.stack([(*kept.x.T[1:], kept.mises) for kept in self.taken], axis=1)
         return Section(np.array([kept.stroke for kept in self.taken]), y, z, mises, self._size, self._mirrored)
+
+
+def section_of(looks: Sequence[Snapshot], seeds: Seeds, mirrors: tuple[bool, bool]) -> Section:
+    """The section of looks that were kept whole.
+
+    Args:
+        looks: The particles at some moments, one at least.
+        seeds: Particles of the run at rest.
+        mirrors: Whether x = 0 and y = 0 are mirrors.
+
+    Returns:
+        The food across the blade's middle at each of them.
+    """
+    recorder = SectionRecorder(seeds, mirrors, len(looks))
+    for look in looks:
+        recorder.take(look)
+    section = recorder.section()
+    assert section is not None  # because something was kept
+    return section
 
 
 def _pieces(seeds: Seeds, mirrored: bool) -> tuple[np.ndarray, np.ndarray]:

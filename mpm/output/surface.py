@@ -22,6 +22,8 @@ AROUND = 64  # vertices of a ring
 DISCS = 12  # rings of the face of the cut and of the far end, besides their middle
 ROUNDING = 1e-9  # part by which vertices on the rim of a shape are moved inwards, where it has a height
 SLOPE = 1e-8  # part of the spread of the neighbours that is added to it, in case they lie in a plane
+ON_FACE = 1 + DISCS * AROUND  # first vertices of either half: the face of the cut from its middle to its rim
+PASSED = 0.5  # part of a vertex's particles that the cut has passed from which on it is cut
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,23 +110,47 @@ class Surface:
     Attributes:
         rest: Vertices at rest [m], shape (m, 3).
         triangles: Vertices of each triangle, seen from outside against the clock, shape (t, 3).
+        second: The first vertex of the half at y > 0.
     """
 
     def __init__(self, shape: Shape, seeds: Seeds, mirrors: tuple[bool, bool]) -> None:
         left, right = (half_of(shape, seeds.spacing, side) for side in (-1.0, 1.0))
         places = {-1.0: left.points, 1.0: right.points}
+        self.second = len(left.points)
+        self._starts = (0, self.second)
         self._mirrored = mirrors[1]
         sides = (-1.0,) if self._mirrored else (-1.0, 1.0)
         self._carried = [_Carried(places[side], seeds.x, side, mirrors[0]) for side in sides]
         self.triangles = np.concatenate([left.triangles, right.triangles + len(left.points)])
         self.rest = np.concatenate(list(places.values()))
 
+    @property
+    def face(self) -> np.ndarray:
+        """Whether a vertex lies on the face of the cut, its rim among them, shape (m,)."""
+        return self._on_faces(np.ones(ON_FACE, bool))
+
     def points(self, now: Snapshot) -> np.ndarray:
-        """Places of the vertices [m], shape (m, 3)."""
+        """Places of the vertices [m], shape (m, 3): both halves are one where the cut has not passed."""
         halves = [half.points(now.x) for half in self._carried]
         if self._mirrored:
             halves.append(halves[0] * [1.0, -1.0, 1.0])
+        left, right = halves
+        whole = ~self.cut(now)[:ON_FACE]
+        left[:ON_FACE][whole] = right[:ON_FACE][whole] = (left[:ON_FACE] + right[:ON_FACE])[whole] / 2
         return np.concatenate(halves)
+
+    def cut(self, now: Snapshot) -> np.ndarray:
+        """Whether the cut has passed a vertex of its face on either side, shape (m,); False for all others."""
+        passed = self.values(now.severed.astype(float)) >= PASSED
+        left, right = (passed[start : start + ON_FACE] for start in self._starts)
+        return self._on_faces(left | right)
+
+    def _on_faces(self, values: np.ndarray) -> np.ndarray:
+        """Truth values (ON_FACE,) of both faces among those of all vertices (m,)."""
+        out = np.zeros(len(self.rest), bool)
+        for start in self._starts:
+            out[start : start + ON_FACE] = values
+        return out
 
     def values(self, of_particles: np.ndarray) -> np.ndarray:
         """What the particles have, shape (n,), at the vertices, shape (m,)."""

@@ -13,8 +13,8 @@ from mpm.files import write_atomic
 from mpm.scene.errors import OutputError
 from reports.base.scene_render import COLOURS, EYE, FRAME, INK, STEEL, WOOD, Film, blade_at
 
-PER_METRE = 1e5  # whole numbers of the file in a metre: hundredths of a millimetre
-SHADES = 250  # of a page: more steps of the stress than colours would only make it larger
+PER_METRE = 2e4  # whole numbers of the file in a metre: a twentieth of a millimetre, less than a pixel
+SHADES = 100  # of a page: more steps of the stress than colours would only make it larger
 WRAPPER = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>A simulated cut</title></head>
 <body><p>Unpacking. This needs a browser of 2023 or later, with scripts.</p>
@@ -116,7 +116,7 @@ def _moving(film: Film, k: int, go: Any, *, whole: bool) -> list[Any]:
 
 
 def _corners(points: np.ndarray) -> dict[str, np.ndarray]:
-    """Places [m] as short integers in hundredths of a millimetre, which is a quarter of the file."""
+    """Places [m] as short integers in twentieths of a millimetre, which is a quarter of the file."""
     limit = np.iinfo(np.int16).max
     short = np.clip(np.round(points * PER_METRE), -limit, limit).astype(np.int16)
     return dict(zip("xyz", short.T, strict=True))

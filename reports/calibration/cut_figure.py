@@ -9,14 +9,13 @@ from functools import partial
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon
 
 from mpm.output.section import Section
 from mpm.scene import Knife
-from reports.base.figures import BLACK, LIGHT, WIDTH, svg
+from reports.base.figures import WIDTH, svg
+from reports.base.section_figure import draw_food, draw_tools
 
 EARLY = 0.2
 """Part of the stroke at which the first picture is taken."""
@@ -26,7 +25,6 @@ COLOURS = "cividis_r"  # as light as grey in print, and the same to readers who 
 DOTS = 220  # dots per inch of the particles, which are no vector graphics: some ten thousand of them
 ABOUT = 0.8  # distance from the blade to which a glance goes, in heights of the food
 MARGIN = 0.12  # room around the food, of its height
-FILLING = 1.2  # of a particle's square, so that there are no gaps where the food is stretched
 TALLEST = 52.0  # of one picture [mm]
 LABELS = 14.0  # title and numbers of the axes, of a picture's height [mm]
 LEAST = 26.0  # of one picture of several in a row [mm]
@@ -80,8 +78,8 @@ def cut(section: Section, knife: Knife, height: float, stroke: np.ndarray, force
     def draw(figure: Figure, looks: Sequence[tuple[int, str]]) -> None:
         panels = list(figure.subplots(1, len(looks), squeeze=False).flat)
         for axes, (k, name) in zip(panels, looks, strict=True):
-            _food(axes, section, k, colour)
-            _tools(axes, knife, height - float(section.stroke[k]), top, half)
+            draw_food(axes, section, k, colour)
+            draw_tools(axes, knife, height - float(section.stroke[k]), top)
             at = 1e3 * float(section.stroke[k])
             axes.set_title(f"{at:.1f} mm deep" + (f", {name}" if name else ""))
             axes.set(xlim=(-1e3 * half, 1e3 * half), ylim=(-1e3 * MARGIN * height, 1e3 * top), aspect="equal")
@@ -121,8 +119,8 @@ def glance(section: Section, knife: Knife, height: float, stroke: np.ndarray, fo
 
     def draw(axes: Axes) -> None:
         top = height * (1 + 3 * MARGIN)
-        _food(axes, section, k, colour)
-        _tools(axes, knife, height - float(section.stroke[k]), top, half)
+        draw_food(axes, section, k, colour)
+        draw_tools(axes, knife, height - float(section.stroke[k]), top)
         axes.set(xlim=(-1e3 * half, 1e3 * half), ylim=(-1e3 * MARGIN * height, 1e3 * top), aspect="equal")
         axes.set(xlabel="across the blade [mm]", ylabel="height [mm]")
         axes.set_title(f"largest force, {1e3 * float(section.stroke[k]):.1f} mm", loc="right")
@@ -130,27 +128,3 @@ def glance(section: Section, knife: Knife, height: float, stroke: np.ndarray, fo
         axes.figure.colorbar(colour, ax=axes, location="right", aspect=20, extend="max", label="von Mises stress [kPa]")
 
     return draw
-
-
-def _food(axes: Axes, section: Section, k: int, colour: ScalarMappable) -> None:
-    y, z, half = 1e3 * section.y[k], 1e3 * section.z[k], FILLING * 1e3 * section.size.T / 2
-    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    shades = colour.to_rgba(section.mises[k] / 1e3)
-    for sign in (1.0, -1.0) if section.mirrored else (1.0,):
-        squares = np.stack([sign * y, z], axis=1)[:, None] + half[:, None] * corners
-        axes.add_collection(
-            PolyCollection(squares, facecolors=shades, edgecolors=shades, linewidths=0.2, rasterized=True)
-        )
-
-
-def _tools(axes: Axes, knife: Knife, edge: float, top: float, half: float) -> None:
-    """Blade above its edge, and the board."""
-    spine = knife.spine / 2
-    full = min(spine / math.tan(knife.angle / 2), knife.height)
-    up = min(edge + knife.height, 2 * top)
-    outline = [(0.0, edge), (spine, edge + full), (spine, up), (-spine, up), (-spine, edge + full)]
-    axes.add_patch(
-        Polygon([(1e3 * y, 1e3 * z) for y, z in outline], facecolor="white", edgecolor=BLACK, lw=0.7, zorder=3)
-    )
-    axes.axhspan(-1e3 * top, 0.0, color=LIGHT, lw=0, zorder=0)
-    axes.axhline(0.0, color=BLACK, lw=0.7, zorder=3)

@@ -195,7 +195,7 @@ def run(args: argparse.Namespace) -> int:
         summary = _summary(args, food, scene, record, assumed) | ({} if done is None else {"around": document(done)})
         write_json(out / "summary.json", summary)
         if watch is not None:
-            _draw(args, out, simulation, record, watch, f"{food.name}, {scene.knife.name} knife")
+            _draw(args, out, simulation, record, watch, food.name)
     if args.json:
         print_json(summary)
     else:
@@ -339,19 +339,16 @@ def _words(name: str, scene: Scene, record: ForceRecord, out: Path) -> str:
 
 
 def _draw(
-    args: argparse.Namespace, out: Path, simulation: Any, record: ForceRecord, watch: SnapshotRecorder, title: str
+    args: argparse.Namespace, out: Path, simulation: Any, record: ForceRecord, watch: SnapshotRecorder, food: str
 ) -> None:
     """Pictures, video and page, whatever was asked for; force.csv and summary.json are written before."""
     if not watch.taken:
         say("nothing to draw: the run broke down before the first look")
         return
-    from mpm.output.surface import Surface
     from reports.base.html_page import page
     from reports.base.scene_render import Film, stills, video
 
-    scene = simulation.scene
-    surface = Surface(scene.food.shape, simulation.setup.seeds, scene.mirrors)
-    film = Film(scene, surface, watch.taken, record.time, record.stroke, record.resolved)
+    film = Film.of(food, simulation, watch.taken, record)
     if args.pictures:
         say("drawing contact, largest force and end")
         stills(film, out)
@@ -360,7 +357,7 @@ def _draw(
         page(
             replace(film, looks=watch.taken[FRAMES_PER_PAGE_FRAME - 1 :: FRAMES_PER_PAGE_FRAME]),
             out / "cut.html",
-            title,
+            f"{food}, {film.scene.knife.name} knife",
         )
     if args.video:
         rest = Countdown(len(watch.taken))
