@@ -129,6 +129,12 @@ class Surface:
         """Whether a vertex lies on the face of the cut, its rim among them, shape (m,)."""
         return self._on_faces(np.ones(ON_FACE, bool))
 
+    @property
+    def parts(self) -> tuple[np.ndarray, np.ndarray]:
+        """Triangles of the skin and of the faces of the cut, shapes (t, 3)."""
+        inside = self.face[self.triangles].all(axis=1)
+        return self.triangles[~inside], self.triangles[inside]
+
     def points(self, now: Snapshot) -> np.ndarray:
         """Places of the vertices [m], shape (m, 3): both halves are one where the cut has not passed."""
         halves = [half.points(now.x) for half in self._carried]

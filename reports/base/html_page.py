@@ -50,12 +50,13 @@ def page(film: Film, path: Path, title: str) -> None:
         rows=1, cols=2, column_widths=[0.66, 0.34], specs=[[{"type": "scene"}, {"type": "xy"}]], horizontal_spacing=0.07
     )
     figure.add_trace(_board(film, go), row=1, col=1)
-    for part, column in zip(_moving(film, 0, go, whole=True), (1, 1, 2), strict=True):
+    for part, column in zip(_moving(film, 0, go, whole=True), (1, 1, 1, 2), strict=True):
         figure.add_trace(part, row=1, col=column)
     curve = go.Scatter(x=film.stroke * 1e3, y=film.force, mode="lines", line={"color": INK}, hovertemplate=HOVER)
     figure.add_trace(curve, row=1, col=2)
     figure.frames = [
-        go.Frame(data=_moving(film, k, go, whole=False), traces=[1, 2, 3], name=str(k)) for k in range(len(film.looks))
+        go.Frame(data=_moving(film, k, go, whole=False), traces=[1, 2, 3, 4], name=str(k))
+        for k in range(len(film.looks))
     ]
     figure.update_layout(**_layout(film, title))
     figure.update_xaxes(title=TITLES[1], zeroline=False)
@@ -91,25 +92,36 @@ def _board(film: Film, go: Any) -> Any:
 
 
 def _moving(film: Film, k: int, go: Any, *, whole: bool) -> list[Any]:
-    """Food, blade and the place on the curve at one look: all of them, or what changes."""
+    """Skin, faces of the cut, blade and the place on the curve at one look: all of them, or what changes.
+
+    Skin and faces have vertices of their own, or their light would run into each other along the rim, like a groove.
+    """
     look, surface = film.looks[k], film.surface
     points, triangles = blade_at(film.scene, look)
     step = film.largest / 1e3 / SHADES
     stress = (step * np.round(surface.values(look.mises) / 1e3 / step)).astype(np.float32)
-    food, knife = {"intensity": stress, **_corners(surface.points(look))}, _corners(points)
+    places, knife = surface.points(look), _corners(points)
     now = {"x": [look.stroke * 1e3], "y": [film.force_at(look)]}
+    parts = [np.unique(part, return_inverse=True) for part in surface.parts]
+    foods = [{"intensity": stress[used], **_corners(places[used])} for used, _ in parts]
     if not whole:
-        return [go.Mesh3d(**food), go.Mesh3d(**knife), go.Scatter(**now)]
+        return [*(go.Mesh3d(**food) for food in foods), go.Mesh3d(**knife), go.Scatter(**now)]
     bar = {"title": {"text": TITLES[0], "side": "right"}, "x": -0.04, "len": 0.6, "thickness": 14}
     colours = {"cmin": 0.0, "cmax": film.largest / 1e3, "colorscale": COLOURS, "colorbar": bar}
-    return [
+    hover = "%{intensity:.3g} kPa<extra></extra>"
+    meshes = [
         go.Mesh3d(
             **food,
-            **_faces(surface.triangles),
+            **_faces(own.reshape(-1, 3)),
             **colours,
+            showscale=first,
             lighting=LIGHT,
-            hovertemplate="%{intensity:.3g} kPa<extra></extra>",
-        ),
+            hovertemplate=hover,
+        )
+        for food, (_, own), first in zip(foods, parts, (True, False), strict=True)
+    ]
+    return [
+        *meshes,
         go.Mesh3d(**knife, **_faces(triangles), color=STEEL, flatshading=True, lighting=LIGHT, hoverinfo="skip"),
         go.Scatter(**now, mode="markers", marker={"size": 11, "color": INK}, hovertemplate=HOVER),
     ]

@@ -231,9 +231,8 @@ class Stage:
         film, plot = self.film, self._plot
         plot.add_mesh(pyvista.Box(board(film)), color=WOOD, ambient=0.25)
         colours, surface = food_colours(film.food), film.surface
-        inside = surface.face[surface.triangles].all(axis=1)
         # skin and faces have vertices of their own: their light would run into each other along the rim, like a groove
-        self._parts = [_Part(surface, surface.triangles[which]) for which in (~inside, inside)]
+        self._parts = [_Part(surface, triangles) for triangles in surface.parts]
         for part, colour, light in zip(self._parts, (colours.skin, colours.flesh), (GLOSS, EVEN), strict=True):
             plot.add_mesh(part.mesh, color=colour, smooth_shading=True, split_sharp_edges=False, **light)
         self._knife = _mesh(*blade_at(film.scene, film.looks[0]))
