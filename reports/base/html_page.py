@@ -147,7 +147,7 @@ def _layout(film: Film, title: str) -> dict[str, Any]:
     scene: dict[str, Any] = {
         name: {"range": limits, "visible": False} for name, limits in (ranges | {"zaxis": [-0.01 * top, top]}).items()
     }
-    eye = 2.1 * EYE / np.linalg.norm(EYE)
+    eye = 3.2 * EYE / np.linalg.norm(EYE)
     scene |= {"aspectmode": "data", "camera": {"eye": dict(zip("xyz", map(float, eye), strict=True))}}
     step = {"frame": {"duration": 0, "redraw": True}, "mode": "immediate", "transition": {"duration": 0}}
     play = {"frame": {"duration": 120, "redraw": True}, "fromcurrent": True, "transition": {"duration": 0}}
