@@ -87,6 +87,9 @@ class Film:
             simulation: What has run.
             looks: What was kept of it, one look at least.
             record: Its forces.
+
+        Returns:
+            What is drawn of it.
         """
         scene, seeds = simulation.scene, simulation.setup.seeds
         surface = Surface(scene.food.shape, seeds, scene.mirrors)

@@ -13,6 +13,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from mpm.output.snapshot import Snapshot
+from mpm.scene import Knife
 from reports.base.figures import BLACK, GREY, RED, STYLE
 from reports.base.section_figure import draw_food, draw_tools
 
@@ -109,6 +110,7 @@ class Sheet:
         axes = figure.add_axes((0.26, 0.735, 0.27, 0.215))
         k = next(k for k, own in enumerate(film.looks) if own is look)
         draw_food(axes, film.section, k, colour)
+        assert isinstance(film.scene.knife, Knife)  # a press cuts nothing
         draw_tools(axes, film.scene.knife, shape.height - look.stroke, ABOVE * shape.height)
         reach = 1e3 * shape.height
         axes.set(xlim=(-ABOUT * reach, ABOUT * reach), ylim=(-0.08 * reach, ABOVE * reach), aspect="equal", anchor="C")
