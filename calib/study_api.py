@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from calib.api import script_hidden
 from calib.calibration.parameter_table import ParameterTable, parameter_table
@@ -15,9 +15,10 @@ from calib.io.progress import Progress, ProgressBar
 from calib.io.typed_document import to_document
 from calib.io.wording import in_arguments, speaking_of_arguments
 from calib.material.food import FoodSpec, load_material_file
-from calib.multi_specimen.result import StudyResult, read_result
-from calib.multi_specimen.spec import StudySpec
-from calib.multi_specimen.study_file import read_study
+
+if TYPE_CHECKING:
+    from calib.multi_specimen.result import StudyResult
+    from calib.multi_specimen.spec import StudySpec
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +84,8 @@ class Study:
         Raises:
             CutcalError: Anything wrong with the file; the message names the place in it.
         """
+        from calib.multi_specimen.study_file import read_study
+
         with speaking_of_arguments():
             return Study(read_study(path))
 
@@ -93,6 +96,8 @@ class Study:
         Raises:
             DocumentError: There is no finished study in it.
         """
+        from calib.multi_specimen.result import read_result
+
         return StudyRun(Path(out), read_result(Path(out)))
 
     def run(

@@ -75,8 +75,8 @@ class FoodMesh:
         Args:
             item: The food.
             points: Vertices in the world [m], shape (m, 3).
-            triangles: Shape (t, 3).
-            flesh: Which vertices lie on the face of a cut, shape (m,).
+            triangles: Numbers of their vertices [-], shape (t, 3).
+            flesh: Which vertices lie on the face of a cut [-], shape (m,).
             cell: Width of the cells in which vertices become one [m].
 
         Returns:

@@ -56,7 +56,16 @@ class Drawn:
 
     @staticmethod
     def of(points: np.ndarray, triangles: np.ndarray, paint: Paint) -> Drawn:
-        """Of one paint; the place on the body is the place in space."""
+        """Of one paint; the place on the body is the place in space.
+
+        Args:
+            points: Vertices [m], shape (n, 3).
+            triangles: Numbers of their vertices [-], shape (t, 3).
+            paint: How it looks.
+
+        Returns:
+            The body.
+        """
         ref = np.column_stack([points, np.zeros((len(points), 2))])
         return Drawn(np.asarray(points, float), triangles, np.zeros(len(triangles), int), (paint,), ref)
 
@@ -85,7 +94,15 @@ class Drawn:
 
 
 def box(low: tuple[float, float, float], high: tuple[float, float, float], paint: Paint) -> Drawn:
-    """A box between two corners [m], each side with vertices of its own."""
+    """A box, each side with vertices of its own.
+
+    Args:
+        low, high: Two corners x, y, z [m].
+        paint: How it looks.
+
+    Returns:
+        The box.
+    """
     a, b = np.array(low, float), np.array(high, float)
     points, triangles, first = [], [], 0
     for axis in range(3):
@@ -111,6 +128,9 @@ def lathe(profile: list[tuple[float, float]], paint: Paint, around: int = 16) ->
         profile: Radius and height [m] from below to above along its outside; a radius of 0 closes it.
         paint: How it looks.
         around: Vertices of a ring.
+
+    Returns:
+        The body.
     """
     angle = 2 * np.pi * np.arange(around) / around
     points = np.concatenate(
@@ -132,8 +152,8 @@ def clustered(
 
     Args:
         points: Vertices [m], shape (n, 3).
-        triangles: Shape (t, 3).
-        parts: Number of the part of the surface that each vertex is of, shape (n,); those of two are kept apart.
+        triangles: Numbers of their vertices [-], shape (t, 3).
+        parts: Number of the part of the surface that each vertex is of [-], shape (n,); those of two are kept apart.
         cell: Width of a cell [m].
 
     Returns:

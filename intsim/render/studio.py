@@ -51,11 +51,24 @@ class Geometry:
         return self._there
 
     def draw(self, views: np.ndarray, near: np.ndarray, which: np.ndarray) -> None:
-        """Find what is seen in views (c, 16), over what is there already: ``near`` and ``which`` (c, h, w)."""
+        """Find what is seen, over what is there already.
+
+        Args:
+            views: Each view as :meth:`intsim.render.view.View.row` writes it [m, pixels], shape (c, 16).
+            near: Nearness of what is seen in each pixel [1/m], shape (c, h, w); changed.
+            which: Number of the triangle that is seen there [-], shape (c, h, w); changed.
+        """
         raster.draw(self.points, self._triangles, views, self._room(len(views)), near, which)
 
     def see(self, views: np.ndarray, near: np.ndarray, which: np.ndarray, seen_as: np.ndarray) -> None:
-        """The same, and how it looks (c, h, w, 7 or more)."""
+        """The same, and how it looks.
+
+        Args:
+            views: Each view [m, pixels], shape (c, 16).
+            near: Nearness of what is seen in each pixel [1/m], shape (c, h, w); changed.
+            which: Number of the triangle that is seen there [-], shape (c, h, w); changed.
+            seen_as: Colour, normal and gloss there [-], shape (c, h, w, 7 or more); changed.
+        """
         which.fill(-1)
         raster.see(
             self.points,

@@ -38,12 +38,31 @@ class View:
 
     @staticmethod
     def towards(eye: np.ndarray, target: np.ndarray, field: float, pixels: int) -> View:
-        """A camera at ``eye`` (3,) that looks at ``target`` (3,) [m], its field of view [rad] as wide as high."""
+        """A camera.
+
+        Args:
+            eye: Where it is [m], shape (3,).
+            target: What it looks at [m], shape (3,).
+            field: Its field of view, as wide as high [rad].
+            pixels: Width and height of its picture.
+
+        Returns:
+            What it sees.
+        """
         return View(np.asarray(eye, float), _turn(np.subtract(target, eye)), _focal(field, pixels), pixels)
 
     @staticmethod
     def lamp(direction: np.ndarray, reach: float, pixels: int) -> View:
-        """What a lamp far away sees that shines in a direction (3,), so far around the middle of the board [m]."""
+        """What a lamp far away sees.
+
+        Args:
+            direction: In which it shines [-], shape (3,).
+            reach: How far around the middle of the board [m].
+            pixels: Width and height of its picture.
+
+        Returns:
+            What it sees.
+        """
         turn = _turn(direction)
         return View(-2 * reach * turn[2], turn, pixels / (2 * reach), pixels, flat=True)
 

@@ -64,8 +64,8 @@ class Stage:
             cut: Number of the cut: another one has another mesh, and at first it lies as the food does at rest.
             which: Its place among the foods of the episode.
             points: Vertices in the world [m], shape (m, 3).
-            triangles: Vertices of each triangle, shape (t, 3).
-            flesh: Which vertices lie on the face of the cut, shape (m,).
+            triangles: Numbers of the vertices of each triangle [-], shape (t, 3).
+            flesh: Which vertices lie on the face of the cut [-], shape (m,).
         """
         if cut != self._cut:
             self._cut = cut

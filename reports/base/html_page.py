@@ -11,7 +11,8 @@ import numpy as np
 
 from mpm.files import write_atomic
 from mpm.scene.errors import OutputError
-from reports.base.scene_render import COLOURS, EYE, FRAME, INK, STEEL, WOOD, Film, blade_at
+from reports.base.film import COLOURS, EYE, FRAME, Film, blade_at
+from reports.base.scene_render import INK, STEEL, WOOD
 
 PER_METRE = 2e4  # whole numbers of the file in a metre: a twentieth of a millimetre, less than a pixel
 SHADES = 100  # of a page: more steps of the stress than colours would only make it larger

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from matplotlib import style
 from matplotlib.axes import Axes
@@ -15,10 +13,8 @@ from matplotlib.figure import Figure
 from mpm.output.snapshot import Snapshot
 from mpm.scene import Knife
 from reports.base.figures import BLACK, GREY, RED, STYLE
+from reports.base.film import COLOURS, Film, View, board
 from reports.base.section_figure import draw_food, draw_tools
-
-if TYPE_CHECKING:
-    from reports.base.scene_render import Film, View
 
 INCHES = (12.0, 9.0)  # of a sheet, whatever its pixels: letters keep their part of it
 HEAD = 0.3  # of the sheet's height, above the picture
@@ -49,8 +45,6 @@ def bar_length(length: float) -> float:
 
 def bar_ends(film: Film) -> np.ndarray:
     """Where the scale bar begins and ends, on the board before the food and along it [m], shape (2, 3)."""
-    from reports.base.scene_render import board
-
     _, front, low, _, _, top = board(film)
     x, y = 0.4 * front + 0.6 * film.scene.food.shape.width / 2, low + 0.05 * film.scene.food.shape.length
     return np.array([[x, y, top], [x, y + bar_length(film.scene.food.shape.length), top]])
@@ -72,7 +66,7 @@ class Sheet:
         """A sheet.
 
         Args:
-            picture: The scene at this look, of the view's size, shape (height, width, 3), 0 to 255.
+            picture: The scene at this look, of the view's size, shape (height, width, 3) [0 to 255].
             look: The look.
             apart: Whether it shows the pieces drawn apart.
 
@@ -103,8 +97,6 @@ class Sheet:
 
     def _section(self, figure: Figure, look: Snapshot) -> None:
         """The stress about the blade, in the section across its middle."""
-        from reports.base.scene_render import COLOURS
-
         film, shape = self._film, self._film.scene.food.shape
         colour = ScalarMappable(Normalize(0.0, film.largest / 1e3), COLOURS)
         axes = figure.add_axes((0.26, 0.735, 0.27, 0.215))

@@ -345,8 +345,9 @@ def _draw(
     if not watch.taken:
         say("nothing to draw: the run broke down before the first look")
         return
+    from reports.base.film import Film
     from reports.base.html_page import page
-    from reports.base.scene_render import Film, stills, video
+    from reports.base.scene_render import stills, video
 
     film = Film.of(food, simulation, watch.taken, record)
     if args.pictures:

@@ -31,24 +31,9 @@ from mpm.runtime import Runtime
 from mpm.scene import Knife, Motion
 from mpm.solver import Simulation
 from reports.base.figures import RED
+from reports.base.film import APART, AXES, MOMENTS, STEPS, Film, blade, blade_at, round_up
 from reports.base.html_page import page
-from reports.base.scene_render import (
-    APART,
-    AXES,
-    MOMENTS,
-    SIZE,
-    STEEL,
-    STEPS,
-    WOOD,
-    Film,
-    Stage,
-    attempt,
-    blade,
-    blade_at,
-    round_up,
-    stills,
-    video,
-)
+from reports.base.scene_render import SIZE, STEEL, WOOD, Stage, attempt, stills, video
 from reports.base.scene_sheet import bar_ends, bar_length, view_size
 from tests.mpm.scenes import PRISM
 from tests.reports.web.browser import found, tab
