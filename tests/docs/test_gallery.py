@@ -20,12 +20,19 @@ PICTURES = [f"{name[3:-3]}.png" for name in SCRIPTS]
 """What each of them draws."""
 QUICK = ("01_trace.py", "02_food.py", "03_prior.py")
 """Those that simulate nothing."""
+LONG = ("06_compare.py", "07_next_test.py", "13_grids.py")
+"""Those that take half a minute each."""
 LONGEST = 40
 """Lines of a script."""
 MOST_BYTES, MOST_BYTES_IN_ALL = 100_000, 600_000
 SAME_INK = 0.03
 """Largest change of a picture's ink [-]: the same numbers and fewer colours make 0.001, one line less 0.036 and more.
 Where the ink is does not count, for a machine that rounds otherwise moves a curve."""
+
+
+def marks(name: str) -> list[pytest.MarkDecorator]:
+    """How long a script takes."""
+    return [] if name in QUICK else [pytest.mark.long if name in LONG else pytest.mark.slow]
 
 
 def ink(path: Path) -> np.ndarray:
@@ -39,7 +46,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("gallery")
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in SCRIPTS])
+@pytest.mark.parametrize("name", [pytest.param(n, marks=marks(n)) for n in SCRIPTS])
 def test_script_draws_its_picture(name: str, folder: Path) -> None:
     """The script runs as a user would run it, and draws as much as there is in the picture that is kept."""
     environment = os.environ | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg", "PYTHONIOENCODING": "utf-8"}

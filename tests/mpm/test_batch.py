@@ -66,7 +66,7 @@ def test_one_launch_for_all_cuts(scenes: tuple[Scene, ...], monkeypatch: pytest.
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("threads", [1, 0])
+@pytest.mark.parametrize("threads", [pytest.param(1, marks=pytest.mark.long), 0])
 def test_a_cut_that_breaks_down_stops_alone(threads: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Food that leaves the grid ends its own run with its reason; the one beside it goes on to its end. Scenes of
     another kind, or in another precision, may be among them.

@@ -34,7 +34,7 @@ def apart(one: ForceRecord, two: ForceRecord) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scene", [SCENE, BRITTLE], ids=["flows", "breaks"])
+@pytest.mark.parametrize("scene", [SCENE, pytest.param(BRITTLE, marks=pytest.mark.long)], ids=["flows", "breaks"])
 @pytest.mark.parametrize(("precision", "close"), [("f64", 1e-9), ("f32", 1e-4)])
 def test_the_layout_of_a_gpu_gives_the_same_cut(
     scene: Scene, precision: str, close: float, monkeypatch: pytest.MonkeyPatch

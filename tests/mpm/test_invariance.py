@@ -96,7 +96,11 @@ def stiff() -> ForceRecord:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("change", [{"seed": 1}, {"seed": 2}, {"grid_shift": (0.0, 0.0, 0.5)}, {"dx": 3e-3}], ids=str)
+@pytest.mark.parametrize(
+    "change",
+    [{"seed": 1}, {"seed": 2}, {"grid_shift": (0.0, 0.0, 0.5)}, pytest.param({"dx": 3e-3}, marks=pytest.mark.long)],
+    ids=str,
+)
 def test_force_of_the_faces_belongs_to_the_food(stiff, change):
     """In a stiff food seeds and the height of the nodes move the work by less than 2 %, cells of 3 for 4 mm by 3 %.
 

@@ -81,7 +81,7 @@ def test_the_stiffness_of_a_particle_is_the_mean_over_its_cube() -> None:
     ("layer", "mass"),
     [
         pytest.param({"rind_stiffness": 5.0}, (1.5, np.inf), marks=pytest.mark.long),
-        pytest.param({"core_stiffness": 0.1}, (0.7, 0.85), marks=pytest.mark.slow),
+        pytest.param({"core_stiffness": 0.1}, (0.7, 0.85), marks=pytest.mark.long),
     ],
 )
 def test_a_layer_of_another_stiffness_weighs_nothing(layer: dict[str, float], mass: tuple[float, float]) -> None:
