@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from calib.api import script_hidden
 from calib.calibration.parameter_table import ParameterTable, parameter_table
+from calib.calibration.run_folder import RunFolder
 from calib.io.folder import finite
 from calib.io.progress import Progress, ProgressBar
 from calib.io.typed_document import to_document
 from calib.io.wording import in_arguments, speaking_of_arguments
-from calib.material.food import FoodSpec, load_material_file
 
 if TYPE_CHECKING:
     from calib.multi_specimen.result import StudyResult
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class StudyRun:
+class StudyRun(RunFolder):
     """A finished study and its folder.
 
     Attributes:
@@ -51,20 +51,6 @@ class StudyRun:
         """Fitted values by name: value, unit, 95 % interval, literature range, verdict; one of a specimen's own is
         NAME@CUT."""
         return parameter_table(self.summary["parameters"])
-
-    @property
-    def material(self) -> FoodSpec:
-        """The calibrated food.
-
-        Raises:
-            MaterialError: material.yaml is missing or damaged.
-        """
-        return load_material_file(self.folder / "material.yaml")
-
-    @property
-    def report(self) -> Path:
-        """Path of the report."""
-        return self.folder / "report.pdf"
 
 
 @dataclass(frozen=True, eq=False)

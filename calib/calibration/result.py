@@ -27,6 +27,7 @@ from calib.calibration.result_parts import (
     SobolIndices,
     TraceSource,
 )
+from calib.calibration.run_folder import RunFolder
 from calib.calibration.withdrawal_result import WithdrawalAgreement
 from calib.errors import CurveError, DocumentError, OutputError
 from calib.io import typed_document
@@ -35,7 +36,6 @@ from calib.io.provenance import Invocation, Software
 from calib.io.type_schema import ALWAYS, NotNegative, Shared, keywords, one_of
 from calib.io.typed_document import FLAT, NULL, renamed
 from calib.io.wording import brief
-from calib.material.food import FoodSpec, load_material_file
 from calib.material.properties import MEANINGS
 from calib.material.references import cited
 from calib.posterior.estimates import ModeSummary, PosteriorSummary
@@ -57,7 +57,7 @@ RATED = {
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class CalibrationResult:
+class CalibrationResult(RunFolder):
     """A calibration on one trace.
 
     ``summary.json`` of ``calibrate``, and what ``calibrate --json`` prints.
@@ -224,20 +224,6 @@ class CalibrationResult:
 
     def _repr_html_(self) -> str:
         return html_table(self)
-
-    @property
-    def material(self) -> FoodSpec:
-        """The calibrated food.
-
-        Raises:
-            MaterialError: material.yaml is missing or damaged.
-        """
-        return load_material_file(self.folder / "material.yaml")
-
-    @property
-    def report(self) -> Path:
-        """Path of the report."""
-        return self.folder / "report.pdf"
 
     @property
     def references(self) -> dict[str, str]:

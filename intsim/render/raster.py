@@ -245,9 +245,8 @@ def light(
 
     ``near`` and ``seen_as`` are as :func:`see` has filled them for c views, of scene and room; for a camera that stands
     ``room`` is what :func:`settle` has made of that. ``lamp`` (1, 16) is the lamp as a view and ``shadow`` (1, ., .)
-    how near to it what it sees is; ``lamps`` (10,) its colour, the colour from above and from below, and the
-    tolerance of a
-    shadow [m]. ``out`` (c, h, w, 3) is filled, 8 bits.
+    how near to it what it sees is; ``lamps`` (10,) its colour, the colour from above and from below, and the tolerance
+    of a shadow [m]. ``out`` (c, h, w, 3) is filled, 8 bits.
     """
     ti.loop_config(serialize=True)
     for c in range(views.shape[0]):
