@@ -171,7 +171,8 @@ class Scene:
     @property
     def suction(self) -> float:
         """Largest tension between board and food [Pa]: the board's, where the food stands on a flat face."""
-        return self.board.suction if self.tied and self.food.shape.stands else 0.0
+        held = self.numerics.contact == "cohesive" and self.food.shape.stands
+        return self.board.suction if held else 0.0
 
     @property
     def tie_strength(self) -> float:
