@@ -143,7 +143,7 @@ def _board(result: CalibrationResult, mu: float) -> str:
     """Contact, friction and suction of the board."""
     held = _value(result, "board_suction")
     held = _part(result, "board", "suction") if held is None else held
-    pull = f"held down by a suction of at most {quantity(held, 'Pa')}" if held else "without adhesion"
+    pull = f"that holds a wet face [@Stefan 1874] by up to {quantity(held, 'Pa')}" if held else "without adhesion"
     return f"contact {pull}, Coulomb friction {quantity(mu, '-')}"
 
 
