@@ -384,7 +384,7 @@ def cut_scene(
     if coarse:
         cell, mach = cell / CELL_PER_ZONE, 2 * mach
     filled = food.to_scene_food()
-    board = {name: food.value(p) for name, p in OF_BOARD.items()}
+    board = {name: food.value(p) for name, p in OF_BOARD.items() if shape.stands or p != BOARD_SUCTION}
     motion = stroke if isinstance(stroke, Motion) else Motion(stroke or shape.height)
     return Scene(
         food=type(filled)(shape, filled.material),

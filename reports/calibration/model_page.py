@@ -141,8 +141,8 @@ def _laws(result: CalibrationResult) -> list[list[str]]:
 
 def _board(result: CalibrationResult, mu: float) -> str:
     """Contact, friction and suction of the board."""
-    held = _value(result, "board_suction")
-    held = _part(result, "board", "suction") if held is None else held
+    fitted = result.fitted.get("board_suction")
+    held = _part(result, "board", "suction") if fitted is None else fitted.value
     pull = f"that holds a wet face [@Stefan 1874] by up to {quantity(held, 'Pa')}" if held else "without adhesion"
     return f"contact {pull}, Coulomb friction {quantity(mu, '-')}"
 
