@@ -16,6 +16,7 @@ from calib.trace.baselines import (
     LINEAR,
     ZERO,
     Drift,
+    behind_the_cut,
     check_approach,
     drift_of,
     level_behind,
@@ -28,7 +29,7 @@ from calib.trace.cuts import single_cut
 from calib.trace.filters import FILTER_SD_M, N_STROKE, leading_grid, parabola_peak, resample, smooth
 from calib.trace.mending import mended
 from calib.trace.missing import held_samples
-from calib.trace.stroke import DWELL_M, board_warnings, clock_of, end_of_descent, stroke_axis, stroke_in_food
+from calib.trace.stroke import DWELL_M, board_warnings, clock_of, end_of_descent, rises_with_the_force, stroke_axis, stroke_in_food
 from calib.trace.sudden import sudden_changes
 from calib.trace.trace import MIN_SAMPLES, Trace
 
@@ -168,7 +169,7 @@ def condition(
     noise = _filtered_noise(contact, samples, length)
     peak = parabola_peak(curve)
     _check_peak(trace, peak)
-    behind_sd, behind = level_behind(trace, tared, out, peak, level.noise_sd)
+    behind_sd, behind = level_behind(trace, tared, behind_the_cut(trace, tared, contact), peak, level.noise_sd)
     end_s = float(trace.time[int(np.argmax(axis.stroke >= length * (1 - 1e-9)))])
     level_sd = _root_sum(level.level_sd, mend.level_sd, 0.0 if air_mend is None else air_mend.level_sd)
     level_sd, noise_sd = (sd if sd > ROUNDING * peak else 0.0 for sd in (level_sd, level.noise_sd))
@@ -251,6 +252,12 @@ def _check_options(trace: Trace, speed: float | None, height: float | None, base
 
 def _check_record(trace: Trace, force: np.ndarray, last: int) -> None:
     """Refuse a record that does not go down for long enough, or in whose force there is nothing."""
+    if rises_with_the_force(trace):
+        raise TraceError(
+            f"{trace.source}, column {trace.columns.get('position')}: the position rises as the force grows, so it is no "
+            f"height; if it is a way down, say --depth-col {quoted(trace.columns.get('position'))}, else name another "
+            "with --position-col, or none and give --speed"
+        )
     if last + 1 < MIN_SAMPLES:
         raise TraceError(
             f"{trace.source}, column {trace.columns.get('position')}: the position is at its lowest after {last + 1} "
