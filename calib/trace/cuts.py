@@ -143,9 +143,9 @@ def _main_load(force: np.ndarray) -> tuple[int, int]:
     """
     loads, top = _loads(force)
     least = max(SLIGHT * top, CLEAR_SD * noise_of(force))
-    if top < least:
+    stretches = _stretches(loads, least, 0.5 * least) if top > least else []
+    if len(stretches) < 2:
         return 0, len(force)
-    stretches = _stretches(loads, least, 0.5 * least)
     largest = [float(loads[a : b + 1].max()) for a, b in stretches]
     main = int(np.argmax(largest))
     begin, end = stretches[main]
@@ -210,5 +210,5 @@ def _without_others(trace: Trace, span: tuple[int, int]) -> Trace:
         return trace
     where = f"from {trace.where(start)} to {trace.where(stop - 1)}"
     what = "is under little load" if trace.position is None else "comes down under no load"
-    note = f"{trace.source}: only what is {where} is taken for the cut: the knife {what} at other times; --cut {WHOLE} if not"
+    note = f"{trace.source}: only {where} is taken for the cut; the knife {what} elsewhere (--cut {WHOLE} if not)"
     return replace(trace.part(np.arange(start, stop)), breaks=(), notes=(*trace.notes, note))

@@ -275,17 +275,17 @@ def _level_behind(trace: Trace, i: int) -> float | None:
     return float(np.median(out)) if FEWEST_BEHIND <= len(out) < len(trace.force) - i else None
 
 
-def _is_step(
-    force: np.ndarray, ends: tuple[int, int], change: tuple[float, bool], limit: float, noise: float
-) -> bool:
+def _is_step(force: np.ndarray, ends: tuple[int, int], change: tuple[float, bool], limit: float, noise: float) -> bool:
     """Whether the sensor was zeroed from one sample to another, and not the food touched.
 
     The force is level before, from the record's start or the step before, and after. Then it is at zero, or it has
-    fallen, or its new level is that behind the cut; and it leaves its new level by more than the step later on.
+    fallen, or, in one sample, its new level is that behind the cut; and it leaves its new level by more than the step
+    later on.
     """
     side, (i, j) = STEP_SIDE, ends
     step, same = change
-    if abs(step) <= limit or (i == j and abs(force[i] - force[i - 1]) < SUDDEN_PART * abs(step)):
+    sharp = float(np.abs(np.diff(force[i - 1 : j + 1])).max()) >= SUDDEN_PART * abs(step)
+    if abs(step) <= limit or sharp != (i == j):
         return False
     left, right = force[i - side : i], force[j : j + side]
     flat = max(3.0 * noise, 0.003 * abs(step))
@@ -298,4 +298,4 @@ def _is_step(
     before = force[:i]
     loaded = np.percentile(before, 98) - np.percentile(before, 2) > 0.5 * abs(step) + 8.0 * noise
     rises = float(np.percentile(force[j:], 98)) - level
-    return bool((zeroed or step < 0.0 or same) and not loaded and rises > max(limit, 10.0 * noise))
+    return bool((zeroed or step < 0.0 or (same and sharp)) and not loaded and rises > max(limit, 10.0 * noise))

@@ -42,8 +42,6 @@ THROUGH_FALL_M, THROUGH_REST_M = 3e-3, 1e-3
 force that falls with the chord of a round food, or where the stroke ends, does not tell where the board is."""
 CLOCK_STEP = 1e-9
 """Least step of the clock, part of its whole time [-], so that it rises."""
-RISING_PART = 0.1
-"""Part of a position's range by which it rises with the force if it is no height [-]."""
 MAX_DESCENT_FRACTION = 0.5
 """Part of the position's range that must lie before its lowest point for a record to be a downward stroke."""
 
@@ -80,19 +78,6 @@ def end_of_descent(trace: Trace) -> int:
         return len(trace.time) - 1
     top = int(np.argmax(trace.position[: lowest + 1]))
     return top + int(np.argmax(trace.position[top : lowest + 1] <= trace.position[lowest] + DWELL_M))
-
-
-def rises_with_the_force(trace: Trace) -> bool:
-    """Whether the position rises while the force comes from a tenth to nine tenths of its largest: it is no height."""
-    if trace.position is None:
-        return False
-    loaded = np.abs(trace.force - np.median(trace.force[: max(5, len(trace.force) // 20)]))
-    top = float(np.percentile(loaded, 98))
-    late = int(np.argmax(loaded >= 0.9 * top))
-    low = np.flatnonzero(loaded[:late] < 0.1 * top)
-    if not len(low):
-        return False
-    return float(trace.position[late] - trace.position[low[-1]]) > RISING_PART * float(np.ptp(trace.position))
 
 
 def stroke_axis(
