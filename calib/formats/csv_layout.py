@@ -104,7 +104,9 @@ def layout_of(source: str, body: NumberedLines) -> Layout:
     count = _blocks(header)
     if count > 1 and len(parts) == 1:
         kept, parts = _stacked(kept, len(header), count)
-        header, units = header[: (len(header) + 1) // count], units[: (len(header) + 1) // count]
+        size = (len(header) + 1) // count
+        alike = header[:size] == header[size : 2 * size]
+        header, units = [n if alike else _NUMBER_OF_SPECIMEN.sub("", n) for n in header[:size]], units[:size]
         if not header[-1].strip():
             header, kept = header[:-1], [(line, cells[: len(header) - 1]) for line, cells in kept]
     return Layout(above, header, units, kept, parts, cut_off, words, count)

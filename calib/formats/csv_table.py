@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 
 from calib.errors import TraceError
-from calib.formats.csv_layout import Layout, are_units, is_words, layout_of
+from calib.formats.csv_layout import FEW, Layout, are_units, is_words, layout_of
 from calib.io.wording import brief
 from calib.table.encoding import decode
 from calib.table.numerals import as_plain, is_number, styles_of
@@ -161,7 +161,7 @@ def _columns(
     left_out, notes = {}, []
     kept = []
     for name, cells in zip(names, zip(*(row for _, row in layout.rows), strict=True), strict=True):
-        if name in found and found[name] == cells:
+        if name in found and found[name] == cells and len(cells) > FEW:
             notes.append(f"{source}: column {brief(name)} stands there twice with the same numbers; one was left out")
             continue
         kept.append(name)

@@ -24,6 +24,9 @@ JUMP = 5.0
 """Steps of the clock, in median steps, from which on it has jumped, or samples are missing."""
 MOST_JUMPS = 5
 """Jumps of a clock that are repaired; more of them leave nothing of it."""
+MOST_AGAIN = 0.1
+"""Part of the rows that may repeat earlier ones, as where pieces of a record overlap; a record that is there twice has
+more."""
 MOST_UNORDERED, LATEST_ROWS = 0.05, 10
 """Part of the rows after which time falls, and rows by which one is away from its place, in a record that is sorted."""
 FEWEST_ROWS = 20
@@ -76,7 +79,9 @@ def running_clock(
     time, force = columns
     _check_swapped(table, time, force, t, f)
     order, ordered = _in_order(table, time, (t, f) if p is None else (t, f, p))
-    t, f, p = t[order], f[order], None if p is None else p[order]
+    if ordered:
+        t, f, p = t[order], f[order], None if p is None else p[order]
+        table = replace(table, rows=[table.rows[i] for i in order])
     steps = np.diff(t)
     if np.any(steps < 0.0) or np.mean(steps == 0.0) < STANDING:
         clock = _without_repeats(table, t, f, p)
@@ -130,7 +135,7 @@ def _in_order(table: Table, time: Column, columns: tuple[np.ndarray, ...]) -> tu
     t = columns[0]
     order, notes = np.arange(len(t)), []
     steps = np.diff(t)
-    if len(t) < FEWEST_ROWS or np.all(steps > 0.0):
+    if len(t) < FEWEST_ROWS or len(table.parts) > 1 or np.all(steps > 0.0):
         return order, []
     if np.all(steps < 0.0):
         return order[::-1], [f"{table.source}: time falls from row to row; the record was turned round"]

@@ -186,7 +186,7 @@ def _nothing_fits(table: Table, role: str, option: str) -> str:
     others = [name for name in table.columns if (unit := meaning(table, name).measure) and unit.fits(role)]
     others = [name for name in others if not not_measured(name)]
     unfit = [name for name in table.columns if _unit_is_none_of_it(table, name, role)]
-    if not bare and len(others) == 1:
+    if not bare and len(others) == 1 and "did you mean" not in what:
         what = f"; the only one in a unit of {role} is {quoted(others[0])}: name it with {option} if it is that"
     elif not bare and unfit:
         unit = quoted(meaning(table, unfit[0]).unit)
