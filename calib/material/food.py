@@ -19,7 +19,7 @@ from calib.material.food_file import dump_material
 from calib.material.own_food import OPTIONAL_HERE, filled
 from calib.material.properties import (
     ADHESION,
-    BOARD_FRICTION,
+    BOARD,
     DIMENSIONS,
     FORM,
     INCLUSIONS,
@@ -51,7 +51,7 @@ FILES = (".yaml", ".yml")
 """How the name of a food's file ends."""
 _STRENGTHS = ("strength_ratio", "tensile_strength")  # a food has one of them at most
 _LAYERS = (*LAYERS, *LAYERS.values(), *LAYER_STIFFNESS.values())
-_OPTIONAL = (*_LAYERS, "skin_stiffness", BOARD_FRICTION, *ADHESION, *RELAXATION, RELAXING_BULK, RATE_EXPONENT,
+_OPTIONAL = (*_LAYERS, "skin_stiffness", *BOARD, *ADHESION, *RELAXATION, RELAXING_BULK, RATE_EXPONENT,
              *_STRENGTHS)  # fmt: skip
 _NULLABLE = ("R_skin", "fracture_energy", *_OPTIONAL)  # a file may leave the optional ones out
 
@@ -161,7 +161,7 @@ class FoodSpec:
         """Names of the properties that a calibration fits unless told otherwise."""
         start = ("R_skin", "skin_thickness") if self.properties["skin_thickness"].value > 0.0 else ("R_initiation",)
         strength = tuple(name for name in _STRENGTHS if name in self.properties)
-        board = (BOARD_FRICTION,) if BOARD_FRICTION in self.properties else ()
+        board = tuple(name for name in BOARD if name in self.properties)
         return ("E", "yield_stress", *strength, "R", *self.layers, *start, "initiation_depth", "mu", *board)
 
     @property
@@ -301,7 +301,7 @@ class FoodSpec:
 
         sizes = {"length": length, "width": width, "height": height}
         size: dict[str, Any] = {n: self.dims[n].value if given is None else given for n, given in sizes.items()}
-        values: dict[str, Any] = {n: p.value for n, p in self.properties.items() if n != BOARD_FRICTION}
+        values: dict[str, Any] = {n: p.value for n, p in self.properties.items() if n not in BOARD}
         if self._lacks_strength:
             del values["fracture_energy"]
         kind, roundness = named(shape or self.shape_kind)

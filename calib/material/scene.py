@@ -10,7 +10,7 @@ import numpy as np
 
 from calib.material.food import FoodSpec
 from calib.material.form import open_shape
-from calib.material.properties import BOARD_FRICTION
+from calib.material.properties import BOARD_FRICTION, BOARD_SUCTION
 from calib.trace.conditioning import Conditioned
 from mpm.scene import Board, EdgeLaw, Knife, Motion, Numerics, Scene
 from mpm.scene.outline import Outline
@@ -43,6 +43,8 @@ LENGTH_PER_HEIGHT = 4.0
 """Largest simulated length across the blade of a food with parallel sides, over its height. The blade bends its halves
 apart like the arms of a double cantilever beam (Gurney and Hunt 1967), so the force on its faces grows with the length
 (docs/theory.md, "Measured choices")."""
+OF_BOARD = {"mu": BOARD_FRICTION, "suction": BOARD_SUCTION}
+"""Properties of a food that belong to the board under it, by what ``mpm.scene.Board`` calls them."""
 FITTED_SIZES = ("height", "aspect", "roundness")
 """What may be fitted of a specimen beside its material."""
 MID_LENGTH = 0.5
@@ -255,17 +257,16 @@ def of_specimen(
 
     Args:
         scene: The scene with any height.
-        values: Fitted values by name, ``height`` [m], ``aspect`` [-], ``roundness`` [-] and ``board_friction`` [-]
-            among them or not.
+        values: Fitted values by name, ``height`` [m], ``aspect`` [-], ``roundness`` [-], ``board_friction`` [-] and
+            ``board_suction`` [Pa] among them or not.
         kept: Which of ``width`` and ``length`` do not grow with the height, because they were measured.
 
     Returns:
         The scene, and the values without these.
     """
     rest = dict(values)
-    friction = rest.pop(BOARD_FRICTION, None)
-    if friction is not None:
-        scene = replace(scene, board=Board(friction))
+    board = {name: rest.pop(p, None) for name, p in OF_BOARD.items()}
+    scene = replace(scene, board=replace(scene.board, **{n: v for n, v in board.items() if v is not None}))
     roundness = rest.pop("roundness", None)
     if roundness is not None:
         scene = replace(scene, food=replace(scene.food, shape=replace(scene.food.shape, roundness=roundness)))
@@ -382,12 +383,13 @@ def cut_scene(
     thick = mach < MACH
     if coarse:
         cell, mach = cell / CELL_PER_ZONE, 2 * mach
-    filled, friction = food.to_scene_food(), food.value(BOARD_FRICTION)
+    filled = food.to_scene_food()
+    board = {name: food.value(p) for name, p in OF_BOARD.items() if shape.stands or p != BOARD_SUCTION}
     motion = stroke if isinstance(stroke, Motion) else Motion(stroke or shape.height)
     return Scene(
         food=type(filled)(shape, filled.material),
         knife=knife,
-        board=Board() if friction is None else Board(friction),
+        board=Board(**{n: v for n, v in board.items() if v is not None}),
         motion=replace(
             motion, stroke=min(motion.stroke, shape.height), mach=mach, end_speed=END_SPEED if thick else 1.0
         ),

@@ -11,6 +11,7 @@ from calib.io.provenance import code_key, key_of
 from calib.material.food import FoodSpec
 from calib.material.form import ROUNDNESS
 from calib.material.knife import load_knife
+from calib.material.properties import BOARD_SUCTION
 from calib.material.remarks import notes
 from calib.material.scene import (
     SizeRange,
@@ -42,6 +43,7 @@ from calib.trace.cuts import single_cut
 from calib.trace.filters import BandLimited
 from calib.trace.stroke import board_stroke
 from mpm.scene import Knife, Motion, Scene
+from mpm.scene.shapes import Shape
 
 FINE, COARSE, REPLICATED = "fine", "coarse", "again"
 """What the fidelities of a search are called in its store; a replicate is called ``again``."""
@@ -157,7 +159,7 @@ def set_up(request: Request) -> Setup:
     curve, air_sha256 = conditioned(request)
     request, sticks = _with_adhesion(with_height(request, curve))
     fine, coarse, sizes, assumed = _scenes(request, curve)
-    names = _names(request, sizes)
+    names = _held_down(request, _names(request, sizes), fine.food.shape)
     if not request.scaled:  # several are judged together
         check_speeds(names, {curve.trace.source: real_speed(curve)})
     sensor, said = sensor_of(curve, request.gain_sd, request.lag_sd, request.bandwidth)
@@ -246,6 +248,22 @@ def _names(request: Request, sizes: Collection[str]) -> tuple[str, ...]:
         return request.fit
     sticks = ("adhesion_energy",) if request.withdrawal else ()
     return (*food.default_fit, *sticks, *sizes, *((ROUNDNESS,) if form_is_open(food, sizing) else ()))
+
+
+def _held_down(request: Request, names: tuple[str, ...], shape: Shape) -> tuple[str, ...]:
+    """The names without the suction of the board, where the specimen stands on no flat face.
+
+    Raises:
+        MaterialError: It was asked for there.
+    """
+    if shape.stands or BOARD_SUCTION not in names:
+        return names
+    if request.fit is not None:
+        raise MaterialError(
+            f"--fit {BOARD_SUCTION}: a {shape.words} touches the board in a line or a point, and is not held down; "
+            "leave it out, or give the specimen a --shape with a flat face"
+        )
+    return tuple(name for name in names if name != BOARD_SUCTION)
 
 
 def _objective(

@@ -28,7 +28,7 @@ from calib.simulation.evaluation_file import UNREADABLE
 from calib.simulation.evaluation_store import content_key
 from calib.simulation.workers import Errand
 from mpm.files import write_atomic
-from mpm.output.record import ADHESION, COHESION, ENDINGS, ForceRecord
+from mpm.output.record import ADHESION, COHESION, ENDINGS, SUCTION, ForceRecord
 from mpm.output.section import Section
 from mpm.output.topology import Topology
 from mpm.scene import Scene
@@ -140,8 +140,8 @@ def _read(path: Path, key: str) -> ForceRecord | None:
             found = {name: values[()] for name, values in file.items() if name != SECTION_GROUP}
             found |= {name: v.item() if isinstance(v, np.generic) else v for name, v in file.attrs.items()}
             found[SECTION_GROUP] = Section(**section) if section else None
-            found.setdefault(COHESION, None)
-            found.setdefault(ADHESION, None)
+            for name in (COHESION, ADHESION, SUCTION):
+                found.setdefault(name, None)
             found.setdefault("slowed", False)
             found.setdefault("rows_down", None)
             values = {f.name: found[f.name] for f in fields(ForceRecord)}

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calib.material.properties import BOARD_FRICTION
+from calib.material.properties import BOARD, BOARD_FRICTION, BOARD_SUCTION
 from calib.material.scene import FITTED_SIZES
 from calib.problem.objective import Objective
 from calib.uncertainty.intervals import Uncertainty, marginal_information
@@ -27,6 +27,10 @@ REMEDIES = {
         "friction of the board",
         "a tilted board would tell it (--set; --fit without it)",
     ),
+    BOARD_SUCTION: (
+        "suction of the board",
+        "a dry, rough board or a rack would let air under the food (--fit without it, --set board_suction=0)",
+    ),
     "aspect": ("width", "a calliper or a photograph would tell it (--width)"),
     "width": ("width", "a calliper or a photograph would tell it (--width)"),
     "gain": ("gain of the sensor", "a hung mass would tell it (--gain-sd)"),
@@ -41,7 +45,7 @@ class Limiting:
     Attributes:
         name: The parameter whose interval it is.
         parts: Its width over what it is [-], by what would be known: ``roundness``, ``height``,
-            ``aspect``, ``board_friction``, ``width``, ``gain``.
+            ``aspect``, ``board_friction``, ``board_suction``, ``width``, ``gain``.
     """
 
     name: str
@@ -81,7 +85,7 @@ def limiting(objective: Objective, found: Uncertainty) -> Limiting | None:
     k = names.index(ANSWER)
     parts: dict[str, float] = {
         name: float(np.sqrt(max(1.0 - found.correlation[k, names.index(name)] ** 2, 0.0)))
-        for name in (*FITTED_SIZES, BOARD_FRICTION)
+        for name in (*FITTED_SIZES, *BOARD)
         if name in names
     }
     prior = objective.parameters.prior_jacobian()

@@ -120,6 +120,12 @@ CONSTANTS = (
         field="mu",
     ),
     MethodConstant(
+        "suction of the board", "board", "board_suction", (0.5, 2.0),
+        "a food's that stands on a flat face (materials.yaml), where it is not fitted; it keeps the halves down",
+        field="suction",
+        where=lambda scene: scene.suction > 0,
+    ),
+    MethodConstant(
         "time step", "numerics", "safety", (0.5,), "numerical: part of the stability limit",
         "twice of it is beyond that limit",
     ),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from intsim.render.mesh import Drawn, Paint, box
-from mpm.scene.scene import Knife
+from mpm.scene import Knife
 
 STEEL = Paint((0.82, 0.83, 0.85), gloss=1.2)
 WOOD = Paint((0.20, 0.12, 0.08), gloss=0.3)

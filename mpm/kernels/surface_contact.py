@@ -16,6 +16,7 @@ from mpm.state.tables import (
     BLADE_MU,
     BOARD,
     BOARD_MU,
+    BOARD_SUCTION,
     CONTACT,
     COUNT,
     DX,
@@ -29,6 +30,7 @@ from mpm.state.tables import (
     MASS,
     SPACING,
     SPINE,
+    SUCTION_WORK,
     TILT_COS,
     TILT_SIN,
     TIP_RADIUS,
@@ -151,6 +153,8 @@ def friction_limit(s: ti.template(), cut, p, press, own):
 def board_contact(s: ti.template(), cut, p, m, dt, u, at):
     """Contact of one particle with the board; returns the change of its velocity [m/s].
 
+    A food that stands on a flat face is held down by up to the suction times the area of the face.
+
     Friction is Coulomb's alone. The limit of :func:`friction_limit` would bind where the pressure exceeds the yield
     stress over sqrt(3) mu, which under a food that lies on a board is at the points of a round one. Its contact is
     narrower than a particle's face there, and the area to multiply is not known. Nor is food drawn along the board by a
@@ -167,6 +171,7 @@ def board_contact(s: ti.template(), cut, p, m, dt, u, at):
     own = surface_traction(s, cut, p, s.surface_volume[cut, p][0], s.board_gap[cut, p], ti.Vector([0.0, 0.0, 1.0]))
     force = s.board_gap[cut, p] - at[2] + own[2]
     own[2] = 0.0
+    shell = s.surface_volume[cut, p][0]
     if force > 0:
         slide = dt * ti.Vector([u[0], u[1], 0.0])
         hold = stick_slip(s.stick[cut, 0, p], slide, own, s.par[cut, BOARD_MU] * force)
@@ -176,6 +181,13 @@ def board_contact(s: ti.template(), cut, p, m, dt, u, at):
         s.sums[cut, FRICTION_WORK] -= m / dt * dv.dot(slide)
     else:
         s.stick[cut, 0, p] = ti.Vector.zero(float, 3)
+        if s.par[cut, BOARD_SUCTION] > 0 and shell > 0:
+            area = shell / s.board_gap[cut, p]
+            most = s.par[cut, BOARD_SUCTION] * area
+            most /= s.par[cut, CONTACT] * s.par[cut, MASS] * s.volume_ratio[cut, p]
+            dv[2] = -s.par[cut, CONTACT] * dt * ti.min(-force, most)
+            book_impulse(s, cut, BOARD, -m * dv)
+            s.sums[cut, SUCTION_WORK] -= m * dv[2] * u[2]
     return dv
 
 

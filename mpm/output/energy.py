@@ -9,6 +9,7 @@ SPENT = {
     "cohesion": "opening ahead of the edge",
     "friction": "friction",
     "adhesion": "adhesion",
+    "suction": "lifting it off the board",
     "plastic": "flow",
     "damage": "damage",
     "viscous": "loss factor",

@@ -18,6 +18,7 @@ A cut with a cohesive crack has one more, :data:`COHESION`, and one of a food th
 COHESION = "cohesion"
 """What the food has taken where it opened across the cut plane by itself, ahead of the edge."""
 ADHESION = "adhesion"
+SUCTION = "suction"
 """What it has taken to take the food off the blade's faces."""
 STROKE, BOARD, LIMIT = "stroke", "board", "force_limit"
 ENDINGS = (STROKE, BOARD, LIMIT)
@@ -78,6 +79,8 @@ class ForceRecord:
             [J], shape (n,); None without one.
         adhesion: Energy that it has taken so far to take the food off the blade's faces [J], shape (n,); None where it
             does not stick. A part of it is stored in faces that are being taken off.
+        suction: Energy that it has taken so far to lift the food off the board against its suction [J], shape (n,);
+            None where the board does not hold it.
         slowed: Whether the blade slowed down on its way.
         ended: Why the motion ended, one of :data:`ENDINGS`; a run that broke down has its reason in ``status``.
         rows_down: Rows before the blade is withdrawn, all of its way down and of its pause; None where it is not.
@@ -121,6 +124,7 @@ class ForceRecord:
     resistance: float = math.nan
     cohesion: np.ndarray | None = None
     adhesion: np.ndarray | None = None
+    suction: np.ndarray | None = None
     slowed: bool = False
     ended: str = STROKE
     rows_down: int | None = None
@@ -211,7 +215,7 @@ class ForceRecord:
         Without ties across the cut plane (the ``nodal`` contact) it holds all that new surface costs as well.
         """
         booked = self.kinetic + self.elastic + self.plastic + self.damage + self.viscous + self.friction + self.parting
-        for more in (self.cohesion, self.adhesion):
+        for more in (self.cohesion, self.adhesion, self.suction):
             booked = booked if more is None else booked + more
         return self.work_done + self.weighing - booked
 
@@ -227,9 +231,9 @@ class ForceRecord:
 
     @property
     def energies(self) -> tuple[str, ...]:
-        """Names of the energies of this record: :data:`ENERGIES`, and :data:`COHESION` and :data:`ADHESION` where there
-        are ties and sticky faces."""
-        more = [name for name in (COHESION, ADHESION) if getattr(self, name) is not None]
+        """Names of the energies of this record: :data:`ENERGIES`, and :data:`COHESION`, :data:`ADHESION` and
+        :data:`SUCTION` where there are ties, sticky faces and a board that holds the food."""
+        more = [name for name in (COHESION, ADHESION, SUCTION) if getattr(self, name) is not None]
         return (*ENERGIES[:-1], *more, ENERGIES[-1])
 
     @property

@@ -41,6 +41,7 @@ class Interval:
         parting: Energy that the cutting edge has taken in it [J].
         cohesion: Energy that ties across the cut plane have taken in it [J].
         adhesion: Energy that sticky faces have taken in it [J].
+        suction: Energy that the board's suction has taken in it [J].
         moment: Of the food on the knife about the middle of the edge [N m].
         tilt: Angle of the edge to the board at its end [rad].
     """
@@ -64,6 +65,7 @@ class Interval:
     parting: float
     cohesion: float
     adhesion: float
+    suction: float
     moment: float
     tilt: float
 
@@ -143,6 +145,7 @@ class Recorder:
             parting=sums[row.CUTTING_WORK],
             cohesion=sums[row.TIE_WORK],
             adhesion=sums[row.ADHESION_WORK],
+            suction=sums[row.SUCTION_WORK],
             moment=sums[row.MOMENT] / span,
             tilt=pose[row.TILT],
         )
@@ -206,5 +209,6 @@ class Recorder:
             resistance=mean_toughness(food.shape, material, parted / section, food.crossed) if cohesive else math.nan,
             cohesion=np.cumsum(self._column("cohesion")) if scene.tied else None,
             adhesion=np.cumsum(self._column("adhesion")) if material.adhesion > 0 else None,
+            suction=np.cumsum(self._column("suction")) if scene.suction > 0 else None,
             slowed=scene.slows_down,
         )

@@ -6,13 +6,11 @@ from mpm.scene.scene import (
     BAND_CELLS,
     CONTACTS,
     PRECISIONS,
-    Board,
     EdgeLaw,
-    Knife,
     Numerics,
-    Press,
     Scene,
 )
+from mpm.scene.tools import Board, Knife, Press
 
 __all__ = [
     "BAND_CELLS",

@@ -14,68 +14,11 @@ from mpm.scene.errors import SceneError, check_number
 from mpm.scene.inclusions import Food
 from mpm.scene.material import REFERENCE_SPEED, Material
 from mpm.scene.motion import Arm, Motion
+from mpm.scene.tools import Board, Knife, Press
 
 CONTACTS = ("cohesive", "nodal")
 PRECISIONS = ("f64", "f32")
 BAND_CELLS = 2.5  # width of a crack band of grid-smoothed damage [cells] (docs/theory.md, "Measured choices")
-
-
-@dataclass(frozen=True)
-class Knife:
-    """A straight blade: a wedge of the included angle up to the spine's thickness, parallel above it.
-
-    Attributes: name; spine thickness [m]; included angle of the wedge [rad]; blade height [m]; length along x [m];
-    radius of the tip [m], 0 = sharp. A wire is a blade as thick and half as high as its diameter.
-    """
-
-    name: str
-    spine: float
-    angle: float
-    height: float
-    length: float
-    radius: float = 0.0
-
-    def __post_init__(self) -> None:
-        w = f"knife {self.name}"
-        check_number(w, "spine", self.spine, 1e-5, 0.1, "m")
-        check_number(w, "angle", self.angle, 1e-3, math.pi / 2, "rad")
-        check_number(w, "height", self.height, 1e-4, 1.0, "m")
-        check_number(w, "length", self.length, 1e-3, 1.0, "m")
-        check_number(w, "radius", self.radius, -1e-300, 0.05, "m")
-        if 2 * self.radius > self.spine * (1 + 1e-9):
-            raise SceneError(
-                f"{w}: a tip of radius {self.radius * 1e3:g} mm is wider than the spine of {self.spine * 1e3:g} mm"
-            )
-
-
-@dataclass(frozen=True)
-class Press:
-    """A rigid plate, or a wedge with its edge along x, that presses on the food from above and cuts nothing.
-
-    It reaches over the whole food. With a Scene's ``stroke`` it makes the compression and indentation tests that have
-    closed forms and finite-element references.
-
-    Attributes: name; half_angle between the faces and the vertical [rad], pi/2 for a plate; mu, Coulomb friction [-].
-    """
-
-    name: str = "plate"
-    half_angle: float = math.pi / 2
-    mu: float = 0.0
-
-    def __post_init__(self) -> None:
-        w = f"press {self.name}"
-        check_number(w, "half_angle", self.half_angle, 0.1, math.pi / 2 * (1 + 1e-9), "rad")
-        check_number(w, "mu", self.mu, -1e-300, 10.0, "")
-
-
-@dataclass(frozen=True)
-class Board:
-    """The board under the food: Coulomb friction coefficient [-]."""
-
-    mu: float = 0.5
-
-    def __post_init__(self) -> None:
-        check_number("board", "mu", self.mu, -1e-300, 10.0, "")
 
 
 @dataclass(frozen=True)
@@ -224,6 +167,12 @@ class Scene:
     def tied(self) -> bool:
         """Whether ties hold the food together across the cut plane, which the edge and the opening cut."""
         return self.cuts and self.numerics.contact == "cohesive"
+
+    @property
+    def suction(self) -> float:
+        """Largest tension between board and food [Pa]: the board's, where the food stands on a flat face."""
+        held = self.numerics.contact == "cohesive" and self.food.shape.stands
+        return self.board.suction if held else 0.0
 
     @property
     def tie_strength(self) -> float:

@@ -103,6 +103,11 @@ class Shape:
         return self.kind in PRISMS if self.table is None else self.table.prism
 
     @property
+    def stands(self) -> bool:
+        """Whether it stands on a flat face, as a half food does, and not on a line or a point."""
+        return self.kind in (*FLAT_DOWN, *FLAT_TOP) if self.table is None else self.table.halved
+
+    @property
     def walled(self) -> bool:
         """Whether its flanks are upright."""
         return self.kind in FLAT_TOP if self.table is None else self.table.walled

@@ -16,8 +16,8 @@ DX, INV_DX, ORIGIN_X, ORIGIN_Y, ORIGIN_Z, FIRST_STATION = range(31, 37)
 SPACING, TIE_OPENING, CONTACT, LAYERED = range(37, 41)
 EDGE_BAND, LEAST_GAP = range(41, 43)
 SKIN_STIFFNESS, SKIN_POISSON, WIDTH_OF_FORCE, ZONE_MOST, LEAST_WIDTH, LOCAL_DENT = range(43, 49)
-EXTENSION, DENT_WIDTH, RELAXING_BULK = 49, 50, 51
-N_PARAMETERS = 52
+EXTENSION, DENT_WIDTH, RELAXING_BULK, BOARD_SUCTION = range(49, 53)
+N_PARAMETERS = 53
 
 # Rows of the table of sizes: particles, blocks of them, nodes along x, y, z, slices along the edge, the node plane
 # along y that is nearest to y = 0, the first and last + 1 node plane along y whose nodes have a second field, how far
@@ -40,10 +40,11 @@ N_SIZES = 13
 
 # Rows of the table of sums over an output interval: impulses on edge, faces and board (three each), losses of the
 # particles, how many were inverted or left the grid, work of friction and of the edge, moment on the knife, work of
-# ties and of sticky faces.
+# ties, of sticky faces and of the board's suction.
 EDGE, FACE, BOARD = 0, 3, 6
 PLASTIC, DAMAGE, VISCOUS, INVERTED, OUTSIDE, FRICTION_WORK, CUTTING_WORK, MOMENT, TIE_WORK, ADHESION_WORK = range(9, 19)
-N_SUMS = 19
+SUCTION_WORK = 19
+N_SUMS = 20
 N_LOSSES = 5  # rows from PLASTIC to OUTSIDE, which are sums over particles
 
 # Rows of the sums over all particles at an output: momentum (three), kinetic and elastic energy.

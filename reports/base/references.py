@@ -26,6 +26,8 @@ REFERENCES: dict[str, str] = {
     "Atkins 2009": "Atkins, T. (2009). The Science and Engineering of Cutting. Butterworth-Heinemann.",
     "Chouly 2013": "Chouly, F., Hild, P. (2013). A Nitsche-based method for unilateral contact problems. SIAM J. "
     "Numer. Anal. 51:1295-1307. doi:10.1137/12088344X",
+    "Stefan 1874": "Stefan, J. (1874). Versuche über die scheinbare Adhäsion. Sitzungsber. Akad. Wiss. Wien, "
+    "Math.-Naturwiss. Kl. 69:713-735.",
     "Raous 1999": "Raous, M., Cangémi, L., Cocou, M. (1999). A consistent model coupling adhesion, friction, and "
     "unilateral contact. Comput. Methods Appl. Mech. Eng. 177:383-399. doi:10.1016/S0045-7825(98)00389-2",
     "Kennedy 2001": "Kennedy, M. C., O'Hagan, A. (2001). Bayesian calibration of computer models. J. R. Statist. Soc. "

@@ -135,9 +135,16 @@ def _laws(result: CalibrationResult) -> list[list[str]]:
     mu = _value(result, "board_friction")
     mu = _part(result, "board", "mu") if mu is None else mu
     if mu is not None:
-        law = f"contact without adhesion, Coulomb friction {quantity(mu, '-')}"
-        rows.append(("Board", law, "board_friction"))
+        rows.append(("Board", _board(result, mu), "board_friction board_suction"))
     return [[part, law, ", ".join(n for n in names.split() if _known(result, n)) or "–"] for part, law, names in rows]
+
+
+def _board(result: CalibrationResult, mu: float) -> str:
+    """Contact, friction and suction of the board."""
+    fitted = result.fitted.get("board_suction")
+    held = _part(result, "board", "suction") if fitted is None else fitted.value
+    pull = f"that holds a wet face [@Stefan 1874] by up to {quantity(held, 'Pa')}" if held else "without adhesion"
+    return f"contact {pull}, Coulomb friction {quantity(mu, '-')}"
 
 
 def _loss(result: CalibrationResult) -> tuple[str, str, str]:

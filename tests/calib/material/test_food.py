@@ -87,6 +87,7 @@ def test_shipped_foods(foods: dict[str, FoodSpec]) -> None:
     assert set(FOODS) == set(foods)
     for food in foods.values():
         assert set(PROPERTIES) - set(food.properties) <= {
+            "board_suction",
             "R_skin",
             "tensile_strength",
             "strength_ratio",
@@ -225,7 +226,7 @@ def test_default_fit_follows_the_skin(foods: dict[str, FoodSpec]) -> None:
         "mu",
         "board_friction",
     )
-    start = ("R_initiation", "initiation_depth", "mu", "board_friction")
+    start = ("R_initiation", "initiation_depth", "mu", "board_friction", "board_suction")
     assert foods["potato"].default_fit == ("E", "yield_stress", "strength_ratio", "R", *start)
 
 

@@ -82,7 +82,7 @@ def test_a_study_varies_every_constant_of_the_method(study, capsys):
     assert zone["rows"][0] == {k: v for k, v in document["grids"][0].items() if k != "dx_m"} | {"value": 8e-3}
     assert [row["value"] for row in zone["rows"]] == [8e-3, 16e-3] and zone["spread_work"] > 1e-3
     # an axis; of foods without strength, with a sharp crack, with layers
-    unused = {"safety", "cohesive_zone", "crack_ties", "layer_rows"}
+    unused = {"safety", "cohesive_zone", "crack_ties", "layer_rows", "board_suction"}
     varied = {c.key for c in CONSTANTS} - unused
     assert set(document["constants"]) == varied
     assert [row["mach"] for row in document["mach"]["rows"]] == [0.01, 0.02]

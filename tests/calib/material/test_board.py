@@ -1,7 +1,8 @@
-"""The friction of a food on its board: a property that belongs to the scene's board and not to its material."""
+"""Friction and suction of a food's board: properties that belong to the scene's board and not to its material."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from calib.material.knife import load_knife
 from calib.material.scene import Sizing, cut_scene, of_specimen, specimen
 from mpm.scene import Board, Scene
 
-CHERRY = load_food("cherry")
+CHERRY, APPLE = load_food("cherry"), load_food("apple")
 
 
 def scene(food: FoodSpec) -> Scene:
@@ -37,6 +38,25 @@ def test_a_fitted_friction_is_the_boards() -> None:
     found, rest = of_specimen(plain, {"board_friction": 0.8, "E": 2e5})
     assert rest == {"E": 2e5} and found.board == Board(0.8)
     assert {**found.as_dict(), "board": None} == {**plain.as_dict(), "board": None}
+
+
+def test_a_half_food_is_held_down() -> None:
+    """The food's suction is the board's; a specimen of the same food that stands on no flat face is not held."""
+    own = APPLE.properties["board_suction"].value
+    assert scene(APPLE).board.suction == scene(APPLE).suction == own > 0
+    assert of_specimen(scene(APPLE), {"board_suction": 2e4})[0].suction == 2e4
+    assert scene(CHERRY).board.suction == 0.0
+    whole, _ = specimen(APPLE, None, Sizing(shape="sphere"))
+    lying = cut_scene(APPLE, whole, load_knife("kitchen"))
+    assert lying.board.suction == 0.0
+    rolled = replace(scene(APPLE), food=lying.food)
+    assert rolled.board.suction == own and rolled.suction == 0.0
+
+
+def test_foods_that_lie_on_a_cut_face_have_a_suction() -> None:
+    """And no others: what touches the board in a line or a point is not held."""
+    for name, food in load_foods().items():
+        assert ("board_suction" in food.properties) == specimen(food, None, Sizing())[0].stands, name
 
 
 def test_every_food_says_it(tmp_path: Path) -> None:
