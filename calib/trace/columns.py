@@ -189,8 +189,8 @@ def _nothing_fits(table: Table, role: str, option: str) -> str:
     if not bare and len(others) == 1 and "did you mean" not in what:
         what = f"; the only one in a unit of {role} is {quoted(others[0])}: name it with {option} if it is that"
     elif not bare and unfit:
-        unit = quoted(meaning(table, unfit[0]).unit)
-        what = f"; {quoted(unfit[0])} has the unit {unit}, which is none of a {role} ({EXAMPLES[role]})"
+        stated = quoted(meaning(table, unfit[0]).unit)
+        what = f"; {quoted(unfit[0])} has the unit {stated}, which is none of a {role} ({EXAMPLES[role]})"
         what += f"; if that is wrong, say {option} {quoted(f'{unfit[0]}={SI_OF_ROLE[role]}')}"
     if role == "time":
         what += ", or give --rate where rows were written at a known rate"
