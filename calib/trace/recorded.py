@@ -21,6 +21,8 @@ CLOCK_START_S = 1000.0
 then counts from its first sample."""
 DISABLED = "none"
 """Value of ``position_col`` that leaves a position column unused."""
+MOST_LETTERS = 450
+"""Of an error that says two things at once; a longer one says the first alone."""
 ROWS = "the rows"
 """What the time is called where rows are counted."""
 RISING = 0.1
@@ -159,9 +161,11 @@ def _time_and_force(table: Table, how: Reading) -> tuple[Column, list[str], Colu
             choose(table, "force", how.force_col)
         except TraceError as also:
             first = str(missing).split("; ")
-            more = [text for text in str(also).removeprefix(f"{table.source}: ").split("; ") if text not in first]
-            if more and str(also) != str(missing):
-                raise TraceError(f"{missing}; and {'; '.join(more)}") from None
+            other = str(also).removeprefix(f"{table.source}: ")
+            more = [text for text in other.split("; ") if text not in first]
+            both = f"{missing}; and {'; '.join(more)}"
+            if more and str(also) != str(missing) and len(both) <= MOST_LETTERS:
+                raise TraceError(both) from None
         raise
     return time, said, choose(table, "force", how.force_col)
 
