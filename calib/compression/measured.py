@@ -16,6 +16,7 @@ from calib.io.type_schema import Shared
 from calib.io.wording import brief
 from calib.table.table import Table
 from calib.trace.columns import candidates, choose, numbers, without_empty
+from calib.trace.mending import noise_of
 from calib.trace.names import stem_of
 from calib.trace.recorded import MIN_SAMPLES, parse_sign
 from mpm.arrays import FloatArray
@@ -27,6 +28,13 @@ SMALL_STRAIN = 0.05
 """Strain up to which the slope of the stress is the small-strain modulus [-]: the window of published moduli."""
 REPEAT_COLUMNS = ("replicate", "repeat", "specimen", "sample", "run", "trial", "test")
 """Columns that split a file into repeats; one that counts rows does not."""
+CONTACT_SD, CONTACT_PART, LONGEST_APPROACH = 5.0, 2e-3, 0.01
+"""Noise standard deviations, and part of the largest stress, from which on a plate touches; strain before it that is
+told [-]."""
+_PHASES = frozenset("cycle cycle_number cycle_no cycle_count bite phase segment step stage state".split())
+"""Stems of columns that tell parts of the test of one specimen, which is another one after each of them."""
+BEGIN = 0.1
+"""Part of the way within which that of each specimen begins [-]."""
 LOADED, UNLOADED = 0.5, 0.2
 """Parts of the largest way of the plate above which it is pressed, and below which it has come back [-]."""
 
@@ -149,7 +157,9 @@ def read_repeats(
             load = parse_sign(sign) * load
             way, said = _its_own_way(table.source, compression.name, way)
             notes += said
-        for name, on in _repeats(table):
+        repeats, said = _by_label(table, _repeats(table), way)
+        notes += said
+        for name, on in repeats:
             label = name if len(paths) == 1 else f"{path.stem} {name}".strip()
             label = label or path.stem
             if label in names:
@@ -163,6 +173,7 @@ def read_repeats(
             )
             notes += faults
             e, s = _loading(where, way[on], mended, shape, strain)
+            notes += _before_contact(where, table, on, (e, s))
             notes += _later_loadings(where, table, on, way[on])
             rows.append(np.interp(grid, e, s))
             slopes.append(slope(e, s))
@@ -189,6 +200,27 @@ def _repeats(table: Table) -> list[tuple[str, np.ndarray]]:
     return [(str(k), np.arange(*span)) for k, span in enumerate(zip(table.parts, ends, strict=True), start=1)]
 
 
+def _by_label(
+    table: Table, found: list[tuple[str, np.ndarray]], way: FloatArray
+) -> tuple[list[tuple[str, np.ndarray]], list[str]]:
+    """The repeats of a file that nothing known splits, by a column of labels: the way begins anew where they change."""
+    if len(found) > 1 or len(way) < 2 * MIN_SAMPLES:
+        return found, []
+    for name, cells in table.columns.items():
+        if stem_of(name) in _PHASES:
+            continue
+        of = np.array([str(cell).strip() for cell in cells])
+        starts = np.flatnonzero(of[1:] != of[:-1]) + 1
+        labels = list(dict.fromkeys(of.tolist()))
+        blocks = np.diff(np.r_[0, starts, len(of)])
+        if not len(starts) or len(labels) != len(blocks) or blocks.min() < MIN_SAMPLES:
+            continue
+        if np.all(np.abs(way[starts] - way[0]) <= BEGIN * np.ptp(way)):
+            note = f"{table.source}: each value of column {brief(name)} is taken for a specimen of its own"
+            return [(label, np.flatnonzero(of == label)) for label in labels], [note]
+    return found, []
+
+
 def _places(where: str, table: Table, column: str, on: np.ndarray) -> Callable[[int], str]:
     """What errors call a sample of a repeat, by its index in it."""
     return lambda i: f"{where}, {table.row} {brief(table.rows[on[i]])}, column {brief(column)}"
@@ -200,6 +232,21 @@ def _its_own_way(source: str, name: str, way: FloatArray) -> tuple[FloatArray, l
     if gone.max() >= -gone.min():
         return way, []
     return -way, [f"{source}: {brief(name)} falls as the plates approach, so it is taken as negative in compression"]
+
+
+def _before_contact(where: str, table: Table, on: np.ndarray, curve: tuple[FloatArray, FloatArray]) -> list[str]:
+    """Whether the load stays at nothing while the plate comes down, one sentence or none."""
+    strain, stress = curve
+    noise = noise_of(stress)
+    touched = np.flatnonzero(np.abs(stress) > max(CONTACT_SD * noise, CONTACT_PART * float(np.ptp(stress))))
+    free = float(strain[touched[0]]) if len(touched) else 0.0
+    if free <= LONGEST_APPROACH:
+        return []
+    row = f"{table.row} {brief(table.rows[on[min(int(touched[0]), len(on) - 1)]])}"
+    return [
+        f"{where}: the load stays at nothing over the first {free:.1%} of strain, up to about {row}: if the plate had "
+        "not touched the specimen there, remove the rows before it, or the modulus is too small"
+    ]
 
 
 def _later_loadings(where: str, table: Table, on: np.ndarray, way: FloatArray) -> list[str]:

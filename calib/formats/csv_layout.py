@@ -12,7 +12,7 @@ from calib.errors import TraceError
 from calib.io.wording import quoted
 from calib.table.clock_cells import is_clock
 from calib.table.numerals import is_number
-from calib.table.units import is_unit
+from calib.table.units import is_unit, split_unit
 
 SEPARATORS = (",", ";", "\t", "|", " ")
 """What may stand between cells; a blank stands for any number of them."""
@@ -23,6 +23,8 @@ SAMPLE = 200
 MOST_BELOW, MOST_BETWEEN, FEW = 40, 20, 5
 """Lines below the last row, lines of words between rows, and rows by which it is told what a row is like."""
 _COMMENT = re.compile(r"(comments?|remarks?|notes?|bemerkung(en)?|kommentar|)", re.IGNORECASE)
+_NUMBER_OF_SPECIMEN = re.compile(r"[\s_#]\d+(?=\s*([\[(].*)?$)")
+"""The number of a specimen in the name of a column, as in ``Load 2 (N)``."""
 UNIT_CELL = re.compile(
     r"\s*[\[(]?\s*[A-Za-z%\u00b5\u03bc\u00b0\"][\w/^%.*\u00b7-]{0,14}\s*[\])]?\s*|\s*[\[(]?\s*[-/]?\s*[\])]?\s*"
 )
@@ -102,7 +104,9 @@ def layout_of(source: str, body: NumberedLines) -> Layout:
     count = _blocks(header)
     if count > 1 and len(parts) == 1:
         kept, parts = _stacked(kept, len(header), count)
-        header, units = header[: (len(header) + 1) // count], units[: (len(header) + 1) // count]
+        size = (len(header) + 1) // count
+        alike = header[:size] == header[size : 2 * size]
+        header, units = [n if alike else _NUMBER_OF_SPECIMEN.sub("", n) for n in header[:size]], units[:size]
         if not header[-1].strip():
             header, kept = header[:-1], [(line, cells[: len(header) - 1]) for line, cells in kept]
     return Layout(above, header, units, kept, parts, cut_off, words, count)
@@ -163,20 +167,36 @@ def _header(rows: NumberedRows, width: int) -> tuple[int, int | None] | None:
         held = [_share(cells) > 0.5 and abs(len(cells) - width) <= 1 for cells in below]
         return bool(held) and held[0] and sum(held) >= min(3, len(held))
 
+    found: tuple[int, int | None] | None = None
     for k in range(min(len(rows) - 1, MOST_ABOVE + 1)):
         cells = rows[k][1]
         if abs(len(cells) - width) > 1 or not is_words(cells):
             continue
+        here: tuple[int, int | None] | None = None
         if numbers_from(k + 1):
             above_it = rows[k - 1][1] if k else []
+            here = k, None
             if k and is_words(above_it) and len(above_it) == len(cells) and _mostly_units(cells):
-                return k - 1, k if are_units(cells) else None
-            return k, None
-        below = rows[k + 1][1]
-        units = len(below) == len(cells) and are_units(below) and _mostly_units(below) and not _mostly_units(cells)
-        if units and k + 2 < len(rows) and numbers_from(k + 2):
-            return k, k + 1
-    return None
+                here = k - 1, k if are_units(cells) else None
+        elif k + 2 < len(rows) and numbers_from(k + 2):
+            below = rows[k + 1][1]
+            if len(below) == len(cells) and are_units(below) and _mostly_units(below) and not _mostly_units(cells):
+                here = k, k + 1
+        if here is None or (found is not None and not _has_units(rows, here)):
+            continue
+        if rows[here[0]][1] == rows[found[0]][1] if found is not None else False:
+            break  # another specimen
+        found = here
+        start = k + 1 if here[1] is None else here[1] + 1
+        held = [_share(row) > 0.5 for _, row in rows[start : start + FEW]]
+        if len(held) < FEW or all(held):
+            break  # what is shorter is a list of results
+    return found
+
+
+def _has_units(rows: NumberedRows, head: tuple[int, int | None]) -> bool:
+    """Whether a header has a row of units below it, or units in its names."""
+    return head[1] is not None or any(split_unit(cell).text for cell in rows[head[0]][1])
 
 
 def _mostly_units(cells: Sequence[str]) -> bool:
@@ -236,11 +256,13 @@ def _is_below(cells: Sequence[str], usual: int, where: Sequence[int]) -> bool:
 def _as_wide(rows: NumberedRows, header: list[str]) -> tuple[NumberedRows, list[str]]:
     """Rows and header of one width, where all rows lack the comment at their end, or the header the rows' number."""
     widths = {len(cells) for _, cells in rows}
-    if not header or len(widths) != 1 or widths == {len(header)}:
+    if not header or widths == {len(header)} or not widths:
         return rows, header
-    (width,) = widths
-    if width < len(header) and all(_COMMENT.fullmatch(name.strip()) for name in header[width:]):
-        return [(line, [*cells, *[""] * (len(header) - width)]) for line, cells in rows], header
+    width = min(widths)
+    if 1 < width < len(header) and all(_COMMENT.fullmatch(name.strip()) for name in header[width:]):
+        return [(line, [*cells, *[""] * (len(header) - len(cells))]) for line, cells in rows], header
+    if len(widths) != 1:
+        return rows, header
     numbers = [cells[0].strip() for _, cells in rows]
     if width == len(header) + 1 and numbers[0] in ("0", "1"):
         if all(text == str(k) for k, text in enumerate(numbers, start=int(numbers[0]))):
@@ -251,7 +273,10 @@ def _as_wide(rows: NumberedRows, header: list[str]) -> tuple[NumberedRows, list[
 def _blocks(header: Sequence[str]) -> int:
     """How often the same columns stand beside each other, with an empty column between them or not."""
     names = [name.strip() for name in header]
-    for wide in (names, [*names, ""]):
+    plain = [re.sub(r"\.\d+$", "", name) for name in names]  # as pandas tells the same names apart
+    numbered = [_NUMBER_OF_SPECIMEN.sub("", name) for name in names]
+    plain = [one if one in names else name for one, name in zip(plain, names, strict=True)]
+    for wide in (names, [*names, ""], plain, [*plain, ""], numbered, [*numbered, ""]):
         for count in range(len(wide) // 2, 1, -1):
             size, rest = divmod(len(wide), count)
             if not rest and size > 1 and wide == wide[:size] * count and len(set(wide[:size])) == size:

@@ -8,12 +8,12 @@ import re
 from collections.abc import Sequence
 
 from calib.errors import TraceError
-from calib.formats.csv_layout import Layout, are_units, is_words, layout_of
+from calib.formats.csv_layout import FEW, Layout, are_units, is_words, layout_of
 from calib.io.wording import brief
 from calib.table.encoding import decode
-from calib.table.numerals import is_number, styles_of
+from calib.table.numerals import as_plain, is_number, styles_of
 from calib.table.table import MEASURED, Table, check_names
-from calib.table.units import is_unit
+from calib.table.units import is_unit, split_unit
 
 _STATED = re.compile(
     r"\W*(?:units?\s+(?:of\s+)?(?P<of>[\w ]+?)|(?P<what>[\w ]+?)\s+units?)\s*"
@@ -22,7 +22,7 @@ _STATED = re.compile(
 )
 """A line such as ``Force Units: lbf``."""
 _SYNONYMS = (
-    ("force", "load", "resistance"),
+    ("force", "load", "resistance", "fx", "fy", "fz"),
     ("position", "displacement", "extension", "distance", "stroke", "travel", "height", "length", "depth", "crosshead"),
     ("time",),
 )
@@ -56,11 +56,13 @@ def table_of_csv(source: str, raw: bytes, decimal: str | None = None) -> Table:
     if len(body) < 2:
         raise TraceError(f"{source}: {'a header but no data' if body else 'nothing but comments'}")
     layout = layout_of(source, body)
-    names, hint, said = _names(source, layout, comments)
-    check_names(source, names)
+    first = layout.rows[0][0] if layout.rows else len(numbered)
+    heads = [line for i, line in numbered if i < first and line.lstrip().startswith("#")]
+    names, hint, said = _names(source, layout, heads)
     if not layout.rows:
+        check_names(source, names)
         raise TraceError(f"{source}: a header but no data")
-    columns = dict(zip(names, zip(*(row for _, row in layout.rows), strict=True), strict=True))
+    columns, left_out, more = _columns(source, names, layout)
     columns, styled = _in_python(source, columns, decimal or _stated_decimal(layout))
     lines = [" ".join(cells) if len(cells) == 1 else ";".join(cells) for cells in layout.above] + comments
     return Table(
@@ -70,8 +72,9 @@ def table_of_csv(source: str, raw: bytes, decimal: str | None = None) -> Table:
         row="row",
         sha256=hashlib.sha256(raw).hexdigest(),
         label=_label(comments),
-        units=_units(names, layout, lines),
-        notes=(*notes, *said, *_left_out(source, layout), *styled),
+        units=_units(names, layout, lines) | _units_in_comments(names, heads),
+        left_out=left_out,
+        notes=(*notes, *said, *_left_out(source, layout), *more, *styled),
         parts=layout.parts,
         hint=hint,
     )
@@ -105,11 +108,10 @@ def _names(source: str, layout: Layout, comments: Sequence[str]) -> tuple[list[s
         names = [re.sub(r"^[#%]\s+", "", name.strip()) for name in layout.header]
         return [name or f"column {i}" for i, name in enumerate(names, start=1)], "", []
     first = layout.rows[0][1] if layout.rows else []
-    for comment in reversed(comments):
-        for separator in (",", ";", "\t", None):
-            cells = [cell.strip() for cell in comment.strip().lstrip("#").strip().split(separator)]
-            if len(cells) == len(first) > 1 and is_words(cells) and not are_only_units(cells):
-                return cells, "", []
+    told = [cells for comment in comments for cells in _cells_of(comment) if len(cells) == len(first) > 1]
+    told = [cells for cells in told if is_words(cells) and not are_only_units(cells)]
+    if told:
+        return max(reversed(told), key=_told_by), "", []
     stamped = _STAMPED.get(len(first))
     if stamped and not is_number(first[2]) and all(is_number(cell) for k, cell in enumerate(first) if k != 2):
         what = "stamped wrench" if "wrench.force.x" in stamped else "stamped pose"
@@ -121,6 +123,69 @@ def _names(source: str, layout: Layout, comments: Sequence[str]) -> tuple[list[s
         f"({shown}), as in --time-col 'column 1=s'"
     )
     return names, hint, []
+
+
+def _cells_of(comment: str) -> list[list[str]]:
+    """The cells of a comment, by each of what may separate them."""
+    text = re.sub(
+        r"^\W*(columns?|fields?|header|names?|units?)\s*:", "", comment.strip().lstrip("#").strip(), flags=re.I
+    )
+    return [[cell.strip() for cell in re.split(mark, text.strip())] for mark in (",", ";", r"\t", r"\s{2,}", r"\s+")]
+
+
+def _told_by(cells: Sequence[str]) -> int:
+    """How many cells of a comment look like names of columns: with a unit, or a word for what is measured."""
+    known = {word for group in _SYNONYMS for word in group}
+    words = [set(re.split(r"[\W_]+", cell.lower())) for cell in cells]
+    return sum(bool(split_unit(cell).text) + 2 * bool(own & known) for cell, own in zip(cells, words, strict=True))
+
+
+def _units_in_comments(names: Sequence[str], comments: Sequence[str]) -> dict[str, str]:
+    """Units of a comment that holds nothing else, one for each column."""
+    for comment in comments:
+        for cells in _cells_of(comment):
+            if len(cells) == len(names) and are_only_units(cells):
+                return {name: cell.strip(" []()") for name, cell in zip(names, cells, strict=True)}
+    return {}
+
+
+def _columns(
+    source: str, names: Sequence[str], layout: Layout
+) -> tuple[dict[str, tuple[str, ...]], dict[str, str], list[str]]:
+    """The cells of each column by name, those that were left out and why, and what was done, one sentence each.
+
+    A column that stands twice with the same cells is one. An empty one is none, unless LabVIEW's header says by how
+    much its time goes on.
+    """
+    found: dict[str, tuple[str, ...]] = {}
+    left_out, notes = {}, []
+    kept = []
+    for name, cells in zip(names, zip(*(row for _, row in layout.rows), strict=True), strict=True):
+        if name in found and found[name] == cells and len(cells) > FEW:
+            notes.append(f"{source}: column {brief(name)} stands there twice with the same numbers; one was left out")
+            continue
+        kept.append(name)
+        found.setdefault(name, cells)
+    check_names(source, kept)
+    for name in [name for name, cells in found.items() if not any(cell.strip() for cell in cells)]:
+        step = _increment(layout) if name == "X_Value" else None
+        if step is None:
+            del found[name]
+            left_out[name] = "all its cells are empty"
+        else:
+            found[name] = tuple(repr(step * k) for k in range(len(layout.rows)))
+            notes.append(f"{source}: {name} is empty; times go on by the Delta_X of {step:g} s in the header")
+    return found, left_out, notes
+
+
+def _increment(layout: Layout) -> float | None:
+    """The step of the time that LabVIEW's header states for all channels [s]."""
+    for cells in layout.above:
+        if cells[0].strip() == "Delta_X":
+            steps = {as_plain(cell, mark) for cell in cells[1:] if cell.strip() for mark in (".", ",")} - {None}
+            step = steps.pop() if len(steps) == 1 else None
+            return step if step is not None and step > 0.0 else None
+    return None
 
 
 def are_only_units(cells: Sequence[str]) -> bool:

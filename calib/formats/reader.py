@@ -13,6 +13,7 @@ from calib.errors import TraceError
 from calib.formats.bundled import BUNDLED, bundled_or_same
 from calib.formats.csv_table import table_of_csv
 from calib.formats.json_table import table_of_json
+from calib.formats.packed import unpacked
 from calib.table.clock_cells import with_clocks
 from calib.table.table import Table
 from mpm.files import read_regular
@@ -27,8 +28,7 @@ _TDMS_SIGNATURE = b"TDSm"
 _BAG_SUFFIXES = (".bag", ".mcap", ".db3")
 _NOT_READ = {
     b"\xd0\xcf\x11\xe0": "an .xls file or another document of Microsoft Office before 2007",
-    b"PK\x03\x04": "a ZIP archive",
-    b"\x1f\x8b": "compressed with gzip",
+    b"\x93NUMPY": "an array of numpy without names of columns",
 }
 _HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf", ".he5")
@@ -64,7 +64,8 @@ def _table(path: str | Path, decimal: str | None) -> Table:
         from calib.formats.bag_table import table_of_bag
 
         return table_of_bag(file)
-    raw = _content(file)
+    file, raw = unpacked(file, _content(file))
+    suffix = file.suffix.lower()
     source = f"{file.name}:{address}" if address else file.name
     matlab = raw.startswith(_MATLAB_SIGNATURE)
     if raw.startswith(_HDF5_SIGNATURE) or suffix in _HDF5_SUFFIXES or (matlab and _HDF5_SIGNATURE in raw[:4096]):

@@ -15,11 +15,14 @@ from calib.table.table import Cells, Table, as_float
 DAY = 86400.0
 """Seconds of a day."""
 _CLOCK = re.compile(
-    r"""\s*(?P<date>\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}|\d{1,2}[- ][A-Za-z]{3}[- ]\d{2,4}|\d{8}|\d+\ days?)?[T ,]*
+    r"""\s*(?:[A-Za-z]{3},?\ +)?(?P<date>\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}|\d{1,2}[- ][A-Za-z]{3}[- ]\d{2,4}|\d{8}|
+    \d+\ days?|[A-Za-z]{3,9}\.?\ +\d{1,2}(?:,?\ +\d{4}(?=[ ,]))?)?[T ,_]*
     (?P<sign>-?)(?P<h>\d{1,3}):(?P<m>\d{2})(?::(?P<s>\d{2}(?:[.,:]\d+)?))?\s*(?P<half>[AaPp]\.?[Mm]\.?)?
-    \s*(?:Z|UTC|[-+]\d{2}:?\d{2})?\s*""",
+    \s*(?:Z|UTC|[-+]\d{2}:?\d{2}|\ \d{4})?\s*""",
     re.VERBOSE,
 )
+_COMPACT = re.compile(r"\s*(?P<date>\d{8})[T _-](?P<h>\d{2})(?P<m>\d{2})(?P<s>\d{2}(?:[.,]\d+)?)Z?\s*")
+"""A stamp without marks between its parts, as in the names of files."""
 _MINUTES = re.compile(r"\s*(?P<m>\d{1,3}):(?P<s>\d{2}[.,]\d+)\s*")
 """Minutes and seconds, as spreadsheets show a time of the day."""
 _SECONDS = re.compile(r"(?P<stamp>.*stamp[._/]|.*header[._/]|)secs?", re.IGNORECASE)
@@ -63,8 +66,8 @@ def seconds_of(cells: Cells) -> np.ndarray | None:
         return None
     if not isinstance(cells[0], str):
         return _of_objects(cells)
-    pattern = _MINUTES if _MINUTES.fullmatch(cells[0]) else _CLOCK
-    if not pattern.fullmatch(cells[0]):
+    pattern = next((one for one in (_MINUTES, _COMPACT, _CLOCK) if one.fullmatch(cells[0])), None)
+    if pattern is None:
         return None
     found = [pattern.fullmatch(cell) if isinstance(cell, str) else None for cell in cells]
     return _counted([match.groupdict() for match in found if match]) if all(found) else None
@@ -138,4 +141,4 @@ def _floats(cells: Cells) -> np.ndarray | None:
 
 def is_clock(cell: str) -> bool:
     """Whether a cell holds a time of the day, with a date or without."""
-    return _CLOCK.fullmatch(cell) is not None or _MINUTES.fullmatch(cell) is not None
+    return any(pattern.fullmatch(cell) for pattern in (_CLOCK, _MINUTES, _COMPACT))

@@ -24,6 +24,14 @@ _WESTERN = re.compile(
 """Letters and signs that headers in Western languages have."""
 _CAPITALS = re.compile("[\u00c0-\u00de]{2}|[\u00df-\u00ff]{3}")
 """Letters beyond ASCII that follow each other, as they do where another alphabet is read as Western."""
+_COUNTRIES = ("cp1252", "gb18030", "cp932", "cp949", "big5", "cp1251", "cp1250", "mac_roman")
+"""Encodings of a country, the most usual first."""
+_WORDS = re.compile(
+    "[Pp]r\u00fcf|[Hh]\u00f6he|[Ff]or\u00e7a|D\u00e9placement|d\u00e9placement|[Ss]i\u0142a|[Pp]rzemieszczenie|\u65f6\u95f4|\u6642\u9593|\u6642\u523b|"
+    "\u8bd5\u9a8c|\u8a66\u9a13|\u8377\u91cd|\u8f7d\u8377|\u8ca0\u8377|\u4f4d\u79fb|\u5909\u4f4d|\u9ad8\u3055|\u9ad8\u5ea6|\u884c\u7a0b|\u30b9\u30c8\u30ed\u30fc\u30af|\uc2dc\uac04|\ud558\uc911|\ubcc0\uc704|"
+    "[\u0412\u0432]\u0440\u0435\u043c\u044f|[\u041d\u043d]\u0430\u0433\u0440\u0443\u0437\u043a\u0430|[\u0423\u0443]\u0441\u0438\u043b\u0438\u0435|[\u041f\u043f]\u0435\u0440\u0435\u043c\u0435\u0449\u0435\u043d\u0438\u0435"
+)
+"""Words of measurement that have letters beyond ASCII: in the wrong encoding they are others."""
 MOST_FOREIGN = 0.3
 """Part of the bytes beyond ASCII from which on a file that is not UTF-8 is no table of numbers."""
 WIDE = 0.4
@@ -75,16 +83,33 @@ def _narrow(source: str, raw: bytes, kind: str) -> tuple[str, tuple[str, ...]]:
         foreign = re.sub(rb"[\x00-\x7f]+", b"", raw)
         if _BINARY.search(raw) or len(foreign) > MOST_FOREIGN * len(raw):
             raise _not_text(source, kind, f"byte {error.start} is not UTF-8") from None
-    try:
-        western = raw.decode("cp1252")
-    except UnicodeDecodeError:
-        western = ""
-    name = "cp1252"
-    if not western or not _WESTERN.fullmatch(western) or _CAPITALS.search(western):
-        lines = b"\n".join(line for line in raw.split(b"\n") if not line.isascii())
+    lines = b"\n".join(line for line in raw.split(b"\n") if not line.isascii())
+    name = _told_by_words(lines) or _western(raw)
+    if not name:
         best = from_bytes(lines).best()
         name = best.encoding if best is not None else "cp1252"
     return raw.decode(name, "replace"), (f"{source}: not UTF-8, read as {name}; check the names of its columns",)
+
+
+def _western(raw: bytes) -> str:
+    """The encoding of Western Europe where the text has its letters alone, else nothing."""
+    try:
+        text = raw.decode("cp1252")
+    except UnicodeDecodeError:
+        return ""
+    return "cp1252" if text and _WESTERN.fullmatch(text) and not _CAPITALS.search(text) else ""
+
+
+def _told_by_words(lines: bytes) -> str:
+    """The encoding in which lines hold the most words of measurement, empty where they hold none in any."""
+    found = dict.fromkeys(_COUNTRIES, 0)
+    for name in _COUNTRIES:
+        try:
+            found[name] = len(_WORDS.findall(lines.decode(name)))
+        except UnicodeDecodeError:
+            continue
+    best = max(found, key=lambda name: found[name])
+    return best if found[best] else ""
 
 
 def _without_zeros(source: str, text: str, kind: str, notes: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:

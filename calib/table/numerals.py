@@ -13,6 +13,8 @@ from dataclasses import dataclass
 
 from calib.table.table import as_float
 
+FEWEST_BARE = 5
+"""Different whole numbers below a thousand from which on a column counts in ones."""
 _EXPONENT = r"(?:[eE][-+]?\d+)?"
 _GROUPED = {mark: re.compile(rf"[-+]?[1-9]\d{{0,2}}(?:{re.escape(mark)}\d{{3}})+") for mark in ",."}
 """Whole numbers whose thousands are set off by a mark, which may be decimals too where there is one mark."""
@@ -82,6 +84,10 @@ def styles_of(columns: Mapping[str, Sequence[str]], decimal: str | None = None) 
     found = {}
     for name, (marks, doubtful) in evidence.items():
         own = marks or (certain if doubtful else set())
+        if not own and not doubtful and any(_SPACED.search(cell) for cell in columns[name]):
+            own = (
+                certain if len(certain) == 1 else {"."}
+            )  # whole numbers whose thousands a blank or apostrophe sets off
         if decimal is not None:
             own = {decimal} if marks | doubtful else set()
         if len(own) != 1:
@@ -89,7 +95,7 @@ def styles_of(columns: Mapping[str, Sequence[str]], decimal: str | None = None) 
         mark = next(iter(own))
         other = "," if mark == "." else "."
         grouped = any(other in cell for cell in columns[name])
-        if mark == "," or grouped:
+        if mark == "," or grouped or any(_SPACED.search(cell) for cell in columns[name][:1000]):
             found[name] = Style(mark, grouped)
     return found
 
@@ -110,4 +116,17 @@ def _evidence(cells: Sequence[str]) -> tuple[set[str], set[str]]:
                     doubtful.add(mark)
                 else:
                     certain[mark] += 1
-    return {mark for mark, count in certain.items() if count > 1}, doubtful
+    marks = {mark for mark, count in certain.items() if count > 1}
+    if not marks and len(doubtful) == 1 and _counts_in_ones(cells):
+        (mark,) = doubtful  # 995, 1.000: whole numbers, of which those from a thousand on have a mark
+        return {"," if mark == "." else "."}, doubtful
+    return marks, doubtful
+
+
+def _counts_in_ones(cells: Sequence[str]) -> bool:
+    """Whether numbers below a thousand are whole and without a mark, several of them, where others have one.
+
+    A program that writes three decimals writes them behind all numbers of a column.
+    """
+    bare = {tidy(cell) for cell in cells if "," not in cell and "." not in cell}
+    return sum(bool(re.fullmatch(r"[-+]?[1-9]\d{0,2}", text)) for text in bare) >= FEWEST_BARE

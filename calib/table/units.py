@@ -65,15 +65,16 @@ EXAMPLES = {
 
 _SI = {
     Quantity.TIME: {
-        1.0: "s sec secs second seconds seg sek sekunde sekunden",
+        1.0: "s sec secs second seconds seg sek sekunde sekunden seconde secondes segundo segundos "
+        "secondi secondo \u79d2 \u0441 \u0441\u0435\u043a",
         1e-3: "ms msec msecs millisecond milliseconds millis",
         1e-6: "us usec usecs microsecond microseconds micros",
         1e-9: "ns nsec nsecs nanosecond nanoseconds nanos nanosec",
     },
     Quantity.FORCE: {
-        1.0: "N n newton newtons",
+        1.0: "N n newton newtons \u041d \u725b",
         1e6: "MN meganewton",
-        1e3: "kN KN kn kilonewton kilonewtons",
+        1e3: "kN KN kn kilonewton kilonewtons \u043a\u041d",
         1e1: "daN decanewton",
         1e-1: "dN decinewton",
         1e-2: "cN centinewton centinewtons",
@@ -84,19 +85,19 @@ _SI = {
         1.0: "m metre metres meter meters",
         1e-1: "dm decimetre decimeter",
         1e-2: "cm centimetre centimetres centimeter centimeters",
-        1e-3: "mm millimetre millimetres millimeter millimeters",
+        1e-3: "mm millimetre millimetres millimeter millimeters \u043c\u043c \u6beb\u7c73",
         1e-6: "um micrometre micrometres micrometer micrometers micron microns",
         1e-9: "nm nanometre nanometer nanometres nanometers",
     },
 }
 _OTHER_SYSTEMS = {
-    Quantity.TIME: {60.0: "min mins minute minutes", 3600.0: "h hr hrs hour hours"},
+    Quantity.TIME: {60.0: "min mins minute minutes minuten minuti minutos", 3600.0: "h hr hrs hour hours"},
     Quantity.FORCE: {
-        STANDARD_GRAVITY: "kgf kg kp kilogram kilograms kilopond kilogram-force",
-        1e-3 * STANDARD_GRAVITY: "gf g gram grams gramme grammes gram-force pond",
+        STANDARD_GRAVITY: "kgf kg kp kilogram kilograms kilopond kilogram-force kg-force",
+        1e-3 * STANDARD_GRAVITY: "gf g gram grams gramme grammes gram-force g-force pond",
         1e-6 * STANDARD_GRAVITY: "mgf mg milligram milligrams",
         1e3 * STANDARD_GRAVITY: "tf tonf tonne-force",
-        POUND * STANDARD_GRAVITY: "lbf lb lbs lbsf pound pounds pound-force",
+        POUND * STANDARD_GRAVITY: "lbf lb lbs lbsf pound pounds pound-force lb-force",
         1e3 * POUND * STANDARD_GRAVITY: "klbf kip kips",
         POUND / 16.0 * STANDARD_GRAVITY: "ozf oz ounce ounces ounce-force",
         1e-5: "dyn dyne dynes",
@@ -154,6 +155,7 @@ def unit_of(text: str) -> Unit | None:
         return None
     known = UNITS.get(word) or UNITS.get(word.rstrip("."))
     if known is None:
+        word = word.rstrip(".") or word
         known = _ANY_CASE.get(_AMBIGUOUS_CASE.get(word.lower(), word.lower()).lower())
     if known is None and _is_compound(word):
         known = Unit(word, Quantity.OTHER, float("nan"), False)

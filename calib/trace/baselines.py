@@ -28,6 +28,9 @@ BEHIND_PART, BEHIND_SD = 0.03, 4.0
 told."""
 UNTOLD_REACH = 5.0
 """Lengths of what is before contact over which a drift may be carried on without a word."""
+LEVEL_BEHIND, REST_SD = 20, 3.0
+"""Samples at the end of a record without a position that show a level, and noise standard deviations within which they
+do."""
 BEHIND_SAMPLES = 5
 """Samples behind the cut from which on they have a level."""
 
@@ -146,6 +149,29 @@ def out_of_the_food(trace: Trace, contact: ContactOnset) -> np.ndarray:
     below = np.flatnonzero(trace.position < height + CLEAR_M)
     last = int(below[-1]) + 1 if len(below) else len(trace.time)
     return np.arange(last, len(trace.time))
+
+
+def behind_the_cut(trace: Trace, tared: np.ndarray, contact: ContactOnset) -> np.ndarray:
+    """Samples at the end of the record that show the level behind the cut.
+
+    Without a position they are those of a force that has come to rest below its level before the cut: no food pulls a
+    knife down for as long.
+
+    Args:
+        trace: The cut.
+        tared: Its force above the baseline [N], shape (n,).
+        contact: Its contact.
+
+    Returns:
+        Their indices, shape (k,) [-]; none where nothing tells them.
+    """
+    if trace.position is not None:
+        return out_of_the_food(trace, contact)
+    count = max(LEVEL_BEHIND, len(tared) // 20)
+    last, noise = tared[-count:], contact.baseline.noise_sd
+    level = float(np.median(last))
+    still = float(np.std(last)) <= REST_SD * noise
+    return np.arange(len(tared) - count, len(tared)) if still and level < 0.0 else np.empty(0, dtype=int)
 
 
 def trigger_contact(trace: Trace, force: np.ndarray) -> ContactOnset:

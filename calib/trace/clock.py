@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +24,11 @@ JUMP = 5.0
 """Steps of the clock, in median steps, from which on it has jumped, or samples are missing."""
 MOST_JUMPS = 5
 """Jumps of a clock that are repaired; more of them leave nothing of it."""
+MOST_AGAIN = 0.1
+"""Part of the rows that may repeat earlier ones, as where pieces of a record overlap; a record that is there twice has
+more."""
+MOST_UNORDERED, LATEST_ROWS = 0.05, 10
+"""Part of the rows after which time falls, and rows by which one is away from its place, in a record that is sorted."""
 FEWEST_ROWS = 20
 """Rows from which on what follows a restart of the clock is a record of its own."""
 _PREFIXES = {1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
@@ -73,12 +78,17 @@ def running_clock(
     """
     time, force = columns
     _check_swapped(table, time, force, t, f)
+    order, ordered = _in_order(table, time, (t, f) if p is None else (t, f, p))
+    if ordered:
+        t, f, p = t[order], f[order], None if p is None else p[order]
+        table = replace(table, rows=[table.rows[i] for i in order])
     steps = np.diff(t)
     if np.any(steps < 0.0) or np.mean(steps == 0.0) < STANDING:
         clock = _without_repeats(table, t, f, p)
     else:
         clock = _spread(table, time, t)
-    clock = _restarted(table, time, clock)
+    clock = replace(clock, notes=(*ordered, *clock.notes))
+    clock = _restarted(table, time, clock, p)
     clock = _without_jumps(table, time, clock, p)
     bad = np.flatnonzero(np.diff(clock.time) <= 0.0)
     if len(bad):
@@ -89,7 +99,7 @@ def running_clock(
             "where rows are written at a known rate"
         )
     _check_rate(table, time, clock.time, t)
-    return clock
+    return replace(clock, kept=order[clock.kept])
 
 
 def _place(table: Table, column: Column, i: int) -> str:
@@ -113,6 +123,61 @@ def _check_swapped(table: Table, time: Column, force: Column, t: np.ndarray, f: 
             f"rises in equal steps like a clock, {brief(time.name)} does not); exchange their names or use "
             "--time-col and --force-col"
         )
+
+
+def _in_order(table: Table, time: Column, columns: tuple[np.ndarray, ...]) -> tuple[np.ndarray, list[str]]:
+    """The samples in the order of their times, and what was done, one sentence each.
+
+    A file that begins with the last sample is turned round. Rows that say again what an earlier row says are left out.
+    A few rows that came late, as over a network, are put where they belong. A lone time that is far from both of its
+    neighbours is left out.
+    """
+    t = columns[0]
+    order, notes = np.arange(len(t)), []
+    steps = np.diff(t)
+    if len(t) < FEWEST_ROWS or len(table.parts) > 1 or np.all(steps > 0.0):
+        return order, []
+    if np.all(steps < 0.0):
+        return order[::-1], [f"{table.source}: time falls from row to row; the record was turned round"]
+    falls = np.flatnonzero(steps < 0.0)
+    if not len(falls) or len(falls) > MOST_UNORDERED * len(t):
+        return order, []
+    rows = np.column_stack(columns)
+    _, first = np.unique(rows, axis=0, return_index=True)
+    again = np.setdiff1d(order, first)
+    within = t < np.maximum.accumulate(t)
+    if (
+        len(again)
+        and len(again) <= len(t) / 2
+        and np.all(within[again] | np.isin(again - 1, again) | _same(rows, again))
+    ):
+        order = np.sort(first)
+        if np.all(np.diff(t[order]) > 0.0):
+            row = f"{table.row} {brief(table.rows[again[0]])}"
+            return order, [f"{table.source}: {len(again)} rows, the first is {row}, repeat earlier ones; left out"]
+        order = np.arange(len(t))
+    usual = float(np.median(np.abs(steps)))
+    middle = 0.5 * (t[:-2] + t[2:])
+    lone = 1 + np.flatnonzero(
+        (np.abs(t[2:] - t[:-2] - 2.0 * usual) <= usual) & (np.abs(t[1:-1] - middle) > JUMP * usual)
+    )
+    if 0 < len(lone) <= MOST_JUMPS:
+        order = np.delete(order, lone)
+        notes = [
+            f"{_place(table, time, int(lone[0]))}: {len(lone)} of the times stand out alone; those rows were left out"
+        ]
+    late = np.argsort(t[order], kind="stable")
+    moved = np.abs(late - np.arange(len(late)))
+    if moved.any() and moved.max() <= LATEST_ROWS and np.all(np.diff(t[order][late]) > 0.0):
+        place = _place(table, time, int(order[int(np.argmax(moved > 0))]))
+        notes.append(f"{place}: {np.count_nonzero(moved)} rows are not in the order of their times; they were sorted")
+        order = order[late]
+    return order, notes
+
+
+def _same(rows: np.ndarray, again: np.ndarray) -> np.ndarray:
+    """Whether rows repeat the row just before them."""
+    return np.array([bool(i) and bool(np.all(rows[i] == rows[i - 1])) for i in again], dtype=bool)
 
 
 def _without_repeats(table: Table, t: np.ndarray, f: np.ndarray, p: np.ndarray | None) -> Clock:
@@ -162,8 +227,11 @@ def _spread(table: Table, time: Column, t: np.ndarray) -> Clock:
     return Clock(whole, np.arange(len(t)), sd=tick / 12**0.5, notes=(note,))
 
 
-def _restarted(table: Table, time: Column, clock: Clock) -> Clock:
-    """The record with the times after a restart counted on, and the places of restarts and of parts of the file."""
+def _restarted(table: Table, time: Column, clock: Clock, p: np.ndarray | None) -> Clock:
+    """The record with the times after a restart counted on, and the places of restarts and of parts of the file.
+
+    Where the knife moves on through a restart as before it, the record does not begin anew: the clock has jumped.
+    """
     t = clock.time
     steps = np.diff(t)
     step = float(np.median(steps))
@@ -172,6 +240,10 @@ def _restarted(table: Table, time: Column, clock: Clock) -> Clock:
     goes_on = [int(i) for i in begin if np.all(np.abs(steps[i : i + 3]) <= JUMP * step)]
     restarts = [i for i in goes_on if abs(t[i] - t[0]) <= near]
     parts = [int(np.searchsorted(clock.kept, start)) for start in table.parts[1:]]
+    parts = [i for i in parts if not 0.0 < steps[i - 1] <= JUMP * step]  # the clock goes on: one record in pieces
+    if p is not None:
+        height = p[clock.kept]
+        restarts = [i for i in restarts if not _moves_on(height, i)]
     ends = sorted({*restarts, *parts})
     if not ends or min(np.diff([0, *ends, len(t)])) < FEWEST_ROWS:
         return clock
@@ -184,6 +256,13 @@ def _restarted(table: Table, time: Column, clock: Clock) -> Clock:
     rows = ", ".join(f"{table.row} {brief(table.rows[clock.kept[i]])}" for i in ends[:3])
     note = f"{table.source}: the record begins anew at {rows}; times are counted on from there"
     return Clock(out, clock.kept, clock.sd, tuple(ends), (*clock.notes, note))
+
+
+def _moves_on(height: np.ndarray, i: int) -> bool:
+    """Whether the knife moves from one sample to the next as it does around them [m], shape (n,)."""
+    near = np.diff(height[max(i - 8, 0) : i + 8])
+    step, usual = float(height[i] - height[i - 1]), float(np.median(near))
+    return abs(usual) > 0.0 and 0.0 < step / usual < 3.0 and float(np.std(near)) < abs(usual)
 
 
 def _without_jumps(table: Table, time: Column, clock: Clock, p: np.ndarray | None) -> Clock:

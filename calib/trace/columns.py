@@ -28,6 +28,12 @@ _EMPTY = frozenset(
     ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "1.#qnan", "-1.#ind", "1.#ind", "missing")
 )
 """What programs write into a cell that holds nothing."""
+EPOCH_S = (9.5e8, 4.1e9)
+"""Seconds since 1970 between which a clock of our time is: the years 2000 to 2099."""
+_FINER = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+"""Units in which clocks count, and one of each in seconds."""
+SLOWEST_STEP_S = 0.5
+"""Step of a clock from which on it counts in a finer unit [s]."""
 SPARSE = 0.1
 """Part of a column's cells that are empty from which on they are other topics' rows, not samples that are missing."""
 MOST_EMPTY = 0.1
@@ -88,13 +94,17 @@ def choose(table: Table, role: str, wanted: str | None, option: str | None = Non
             raise TraceError(f"{table.source}: no column {quoted(wanted)} ({option}){hint}")
         return _column(table, role, name, option, given)
     fitting = candidates(table, role)
+    if role == "time" and len(fitting) > 1 and _one_clock(table, fitting):
+        note = f"{table.source}: {listed(fitting, LONG)} are one clock; {brief(fitting[0], LONG)} is used"
+        one = _column(table, role, fitting[0], option)
+        return replace(one, notes=(*one.notes, note))
     if len(fitting) == 1:
         return _column(table, role, fitting[0], option)
     if fitting:
         raise TraceError(
             f"{table.source}: several columns could be the {role}: {listed(fitting, LONG)}; choose one with {option}"
         )
-    bare = _bare_force(table) if role == "force" else None
+    bare = _bare_force(table) if role == "force" else _clock_since_1970(table) if role == "time" else None
     if bare is not None:
         return bare
     raise TraceError(f"{table.source}: {table.hint}" if table.hint else _nothing_fits(table, role, option))
@@ -118,13 +128,54 @@ def _bare_force(table: Table) -> Column | None:
     return replace(_column(table, "force", measured[0], "--force-col"), notes=(note,))
 
 
+def _one_clock(table: Table, names: Sequence[str]) -> bool:
+    """Whether clocks go together, to half a step of the first."""
+    clocks = []
+    for name in names:
+        try:
+            clocks.append(numbers(table, _column(table, "time", name, "--time-col")))
+        except TraceError:
+            return False
+    first = clocks[0] - clocks[0][0]
+    step = float(np.median(np.abs(np.diff(first)))) if len(first) > 1 else 0.0
+    return step > 0.0 and all(np.max(np.abs(other - other[0] - first)) <= 0.5 * step for other in clocks[1:])
+
+
+def _plain_numbers(table: Table, name: str) -> np.ndarray | None:
+    """The numbers of a column as they stand, None where it holds anything else."""
+    values = [as_float(cell) for cell in table.columns[name]]
+    return None if not values or any(value is None for value in values) else np.array(values, dtype=float)
+
+
+def _clock_since_1970(table: Table) -> Column | None:
+    """The only column that is called a time, has no unit, and counts since 1970: its size tells in what it counts."""
+    asked = [name for name in table.columns if _would_fit(table, name, "time") and not not_measured(name)]
+    values = _plain_numbers(table, asked[0]) if len(asked) == 1 and not table.hint else None
+    if values is None:
+        return None
+    first, last = EPOCH_S
+    clocks = {unit: values * factor for unit, factor in _FINER.items()}
+    unit = next((unit for unit, clock in clocks.items() if np.all((clock > first) & (clock < last))), "")
+    if not unit:
+        return None
+    note = f"{table.source}: {brief(asked[0], LONG)} counts since 1970, so it is taken in {unit}"
+    return Column(asked[0], "time", _FINER[unit], notes=(note,))
+
+
+def _likely_unit(table: Table, name: str) -> str:
+    """The unit in which a clock without one would tick as those of sensors do; seconds where nothing tells."""
+    values = _plain_numbers(table, name)
+    step = float(np.median(np.abs(np.diff(values)))) if values is not None and len(values) > 1 else 0.0
+    return next((unit for unit, factor in _FINER.items() if step * factor < SLOWEST_STEP_S), "s")
+
+
 def _nothing_fits(table: Table, role: str, option: str) -> str:
     """Why no column could be chosen, and what can be named instead."""
     header = f"{table.source}: no {role} column with its unit in the name, such as {', '.join(_EXPECTED[role][:3])}"
     asked = [name for name in table.columns if _would_fit(table, name, role)]
     bare = [name for name in asked if not not_measured(name)]
     if bare:
-        units = SI_OF_ROLE[role]
+        units = _likely_unit(table, bare[0]) if role == "time" else SI_OF_ROLE[role]
         what = (
             f"; did you mean {quoted(bare[0])}, which has no unit? name it with its unit: {option} "
             f"{quoted(bare[0] + chr(61) + units)}"
@@ -132,10 +183,28 @@ def _nothing_fits(table: Table, role: str, option: str) -> str:
     else:
         near = _did_you_mean(_EXPECTED[role], table)
         what = f"{near}; name one with {option} and its unit, as in 'NAME={SI_OF_ROLE[role]}'"
+    others = [name for name in table.columns if (unit := meaning(table, name).measure) and unit.fits(role)]
+    others = [name for name in others if not not_measured(name)]
+    unfit = [name for name in table.columns if _unit_is_none_of_it(table, name, role)]
+    if not bare and len(others) == 1 and "did you mean" not in what:
+        what = f"; the only one in a unit of {role} is {quoted(others[0])}: name it with {option} if it is that"
+    elif not bare and unfit:
+        stated = quoted(meaning(table, unfit[0]).unit)
+        what = f"; {quoted(unfit[0])} has the unit {stated}, which is none of a {role} ({EXAMPLES[role]})"
+        what += f"; if that is wrong, say {option} {quoted(f'{unfit[0]}={SI_OF_ROLE[role]}')}"
+    if role == "time":
+        what += ", or give --rate where rows were written at a known rate"
     derived = [name for name in asked if not_measured(name)]
     more = f" ({listed(derived[:2], LONG)} was commanded or derived and is not chosen unasked)" if derived else ""
     left = "; ".join(f"{brief(name)} was left out, {why}" for name, why in list(table.left_out.items())[:3])
     return f"{header}{what}{more}{f' ({left})' if left else ''}"
+
+
+def _unit_is_none_of_it(table: Table, name: str, role: str) -> bool:
+    """Whether a column is called like one of a role but has a unit of something else, or one that nobody knows."""
+    said = meaning(table, name)
+    unfit = bool(said.unit) and (said.measure is None or not said.measure.fits(role))
+    return unfit and named_like(said.stem, role)
 
 
 def _would_fit(table: Table, name: str, role: str) -> bool:
@@ -258,7 +327,8 @@ def _number(table: Table, column: Column, i: int, cell: Any) -> float:
         return number
     if cell is None or (isinstance(cell, str) and not cell.strip()):
         raise TraceError(f"{_where(table, column, i)}: an empty cell is not a number; fill it or remove the row")
-    hint = "; write decimals with a point" if isinstance(cell, str) and as_plain(cell, ",") is not None else ""
+    comma = isinstance(cell, str) and as_plain(cell, ",") is not None
+    hint = "; write decimals with a point, or say --decimal , (or . where commas set off thousands)" if comma else ""
     hint = hint or "; remove or repair the row"
     raise TraceError(f"{_where(table, column, i)}: {_shown(cell)} is not a number{hint}")
 

@@ -16,6 +16,7 @@ from calib.trace.baselines import (
     LINEAR,
     ZERO,
     Drift,
+    behind_the_cut,
     check_approach,
     drift_of,
     level_behind,
@@ -28,6 +29,7 @@ from calib.trace.cuts import single_cut
 from calib.trace.filters import FILTER_SD_M, N_STROKE, leading_grid, parabola_peak, resample, smooth
 from calib.trace.mending import mended
 from calib.trace.missing import held_samples
+from calib.trace.recorded import rises_with_the_force
 from calib.trace.stroke import DWELL_M, board_warnings, clock_of, end_of_descent, stroke_axis, stroke_in_food
 from calib.trace.sudden import sudden_changes
 from calib.trace.trace import MIN_SAMPLES, Trace
@@ -168,9 +170,9 @@ def condition(
     noise = _filtered_noise(contact, samples, length)
     peak = parabola_peak(curve)
     _check_peak(trace, peak)
-    behind_sd, behind = level_behind(trace, tared, out, peak, level.noise_sd)
+    behind_sd, behind = level_behind(trace, tared, behind_the_cut(trace, tared, contact), peak, level.noise_sd)
     end_s = float(trace.time[int(np.argmax(axis.stroke >= length * (1 - 1e-9)))])
-    level_sd = _root_sum(level.level_sd, mend.level_sd, 0.0 if air_mend is None else air_mend.level_sd)
+    level_sd = math.hypot(level.level_sd, mend.level_sd, 0.0 if air_mend is None else air_mend.level_sd)
     level_sd, noise_sd = (sd if sd > ROUNDING * peak else 0.0 for sd in (level_sd, level.noise_sd))
     at_peak = contact.onset + (end_s - contact.onset) * float(grid[int(np.argmax(curve))]) / length
     drift_sd = 0.0 if drift is None else drift.sd(at_peak)
@@ -183,7 +185,7 @@ def condition(
         baseline_sd_N=level_sd,
         baseline_kind=baseline if air is None else "air",
         onset_s=contact.onset,
-        onset_sd_s=_root_sum(contact.onset_sd, trace.time_sd),
+        onset_sd_s=math.hypot(contact.onset_sd, trace.time_sd),
         end_s=end_s,
         time=trace.time,
         force=tared,
@@ -193,10 +195,10 @@ def condition(
         stroke_source=axis.source,
         stroke_length_m=length,
         noise_sd_N=noise_sd,
-        curve_noise_sd_N=_root_sum(noise, held.step_sd),
+        curve_noise_sd_N=math.hypot(noise, held.step_sd),
         filter_sd_m=FILTER_SD_M,
         peak_N=peak,
-        peak_sd_N=_root_sum(noise, level_sd, drift_sd, behind_sd, held.peak_sd, held.step_sd),
+        peak_sd_N=math.hypot(noise, level_sd, drift_sd, behind_sd, held.peak_sd, held.step_sd),
         drift_N_per_s=level.slope if drift is None else 0.0,
         drift_sd_N_per_s=level.slope_sd if drift is None else drift.slope_sd,
         at_board=axis.at_board,
@@ -209,11 +211,6 @@ def condition(
             *board_warnings(trace.source, grid, curve),
         ),
     )
-
-
-def _root_sum(*parts: float) -> float:
-    """Root of the sum of the squares."""
-    return math.hypot(*parts)
 
 
 def _contact(
@@ -251,11 +248,17 @@ def _check_options(trace: Trace, speed: float | None, height: float | None, base
 
 def _check_record(trace: Trace, force: np.ndarray, last: int) -> None:
     """Refuse a record that does not go down for long enough, or in whose force there is nothing."""
+    where = f"{trace.source}, column {trace.columns.get('position')}"
+    if rises_with_the_force(trace.force, trace.position):
+        raise TraceError(
+            f"{where}: the position does not descend after contact, it rises as the force grows; say --depth-col if it "
+            "is a way down, else name another with --position-col, or none and give --speed"
+        )
     if last + 1 < MIN_SAMPLES:
         raise TraceError(
-            f"{trace.source}, column {trace.columns.get('position')}: the position is at its lowest after {last + 1} "
-            f"samples, at least {MIN_SAMPLES} are needed on the way down; it must be a height, or a depth named like "
-            "stroke_m; name another with --position-col, or none and give --speed"
+            f"{where}: the position is at its lowest after {last + 1} samples, at least {MIN_SAMPLES} are needed on "
+            "the way down; it must be a height, or a depth named like stroke_m; name another with --position-col, or "
+            "none and give --speed"
         )
     if 0.0 < np.ptp(force[: last + 1]) < NOTHING_N:
         raise TraceError(
@@ -335,8 +338,7 @@ def _drift_warnings(trace: Trace, force: np.ndarray, contact: ContactOnset, end:
     whole = estimate_baseline(trace.time, force, 0, before)
     if whole.slope_sd < base.slope_sd:  # a drift is taken for contact early, which leaves a short window
         base = replace(base, slope=whole.slope, slope_sd=whole.slope_sd, start=0, stop=whole.stop)
-    found = []
-    drift = base.slope * (end - contact.onset)
+    found, drift = [], base.slope * (end - contact.onset)
     told = end - contact.onset < DRIFT_REACH * (trace.time[base.stop - 1] - trace.time[base.start])
     significant = abs(base.slope) > DRIFT_SIGNIFICANCE * base.slope_sd
     if told and significant and abs(drift) > DRIFT_FRACTION * contact.peak:

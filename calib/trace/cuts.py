@@ -23,6 +23,10 @@ RAISED = 0.5
 """Part of the position's range by which a knife goes up again between two cuts [-]."""
 CLEAR_SD = 10.0
 """Noise standard deviations that a load has."""
+SLIGHT = 0.04
+"""Part of the largest force above which a knife touches something, where the force is all there is [-]."""
+FEWEST_LOADED = 5
+"""Samples under load of a way down on which the knife cuts."""
 REST = 0.25
 """Part of a cut's time for which the force is released before another one begins [-]."""
 
@@ -37,15 +41,19 @@ def find_cuts(trace: Trace) -> list[tuple[int, int]]:
         trace: The record.
 
     Returns:
-        The cuts, in order; the whole record for one.
+        The cuts, in order; the whole record for one. A way down without a load, such as one in the air, is none of
+        them.
     """
     ends = [0, *trace.breaks, len(trace.time)]
     found: list[tuple[int, int]] = []
     for start, stop in zip(ends[:-1], ends[1:], strict=True):
         force = trace.force[start:stop]
-        marks = _released(force) if trace.position is None else _raised(force, trace.position[start:stop])
-        edges = [start, *(start + mark for mark in marks), stop]
-        found += list(zip(edges[:-1], edges[1:], strict=True))
+        if trace.position is None:
+            edges = [0, *_released(force), stop - start]
+            spans = list(zip(edges[:-1], edges[1:], strict=True))
+        else:
+            spans = _loaded(force, trace.position[start:stop])
+        found += [(start + a, start + b) for a, b in spans]
     return found
 
 
@@ -70,7 +78,7 @@ def single_cut(trace: Trace, cut: int | str | None) -> Trace:
     cuts = find_cuts(trace)
     if cut is None:
         if len(cuts) == 1:
-            return trace
+            return _without_others(trace, _main_load(trace.force) if trace.position is None else cuts[0])
         places = ", ".join(trace.where(_first_load(trace, *span)) for span in cuts[:4])
         more = f" and {len(cuts) - 4} more" if len(cuts) > 4 else ""
         raise TraceError(
@@ -106,9 +114,7 @@ def _smooth(force: np.ndarray) -> np.ndarray:
 
 def _released(force: np.ndarray) -> list[int]:
     """Where the force is released between two loads, by the force alone."""
-    away = _smooth(force) - _level(force)
-    low, top = np.percentile(away, (0.5, 99.5))
-    loads, top = (away, float(top)) if top >= -low else (-away, -float(low))
+    loads, top = _loads(force)
     if top < CLEAR_SD * noise_of(force):
         return []
     stretches = _stretches(loads, TOUCHED * top, RELEASED * top)
@@ -120,6 +126,38 @@ def _released(force: np.ndarray) -> list[int]:
         if len(free) >= max(REST * min(end - start, stop - begin), 5):
             marks.append(int(free[0] + free[-1]) // 2)
     return marks
+
+
+def _loads(force: np.ndarray) -> tuple[np.ndarray, float]:
+    """The force without its level, in the direction in which it goes further [N], and how far it goes [N]."""
+    away = _smooth(force) - _level(force)
+    low, top = np.percentile(away, (0.5, 99.5))
+    return (away, float(top)) if top >= -low else (-away, -float(low))
+
+
+def _main_load(force: np.ndarray) -> tuple[int, int]:
+    """First sample and the one after the last of the part of a force with its largest load.
+
+    Another load that is less than half of it, and lies apart by a quarter of its time, is none of the cut: a knife that
+    touched before, or was wiped behind it.
+    """
+    loads, top = _loads(force)
+    least = max(SLIGHT * top, CLEAR_SD * noise_of(force))
+    stretches = _stretches(loads, least, 0.5 * least) if top > least else []
+    if len(stretches) < 2:
+        return 0, len(force)
+    largest = [float(loads[a : b + 1].max()) for a, b in stretches]
+    main = int(np.argmax(largest))
+    begin, end = stretches[main]
+    rest = max(REST * (end - begin), 5)
+    start, stop = 0, len(force)
+    for (a, b), load in zip(stretches, largest, strict=True):
+        if load < PRESSED * top and b - a >= FEWEST_LOADED:
+            if begin - b >= rest:
+                start = max(start, (b + begin) // 2)
+            elif a - end >= rest:
+                stop = min(stop, (end + a) // 2)
+    return start, stop
 
 
 def _stretches(loads: np.ndarray, high: float, low: float) -> list[tuple[int, int]]:
@@ -135,26 +173,42 @@ def _stretches(loads: np.ndarray, high: float, low: float) -> list[tuple[int, in
     return found
 
 
-def _raised(force: np.ndarray, position: np.ndarray) -> list[int]:
-    """Where the knife is highest between two ways down to a load."""
-    span = float(np.ptp(position))
+def _loaded(force: np.ndarray, position: np.ndarray) -> list[tuple[int, int]]:
+    """First sample and the one after the last of each way down and up again on which the knife is under load."""
+    edges = [0, *_tops(position), len(position)]
     load = np.abs(_smooth(force) - _level(force))
-    top = float(np.percentile(load, 99.5))
+    least = max(TOUCHED * float(np.percentile(load, 99.5)), CLEAR_SD * noise_of(force))
+    ways = list(zip(edges[:-1], edges[1:], strict=True))
+    found = [(a, b) for a, b in ways if np.count_nonzero(load[a:b] > least) >= FEWEST_LOADED]
+    return found if found and len(ways) > 1 else [(0, len(position))]
+
+
+def _tops(position: np.ndarray) -> list[int]:
+    """Where the knife is highest between two ways down, each of half its range."""
+    span = float(np.ptp(position))
     marks: list[int] = []
-    low, high, at, seen, seen_before = float(position[0]), float(position[0]), 0, False, False
-    falling = False
-    for i, (z, x) in enumerate(zip(position, load, strict=True)):
-        seen = seen or bool(x > PRESSED * top)
+    low, high, at, falling = float(position[0]), float(position[0]), 0, False
+    fallen = False
+    for i, z in enumerate(map(float, position)):
         if falling:
-            low = min(low, float(z))
+            low = min(low, z)
             if z > low + RAISED * span:
-                falling, high, at = False, float(z), i
-                seen_before, seen = seen_before or seen, False
-        else:
-            if z >= high:
-                high, at = float(z), i
-            if z < high - RAISED * span:
-                falling, low = True, float(z)
-                if seen_before:
-                    marks.append(at)
-    return [mark for mark in marks if np.any(load[mark:] > PRESSED * top)]
+                falling, high, at = False, z, i
+        elif z >= high:
+            high, at = z, i
+        elif z < high - RAISED * span:
+            if fallen:
+                marks.append(at)
+            falling, fallen, low = True, True, z
+    return marks
+
+
+def _without_others(trace: Trace, span: tuple[int, int]) -> Trace:
+    """The part of a record with its only cut, without the touches that are none; with a note where there are such."""
+    start, stop = span
+    if (start, stop) == (0, len(trace.time)) or stop - start < MIN_SAMPLES:
+        return trace
+    where = f"from {trace.where(start)} to {trace.where(stop - 1)}"
+    what = "is under little load" if trace.position is None else "comes down under no load"
+    note = f"{trace.source}: only {where} is taken for the cut; the knife {what} elsewhere (--cut {WHOLE} if not)"
+    return replace(trace.part(np.arange(start, stop)), breaks=(), notes=(*trace.notes, note))

@@ -26,6 +26,8 @@ STEP_SIDE = 12
 """Samples on each side of a step of the level, which are level themselves."""
 SUDDEN_PART = 0.7
 """Part of a step of the level that one sample makes, at least."""
+SLOW_STEP_S = 0.15
+"""Time within which a step of the level is over that a filter has spread [s]: low-passes of 5 Hz and more."""
 STEP_SD = 8.0
 """Noise standard deviations by which the level steps."""
 STEP_PART = 0.02
@@ -114,8 +116,13 @@ def without_spikes(trace: Trace, force: np.ndarray, role: str) -> tuple[np.ndarr
     """
     n, unit = len(force), {"force": "N", "position": "m"}[role]
     limit = max(SPIKE_SD * noise_of(force), SPIKE_PART * usual_range(force), 1e-9)
-    out, count = force.copy(), 0
-    notes: list[str] = []
+    out, at_ends = _with_sound_ends(force, limit)
+    count = int(np.count_nonzero(out != force))
+    notes = [
+        f"{_place(trace, i, role)}: {force[i]:.4g} {unit} stands out alone from what is beside it; it was replaced by "
+        "the value there"
+        for i in at_ends
+    ]
     i = 1
     while i < n - 1:
         length = next((k for k in range(1, SPIKE_SAMPLES + 1) if _stands_out(out, i, k, limit)), 0)
@@ -143,6 +150,25 @@ def without_spikes(trace: Trace, force: np.ndarray, role: str) -> tuple[np.ndarr
     if count > len(notes) > 2:
         notes[-1] += f" ({count} samples in all)"
     return out, notes
+
+
+def _with_sound_ends(force: np.ndarray, limit: float) -> tuple[np.ndarray, list[int]]:
+    """The values with those at the first and the last samples replaced that stand out from the next, and which.
+
+    A sensor that starts, or a last row that is not whole, writes such values.
+    """
+    out, found = force.copy(), []
+    for values, outer in ((out, 0), (out[::-1], len(out) - 1)):  # the second is the record from its end
+        for length in range(1, SPIKE_SAMPLES + 1):
+            beside = values[length : length + 2 * SIDE]
+            if len(beside) < 2 * SIDE or abs(values[length - 1] - values[length]) <= limit:
+                continue
+            off = np.abs(values[:length] - float(np.median(beside)))
+            if np.all(off > max(limit, 3.0 * float(np.ptp(beside)))):
+                values[:length] = values[length]
+                found.append(outer)
+                break
+    return out, found
 
 
 def _without_stops(trace: Trace, position: np.ndarray) -> tuple[np.ndarray, list[str]]:
@@ -192,26 +218,52 @@ def _without_steps(trace: Trace) -> tuple[np.ndarray, float, list[str]]:
     limit = max(STEP_SD * noise, STEP_PART * usual_range(force), 1e-9)
     out, variance = force.copy(), 0.0
     notes: list[str] = []
-    last = 0  # before which all is done; a step is a change of most of its size from one sample to the next
-    for i in (np.flatnonzero(np.abs(np.diff(force)) >= SUDDEN_PART * limit) + 1).tolist():
-        if not max(side, last) <= i <= len(force) - side:
+    done: list[tuple[int, int]] = []
+    for i, width in _changes(force, limit, int(min(SLOW_STEP_S / trace.dt, len(force) / 8))):
+        j = i + width  # the new level begins
+        if not side <= i <= j <= len(force) - side or any(i < b + side and j > a - side for a, b in done):
             continue
-        left, right = force[i - side : i], force[i : i + side]
+        left, right = force[i - side : i], force[j : j + side]
         step = float(np.median(right) - np.median(left))
-        behind = _level_behind(trace, i)
+        behind = _level_behind(trace, j)
         same = behind is not None and abs(behind - float(np.median(right))) <= 0.2 * abs(step)
-        if not _is_step(out, i, (step, same), limit, noise):
+        if not _is_step(out, (i, j), (step, same), limit, noise):
             continue
         out[:i] += step
+        out[i:j] = np.median(right)
         variance += np.pi / side * max(noise, 1e-12) ** 2
+        within = "one sample" if not width else f"{width + 1} samples"
         notes.append(
-            f"{_place(trace, i)}: the level goes from {np.median(left):.4g} to {np.median(right):.4g} N in one "
-            "sample, as where a sensor is zeroed; what is before was moved to the level after it"
+            f"{_place(trace, i)}: the level goes from {np.median(left):.4g} to {np.median(right):.4g} N in {within}, "
+            "as where a sensor is zeroed; what is before was moved to the level after it"
         )
-        last = i + side
+        done.append((i, j))
     if len(notes) > 3:
         return force, 0.0, []
     return out, float(np.sqrt(variance)), notes
+
+
+def _changes(force: np.ndarray, limit: float, widest: int) -> list[tuple[int, int]]:
+    """Where the level may step: the first sample of a change, and how many samples it takes beyond one, fewest first.
+
+    A change within one sample is most of the step. One that a filter has spread is between two levels: the force
+    hardly varies on either side of it.
+    """
+    sharp = [(int(i) + 1, 0) for i in np.flatnonzero(np.abs(np.diff(force)) >= SUDDEN_PART * limit)]
+    side, n = STEP_SIDE, len(force)
+    if n < 3 * side:
+        return sharp
+    windows = np.lib.stride_tricks.sliding_window_view(force, side)
+    level, spread = windows.mean(axis=1), windows.std(axis=1)
+    slow: list[tuple[int, int]] = []
+    width = 2
+    while width <= widest:
+        i = np.arange(side, n - side - width)
+        change = np.abs(level[i + width] - level[i - side])
+        calm = np.maximum(spread[i + width], spread[i - side]) <= 0.02 * change
+        slow += [(int(k), width) for k in i[calm & (change > limit)]]
+        width += max(1, width // 4)
+    return [*sharp, *slow]
 
 
 def _level_behind(trace: Trace, i: int) -> float | None:
@@ -223,17 +275,19 @@ def _level_behind(trace: Trace, i: int) -> float | None:
     return float(np.median(out)) if FEWEST_BEHIND <= len(out) < len(trace.force) - i else None
 
 
-def _is_step(force: np.ndarray, i: int, change: tuple[float, bool], limit: float, noise: float) -> bool:
-    """Whether the sensor was zeroed before sample ``i``, and not the food touched.
+def _is_step(force: np.ndarray, ends: tuple[int, int], change: tuple[float, bool], limit: float, noise: float) -> bool:
+    """Whether the sensor was zeroed from one sample to another, and not the food touched.
 
     The force is level before, from the record's start or the step before, and after. Then it is at zero, or it has
-    fallen, or its new level is that behind the cut; and it leaves its new level by more than the step later on.
+    fallen, or, in one sample, its new level is that behind the cut; and it leaves its new level by more than the step
+    later on.
     """
-    side = STEP_SIDE
+    side, (i, j) = STEP_SIDE, ends
     step, same = change
-    if abs(step) <= limit or abs(force[i] - force[i - 1]) < SUDDEN_PART * abs(step):
+    sharp = float(np.abs(np.diff(force[i - 1 : j + 1])).max()) >= SUDDEN_PART * abs(step)
+    if abs(step) <= limit or sharp != (i == j):
         return False
-    left, right = force[i - side : i], force[i : i + side]
+    left, right = force[i - side : i], force[j : j + side]
     flat = max(3.0 * noise, 0.003 * abs(step))
     if np.std(left) > flat or np.std(right) > flat or abs(np.median(right[:4]) - np.median(right[-4:])) > 2.0 * flat:
         return False
@@ -243,5 +297,5 @@ def _is_step(force: np.ndarray, i: int, change: tuple[float, bool], limit: float
     zeroed = abs(level) <= max(4.0 * noise, NEAR_ZERO * abs(step)) and abs(np.median(left)) > 2.0 * abs(level)
     before = force[:i]
     loaded = np.percentile(before, 98) - np.percentile(before, 2) > 0.5 * abs(step) + 8.0 * noise
-    rises = float(np.percentile(force[i:], 98)) - level
-    return bool((zeroed or step < 0.0 or same) and not loaded and rises > max(limit, 10.0 * noise))
+    rises = float(np.percentile(force[j:], 98)) - level
+    return bool((zeroed or step < 0.0 or (same and sharp)) and not loaded and rises > max(limit, 10.0 * noise))

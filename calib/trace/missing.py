@@ -16,6 +16,8 @@ HIDDEN_PEAK = 0.03
 """Part of the peak by which the force may exceed it where samples are missing; beyond it the record is refused."""
 SIDE = 8
 """Samples on each side of a gap from which the force is carried on into it."""
+SHORTEST_JUMP_M = 1e-3
+"""Jump of a position from one sample to the next from which on samples are missing there [m]."""
 LARGEST_GAP = 0.25
 """Part of the stroke from which on samples that are missing are too many."""
 LOST_SD = 8.0
@@ -113,10 +115,17 @@ def _few(notes: Sequence[str]) -> list[str]:
 
 
 def _gaps(trace: Trace) -> list[_Gap]:
-    """Where the clock goes on by many samples."""
+    """Where the clock goes on by many samples, or the knife without it, as where times were counted from the rows."""
     steps = np.diff(trace.time)
-    places = np.flatnonzero(steps > JUMP * float(np.median(steps)))
-    return [_Gap(int(i), int(i) + 1, "no samples were written") for i in places if int(i) + 1 not in trace.breaks]
+    late = steps > JUMP * float(np.median(steps))
+    found = {int(i): "no samples were written" for i in np.flatnonzero(late)}
+    if trace.position is not None:
+        moves = np.abs(np.diff(trace.position))
+        usual = float(np.median(moves[moves > 0.0])) if np.any(moves > 0.0) else 0.0
+        usual = max(usual, float(np.percentile(moves, 95)))
+        jumps = np.flatnonzero((moves > max(JUMP * usual, SHORTEST_JUMP_M)) & ~late)
+        found |= {int(i): "the position jumps from one sample to the next, others are missing" for i in jumps}
+    return [_Gap(i, i + 1, why) for i, why in sorted(found.items()) if i + 1 not in trace.breaks]
 
 
 def _stands(trace: Trace, place: Standing, what: str) -> str:

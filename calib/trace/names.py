@@ -3,21 +3,36 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from dataclasses import dataclass
 
 from calib.table.table import Table
 from calib.table.units import Unit, is_unit, split_unit, unit_of
 
+_OF_THE_TEST = r"(_(test|d_essai|de_ensayo|di_prova|do_ensaio|measurement|standard|estandar|traverse|traversa))?"
+"""What machines write behind the name of a quantity."""
 _STEMS = {
-    "time": (re.compile(r"(test_|run_|relative_)?time|t|timestamp|elapsed(_time)?|date_?time|stamp"),),
-    "force": (re.compile(r"(.*_)?(force|load|resistance|f|fz)(_z)?|(.*_)?wrench_z"),),
+    "time": (
+        re.compile(
+            rf"((test|run|relative|elapsed|total|measurement|sample|log|publish|record(ed)?|receive|system|sensor)_)?time"
+            rf"{_OF_THE_TEST}|t|(time|elapsed)_?stamp|elapsed(_time)?|date_?time|stamp|(column|unnamed)_\d+"
+        ),
+    ),
+    "force": (
+        re.compile(rf"(.*_)?(force|load|load_?cell|resistance|f|fz)(_z)?(_?\d)?{_OF_THE_TEST}|(.*_)?wrench_z|last"),
+    ),
     "position": (
         re.compile(r"((ee|knife|tool|tcp|blade)_)?(z|height|position|pos)(_z)?"),
-        re.compile(r"(.*_)?(stroke|displacement|travel|depth|extension|penetration|distance|crosshead)"),
+        re.compile(
+            rf"(.*_)?(stroke|displacement|disp|displ|travel|depth|extension|penetration|distance|crosshead){_OF_THE_TEST}"
+        ),
     ),
     "compression": (
         re.compile(r"gap"),
-        re.compile(r"(.*_)?(compression|stroke|displacement|travel|extension|distance|depth|crosshead)"),
+        re.compile(
+            r"(.*_)?(compression|stroke|displacement|disp|displ|travel|extension|distance|depth|crosshead)"
+            rf"{_OF_THE_TEST}"
+        ),
     ),
 }
 _DEPTH = _STEMS["position"][1]
@@ -31,13 +46,13 @@ _ROS = (
     (re.compile(r"field\.(.*\.)?stamp"), "stamp", "ns"),
     (re.compile(r"%time"), "time", "ns"),
     (re.compile(r"/(.*/)?stamp"), "stamp", "s"),
-    (re.compile(r"(.*[./])?header[./]stamp"), "stamp", "s"),
+    (re.compile(r"(.*[./_])?header[./_]stamp"), "stamp", "s"),
     (re.compile(r"__time"), "time", "s"),
     (re.compile(r"X_Value"), "time", "s"),
     (re.compile(r"(.*[./])?O_F_ext_hat_K([./].*force[./]z|[.\[_]?2\]?)", re.IGNORECASE), "base_fz", "N"),
     (re.compile(r"(.*[./])?K_F_ext_hat_K([./].*force[./]z|[.\[_]?2\]?)", re.IGNORECASE), "knife_fz", "N"),
     (re.compile(r"(.*[./])?O_T_EE([./].*position[./]z|[.\[_]?14\]?)", re.IGNORECASE), "ee_z", "m"),
-    (re.compile(r"(.*[./])?actual_TCP_force[.\[_]?2\]?"), "force_z", "N"),
+    (re.compile(r"(.*[./])?(actual_TCP_force|ft_raw_wrench)[.\[_]?2\]?"), "force_z", "N"),
     (re.compile(r"(.*[./])?actual_TCP_pose[.\[_]?2\]?"), "position_z", "m"),
     (re.compile(r"(.*[./])?force[./]z"), "force_z", "N"),
     (re.compile(r"(.*[./])?position[./]z"), "position_z", "m"),
@@ -68,11 +83,18 @@ COUNTERS = frozenset(
 _WORDS = {
     word: english
     for english, words in {
-        "time": "prüfzeit zeit temps tiempo tempo tijd 試験時間 時間 时间 時刻",
-        "force": "standardkraft prüfkraft kraft fuerza forza força kracht 試験力 荷重 载荷 力",
+        "time": (
+            "prüfzeit messzeit versuchszeit zeit temps tiempo tempo tijd czas время 試験時間 试验时间 時間 时间 時刻 "
+            "시간"
+        ),
+        "force": (
+            "standardkraft prüfkraft kraft belastung fuerza carga forza carico força kracht siła "
+            "нагрузка усилие сила 試験力 试验力 荷重 载荷 負荷 负荷 力 하중"
+        ),
         "displacement": (
-            "standardweg traversenweg weg déplacement deplacement desplazamiento spostamento deslocamento verplaatsing "
-            "変位 位移 ストローク"
+            "standardweg traversenweg weg distanz stauchung zusammendrückung déplacement deplacement course "
+            "enfoncement desplazamiento recorrido spostamento corsa deslocamento verplaatsing droga przemieszczenie "
+            "перемещение 変位 位移 行程 ストローク 변위"
         ),
         "height": "höhe hauteur altura altezza hoogte 高さ 高度",
     }.items()
@@ -116,7 +138,8 @@ def stem_of(name: str) -> str:
     apart = re.sub(r"(?<=[a-z])(?=[A-Z][a-z])", "_", name).lower()
     if not apart.isascii() or _FOREIGN.search(apart):
         apart = _FOREIGN.sub(lambda found: _WORDS[found.group()], apart)
-    stem = re.sub(r"[^a-z0-9]+", "_", apart).strip("_")
+    plain = "".join(c for c in unicodedata.normalize("NFKD", apart) if not unicodedata.combining(c))
+    stem = re.sub(r"[^a-z0-9]+", "_", plain).strip("_")
     return re.sub(r"^(latest|(run|data_set|dataset|test|specimen|probe)_\d+)_(?=[a-z])", "", stem)
 
 

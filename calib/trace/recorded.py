@@ -21,8 +21,12 @@ CLOCK_START_S = 1000.0
 then counts from its first sample."""
 DISABLED = "none"
 """Value of ``position_col`` that leaves a position column unused."""
+MOST_LETTERS = 450
+"""Of an error that says two things at once; a longer one says the first alone."""
 ROWS = "the rows"
 """What the time is called where rows are counted."""
+RISING = 0.1
+"""Part of a position's range by which it rises with the force if it is no height."""
 TURNED = 0.2
 """Part of a depth's range by which it must fall up to the load for it to be counted negative downwards."""
 
@@ -157,9 +161,11 @@ def _time_and_force(table: Table, how: Reading) -> tuple[Column, list[str], Colu
             choose(table, "force", how.force_col)
         except TraceError as also:
             first = str(missing).split("; ")
-            more = [text for text in str(also).removeprefix(f"{table.source}: ").split("; ") if text not in first]
-            if more and str(also) != str(missing):
-                raise TraceError(f"{missing}; and {'; '.join(more)}") from None
+            other = str(also).removeprefix(f"{table.source}: ")
+            more = [text for text in other.split("; ") if text not in first]
+            both = f"{missing}; and {'; '.join(more)}"
+            if more and str(also) != str(missing) and len(both) <= MOST_LETTERS:
+                raise TraceError(both) from None
         raise
     return time, said, choose(table, "force", how.force_col)
 
@@ -262,6 +268,16 @@ def _on_the_forces_rows(
 def _parts_of(table: Table, on: np.ndarray) -> tuple[int, ...]:
     """Where the parts of a table begin among some of its rows."""
     return tuple(int(np.searchsorted(on, start)) for start in table.parts)
+
+
+def rises_with_the_force(f: np.ndarray, p: np.ndarray | None) -> bool:
+    """Whether a height [m], shape (n,), rises while the force [N], shape (n,), comes from a tenth to nine tenths of its
+    largest, so that it is none."""
+    loaded = np.abs(f - np.median(f[: max(5, len(f) // 20)]))
+    top = float(np.percentile(loaded, 98))
+    late = int(np.argmax(loaded >= 0.9 * top))
+    low = np.flatnonzero(loaded[:late] < 0.1 * top)
+    return p is not None and len(low) > 0 and float(p[late] - p[low[-1]]) > RISING * float(np.ptp(p))
 
 
 def _downwards(table: Table, column: Column, f: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:

@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 
 MEASUREMENT = "measurement"  # title of the group of options that say what was measured
 HEIGHT_HELP = "column of the knife's height ('none'), or --depth-col"
+RATE_HELP = "rows a second without a clock; --decimal is , or ."
 CHECK_HELP = "say how the trace is read (and draw it), then end"
 BASELINE_HELP = f"of a force without --air: {', '.join(BASELINES)}"
 HELP = "fit a food to a measured knife-force trace, and report"
@@ -91,7 +92,8 @@ def add_trace(p: argparse.ArgumentParser, *, required: bool = True) -> None:
     g.add_argument("--position-col", metavar="NAME", help=HEIGHT_HELP)
     g.add_argument("--depth-col", metavar="NAME", help=argparse.SUPPRESS)
     g.add_argument("--sign", choices=("+", "-"), metavar="+|-", help="sign that makes resistance positive")
-    g.add_argument("--rate", type=number(0, 1e6, "/s"), metavar="HZ", help="rows a second, where there is no clock")
+    g.add_argument("--rate", type=number(0, 1e6, "/s"), metavar="HZ", help=RATE_HELP)
+    g.add_argument("--decimal", choices=(".", ","), help=argparse.SUPPRESS)
     g.add_argument("--speed", type=number(0, 10, "m/s"), metavar="M/S", help="of the knife, where there is no position")
     height = number(-100, 100, "m")
     g.add_argument("--board-z", type=height, metavar="M", help="what its height reads with the edge on the board [m]")
@@ -163,7 +165,7 @@ def measured(args: argparse.Namespace, command: Sequence[str]) -> Request:
     Raises:
         CutcalError: An impossible value, an unknown name, a missing file.
     """
-    how = ("time_col", "force_col", "position_col", "depth_col", "sign", "rate")
+    how = ("time_col", "force_col", "position_col", "depth_col", "sign", "rate", "decimal")
     columns: dict[str, Any] = {name: getattr(args, name) for name in how}
     return Request(
         food=food_of(args),

@@ -228,7 +228,11 @@ def test_a_package_that_is_missing_is_named(tmp_path: Path, monkeypatch: pytest.
         TraceError, match=r"a.tdms: a TDMS file needs nptdms; install it with pip install 'cutcal\[formats\]'"
     ):
         read_trace(tmp_path / "a.tdms")
-    for raw, words in ((b"\xd0\xcf\x11\xe0" + b"0" * 600, "Office before 2007"), (b"\x1f\x8b\x08" + b"0" * 30, "gzip")):
+    for raw, words in (
+        (b"\xd0\xcf\x11\xe0" + b"0" * 600, "Office before 2007; export the record as CSV"),
+        (b"\x93NUMPY" + b"0" * 600, "numpy without names of columns; export the record as CSV"),
+        (b"\x1f\x8b\x08" + b"0" * 30, "damaged, or not compressed as its name says"),
+    ):
         (tmp_path / "a.xls").write_bytes(raw)
-        with pytest.raises(TraceError, match=f"a.xls: .*{words}; export the record as CSV"):
+        with pytest.raises(TraceError, match=f"a.xls: .*{words}"):
             read_trace(tmp_path / "a.xls")

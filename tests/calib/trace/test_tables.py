@@ -143,7 +143,7 @@ def spoilt(**change: Any) -> list[dict[str, Any]]:
         (spoilt(force_N=True), "index 17, column force_N: True is not a number"),
         (spoilt(force_N=10**400), "index 17, column force_N: 1000.* is not finite"),
         (spoilt(force_N=1e9), r"index 17, column force_N: 1000000000.0 is beyond 1e\+06 N, too much for a force"),
-        (spoilt(time_s=0.0), "index 17, column time_s: time does not increase"),
+        (spoilt(time_s=float(TIME[16])), "index 17, column time_s: time does not increase"),
         (
             {"time_s": TIME.tolist(), "z_m": HEIGHT.tolist(), "force_N": LOAD[:-1].tolist()},
             "no force column.*force_N was left out, it has 39 values where others have 40",

@@ -1,0 +1,115 @@
+"""Touches and ways in the air beside a cut, a level that is reached slowly, and ends of a record that stand out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from calib.errors import TraceError
+from calib.trace.conditioning import Conditioned, condition
+from calib.trace.trace import Trace
+from tests.calib.made_cuts import LEVEL, RATE, made_cut
+
+CUT = made_cut()
+TRUE = condition(CUT.trace())
+COLUMNS = {"time": "time_s", "force": "force_N", "position": "position_m"}
+SPEED = 0.02
+
+
+def way(scale: float, depth: float = 0.032) -> tuple[np.ndarray, np.ndarray]:
+    """Force above its level [N] and height [m] of a way down to a depth in the food and up again."""
+    end = (0.02 + depth) / SPEED
+    time = np.arange(int((end + 0.6) * RATE)) / RATE
+    height = 0.06 - SPEED * np.minimum(time, end) + 0.1 * np.maximum(time - end, 0.0)
+    inside = np.where(time <= end, 0.04 - height, 0.0)
+    return scale * np.interp(inside, [0.0, 0.022, 0.032], [0.0, 12.0, 9.6]), height
+
+
+def joined(*ways: tuple[np.ndarray, np.ndarray], position: bool = True) -> Trace:
+    """One record of several ways."""
+    load, height = (np.concatenate(parts) for parts in zip(*ways, strict=True))
+    force = LEVEL + load + 0.03 * np.random.default_rng(5).normal(size=len(load))
+    return Trace(np.arange(len(load)) / RATE, force, height if position else None, "made.csv", columns=COLUMNS)
+
+
+def is_the_cut(done: Conditioned) -> None:
+    """Peak and stroke are those of the made-up cut."""
+    assert done.peak_N == pytest.approx(TRUE.peak_N, rel=0.01)
+    assert done.stroke_length_m == pytest.approx(TRUE.stroke_length_m, rel=0.01)
+
+
+@pytest.mark.parametrize("other", [(0.0, 0.032), (0.1, 0.032), (0.02, 0.034)])
+@pytest.mark.parametrize("first", [True, False])
+def test_a_way_without_load_is_no_cut(other: tuple[float, float], first: bool) -> None:
+    """A way in the air, or one that only touches, before the cut or behind it, also a deeper one; it is said."""
+    ways = (way(*other), way(1.0)) if first else (way(1.0), way(*other))
+    done = condition(joined(*ways))
+    is_the_cut(done)
+    assert any("the knife comes down under no load elsewhere" in note for note in done.warnings), done.warnings
+
+
+def test_a_way_under_a_third_of_the_load_is_a_cut() -> None:
+    """It is not dropped: the number of cuts is said."""
+    with pytest.raises(TraceError, match="the record holds 2 cuts.*--cut 1"):
+        condition(joined(way(0.3), way(1.0)))
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_a_slight_touch_without_a_position(first: bool) -> None:
+    """The stroke is not counted from the touch, or to it."""
+    ways = (way(1.0, 0.003), way(1.0)) if first else (way(1.0), way(0.05))
+    done = condition(joined(*ways, position=False), speed=SPEED)
+    is_the_cut(done)
+    assert any("the knife is under little load elsewhere" in note for note in done.warnings), done.warnings
+
+
+@pytest.mark.parametrize("samples", [3, 5, 20])
+@pytest.mark.parametrize("level", [-3.0, 3.0])
+def test_a_zeroing_that_a_filter_has_spread(samples: int, level: float) -> None:
+    """What is before is moved to the level after it, with a position and without."""
+    before = level * np.clip((0.7 * RATE - np.arange(640)) / samples, 0.0, 1.0)
+    for position in (CUT.height, None):
+        done = condition(
+            Trace(CUT.time, CUT.force - LEVEL + before, position, "made.csv", columns=COLUMNS), speed=SPEED
+        )
+        assert done.peak_N == pytest.approx(TRUE.peak_N, rel=0.01)
+        assert done.onset_s == pytest.approx(TRUE.onset_s, abs=0.01)
+        assert any("samples, as where a sensor is zeroed" in note for note in done.warnings), done.warnings
+
+
+def test_a_level_that_has_fallen_is_said_without_a_position() -> None:
+    """The sensor was zeroed too near to contact to be told there; the end of the record shows it."""
+    force = np.where(CUT.time < 0.98, CUT.force, CUT.force - LEVEL)
+    done = condition(Trace(CUT.time, force, None, "made.csv", columns=COLUMNS), speed=SPEED)
+    assert any("the force is 3 N below its level before it" in note for note in done.warnings), done.warnings
+    assert done.peak_sd_N > 0.5
+
+
+@pytest.mark.parametrize(("at", "value"), [(0, 500.0), (slice(0, 3), 77.0), (639, -500.0), (slice(638, 640), 77.0)])
+def test_the_ends_of_a_record_may_stand_out(at: int | slice, value: float) -> None:
+    """The first or last samples are replaced by the value beside them, and said."""
+    force = CUT.force.copy()
+    force[at] = value
+    for position in (CUT.height, None):
+        done = condition(Trace(CUT.time, force, position, "made.csv", columns=COLUMNS), speed=SPEED)
+        assert done.peak_N == pytest.approx(TRUE.peak_N, rel=0.01)
+        assert any("stands out alone from what is beside it" in note for note in done.warnings), done.warnings
+
+
+def test_a_position_that_jumps_shows_missing_samples() -> None:
+    """Times that were counted from the rows do not show them; a larger gap at the peak is refused."""
+    for lost, refused in ((np.r_[200:262], False), (np.r_[360:470], True)):
+        keep = np.setdiff1d(np.arange(640), lost)
+        trace = Trace(CUT.time[: len(keep)], CUT.force[keep], CUT.height[keep], "made.csv", columns=COLUMNS)
+        if refused:
+            with pytest.raises(TraceError, match="the position jumps from one sample to the next, others are missing"):
+                condition(trace)
+        else:
+            is_the_cut(done := condition(trace))
+            assert any("the position jumps from one sample to the next" in note for note in done.warnings)
+
+
+def test_a_depth_that_is_called_a_position_is_refused_with_the_option() -> None:
+    """It rises as the force grows."""
+    with pytest.raises(TraceError, match="column position_m: the position does not descend .*it rises.*--depth-col"):
+        condition(Trace(CUT.time, CUT.force, 0.06 - CUT.height, "made.csv", columns=COLUMNS))
