@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calib.material.food import load_food
+from calib.material.food import load_food, load_foods
 from cutcal.main import main
 from tests.data_dir import ROOT
 
@@ -129,7 +129,12 @@ def test_numbers_are_checked_by_the_parser(value, capsys):
 def test_foods_lists_and_shows(capsys):
     """``foods`` lists every food; one food comes with ranges, sources and its flags; JSON is one document."""
     assert main(["foods"]) == 0
-    assert "potato" in capsys.readouterr().out.split()
+    head, *lines, foot = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(load_foods())
+    assert max(map(len, [head, *lines, foot])) <= 80
+    (potato,) = (line for line in lines if line.startswith("potato "))
+    assert head.split() == ["shape", "length", "width", "height", "E", "R"]
+    assert potato.split() == "potato half_cylinder 80 mm 65 mm 50 mm 2 MPa 75 J/m^2".split()
     assert main(["foods", "banana"]) == 0
     assert "Table 2" in capsys.readouterr().out
     assert main(["foods", "cherry"]) == 0

@@ -230,11 +230,28 @@ def run_study(args: argparse.Namespace, command: Sequence[str]) -> int:
 
     if args.check is not None:
         raise CutcalError("--check is for one trace: give --food and --trace, and leave --config out")
-    taken = [n for n in ("food", "trace", "air", "material", "fit") if getattr(args, n) is not None]
+    taken = beside_study(args)
+    if taken in NOT_IN_A_FILE:
+        raise CutcalError(f"--{taken} beside --config, which does not take it; leave it out")
     if taken:
-        raise CutcalError(f"--{taken[0]} beside --config: write it into {args.config}, where it belongs to a trace")
+        raise CutcalError(f"--{taken} beside --config: write it into {args.config}, for all cuts or for one")
     study = read_study(args.config).run_with(budget=args.budget, arch=args.arch, command=tuple(command))
     return fit_study(args, study, Path(args.out or f"cutcal-{Path(args.config).stem}"))
+
+
+OF_A_STUDY = ("config", "out", "budget", "arch", "workers", "scheduler", "resume", "json", "check")
+"""Options that ``--config`` goes with."""
+NOT_IN_A_FILE = ("all", "discrepancy", "u-num")
+"""Options that are neither for a study nor for a trace of one."""
+
+
+def beside_study(args: argparse.Namespace) -> str:
+    """The first option that was given beside ``--config`` and would not be heeded, without its dashes; none: empty."""
+    parser = argparse.ArgumentParser()
+    add_args(parser)
+    usual = vars(parser.parse_args([]))
+    others = (name for name, value in usual.items() if name not in OF_A_STUDY and getattr(args, name) != value)
+    return next((name.replace("_", "-") for name in others), "")
 
 
 def run_cuts(args: argparse.Namespace, study: StudySpec) -> int:

@@ -42,6 +42,16 @@ def _outline(food: FoodSpec) -> str:
     return f"{food.shape_kind}, {size} mm"
 
 
+def _table() -> str:
+    """Shape, sizes, and the two values that a cut hangs on most, a food a line."""
+    lines = [f"{'':15s}{'shape':15s}{'length':>9s}{'width':>9s}{'height':>9s}{'E':>10s}{'R':>11s}"]
+    for name, food in load_foods().items():
+        sizes = "".join(f"{food.dims[n].value * 1e3:>6g} mm" for n in ("length", "width", "height"))
+        E, R = food.value("E") / 1e6, food.value("R")
+        lines.append(f"{name:15s}{food.shape_kind:15s}{sizes}{E:>6.3g} MPa{R:>5.3g} J/m^2")
+    return "\n".join([*lines, "E: Young's modulus, R: cutting resistance; cutcal foods NAME says all values"])
+
+
 def run(args: argparse.Namespace) -> int:
     """Print the list, one food, or a file to begin one with."""
     if args.template is not None:
@@ -52,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
         if args.json:
             print_json(names)
         else:
-            print("\n".join(f"{name:15s}{_outline(food)}" for name, food in load_foods().items()))
+            print(_table())
         return 0
     food = load_food(args.name)
     if args.json:
