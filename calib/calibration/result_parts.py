@@ -225,6 +225,8 @@ class Posterior:
         correlations: Posterior correlation of two parameters, by "one,other".
         R_if_known: Width of the interval of R over what it is [-], if one thing more of specimen or sensor was known,
             by its name; missing where R was not fitted or the fit ended too early.
+        discrepancy: How far the fit lets a right model be from the trace, part of the peak; missing in documents of
+            older versions.
     """
 
     profiles: Mapping[str, ProfileCurve] = field(default_factory=dict)
@@ -233,6 +235,7 @@ class Posterior:
     predictive_inside: Fraction | None = field(default=None, metadata=NULL)
     correlations: Mapping[str, Annotated[float | None, keywords(minimum=-1, maximum=1), ALWAYS]]
     R_if_known: Mapping[str, float] | None = None
+    discrepancy: Fraction | None = None
 
 
 @dataclass(frozen=True)

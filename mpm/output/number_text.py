@@ -37,6 +37,9 @@ PLAIN_RANGE = (1e-4, 1e6)
 #: Numbers from here on have their thousands set apart.
 GROUP_FROM = 1e4
 
+#: Significant digits of two values that are told beside the difference between them: it shows from 0.1 % on.
+COMPARED_DIGITS = 4
+
 #: With more decimals than this, a value and its much smaller uncertainty are written apart.
 MOST_PLACES = 6
 
@@ -105,6 +108,15 @@ def quantity(
     few = name == "%" and digits is not None and 0.0 < abs(x) < 10.0 ** (digits - PERCENT_PLACES)
     text = _grouped(x, PERCENT_PLACES) if few else plain(x, digits)
     return _with_unit(("+" if signed and text.strip("0.") and x > 0.0 else "") + text, name)
+
+
+def compared(value: float | None, unit: str) -> str:
+    """A value beside one that it is compared with, such as the simulated peak beside the measured one.
+
+    >>> [compared(x, "N").replace(NBSP, " ") for x in (12.547, 12.87)]
+    ['12.55 N', '12.87 N']
+    """
+    return quantity(value, unit, digits=COMPARED_DIGITS)
 
 
 def interval(

@@ -94,9 +94,12 @@ def in_type(text: str) -> str:
     return _RAISED.sub(lambda m: m[1].translate(_EXPONENTS), spaced)
 
 
-def source_in_words(text: str) -> str:
-    """Where a value comes from, as a page prints it: a remark is one of a file that the page's reader has not."""
-    return in_type(_REMARK.sub(r"(remark \1 of materials.yaml)", text))
+def source_in_words(text: str, remarks: str = "") -> str:
+    """Where a value comes from, as a page prints it.
+
+    A remark is one of the material's file: the page has it among its references, or says after its number where it is.
+    """
+    return in_type(_REMARK.sub(rf"(remark \1{remarks})", text))
 
 
 def short(text: str, letters: int) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mpm.output.energy import spent, unbooked
+from mpm.scene.errors import BREAKDOWNS
 from reports.base.format import breakable, count, duration, interval, listed, plain, quantity
 from reports.base.labels import in_words, shown
 from reports.base.run_folder import Data
@@ -22,6 +23,8 @@ KINDS = {
     "again": "as repeats (half the speed, other particles)",
     "check": "as checks of the numerics",
 }
+#: Why a simulation broke down, in words; another reason is told as the solver has it.
+REASONS = {**BREAKDOWNS, "worker_died": "its process was killed"}
 #: Part of the simulations from which on the first page says that they broke down [-].
 MANY_FAILED = 0.1
 #: The line of the first page that has the energy that no law took.
@@ -108,7 +111,7 @@ def failures(failures: Sequence[BrokenRun]) -> list[list[str]]:
         span = interval(min(parts), max(parts), "fraction", digits=2) if parts else ""
         units = same[0].units
         first = [f"{name} = {shown(x, units[name], 3)}" for name, x in same[0].parameters.items()]
-        rows.append([breakable(in_words(reason)), str(len(same)), span, "; ".join(first)])
+        rows.append([breakable(in_words(reason) + (f": {REASONS[reason]}" if reason in REASONS else "")), str(len(same)), span, "; ".join(first)])
     return rows
 
 

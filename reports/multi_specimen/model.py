@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from mpm.scene import Knife
-from reports.base.format import DASH, breakable, count, interval, plain, quantity, uncertain
+from reports.base.format import DASH, breakable, compared, count, interval, plain, quantity, uncertain
 from reports.base.labels import in_words, source_in_words
 from reports.base.references import Citations
 from reports.base.run_folder import Data
@@ -103,8 +103,8 @@ def _cut(name: str, s: Data, columns: Mapping[str, np.ndarray]) -> list[str]:
         cells,
         count(particles),
         quantity(float(columns["stroke_m"][-1]), "m"),
-        quantity(m["peak_real_N"], "N"),
-        quantity(m["peak_sim_N"], "N"),
+        compared(m["peak_real_N"], "N"),
+        compared(m["peak_sim_N"], "N"),
     ]
 
 
@@ -149,7 +149,7 @@ def _ranges(parameters: Data) -> list[list[str]]:
     """Where the literature's range of each property comes from, each once."""
     found: dict[tuple[str, ...], str] = {}
     for name, p in parameters.items():
-        ends, source = interval(p["prior_low"], p["prior_high"], p["unit"]), source_in_words(p.get("source") or "")
+        ends, source = interval(p["prior_low"], p["prior_high"], p["unit"]), source_in_words(p.get("source") or "", " of materials.yaml")
         if source:
             found.setdefault((name.split("@")[0], ends, in_words(p.get("status") or ""), source), name)
     return [[breakable(row[0]), *row[1:]] for row in found]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from reports.base.format import DASH, breakable, listed, quantity
+from reports.base.format import DASH, breakable, compared, listed, quantity
 from reports.base.labels import related, shown
 from reports.base.run_folder import Data
 
@@ -189,14 +189,14 @@ def wide_bands(widths: Mapping[str, float | None]) -> list[str]:
 def peaks(cut: Data, word: str) -> str:
     """Largest forces of a cut, measured and simulated, in words."""
     m = cut["metrics"]
-    return f"Peak {quantity(m['peak_real_N'], 'N')} measured, {quantity(m['peak_sim_N'], 'N')} {word}."
+    return f"Peak {compared(m['peak_real_N'], 'N')} measured, {compared(m['peak_sim_N'], 'N')} {word}."
 
 
 def change(c: Data) -> list[str]:
     """Change of peak and work by one numerical choice."""
     if c.get("reason"):
         return [f"broke down: {c['reason'].replace('_', ' ')}", ""]
-    return [quantity(c.get(key), "fraction", digits=2, signed=True) for key in ("peak_change", "work_change")]
+    return [quantity(c.get(key), "fraction", signed=True) for key in ("peak_change", "work_change")]
 
 
 def carried_on(s: Data) -> str:

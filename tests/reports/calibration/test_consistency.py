@@ -15,8 +15,9 @@ from pypdf import PdfReader
 
 from calib.calibration.result import CalibrationResult, read_result
 from calib.calibration.summary import WITHDRAWAL_LINE
+from calib.material.food import load_foods
 from calib.material.properties import PROPERTIES
-from calib.material.references import cited, references
+from calib.material.references import cited, references, remarks
 from calib.problem.food_parameters import YIELD_STRAIN_FACTOR
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
 from calib.validation.acceptance import NUISANCE_LINES, Conservation, judge
@@ -333,6 +334,22 @@ def test_two_parameters_have_their_correlation_in_words() -> None:
     assert parameter_page.pair(*of_three) == "" == parameter_page.pair(*parameter_page.correlation_matrix({}, ["E"]))
 
 
-def test_a_source_names_the_file_of_its_remark() -> None:
-    """A reader of the report has no list of remarks beside it; units are raised."""
-    assert source_in_words("as apple (remark 5), 10 J/m^2") == "as apple (remark 5 of materials.yaml), 10 J/m²"
+def test_a_source_names_its_remark() -> None:
+    """Which the page has among its references, or its reader finds in the file; units are raised."""
+    assert source_in_words("as apple (remark 5), 10 J/m^2") == "as apple (remark 5), 10 J/m²"
+    assert source_in_words("wet (remark 7)", " of materials.yaml") == "wet (remark 7 of materials.yaml)"
+
+
+def test_remarks_stand_among_the_references() -> None:
+    """In full, with what they refer to themselves; a number that stands elsewhere in a source is no remark."""
+    found = cited(["as apple (remark 5)", "wet food on a board (remark 7); 6 kPa"])
+    assert [name for name in found if name.startswith("remark")] == ["remark 5", "remark 7"]
+    assert found["remark 5"].startswith("Apple is the only flesh") and found["remark 5"].endswith("stay assumed.")
+    assert {"De Belie 2000", "Bishop 2012"} <= set(found)
+    assert list(remarks()) == [str(n) for n in range(1, len(remarks()) + 1)] and len(remarks()) >= 8
+
+
+def test_every_remark_of_a_source_is_in_the_file() -> None:
+    """No value names one that is not there."""
+    named = {n for food in load_foods().values() for p in food.properties.values() if p for n in re.findall(r"\(remark (\d+)\)", p.source)}
+    assert named and named <= set(remarks())
