@@ -230,7 +230,9 @@ def no_answer(remedy: str) -> str:
     said = f"no answer within {PATIENCE:g} s"
     if load < BUSY * _cores():
         return f"{said}; {remedy}"
-    return f"{said}, while {load:.0f} processes wanted {_cores()} cores; end other programs and try again, else {remedy}"
+    return (
+        f"{said}, while {load:.0f} processes wanted {_cores()} cores; end other programs and try again, else {remedy}"
+    )
 
 
 def _cores() -> int:

@@ -315,6 +315,14 @@ class SearchHistory:
     repeatability: float | None = field(default=None, metadata=NULL)
     kept: Mapping[str, Tally] = field(default_factory=dict)
 
+    @property
+    def every(self) -> Tally:
+        """All simulations of the calibration, those of intervals and checks too; of older ones those of the search."""
+        kept = self.kept.values()
+        if not kept:
+            return Tally(self.simulations, self.failed_simulations)
+        return Tally(sum(t.simulations for t in kept), sum(t.failed for t in kept))
+
 
 @dataclass(frozen=True, kw_only=True)
 class SimulatedCut:

@@ -37,8 +37,8 @@ PLAIN_RANGE = (1e-4, 1e6)
 #: Numbers from here on have their thousands set apart.
 GROUP_FROM = 1e4
 
-#: Significant digits of two values that are told beside the difference between them: it shows from 0.1 % on.
-COMPARED_DIGITS = 4
+#: Smallest step of a value that is told beside another and the difference between them, part of the value: 0.1 to 0.2 %.
+COMPARED_STEP = 2e-3
 
 #: With more decimals than this, a value and its much smaller uncertainty are written apart.
 MOST_PLACES = 6
@@ -113,10 +113,11 @@ def quantity(
 def compared(value: float | None, unit: str) -> str:
     """A value beside one that it is compared with, such as the simulated peak beside the measured one.
 
-    >>> [compared(x, "N").replace(NBSP, " ") for x in (12.547, 12.87)]
-    ['12.55 N', '12.87 N']
+    >>> [compared(x, "N").replace(NBSP, " ") for x in (12.547, 12.87, 9.2834)]
+    ['12.55 N', '12.87 N', '9.28 N']
     """
-    return quantity(value, unit, digits=COMPARED_DIGITS)
+    first = float(f"{abs(value):.0e}"[0]) if value and math.isfinite(value) else 1.0
+    return quantity(value, unit, digits=3 if 0.01 / first <= COMPARED_STEP else 4)
 
 
 def interval(

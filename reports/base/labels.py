@@ -75,7 +75,8 @@ def related(value: Any, limit: Any, passed: bool | None) -> str:
 def capital(text: str) -> str:
     """A sentence with a capital, unless it begins with a name: of a property, a file or a column."""
     first = text.split(" ", 1)[0]
-    return text[:1].upper() + text[1:] if first.isalpha() and first not in SYMBOLS else text
+    plain = first.replace("-", "").isalpha()
+    return text[:1].upper() + text[1:] if plain and first not in SYMBOLS else text
 
 
 def as_sentence(text: str) -> str:

@@ -149,7 +149,10 @@ def _ranges(parameters: Data) -> list[list[str]]:
     """Where the literature's range of each property comes from, each once."""
     found: dict[tuple[str, ...], str] = {}
     for name, p in parameters.items():
-        ends, source = interval(p["prior_low"], p["prior_high"], p["unit"]), source_in_words(p.get("source") or "", " of materials.yaml")
+        ends, source = (
+            interval(p["prior_low"], p["prior_high"], p["unit"]),
+            source_in_words(p.get("source") or "", " of materials.yaml"),
+        )
         if source:
             found.setdefault((name.split("@")[0], ends, in_words(p.get("status") or ""), source), name)
     return [[breakable(row[0]), *row[1:]] for row in found]

@@ -332,6 +332,6 @@ def verdict_text(result: CalibrationResult) -> str:
     peak, real = result.agreement.peak_sim_N, result.agreement.peak_real_N
     head = (
         f"{result.food}: {state}; peak {peak:.2f} N against {real:.2f} N ({result.trace.label}), "
-        f"{result.history.simulations} simulations in {result.wall_s:.0f} s"
+        f"{result.history.every.simulations} simulations in {result.wall_s:.0f} s"
     )
     return "\n".join([head, *lines, f"  wrote {result.folder}"])

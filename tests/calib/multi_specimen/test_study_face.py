@@ -79,7 +79,9 @@ def test_impossible_arguments_are_one_line(study: Path, change: dict[str, Any], 
 def twice_cut() -> Trace:
     """A record of two cuts 4 s apart, each of 2 s, with the knife's height [m]."""
     time = np.arange(0.0, 12.0, 0.01)
-    cuts = [np.clip(np.sin(np.pi * (time - start) / 2.0), 0.0, None) * (abs(time - start - 1.0) < 1.0) for start in (2, 7)]
+    cuts = [
+        np.clip(np.sin(np.pi * (time - start) / 2.0), 0.0, None) * (abs(time - start - 1.0) < 1.0) for start in (2, 7)
+    ]
     return Trace(time=time, force=9.0 * sum(cuts), position=0.05 - 0.03 * sum(cuts), source="two.csv", label="measured")
 
 
