@@ -37,7 +37,7 @@ PLAIN_RANGE = (1e-4, 1e6)
 #: Numbers from here on have their thousands set apart.
 GROUP_FROM = 1e4
 
-#: Smallest step of a value that is told beside another and the difference between them, part of the value: 0.1 to 0.2 %.
+#: Largest step of a value that is told beside another and the difference between them, part of the value.
 COMPARED_STEP = 2e-3
 
 #: With more decimals than this, a value and its much smaller uncertainty are written apart.

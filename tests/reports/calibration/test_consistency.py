@@ -338,7 +338,7 @@ def assumed(part: float | None) -> SimpleNamespace:
 
 
 def test_the_model_page_says_what_the_fit_lets_the_model_miss() -> None:
-    """The part of the peak of this very fit, not the usual one; of older runs, that the command may have another one."""
+    """The part of the peak of this very fit; of older runs, that the command may have another one than the usual."""
     for part, words in (
         (0.04, "the noise and 4 % of the peak"),
         (None, "3 % (unless its command says another one) of"),
