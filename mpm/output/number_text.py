@@ -210,6 +210,18 @@ def rung(unit: str, size: float) -> tuple[float, str]:
     return [(factor, name) for start, factor, name in ladder if size >= start * (1.0 - ROUNDING)][-1]
 
 
+def terminal_rung(unit: str, size: float) -> tuple[float, str]:
+    """Factor and text of the unit for a value of this size [SI unit], in letters that every terminal has.
+
+    >>> terminal_rung("Pa", 3.2e5), terminal_rung("J/m^2", 327.0), terminal_rung("m", 5e-5)
+    ((1000.0, 'kPa'), (1.0, 'J/m^2'), (1e-06, 'um'))
+    """
+    factor, name = rung(unit, size)
+    for letter, plain_letters in (("²", "^2"), ("³", "^3"), ("µ", "u"), ("°", "deg")):
+        name = name.replace(letter, plain_letters)
+    return factor, name or "-"
+
+
 def duration(seconds: float | None) -> str:
     """A wall time.
 

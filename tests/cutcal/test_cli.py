@@ -8,9 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calib.calibration.result import read_result
 from calib.material.food import load_food, load_foods
+from cutcal.commands.calibration.calibrate import verdict_text
 from cutcal.main import main
 from tests.data_dir import ROOT
+from tests.reports.sample import summary, write_run
 
 BANANA = ROOT / "force_data" / "banana_reconstructed.csv"
 
@@ -136,8 +139,21 @@ def test_foods_lists_and_shows(capsys):
     assert head.split() == ["shape", "length", "width", "height", "E", "R"]
     assert potato.split() == "potato half_cylinder 80 mm 65 mm 50 mm 2 MPa 75 J/m^2".split()
     assert main(["foods", "banana"]) == 0
-    assert "Table 2" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "Table 2" in shown and "300 kPa      50 to 2000, proxy" in shown
     assert main(["foods", "cherry"]) == 0
     assert "! cherry: not modelled: the stone" in capsys.readouterr().out
     assert main(["foods", "banana", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["banana"]["properties"]["E"]["value"] == load_food("banana").value("E")
+
+
+def test_the_terminal_has_units_that_people_use(tmp_path):
+    """Fitted values and their intervals share one, with no power of ten; so do those of ``foods``."""
+    lines = {
+        line.split()[0]: line.split() for line in verdict_text(read_result(write_run(tmp_path))).splitlines() if line
+    }
+    value, unit, low, to, high, *_ = lines["E"][1:]
+    p = summary()["parameters"]["E"]
+    assert (unit, to) == ("kPa", "to") and float(value) == pytest.approx(p["value"] / 1e3, rel=1e-3)
+    assert [float(low), float(high)] == pytest.approx([p["low95"] / 1e3, p["high95"] / 1e3], rel=5e-3)
+    assert not any("e+" in word for word in lines["E"])

@@ -37,11 +37,13 @@ from cutcal.options import (
     workers_of,
 )
 from cutcal.surroundings import interrupted
+from mpm.output.number_text import terminal_rung
 from mpm.scene.errors import CutcalError
 
 if TYPE_CHECKING:
     from calib.calibration.result import CalibrationResult
-    from calib.multi_specimen.result import HeldOutCut, InSampleCut, StudyResult
+    from calib.multi_specimen.result import HeldOutCut, InSampleCut, StudyParameter, StudyResult
+    from calib.uncertainty.estimates import FittedParameter
 
 MEASUREMENT = "measurement"  # title of the group of options that say what was measured
 HEIGHT_HELP = "column of the knife's height ('none'), or --depth-col"
@@ -303,14 +305,25 @@ def study_text(result: StudyResult, out: Path) -> str:
         )
         lines += [f"        {m.iso18571.caveat}"] if m.iso18571.caveat else []
     lines.append(f"  {'fitted':24s}{'value':>10s} {'':6s}{'95 % interval':>24s}")
-    for name, p in result.parameters.items():
-        interval = "" if p.low95 is None else f"{p.low95:.3g} to {p.high95:.3g}"
-        lines.append(f"  {name:24s}{p.value:>10.4g} {p.unit:6s}{interval:>24s}  {p.verdict}")
+    lines += [f"  {name:24s}{_fitted(p)}" for name, p in result.parameters.items()]
     head = (
         f"{result.food}, {result.study}: {'passed' if result.passed else 'not passed'}; "
         f"{result.simulations} simulations in {result.wall_s:.0f} s"
     )
     return "\n".join([head, *lines, f"  wrote {out}"])
+
+
+def _fitted(p: FittedParameter | StudyParameter) -> str:
+    """Value, interval and verdict of a parameter, in the unit that people use for it."""
+    factor, unit = terminal_rung(p.unit, abs(p.value))
+    known = None if p.low95 is None or p.high95 is None else (p.low95 / factor, p.high95 / factor)
+    interval = "" if known is None else f"{_end(known[0])} to {_end(known[1])}"
+    return f"{p.value / factor:>10.4g} {unit:6s}{interval:>24s}  {p.verdict}"
+
+
+def _end(x: float) -> str:
+    """An end of an interval in three digits: 1750, and no power of ten below a million."""
+    return f"{float(f'{x:.3g}'):g}"
 
 
 def verdict_text(result: CalibrationResult) -> str:
@@ -324,9 +337,7 @@ def verdict_text(result: CalibrationResult) -> str:
         remedy = remedied(v)
         lines += [f"  {'':8s}{remedy}"] if remedy else []
     lines.append(f"  {'fitted':8s}{'95 % interval':>42s}")
-    for name, p in result.fitted.items():
-        interval = "" if p.low95 is None else f"{p.low95:.3g} to {p.high95:.3g}"
-        lines.append(f"  {'':8s}{name:18s}{p.value:>10.4g} {p.unit:6s}{interval:>24s}  {p.verdict}")
+    lines += [f"  {'':8s}{name:18s}{_fitted(p)}" for name, p in result.fitted.items()]
     lines.insert(0, f"  {identified_words(result.fitted)}")
     state = "interrupted" if result.status == "interrupted" else "passed" if result.passed else "not passed"
     peak, real = result.agreement.peak_sim_N, result.agreement.peak_real_N

@@ -10,6 +10,7 @@ from calib.material.food import FoodSpec, load_food, load_foods
 from calib.material.own_food import template
 from calib.material.properties import FORM, PROPERTIES
 from cutcal.options import add_json, print_json
+from mpm.output.number_text import terminal_rung
 
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 HELP = "list the foods, or the values of one with their sources"
@@ -75,8 +76,9 @@ def run(args: argparse.Namespace) -> int:
     for name in (*FORM, *PROPERTIES):
         p = food.roundness if name in FORM else food.properties.get(name)
         if p is not None:
-            text = f"{p.value:g} {p.unit}"
-            print(f"  {name:17s}{text:16s} {p.low:g} to {p.high:g}, {p.status}: {p.source}")
+            factor, unit = terminal_rung(p.unit, p.value)
+            text = f"{p.value / factor:g} {unit}"
+            print(f"  {name:17s}{text:12s} {p.low / factor:g} to {p.high / factor:g}, {p.status}: {p.source}")
     for warning in food.warnings():
         print(f"  ! {warning}")
     return 0
