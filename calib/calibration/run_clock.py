@@ -126,8 +126,9 @@ class RunClock:
             self._part = ALMOST
             self._stage(words, math.nan, math.nan)
             return
-        typical = (self._now() - self._last_began) * (whole - done) / done if done else expected
-        self._stage(words, typical, max(expected, typical) * SLOWER)
+        took = self._now() - self._last_began
+        longest = took * (whole - done) / done if done else expected  # were they all as long: the longest come first
+        self._stage(words, min(longest, max(expected, took)), max(expected, longest) * SLOWER)
 
     def _typically(self) -> float:
         """Time left in a typical run [s]: never less than the last simulations take."""

@@ -87,8 +87,8 @@ def test_simulations_of_the_intervals_are_counted() -> None:
 
 
 def test_the_last_simulations_tell_their_own_time() -> None:
-    """Where they take four times what the search let expect, the time left follows them, and no more than twice that is
-    the most."""
+    """Where they take four times what the search let expect, the time left follows them: the longest come first, so the
+    rest takes no longer than they took; were all as long, it would, and twice that is the most."""
     seen: list[Progress] = []
     now = [0.0]
     clock = RunClock(seen.append, [80.0], lambda: now[0])
@@ -97,7 +97,10 @@ def test_the_last_simulations_tell_their_own_time() -> None:
     assert (seen[-1].typical_s, seen[-1].eta_s) == pytest.approx((LAST_RUNS, SLOWER * LAST_RUNS))
     now[0] += LAST_RUNS
     clock.last("last simulations, 1 of 4", 1, 4)
-    assert (seen[-1].typical_s, seen[-1].eta_s) == pytest.approx((3.0 * LAST_RUNS, SLOWER * 3.0 * LAST_RUNS))
+    assert (seen[-1].typical_s, seen[-1].eta_s) == pytest.approx((LAST_RUNS, SLOWER * 3.0 * LAST_RUNS))
+    now[0] += 0.2 * LAST_RUNS
+    clock.last("last simulations, 3 of 4", 3, 4)
+    assert (seen[-1].typical_s, seen[-1].eta_s) == pytest.approx((0.4 * LAST_RUNS, SLOWER * 0.4 * LAST_RUNS))
 
 
 def test_nothing_is_said_of_a_time_that_is_not_known() -> None:
