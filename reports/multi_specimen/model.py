@@ -77,6 +77,7 @@ def model(
             "fixed": FIXED,
             "limit_sources": _limit_sources(s, limit_sources),
             "ranges": _ranges(s["parameters"]),
+            "presses": [_press(press) for press in (s.get("presses") or {}).values()],
         }
     )
     return {**content, "references": citations.listed}
@@ -143,6 +144,15 @@ def _limit_sources(s: Data, sources: Mapping[str, str]) -> list[list[str]]:
         if name in names:
             grouped.setdefault(why, []).append(name)
     return [["; ".join(lines), why] for why, lines in grouped.items()]
+
+
+def _press(press: Data) -> list[str]:
+    """Name, modulus, its uncertainty, repeats, Poisson's ratio and files of a compression test."""
+    files = "; ".join(f"{breakable(file['name'])}, SHA-256 {file['sha256'][:16]}" for file in press["files"])
+    return [
+        breakable(press["name"]), quantity(press["E"], "Pa"), quantity(press["spread"], "fraction", digits=2),
+        count(press["repeats"]), plain(press["nu"], None), files,
+    ]  # fmt: skip
 
 
 def _ranges(parameters: Data) -> list[list[str]]:

@@ -163,8 +163,8 @@ def sentence(s: Data, widths: Mapping[str, float | None]) -> str:
     elif failed:
         text = f"{held - len(failed)} of {held} held-out cuts were predicted within the limits; not {listed(failed)}."
     else:
-        text = f"All {held} held-out cuts were predicted within the limits." if held > 1 else (
-            f"The held-out cut {next(iter(s['hold_out']))} was predicted within the limits.")  # fmt: skip
+        all_ = {1: f"The held-out cut {next(iter(s['hold_out']))} was", 2: "Both held-out cuts were"}
+        text = f"{all_.get(held, f'All {held} held-out cuts were')} predicted within the limits."
     text += "".join(f" {said}" for said in wide_bands(widths))
     apart: list[str] = []
     for name, t in s["traces"].items():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import re
 
 from calib.io.schema import tag
@@ -48,8 +49,8 @@ def _table() -> str:
     lines = [f"{'':15s}{'shape':15s}{'length':>9s}{'width':>9s}{'height':>9s}{'E':>10s}{'R':>11s}"]
     for name, food in load_foods().items():
         sizes = "".join(f"{food.dims[n].value * 1e3:>6g} mm" for n in ("length", "width", "height"))
-        E, R = food.value("E") / 1e6, food.value("R")
-        lines.append(f"{name:15s}{food.shape_kind:15s}{sizes}{E:>6.3g} MPa{R:>5.3g} J/m^2")
+        E, R = food.value("E") or math.nan, food.value("R") or math.nan
+        lines.append(f"{name:15s}{food.shape_kind:15s}{sizes}{E / 1e6:>6.3g} MPa{R:>5.3g} J/m^2")
     return "\n".join([*lines, "E: Young's modulus, R: cutting resistance; cutcal foods NAME says all values"])
 
 

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from calib.multi_specimen.compression_modulus import CompressionModulus
+from calib.multi_specimen.run import _pressed
 from cutcal import Calibration, Study, Trace
 from cutcal.commands.calibration.calibrate import OF_A_STUDY
 from mpm.scene.errors import CutcalError
@@ -98,3 +100,9 @@ def test_all_cuts_of_a_record(ran: list[dict[str, Any]]) -> None:
         Calibration("banana", twice_cut()).run()
     with pytest.raises(CutcalError, match="holds one cut"):
         Study.of_cuts(Calibration("banana", ROOT / "force_data" / "banana_reconstructed.csv"))
+
+
+def test_a_range_that_a_compression_test_has_narrowed_says_so() -> None:
+    """In place of the literature alone, whose range is another one."""
+    pressed = CompressionModulus("pressed", 278e3, 0.13, 4, 0.45, ())
+    assert _pressed([pressed], "ripe kiwi") == "compression: pressed, 278 kPa to 13 %. Before: ripe kiwi"

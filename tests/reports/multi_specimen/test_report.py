@@ -229,3 +229,13 @@ def test_damaged_input_is_named(tmp_path: Path, damage, message: str) -> None:  
     damage(run)
     with pytest.raises(ReportError, match=message):
         write_report(run)
+
+
+def test_compression_tests_are_told(tmp_path: Path) -> None:
+    """Modulus, how well it is known, what was assumed and the file; nothing where the study has none."""
+    press = {"name": "pressed", "E": 278e3, "spread": 0.13, "repeats": 4, "nu": 0.45,
+             "files": [{"name": "press.csv", "sha256": "c0ffee00" * 8}]}  # fmt: skip
+    with_one = content(read_study(sample.write_study(tmp_path / "one", presses={"pressed": press})))["model"]
+    (row,) = ([spaced(cell) for cell in row] for row in with_one["presses"])
+    assert row == ["pressed", "278 kPa", "13 %", "4", "0.45", "press.csv, SHA-256 c0ffee00c0ffee00"]
+    assert content(read_study(sample.write_study(tmp_path / "none")))["model"]["presses"] == []
