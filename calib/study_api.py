@@ -4,21 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from calib.api import script_hidden
+from calib.api import LIMITS, Calibration, script_hidden, workers_for
 from calib.calibration.parameter_table import ParameterTable, parameter_table
 from calib.calibration.run_folder import RunFolder
 from calib.io.folder import finite
 from calib.io.progress import Progress, ProgressBar
 from calib.io.typed_document import to_document
-from calib.io.wording import in_arguments, speaking_of_arguments
+from calib.io.wording import brief, in_arguments, speaking_of_arguments
+from mpm.runtime import ARCHES
+from mpm.scene.errors import CutcalError, check_number
 
 if TYPE_CHECKING:
     from calib.multi_specimen.result import StudyResult
     from calib.multi_specimen.spec import StudySpec
+
+FOR_ONE_CUT = ("cut", "sample", "withdrawal", "start_from")
+"""Arguments of a calibration that a fit of several cuts does not take."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +64,13 @@ class Study:
 
     Attributes:
         spec: What the file of the study says.
+        call: How it was made, for the command that the summary states.
+        folder: Output folder where :meth:`run` is given none.
     """
 
     spec: StudySpec
+    call: str = field(default="Study", repr=False)
+    folder: str = field(default="", repr=False)
 
     @staticmethod
     def read(path: str | Path) -> Study:
@@ -73,7 +82,24 @@ class Study:
         from calib.multi_specimen.study_file import read_study
 
         with speaking_of_arguments():
-            return Study(read_study(path))
+            return Study(read_study(path), f"Study.read({str(path)!r})", f"cutcal-{Path(path).stem}")
+
+    @staticmethod
+    def of_cuts(calibration: Calibration) -> Study:
+        """All cuts of the record of a calibration as specimens of one food, as ``calibrate --all`` takes them.
+
+        Raises:
+            CutcalError: The record holds one cut, or the calibration says what is for one.
+        """
+        from calib.multi_specimen.spec import study_of_cuts
+
+        with speaking_of_arguments():
+            of_one = next((name for name in FOR_ONE_CUT if getattr(calibration, name)), None)
+            if of_one is not None:
+                raise CutcalError(f"Study.of_cuts: --{of_one.replace('_', '-')} is for one cut; leave it out")
+            request = calibration.request()
+            call = f"Study.of_cuts({calibration!r})"
+            return Study(study_of_cuts(request), call, f"cutcal-{request.food.name}-{request.stem}")
 
     @staticmethod
     def load(out: str | Path) -> StudyRun:
@@ -90,7 +116,10 @@ class Study:
         self,
         out: str | Path | None = None,
         *,
-        workers: int = 2,
+        workers: int | None = None,
+        scheduler: str | None = None,
+        budget: float | None = None,
+        arch: str | None = None,
         resume: bool = False,
         progress: Callable[[Progress], None] | bool | None = None,
         say: Callable[[str], None] | None = None,
@@ -98,9 +127,12 @@ class Study:
         """Fit and predict, and write what ``calibrate --config`` writes.
 
         Args:
-            out: Output folder, which is made and never overwritten; None for ``cutcal-`` and the name of the study's
-                file, in the current folder.
-            workers: Simulations at a time.
+            out: Output folder, which is made and never overwritten; None for the one that ``calibrate`` takes, in the
+                current folder.
+            workers: Simulations at a time; None for 2, of a cluster for all.
+            scheduler: Address of a Dask cluster that runs the simulations, such as ``tcp://host:8786``, or None.
+            budget: Largest number of simulations of each trace, in each fit; None for the study's own.
+            arch: Device of the simulations; None for the study's own, which is ``cpu`` in a file.
             resume: Go on with the study in ``out``; nothing is simulated twice.
             progress: Called after each simulation; True for a bar on standard error.
             say: Called with each warning and stage, as one sentence.
@@ -112,12 +144,32 @@ class Study:
             CutcalError: Anything wrong with the input; nothing that was computed is lost.
         """
         from calib.multi_specimen.run import run
-        from calib.simulation.process_pool import Pool
 
-        folder = Path(f"cutcal-{Path(self.spec.source).stem}" if out is None else out)
+        call = ", ".join(
+            ([] if out is None else [repr(str(out))])
+            + [f"{name}={value!r}" for name, value in (("budget", budget), ("arch", arch)) if value is not None]
+        )
+        folder = Path((self.folder or f"cutcal-{self.spec.food.name}") if out is None else out)
+        say = in_arguments(say)
         with speaking_of_arguments(), script_hidden(), ExitStack() as shown:
-            pool = shown.enter_context(Pool(workers, self.spec.first.arch))
+            device = self._device(workers, budget, arch)
+            study = self.spec.run_with(budget=budget, arch=device, command=(f"{self.call}.run({call})",))
+            pool = shown.enter_context(workers_for(workers, device, scheduler, say))
             if isinstance(progress, bool):
                 progress = shown.enter_context(ProgressBar()) if progress else None
-            result = run(self.spec, folder, pool, resume=resume, progress=progress, say=in_arguments(say))
+            result = run(study, folder, pool, resume=resume, progress=progress, say=say)
         return StudyRun(folder, result)
+
+    def _device(self, workers: int | None, budget: float | None, arch: str | None) -> str:
+        """The device of the simulations.
+
+        Raises:
+            CutcalError: An impossible argument of :meth:`run`.
+        """
+        if not (workers is None or (type(workers) is int and workers > 0)):
+            raise CutcalError(f"Study.run: workers = {brief(workers)}; give a whole number of at least 1")
+        if budget is not None:
+            check_number("Study.run", "budget", budget, *LIMITS["budget"])
+        if not (arch is None or arch in ARCHES):
+            raise CutcalError(f"Study.run: arch = {brief(arch)} is none of {', '.join(ARCHES)}")
+        return self.spec.first.arch if arch is None else arch

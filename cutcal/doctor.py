@@ -41,6 +41,8 @@ CLOSE = 0.05
 """Error of that force that passes; on the few coarse cells it is 1 %."""
 PATIENCE = 180.0
 """Seconds after which a device that has not answered is given up; compiling for the first time takes a twentieth."""
+BUSY = 1.5
+"""Processes that want a core, for each core, from which on a device that has not answered may only have waited."""
 DEVICES = {"cuda": "CUDA", "vulkan": "Vulkan"}
 EXTRAS = {
     "cluster": "--scheduler",
@@ -187,7 +189,7 @@ def _optional(name: str, code: str, remedy: str) -> Finding:
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
     except subprocess.TimeoutExpired:
-        return Finding(name, "absent", f"no answer within {PATIENCE:g} s; {remedy}")
+        return Finding(name, "absent", no_answer(remedy))
     if done.returncode != 0:
         why = _last_line(done.stderr) or f"its process ended with {done.returncode}"
         return Finding(name, "absent", f"{why}; {remedy}")
@@ -203,7 +205,7 @@ def device(arch: str, name: str) -> tuple[Finding, Path | None]:
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
     except subprocess.TimeoutExpired:
-        return Finding(name, bad, f"no answer within {PATIENCE:g} s; {remedy}"), None
+        return Finding(name, bad, no_answer(remedy)), None
     whole = time.monotonic() - began
     try:
         found = json.loads(done.stdout.strip().splitlines()[-1])
@@ -220,6 +222,22 @@ def device(arch: str, name: str) -> tuple[Finding, Path | None]:
     if not (abs(error) <= CLOSE and found["balance"] < 1e-3):
         return Finding(name, "fail", f"{words}: this device computes wrongly; do not use it"), cache
     return Finding(name, "ok", words), cache
+
+
+def no_answer(remedy: str) -> str:
+    """That a device was given up, and what to do: on a busy machine nothing but wait."""
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+    said = f"no answer within {PATIENCE:g} s"
+    if load < BUSY * _cores():
+        return f"{said}; {remedy}"
+    return (
+        f"{said}, while {load:.0f} processes wanted {_cores()} cores; end other programs and try again, else {remedy}"
+    )
+
+
+def _cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _last_line(text: str) -> str:
@@ -245,7 +263,7 @@ def kernels(cache: Path | None) -> Finding:
 
 def memory() -> Finding:
     """Cores and free memory."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    cores = _cores()
     words = f"{cores} core{'s' if cores > 1 else ''}"
     try:
         free = os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")

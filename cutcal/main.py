@@ -80,7 +80,7 @@ def parser(names: Iterable[str] = COMMANDS) -> Parser:
 
 def calibrate() -> int:
     """Entry point of the ``calibrate`` script."""
-    return main(["calibrate", *sys.argv[1:]])
+    return main(sys.argv[1:] if sys.argv[1:] == ["--version"] else ["calibrate", *sys.argv[1:]])
 
 
 def main(argv: Sequence[str] | None = None) -> int:

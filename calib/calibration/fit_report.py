@@ -119,7 +119,7 @@ def _statistics(result: Reported) -> list[tuple[str, str]]:
     """What is known of the fit as a whole, by name."""
     agreement, posterior, history = result.agreement, result.posterior, result.history
     return [
-        ("simulations", f"{history.simulations} ({history.failed_simulations} failed)"),
+        ("simulations", f"{history.every.simulations} ({history.every.failed} failed)"),
         ("fitted parameters", str(len(result.fitted))),
         ("peak, simulated", f"{agreement.peak_sim_N:.3g} N"),
         ("peak, of the trace", f"{agreement.peak_real_N:.3g} N"),

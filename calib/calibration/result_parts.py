@@ -225,6 +225,8 @@ class Posterior:
         correlations: Posterior correlation of two parameters, by "one,other".
         R_if_known: Width of the interval of R over what it is [-], if one thing more of specimen or sensor was known,
             by its name; missing where R was not fitted or the fit ended too early.
+        discrepancy: How far the fit lets a right model be from the trace, part of the peak; missing in documents of
+            older versions.
     """
 
     profiles: Mapping[str, ProfileCurve] = field(default_factory=dict)
@@ -233,6 +235,7 @@ class Posterior:
     predictive_inside: Fraction | None = field(default=None, metadata=NULL)
     correlations: Mapping[str, Annotated[float | None, keywords(minimum=-1, maximum=1), ALWAYS]]
     R_if_known: Mapping[str, float] | None = None
+    discrepancy: Fraction | None = None
 
 
 @dataclass(frozen=True)
@@ -311,6 +314,14 @@ class SearchHistory:
     misfit_history: tuple[tuple[Annotated[int, keywords(minimum=1)], float], ...]
     repeatability: float | None = field(default=None, metadata=NULL)
     kept: Mapping[str, Tally] = field(default_factory=dict)
+
+    @property
+    def every(self) -> Tally:
+        """All simulations of the calibration, those of intervals and checks too; of older ones those of the search."""
+        kept = self.kept.values()
+        if not kept:
+            return Tally(self.simulations, self.failed_simulations)
+        return Tally(sum(t.simulations for t in kept), sum(t.failed for t in kept))
 
 
 @dataclass(frozen=True, kw_only=True)

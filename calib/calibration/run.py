@@ -137,7 +137,7 @@ class _Stages:
 
     def made(self, done: int, whole: int) -> None:
         """A simulation of it is done."""
-        self._clock.intervals(f"{self._words}, {done} of {whole}")
+        self._clock.intervals(f"{self._words}, {done} of {whole}", done)
 
 
 @dataclass(frozen=True, eq=False)

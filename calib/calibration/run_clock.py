@@ -86,6 +86,7 @@ class RunClock:
         self._last: Progress | None = None
         self._each = math.nan
         self._part = 0.0
+        self._more = self._round = 0  # simulations of the intervals in earlier rounds, and in this one
         self._searched = self._last_began = math.nan  # when the search has ended, and the last simulations have begun
 
     def search(self, p: Progress) -> None:
@@ -96,12 +97,15 @@ class RunClock:
         self._last = p
         self._tell(p, self._typically(), p.eta_s + (INTERVAL_RUNS + LAST_RUNS) * self._each)
 
-    def intervals(self, words: str) -> None:
+    def intervals(self, words: str, done: int = 0) -> None:
         """A round of the intervals has begun, or one of its simulations is done.
 
         Args:
             words: What it is.
+            done: Simulations of the round that are done.
         """
+        self._more += self._round if done < self._round else 0
+        self._round = done
         if math.isnan(self._searched):
             self._searched = self._now()
         rest = max(INTERVAL_RUNS * self._each - (self._now() - self._searched), 0.0)
@@ -122,8 +126,9 @@ class RunClock:
             self._part = ALMOST
             self._stage(words, math.nan, math.nan)
             return
-        typical = (self._now() - self._last_began) * (whole - done) / done if done else expected
-        self._stage(words, typical, max(expected, typical) * SLOWER)
+        took = self._now() - self._last_began
+        longest = took * (whole - done) / done if done else expected  # were they all as long: the longest come first
+        self._stage(words, min(longest, max(expected, took)), max(expected, longest) * SLOWER)
 
     def _typically(self) -> float:
         """Time left in a typical run [s]: never less than the last simulations take."""
@@ -131,7 +136,8 @@ class RunClock:
 
     def _stage(self, words: str, typical: float, most: float) -> None:
         if self._last is not None:
-            self._tell(replace(self._last, stage=words), typical, most)
+            made = self._last.done + self._more + self._round
+            self._tell(replace(self._last, stage=words, done=made), typical, most)
 
     def _tell(self, p: Progress, typical: float, most: float) -> None:
         if self._progress is None:

@@ -227,7 +227,7 @@ def _products(found: Uncertainty) -> set[str]:
 def _posterior(setup: Setup, fit: FitResult, analysis: UncertaintyAnalysis | None) -> Posterior:
     """Profiles, the size and correlation of the errors, and how much of the trace lies in the predictive band."""
     if analysis is None:
-        return Posterior(correlations={})
+        return Posterior(correlations={}, discrepancy=setup.request.errors.discrepancy)
     found, chosen, names = analysis.uncertainty, setup.objective.parameters, fit.parameters.names
     profiles = {
         p.name: ProfileCurve(
@@ -246,6 +246,7 @@ def _posterior(setup: Setup, fit: FitResult, analysis: UncertaintyAnalysis | Non
         predictive_inside=analysis.bands[0].inside,
         correlations={f"{names[i]},{names[j]}": float(found.correlation[i, j]) for i, j in pairs},
         R_if_known=None if open_ended is None else open_ended.parts,
+        discrepancy=setup.request.errors.discrepancy,
     )
 
 

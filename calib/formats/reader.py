@@ -138,6 +138,7 @@ def _content(path: Path) -> bytes:
             raise TraceError(f"{path} is a directory; name a CSV, JSON or HDF5 file")
         if not path.exists():
             near = difflib.get_close_matches(path.name, [*_names_beside(path), *BUNDLED], n=3)
+            near = near or [name for name in BUNDLED if name.startswith(path.name)]
             hint = f"did you mean {' or '.join(near)}?" if near else "check the path"
             raise TraceError(f"{path}: no such file; {hint}")
         raw = read_regular(path)

@@ -101,6 +101,12 @@ class Countdown:
         return f"about {clock(took * (self._total - self._spent) / self._spent)} left"
 
 
+def rewrites(stream: TextIO) -> bool:
+    """Whether a line on a stream can be written anew: on a terminal that is not dumb, and in a notebook."""
+    notebook = type(stream).__module__.startswith(NOTEBOOK)
+    return notebook or (stream.isatty() and os.environ.get("TERM") != DUMB)
+
+
 class ProgressBar:
     """Callback that shows :class:`Progress` on a stream; a context manager that ends the line it rewrites.
 
@@ -120,8 +126,7 @@ class ProgressBar:
         self._stream = sys.stderr if stream is None else stream
         self._interval = interval_s
         self._now = now
-        notebook = type(self._stream).__module__.startswith(NOTEBOOK)
-        self._terminal = notebook or (self._stream.isatty() and os.environ.get("TERM") != DUMB)
+        self._terminal = rewrites(self._stream)
         self._width = 0
         self._last = -math.inf
 

@@ -55,7 +55,13 @@ OPTION = re.compile(r"(?<![\w-])--([a-z][a-z-]*[a-z])")
 """An option of the command line in a sentence."""
 COMMAND = re.compile(r"\b(?:cutcal [a-z]+|calibrate)(?: [A-Z]+)?(?: --[a-z-]+(?: [\w.]+)?)* $")
 """What stands before an option that is part of a command to be typed, such as ``cutcal foods --template``."""
-ARGUMENTS = {"material": "food", "run": "start", "config": "Study.read", "resume": "resume=True"}
+ARGUMENTS = {
+    "material": "food",
+    "run": "start",
+    "config": "Study.read",
+    "all": "Study.of_cuts",
+    "resume": "resume=True",
+}
 """What an option is called in Python, where its name is another one."""
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from pathlib import Path
 
@@ -33,6 +33,7 @@ from calib.problem.setup import Setup
 from calib.simulation.evaluation_store import EvaluationStore, Header
 from calib.simulation.workers import Workers
 from mpm.arrays import FloatArray
+from mpm.output.number_text import quantity
 
 
 def run(
@@ -135,6 +136,8 @@ class Finished:
         for k, p in enumerate(self.fit.result.parameters):
             found = p if analysis is None else analysis.uncertainty.intervals[k]
             known = known_of(food, property_of(p.name))
+            if property_of(p.name) == "E" and self.moduli:
+                known = replace(known, status="measured", source=_pressed(self.moduli, known.source))
             out[p.name] = StudyParameter.of_study(found, known, shared=is_shared(p.name))
         return out
 
@@ -187,6 +190,17 @@ class Finished:
         flesh = {n: x for n, x in self.fit.shared_values(knife).items() if n in food.properties}
         source = f"fitted to {', '.join(self.fit.names)} of {self.study.source}"
         return food.with_values(flesh, status="fitted", source=source)
+
+
+def _pressed(moduli: Sequence[CompressionModulus], before: str) -> str:
+    """Where the range of E comes from, where compression tests have narrowed it.
+
+    Args:
+        moduli: The tests.
+        before: Where the range was from without them.
+    """
+    tests = "; ".join(f"{m.name}, {quantity(m.E, 'Pa')} to {quantity(m.spread, 'fraction', digits=2)}" for m in moduli)
+    return f"compression: {tests}. Before: {before}".replace("\u00a0", " ")
 
 
 def _write(done: Finished, out: Path, began: float) -> StudyResult:

@@ -33,7 +33,6 @@ PEAK_LIMIT = 0.05
 FIT_NRMSE_LIMIT = 0.08
 SHAPE_LIMIT = 0.08
 MOMENTUM_BALANCE_LIMIT = 0.01
-CHANGE_DIGITS = 2  # significant digits of such a change
 LOSS_LIMIT = 0.05  # energy lost by the discretisation, of all work: the force is too large by about that
 CURVE_LINE = "curve error (NRMSE)"
 CONSTANTS_LINE = "constants of the method halved and doubled"
@@ -128,7 +127,7 @@ def _change(name: str, runs: Sequence[Check]) -> Verdict:
 
 def _changed(peak: float | None, work: float | None) -> str:
     """What a numerical choice changes, in words."""
-    peak_text, work_text = (quantity(x, "fraction", digits=CHANGE_DIGITS, signed=True) for x in (peak, work))
+    peak_text, work_text = (quantity(x, "fraction", signed=True) for x in (peak, work))
     return f"peak {peak_text}, work {work_text}"
 
 

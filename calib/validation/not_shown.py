@@ -77,7 +77,7 @@ def _limits_of_parameters(fitted: Mapping[str, FittedParameter]) -> list[str]:
             said.append(told.format(listed(names)))
     weak = [n for n, p in fitted.items() if p.verdict == "weak" and property_of(n) in HELD_WEAK]
     if weak:
-        held = listed([f"{quantity(HELD_WEAK[property_of(n)], 'fraction')} for {n}" for n in weak])
+        held = listed([f"{quantity(HELD_WEAK[property_of(n)], 'fraction', digits=None)} for {n}" for n in weak])
         said.append(f"Weak intervals hold the truth less often than in 95 %: of 100 made-up banana cuts in {held}.")
     return said
 

@@ -37,6 +37,9 @@ PLAIN_RANGE = (1e-4, 1e6)
 #: Numbers from here on have their thousands set apart.
 GROUP_FROM = 1e4
 
+#: Largest step of a value that is told beside another and the difference between them, part of the value.
+COMPARED_STEP = 2e-3
+
 #: With more decimals than this, a value and its much smaller uncertainty are written apart.
 MOST_PLACES = 6
 
@@ -105,6 +108,16 @@ def quantity(
     few = name == "%" and digits is not None and 0.0 < abs(x) < 10.0 ** (digits - PERCENT_PLACES)
     text = _grouped(x, PERCENT_PLACES) if few else plain(x, digits)
     return _with_unit(("+" if signed and text.strip("0.") and x > 0.0 else "") + text, name)
+
+
+def compared(value: float | None, unit: str) -> str:
+    """A value beside one that it is compared with, such as the simulated peak beside the measured one.
+
+    >>> [compared(x, "N").replace(NBSP, " ") for x in (12.547, 12.87, 9.2834)]
+    ['12.55 N', '12.87 N', '9.28 N']
+    """
+    first = float(f"{abs(value):.0e}"[0]) if value and math.isfinite(value) else 1.0
+    return quantity(value, unit, digits=3 if 0.01 / first <= COMPARED_STEP else 4)
 
 
 def interval(
@@ -195,6 +208,18 @@ def rung(unit: str, size: float) -> tuple[float, str]:
         return next(((factor, name) for _, factor, name in ladder if factor == 1.0), ladder[0][1:])
     size = _three(size)
     return [(factor, name) for start, factor, name in ladder if size >= start * (1.0 - ROUNDING)][-1]
+
+
+def terminal_rung(unit: str, size: float) -> tuple[float, str]:
+    """Factor and text of the unit for a value of this size [SI unit], in letters that every terminal has.
+
+    >>> terminal_rung("Pa", 3.2e5), terminal_rung("J/m^2", 327.0), terminal_rung("m", 5e-5)
+    ((1000.0, 'kPa'), (1.0, 'J/m^2'), (1e-06, 'um'))
+    """
+    factor, name = rung(unit, size)
+    for letter, plain_letters in (("²", "^2"), ("³", "^3"), ("µ", "u"), ("°", "deg")):
+        name = name.replace(letter, plain_letters)
+    return factor, name or "-"
 
 
 def duration(seconds: float | None) -> str:

@@ -32,6 +32,12 @@ class SimulationError(CutcalError):
         self.fraction = fraction
 
 
+BREAKDOWNS = {
+    "not_finite": "a force, energy or position is no number",
+    "inverted": "a particle was turned inside out",
+    "left_grid": "food left the grid",
+}
+"""Why a simulation cannot go on, in words, by its typed reason."""
 HAIR = 1e-200  # a lower limit this near below zero lets zero pass
 
 

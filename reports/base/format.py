@@ -20,6 +20,7 @@ from mpm.files import write_atomic
 from mpm.output.number_text import DASH as DASH
 from mpm.output.number_text import NBSP as NBSP
 from mpm.output.number_text import before_and_after as before_and_after
+from mpm.output.number_text import compared as compared
 from mpm.output.number_text import count as count
 from mpm.output.number_text import duration as duration
 from mpm.output.number_text import interval as interval

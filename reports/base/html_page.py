@@ -1,4 +1,7 @@
-"""A cut as one HTML file that needs no network: the food to turn around, a slider over the stroke, and the forces."""
+"""A cut as one HTML file that needs no network: the food to turn around, a slider over the stroke, and the forces.
+
+The food has its own colours at first; a button shows the stress in their place.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from mpm.files import write_atomic
+from mpm.output.food_colours import Colour, food_colours
 from mpm.scene.errors import OutputError
 from reports.base.film import COLOURS, EYE, FRAME, Film, blade_at
 from reports.base.scene_render import INK, STEEL, WOOD
@@ -28,6 +32,7 @@ new Response(stream).text().then((page) => { document.open(); document.write(pag
 """
 HOVER = "%{x:.1f} mm, %{y:.2f} N<extra></extra>"
 LIGHT = {"ambient": 0.55, "diffuse": 0.7, "specular": 0.15}
+OF_FOOD = (1, 2)  # traces of the page that are the food: its skin and the faces of the cut
 TITLES = ("von Mises stress [kPa]", "stroke [mm]", "force on the knife [N]")
 
 
@@ -108,24 +113,34 @@ def _moving(film: Film, k: int, go: Any, *, whole: bool) -> list[Any]:
     if not whole:
         return [*(go.Mesh3d(**food) for food in foods), go.Mesh3d(**knife), go.Scatter(**now)]
     bar = {"title": {"text": TITLES[0], "side": "right"}, "x": -0.04, "len": 0.6, "thickness": 14}
-    colours = {"cmin": 0.0, "cmax": film.largest / 1e3, "colorscale": COLOURS, "colorbar": bar}
+    colours = {"cmin": 0.0, "cmax": film.largest / 1e3, "colorbar": bar, "showscale": False}
     hover = "%{intensity:.3g} kPa<extra></extra>"
     meshes = [
         go.Mesh3d(
             **food,
             **_faces(own.reshape(-1, 3)),
             **colours,
-            showscale=first,
+            colorscale=scale,
             lighting=LIGHT,
             hovertemplate=hover,
         )
-        for food, (_, own), first in zip(foods, parts, (True, False), strict=True)
+        for food, (_, own), scale in zip(foods, parts, own_colours(film.food), strict=True)
     ]
     return [
         *meshes,
         go.Mesh3d(**knife, **_faces(triangles), color=STEEL, flatshading=True, lighting=LIGHT, hoverinfo="skip"),
         go.Scatter(**now, mode="markers", marker={"size": 11, "color": INK}, hovertemplate=HOVER),
     ]
+
+
+def own_colours(food: str) -> list[list[list[Any]]]:
+    """Scales of one colour, whatever the stress: of the skin of a food, and of its flesh."""
+    known = food_colours(food)
+    return [[[end, _rgb(colour)] for end in (0, 1)] for colour in (known.skin, known.flesh)]
+
+
+def _rgb(colour: Colour) -> str:
+    return f"rgb({', '.join(str(round(255 * part)) for part in colour)})"
 
 
 def _corners(points: np.ndarray) -> dict[str, np.ndarray]:
@@ -177,6 +192,22 @@ def _layout(film: Film, title: str) -> dict[str, Any]:
                     {"label": "play", "method": "animate", "args": [None, play]},
                     {"label": "stop", "method": "animate", "args": [[None], step]},
                 ],
-            }
+            },
+            {
+                "type": "buttons",
+                "direction": "left",
+                "x": 0.22,
+                "y": 1.08,
+                "buttons": [
+                    _coloured("food", own_colours(film.food), shown=False),
+                    _coloured("stress", [COLOURS, COLOURS], shown=True),
+                ],
+            },
         ],
     }
+
+
+def _coloured(label: str, scales: list[Any], *, shown: bool) -> dict[str, Any]:
+    """A button that colours skin and faces of the cut by these scales, with the bar of the stress or without."""
+    change = {"colorscale": scales, "showscale": [shown, False]}
+    return {"label": label, "method": "restyle", "args": [change, list(OF_FOOD)]}

@@ -75,7 +75,8 @@ def related(value: Any, limit: Any, passed: bool | None) -> str:
 def capital(text: str) -> str:
     """A sentence with a capital, unless it begins with a name: of a property, a file or a column."""
     first = text.split(" ", 1)[0]
-    return text[:1].upper() + text[1:] if first.isalpha() and first not in SYMBOLS else text
+    plain = first.replace("-", "").isalpha()
+    return text[:1].upper() + text[1:] if plain and first not in SYMBOLS else text
 
 
 def as_sentence(text: str) -> str:
@@ -94,9 +95,12 @@ def in_type(text: str) -> str:
     return _RAISED.sub(lambda m: m[1].translate(_EXPONENTS), spaced)
 
 
-def source_in_words(text: str) -> str:
-    """Where a value comes from, as a page prints it: a remark is one of a file that the page's reader has not."""
-    return in_type(_REMARK.sub(r"(remark \1 of materials.yaml)", text))
+def source_in_words(text: str, remarks: str = "") -> str:
+    """Where a value comes from, as a page prints it.
+
+    A remark is one of the material's file: the page has it among its references, or says after its number where it is.
+    """
+    return in_type(_REMARK.sub(rf"(remark \1{remarks})", text))
 
 
 def short(text: str, letters: int) -> str:

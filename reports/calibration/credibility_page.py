@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from reports import ReportError
-from reports.base.format import breakable, interval, quantity
+from reports.base.format import breakable, compared, interval, quantity
 from reports.base.labels import capital, in_words
 from reports.base.run_folder import REMEDY, Data, read_json
 
@@ -59,7 +59,7 @@ def _without_E(text: str) -> str:
 def _row(one: Mapping[str, Any], factor: float) -> list[str]:
     """Simulated and measured value, error, uncertainties, the interval of the model's error, and what follows."""
     unit, error, reach = one["unit"], one["error"], one["u_val"]
-    values = [quantity(one["simulated"], unit), quantity(one["measured"], unit), quantity(error, unit, signed=True)]
+    values = [compared(one["simulated"], unit), compared(one["measured"], unit), quantity(error, unit, signed=True)]
     uncertain = [quantity(one[key], unit, digits=2) for key in UNCERTAINTIES]
     if reach is None:
         return [*values, *uncertain, "not known", "nothing: a repeated run broke down, or none was made"]

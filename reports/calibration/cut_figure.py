@@ -27,7 +27,7 @@ ABOUT = 0.8  # distance from the blade to which a glance goes, in heights of the
 MARGIN = 0.12  # room around the food, of its height
 TALLEST = 52.0  # of one picture [mm]
 LABELS = 14.0  # title and numbers of the axes, of a picture's height [mm]
-LEAST = 26.0  # of one picture of several in a row [mm]
+LEAST = 18.0  # of one picture of several in a row [mm]
 AXIS = 14.0  # numbers and label at the left of a picture [mm]
 SCALE = 18.0  # scale of colours at the right, of a picture's width [mm]
 

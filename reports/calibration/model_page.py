@@ -260,6 +260,12 @@ def _conditions(result: CalibrationResult) -> list[list[str]]:
     return [*rows, ["G", "the grid, at its size; all other surfaces are free"]]
 
 
+def _left_out(result: CalibrationResult) -> str:
+    """How far a right model may be from the trace, part of its peak."""
+    said = result.posterior.discrepancy
+    return "3 % (unless its command says another one)" if said is None else quantity(said, "fraction", digits=None)
+
+
 def _objective(result: CalibrationResult) -> str:
     words = "Tare, drift and lag are integrated out of the curve; gain and width widen the intervals."
     open_ = f" {words}" if result.nuisances else ""
@@ -275,7 +281,7 @@ def _objective(result: CalibrationResult) -> str:
         f"The fit minimises the sum of squared residuals of {what} whitened, and of the parameters against the "
         "literature's ranges (central 95 % of normal priors, of the logarithm for stresses and resistances)."
         f"{ratio} "
-        "A residual's variance is noise plus 3 % of the peak for what the model leaves out, unless another "
-        f"--discrepancy is in the command [@Kennedy 2001].{pull if up else ''}{open_} Intervals are profile "
+        f"The standard deviation of a residual is that of the noise and {_left_out(result)} of the peak, for what the "
+        f"model leaves out, in squares [@Kennedy 2001].{pull if up else ''}{open_} Intervals are profile "
         "likelihoods whose ends were simulated [@Raue 2009]."
     )

@@ -17,7 +17,9 @@ POINTS = 121  # of an outline
 BURIED = 0.45  # of the food's height, to which the blade is drawn
 HEIGHT = 46.0  # of the sketch [mm]
 ABOVE = 0.55  # room above the food, of its height
-PATCH = 5  # cells of the grid that are drawn, in each direction
+ROOM = 0.9  # least way to either side of the blade that is drawn, of the food's height: the letters take it
+PATCH = 5  # cells of the grid that are drawn at most, in each direction
+BESIDE, TALL = 0.45, 0.8  # of the food's half length and of its height, which they do not leave
 FLESH = "#f3e3b3"
 
 
@@ -53,7 +55,7 @@ def sketch(shape: Shape, knife: Knife, dx: float, symmetric: tuple[bool, bool]) 
 
 
 def _ratio(shape: Shape) -> tuple[float, float]:
-    return max(shape.length, 0.8 * shape.height), max(shape.width, 0.8 * shape.height)
+    return max(shape.length, 2 * ROOM * shape.height), max(shape.width, 0.8 * shape.height)
 
 
 def _across(axes: Axes, shape: Shape, knife: Knife, dx: float) -> None:
@@ -67,20 +69,23 @@ def _across(axes: Axes, shape: Shape, knife: Knife, dx: float) -> None:
     corners = [(0.0, edge), (wide, min(edge + full, top)), (wide, top), (-wide, top), (-wide, min(edge + full, top))]
     axes.add_patch(Polygon([(1e3 * a, 1e3 * b) for a, b in corners], facecolor="white", edgecolor=BLACK, lw=0.9))
     cell, corner = 1e3 * dx, (0.55e3 * y[0], 0.12e3 * shape.height)
-    for k in range(PATCH + 1):
-        axes.plot([corner[0], corner[0] + PATCH * cell], [corner[1] + k * cell] * 2, color=BLUE, lw=0.5)
-        axes.plot([corner[0] + k * cell] * 2, [corner[1], corner[1] + PATCH * cell], color=BLUE, lw=0.5)
+    cells = max(1, min(PATCH, int(BESIDE * 1e3 * -y[0] / cell), int(TALL * 1e3 * shape.height / cell)))
+    for k in range(cells + 1):
+        axes.plot([corner[0], corner[0] + cells * cell], [corner[1] + k * cell] * 2, color=BLUE, lw=0.5)
+        axes.plot([corner[0] + k * cell] * 2, [corner[1], corner[1] + cells * cell], color=BLUE, lw=0.5)
     h = 1e3 * shape.height
     _mark(axes, "A", (wide * 1e3, 1e3 * top), (0.30 * h, 1.30 * h))
     _mark(axes, "B", (wide * 5e2, (0.75 * top + 0.25 * edge) * 1e3), (0.62 * h, 1.12 * h))
     _mark(axes, "C", (0.0, 1e3 * edge), (0.42 * h, 0.42 * h))
     _mark(axes, "D", (0.0, 0.5e3 * edge), (0.30 * h, 0.14 * h))
-    _mark(axes, "E", (0.7e3 * y[-1], 0.0), (0.72e3 * y[-1], 0.22 * h))
-    axes.annotate("G", (corner[0] + PATCH * cell, corner[1] + PATCH * cell), color=BLUE, fontweight="bold",
+    board = max(0.7e3 * y[-1], 0.62 * h)
+    _mark(axes, "E", (board, 0.0), (board + 0.02 * h, 0.22 * h))
+    axes.annotate("G", (corner[0] + cells * cell, corner[1] + cells * cell), color=BLUE, fontweight="bold",
                   xytext=(2, 1), textcoords="offset points")  # fmt: skip
     axes.annotate("", (-0.2 * h, 1.08 * h), (-0.2 * h, (1.0 + 0.8 * ABOVE) * h),
                   arrowprops={"arrowstyle": "-|>", "color": RED})  # fmt: skip
-    axes.set_xlim(1.04e3 * y[0], 1.04e3 * y[-1])
+    reach = max(1.04e3 * y[-1], ROOM * h)
+    axes.set_xlim(-reach, reach)
     axes.set_title("across the blade, y [mm]")
 
 

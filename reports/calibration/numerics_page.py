@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from mpm.output.energy import spent, unbooked
+from mpm.scene.errors import BREAKDOWNS
 from reports.base.format import breakable, count, duration, interval, listed, plain, quantity
 from reports.base.labels import in_words, shown
 from reports.base.run_folder import Data
@@ -22,6 +23,8 @@ KINDS = {
     "again": "as repeats (half the speed, other particles)",
     "check": "as checks of the numerics",
 }
+#: Why a simulation broke down, in words; another reason is told as the solver has it.
+REASONS = {**BREAKDOWNS, "worker_died": "its process was killed"}
 #: Part of the simulations from which on the first page says that they broke down [-].
 MANY_FAILED = 0.1
 #: The line of the first page that has the energy that no law took.
@@ -49,18 +52,10 @@ def numerics(result: CalibrationResult) -> Data:
 
 def broke_down(history: SearchHistory) -> str:
     """A sentence for the first page where many simulations broke down, with a space before it; else nothing."""
-    every, failed = _numbers(history)
+    every, failed = history.every.simulations, history.every.failed
     if not failed or failed < MANY_FAILED * every:
         return ""
     return f" {count(failed)} of {count(every)} simulations broke down: where they lie the fit is blind."
-
-
-def _numbers(history: SearchHistory) -> tuple[int, int]:
-    """How many simulations there are, and how many of them failed; of older runs those of the search alone."""
-    kept = history.kept.values()
-    if not kept:
-        return history.simulations, history.failed_simulations
-    return sum(t.simulations for t in kept), sum(t.failed for t in kept)
 
 
 def _simulations(history: SearchHistory) -> Data:
@@ -68,7 +63,7 @@ def _simulations(history: SearchHistory) -> Data:
     kept = history.kept
     known = {kind: kept[kind] for kind in KINDS if kind in kept} | {k: t for k, t in kept.items() if k not in KINDS}
     kinds = [f"{count(t.simulations)} {KINDS.get(kind, kind)}" for kind, t in known.items()]
-    every, failed = _numbers(history)
+    every, failed = history.every.simulations, history.every.failed
     of_search = f"the search made {count(history.simulations)} of them"
     return {
         "simulations": count(every),
@@ -108,7 +103,14 @@ def failures(failures: Sequence[BrokenRun]) -> list[list[str]]:
         span = interval(min(parts), max(parts), "fraction", digits=2) if parts else ""
         units = same[0].units
         first = [f"{name} = {shown(x, units[name], 3)}" for name, x in same[0].parameters.items()]
-        rows.append([breakable(in_words(reason)), str(len(same)), span, "; ".join(first)])
+        rows.append(
+            [
+                breakable(in_words(reason) + (f": {REASONS[reason]}" if reason in REASONS else "")),
+                str(len(same)),
+                span,
+                "; ".join(first),
+            ]
+        )
     return rows
 
 

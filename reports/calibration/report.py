@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from mpm.scene import Knife
 from mpm.scene.shapes import Shape
 from reports.base import figures
-from reports.base.format import breakable, count, listed, plain, publish, quantity, uncertain
+from reports.base.format import breakable, compared, count, listed, plain, publish, quantity, uncertain
 from reports.base.labels import LEAST_PART, capital, in_type, in_words, related, shown
 from reports.base.references import Citations
 from reports.base.run_folder import Data, Finished, read_finished
@@ -138,7 +138,7 @@ def _null_peaks(result: CalibrationResult) -> dict[str, str]:
     agreement = result.agreement
     models = {**agreement.null_models, **({"start": result.at_literature} if result.at_literature else {})}
     peaks = {name: agreement.peak_real_N * (1.0 + (m.peak_error or 0.0)) for name, m in models.items()}
-    return {f"{name}_N": quantity(peak, "N") for name, peak in peaks.items()}
+    return {f"{name}_N": compared(peak, "N") for name, peak in peaks.items()}
 
 
 def _legend(result: CalibrationResult) -> dict[str, str]:
@@ -146,7 +146,7 @@ def _legend(result: CalibrationResult) -> dict[str, str]:
     agreement = result.agreement
     return {
         "real_N": f"{result.trace.label}, peak {uncertain(agreement.peak_real_N, result.peak_sd_N, 'N')}",
-        "sim_N": f"simulated, peak {quantity(agreement.peak_sim_N, 'N')}",
+        "sim_N": f"simulated, peak {compared(agreement.peak_sim_N, 'N')}",
     }
 
 
@@ -261,7 +261,7 @@ def _trace(result: CalibrationResult) -> Data:
         "label": trace.label,
         "samples": count(trace.samples),
         "duration": quantity(seconds, "s"),
-        "rate": quantity(trace.samples / seconds if seconds > 0.0 else None, "Hz"),
+        "rate": quantity((trace.samples - 1) / seconds if seconds > 0.0 else None, "Hz"),
         "columns": [[role, breakable(name)] for role, name in trace.columns.items()],
         "air": breakable(air.source or "without a name") if air else None,
     }
@@ -362,12 +362,13 @@ def _null_sentences(agreement: Agreement) -> list[str]:
 def _metrics(agreement: Agreement) -> Data:
     """The figures of the comparison by name; the template labels them."""
     m, g, iso = agreement.metrics, agreement.sprague_geers, agreement.iso18571
-    units = {"peak_sim_N": "N", "work_sim_J": "J", "work_real_J": "J", "shape_ramp": "fraction",
-             "shape_peak": "fraction", "shape_release": "fraction", "best_scale": "-", "relative_l2": "fraction",
-             "best_scale_residual": "fraction"}  # fmt: skip
+    units = {"shape_ramp": "fraction", "shape_peak": "fraction", "shape_release": "fraction", "best_scale": "-",
+             "relative_l2": "fraction", "best_scale_residual": "fraction"}  # fmt: skip
+    sizes = {"peak_sim_N": "N", "work_sim_J": "J", "work_real_J": "J"}
     signed = ("peak_error", "peak_position_error", "work_error", "stiffness_error")
     return {
         **{name: quantity(getattr(m, name), unit) for name, unit in units.items()},
+        **{name: compared(getattr(m, name), unit) for name, unit in sizes.items()},
         **{name: quantity(getattr(m, name), "fraction", signed=True) for name in signed},
         "sprague_geers": [quantity(getattr(g, k), "fraction", signed=k == "M") for k in "MPC"],
         "iso": {k: quantity(getattr(iso, k), "-") for k in ("Z", "EP", "EM", "ES", "R")},

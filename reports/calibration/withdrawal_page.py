@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from reports.base.figures import BLACK, MEASURED, SIMULATED, predictive, svg
-from reports.base.format import plain, quantity
+from reports.base.format import compared, plain, quantity
 from reports.base.run_folder import Data
 from reports.calibration import measurement
 
@@ -47,9 +47,9 @@ def withdrawal(found: WithdrawalAgreement) -> Data:
         "rows": [
             ["Compared", f"from {quantity(found.from_m, 'm')} to {quantity(found.to_m, 'm')} above the lowest point"],
             ["Speed", f"{quantity(found.speed_m_s, 'm/s')} on average"],
-            ["Largest pull", f"measured {quantity(found.peak_real_N, 'N')}, simulated "
-                             f"{quantity(found.peak_sim_N, 'N')}"],
-            ["Work", f"measured {quantity(found.work_real_J, 'J')}, simulated {quantity(found.work_sim_J, 'J')}"],
+            ["Largest pull", f"measured {compared(found.peak_real_N, 'N')}, simulated "
+                             f"{compared(found.peak_sim_N, 'N')}"],
+            ["Work", f"measured {compared(found.work_real_J, 'J')}, simulated {compared(found.work_sim_J, 'J')}"],
             ["Curve error (NRMSE)", f"{quantity(found.nrmse, 'fraction')}, over the largest measured pull"],
             ["Within the 95 % band", "not determined" if inside is None else quantity(inside, "fraction", digits=2)],
             *([f"Evidence for {NAMED[name]}", _evidence(one)] for name, one in found.without.items()),

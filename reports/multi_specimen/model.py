@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from mpm.scene import Knife
-from reports.base.format import DASH, breakable, count, interval, plain, quantity, uncertain
+from reports.base.format import DASH, breakable, compared, count, interval, plain, quantity, uncertain
 from reports.base.labels import in_words, source_in_words
 from reports.base.references import Citations
 from reports.base.run_folder import Data
@@ -77,6 +77,7 @@ def model(
             "fixed": FIXED,
             "limit_sources": _limit_sources(s, limit_sources),
             "ranges": _ranges(s["parameters"]),
+            "presses": [_press(press) for press in (s.get("presses") or {}).values()],
         }
     )
     return {**content, "references": citations.listed}
@@ -103,8 +104,8 @@ def _cut(name: str, s: Data, columns: Mapping[str, np.ndarray]) -> list[str]:
         cells,
         count(particles),
         quantity(float(columns["stroke_m"][-1]), "m"),
-        quantity(m["peak_real_N"], "N"),
-        quantity(m["peak_sim_N"], "N"),
+        compared(m["peak_real_N"], "N"),
+        compared(m["peak_sim_N"], "N"),
     ]
 
 
@@ -145,11 +146,23 @@ def _limit_sources(s: Data, sources: Mapping[str, str]) -> list[list[str]]:
     return [["; ".join(lines), why] for why, lines in grouped.items()]
 
 
+def _press(press: Data) -> list[str]:
+    """Name, modulus, its uncertainty, repeats, Poisson's ratio and files of a compression test."""
+    files = "; ".join(f"{breakable(file['name'])}, SHA-256 {file['sha256'][:16]}" for file in press["files"])
+    return [
+        breakable(press["name"]), quantity(press["E"], "Pa"), quantity(press["spread"], "fraction", digits=2),
+        count(press["repeats"]), plain(press["nu"], None), files,
+    ]  # fmt: skip
+
+
 def _ranges(parameters: Data) -> list[list[str]]:
     """Where the literature's range of each property comes from, each once."""
     found: dict[tuple[str, ...], str] = {}
     for name, p in parameters.items():
-        ends, source = interval(p["prior_low"], p["prior_high"], p["unit"]), source_in_words(p.get("source") or "")
+        ends, source = (
+            interval(p["prior_low"], p["prior_high"], p["unit"]),
+            source_in_words(p.get("source") or "", " of materials.yaml"),
+        )
         if source:
             found.setdefault((name.split("@")[0], ends, in_words(p.get("status") or ""), source), name)
     return [[breakable(row[0]), *row[1:]] for row in found]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from reports.base.format import DASH, breakable, listed, quantity
+from reports.base.format import DASH, breakable, compared, listed, quantity
 from reports.base.labels import related, shown
 from reports.base.run_folder import Data
 
@@ -163,8 +163,8 @@ def sentence(s: Data, widths: Mapping[str, float | None]) -> str:
     elif failed:
         text = f"{held - len(failed)} of {held} held-out cuts were predicted within the limits; not {listed(failed)}."
     else:
-        text = f"All {held} held-out cuts were predicted within the limits." if held > 1 else (
-            f"The held-out cut {next(iter(s['hold_out']))} was predicted within the limits.")  # fmt: skip
+        all_ = {1: f"The held-out cut {next(iter(s['hold_out']))} was", 2: "Both held-out cuts were"}
+        text = f"{all_.get(held, f'All {held} held-out cuts were')} predicted within the limits."
     text += "".join(f" {said}" for said in wide_bands(widths))
     apart: list[str] = []
     for name, t in s["traces"].items():
@@ -189,14 +189,14 @@ def wide_bands(widths: Mapping[str, float | None]) -> list[str]:
 def peaks(cut: Data, word: str) -> str:
     """Largest forces of a cut, measured and simulated, in words."""
     m = cut["metrics"]
-    return f"Peak {quantity(m['peak_real_N'], 'N')} measured, {quantity(m['peak_sim_N'], 'N')} {word}."
+    return f"Peak {compared(m['peak_real_N'], 'N')} measured, {compared(m['peak_sim_N'], 'N')} {word}."
 
 
 def change(c: Data) -> list[str]:
     """Change of peak and work by one numerical choice."""
     if c.get("reason"):
         return [f"broke down: {c['reason'].replace('_', ' ')}", ""]
-    return [quantity(c.get(key), "fraction", digits=2, signed=True) for key in ("peak_change", "work_change")]
+    return [quantity(c.get(key), "fraction", signed=True) for key in ("peak_change", "work_change")]
 
 
 def carried_on(s: Data) -> str:

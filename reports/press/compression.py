@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 STRESS = "Stress"
 """Title of the part that shows it."""
 ALT = "Measured and fitted stress over strain, and their difference"
-CITED = ("Hu 2018", "Stomakhin 2012")
-"""What the report cites as [1] and [2]."""
+CITED = ("Stomakhin 2012", "Hu 2018")
+"""What the report cites as [1] and [2], in the order in which it is read."""
 LAW = (
-    "fixed-corotated, isotropic elasticity [2]: stress is in proportion to Young's modulus, so that one simulated "
+    "fixed-corotated, isotropic elasticity [1]: stress is in proportion to Young's modulus, so that one simulated "
     "curve is scaled to each repeat by least squares"
 )
 NRMSE = (
@@ -119,7 +119,7 @@ def _facts(result: CompressionResult) -> list[tuple[str, str]]:
         ("Law", LAW),
         (
             "Simulation",
-            f"moving least squares material point method [1]: {run.cells} cells of {quantity(run.dx_m, 'm')} over the "
+            f"moving least squares material point method [2]: {run.cells} cells of {quantity(run.dx_m, 'm')} over the "
             f"height, {count(run.particles)} particles, {count(run.steps)} steps, plate at {plain(run.mach, 2)} of the "
             "speed of pressure waves, no gravity",
         ),

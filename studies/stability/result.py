@@ -11,12 +11,11 @@ from calib.io.provenance import CommandLine, Commit, DeviceName, Seed, Versions
 from calib.io.type_schema import Count, Fraction, NotNegative, Positive, keywords, one_of
 from calib.io.typed_document import FLAT
 from calib.simulation.workers import DIED
+from mpm.scene.errors import BREAKDOWNS
 
 RESULT_FILE = "stress.json"
 REASONS = {
-    "not_finite": "a force, energy or position is no number",
-    "inverted": "a particle was turned inside out",
-    "left_grid": "food left the grid",
+    **BREAKDOWNS,
     "energy_growth": "more energy than was put in",
     "momentum": "momentum does not balance",
     "cfl": "the time step is refused",

@@ -8,9 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from calib.material.food import load_food
+from calib.calibration.result import read_result
+from calib.material.food import load_food, load_foods
+from cutcal.commands.calibration.calibrate import verdict_text
 from cutcal.main import main
 from tests.data_dir import ROOT
+from tests.reports.sample import summary, write_run
 
 BANANA = ROOT / "force_data" / "banana_reconstructed.csv"
 
@@ -44,7 +47,7 @@ def refused(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
 BAD_TRACES = {
     "text in the force column": (spoil(cut(), 17, "force_N", "oops"), ["force_N", "oops", "19"]),
     "inf in the force column": (spoil(cut(), 17, "force_N", "inf"), ["force_N", "19"]),
-    "time not increasing": (cut().assign(time_s=lambda d: d.time_s.where(d.index % 2 == 0, 0.0)), ["time_s", "increas"]),
+    "time not increasing": (cut().assign(time_s=lambda d: d.time_s * (d.index % 2)), ["time_s", "increas"]),
     "no contact": (cut().assign(force_N=5 + np.random.default_rng(1).normal(0, 0.02, 200)), ["no contact"]),
     "short baseline": (cut(before=3), ["baseline"]),
     "wrong sign": (cut(sign=-1.0), ["--sign"]),
@@ -129,10 +132,28 @@ def test_numbers_are_checked_by_the_parser(value, capsys):
 def test_foods_lists_and_shows(capsys):
     """``foods`` lists every food; one food comes with ranges, sources and its flags; JSON is one document."""
     assert main(["foods"]) == 0
-    assert "potato" in capsys.readouterr().out.split()
+    head, *lines, foot = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(load_foods())
+    assert max(map(len, [head, *lines, foot])) <= 80
+    (potato,) = (line for line in lines if line.startswith("potato "))
+    assert head.split() == ["shape", "length", "width", "height", "E", "R"]
+    assert potato.split() == "potato half_cylinder 80 mm 65 mm 50 mm 2 MPa 75 J/m^2".split()
     assert main(["foods", "banana"]) == 0
-    assert "Table 2" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "Table 2" in shown and "300 kPa      50 to 2000, proxy" in shown
     assert main(["foods", "cherry"]) == 0
     assert "! cherry: not modelled: the stone" in capsys.readouterr().out
     assert main(["foods", "banana", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["banana"]["properties"]["E"]["value"] == load_food("banana").value("E")
+
+
+def test_the_terminal_has_units_that_people_use(tmp_path):
+    """Fitted values and their intervals share one, with no power of ten; so do those of ``foods``."""
+    lines = {
+        line.split()[0]: line.split() for line in verdict_text(read_result(write_run(tmp_path))).splitlines() if line
+    }
+    value, unit, low, to, high, *_ = lines["E"][1:]
+    p = summary()["parameters"]["E"]
+    assert (unit, to) == ("kPa", "to") and float(value) == pytest.approx(p["value"] / 1e3, rel=1e-3)
+    assert [float(low), float(high)] == pytest.approx([p["low95"] / 1e3, p["high95"] / 1e3], rel=5e-3)
+    assert not any("e+" in word for word in lines["E"])

@@ -11,6 +11,7 @@ import sys
 
 import pytest
 
+from calib._version import __version__
 from calib.material.food import load_foods
 from calib.material.knife import load_knives
 from cutcal.doctor import Finding
@@ -209,6 +210,10 @@ def test_calibrate_alone_is_the_same(capsys, monkeypatch):
     assert calibrate() == main(["calibrate", "--food"]) == 1
     one, other = capsys.readouterr().err.splitlines()
     assert one == other
+    monkeypatch.setattr(sys, "argv", ["calibrate", "--version"])
+    with pytest.raises(SystemExit, match="0"):
+        calibrate()
+    assert capsys.readouterr().out == f"cutcal {__version__}\n"
 
 
 def test_names_that_are_offered_are_known(capsys):

@@ -94,6 +94,24 @@ def test_a_device_that_computes_wrongly_or_hangs_is_told(monkeypatch):
     assert "no answer" in doctor.device("vulkan", "Vulkan")[0].words
 
 
+def test_a_busy_machine_is_not_called_broken(monkeypatch):
+    """Where many processes want the cores a solver that has not answered may only have waited: that comes first."""
+    if not hasattr(doctor.os, "getloadavg"):
+        pytest.skip("no load average on this system")
+
+    def hang(command: list[str], timeout: float, **_: object) -> None:
+        raise subprocess.TimeoutExpired(command, timeout)
+
+    monkeypatch.setattr(subprocess, "run", hang)
+    monkeypatch.setattr(doctor, "_cores", lambda: 2)
+    said = {}
+    for load in (0.3, 7.2):
+        monkeypatch.setattr(doctor.os, "getloadavg", lambda load=load: (load, load, load))
+        said[load] = doctor.device("cpu", "solver")[0].words
+    assert said[0.3] == "no answer within 180 s; pip install --force-reinstall taichi"
+    assert "while 7 processes wanted 2 cores; end other programs and try again, else pip" in said[7.2]
+
+
 def test_cache_memory_and_folder(monkeypatch, tmp_path):
     """No cache is slow, not wrong; little memory and a folder that is missing fail."""
     assert doctor.kernels(None).state == doctor.kernels(tmp_path / "none").state == "absent"

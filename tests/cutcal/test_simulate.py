@@ -12,8 +12,10 @@ import pandas as pd
 import pytest
 
 from calib.trace.trace import read_trace
+from cutcal.commands.solver.simulate import _state
 from cutcal.main import main
 from mpm.output.energy import doubts
+from mpm.output.record import ForceRecord
 from tests.calib.documents import valid
 from tests.calib.made_outlines import half, picture
 
@@ -35,6 +37,18 @@ def test_simulate_writes_a_force_record_that_reads_back(tmp_path: Path, capsys):
     np.testing.assert_allclose(back.force, c["knife_fz_N"])
     assert main([*argv, "--out", str(out)]) == 1
     assert "never overwritten" in capsys.readouterr().err
+
+
+def test_a_cut_that_broke_down_says_how_far_it_came() -> None:
+    """In words, with the reason that the files have; one that is done is done."""
+    found = ForceRecord.__new__(ForceRecord)
+    vars(found).update(status="inverted", fraction=0.57)
+    said = _state(found)
+    assert said == "broke down after 57% of its stroke (inverted: a particle was turned inside out)"
+    vars(found).update(status="stopped", fraction=0.5)
+    assert _state(found) == "broke down after 50% of its stroke (stopped)"
+    vars(found).update(status="done")
+    assert _state(found) == "done"
 
 
 def test_simulate_withdraws_the_blade(tmp_path: Path, capsys):

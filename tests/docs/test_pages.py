@@ -30,6 +30,9 @@ from tests.data_dir import ROOT
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.glob("*.md"))
 TEXTS = [*PAGES, ROOT / "README.md"]
+LINKED = [*TEXTS, ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", ROOT / "force_data" / "SOURCES.md"]
+LINK = re.compile(r"\]\(([^)#\s]*)(?:#([^)\s]*))?\)")
+"""A link of a page: its file, and the heading in it."""
 
 
 def read(path: Path) -> str:
@@ -106,12 +109,38 @@ def test_commands_can_be_typed(path: Path) -> None:
             pytest.fail(f"{path.name}: {line}")
 
 
-@pytest.mark.parametrize("path", TEXTS, ids=name_of)
-def test_links_lead_to_files(path: Path) -> None:
-    """A link to a file of the repository leads to one, as the page is read there."""
-    links = re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", read(path))
-    inside = [link for link in links if "://" not in link]
-    assert [link for link in inside if not (path.parent / link).exists()] == []
+def anchors(path: Path) -> set[str]:
+    """Places of a page that a link may lead to, as the repository and the site name them."""
+    found: list[str] = []
+    for heading in re.findall(r"^#{1,6} (.+)$", re.sub(r"^```.*?^```", "", read(path), flags=re.M | re.S), flags=re.M):
+        words = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).lower()
+        found.append(re.sub(r"[^\w -]", "", words).replace(" ", "-"))
+    made = {f"cutcal-{name}" for name in COMMANDS} if path == DOCS / "cli.md" else set()  # by the directive there
+    return {f"{name}-{found[:k].count(name)}" if name in found[:k] else name for k, name in enumerate(found)} | made
+
+
+def broken(path: Path, text: str) -> list[str]:
+    """Links of a page to files and headings that are not there, as the page is read in the repository."""
+    out = []
+    for link, heading in LINK.findall(text):
+        target = path.parent / link if link else path
+        if "://" in link or link.startswith("mailto:"):
+            continue
+        if not target.exists() or (heading and target.suffix == ".md" and heading not in anchors(target)):
+            out.append(f"{link}#{heading}")
+    return out
+
+
+@pytest.mark.parametrize("path", LINKED, ids=name_of)
+def test_links_lead_to_files_and_headings(path: Path) -> None:
+    """A link to a file of the repository leads to one, and one to a heading to one that is there."""
+    assert broken(path, read(path)) == []
+
+
+def test_a_broken_link_would_be_found() -> None:
+    """A file that is not there, a heading that is not, here and on another page."""
+    text = "[a](docs/none.md) [b](#none) [c](docs/theory.md#none) [d](docs/cli.md#cutcal-press) [e](#try-it)"
+    assert broken(ROOT / "README.md", text) == ["docs/none.md#", "#none", "docs/theory.md#none"]
 
 
 @pytest.mark.parametrize("page", ["theory.md", "converge.md"])

@@ -37,11 +37,13 @@ from cutcal.options import (
     workers_of,
 )
 from cutcal.surroundings import interrupted
+from mpm.output.number_text import terminal_rung
 from mpm.scene.errors import CutcalError
 
 if TYPE_CHECKING:
     from calib.calibration.result import CalibrationResult
-    from calib.multi_specimen.result import HeldOutCut, InSampleCut, StudyResult
+    from calib.multi_specimen.result import HeldOutCut, InSampleCut, StudyParameter, StudyResult
+    from calib.uncertainty.estimates import FittedParameter
 
 MEASUREMENT = "measurement"  # title of the group of options that say what was measured
 HEIGHT_HELP = "column of the knife's height ('none'), or --depth-col"
@@ -232,11 +234,28 @@ def run_study(args: argparse.Namespace, command: Sequence[str]) -> int:
 
     if args.check is not None:
         raise CutcalError("--check is for one trace: give --food and --trace, and leave --config out")
-    taken = [n for n in ("food", "trace", "air", "material", "fit") if getattr(args, n) is not None]
+    taken = beside_study(args)
+    if taken in NOT_IN_A_FILE:
+        raise CutcalError(f"--{taken} beside --config, which does not take it; leave it out")
     if taken:
-        raise CutcalError(f"--{taken[0]} beside --config: write it into {args.config}, where it belongs to a trace")
+        raise CutcalError(f"--{taken} beside --config: write it into {args.config}, for all cuts or for one")
     study = read_study(args.config).run_with(budget=args.budget, arch=args.arch, command=tuple(command))
     return fit_study(args, study, Path(args.out or f"cutcal-{Path(args.config).stem}"))
+
+
+OF_A_STUDY = ("config", "out", "budget", "arch", "workers", "scheduler", "resume", "json", "check")
+"""Options that ``--config`` goes with."""
+NOT_IN_A_FILE = ("all", "discrepancy", "u-num")
+"""Options that are neither for a study nor for a trace of one."""
+
+
+def beside_study(args: argparse.Namespace) -> str:
+    """The first option that was given beside ``--config`` and would not be heeded, without its dashes; none: empty."""
+    parser = argparse.ArgumentParser()
+    add_args(parser)
+    usual = vars(parser.parse_args([]))
+    others = (name for name, value in usual.items() if name not in OF_A_STUDY and getattr(args, name) != value)
+    return next((name.replace("_", "-") for name in others), "")
 
 
 def run_cuts(args: argparse.Namespace, study: StudySpec) -> int:
@@ -288,14 +307,25 @@ def study_text(result: StudyResult, out: Path) -> str:
         )
         lines += [f"        {m.iso18571.caveat}"] if m.iso18571.caveat else []
     lines.append(f"  {'fitted':24s}{'value':>10s} {'':6s}{'95 % interval':>24s}")
-    for name, p in result.parameters.items():
-        interval = "" if p.low95 is None else f"{p.low95:.3g} to {p.high95:.3g}"
-        lines.append(f"  {name:24s}{p.value:>10.4g} {p.unit:6s}{interval:>24s}  {p.verdict}")
+    lines += [f"  {name:24s}{_fitted(p)}" for name, p in result.parameters.items()]
     head = (
         f"{result.food}, {result.study}: {'passed' if result.passed else 'not passed'}; "
         f"{result.simulations} simulations in {result.wall_s:.0f} s"
     )
     return "\n".join([head, *lines, f"  wrote {out}"])
+
+
+def _fitted(p: FittedParameter | StudyParameter) -> str:
+    """Value, interval and verdict of a parameter, in the unit that people use for it."""
+    factor, unit = terminal_rung(p.unit, abs(p.value))
+    known = None if p.low95 is None or p.high95 is None else (p.low95 / factor, p.high95 / factor)
+    interval = "" if known is None else f"{_end(known[0])} to {_end(known[1])}"
+    return f"{p.value / factor:>10.4g} {unit:6s}{interval:>24s}  {p.verdict}"
+
+
+def _end(x: float) -> str:
+    """An end of an interval in three digits: 1750, and no power of ten below a million."""
+    return f"{float(f'{x:.3g}'):g}"
 
 
 def verdict_text(result: CalibrationResult) -> str:
@@ -309,14 +339,12 @@ def verdict_text(result: CalibrationResult) -> str:
         remedy = remedied(v)
         lines += [f"  {'':8s}{remedy}"] if remedy else []
     lines.append(f"  {'fitted':8s}{'95 % interval':>42s}")
-    for name, p in result.fitted.items():
-        interval = "" if p.low95 is None else f"{p.low95:.3g} to {p.high95:.3g}"
-        lines.append(f"  {'':8s}{name:18s}{p.value:>10.4g} {p.unit:6s}{interval:>24s}  {p.verdict}")
+    lines += [f"  {'':8s}{name:18s}{_fitted(p)}" for name, p in result.fitted.items()]
     lines.insert(0, f"  {identified_words(result.fitted)}")
     state = "interrupted" if result.status == "interrupted" else "passed" if result.passed else "not passed"
     peak, real = result.agreement.peak_sim_N, result.agreement.peak_real_N
     head = (
         f"{result.food}: {state}; peak {peak:.2f} N against {real:.2f} N ({result.trace.label}), "
-        f"{result.history.simulations} simulations in {result.wall_s:.0f} s"
+        f"{result.history.every.simulations} simulations in {result.wall_s:.0f} s"
     )
     return "\n".join([head, *lines, f"  wrote {result.folder}"])

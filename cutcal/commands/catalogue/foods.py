@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import re
 
 from calib.io.schema import tag
@@ -10,6 +11,7 @@ from calib.material.food import FoodSpec, load_food, load_foods
 from calib.material.own_food import template
 from calib.material.properties import FORM, PROPERTIES
 from cutcal.options import add_json, print_json
+from mpm.output.number_text import terminal_rung
 
 NAME = re.compile(r"[a-z][a-z0-9_]*")
 HELP = "list the foods, or the values of one with their sources"
@@ -42,6 +44,16 @@ def _outline(food: FoodSpec) -> str:
     return f"{food.shape_kind}, {size} mm"
 
 
+def _table() -> str:
+    """Shape, sizes, and the two values that a cut hangs on most, a food a line."""
+    lines = [f"{'':15s}{'shape':15s}{'length':>9s}{'width':>9s}{'height':>9s}{'E':>10s}{'R':>11s}"]
+    for name, food in load_foods().items():
+        sizes = "".join(f"{food.dims[n].value * 1e3:>6g} mm" for n in ("length", "width", "height"))
+        E, R = food.value("E") or math.nan, food.value("R") or math.nan
+        lines.append(f"{name:15s}{food.shape_kind:15s}{sizes}{E / 1e6:>6.3g} MPa{R:>5.3g} J/m^2")
+    return "\n".join([*lines, "E: Young's modulus, R: cutting resistance; cutcal foods NAME says all values"])
+
+
 def run(args: argparse.Namespace) -> int:
     """Print the list, one food, or a file to begin one with."""
     if args.template is not None:
@@ -52,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
         if args.json:
             print_json(names)
         else:
-            print("\n".join(f"{name:15s}{_outline(food)}" for name, food in load_foods().items()))
+            print(_table())
         return 0
     food = load_food(args.name)
     if args.json:
@@ -65,8 +77,9 @@ def run(args: argparse.Namespace) -> int:
     for name in (*FORM, *PROPERTIES):
         p = food.roundness if name in FORM else food.properties.get(name)
         if p is not None:
-            text = f"{p.value:g} {p.unit}"
-            print(f"  {name:17s}{text:16s} {p.low:g} to {p.high:g}, {p.status}: {p.source}")
+            factor, unit = terminal_rung(p.unit, p.value)
+            text = f"{p.value / factor:g} {unit}"
+            print(f"  {name:17s}{text:12s} {p.low / factor:g} to {p.high / factor:g}, {p.status}: {p.source}")
     for warning in food.warnings():
         print(f"  ! {warning}")
     return 0

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from calib.io.folder import prepare, write_csv, write_json
-from calib.io.progress import Countdown, clock
+from calib.io.progress import Countdown, clock, rewrites
 from calib.io.provenance import git_commit, versions
 from calib.io.schema import tag
 from calib.io.typed_document import to_document
@@ -39,7 +39,7 @@ from mpm.output.energy import doubts, spent, unbooked
 from mpm.output.record import LIMIT, ForceRecord
 from mpm.output.snapshot import SnapshotRecorder
 from mpm.scene import CONTACTS, Arm, Inclusion, Motion, Scene
-from mpm.scene.errors import CutcalError
+from mpm.scene.errors import BREAKDOWNS, CutcalError
 from mpm.scene.shapes import Shape
 
 if TYPE_CHECKING:
@@ -276,7 +276,7 @@ def _simulated(args: argparse.Namespace, scene: Scene) -> tuple[Simulation, Snap
 
     simulation = Simulation(scene, Runtime(args.arch, args.threads))
     watch = SnapshotRecorder(VIDEO_FRAMES) if args.pictures or args.video or args.page else None
-    terminal = sys.stderr.isatty()
+    terminal = rewrites(sys.stderr)
     record = simulation.run(progress=show if terminal else None, snapshots=watch)
     if terminal:
         print(file=sys.stderr)
@@ -314,10 +314,18 @@ def _sizes(one: Inclusion | None) -> list[float] | None:
     return None if one is None else [one.length, one.width, one.height]
 
 
+def _state(record: ForceRecord) -> str:
+    """That the cut is done, or how far it came and why no further."""
+    if record.status == "done":
+        return record.status
+    why = f": {BREAKDOWNS[record.status]}" if record.status in BREAKDOWNS else ""
+    return f"broke down after {record.fraction:.0%} of its stroke ({record.status}{why})"
+
+
 def _words(name: str, scene: Scene, record: ForceRecord, out: Path) -> str:
     """What the terminal shows at the end."""
     lines = [
-        f"{name}: peak {record.peak:.2f} N, work {record.work:.3f} J, {record.status}; "
+        f"{name}: peak {record.peak:.2f} N, work {record.work:.3f} J, {_state(record)}; "
         f"momentum balance closes to {record.momentum_residual:.1e} of the peak; wrote {out}"
     ]
     up = record.withdrawal

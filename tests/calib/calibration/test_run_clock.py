@@ -72,9 +72,23 @@ def test_one_bar_from_the_first_simulation_to_the_last() -> None:
     assert "left" not in seen[-1].line()  # what nobody knows
 
 
+def test_simulations_of_the_intervals_are_counted() -> None:
+    """Three of a first round and two of a second one are five more than the search has made."""
+    seen: list[Progress] = []
+    clock = RunClock(seen.append, [80.0], lambda: 0.0)
+    clock.search(Progress(30, 30.0, 100.0, 0, 9.0, 140.0, "round"))
+    for words, rounds in (("round 1", 3), ("round 2", 2)):
+        clock.intervals(words)
+        for k in range(rounds):
+            clock.intervals(f"{words}, {k + 1} of {rounds}", k + 1)
+    clock.last("last simulations", 0, 4)
+    assert [p.done for p in seen] == [30, 30, 31, 32, 33, 33, 34, 35, 35]
+    assert seen[-1].line().startswith("35 simulations, 30 of a budget of 100")
+
+
 def test_the_last_simulations_tell_their_own_time() -> None:
-    """Where they take four times what the search let expect, the time left follows them, and no more than twice that is
-    the most."""
+    """Where they take four times what the search let expect, the time left follows them: the longest come first, so the
+    rest takes no longer than they took; were all as long, it would, and twice that is the most."""
     seen: list[Progress] = []
     now = [0.0]
     clock = RunClock(seen.append, [80.0], lambda: now[0])
@@ -83,7 +97,10 @@ def test_the_last_simulations_tell_their_own_time() -> None:
     assert (seen[-1].typical_s, seen[-1].eta_s) == pytest.approx((LAST_RUNS, SLOWER * LAST_RUNS))
     now[0] += LAST_RUNS
     clock.last("last simulations, 1 of 4", 1, 4)
-    assert (seen[-1].typical_s, seen[-1].eta_s) == pytest.approx((3.0 * LAST_RUNS, SLOWER * 3.0 * LAST_RUNS))
+    assert (seen[-1].typical_s, seen[-1].eta_s) == pytest.approx((LAST_RUNS, SLOWER * 3.0 * LAST_RUNS))
+    now[0] += 0.2 * LAST_RUNS
+    clock.last("last simulations, 3 of 4", 3, 4)
+    assert (seen[-1].typical_s, seen[-1].eta_s) == pytest.approx((0.4 * LAST_RUNS, SLOWER * 0.4 * LAST_RUNS))
 
 
 def test_nothing_is_said_of_a_time_that_is_not_known() -> None:

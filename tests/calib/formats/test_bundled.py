@@ -40,6 +40,8 @@ def test_a_slip_names_the_trace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.chdir(tmp_path)
     with pytest.raises(TraceError, match="did you mean banana_reconstructed"):
         read_trace("banana_reconstruction")
+    with pytest.raises(TraceError, match="did you mean banana_reconstructed"):
+        read_trace("banana")
     shutil.copy(ROOT / "force_data" / f"{BUNDLED[0]}.csv", tmp_path / "banana_mine.csv")
     with pytest.raises(TraceError, match=r"did you mean banana_mine.csv"):
         read_trace("banana_mne.csv")

@@ -283,9 +283,15 @@ def test_a_force_without_balance_does_not_pass(study: Path, tmp_path: Path, monk
 def test_a_study_and_the_options_of_one_trace_exclude_each_other(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """--trace beside --config, or neither food nor study: one line that says what to do."""
+    """--trace beside --config, or neither food nor study: one line that says what to do. No option is passed over."""
     assert main(["calibrate", "--config", str(study), "--trace", "x.csv", "--out", str(tmp_path / "o")]) == 1
     assert "--trace beside --config" in capsys.readouterr().err
+    for option, value in (("--seed", "3"), ("--dx", "5mm"), ("--knife", "edc"), ("--set", "E=2e5")):
+        assert main(["calibrate", "--config", str(study), option, value]) == 1, "it would not be heeded"
+        assert f"{option} beside --config: write it into {study}" in capsys.readouterr().err
+    for option in (["--all"], ["--u-num", "x"]):
+        assert main(["calibrate", "--config", str(study), *option]) == 1
+        assert f"{option[0]} beside --config, which does not take it" in capsys.readouterr().err
     assert main(["calibrate", "--food", "banana"]) == 1
     assert "--trace missing: name the food and its trace, or a study with --config" in capsys.readouterr().err
 

@@ -32,7 +32,7 @@ from mpm.scene import Knife, Motion
 from mpm.solver import Simulation
 from reports.base.figures import RED
 from reports.base.film import APART, AXES, MOMENTS, STEPS, Film, blade, blade_at, round_up
-from reports.base.html_page import page
+from reports.base.html_page import own_colours, page
 from reports.base.scene_render import SIZE, STEEL, WOOD, Stage, attempt, stills, video
 from reports.base.scene_sheet import bar_ends, bar_length, view_size
 from tests.mpm.scenes import PRISM
@@ -215,6 +215,9 @@ def test_a_page_needs_no_network_and_has_all_looks(film: Film, tmp_path: Path) -
     frames = json.loads(re.search(r"Plotly\.addFrames\('[^']+', (\[.*?\])\);", text, re.DOTALL)[1])  # type: ignore[index]
     assert len(frames) == len(film.looks)
     skin, faces, knife, now = frames[3]["data"]
+    assert "colorscale" not in skin  # which the buttons set for all looks
+    for scale, label in ((json.dumps(own_colours(film.food)[0]), "food"), ('["YlOrRd", "YlOrRd"]', "stress")):
+        assert scale.replace(" ", "") in text.replace(" ", "") and f'"label":"{label}","method":"restyle"' in text
 
     def numbers(one: dict[str, Any]) -> np.ndarray:
         return np.frombuffer(base64.b64decode(one["bdata"]), dtype=np.dtype(one["dtype"]))
@@ -227,6 +230,15 @@ def test_a_page_needs_no_network_and_has_all_looks(film: Film, tmp_path: Path) -
         np.testing.assert_allclose(numbers(shown["intensity"]), stress, atol=5.1e-6 * film.largest)
     assert numbers(knife["z"]).min() == pytest.approx(2e4 * (0.024 - look.stroke), abs=1)
     assert now["y"] == [pytest.approx(film.force_at(look))]
+
+
+def test_a_page_shows_the_food_in_its_colours() -> None:
+    """Whatever the stress: green skin and light flesh of a cucumber; a food without colours has those of all others."""
+    skin, flesh = own_colours("cucumber")
+    assert (
+        skin == [[0, "rgb(33, 92, 33)"], [1, "rgb(33, 92, 33)"]] and flesh[0][1] == flesh[1][1] == "rgb(204, 230, 158)"
+    )
+    assert own_colours("tofu") == own_colours("nobody's") != own_colours("cucumber")
 
 
 @pytest.mark.slow

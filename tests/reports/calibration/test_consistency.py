@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,24 +15,29 @@ import pytest
 from matplotlib.figure import Figure
 from pypdf import PdfReader
 
+from calib.calibration.credibility import write_credibility
 from calib.calibration.result import CalibrationResult, read_result
+from calib.calibration.result_parts import SearchHistory, Tally
 from calib.calibration.summary import WITHDRAWAL_LINE
+from calib.material.food import load_foods
 from calib.material.properties import PROPERTIES
-from calib.material.references import cited, references
+from calib.material.references import cited, references, remarks
 from calib.problem.food_parameters import YIELD_STRAIN_FACTOR
 from calib.uncertainty.estimates import FittedNuisance, FittedParameter
-from calib.validation.acceptance import NUISANCE_LINES, Conservation, judge
+from calib.validation.acceptance import NUISANCE_LINES, Conservation, changes, judge
 from calib.validation.bounds import bound_word
 from calib.validation.metrics import compare
 from calib.validation.null_models import null_models
-from calib.validation.numerical_checks import VARIANTS, Check
+from calib.validation.numerical_checks import HALF_SPEED, VARIANTS, Check
 from calib.validation.predictive_score import PredictiveScore
 from calib.validation.prior_conflict import PriorConflict
 from mpm.output.section import Section
 from mpm.scene import Knife
+from mpm.scene.shapes import Shape
+from reports.base.figures import BLUE
 from reports.base.format import quantity
-from reports.base.labels import in_words, source_in_words
-from reports.calibration import cut_figure, model_page, parameter_page, report
+from reports.base.labels import capital, in_words, source_in_words
+from reports.calibration import cut_figure, model_page, model_sketch, parameter_page, report
 from tests.reports import sample
 from tests.reports.sample import spaced
 
@@ -38,7 +45,9 @@ NUMBER = r"([+−]?\(?[\d.]+(?: ± [\d.]+\)?)?(?: × 10\S+)?(?: ?(?:%|[µmk]?N|[
 #: Each meaning, and the places where the report says it; the number is the group.
 MEANINGS: dict[str, tuple[str, ...]] = {
     "measured peak": (rf"measured, peak {NUMBER}", rf"\nPeak {NUMBER} parabola"),
-    "simulated peak": (rf"simulated, peak {NUMBER}", rf"\nPeak {NUMBER}, [+−]"),
+    "simulated peak": (rf"simulated, peak {NUMBER}", rf"\nPeak {NUMBER}, [+−]", r"\nPeak force (\S+ N) \S+ N "),
+    "simulated work": (rf"\nWork {NUMBER}, [+−]", r"\nWork (\S+ m?J) \S+ m?J [+−]"),
+    "measured work": (r"Work in the trace (\S+ m?J)", r"\nWork \S+ m?J (\S+ m?J) [+−]"),
     "peak error": (
         rf"peak force error {NUMBER}",
         rf"simulation, fitted \S+ % \S+ % \S+ {NUMBER}",
@@ -110,6 +119,7 @@ def words(folder: Path, monkeypatch: pytest.MonkeyPatch, kind: str = "good", **c
 
     monkeypatch.setattr(report, "publish", caught)
     run = sample.write_run(folder, kind, **(judged(kind) | changes))
+    write_credibility(read_result(run))
     path = report.write_report(read_result(run))
     pages = [page.extract_text() for page in PdfReader(path).pages]
     return spaced("\n".join([*pages, FIGURES, *drawn]))
@@ -150,6 +160,12 @@ def test_a_parameter_at_a_bound_has_one_word(text: str) -> None:
     assert re.search(r"parameters at a bound 0 ≤ 0 ✓ passed", text)
 
 
+def test_sentences_begin_with_a_capital() -> None:
+    """A word with a hyphen does too; a file, a column and a symbol keep their letters."""
+    found = [capital(t) for t in ("normalised-shape error: failed", "cut.csv has none", "force_N is", "mu and R")]
+    assert found == ["Normalised-shape error: failed", "cut.csv has none", "force_N is", "mu and R"]
+
+
 def test_R_is_a_resistance_only(text: str) -> None:
     """The rating is called ISO rating: R has one meaning."""
     assert "rating R" not in text and "ISO rating" in text
@@ -180,6 +196,69 @@ def test_a_digitised_trace_has_no_noise_of_1e_16(tmp_path: Path, monkeypatch: py
     found = words(tmp_path, monkeypatch, **changes)
     assert "Noise none digitised" in found
     assert not re.search(r"± \S+ × 10", found)
+
+
+def test_a_reader_who_divides_finds_the_error(text: str) -> None:
+    """Peak and work error follow from the two values beside them, but for the last digit that is printed."""
+    row = re.search(r"\nPeak force (\S+) N (\S+) N ([+−]\S+) N", text)
+    assert row is not None
+    simulated, measured, error = (float(x.replace("−", "-")) for x in row.groups())
+    assert simulated - measured == pytest.approx(error, abs=0.02)
+    for name in ("peak error", "work error"):
+        printed = said(text, MEANINGS[name])[0]
+        pair = re.search(rf"\n{'Peak force' if name[0] == 'p' else 'Work'} (\S+) m?[NJ] (\S+) m?[NJ] [+−]", text)
+        assert pair is not None
+        found = float(pair[1]) / float(pair[2]) - 1.0
+        assert 100.0 * found == pytest.approx(float(printed.removesuffix(" %").replace("−", "-")), abs=0.2)
+
+
+def test_a_change_has_the_digits_of_its_line() -> None:
+    """The larger one of peak and work in the note is the value of the line, letter by letter."""
+    checks = [Check(name, None, 0.0233, 0.0233, -0.0204) for name in VARIANTS if name != HALF_SPEED]
+    checks.append(Check("twice the process zone", None, 0.1234, -0.0101, 0.1234))
+    for line in changes(checks):
+        value = spaced(quantity(line.value, "fraction", signed=True))
+        assert value in spaced(line.note or ""), (line.name, line.note)
+
+
+def test_samples_a_second_are_those_between_samples(tmp_path: Path) -> None:
+    """Of 11 samples in a second there are 10 steps: what --check says is what the report says."""
+    summary = sample.summary()
+    trace = summary["trace"] | {"samples": 11, "duration_s": 1.0}
+    found = read_result(sample.write_run(tmp_path, trace=trace))
+    assert spaced(report._trace(found)["rate"]) == "10.0 Hz"
+
+
+def test_all_simulations_are_counted_one_way() -> None:
+    """Those of every kind that was kept; of older runs, which say no kinds, those of the search."""
+    history = SearchHistory(simulations=137, failed_simulations=1, failures=(), misfit_history=())
+    assert history.every == Tally(137, 1)
+    kept = {"coarse": Tally(124, 1), "fine": Tally(13, 0), "check": Tally(18, 2)}
+    assert replace(history, kept=kept).every == Tally(155, 3)
+
+
+def test_the_grid_of_the_sketch_stays_beside_the_blade() -> None:
+    """Coarse cells in a short food: fewer of them are drawn, and the letters keep off each other."""
+    figure = Figure()
+    axes = figure.subplots()
+    model_sketch._across(axes, Shape("block", 0.03, 0.036, 0.03), Knife(**sample.summary()["knife"]), 5e-3)
+    grid = np.concatenate([line.get_xdata() for line in axes.lines if line.get_color() == BLUE])
+    assert -15.0 < grid.min() and grid.max() < -1.0
+    at = {a.get_text(): a.xyann for a in axes.texts if a.get_text() in "ABCDE"}
+    for one, other in itertools.combinations(at.values(), 2):
+        assert np.hypot(one[0] - other[0], one[1] - other[1]) > 4.0
+
+
+def test_looks_at_a_short_food_stand_in_a_row() -> None:
+    """Of 60 mm and 30 mm, too; of 132 mm and 33 mm each has a row of its own."""
+    knife, force = Knife(**sample.summary()["knife"]), np.array([0.0, 9.0, 1.0])
+    for half, height, documents in ((0.03, 0.03, 1), (0.066, 0.033, 3)):
+        y = np.linspace(-half, half, 9)
+        section = Section(
+            np.array([0.005, 0.015, height]), np.tile(y, (3, 1)), np.full((3, 9), 0.01), np.full((3, 9), 3e3),
+            np.full((2, 9), 4e-3), False,
+        )  # fmt: skip
+        assert len(cut_figure.cut(section, knife, height, section.stroke, force)) == documents
 
 
 def test_simulations_add_up(text: str, tmp_path: Path) -> None:
@@ -253,10 +332,25 @@ def test_names_in_sources_have_their_reference() -> None:
     assert len(found) == 2 and len(references()) > 50
 
 
+def assumed(part: float | None) -> SimpleNamespace:
+    """What is known of all parameters together: no more than the discrepancy that the fit assumed, part of the peak."""
+    return SimpleNamespace(discrepancy=part)
+
+
+def test_the_model_page_says_what_the_fit_lets_the_model_miss() -> None:
+    """The part of the peak of this very fit; of older runs, that the command may have another one than the usual."""
+    for part, words in (
+        (0.04, "the noise and 4 % of the peak"),
+        (None, "3 % (unless its command says another one) of"),
+    ):
+        result = SimpleNamespace(fitted={}, nuisances={}, withdrawal=None, posterior=assumed(part))
+        assert words in spaced(model_page._objective(result))
+
+
 def test_the_model_page_says_how_well_the_yield_strain_is_known() -> None:
     """With the factor of the fit's prior; nothing is said of it where only one of the two was fitted."""
     both, one = (
-        SimpleNamespace(fitted=dict.fromkeys(names), nuisances={}, withdrawal=None)
+        SimpleNamespace(fitted=dict.fromkeys(names), nuisances={}, withdrawal=None, posterior=assumed(0.03))
         for names in (("E", "yield_stress"), ("E",))
     )
     said = f"Yield stress over E is known to a factor of {YIELD_STRAIN_FACTOR:g}."
@@ -319,7 +413,7 @@ def test_the_model_page_says_that_the_blade_is_withdrawn() -> None:
     """In the conditions and in what is minimised, and nothing of it where it was not fitted."""
     cut = SimpleNamespace(mach=0.01, speed_real_m_s=None, scene={}, mirror_images=1)
     for up in (None, object()):
-        result = SimpleNamespace(cut=cut, withdrawal=up, fitted={}, nuisances={})
+        result = SimpleNamespace(cut=cut, withdrawal=up, fitted={}, nuisances={}, posterior=assumed(0.03))
         assert ("up again at the same speed" in model_page._conditions(result)[0][1]) == (up is not None)
         said = model_page._objective(result)
         assert ("the pull on the way up" in said and "10 % of the largest pull" in said) == (up is not None)
@@ -333,6 +427,28 @@ def test_two_parameters_have_their_correlation_in_words() -> None:
     assert parameter_page.pair(*of_three) == "" == parameter_page.pair(*parameter_page.correlation_matrix({}, ["E"]))
 
 
-def test_a_source_names_the_file_of_its_remark() -> None:
-    """A reader of the report has no list of remarks beside it; units are raised."""
-    assert source_in_words("as apple (remark 5), 10 J/m^2") == "as apple (remark 5 of materials.yaml), 10 J/m²"
+def test_a_source_names_its_remark() -> None:
+    """Which the page has among its references, or its reader finds in the file; units are raised."""
+    assert source_in_words("as apple (remark 5), 10 J/m^2") == "as apple (remark 5), 10 J/m²"
+    assert source_in_words("wet (remark 7)", " of materials.yaml") == "wet (remark 7 of materials.yaml)"
+
+
+def test_remarks_stand_among_the_references() -> None:
+    """In full, with what they refer to themselves; a number that stands elsewhere in a source is no remark."""
+    found = cited(["as apple (remark 5)", "wet food on a board (remark 7); 6 kPa"])
+    assert [name for name in found if name.startswith("remark")] == ["remark 5", "remark 7"]
+    assert found["remark 5"].startswith("Apple is the only flesh") and found["remark 5"].endswith("stay assumed.")
+    assert {"De Belie 2000", "Bishop 2012"} <= set(found)
+    assert list(remarks()) == [str(n) for n in range(1, len(remarks()) + 1)] and len(remarks()) >= 8
+
+
+def test_every_remark_of_a_source_is_in_the_file() -> None:
+    """No value names one that is not there."""
+    named = {
+        n
+        for food in load_foods().values()
+        for p in food.properties.values()
+        if p
+        for n in re.findall(r"\(remark (\d+)\)", p.source)
+    }
+    assert named and named <= set(remarks())

@@ -35,7 +35,9 @@ def test_an_error_beyond_its_uncertainty_is_the_models(tmp_path: Path) -> None:
     page = credibility(write(tmp_path))
     assert page is not None
     peak, work = page["rows"]
-    assert peak[:3] == ["Peak force", "19.4\u00a0N", "20.0\u00a0N"] and peak[-1] == "an error of the model is not shown"
+    assert (
+        peak[:3] == ["Peak force", "19.40\u00a0N", "20.00\u00a0N"] and peak[-1] == "an error of the model is not shown"
+    )
     assert work[0] == "Work" and work[-1] == "an error of the model is shown"
     assert page["factor"] == "2" and len(page["not_counted"]) == 3
 

@@ -332,7 +332,8 @@ def test_failures_are_grouped_by_reason(content: Content) -> None:
     """Twenty-one failures of three kinds are three lines with number and completed stroke."""
     rows = content("failed")["failures"]
     assert [(r[0], r[1], spaced(r[2])) for r in rows] == [
-        ("inverted", "7", "20 to 74 %"), ("not finite", "7", "23 to 77 %"), ("stopped", "7", "26 to 80 %")
+        ("inverted: a particle was turned inside out", "7", "20 to 74 %"),
+        ("not finite: a force, energy or position is no number", "7", "23 to 77 %"), ("stopped", "7", "26 to 80 %")
     ]  # fmt: skip
     assert spaced(rows[0][3]).startswith("E = 51.0 kPa; R = 1180 J/m²; mu = 0.580")
 

@@ -124,7 +124,7 @@ def test_the_model_says_what_was_simulated(tmp_path: Path) -> None:
     third, first, _ = ([spaced(cell) for cell in row] for row in w["cuts"])
     m = s["traces"]["first"]["metrics"]
     assert first[0] == "first" and "mm" in first[1] and "wedge" in first[2] and first[3].startswith("3.00 mm, ")
-    assert first[4:] == ["5120", "33.0 mm", f"{m['peak_real_N']:.1f} N", f"{m['peak_sim_N']:.1f} N"]
+    assert first[4:] == ["5120", "33.0 mm", f"{m['peak_real_N']:.2f} N", f"{m['peak_sim_N']:.2f} N"]
     assert third[4] == "4096" and third[1] == first[1]
     assert [[spaced(cell) for cell in row] for row in w["conditioning"]][0] == [
         "third", "constant, 0.410 ± 0.020 N", "1.250 ± 0.010 s", "position", "0.050 N", "0.5 mm", "15.0 Hz",
@@ -229,3 +229,13 @@ def test_damaged_input_is_named(tmp_path: Path, damage, message: str) -> None:  
     damage(run)
     with pytest.raises(ReportError, match=message):
         write_report(run)
+
+
+def test_compression_tests_are_told(tmp_path: Path) -> None:
+    """Modulus, how well it is known, what was assumed and the file; nothing where the study has none."""
+    press = {"name": "pressed", "E": 278e3, "spread": 0.13, "repeats": 4, "nu": 0.45,
+             "files": [{"name": "press.csv", "sha256": "c0ffee00" * 8}]}  # fmt: skip
+    with_one = content(read_study(sample.write_study(tmp_path / "one", presses={"pressed": press})))["model"]
+    (row,) = ([spaced(cell) for cell in row] for row in with_one["presses"])
+    assert row == ["pressed", "278 kPa", "13 %", "4", "0.45", "press.csv, SHA-256 c0ffee00c0ffee00"]
+    assert content(read_study(sample.write_study(tmp_path / "none")))["model"]["presses"] == []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -125,7 +126,9 @@ def test_a_compression_says_law_numerics_seed_and_files(told: Any) -> None:
     assert "10 cells of 3.00 mm" in facts["Simulation"] and "4374 particles, 17 947 steps" in facts["Simulation"]
     (file,) = rows["Files"]
     assert file[:3] == ["gel.csv", "compression_mm", "load_N"] and file[3].replace("\u200b", "") == "c0ffee00" * 8
-    assert [row[0] for row in rows["References"]] == ["[1]", "[2]"] and "Stomakhin" in rows["References"][1][1]
+    assert [row[0] for row in rows["References"]] == ["[1]", "[2]"] and "Stomakhin" in rows["References"][0][1]
+    cited = re.findall(r"\[(\d)\]", " ".join(text for _, text in content["facts"]))
+    assert cited == ["1", "2"]  # in the order in which they are read
     (verdict,) = [part for part in content["parts"] if part["title"] == "Verdict"]
     assert "NRMSE: root mean square" in verdict["text"] and "closed form of the same law" in verdict["text"]
     assert rows["Verdict"] == [
