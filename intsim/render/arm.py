@@ -150,9 +150,9 @@ def _outside(mesh: Drawn) -> Drawn:
     triangles = np.ascontiguousarray(np.column_stack([mesh.triangles, mesh.paint_of]), np.int32)
     reach = float(np.linalg.norm(points, axis=1).max())
     views = np.array([View.lamp(np.array(direction), reach, PROBE_PIXELS).row for direction in SIDES])
-    shape = len(SIDES), PROBE_PIXELS, PROBE_PIXELS
-    near, which = np.full(shape, np.float32(-1e9)), np.full(shape, np.int32(-1))
-    raster.draw(points, triangles, views, np.empty((len(SIDES), *points.shape), np.float32), near, which)
+    count = len(SIDES) * PROBE_PIXELS**2
+    near, which = np.full(count, np.float32(-1e9)), np.full(count, np.int32(-1))
+    raster.draw(points, triangles, views, np.empty_like(points), near, which)
     seen = np.zeros(len(triangles), bool)
     seen[which[which >= 0]] = True
     used = np.unique(mesh.triangles[seen])

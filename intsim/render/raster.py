@@ -4,8 +4,9 @@ What is seen where depends on geometry alone. It is found once (:func:`see`) and
 (:func:`light`), with shadows from maps of what the lamp sees (Williams 1978). What does not move is lit once
 (:func:`settle`), and again where a shadow of the scene falls on it.
 
-Numbers of a view are read into local variables before a loop: the compiler cannot know that what a loop writes is
-elsewhere, and would read them again for each vertex.
+Pictures are square, and their pixels are one row after the other, view after view, in arrays with one index. Numbers
+of a view are read into local variables before a loop. The compiler cannot know that what a loop writes is elsewhere,
+and would read shapes and views again for each pixel.
 """
 
 import taichi as ti
@@ -13,17 +14,15 @@ import taichi as ti
 from intsim.render.texture import part_of_second
 from intsim.render.view import NEAR
 
+
+
+def rows(size: int, kind: type = ti.f32) -> ti.types.ndarray:
+    """An array of rows of so many numbers, shape (n, size): one index, and no product of shapes for each number."""
+    return ti.types.ndarray(dtype=ti.types.vector(size, kind), ndim=1)
+
+
+numbers = ti.types.ndarray(dtype=ti.f32, ndim=1)
 array = ti.types.ndarray
-triples = ti.types.ndarray(dtype=ti.math.vec3, ndim=1)
-"""Points or directions, shape (n, 3)."""
-corners = ti.types.ndarray(dtype=ti.types.vector(4, ti.i32), ndim=1)
-"""Triangles: their vertices, and their row of the paints, shape (t, 4)."""
-seen_points = ti.types.ndarray(dtype=ti.math.vec3, ndim=2)
-"""Points in views, shape (c, n, 3)."""
-places = ti.types.ndarray(dtype=ti.math.vec3, ndim=3)
-"""Places seen in pictures, shape (c, h, w, 3)."""
-bytes_of_colour = ti.types.ndarray(dtype=ti.types.vector(3, ti.u8), ndim=3)
-"""Pictures, shape (c, h, w, 3)."""
 GLOW = 2.0
 """Gloss from which on a surface shines by itself."""
 
@@ -58,23 +57,27 @@ def cover(
     there: ti.template(),
     near: ti.template(),
     which: ti.template(),
-    numbered: ti.template(),
 ):
-    """Find how near what is seen in each pixel of view c is, and which triangle that is where it is ``numbered``; those
-    that turn their back are left out."""
+    """Find how near what is seen in each pixel of view c is, and which triangle that is; those that turn their back are
+    left out."""
     eye, turn, focal, half, flat = camera(views, c)
     for i in range(points.shape[0]):
-        there[c, i] = seen(eye, turn, focal, half, flat, points[i])
-    height, width = near.shape[1], near.shape[2]
+        there[i] = seen(eye, turn, focal, half, flat, points[i])
+    width, end = ti.cast(2 * half, ti.i32), 2 * half
+    first = c * width * width
+    floor = ti.select(flat, -1e9, 0.0)  # nothing behind a camera; a lamp far away has nothing behind it
     for t in range(triangles.shape[0]):
         own = triangles[t]
-        a, b, d = there[c, own[0]], there[c, own[1]], there[c, own[2]]
+        a, b, d = there[own[0]], there[own[1]], there[own[2]]
+        # the first and the last middle of a pixel between the ends of the triangle: most are smaller than a pixel
+        x0 = ti.cast(ti.ceil(ti.max(ti.min(a.x, b.x, d.x), 0.0) - 0.5), ti.i32)
+        x1 = ti.cast(ti.min(ti.max(a.x, b.x, d.x), end) + 0.5, ti.i32) - 1
+        y0 = ti.cast(ti.ceil(ti.max(ti.min(a.y, b.y, d.y), 0.0) - 0.5), ti.i32)
+        y1 = ti.cast(ti.min(ti.max(a.y, b.y, d.y), end) + 0.5, ti.i32) - 1
         area = (b.x - a.x) * (d.y - a.y) - (b.y - a.y) * (d.x - a.x)
-        if area < 0 and (flat or ti.min(a.z, b.z, d.z) > 0):
-            x0 = ti.max(ti.cast(ti.ceil(ti.min(a.x, b.x, d.x) - 0.5), ti.i32), 0)
-            x1 = ti.min(ti.cast(ti.floor(ti.max(a.x, b.x, d.x) - 0.5), ti.i32), width - 1)
-            y0 = ti.max(ti.cast(ti.ceil(ti.min(a.y, b.y, d.y) - 0.5), ti.i32), 0)
-            y1 = ti.min(ti.cast(ti.floor(ti.max(a.y, b.y, d.y) - 0.5), ti.i32), height - 1)
+        hidden = ti.cast(x0 > x1, ti.i32) | ti.cast(y0 > y1, ti.i32) | ti.cast(area >= 0, ti.i32)
+        hidden |= ti.cast(ti.min(a.z, b.z, d.z) <= floor, ti.i32)
+        if hidden == 0:
             over = 1 / area
             for y in range(y0, y1 + 1):
                 py = ti.cast(y, ti.f32) + 0.5
@@ -84,16 +87,17 @@ def cover(
                     ld = ((b.x - a.x) * (py - a.y) - (b.y - a.y) * (px - a.x)) * over
                     la = 1 - lb - ld
                     if la >= 0 and lb >= 0 and ld >= 0:
+                        k = first + y * width + x
                         w = la * a.z + lb * b.z + ld * d.z
-                        if w > near[c, y, x]:
-                            near[c, y, x] = w
-                            if ti.static(numbered):
-                                which[c, y, x] = t
+                        if w > near[k]:
+                            near[k] = w
+                            which[k] = t
 
 
 @ti.func
 def shade(
     c: ti.i32,
+    width: ti.i32,
     triangles: ti.template(),
     there: ti.template(),
     near: ti.template(),
@@ -103,98 +107,99 @@ def shade(
     seen_as: ti.template(),
 ):
     """Put colour, normal and gloss of what is seen in each pixel of view c into ``seen_as``, where a triangle is."""
-    for y in range(which.shape[1]):
-        for x in range(which.shape[2]):
-            t = which[c, y, x]
+    for y in range(width):
+        for x in range(width):
+            spot = (c * width + y) * width + x
+            t = which[spot]
             if t >= 0:
                 own = triangles[t]
                 i, j, k = own[0], own[1], own[2]
-                a, b, d = there[c, i], there[c, j], there[c, k]
+                a, b, d = there[i], there[j], there[k]
                 px, py = ti.cast(x, ti.f32) + 0.5, ti.cast(y, ti.f32) + 0.5
                 over = 1 / ((b.x - a.x) * (d.y - a.y) - (b.y - a.y) * (d.x - a.x))
                 lb = ((px - a.x) * (d.y - a.y) - (py - a.y) * (d.x - a.x)) * over
                 ld = ((b.x - a.x) * (py - a.y) - (b.y - a.y) * (px - a.x)) * over
                 la = 1 - lb - ld
-                far = 1 / near[c, y, x]  # in the picture one over the distance is linear, not the place
-                la, lb, ld = la * a.z * far, lb * b.z * far, ld * d.z * far
-                at = ti.Vector(
-                    [la * looks[i, m] + lb * looks[j, m] + ld * looks[k, m] for m in ti.static(range(8))], ti.f32
-                )
+                far = 1 / near[spot]  # in the picture one over the distance is linear, not the place
+                at = la * a.z * far * looks[i] + lb * b.z * far * looks[j] + ld * d.z * far * looks[k]
                 n = ti.Vector([at[0], at[1], at[2]], ti.f32)
                 n = n / ti.max(n.norm(), 1e-12)
-                p = own[3]
-                kind = ti.cast(paints[p, 0], ti.i32)
+                paint = paints[own[3]]
+                kind = ti.cast(paint[0], ti.i32)
                 share = ti.cast(0.0, ti.f32)
                 if kind > 0:
                     place, section = ti.Vector([at[3], at[4], at[5]], ti.f32), ti.Vector([at[6], at[7]], ti.f32)
-                    share = part_of_second(kind, place, section, paints[p, 7], paints[p, 8], paints[p, 9])
+                    share = part_of_second(kind, place, section, paint[7], paint[8], paint[9])
+                out = ti.Vector([0.0 for m in ti.static(range(7))], ti.f32)
                 for m in ti.static(range(3)):
-                    seen_as[c, y, x, m] = paints[p, 1 + m] + share * (paints[p, 4 + m] - paints[p, 1 + m])
-                    seen_as[c, y, x, 3 + m] = n[m]
-                seen_as[c, y, x, 6] = paints[p, 10]
+                    out[m] = paint[1 + m] + share * (paint[4 + m] - paint[1 + m])
+                    out[3 + m] = n[m]
+                out[6] = paint[10]
+                seen_as[spot] = out
 
 
 @ti.kernel
 def draw(
-    points: triples,
-    triangles: corners,
+    points: rows(3),
+    triangles: rows(4, ti.i32),
     views: array(ti.f32, 2),
-    there: seen_points,
-    near: array(ti.f32, 3),
-    which: array(ti.i32, 3),
+    there: rows(3),
+    near: numbers,
+    which: array(ti.i32, 1),
 ):
     """Find which triangle is seen in each pixel of each of c views.
 
     ``points`` (n, 3) and ``triangles`` (t, 4) are the mesh, ``views`` (c, 16) as
-    :attr:`intsim.render.view.View.row` has them, and ``there`` (c, n, 3) is room for as many points. ``near`` and
-    ``which`` (c, h, w) are updated: how near it is, and its number.
+    :attr:`intsim.render.view.View.row` has them, and ``there`` (n, 3) is room for as many points. ``near`` and
+    ``which`` (c * h * w,) are updated: how near it is, and its number.
     """
     ti.loop_config(serialize=True)
     for c in range(views.shape[0]):
-        cover(c, points, triangles, views, there, near, which, True)
+        cover(c, points, triangles, views, there, near, which)
 
 
 @ti.kernel
 def see(
-    points: triples,
-    triangles: corners,
+    points: rows(3),
+    triangles: rows(4, ti.i32),
     views: array(ti.f32, 2),
-    there: seen_points,
-    near: array(ti.f32, 3),
-    which: array(ti.i32, 3),
-    looks: array(ti.f32, 2),
-    paints: array(ti.f32, 2),
-    seen_as: array(ti.f32, 4),
+    there: rows(3),
+    near: numbers,
+    which: array(ti.i32, 1),
+    looks: rows(8),
+    paints: rows(11),
+    seen_as: rows(7),
 ):
     """Find what is seen in each pixel of each view, as :func:`draw`, and how it looks.
 
     The last of a triangle's four numbers is its row of ``paints``; ``looks`` (n, 8) has normal, place on the body and
-    place on the section of each vertex. Colour, normal and gloss are put into ``seen_as`` (c, h, w, 7) where a triangle
-    is.
+    place on the section of each vertex. Colour, normal and gloss are put into ``seen_as`` (c * h * w, 7) where a
+    triangle is.
     """
     ti.loop_config(serialize=True)
     for c in range(views.shape[0]):
-        cover(c, points, triangles, views, there, near, which, True)
-        shade(c, triangles, there, near, which, looks, paints, seen_as)
+        cover(c, points, triangles, views, there, near, which)
+        width = ti.cast(2 * views[c, 13], ti.i32)
+        shade(c, width, triangles, there, near, which, looks, paints, seen_as)
 
 
 @ti.kernel
-def turn_normals(points: triples, triangles: corners, looks: array(ti.f32, 2)):
+def turn_normals(points: rows(3), triangles: rows(4, ti.i32), looks: rows(8)):
     """Normals at the vertices: those of the triangles around each, by their area. The first three of ``looks`` (n, 8)
     are filled."""
     ti.loop_config(serialize=True)
     for i in range(points.shape[0]):
         for m in ti.static(range(3)):
-            looks[i, m] = 0.0
+            looks[i][m] = 0.0
     ti.loop_config(serialize=True)
     for t in range(triangles.shape[0]):
         own = triangles[t]
         i, j, k = own[0], own[1], own[2]
         n = (points[j] - points[i]).cross(points[k] - points[i]) * 1e4
         for m in ti.static(range(3)):  # one thread: an addition need not be atomic
-            looks[i, m] = looks[i, m] + n[m]
-            looks[j, m] = looks[j, m] + n[m]
-            looks[k, m] = looks[k, m] + n[m]
+            looks[i][m] = looks[i][m] + n[m]
+            looks[j][m] = looks[j][m] + n[m]
+            looks[k][m] = looks[k][m] + n[m]
 
 
 @ti.func
@@ -221,7 +226,8 @@ def lit_parts(
     up = 0.5 + 0.5 * n.z
     rim = 0.75 + 0.25 * ti.max(-n.dot(ray), 0.0)
     bisector = to - ray
-    shine = ti.max(n.dot(bisector), 0.0) ** 2 / bisector.norm_sqr()  # Blinn (1977), to the 32nd power
+    shine = ti.max(n.dot(bisector), 0.0)
+    shine = shine * shine / bisector.norm_sqr()  # Blinn (1977), to the 32nd power
     shine = shine * shine
     shine = shine * shine
     shine = shine * shine
@@ -248,58 +254,18 @@ def colour(rest, given, lit: ti.f32):
 @ti.kernel
 def settle(
     views: array(ti.f32, 2),
-    near: array(ti.f32, 3),
-    looks: array(ti.f32, 4),
+    near: numbers,
+    looks: rows(7),
     lamp: array(ti.f32, 2),
-    shadow: array(ti.f32, 3),
-    place: places,
-    fixed: bytes_of_colour,
+    shadow: numbers,
+    place: rows(3),
+    fixed: rows(3, ti.u8),
 ):
-    """The light on what does not move, for cameras that do not.
+    """The light on what does not move, for cameras that do not: the first views, as many as ``fixed`` has room for.
 
-    Args as those of :func:`light`. The first six of ``looks`` (c, h, w, 7) are replaced by what the lamp does not give
-    and what it gives; ``place`` (c, h, w, 3) is filled with the place in the lamp's view, ``fixed`` (c, h, w, 3) with
-    the colour of a pixel on which no shadow of the scene falls.
-    """
-    ti.loop_config(serialize=True)
-    for c in range(fixed.shape[0]):
-        eye, turn, focal, half, _ = camera(views, c)
-        from_lamp, to_lamp, scale, middle, flat = camera(lamp, 0)
-        colours, tolerance = lamp_light(lamp)
-        to = -ti.Vector([to_lamp[2, 0], to_lamp[2, 1], to_lamp[2, 2]], ti.f32)
-        for y in range(near.shape[1]):
-            for x in range(near.shape[2]):
-                look = ti.Vector([looks[c, y, x, m] for m in ti.static(range(7))], ti.f32)
-                rest, given, beside = lit_parts(
-                    eye, turn, focal, half, to, colours, tolerance, y, x, near[c, y, x], look
-                )
-                there = seen(from_lamp, to_lamp, scale, middle, flat, beside)
-                for m in ti.static(range(3)):
-                    looks[c, y, x, m], looks[c, y, x, 3 + m] = rest[m], given[m]
-                place[c, y, x] = there
-                fixed[c, y, x] = colour(rest, given, lit_at(there, shadow, tolerance))
-
-
-@ti.kernel
-def light(
-    views: array(ti.f32, 2),
-    near: array(ti.f32, 3),
-    seen_as: array(ti.f32, 4),
-    room_near: array(ti.f32, 3),
-    room_looks: array(ti.f32, 4),
-    place: places,
-    fixed: bytes_of_colour,
-    lamp: array(ti.f32, 2),
-    shadow: array(ti.f32, 3),
-    out: bytes_of_colour,
-):
-    """Light what is seen: the nearer of scene and room.
-
-    ``near`` and ``seen_as`` are as :func:`see` has filled them for c views, of the scene and of the room; for the
-    cameras that stand, which come first, :func:`settle` has filled ``room_looks``, ``place`` and ``fixed``. ``lamp`` (2, 16) is the
-    lamp as a view, and in the second row its colour, the colour from above and from below, and the tolerance of a
-    shadow [m]. ``shadow`` (2, ., .) is how near to it is what it sees of the room and of the scene. ``out``
-    (c, h, w, 3) is filled, 8 bits.
+    Args as those of :func:`light`. The first six of ``looks`` (c * h * w, 7) are replaced by what the lamp does not
+    give and what it gives; ``place`` (., 3) is filled with the place in the lamp's view, ``fixed`` (., 3) with the
+    colour of a pixel on which no shadow of the scene falls.
     """
     ti.loop_config(serialize=True)
     for c in range(views.shape[0]):
@@ -307,54 +273,98 @@ def light(
         from_lamp, to_lamp, scale, middle, flat = camera(lamp, 0)
         colours, tolerance = lamp_light(lamp)
         to = -ti.Vector([to_lamp[2, 0], to_lamp[2, 1], to_lamp[2, 2]], ti.f32)
-        stands = c < fixed.shape[0]
-        for y in range(near.shape[1]):
-            for x in range(near.shape[2]):
-                w, behind = near[c, y, x], room_near[c, y, x]
+        width, wide = ti.cast(2 * half, ti.i32), ti.cast(2 * middle, ti.i32)
+        if (c + 1) * width * width <= fixed.shape[0]:
+            for y in range(width):
+                for x in range(width):
+                    k = (c * width + y) * width + x
+                    rest, given, beside = lit_parts(
+                        eye, turn, focal, half, to, colours, tolerance, y, x, near[k], looks[k]
+                    )
+                    there = seen(from_lamp, to_lamp, scale, middle, flat, beside)
+                    for m in ti.static(range(3)):
+                        looks[k][m], looks[k][3 + m] = rest[m], given[m]
+                    place[k] = there
+                    fixed[k] = colour(rest, given, lit_at(there, shadow, wide, tolerance))
+
+
+@ti.kernel
+def light(
+    views: array(ti.f32, 2),
+    near: numbers,
+    seen_as: rows(7),
+    room_near: numbers,
+    room_looks: rows(7),
+    place: rows(3),
+    fixed: rows(3, ti.u8),
+    lamp: array(ti.f32, 2),
+    shadow: numbers,
+    out: rows(3, ti.u8),
+):
+    """Light what is seen: the nearer of scene and room.
+
+    ``near`` and ``seen_as`` are as :func:`see` has filled them for c views, of the scene and of the room; for the
+    cameras that stand, which come first, :func:`settle` has filled ``room_looks``, ``place`` and ``fixed``. ``lamp``
+    (2, 16) is the lamp as a view, and in the second row its colour, the colour from above and from below, and the
+    tolerance of a shadow [m]. ``shadow`` is how near to it is what it sees, first of the room, then of the scene.
+    ``out`` (c * h * w, 3) is filled, 8 bits.
+    """
+    ti.loop_config(serialize=True)
+    for c in range(views.shape[0]):
+        eye, turn, focal, half, _ = camera(views, c)
+        from_lamp, to_lamp, scale, middle, flat = camera(lamp, 0)
+        colours, tolerance = lamp_light(lamp)
+        to = -ti.Vector([to_lamp[2, 0], to_lamp[2, 1], to_lamp[2, 2]], ti.f32)
+        width, wide = ti.cast(2 * half, ti.i32), ti.cast(2 * middle, ti.i32)
+        stands = (c + 1) * width * width <= fixed.shape[0]
+        for y in range(width):
+            for x in range(width):
+                k = (c * width + y) * width + x
+                w, behind = near[k], room_near[k]
                 own = w >= behind
                 if stands and not own:
-                    there = place[c, y, x]
-                    if is_shaded(there, shadow, tolerance):
-                        rest = ti.Vector([room_looks[c, y, x, m] for m in ti.static(range(3))], ti.f32)
-                        given = ti.Vector([room_looks[c, y, x, 3 + m] for m in ti.static(range(3))], ti.f32)
-                        out[c, y, x] = colour(rest, given, lit_at(there, shadow, tolerance))
+                    there = place[k]
+                    if is_shaded(there, shadow, wide, tolerance):
+                        look = room_looks[k]
+                        rest = ti.Vector([look[0], look[1], look[2]], ti.f32)
+                        given = ti.Vector([look[3], look[4], look[5]], ti.f32)
+                        out[k] = colour(rest, given, lit_at(there, shadow, wide, tolerance))
                     else:
-                        out[c, y, x] = fixed[c, y, x]
+                        out[k] = fixed[k]
                 else:
-                    look = ti.Vector([0.0 for m in ti.static(range(7))], ti.f32)
+                    look = room_looks[k]
                     if own:
-                        look = ti.Vector([seen_as[c, y, x, m] for m in ti.static(range(7))], ti.f32)
-                    else:
-                        look = ti.Vector([room_looks[c, y, x, m] for m in ti.static(range(7))], ti.f32)
+                        look = seen_as[k]
                     w = ti.max(w, behind)
                     rest, given, beside = lit_parts(eye, turn, focal, half, to, colours, tolerance, y, x, w, look)
                     there = seen(from_lamp, to_lamp, scale, middle, flat, beside)
-                    out[c, y, x] = colour(rest, given, lit_at(there, shadow, tolerance))
+                    out[k] = colour(rest, given, lit_at(there, shadow, wide, tolerance))
 
 
 @ti.func
-def is_shaded(there, shadow: ti.template(), tolerance: ti.f32):
+def is_shaded(there, shadow: ti.template(), wide: ti.i32, tolerance: ti.f32):
     """Whether a shadow of the scene falls on a place in the lamp's view, wholly or in part."""
     near = there.z + tolerance
     i, j = ti.cast(ti.floor(there.x - 0.5), ti.i32), ti.cast(ti.floor(there.y - 0.5), ti.i32)
     out = False
-    if 0 <= i < shadow.shape[2] - 1 and 0 <= j < shadow.shape[1] - 1:
-        low = ti.max(shadow[1, j, i], shadow[1, j, i + 1])
-        out = ti.max(low, shadow[1, j + 1, i], shadow[1, j + 1, i + 1]) > near
+    if 0 <= i < wide - 1 and 0 <= j < wide - 1:
+        k = (wide + j) * wide + i
+        out = ti.max(ti.max(shadow[k], shadow[k + 1]), ti.max(shadow[k + wide], shadow[k + wide + 1])) > near
     return out
 
 
 @ti.func
-def lit_at(there, shadow: ti.template(), tolerance: ti.f32) -> ti.f32:
+def lit_at(there, shadow: ti.template(), wide: ti.i32, tolerance: ti.f32) -> ti.f32:
     """Which part of a lamp reaches a place in its view, from 0 to 1: over four pixels of what it sees."""
     x, y, near = there.x - 0.5, there.y - 0.5, there.z + tolerance
     i, j = ti.cast(ti.floor(x), ti.i32), ti.cast(ti.floor(y), ti.i32)
     out = ti.cast(1.0, ti.f32)
-    if 0 <= i < shadow.shape[2] - 1 and 0 <= j < shadow.shape[1] - 1:
+    if 0 <= i < wide - 1 and 0 <= j < wide - 1:
         fx, fy = x - ti.floor(x), y - ti.floor(y)
-        a = ti.select(ti.max(shadow[0, j, i], shadow[1, j, i]) <= near, 1.0, 0.0)
-        b = ti.select(ti.max(shadow[0, j, i + 1], shadow[1, j, i + 1]) <= near, 1.0, 0.0)
-        c = ti.select(ti.max(shadow[0, j + 1, i], shadow[1, j + 1, i]) <= near, 1.0, 0.0)
-        d = ti.select(ti.max(shadow[0, j + 1, i + 1], shadow[1, j + 1, i + 1]) <= near, 1.0, 0.0)
+        k, own = j * wide + i, (wide + j) * wide + i  # of the room, of the scene
+        a = ti.select(ti.max(shadow[k], shadow[own]) <= near, 1.0, 0.0)
+        b = ti.select(ti.max(shadow[k + 1], shadow[own + 1]) <= near, 1.0, 0.0)
+        c = ti.select(ti.max(shadow[k + wide], shadow[own + wide]) <= near, 1.0, 0.0)
+        d = ti.select(ti.max(shadow[k + wide + 1], shadow[own + wide + 1]) <= near, 1.0, 0.0)
         out = (a * (1 - fx) + b * fx) * (1 - fy) + (c * (1 - fx) + d * fx) * fy
     return out

@@ -36,18 +36,12 @@ class Geometry:
         self._paints = np.array([paint.row for paint in drawn.paints], np.float32)
         self._looks = np.zeros((len(self.points), 8), np.float32)
         self._looks[:, 3:] = drawn.ref
-        self._there = np.zeros((0, *self.points.shape), np.float32)
+        self._there = np.zeros_like(self.points)
         self.turned()
 
     def turned(self) -> None:
         """Find the normals anew: the points have changed."""
         raster.turn_normals(self.points, self._triangles, self._looks)
-
-    def _room(self, count: int) -> np.ndarray:
-        """Room for the points of so many views."""
-        if len(self._there) < count:
-            self._there = np.zeros((count, *self.points.shape), np.float32)
-        return self._there
 
     def draw(self, views: np.ndarray, near: np.ndarray, which: np.ndarray) -> None:
         """Find what is seen, over what is there already.
@@ -57,7 +51,7 @@ class Geometry:
             near: Nearness of what is seen in each pixel [1/m], shape (c, h, w); changed.
             which: Number of the triangle that is seen there [-], shape (c, h, w); changed.
         """
-        raster.draw(self.points, self._triangles, views, self._room(len(views)), near, which)
+        raster.draw(self.points, self._triangles, views, self._there, near.reshape(-1), which.reshape(-1))
 
     def see(self, views: np.ndarray, near: np.ndarray, which: np.ndarray, seen_as: np.ndarray) -> None:
         """The same, and how it looks.
@@ -69,9 +63,16 @@ class Geometry:
             seen_as: Colour, normal and gloss there [-], shape (c, h, w, 7); changed.
         """
         which.fill(-1)
-        there = self._room(len(views))
         raster.see(
-            self.points, self._triangles, views, there, near, which, self._looks, self._paints, seen_as
+            self.points,
+            self._triangles,
+            views,
+            self._there,
+            near.reshape(-1),
+            which.reshape(-1),
+            self._looks,
+            self._paints,
+            seen_as.reshape(-1, seen_as.shape[-1]),
         )
 
 
@@ -108,7 +109,15 @@ class Room:
         self._geometry.see(views[still], self.near[still], self._which[still], self.look[still])
         self.place = np.zeros((self._standing, *shape[1:], 3), np.float32)
         self.fixed = np.zeros(self.place.shape, np.uint8)
-        raster.settle(views, self.near, self.look, self.lamp, self._shadow, self.place, self.fixed)
+        raster.settle(
+            views,
+            self.near.reshape(-1),
+            self.look.reshape(-1, 7),
+            self.lamp,
+            self._shadow.reshape(-1),
+            self.place.reshape(-1, 3),
+            self.fixed.reshape(-1, 3),
+        )
 
     def follow(self, views: np.ndarray, before: np.ndarray) -> None:
         """See it anew with the cameras that move, behind what is ``before`` it (c, h, w)."""
@@ -191,15 +200,15 @@ class Studio:
         shadow = room.shadow(self._scene)
         raster.light(
             self._views,
-            self._near,
-            self._seen_as,
-            room.near,
-            room.look,
-            room.place,
-            room.fixed,
+            self._near.reshape(-1),
+            self._seen_as.reshape(-1, 7),
+            room.near.reshape(-1),
+            room.look.reshape(-1, 7),
+            room.place.reshape(-1, 3),
+            room.fixed.reshape(-1, 3),
             room.lamp,
-            shadow,
-            self._out,
+            shadow.reshape(-1),
+            self._out.reshape(-1, 3),
         )
         seen = dict(zip(self._order, self._out.copy(), strict=True))
         return {name: seen[name] for name in self._cameras}
