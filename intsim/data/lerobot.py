@@ -18,8 +18,8 @@ from calib.simulation.workers import Workers
 from intsim.data.cameras import CAMERA_NAMES, WORK_CAMERA
 from intsim.data.export_episodes import ExportEpisode, check_target, export_episodes
 from intsim.data.shards import StoredTrajectory
-from intsim.task.gym_action import to_gym_action
-from intsim.task.planner import CONTROL_RATE, GRIPPER_CLOSED
+from intsim.task.gym_action import policy_state, to_gym_action
+from intsim.task.planner import CONTROL_RATE
 from intsim.task.selection import EVERY_TASK, TaskFilter
 
 CODEBASE_VERSION = "v3.0"
@@ -61,10 +61,8 @@ def episode_columns(stored: StoredTrajectory) -> dict[str, np.ndarray]:
     g = stored.group
     n = len(g["actions"])
     edge = g["obs/extra/edge"][()][:n]
-    zero, gripper = np.zeros(n), np.full(n, GRIPPER_CLOSED)
-    state = np.column_stack([edge[:, :3], zero, edge[:, 4], edge[:, 3], zero, gripper])
     return {
-        "observation.state": state.astype(np.float32),
+        "observation.state": policy_state(edge).astype(np.float32),
         "action": to_gym_action(g["control/delta"][()], edge[:, 3]).astype(np.float32),
         "extra.qpos": g["obs/agent/qpos"][()][:n],
         "extra.joint_target": g["actions"][()],

@@ -185,8 +185,8 @@ def deflate(content: Any) -> bytes:
 def png_bytes(frame: np.ndarray) -> bytes:
     """A picture as a PNG file.
 
-    Each row is written as the change from the pixel at its left (the standard's filter *Sub*). Pillow tries five filters
-    for each row, which takes longer than all the rest and saves nothing in rendered pictures.
+    Each row is written as the change from the pixel at its left (the standard's filter *Sub*). Pillow tries five
+    filters for each row, which takes longer than all the rest and saves nothing in rendered pictures.
 
     Args:
         frame: Red, green and blue, 8 bits [-], shape (h, w, 3).

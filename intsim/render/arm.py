@@ -101,6 +101,7 @@ class _Joint:
         self._origin = _pose(joint.find("origin"))
         x, y, z = self.axis / np.linalg.norm(self.axis)
         self._cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        self._cross_twice = self._cross @ self._cross
 
     @property
     def moves(self) -> bool:
@@ -113,7 +114,9 @@ class _Joint:
         if self.kind == "prismatic":
             own[:3, 3] = value * self.axis
         elif self.moves:
-            own[:3, :3] += math.sin(value) * self._cross + (1 - math.cos(value)) * self._cross @ self._cross  # Rodrigues
+            own[:3, :3] += (
+                math.sin(value) * self._cross + (1 - math.cos(value)) * self._cross @ self._cross
+            )  # Rodrigues
         return self._origin @ own
 
 

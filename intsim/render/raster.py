@@ -15,7 +15,6 @@ from intsim.render.texture import part_of_second
 from intsim.render.view import NEAR
 
 
-
 def rows(size: int, kind: type = ti.f32) -> ti.types.ndarray:
     """An array of rows of so many numbers, shape (n, size): one index, and no product of shapes for each number."""
     return ti.types.ndarray(dtype=ti.types.vector(size, kind), ndim=1)
