@@ -1,16 +1,18 @@
-"""LeRobot's own code behind the protocol: a small random policy is asked as ``lerobot-eval`` asks it. Needs LeRobot 0.6.1
-(Python 3.12), which is not among the extras: its tests are marked ``vla``."""
+"""LeRobot's own code behind the protocol: a small random policy is asked as ``lerobot-eval`` asks it. Needs LeRobot
+0.6.1 (Python 3.12), which is not among the extras: its tests are marked ``vla``."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
 import threading
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import intsim
 from intsim.policy.remote import Remote
 from intsim.policy.server import Server
 from intsim.task.gym_action import from_gym_action, policy_state
@@ -21,15 +23,16 @@ POSE = np.array([0.1, -0.05, 0.2, 0.4, 0.1])
 
 
 def test_adapters_need_no_more_than_numpy():
-    """They run in environments of others: what importing them brings along is NumPy and this project's own modules, none
-    of which needs more."""
+    """They run in environments of others: what importing them brings along is NumPy and this project's own modules,
+    none of which needs more."""
     code = (
-        "import sys, intsim.policy.vla_adapters\n"
-        "names = {name.split('.')[0] for name in sys.modules}\n"
-        "print(*sorted(names - set(sys.stdlib_module_names) - {'__main__', 'sitecustomize'}))"
+        "import sys\n"
+        f"sys.path.insert(0, {str(Path(intsim.__file__).parents[1])!r})\n"
+        "before = set(sys.modules)\n"
+        "import intsim.policy.vla_adapters\n"
+        "print(*{name.split('.')[0] for name in set(sys.modules) - before} - set(sys.stdlib_module_names))"
     )
-    found = subprocess.run([sys.executable, "-I", "-c", f"import sys; sys.path.insert(0, '.')\n{code}"],
-                           capture_output=True, text=True, check=True)  # fmt: skip
+    found = subprocess.run([sys.executable, "-I", "-c", code], capture_output=True, text=True, check=True)
     named = {name for name in found.stdout.split() if not name.startswith("_")}
     assert {"intsim", "numpy"} <= named <= {"calib", "cython_runtime", "intsim", "mpm", "numpy"}
 
@@ -107,8 +110,8 @@ def seen(step: int) -> dict[str, np.ndarray]:
 
 @pytest.mark.vla
 def test_its_actions_are_those_of_lerobots_own_evaluation(act):
-    """Step by step through the protocol, two chunks long: what LeRobot's functions, called as its ``rollout`` calls them,
-    give for the same pictures and state, brought to metres and radians. A new episode begins with a new chunk."""
+    """Step by step through the protocol, two chunks long: what LeRobot's functions, called as its ``rollout`` calls
+    them, give for the same pictures and state, brought to metres and radians. A new episode begins a new chunk."""
     import torch
     from lerobot.envs.utils import preprocess_observation
     from lerobot.policies.act.modeling_act import ACTPolicy
