@@ -16,6 +16,7 @@ import numpy as np
 from calib.errors import OutputError
 from calib.simulation.workers import Workers
 from intsim.data.cameras import CAMERA_NAMES, WORK_CAMERA
+from intsim.data.dataset_card import CARD_FILE, dataset_card
 from intsim.data.export_episodes import ExportEpisode, check_target, export_episodes
 from intsim.data.shards import StoredTrajectory
 from intsim.task.gym_action import policy_state, to_gym_action
@@ -261,6 +262,7 @@ class _Writer:
         stats = {name: merge_statistics(parts) for name, parts in self.parts.items()}
         (meta / "stats.json").write_text(json.dumps(stats, indent=1) + "\n", encoding="utf-8")
         (meta / "info.json").write_text(json.dumps(info, indent=1) + "\n", encoding="utf-8")
+        (self.out / CARD_FILE).write_text(dataset_card(info, stats, self.side), encoding="utf-8")
         return info
 
     def _info(self) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """LeRobot's own code behind the protocol: a small random policy is asked as ``lerobot-eval`` asks it. Needs LeRobot
-0.6.1 (Python 3.12), which is not among the extras: its tests are marked ``vla``. In an environment that has LeRobot, NumPy
-and pytest alone it is run by ``PYTHONPATH=. python -m pytest --noconftest -o addopts=--import-mode=importlib`` and its name."""
+0.6.1 (Python 3.12), which is not among the extras: its tests are marked ``vla``. Where LeRobot, NumPy and pytest alone
+are installed, ``python -m pytest --noconftest -o addopts=--import-mode=importlib`` runs this file."""
 
 from __future__ import annotations
 
