@@ -8,16 +8,8 @@ from typing import Any
 import numpy as np
 
 from calib.material.knife import load_knife
-from intsim.task.planner import (
-    CONTROL_RATE,
-    DESCENT_SPEED,
-    GRIPPER_CLOSED,
-    HOME,
-    PHASES,
-    BladeDescent,
-    minimum_jerk,
-    plan_cut,
-)
+from intsim.task.gym_action import GRIPPER_CLOSED
+from intsim.task.planner import CONTROL_RATE, DESCENT_SPEED, HOME, PHASES, BladeDescent, minimum_jerk, plan_cut
 from intsim.task.targets import TaskError, target
 
 BOARD_REACHED = 2e-4  # height of the edge at which it is on the board [m]

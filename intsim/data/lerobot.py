@@ -16,10 +16,11 @@ import numpy as np
 from calib.errors import OutputError
 from calib.simulation.workers import Workers
 from intsim.data.cameras import CAMERA_NAMES, WORK_CAMERA
+from intsim.data.dataset_card import CARD_FILE, dataset_card
 from intsim.data.export_episodes import ExportEpisode, check_target, export_episodes
 from intsim.data.shards import StoredTrajectory
-from intsim.task.gym_action import to_gym_action
-from intsim.task.planner import CONTROL_RATE, GRIPPER_CLOSED
+from intsim.task.gym_action import policy_state, to_gym_action
+from intsim.task.planner import CONTROL_RATE
 from intsim.task.selection import EVERY_TASK, TaskFilter
 
 CODEBASE_VERSION = "v3.0"
@@ -61,10 +62,8 @@ def episode_columns(stored: StoredTrajectory) -> dict[str, np.ndarray]:
     g = stored.group
     n = len(g["actions"])
     edge = g["obs/extra/edge"][()][:n]
-    zero, gripper = np.zeros(n), np.full(n, GRIPPER_CLOSED)
-    state = np.column_stack([edge[:, :3], zero, edge[:, 4], edge[:, 3], zero, gripper])
     return {
-        "observation.state": state.astype(np.float32),
+        "observation.state": policy_state(edge).astype(np.float32),
         "action": to_gym_action(g["control/delta"][()], edge[:, 3]).astype(np.float32),
         "extra.qpos": g["obs/agent/qpos"][()][:n],
         "extra.joint_target": g["actions"][()],
@@ -263,6 +262,7 @@ class _Writer:
         stats = {name: merge_statistics(parts) for name, parts in self.parts.items()}
         (meta / "stats.json").write_text(json.dumps(stats, indent=1) + "\n", encoding="utf-8")
         (meta / "info.json").write_text(json.dumps(info, indent=1) + "\n", encoding="utf-8")
+        (self.out / CARD_FILE).write_text(dataset_card(info, stats, self.side), encoding="utf-8")
         return info
 
     def _info(self) -> dict[str, Any]:

@@ -43,7 +43,8 @@ from calib.io.folder import finite
 from calib.io.meaning import describe_attributes, describe_sets
 from intsim.data.demonstrate import Demonstration
 from intsim.data.shard_meanings import GROUP, GROUP_ATTRIBUTES, meaning_of
-from intsim.task.planner import CONTROL_RATE, GRIPPER_CLOSED, PHASES
+from intsim.task.gym_action import GRIPPER_CLOSED
+from intsim.task.planner import CONTROL_RATE, PHASES
 from intsim.task.targets import Item
 from mpm.files import replacing, write_atomic
 from mpm.scene.shapes import Shape

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 
 from calib.errors import OutputError
-from intsim.task.planner import GRIPPER_CLOSED, HOME
+from intsim.task.gym_action import GRIPPER_CLOSED
+from intsim.task.planner import HOME
 from intsim.task.selection import TaskFilter, TrainingTasks
 from intsim.task.targets import Item
 

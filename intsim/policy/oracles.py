@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from intsim.task.gym_action import GRIPPER_CLOSED
 from intsim.task.language import parse_instruction
-from intsim.task.planner import GRIPPER_CLOSED, HOME, PRESS, BladeDescent, plan_cut
+from intsim.task.planner import HOME, PRESS, BladeDescent, plan_cut
 from intsim.task.rollout import Policy
 from intsim.task.targets import CutSpec, Item, TaskError, boxed_target, target
 

@@ -1,11 +1,13 @@
-"""Published vision-language-action models as servers of :mod:`intsim.policy.remote`: RDT, Octo and OpenVLA.
+"""Published policies as servers of :mod:`intsim.policy.remote`: RDT, Octo, OpenVLA and those of LeRobot.
 
     python -m intsim.policy.vla_adapters openvla --weights runs/openvla-cutcal --key cutcal --port 8000
     cutcal evaluate --policy remote --server http://127.0.0.1:8000 --world intsim --pixels 256
 
 Each is loaded by its authors' own code and runs in an environment of its own, with the packages that they ask for and a
 GPU; the evaluation runs in another. They have to be fine-tuned on an export of ``cutcal dataset`` first: none has seen
-a knife. No weights are loaded in the tests, where stand-ins take the place of the packages.
+a knife. Of this project they import what needs NumPy alone (and Pillow, for pictures): put the checkout on PYTHONPATH.
+No weights are loaded in the tests, where stand-ins take the place of the packages; LeRobot itself is tried with a small
+random policy where it is installed (tests marked ``vla``).
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from intsim.policy.lerobot_adapter import LeRobotPolicy
 from intsim.policy.remote import TOKEN, Model
 from intsim.policy.server import Server
 from intsim.task.gym_action import from_gym_action
@@ -284,6 +287,8 @@ def load_model(args: argparse.Namespace) -> Model:
             return OpenVLA(args.weights, args.key, args.device, args.statistics)
         if args.model == "octo":
             return Octo(args.weights, args.key)
+        if args.model == "lerobot":
+            return LeRobotPolicy(args.weights, args.device)
         if args.root is None or args.statistics is None:
             raise CutcalError("rdt: give --root, its repository, and --statistics, statistics.json of the export")
         return RDT(args.weights, args.root, args.statistics)
@@ -298,12 +303,12 @@ def main(words: Sequence[str] | None = None) -> int:
     p = argparse.ArgumentParser(
         prog="python -m intsim.policy.vla_adapters", description="Serve a published model as a policy."
     )
-    p.add_argument("model", choices=("rdt", "octo", "openvla"))
+    p.add_argument("model", choices=("rdt", "octo", "openvla", "lerobot"))
     p.add_argument("--weights", required=True, help="fine-tuned weights: a folder, a file or a name")
     p.add_argument("--key", default="", help="data set whose statistics scale the actions back (openvla, octo)")
     p.add_argument("--root", help="repository of rdt")
     p.add_argument("--statistics", help="of rdt: statistics.json of the export; of openvla: a dataset_statistics.json")
-    p.add_argument("--device", default="cuda:0", help="of openvla (default cuda:0)")
+    p.add_argument("--device", default="cuda:0", help="of openvla and lerobot (default cuda:0)")
     p.add_argument(
         "--host", default="127.0.0.1", help=f"(default 127.0.0.1; another one needs a token in the variable {TOKEN})"
     )

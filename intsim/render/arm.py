@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from importlib.util import find_spec
 from itertools import product
@@ -82,9 +83,10 @@ class Arm:
             found[joint.child] = found[joint.parent] @ joint.pose(value)
         return found
 
-    def points(self, links: dict[str, np.ndarray]) -> np.ndarray:
-        """Vertices in the world [m], shape (n, 3)."""
-        return np.concatenate([self._rest[a:b] @ links[name][:3].T for name, a, b in self._spans])
+    def points(self, links: dict[str, np.ndarray], out: np.ndarray) -> None:
+        """Put the vertices in the world [m] into ``out``, shape (n, 3)."""
+        for name, a, b in self._spans:
+            out[a:b] = self._rest[a:b] @ links[name][:3].T
 
 
 class _Joint:
@@ -97,6 +99,9 @@ class _Joint:
         self.kind = joint.get("type", "fixed")
         self.axis = np.array(_numbers(axis.get("xyz", "1 0 0"))) if axis is not None else np.array([1.0, 0.0, 0.0])
         self._origin = _pose(joint.find("origin"))
+        x, y, z = self.axis / np.linalg.norm(self.axis)
+        self._cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        self._cross_twice = self._cross @ self._cross
 
     @property
     def moves(self) -> bool:
@@ -109,7 +114,9 @@ class _Joint:
         if self.kind == "prismatic":
             own[:3, 3] = value * self.axis
         elif self.moves:
-            own[:3, :3] = Rotation.from_rotvec(value * self.axis).as_matrix()
+            own[:3, :3] += (
+                math.sin(value) * self._cross + (1 - math.cos(value)) * self._cross @ self._cross
+            )  # Rodrigues
         return self._origin @ own
 
 
@@ -143,12 +150,12 @@ def _pose(origin: ElementTree.Element | None) -> np.ndarray:
 def _outside(mesh: Drawn) -> Drawn:
     """What can be seen of a link from any side: its inner parts are never drawn."""
     points = np.ascontiguousarray(mesh.points - (mesh.points.min(0) + mesh.points.max(0)) / 2, np.float32)
-    triangles = np.ascontiguousarray(mesh.triangles, np.int32)
+    triangles = np.ascontiguousarray(np.column_stack([mesh.triangles, mesh.paint_of]), np.int32)
     reach = float(np.linalg.norm(points, axis=1).max())
     views = np.array([View.lamp(np.array(direction), reach, PROBE_PIXELS).row for direction in SIDES])
-    shape = len(SIDES), PROBE_PIXELS, PROBE_PIXELS
-    near, which = np.full(shape, np.float32(-1e9)), np.full(shape, np.int32(-1))
-    raster.draw(points, triangles, views, np.empty((len(SIDES), *points.shape), np.float32), near, which)
+    count = len(SIDES) * PROBE_PIXELS**2
+    near, which = np.full(count, np.float32(-1e9)), np.full(count, np.int32(-1))
+    raster.draw(points, triangles, views, np.empty_like(points), near, which)
     seen = np.zeros(len(triangles), bool)
     seen[which[which >= 0]] = True
     used = np.unique(mesh.triangles[seen])

@@ -11,9 +11,10 @@ from calib.material.food import FoodSpec
 from intsim.sim.severing import SeveringOutcome
 from intsim.sim.world import ENV_ID, EPISODE_STEPS, World
 from intsim.task.guardrail import MAX_JOINT_SPEEDS, Guardrail
+from intsim.task.gym_action import GRIPPER_CLOSED
 from intsim.task.kinematic_table import limit_command
 from intsim.task.motion import at_rest
-from intsim.task.planner import CONTROL_RATE, GRIPPER_CLOSED
+from intsim.task.planner import CONTROL_RATE
 from intsim.task.rollout import Policy, Rollout
 from intsim.task.suites import Episode
 

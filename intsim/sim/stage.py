@@ -11,6 +11,7 @@ from intsim.render.arm import BASE_POSITION, BLADE_OFFSET, Arm, panda_descriptio
 from intsim.render.food import FoodMesh
 from intsim.render.kitchen import board_clutter
 from intsim.render.knife import knife_mesh
+from intsim.render.mesh import Drawn
 from intsim.render.studio import HAND, Studio
 from intsim.sim.piece_mesh import standing_mesh
 from intsim.task.targets import Item
@@ -40,7 +41,7 @@ class Stage:
         self._studio = Studio(Arm(panda_description(), BASE_POSITION, ARM_CELL / pixels, blade), cameras, pixels)
         self._items: list[Item] = []
         self._foods: list[FoodMesh] = []
-        self._shown: list[np.ndarray] = []
+        self._shown: list[Drawn] = []
 
     def serve(self, items: Sequence[Item], seed: int) -> None:
         """Put the foods of an episode on the board, in place of those before.
@@ -54,8 +55,8 @@ class Stage:
         for item in items:
             mesh = standing_mesh(item)
             self._foods.append(FoodMesh.of(item, mesh.points, mesh.triangles, mesh.flesh, self._cell))
-            self._shown.append(mesh.points)
-        self._studio.serve([*(food.drawn for food in self._foods), *self._beside])
+        self._shown = [food.drawn for food in self._foods]
+        self._studio.serve([*self._shown, *self._beside])
 
     def show(self, cut: int, which: int, points: np.ndarray, triangles: np.ndarray, flesh: np.ndarray) -> None:
         """Show a food as a mesh.
@@ -69,9 +70,8 @@ class Stage:
         """
         if cut != self._cut:
             self._cut = cut
-            self._foods[which] = FoodMesh.of(self._items[which], points, triangles, flesh, self._cell)
-            self._studio.serve([*(food.drawn for food in self._foods), *self._beside])
-        self._shown[which] = points
+            self._change(which, FoodMesh.of(self._items[which], points, triangles, flesh, self._cell))
+        self._shown[which] = self._foods[which].at(points)
 
     def rest(self, which: int, item: Item) -> None:
         """Show a food at rest as it has become: in pieces that have slid apart, with the faces of its cuts.
@@ -83,14 +83,16 @@ class Stage:
         if item is self._items[which]:
             return
         mesh, self._items[which] = standing_mesh(item), item
-        self._foods[which] = FoodMesh.of(item, mesh.points, mesh.triangles, mesh.flesh, self._cell)
-        self._shown[which] = mesh.points
-        self._studio.serve([*(food.drawn for food in self._foods), *self._beside])
+        self._change(which, FoodMesh.of(item, mesh.points, mesh.triangles, mesh.flesh, self._cell))
+
+    def _change(self, which: int, food: FoodMesh) -> None:
+        """Another mesh for a food; the others stay as they are."""
+        self._foods[which], self._shown[which] = food, food.drawn
+        self._studio.serve([*self._shown, *self._beside])
 
     def place(self, qpos: np.ndarray) -> None:
         """Bring the arm to joints (9,) [rad, m], and find what each camera sees."""
-        foods = [food.at(points) for food, points in zip(self._foods, self._shown, strict=True)]
-        self._studio.place(qpos, [*foods, *self._beside])
+        self._studio.place(qpos, [*self._shown, *self._beside])
 
     def pictures(self, background: int) -> dict[str, np.ndarray]:
         """What each camera sees before a background, 8 bits, shape (pixels, pixels, 3) each.

@@ -1,4 +1,4 @@
-"""A change of the edge's pose as an action of ManiSkill's ``pd_ee_delta_pose``, and back.
+"""A change of the edge's pose as an action of ManiSkill's ``pd_ee_delta_pose``, and back; a pose as a policy's state.
 
 There 1 stands for 0.1 m, and for -0.1 rad: ManiSkill's controller multiplies a rotation by its lower limit. The
 rotation is one vector about axes that are aligned with the robot's base.
@@ -9,6 +9,28 @@ from __future__ import annotations
 import numpy as np
 
 PLACE_SCALE, TURN_SCALE = 0.1, -0.1  # change of place [m] and of direction [rad] that an action of 1 stands for
+
+GRIPPER_CLOSED = -1.0
+"""Gripper's part of an action, and of a state: closed on the handle.
+
+ManiSkill's Panda maps -1 to 1 onto finger joints from -0.01 to 0.04 m, so that -1 presses the fingers together and 0
+holds them 15 mm apart.
+"""
+
+
+def policy_state(pose: np.ndarray) -> np.ndarray:
+    """A pose of the edge as the exports have it, and as a policy that learnt from one is given it.
+
+    Args:
+        pose: x, y, z [m], yaw and tilt [rad], shape (..., 5).
+
+    Returns:
+        x, y, z [m], roll (0), tilt and yaw [rad], 0 and the gripper [-], shape (..., 8).
+    """
+    pose = np.asarray(pose, float)
+    zero = np.zeros(pose.shape[:-1])
+    place = [pose[..., k] for k in range(3)]
+    return np.stack([*place, zero, pose[..., 4], pose[..., 3], zero, zero + GRIPPER_CLOSED], axis=-1)
 
 
 def to_gym_action(change: np.ndarray, yaw: np.ndarray | float) -> np.ndarray:

@@ -13,12 +13,6 @@ STYLES = ("press", "slice", "rock", "saw")
 PHASES = ("approach", "contact", "cut", "hold", "retract")
 CONTROL_RATE = 20.0  # control steps a second
 HOME = (-0.25, 0.0, 0.25)  # where the middle of the edge begins [m]
-GRIPPER_CLOSED = -1.0
-"""Gripper's part of an action: closed on the handle.
-
-ManiSkill's Panda maps -1 to 1 onto finger joints from -0.01 to 0.04 m, so that -1 presses the fingers together and 0
-holds them 15 mm apart.
-"""
 CLEARANCE = 0.02  # height above the food at which the descent begins [m]
 DESCENT_SPEED = 0.04  # of the descent [m/s]
 APPROACH_TIME = 2.0  # time from home to above the food, and back up [s]

@@ -109,7 +109,9 @@ def test_names_that_mean_nothing_are_listed_with_their_units(tmp_path: Path) -> 
     """Which column is which is not guessed; the units that the file states help to say it."""
     with pytest.raises(TraceError, match=r"only one in a unit of time is 'Tid': name it.*of force is 'Voima': name it"):
         read_trace(plain(tmp_path, header="Tid,Voima,Matka\ns,N,m"))
-    with pytest.raises(TraceError, match=r"the columns are time_s \[s\], Voima \[N\], Vino \[N\]; name one with --force-col"):
+    with pytest.raises(
+        TraceError, match=r"the columns are time_s \[s\], Voima \[N\], Vino \[N\]; name one with --force-col"
+    ):
         read_trace(plain(tmp_path, header="time_s,Voima,Vino\ns,N,N"))
 
 

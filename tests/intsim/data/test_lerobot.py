@@ -103,6 +103,31 @@ def test_force_is_nothing_that_a_policy_learns_from(painted):
     assert {"contact.force", "contact.impulse", "extra.qpos"} <= set(info["features"])
 
 
+def test_the_card_says_what_is_in_it(stored, painted, tmp_path):
+    """Licence by whether meshes of others are seen, counts of episodes and outcomes, and statistics of each component;
+    the head is one that a hub reads."""
+    import yaml
+
+    out, info = painted
+    card = (out / "README.md").read_text()
+    head = yaml.safe_load(card.split("---\n")[1])
+    assert head["license"] == "cc-by-nc-4.0" and "LeRobot" in head["tags"]
+    entries = [one.entry for one in trajectories(stored)]
+    severed = 2 * sum(len(e["instructions"]) * e["severed"] for e in entries)
+    for line in (
+        f"| episodes | {info['total_episodes']} |",
+        "| trajectories | 3 |",
+        "| backgrounds | 2 |",
+        f"| end with the food in pieces | {severed} |",
+    ):
+        assert line in card, line
+    stats = json.loads((out / "meta/stats.json").read_text())
+    assert f"| `contact.force` | z | {stats['contact.force']['min'][2]:.4g} |" in card
+    assert card.count("| `observation.state` |") == 8 and card.count("| `action` |") == 7
+    export_lerobot(stored, tmp_path / "bare")
+    assert "license: mit" in (tmp_path / "bare" / "README.md").read_text()
+
+
 def test_tasks_are_looked_up_by_their_row(painted):
     """Row n of tasks.parquet is task n, the sentence its index; a trajectory is there in all of its sentences before
     each background, and begins with another one."""

@@ -31,9 +31,9 @@ from intsim.sim import environment as robot_environment
 from intsim.sim.closed_loop import make_environment, roll_out_closed_loop
 from intsim.sim.panda import JOINT_IMPEDANCE, edge_pose
 from intsim.sim.world import World
-from intsim.task.gym_action import to_gym_action
+from intsim.task.gym_action import GRIPPER_CLOSED, to_gym_action
 from intsim.task.motion import MotionEnd
-from intsim.task.planner import GRIPPER_CLOSED, PHASES, BladeDescent, plan_cut
+from intsim.task.planner import PHASES, BladeDescent, plan_cut
 from intsim.task.suites import sample_episode
 from intsim.task.targets import target
 from mpm.scene.errors import CutcalError

@@ -54,8 +54,10 @@ def test_the_nearer_of_two_hides_the_other_in_whatever_order():
         assert look[PIXELS // 2, PIXELS // 2, 0] == 1 and look[PIXELS // 2, 12, 1] == 1
 
 
-def test_nothing_is_seen_through_the_shadow_of_a_lamp_but_beside_it():
-    """The room that a lamp from above does not reach under a plate is as wide as the plate."""
+@pytest.mark.parametrize(("moves", "stands"), [(False, False), (True, False), (False, True), (True, True)])
+def test_nothing_is_seen_through_the_shadow_of_a_lamp_but_beside_it(moves, stands):
+    """The room that a lamp from above does not reach under a plate is as wide as the plate: whether the plate moves,
+    or stands as the room does, and whether the floor is lit anew or was lit once."""
     from intsim.render import raster
     from intsim.render.studio import FAR, Geometry
 
@@ -63,16 +65,24 @@ def test_nothing_is_seen_through_the_shadow_of_a_lamp_but_beside_it():
         box((-1, -1, -0.1), (1, 1, 0.0), Paint((1, 1, 1))),
         box((-0.25, -0.25, 0.5), (0.25, 0.25, 0.55), Paint((1, 0, 0))),
     )
-    lamp = View.lamp(np.array([0.0, 0.0, -1.0]), 1.5, 256).row[None]
-    shadow = np.full((1, 256, 256), np.float32(FAR))
-    Geometry(Drawn.all([floor, plate])).draw(lamp, shadow, np.zeros((1, 256, 256), np.int32))
+    lamp = np.zeros((2, 16), np.float32)
+    lamp[0] = View.lamp(np.array([0.0, 0.0, -1.0]), 1.5, 256).row
+    lamp[1, :10] = [0.8] * 3 + [0.1] * 6 + [0.01]
+    shadow = np.full((2, 256, 256), np.float32(FAR))  # of the room, of the scene
+    part = slice(int(moves), int(moves) + 1)
+    Geometry(Drawn.all([floor, plate])).draw(lamp[:1], shadow[part], np.zeros((1, 256, 256), np.int32))
     view = View.towards(np.array([0.0, 0.0, 0.4]), np.zeros(3), 2.0, PIXELS)  # from below the plate
     near, _, look = seen(floor, view)
-    none, room = np.zeros_like(near)[None], np.zeros((1, PIXELS, PIXELS, 9), np.float32)
-    out = np.zeros((1, PIXELS, PIXELS, 3), np.uint8)
-    lamps = np.array([0.8, 0.8, 0.8, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.01], np.float32)
-    raster.light(view.row[None], near[None], look[None], none, room, lamp, shadow, lamps, out)
-    dark = out[0, PIXELS // 2, :, 0] < 120
+    near, look, count = near.reshape(-1), look.reshape(-1, 7), PIXELS**2
+    none, out = np.zeros_like(near), np.zeros((count, 3), np.uint8)
+    place, fixed = np.zeros((count, 3), np.float32), np.zeros((count, 3), np.uint8)
+    if stands:  # the floor is what does not move
+        raster.settle(view.row[None], near, look, lamp, shadow.reshape(-1), place, fixed)
+        near, none = none, near
+    else:
+        place, fixed = place[:0], fixed[:0]
+    raster.light(view.row[None], near, look, none, look, place, fixed, lamp, shadow.reshape(-1), out)
+    dark = out.reshape(PIXELS, PIXELS, 3)[PIXELS // 2, :, 0] < 120
     wide = dark.sum() / view.focal * 0.4
     assert wide == pytest.approx(0.5, abs=2 * 0.4 / view.focal) and not dark[0] and not dark[-1]
 
