@@ -47,7 +47,7 @@ LIMITS: dict[str, tuple[float, float, str]] = {
 """Numbers between which a value must lie, and its unit: those of the command line."""
 LOCAL_WORKERS = 2
 """Simulations at a time on this machine, a process each."""
-READING = ("time_col", "force_col", "position_col", "depth_col", "sign", "rate")
+READING = ("time_col", "force_col", "position_col", "depth_col", "sign", "rate", "decimal")
 """Arguments that say how files and DataFrames are read."""
 KEYS = ("food", "created", "status", "passed", "trace", "parameters", "versions")
 """What tells the summary of a calibration from that of a cut."""
@@ -86,7 +86,8 @@ class Calibration:
         baseline: What is subtracted without an air run, one of ``calib.trace.baselines.BASELINES``.
         cut: Number of the cut in a record of several, from 1; ``whole`` for a record that is one; None for its only.
         set: Other values of properties [SI], by name, such as ``{"E": 2e5}``.
-        time_col, force_col, position_col, depth_col, sign, rate: How files and DataFrames are read, as in ``columns``.
+        time_col, force_col, position_col, depth_col, sign, rate, decimal: How files and DataFrames are read, as in
+            ``columns``.
         gain_sd: Relative standard deviation of the sensor's gain [-]; None for what its kind suggests.
         lag_sd: Standard deviation of the sensor's delay [s], or None.
         bandwidth: Cut-off of the low-pass that the force went through [Hz]; None for what its kind suggests.
@@ -133,6 +134,7 @@ class Calibration:
     depth_col: str | None = None
     sign: str | int | None = None
     rate: float | None = None
+    decimal: str | None = None
     gain_sd: float | None = None
     lag_sd: float | None = None
     bandwidth: float | None = None
