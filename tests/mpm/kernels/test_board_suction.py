@@ -32,7 +32,7 @@ def drawn_up(pull: float, steps: int, kind: str = "block", suction: float = SUCT
         Motion(2e-3, 1e-3),
         board=Board(0.5, suction),
         edge=EdgeLaw(zone=3e-3),
-        numerics=Numerics(dx=3e-3, gravity=-pull, mirror=False),
+        numerics=Numerics(dx=3e-3, gravity=-pull),
     )
     sim = Simulation(scene, Runtime(threads=1))
     sim.load(FLESH)
