@@ -161,7 +161,7 @@ class FoodSpec:
         """Names of the properties that a calibration fits unless told otherwise."""
         start = ("R_skin", "skin_thickness") if self.properties["skin_thickness"].value > 0.0 else ("R_initiation",)
         strength = tuple(name for name in _STRENGTHS if name in self.properties)
-        board = tuple(name for name in BOARD if name in self.properties)
+        board = tuple(name for name in BOARD if self.value(name))
         return ("E", "yield_stress", *strength, "R", *self.layers, *start, "initiation_depth", "mu", *board)
 
     @property

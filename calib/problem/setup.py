@@ -160,6 +160,11 @@ def set_up(request: Request) -> Setup:
     request, sticks = _with_adhesion(with_height(request, curve))
     fine, coarse, sizes, assumed = _scenes(request, curve)
     names = _held_down(request, _names(request, sizes), fine.food.shape)
+    if BOARD_SUCTION in names:
+        assumed.append(
+            "how firmly the board holds the food's wet face is not known: it is fitted; give --set board_suction=0 if it "
+            "lay on a rack or on grooves that let air under it"
+        )
     if not request.scaled:  # several are judged together
         check_speeds(names, {curve.trace.source: real_speed(curve)})
     sensor, said = sensor_of(curve, request.gain_sd, request.lag_sd, request.bandwidth)
@@ -260,7 +265,7 @@ def _held_down(request: Request, names: tuple[str, ...], shape: Shape) -> tuple[
         return names
     if request.fit is not None:
         raise MaterialError(
-            f"--fit {BOARD_SUCTION}: a {shape.words} touches the board in a line or a point, and is not held down; "
+            f"--fit {BOARD_SUCTION}: this {shape.words} touches the board in a line or a point, and is not held down; "
             "leave it out, or give the specimen a --shape with a flat face"
         )
     return tuple(name for name in names if name != BOARD_SUCTION)

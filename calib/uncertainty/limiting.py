@@ -29,7 +29,7 @@ REMEDIES = {
     ),
     BOARD_SUCTION: (
         "suction of the board",
-        "a dry, rough board or a rack would let air under the food (--fit without it, --set board_suction=0)",
+        "a rack or a board with grooves lets air under the food (--set board_suction=0)",
     ),
     "aspect": ("width", "a calliper or a photograph would tell it (--width)"),
     "width": ("width", "a calliper or a photograph would tell it (--width)"),

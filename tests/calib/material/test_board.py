@@ -53,6 +53,12 @@ def test_a_half_food_is_held_down() -> None:
     assert rolled.board.suction == own and rolled.suction == 0.0
 
 
+def test_a_board_that_lets_air_in_leaves_nothing_to_fit() -> None:
+    """A suction of 0 is held, and the others stay."""
+    dry = APPLE.with_values({"board_suction": 0.0})
+    assert set(APPLE.default_fit) - set(dry.default_fit) == {"board_suction"} and scene(dry).suction == 0.0
+
+
 def test_foods_that_lie_on_a_cut_face_have_a_suction() -> None:
     """And no others: what touches the board in a line or a point is not held."""
     for name, food in load_foods().items():
