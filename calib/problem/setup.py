@@ -162,8 +162,8 @@ def set_up(request: Request) -> Setup:
     names = _held_down(request, _names(request, sizes), fine.food.shape)
     if BOARD_SUCTION in names:
         assumed.append(
-            "how firmly the board holds the food's wet face is not known: it is fitted; give --set board_suction=0 if it "
-            "lay on a rack or on grooves that let air under it"
+            "how firmly the board holds the food's wet face is not known: it is fitted; give --set board_suction=0 if "
+            "it lay on a rack or on grooves that let air under it"
         )
     if not request.scaled:  # several are judged together
         check_speeds(names, {curve.trace.source: real_speed(curve)})
