@@ -261,12 +261,27 @@ def kernels(cache: Path | None) -> Finding:
     return Finding(name, "ok", f"{cache}, {size / 1e6:.0f} MB")
 
 
+def _free_memory() -> float:
+    """Memory that a program can have [B]: what holds copies of files is given back when it is asked for.
+
+    Raises:
+        AttributeError, ValueError, OSError: The system does not say.
+    """
+    try:
+        said = re.search(r"^MemAvailable:\s+(\d+) kB", Path("/proc/meminfo").read_text("ascii"), re.MULTILINE)
+    except OSError:  # not Linux
+        said = None
+    if said:
+        return 1024.0 * int(said[1])
+    return float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+
+
 def memory() -> Finding:
     """Cores and free memory."""
     cores = _cores()
     words = f"{cores} core{'s' if cores > 1 else ''}"
     try:
-        free = os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+        free = _free_memory()
     except (AttributeError, ValueError, OSError):  # not on macOS and Windows
         return Finding("cores and memory", "ok", words)
     words += f", {free / 1e9:.1f} GB free"

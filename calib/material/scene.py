@@ -265,8 +265,9 @@ def of_specimen(
         The scene, and the values without these.
     """
     rest = dict(values)
-    board = {name: rest.pop(p, None) for name, p in OF_BOARD.items()}
-    scene = replace(scene, board=replace(scene.board, **{n: v for n, v in board.items() if v is not None}))
+    board = {name: rest.pop(p) for name, p in OF_BOARD.items() if p in rest}
+    if board:
+        scene = replace(scene, board=replace(scene.board, **board))
     roundness = rest.pop("roundness", None)
     if roundness is not None:
         scene = replace(scene, food=replace(scene.food, shape=replace(scene.food.shape, roundness=roundness)))

@@ -243,7 +243,7 @@ def test_a_force_is_carried_on_to_rest_from_the_two_slowest_runs():
     far, near = changes([half]), changes([half, quarter])
     assert (far[0].value, far[0].passed) == (pytest.approx(0.08), False)
     assert (near[0].name, near[0].value, near[0].passed) == (HALF_SPEED, pytest.approx(0.06), False)
-    assert near[0].note == "peak −4.6\xa0%, work +6.0\xa0%, extrapolated to rest from half and a quarter of it"
+    assert near[0].note == "peak −4.60\xa0%, work +6.00\xa0%, extrapolated to rest from half and a quarter of it"
     scattered = [Check(HALF_SPEED, None, 0.12, 0.0), Check(QUARTER_SPEED, None, 0.06, 0.0)]
     assert (changes(scattered)[0].value, changes(scattered)[0].passed) == (0.06, False)  # the line ends at nothing
     assert len(near) == 1 and changes([half, replace(quarter, work_change=0.02)])[0].passed
@@ -367,10 +367,10 @@ def test_verdicts_fail_what_fails():
         True,
     )
     assert len(balances(Conservation(0.0, 0.0))) == 2  # nothing was to be parted
-    assert notes["half the simulated speed"] == (0.06, "peak +2.0\xa0%, work −6.0\xa0%, extrapolated to rest")
+    assert notes["half the simulated speed"] == (0.06, "peak +2.00\xa0%, work −6.00\xa0%, extrapolated to rest")
     assert notes["constants of the method halved and doubled"] == (
         0.07,
-        "most by twice the process zone: peak +2.0\xa0%, work −7.0\xa0%",
+        "most by twice the process zone: peak +2.00\xa0%, work −7.00\xa0%",
     )
     assert notes["energy lost by the discretisation"] == (0.09, "of the work")
     assert notes["grid and particles elsewhere"] == (None, "broke down: inverted")

@@ -120,7 +120,7 @@ def test_cache_memory_and_folder(monkeypatch, tmp_path):
     assert doctor.writable("folder", tmp_path).state == "ok"
     lost = doctor.writable("folder", tmp_path / "none")
     assert lost.state == "fail" and "--out" in lost.words
-    monkeypatch.setattr("os.sysconf", lambda name: 1000, raising=False)
+    monkeypatch.setattr(doctor, "_free_memory", lambda: 1e6)
     assert doctor.memory().state == "fail" and "--workers 1" in doctor.memory().words
 
 

@@ -20,7 +20,7 @@ PICTURES = [f"{name[3:-3]}.png" for name in SCRIPTS]
 """What each of them draws."""
 QUICK = ("01_trace.py", "02_food.py", "03_prior.py")
 """Those that simulate nothing."""
-LONG = ("06_compare.py", "07_next_test.py", "13_grids.py")
+LONG = ("06_compare.py", "07_next_test.py", "09_section.py", "11_slicing.py", "13_grids.py")
 """Those that take half a minute each."""
 LONGEST = 40
 """Lines of a script."""

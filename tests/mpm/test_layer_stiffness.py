@@ -127,7 +127,7 @@ def test_a_food_that_is_all_rind_is_a_stiffer_food() -> None:
     assert np.abs(rind.face[-1, 2]) > 1.2 * np.abs(dry.face[-1, 2])  # or the adhesion would not be seen
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_both_ends_of_a_tie_are_as_heavy() -> None:
     """Or what one half gets the other would not lose: beside a blade aside of the middle the rinds differ."""
     aside = replace(scene("sphere", replace(FRUIT, rind_stiffness=5.0), mirror=False))

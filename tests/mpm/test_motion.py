@@ -64,7 +64,7 @@ def test_tilted_edge_needs_the_same_work_per_area():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("turn", [15.0, 45.0])
+@pytest.mark.parametrize("turn", [pytest.param(15.0, marks=pytest.mark.long), 45.0])
 def test_grid_may_lie_at_any_angle(turn):
     """Food and blade turned against the grid: peak and work as on it, within 2 %."""
     straight = cut(PRISM)

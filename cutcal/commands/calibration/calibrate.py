@@ -95,7 +95,7 @@ def add_trace(p: argparse.ArgumentParser, *, required: bool = True) -> None:
     g.add_argument("--depth-col", metavar="NAME", help=argparse.SUPPRESS)
     g.add_argument("--sign", choices=("+", "-"), metavar="+|-", help="sign that makes resistance positive")
     g.add_argument("--rate", type=number(0, 1e6, "/s"), metavar="HZ", help=RATE_HELP)
-    g.add_argument("--decimal", choices=(".", ","), help=argparse.SUPPRESS)
+    g.add_argument("--decimal", choices=(".", ","), metavar="MARK", help=argparse.SUPPRESS)
     g.add_argument("--speed", type=number(0, 10, "m/s"), metavar="M/S", help="of the knife, where there is no position")
     height = number(-100, 100, "m")
     g.add_argument("--board-z", type=height, metavar="M", help="what its height reads with the edge on the board [m]")

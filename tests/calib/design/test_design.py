@@ -132,7 +132,7 @@ def test_the_promise_is_kept_by_another_food(cut: Start, tmp_path: Path) -> None
     best = promised.tests[0]
     assert best.asked is not None and promised.recommended is not None
     truth = cut.parameters.to_dict(
-        cut.parameters.start + 0.5 * cut.present_sd * np.array([1, -1, 1, -1, 1, -1, 1, -1])[: len(cut.parameters)]
+        cut.parameters.start + 0.5 * cut.present_sd * np.resize([1.0, -1.0], len(cut.parameters))
     )
     kept = designed(replace(cut, parameters=cut.parameters.with_values(truth)), tmp_path / "truth", "yield_stress")
     found = next(t for t in kept.tests if t.name == best.name)

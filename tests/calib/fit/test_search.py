@@ -309,6 +309,7 @@ def test_a_curve_that_nothing_follows_is_not_polished(
     assert (sum(not t.coarse for t in made.runs) > fine) is polished
 
 
+@pytest.mark.long
 def test_what_is_not_polished_loses_less_than_an_interval(monkeypatch: pytest.MonkeyPatch) -> None:
     """The chi-square that rounds of small gains would have brought is less than what bounds an interval where the
     errors are as large."""

@@ -317,7 +317,7 @@ def known(journal):
     return journal.read_bytes().count(b'"key"') if journal.exists() else 0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_solver_recovers_R_of_a_prism_after_a_kill(prism, tmp_path, capsys):
     """A thin frictionless blade through a block: peak = R w gives R, and energy = R;
     killed, resumed, nothing run twice.

@@ -69,6 +69,7 @@ def verdicts(analysis: UncertaintyAnalysis) -> dict[str, str]:
     return {i.parameter.name: i.verdict for i in analysis.uncertainty.intervals}
 
 
+@pytest.mark.long
 def test_another_food_that_explains_the_curve_takes_a_claim_back():
     """Which food the first search ends at is chance; the second is sent away from it and ends at the other, the
     interval reaches to it and nothing is claimed. Of 24 seeds it does so in 21 or 22, and which ones hangs on the

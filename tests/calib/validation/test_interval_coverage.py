@@ -86,7 +86,7 @@ def test_it_does_not_pass_by_chance(rows: list[dict[str, Any]]) -> None:
     assert not coverage_of(rows)["passed"]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_study_goes_on_where_it_stopped(analytic: None, tmp_path: Path) -> None:
     """Two traces on the analytic simulator; a torn last line is done again from the store, the other is not touched."""
     out = tmp_path / "out"

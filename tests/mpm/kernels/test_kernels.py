@@ -191,7 +191,11 @@ def test_many_threads_repeat_one(alone, threads):
 
 @pytest.mark.parametrize(
     ("shift", "mirrors"),
-    [((0.0, 0.0, 0.0), (True, True)), ((0.25, 0.0, 0.0), (False, True)), ((0.0, 0.25, 0.0), (True, False))],
+    [
+        ((0.0, 0.0, 0.0), (True, True)),
+        pytest.param((0.25, 0.0, 0.0), (False, True), marks=pytest.mark.long),
+        ((0.0, 0.25, 0.0), (True, False)),
+    ],
     ids=["both mirrors", "across y", "across x"],
 )
 def test_two_threads_repeat_one_beside_mirrors(shift, mirrors):

@@ -276,7 +276,7 @@ def test_a_food_that_is_not_cut_hangs_together():
     assert taken[1] == pytest.approx(20.0, rel=0.02)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_other_ways_to_compute_a_split_give_the_same(monkeypatch):
     """A food cut beside another, in single precision, turned in the grid and by two threads."""
     flesh = replace(SHORT.food, material=FLOWS)
