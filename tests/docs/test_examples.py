@@ -107,7 +107,7 @@ def test_every_example_is_proved_and_shown() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow if n == "01_calibrate.py" else ()) for n in PROVED]
+    "name", [pytest.param(n, marks=pytest.mark.long if n == "01_calibrate.py" else ()) for n in PROVED]
 )
 def test_example(name: str, tmp_path: Path) -> None:
     """The example runs as a user would run it, in a folder of its own, and its number is right."""

@@ -194,7 +194,7 @@ def test_many_threads_repeat_one(alone, threads):
     [
         ((0.0, 0.0, 0.0), (True, True)),
         pytest.param((0.25, 0.0, 0.0), (False, True), marks=pytest.mark.long),
-        ((0.0, 0.25, 0.0), (True, False)),
+        pytest.param((0.0, 0.25, 0.0), (True, False), marks=pytest.mark.long),
     ],
     ids=["both mirrors", "across y", "across x"],
 )

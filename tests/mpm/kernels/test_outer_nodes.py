@@ -84,7 +84,10 @@ SCENE = Scene(
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("shift, turn", [(0.0, 0.0), pytest.param(0.5, 0.0, marks=pytest.mark.long), (0.0, 0.4)])
+@pytest.mark.parametrize(
+    "shift, turn",
+    [(0.0, 0.0), pytest.param(0.5, 0.0, marks=pytest.mark.long), pytest.param(0.0, 0.4, marks=pytest.mark.long)],
+)
 def test_a_stiff_food_does_not_creep_under_a_thick_blade(shift, turn):
     """Without it the first layer creeps under the blade, the more the stiffer the contact is. No law takes that."""
     lost = []

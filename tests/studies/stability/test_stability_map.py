@@ -335,7 +335,7 @@ def quick(tmp_path_factory):
     return out, main(["stress", "--quick", "--out", str(out), "--resume"]), stored
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_quick_map_is_explained(quick):
     """Sound foods are stable, a crushed one and a step of three times the limit are stopped, nonsense is refused."""
     out, code, _ = quick
@@ -356,7 +356,7 @@ def test_quick_map_is_explained(quick):
     assert (out / "stress.svg").read_bytes().startswith(b"<?xml")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_kill_and_resume_run_nothing_twice(quick, capsys):
     """What was stored before the kill is known; a third call knows all, and --json prints the document alone."""
     out, code, stored = quick
@@ -371,7 +371,7 @@ def test_kill_and_resume_run_nothing_twice(quick, capsys):
     assert "--resume" in capsys.readouterr().err
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_negative_verdict_is_exit_code_2(quick, capsys, monkeypatch):
     """A physical cell that is not stable, and one that nothing explains, each make the exit code 2 and are named."""
     out, _, _ = quick
