@@ -153,7 +153,8 @@ def friction_limit(s: ti.template(), cut, p, press, own):
 def board_contact(s: ti.template(), cut, p, m, dt, u, at):
     """Contact of one particle with the board; returns the change of its velocity [m/s].
 
-    A food that stands on a flat face is held down by up to the suction times the area of the face.
+    A food that stands on a flat face is held down by up to the suction times the area of the face, as long as it is
+    within two cells of the board, where contact is looked for.
 
     Friction is Coulomb's alone. The limit of :func:`friction_limit` would bind where the pressure exceeds the yield
     stress over sqrt(3) mu, which under a food that lies on a board is at the points of a round one. Its contact is
@@ -168,10 +169,10 @@ def board_contact(s: ti.template(), cut, p, m, dt, u, at):
         at: Position of its centre [m].
     """
     dv = ti.Vector.zero(float, 3)
-    own = surface_traction(s, cut, p, s.surface_volume[cut, p][0], s.board_gap[cut, p], ti.Vector([0.0, 0.0, 1.0]))
+    shell = s.surface_volume[cut, p][0]
+    own = surface_traction(s, cut, p, shell, s.board_gap[cut, p], ti.Vector([0.0, 0.0, 1.0]))
     force = s.board_gap[cut, p] - at[2] + own[2]
     own[2] = 0.0
-    shell = s.surface_volume[cut, p][0]
     if force > 0:
         slide = dt * ti.Vector([u[0], u[1], 0.0])
         hold = stick_slip(s.stick[cut, 0, p], slide, own, s.par[cut, BOARD_MU] * force)

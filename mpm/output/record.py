@@ -18,8 +18,9 @@ A cut with a cohesive crack has one more, :data:`COHESION`, and one of a food th
 COHESION = "cohesion"
 """What the food has taken where it opened across the cut plane by itself, ahead of the edge."""
 ADHESION = "adhesion"
-SUCTION = "suction"
 """What it has taken to take the food off the blade's faces."""
+SUCTION = "suction"
+"""What it has taken to lift the food off the board, where that holds it down."""
 STROKE, BOARD, LIMIT = "stroke", "board", "force_limit"
 ENDINGS = (STROKE, BOARD, LIMIT)
 """Why a motion ends: as commanded, with the edge pressed on the board by an arm that yields, or where the force on the
