@@ -16,6 +16,10 @@ from mpm.scene.profiles import FAMILY
 ROUNDNESS, ASPECT = "roundness", "aspect"
 """Names of the parameters."""
 
+ASPECT_SPAN = 1.25
+"""Largest width over height of a specimen, over the likely one, and the likely one over the least [-]: half fruits that
+were cut at 0.4 to 0.6 of their diameter (assumed). That of a width over all sizes of a food would be too wide."""
+
 
 def known_of(food: FoodSpec, name: str) -> Property:
     """What the literature says of a property of a food, of a size, or of its width over its height.
@@ -25,14 +29,14 @@ def known_of(food: FoodSpec, name: str) -> Property:
         name: What may be fitted.
 
     Returns:
-        The property; the aspect's range is that of the width.
+        The property.
     """
     if name != ASPECT:
         return {**food.properties, **food.sizes}[name]
     width, height = food.dims["width"], food.dims["height"].value
-    low, high = width.low / height, width.high / height
-    source = f"width over height; width: {width.source}"
-    return Property(ASPECT, width.value / height, low, high, "-", source, width.status)
+    likely = width.value / height
+    source = f"width over height, its spread assumed; width: {width.source}"
+    return Property(ASPECT, likely, likely / ASPECT_SPAN, likely * ASPECT_SPAN, "-", source, "assumed")
 
 
 def open_shape(food: FoodSpec) -> str:

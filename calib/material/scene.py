@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from calib.material.food import FoodSpec
-from calib.material.form import open_shape
+from calib.material.form import ASPECT_SPAN, open_shape
 from calib.material.properties import BOARD_FRICTION, BOARD_SUCTION
 from calib.trace.conditioning import Conditioned
 from mpm.scene import Board, EdgeLaw, Knife, Motion, Numerics, Scene
@@ -159,7 +159,7 @@ def specimen(
         )
     shape = replace(default, length=length, width=width, height=height, cut=(left - right) / 2)
     if sizing.width is None:
-        short = None if knife is None else aspect_range(food, shape, knife, sizing)
+        short = None if knife is None else aspect_range(shape, knife, sizing)
         said.append(
             "the specimen's width is not known: it keeps the proportions of the food; resistances are only identified "
             "as their product with it; give --width if you measured it"
@@ -223,27 +223,25 @@ def height_range(food: FoodSpec, trace: Conditioned, sizing: Sizing) -> SizeRang
     return low, max(likely, clear), high
 
 
-def aspect_range(food: FoodSpec, shape: Shape, knife: Knife, sizing: Sizing) -> SizeRange | None:
+def aspect_range(shape: Shape, knife: Knife, sizing: Sizing) -> SizeRange | None:
     """Range of the width over the height of a specimen that its blade does not reach across.
 
     What lies beside the blade does not load it: the force stops growing where the chord becomes longer than the blade,
     and the width says when. Under a longer blade a width scales the curve and does not shape it.
 
     Args:
-        food: The food with its usual width and the literature's range of it.
         shape: The specimen at its likely sizes.
         knife: The blade.
         sizing: What is known of the specimen.
 
     Returns:
-        Lowest, likely and largest ratio [-]: the likely one times and over half of the literature's range of a width
-        (in the logarithm). None where the width is given, or the blade reaches across the likely one.
+        Lowest, likely and largest ratio [-]: the likely one over and times :data:`calib.material.form.ASPECT_SPAN`.
+        None where the width is given, or the blade reaches across the likely one.
     """
     if sizing.width is not None or sizing.outline is not None or not blade_warnings(shape, knife):
         return None
-    known, likely = food.dims["width"], shape.width / shape.height
-    reach = math.sqrt(known.high / known.low)
-    return likely / reach, likely, likely * reach
+    likely = shape.width / shape.height
+    return likely / ASPECT_SPAN, likely, likely * ASPECT_SPAN
 
 
 def of_specimen(

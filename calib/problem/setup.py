@@ -219,7 +219,7 @@ def _scenes(request: Request, curve: Conditioned) -> tuple[Scene, Scene, dict[st
     knife = load_knife(request.knife)
     shape, assumed = specimen(food, curve, sizing, open_form=ROUNDNESS in _names(request, ()), knife=knife)
     heights = height_range(food, curve, sizing)
-    ranges = {"height": heights, "aspect": aspect_range(food, shape, knife, sizing)}
+    ranges = {"height": heights, "aspect": aspect_range(shape, knife, sizing)}
     sizes = {name: size for name, size in ranges.items() if size is not None}
     stroke, dx, seed = way_of(food, curve), request.dx, request.seed
     fine, screening = (

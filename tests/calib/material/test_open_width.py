@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,7 +15,8 @@ from calib.material.food import load_food
 from calib.material.form import known_of
 from calib.material.knife import load_knife
 from calib.material.scene import Sizing, aspect_range, cut_scene, of_specimen, specimen
-from calib.problem.food_parameters import fit_parameters, size_relative_sd
+from calib.problem.food_parameters import fit_parameters
+from calib.problem.parameters import Z95
 from calib.problem.setup import Setup, set_up
 from calib.trace.trace import Trace
 from mpm.discretisation.particles import seed
@@ -63,15 +65,15 @@ def test_it_cannot_be_fitted_where_it_is_known(record: Trace) -> None:
 
 
 def test_its_prior_is_that_of_the_proportions() -> None:
-    """About the likely ratio, with the spread that the literature gives for a width, whatever the height."""
+    """About the likely ratio, a quarter more or less, whatever the height."""
     for height in (0.044, 0.05):
         shape, _ = specimen(APPLE, None, Sizing(height=height))
-        ratios = aspect_range(APPLE, shape, SHORT, Sizing())
-        assert ratios is not None and aspect_range(APPLE, shape, LONG, Sizing()) is None
+        ratios = aspect_range(shape, SHORT, Sizing())
+        assert ratios is not None and aspect_range(shape, LONG, Sizing()) is None
         (aspect,) = fit_parameters(APPLE, ("aspect",), {"aspect": ratios})
         assert (aspect.unit, aspect.value) == ("-", pytest.approx(2.0))
         assert aspect.prior_centre == pytest.approx(2.0)
-        assert aspect.prior_sd == pytest.approx(size_relative_sd(APPLE, "width"))
+        assert Z95 * aspect.prior_sd == pytest.approx(math.log(1.25))
 
 
 def test_a_candidate_has_its_width() -> None:
@@ -100,10 +102,11 @@ def test_the_food_that_is_written_has_the_fitted_width(record: Trace) -> None:
     assert food.dims["width"].status == "fitted"
 
 
-def test_what_is_known_of_it_is_the_range_of_the_width() -> None:
-    """The report shows it beside the fitted value; any other property is the food's own."""
+def test_what_is_known_of_it_is_the_range_of_the_fit() -> None:
+    """The report shows it beside the fitted value, with the range that the fit has; any other property is the food's
+    own."""
     known, width = known_of(APPLE, "aspect"), APPLE.dims["width"]
-    assert (known.value, known.low, known.high) == pytest.approx(
-        [x / APPLE.dims["height"].value for x in (width.value, width.low, width.high)]
-    )
+    likely = width.value / APPLE.dims["height"].value
+    assert (known.value, known.low, known.high) == pytest.approx((likely, likely / 1.25, likely * 1.25))
+    assert known.status == "assumed"
     assert known_of(APPLE, "R") == APPLE.properties["R"] and known_of(APPLE, "height") == APPLE.dims["height"]
