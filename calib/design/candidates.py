@@ -9,6 +9,7 @@ from calib.design.start import Start
 from calib.errors import MaterialError
 from calib.io.yaml_checks import suggest
 from calib.material.knife import load_knives
+from calib.material.properties import BOARD_SUCTION
 from calib.material.scene import cut_scene
 from mpm.scene import Knife, Scene
 from mpm.scene.errors import CutcalError, SceneError
@@ -18,6 +19,7 @@ MINUTES: Mapping[str, float] = {
     "cut": 10.0,
     "blade": 15.0,
     "narrower": 15.0,
+    "rack": 15.0,
     "slicing": 20.0,
     "compression": 30.0,
     "width": 2.0,
@@ -109,6 +111,7 @@ def candidates(start: Start, blades: Sequence[Knife] | None = None) -> tuple[lis
     narrow = replace(start.shape, width=NARROWER * start.shape.width)
     what = f"cut a piece of {narrow.width * 1e3:.0f} mm, measured, with the {start.knife.name} knife"
     _add(found, out, start, Candidate("narrower", "narrower", what, joint, same_model=True), start.knife, narrow)
+    _rack(start, found, out, joint)
     what = f"cut a specimen of measured width with the {start.knife.name} knife moved along its edge as fast as down"
     _add(found, out, start, Candidate("slicing", "slicing", what, NONE), start.knife, start.shape)
     what = "compress cylinders to 30 % between lubricated plates, three of them"
@@ -116,6 +119,17 @@ def candidates(start: Start, blades: Sequence[Knife] | None = None) -> tuple[lis
     _sizes(start, found, out)
     out.append(LeftOut("speed", "no law with a rate is fitted yet, so the model has the same force at every speed"))
     return found, out
+
+
+def _rack(start: Start, found: list[Candidate], out: list[LeftOut], taken_by: str) -> None:
+    """The cut of a food whose wet face the board does not hold down, where it is not known how firmly it does."""
+    if BOARD_SUCTION not in start.parameters.names:
+        out.append(LeftOut("rack", "how firmly the board holds the food down is not among the parameters"))
+        return
+    food = start.food.with_values({BOARD_SUCTION: 0.0})
+    what = f"cut a specimen of measured width with the {start.knife.name} knife on a rack that lets air under it"
+    dry = replace(start, food=food)
+    _add(found, out, dry, Candidate("rack", "rack", what, taken_by, same_model=True), start.knife, start.shape)
 
 
 def _sizes(start: Start, found: list[Candidate], out: list[LeftOut]) -> None:

@@ -74,7 +74,7 @@ class DesignedTest:
     """
 
     name: str
-    kind: Annotated[str, one_of("cut", "blade", "narrower", "slicing", "compression", "width", "photograph")]
+    kind: Annotated[str, one_of("cut", "blade", "narrower", "rack", "slicing", "compression", "width", "photograph")]
     what: str
     taken_by: Annotated[str, one_of(CALIBRATE, STUDY, RANGES, NONE)]
     minutes: Positive

@@ -9,6 +9,7 @@ import numpy as np
 
 from calib.io.progress import Countdown
 from calib.io.provenance import code_key
+from calib.material.properties import BOARD_SUCTION
 from calib.material.scene import FITTED_SIZES, of_specimen, with_other_particles
 from calib.problem.parameters import LOG_STEP, ParameterSet
 from calib.problem.setup import REPLICATE
@@ -41,10 +42,11 @@ class CutScene:
     kept: tuple[str, ...] = ()
 
     def at(self, values: Mapping[str, float]) -> tuple[Scene, dict[str, float]]:
-        """The scene and the material's values, at values of all parameters."""
-        if self.fitted:
-            return of_specimen(self.scene, values, self.kept)
-        return of_specimen(self.scene, {name: x for name, x in values.items() if name not in FITTED_SIZES})
+        """The scene and the material's values, at values of all parameters. A board that lets air under the food goes
+        on to do so."""
+        foreign = {*(() if self.fitted else FITTED_SIZES), *(() if self.scene.suction > 0 else (BOARD_SUCTION,))}
+        values = {name: x for name, x in values.items() if name not in foreign}
+        return of_specimen(self.scene, values, self.kept if self.fitted else ())
 
 
 @dataclass(eq=False)

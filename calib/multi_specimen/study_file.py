@@ -22,7 +22,7 @@ from typing import Any
 from calib.errors import MaterialError, ShapeError
 from calib.io.yaml_checks import Place, check_keys, choice, finite_number, mapping, read_yaml, text
 from calib.material.food import FoodSpec, load_food, load_material_file
-from calib.material.properties import OF_TRACE, check_override
+from calib.material.properties import BOARD, OF_TRACE, check_override
 from calib.material.scene import MID_LENGTH, Sizing
 from calib.multi_specimen.spec import (
     COMPRESSION,
@@ -135,12 +135,13 @@ def _traces(
 
 
 def _request(place: Place, given: Mapping[str, Any], folder: Path, base: Request) -> Request:
-    check_keys(place, given, ("trace",), ("kind", "air", *NUMBERS, *TEXTS, *OUTLINES))
+    check_keys(place, given, ("trace",), ("kind", "air", "set", *NUMBERS, *TEXTS, *OUTLINES))
     numbers = {n: _number(place, given, n) for n in NUMBERS}
     words = {n: None if n not in given else text(place.at(n), given[n]) for n in TEXTS}
     air = given.get("air")
     return replace(
         base,
+        food=base.food.with_values(_board(place.at("set"), given.get("set", {}))),
         trace=folder / text(place.at("trace"), given["trace"]),
         air=None if air is None else folder / text(place.at("air"), air),
         columns={n: words[n] for n in ("time_col", "force_col", "position_col", "depth_col", "sign", "decimal")}
@@ -156,6 +157,14 @@ def _request(place: Place, given: Mapping[str, Any], folder: Path, base: Request
         lag_sd=numbers["lag_sd"],
         bandwidth=numbers["bandwidth"],
     )
+
+
+def _board(place: Place, given: Any) -> dict[str, float]:
+    """Values of the board under one cut; those of the food are set for all cuts."""
+    for name in mapping(place, given):
+        if name not in BOARD:
+            raise place.at(name).error(f"only {' and '.join(BOARD)} are set for one cut; set the food's at the top")
+    return {n: check_override(n, finite_number(place.at(n), x)) for n, x in given.items()}
 
 
 def _sizing(

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calib.design.candidates import candidates, minutes_of
+from calib.design.candidates import candidates, coarse_cut, minutes_of
 from calib.design.linear import LinearTest, information, posterior
 from calib.design.measurement import CutTest, compression_measurement, cut_measurement, pressed_stress
 from calib.design.quantity import asked_quantity
@@ -149,7 +149,7 @@ def test_the_design_of_a_cut_food(cut: Start, tmp_path: Path) -> None:
     """Each test leaves no more than there was; a measured width narrows what is only known times it; a document."""
     result = designed(cut, tmp_path / "out")
     names = {t.name for t in result.tests}
-    assert {"blade edc", "narrower", "slicing", "compression", "width", "photograph"} <= names
+    assert {"blade edc", "narrower", "rack", "slicing", "compression", "width", "photograph"} <= names
     assert all(0.0 < p.part <= 1.0 for t in result.tests for p in t.parameters.values())
     by_name = {t.name: t for t in result.tests}
     assert by_name["width"].parameters["R"].part < 0.9
@@ -161,6 +161,21 @@ def test_the_design_of_a_cut_food(cut: Start, tmp_path: Path) -> None:
     assert valid(document, "design")["recommended"] == result.recommended
     assert read_design(tmp_path / "out").tests == result.tests
     assert b"<svg" in (tmp_path / "out" / "design.svg").read_bytes()
+
+
+def test_a_rack_holds_nothing_whatever_the_board_would(cut: Start) -> None:
+    """The specimen on it is not held down, a cut on the board is as firmly as the fit asks; where nobody asks how
+    firmly, a rack is no test."""
+    (rack,) = (t for t in candidates(cut)[0] if t.kind == "rack")
+    assert rack.scene is not None and rack.same_model
+    values = cut.parameters.to_dict(cut.parameters.start) | {"board_suction": 3e4}
+    scene, left = CutScene(rack.scene).at(values)
+    assert scene.suction == 0.0 and "board_suction" not in left
+    on_board, left = CutScene(coarse_cut(cut, cut.knife, cut.shape), fitted=True).at(values)
+    assert on_board.suction == 3e4 and "board_suction" not in left
+    known = fit_parameters(cut.food, tuple(n for n in cut.parameters.names if n != "board_suction"))
+    found, out = candidates(replace(cut, parameters=known, reported={}))
+    assert "rack" not in {t.kind for t in found} and "rack" in {one.name for one in out}
 
 
 def test_a_photograph_tells_the_shape(cut: Start, tmp_path: Path) -> None:

@@ -73,6 +73,16 @@ def test_numbers_may_have_their_unit(tmp_path: Path) -> None:
     assert units.compressions[0].sizes == plain.compressions[0].sizes
 
 
+def test_a_cut_says_what_its_board_does(tmp_path: Path) -> None:
+    """One specimen may lie on a rack: its board is set for it alone, and its suction is then not fitted."""
+    text = GOOD.replace("food: banana", "food: potato").replace("width: 0.03", "set: {board_suction: 0}")
+    study = read_study(written(tmp_path, text))
+    held = {name: request.food.value("board_suction") for name, request in study.requests.items()}
+    assert held == {"a": 0.0, "b": study.food.value("board_suction")} and held["b"] != 0.0
+    on_rack, on_board = (study.requests[name].food.default_fit for name in ("a", "b"))
+    assert [name for name in on_board if name not in on_rack] == ["board_suction"]
+
+
 def test_a_food_of_ones_own_is_a_file_beside_the_study(tmp_path: Path) -> None:
     """A file stands where a food's name does; its food has the name that it has there."""
     dump_material(replace(load_food("banana"), name="mine"), tmp_path / "mine.yaml", {})
@@ -114,6 +124,11 @@ def test_the_command_line_says_how_to_run_it(tmp_path: Path) -> None:
             "width: 0.03",
             "width: wide",
             "study.yaml: traces.a.width: 'wide' is not a length: write it in m, or with its unit",
+        ),
+        (
+            "width: 0.03",
+            "set: {R: 200}",
+            "study.yaml: traces.a.set.R: only board_friction and board_suction are set for one cut",
         ),
         ("speed: 0.02", "speed: -0.02", "study.yaml: traces.b.speed: is -0.02; it must be positive"),
         ("kind: compression", "kind: pull", "study.yaml: traces.gel.kind: unknown value 'pull'"),
