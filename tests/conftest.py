@@ -21,10 +21,14 @@ def _seed() -> None:
 
 @pytest.fixture(autouse=True, scope="session")
 def _kept_states() -> Iterator[None]:
-    """Keep the fields of more scenes than a process of its own does: tests take turns with some dozen sizes of them,
-    and kernels are compiled anew, for many seconds, where they are made again."""
+    """Keep the fields of more scenes than a process of its own does, and give them more room: tests take turns with
+    some dozen sizes of them, and kernels are compiled anew, for many seconds, for each size and where fields are made
+    again."""
     import mpm.solver
+    from mpm.discretisation import capacity
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(mpm.solver, "KEPT", 12)
+        patch.setattr(capacity, "NODE_ROOM", (48, *capacity.NODE_ROOM[1:]))
+        patch.setattr(capacity, "PARTICLE_ROOM", (16_384, *capacity.PARTICLE_ROOM[1:]))
         yield
