@@ -205,6 +205,12 @@ class NamedUnit:
 _BRACKETED = re.compile(r"(.*?\S)[\s_]*[\[({<]\s*([^\[\](){}<>]{1,20}?)\s*[\])}>]\s*")
 _SET_OFF = re.compile(r"(.*?\S)\s*(?:,|/|\bin\b)\s*([^\s,]{1,15})")
 _LAST_WORD = re.compile(r"(.*[^\s_])[\s_]+([^\s_]{1,15})")
+_JOINED = re.compile(
+    r"(.*(?i:force|load|time|depth|displacement|position|stroke|extension|distance|travel|height))"
+    r"(N|kN|KN|mN|Sec|S|ms|Ms|mm|Mm|cm|Cm|M)"
+)
+_CAPITAL = {"KN": "kN", "Sec": "s", "S": "s", "Ms": "ms", "Mm": "mm", "Cm": "cm", "M": "m"}
+"""Units as they are joined to a quantity, such as ``ForceN`` and ``timeSec``, and those that got a capital there."""
 _NO_UNIT = re.compile(
     r"[xyzXYZ]|\d+|raw|filtered|filt|corrected|primary|tared|max|mean|avg|average|abs|left|right|up|down|measured|actual|smoothed",
     re.IGNORECASE,
@@ -213,7 +219,7 @@ _NO_UNIT = re.compile(
 
 
 def split_unit(name: str) -> NamedUnit:
-    """Stem and unit of a column's name such as ``force_N``, ``Force [N]``, ``Kraft / N`` or ``Load in kN``.
+    """Stem and unit of a column's name such as ``force_N``, ``Force [N]``, ``Kraft / N``, ``Load in kN`` or ``ForceN``.
 
     What stands in brackets is a unit, known or not. A last word is one only where it is known as such.
     """
@@ -227,7 +233,8 @@ def split_unit(name: str) -> NamedUnit:
         found = pattern.fullmatch(name)
         if found and not found.group(1).endswith("/") and _is_last_word(found.group(2)):
             return NamedUnit(found.group(1), found.group(2))
-    return NamedUnit(name, "")
+    joined = _JOINED.fullmatch(name)
+    return NamedUnit(joined[1], _CAPITAL.get(joined[2], joined[2])) if joined else NamedUnit(name, "")
 
 
 def _is_last_word(word: str) -> bool:

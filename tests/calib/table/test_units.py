@@ -52,6 +52,12 @@ def test_words_that_are_no_units(text: str) -> None:
         ("Stress (kPa)", "Stress", "kPa"), ("Force [xyz]", "Force", "xyz"), ("Force (raw)", "Force (raw)", ""),
         ("/ft/wrench/force/z", "/ft/wrench/force/z", ""), ("force_A", "force_A", ""), ("Time(min)", "Time", "min"),
         ("Fz", "Fz", ""), ("field.O_F_ext_hat_K2", "field.O_F_ext_hat_K2", ""),
+        ("ForceN", "Force", "N"),
+        ("timeSec", "time", "s"),
+        ("knifeDepthMm", "knifeDepth", "mm"),
+        ("LoadKN", "Load", "kN"),
+        ("Times", "Times", ""),
+        ("GripForces", "GripForces", ""),
     ],
 )  # fmt: skip
 def test_units_in_names(name: str, stem: str, unit: str) -> None:
