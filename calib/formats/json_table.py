@@ -17,6 +17,8 @@ from calib.table.vector_fields import LONGEST_VECTOR, row_count, table_of_fields
 _UNITS = ("unit", "units")
 _VALUES = ("values", "value", "data", "samples")
 """Names of a unit and of the numbers it belongs to, in a group that is one column."""
+_HEADS, _ROWS = ("columns", "header", "headers", "names"), ("data", "rows", "values")
+"""Names of a list of names, and of the rows below them, in a group that is a table."""
 
 
 def table_of_json(source: str, raw: bytes) -> Table:
@@ -108,6 +110,7 @@ def _parsed(source: str, text: str) -> Any:
 def _fields(source: str, name: str, value: Any) -> Iterator[tuple[str, list[Any]]]:
     """Every list of values in a document, with the names of its groups before its own."""
     if isinstance(value, dict):
+        value = _rows_below_names(value)
         if value and all(key.isdecimal() for key in value):  # rows by number, as pandas writes a column
             value = list(value.values())
         else:
@@ -128,6 +131,17 @@ def _fields(source: str, name: str, value: Any) -> Iterator[tuple[str, list[Any]
         if width is not None and len(value) <= LONGEST_VECTOR < width:  # a list for each part, not for each sample
             value = [list(sample) for sample in zip(*value, strict=True)]
         yield name, value
+
+
+def _rows_below_names(group: dict[str, Any]) -> dict[str, Any]:
+    """A group of names and rows (pandas calls it split) as lists by name; any other as it is."""
+    head = next((group[key] for key in group if key.lower() in _HEADS and isinstance(group[key], list)), None)
+    rows = next((group[key] for key in group if key.lower() in _ROWS and isinstance(group[key], list)), None)
+    if not head or not rows or not all(isinstance(name, str) for name in head) or len(set(head)) < len(head):
+        return group
+    if not all(isinstance(row, list) and len(row) == len(head) for row in rows):
+        return group
+    return dict(zip(head, map(list, zip(*rows, strict=True)), strict=True))
 
 
 def _common_group_removed(fields: dict[str, list[Any]]) -> dict[str, list[Any]]:

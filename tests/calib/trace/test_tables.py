@@ -115,6 +115,19 @@ def test_other_json_names_need_units_or_options(tmp_path: Path) -> None:
     np.testing.assert_allclose(chosen.force, LOAD)
 
 
+@pytest.mark.parametrize("orient", ["split", "records", "columns", "index", "table"])
+def test_what_pandas_writes_as_json(tmp_path: Path, orient: Any) -> None:
+    """Names above rows, records, and rows by number are one cut; rows of other lengths are none."""
+    frame = pd.DataFrame({"time_s": TIME, "force_N": LOAD, "depth_mm": -1e3 * (HEIGHT - HEIGHT[0])})
+    trace = read_trace(of_json(tmp_path, frame.to_json(orient=orient)))
+    np.testing.assert_allclose(trace.force, LOAD)
+    np.testing.assert_allclose(trace.time, TIME)
+    assert trace.position is not None and np.ptp(trace.position) == pytest.approx(np.ptp(HEIGHT))
+    uneven = {"columns": ["time_s", "force_N"], "data": [[0.0, 1.0], [0.1]]}
+    with pytest.raises(TraceError, match="cut.json"):
+        read_trace(of_json(tmp_path, uneven))
+
+
 def test_label_of_a_json_file(tmp_path: Path) -> None:
     """A document may say that it is a reconstruction."""
     content = {"label": "reconstructed", "time_s": TIME.tolist(), "force_N": LOAD.tolist()}
