@@ -13,6 +13,7 @@ from calib.io.wording import quoted
 from calib.table.clock_cells import is_clock
 from calib.table.numerals import is_number
 from calib.table.units import is_unit, split_unit
+from calib.table.vector_fields import numbers_of
 
 SEPARATORS = (",", ";", "\t", "|", " ")
 """What may stand between cells; a blank stands for any number of them."""
@@ -153,9 +154,9 @@ def _split(line: str, separator: str) -> list[str]:
 
 
 def _share(cells: Sequence[str]) -> float:
-    """Part of the cells that hold anything which hold numbers or times; 0 where fewer than two do."""
+    """Part of the cells that hold anything which hold numbers, vectors or times; 0 where fewer than two do."""
     filled = [cell for cell in cells if cell.strip()]
-    held = sum(is_number(cell) or is_clock(cell) for cell in filled)
+    held = sum(is_number(cell) or is_clock(cell) or len(numbers_of(cell)) > 1 for cell in filled)
     return held / len(filled) if len(filled) > 1 else 0.0
 
 

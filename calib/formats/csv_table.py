@@ -14,6 +14,7 @@ from calib.table.encoding import decode
 from calib.table.numerals import as_plain, is_number, styles_of
 from calib.table.table import MEASURED, Table, check_names
 from calib.table.units import is_unit, split_unit
+from calib.table.vector_fields import units, written_vectors
 
 _STATED = re.compile(
     r"\W*(?:units?\s+(?:of\s+)?(?P<of>[\w ]+?)|(?P<what>[\w ]+?)\s+units?)\s*"
@@ -72,7 +73,7 @@ def table_of_csv(source: str, raw: bytes, decimal: str | None = None) -> Table:
         row="row",
         sha256=hashlib.sha256(raw).hexdigest(),
         label=_label(comments),
-        units=_units(names, layout, lines) | _units_in_comments(names, heads),
+        units=units(names, columns) | _units(names, layout, lines) | _units_in_comments(names, heads),
         left_out=left_out,
         notes=(*notes, *said, *_left_out(source, layout), *more, *styled),
         parts=layout.parts,
@@ -175,6 +176,11 @@ def _columns(
         else:
             found[name] = tuple(repr(step * k) for k in range(len(layout.rows)))
             notes.append(f"{source}: {name} is empty; times go on by the Delta_X of {step:g} s in the header")
+    for name, split in written_vectors(found).items():
+        del found[name]
+        check_names(source, [*found, *split])
+        found |= split
+        notes.append(f"{source}: the cells of {brief(name)} hold vectors, read as {', '.join(split)}")
     return found, left_out, notes
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from calib.table.numerals import is_number
 from calib.table.table import MEASURED, Cells, Table, check_names
 
 FORCE_AXES = ("Fx_N", "Fy_N", "Fz_N", "Tx_Nm", "Ty_Nm", "Tz_Nm")
@@ -22,6 +23,7 @@ FIELD_LENGTHS = {"O_F_ext_hat_K": 6, "K_F_ext_hat_K": 6, "O_T_EE": 16, "tau_ext_
 """Numbers that a sample of such a field has."""
 FIELD_UNITS = {"time": "s"}
 """Units of fields of RobotState whose names have none."""
+_VECTOR = re.compile(r"\s*[\[(]\s*([^\[\](){}]+?)\s*[\])]\s*")
 LONGEST_VECTOR = 16
 """Numbers of a sample from which on it is no vector: a pose has as many."""
 
@@ -79,6 +81,35 @@ def table_of_fields(
         units=units(fields, dict(columns)) | said,
         left_out=left_out,
     )
+
+
+def written_vectors(columns: Mapping[str, tuple[str, ...]]) -> dict[str, dict[str, tuple[str, ...]]]:
+    """The columns of text whose cells hold a vector, such as ``[0.1, 0.2, -5.0]``, as columns of their numbers.
+
+    Args:
+        columns: Cells by name.
+
+    Returns:
+        For each such column, by its name, the columns that it becomes (:func:`parts`); an empty cell is empty in each.
+    """
+    out = {}
+    for name, cells in columns.items():
+        samples = [numbers_of(cell) for cell in cells]
+        widths = {len(sample) for sample, cell in zip(samples, cells, strict=True) if cell.strip()}
+        if len(widths) != 1 or not 1 < max(widths) <= LONGEST_VECTOR:
+            continue
+        empty = ("",) * max(widths)
+        whole = [tuple(sample) or empty for sample in samples]
+        split = parts(name, max(widths))
+        out[name] = {part: tuple(sample[i] for sample in whole) for i, part in split.items()}
+    return out
+
+
+def numbers_of(cell: str) -> list[str]:
+    """The numbers of a vector that is written in a cell, as text; none where it holds anything else."""
+    found = _VECTOR.fullmatch(cell)
+    numbers = re.split(r"\s*[,;]\s*|\s+", found[1]) if found else []
+    return numbers if all(is_number(number) for number in numbers) else []
 
 
 def row_count(fields: Mapping[str, Cells]) -> int:

@@ -128,6 +128,31 @@ def test_what_pandas_writes_as_json(tmp_path: Path, orient: Any) -> None:
         read_trace(of_json(tmp_path, uneven))
 
 
+@pytest.mark.parametrize(
+    "write", [repr, lambda numbers: str(np.array(numbers)), lambda numbers: f"({numbers[0]};{numbers[1]};{numbers[2]})"]
+)
+def test_vectors_in_the_cells_of_a_csv(tmp_path: Path, write: Callable[[list[float]], str]) -> None:
+    """As a frame of lists is written, or of arrays. An empty cell is no sample; words in brackets are none."""
+    force = [write([0.0, 0.1, float(load)]) for load in LOAD]
+    force[17] = ""
+    path = tmp_path / "cut.csv"
+    pd.DataFrame({"time_s": TIME, "force_N": force, "state": "[cutting, now]"}).to_csv(path, index=False)
+    trace = read_trace(path, force_col="force_z_N")
+    np.testing.assert_allclose(trace.force, np.delete(LOAD, 17))
+    assert any("the cells of force_N hold vectors, read as force_x_N, force_y_N, force_z_N" in n for n in trace.notes)
+
+
+def test_a_libfranka_log_as_csv_of_vectors(tmp_path: Path) -> None:
+    """Its fields have their documented meaning there, too."""
+    path = tmp_path / "cut.csv"
+    fields = {"time": TIME, "O_F_ext_hat_K": WRENCH.tolist(), "O_T_EE": POSE.tolist()}
+    pd.DataFrame(fields).to_csv(path, index=False)
+    trace = read_trace(path)
+    np.testing.assert_allclose(trace.force, LOAD)
+    assert trace.position is not None
+    np.testing.assert_allclose(trace.position, HEIGHT)
+
+
 def test_label_of_a_json_file(tmp_path: Path) -> None:
     """A document may say that it is a reconstruction."""
     content = {"label": "reconstructed", "time_s": TIME.tolist(), "force_N": LOAD.tolist()}
