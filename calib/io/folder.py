@@ -10,7 +10,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 from filelock import FileLock, Timeout
 
 from calib.errors import OutputError
@@ -180,6 +179,8 @@ def write_csv(path: Path, columns: Mapping[str, Any], *, head: Sequence[str] = (
     Raises:
         OutputError: The file cannot be written.
     """
+    import pandas as pd  # takes long to import
+
     body = pd.DataFrame(columns).to_csv(index=False, float_format=f"%.{digits}g")
     _replace(path, "".join(f"# {line}\n" for line in head) + body)
 

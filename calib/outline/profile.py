@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from calib.errors import ShapeError
 from calib.io.yaml_checks import mapping, read_yaml
@@ -37,6 +36,8 @@ def food_of(path: Path, way: str) -> Sized:
     Raises:
         ShapeError: The file is no such profile.
     """
+    from scipy.interpolate import PchipInterpolator  # takes long to import
+
     if way not in (REVOLVED, HALF):
         raise ShapeError(f"{path}: numbers are a radius along the axis; say --outline-as {REVOLVED} or {HALF}")
     columns = _of_csv(path) if path.suffix.lower() == ".csv" else _of_yaml(path)

@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from calib.errors import CurveError, OutputError
 from calib.trace.conditioning import Conditioned
@@ -32,6 +31,8 @@ def numerical_uncertainty(folder: Path, food: str, scene: Scene, curve: Conditio
         OutputError: There is no such study in the folder.
         CurveError: It is of another food, knife or cell.
     """
+    import pandas as pd  # takes long to import
+
     try:
         document = json.loads((folder / "converge.json").read_text(encoding="utf-8"))
         table = pd.read_csv(folder / "curves.csv", comment="#")

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import h5py
-import pandas as pd
 
 from calib.errors import OutputError
 from calib.io.wording import brief
 from calib.simulation.evaluation_file import UNREADABLE
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 STORE = "evaluations.h5"
 """Name of the store in the folder of a run."""
@@ -29,6 +32,8 @@ def evaluation_frame(folder: Path) -> pd.DataFrame:
     Raises:
         OutputError: The store is missing or damaged.
     """
+    import pandas as pd  # takes long to import
+
     path = folder / STORE
     if not path.is_file():
         raise OutputError(f"{path}: no such file; name the folder of a calibration with its store")

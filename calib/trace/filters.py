@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import butter, lfilter
 
 from calib.errors import CurveError, TraceError
 
@@ -194,6 +193,8 @@ class BandLimited:
         way = np.interp(time, self.clock, self.stroke)
         way += np.minimum(time, 0.0) * self._begin + np.maximum(time - self.clock[-1], 0.0) * self._end
         there = np.interp(way, np.append(0.0, stroke), np.append(0.0, force), left=0.0)
+        from scipy.signal import butter, lfilter  # takes long to import
+
         felt = lfilter(*butter(LOWPASS_ORDER, self.bandwidth, fs=1.0 / step), there)
         seen = time <= end + step
         return filter_simulated(grid, way[seen], np.interp(time[seen] + delay, time, felt))

@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from mpm.discretisation.particles import Seeds
 from mpm.output.snapshot import Snapshot
@@ -168,6 +167,8 @@ class _Carried:
     """Vertices of one half and the particles they go with."""
 
     def __init__(self, points: np.ndarray, x: np.ndarray, side: float, mirrored: bool) -> None:
+        from scipy.spatial import cKDTree  # takes long to import
+
         own = np.flatnonzero(x[:, 1] * side > 0)
         near, flip = x[own], np.ones(len(own))
         if mirrored:  # the images of the particles across x = 0

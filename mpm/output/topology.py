@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from mpm.discretisation.particles import Seeds
 
@@ -83,6 +81,9 @@ def topology(
     Returns:
         What the cut has left.
     """
+    from scipy.sparse import coo_matrix  # these take long to import
+    from scipy.sparse.csgraph import connected_components
+
     stony = np.zeros(len(half), bool) if stony is None else stony
     cells, image, half = seeds.cells, seeds.owner, half[seeds.owner]
     if mirrors[1]:

@@ -11,7 +11,6 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from mpm.scene.inclusions import Inclusion
 from mpm.scene.material import Material
@@ -68,6 +67,8 @@ def layer_ties(
         Toughness of each row from below, the mean of R over its part [J/m^2], and its part over that of a whole row
         [-], (k, rows).
     """
+    from scipy.spatial import cKDTree  # takes long to import
+
     if not (material.layered or without) or len(places) == 0:
         return np.full((len(places), rows), float(material.R)), np.ones((len(places), rows))
     step, mirrored = spacing / SUBSAMPLES, places[:, 0].min() > 0

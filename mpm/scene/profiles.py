@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from mpm.scene.outline import ALONG, Sections, bent, places, revolved
 
@@ -89,6 +88,8 @@ def spread(kind: str) -> float:
 def _radius(at: tuple[float, ...], size: tuple[float, ...]) -> np.ndarray:
     """Radius at the places of a table, smooth through given ones; round at both ends."""
     v = places(ALONG)
+    from scipy.interpolate import CubicSpline  # takes long to import
+
     squared = CubicSpline(at, np.square(size))(v)
     radius = np.sqrt(np.maximum(squared, 0.0))
     return np.asarray(radius / radius.max())

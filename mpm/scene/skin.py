@@ -10,8 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
-from scipy.special import ndtri
 
 from mpm.scene.shapes import FLAT_DOWN, Shape, inside
 
@@ -52,6 +50,9 @@ def skin_points(shape: Shape, spacing: float, mirrors: tuple[bool, bool]) -> Ski
     Returns:
         The points.
     """
+    from scipy.ndimage import gaussian_filter  # these take long to import
+    from scipy.special import ndtri
+
     step = spacing / SUBSAMPLES
     near, far = shape.ends
     low = np.array([0.0 if mirrors[0] else -shape.width / 2, near, 0.0])

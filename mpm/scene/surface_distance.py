@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from mpm.scene.outline import FLAT, Sections
 
@@ -25,6 +24,8 @@ class SurfaceDistance:
     """
 
     def __init__(self, sections: Sections, size: tuple[float, float, float]) -> None:
+        from scipy.spatial import cKDTree  # takes long to import
+
         self._scale = np.array([size[1] / 2, size[0] / 2, size[2]])
         n, m = (FINER * (count - 1) + 1 for count in sections.bottom.shape)
         n = max(n, m)  # a prism has three sections

@@ -7,7 +7,6 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from mpm.discretisation.capacity import batch_capacity, node_capacity, particle_capacity
 from mpm.discretisation.grid import lay_out
@@ -152,6 +151,8 @@ class Setup:
     def _skin_at_plane(self) -> tuple[SkinPoints, np.ndarray, np.ndarray]:
         """Points of the skin, the tie that bears the tension of each across the cut plane, -1 for none, and over what
         length [m]; of two halves each bears half."""
+        from scipy.spatial import cKDTree  # takes long to import
+
         skin, ties, h = self.skin, self.ties(), self.seeds.spacing
         tie = np.full(len(skin), -1)
         beside = (np.abs(skin.x[:, 1]) < h) & (len(ties) > 0)

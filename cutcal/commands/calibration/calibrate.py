@@ -11,16 +11,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from calib.calibration.fit_report import relation
 from calib.io.progress import ProgressBar
 from calib.multi_specimen.spec import StudySpec, study_of_cuts
 from calib.problem.request import Request
 from calib.problem.target import ErrorModel
 from calib.trace.baselines import BASELINES, CONSTANT
 from calib.trace.cuts import WHOLE
-from calib.validation.acceptance import identified_words
-from calib.validation.not_shown import remedied
-from cutcal.commands.calibration.describe import description
 from cutcal.options import (
     RESUME_HELP,
     RUN,
@@ -195,6 +191,7 @@ def run(args: argparse.Namespace) -> int:
     """Calibrate; prints the verdict, or the summary as JSON."""
     from calib.calibration.result import to_document
     from calib.calibration.run import run as calibrate
+    from cutcal.commands.calibration.describe import description
 
     command = ["calibrate", *(a for a in sys.argv[1:] if a != "calibrate")]
     of_one = [name.replace("_", "-") for name in ("sample", "withdrawal", "start_from") if getattr(args, name)]
@@ -260,6 +257,8 @@ def beside_study(args: argparse.Namespace) -> str:
 
 def run_cuts(args: argparse.Namespace, study: StudySpec) -> int:
     """Fit all cuts of one record together, or say how each of them is read."""
+    from cutcal.commands.calibration.describe import description
+
     if args.check is not None:
         png = picture_of(args.check)
         pictures = {name: png and png.with_stem(f"{png.stem}-{name}") for name in study.requests}
@@ -330,6 +329,10 @@ def _end(x: float) -> str:
 
 def verdict_text(result: CalibrationResult) -> str:
     """What the terminal shows at the end."""
+    from calib.calibration.fit_report import relation
+    from calib.validation.acceptance import identified_words
+    from calib.validation.not_shown import remedied
+
     lines = []
     for v in result.verdicts:
         mark = {True: "pass", False: "FAIL", None: "not run"}[v.passed]
