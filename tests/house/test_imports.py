@@ -131,3 +131,24 @@ def test_the_face_loads_nothing_heavy():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout.split()[:1]) == (0, ["Calibration"]), done.stderr
+
+
+@pytest.mark.parametrize(
+    ("code", "spared"),
+    [
+        (
+            "from cutcal.main import parser; parser()",
+            "taichi pandas matplotlib h5py scipy.interpolate scipy.stats scipy.signal scipy.spatial scipy.optimize",
+        ),
+        (
+            "import calib.simulation.process_pool, mpm.solver",
+            "pandas matplotlib scipy.interpolate scipy.stats scipy.signal scipy.spatial scipy.ndimage",
+        ),
+    ],
+    ids=["the help", "a worker"],
+)
+def test_a_process_loads_what_it_needs(code, spared):
+    """The help of all commands, and a further worker process, start without what takes long to import."""
+    found = f"import sys; {code}; print(*sorted(set(sys.modules) & set({spared.split()})))"
+    done = subprocess.run([sys.executable, "-c", found], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout.strip()) == (0, ""), done.stderr
