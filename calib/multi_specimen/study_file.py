@@ -109,10 +109,7 @@ def _food(top: Place, content: Mapping[str, Any], folder: Path) -> FoodSpec:
     given = content.get("set")
     if given is None:
         return food
-    place = top.at("set")
-    return food.with_values(
-        {n: check_override(n, finite_number(place.at(n), x)) for n, x in mapping(place, given).items()}
-    )
+    return food.with_values(_values(top.at("set"), given))
 
 
 def _traces(
@@ -164,7 +161,12 @@ def _board(place: Place, given: Any) -> dict[str, float]:
     for name in mapping(place, given):
         if name not in BOARD:
             raise place.at(name).error(f"only {' and '.join(BOARD)} are set for one cut; set the food's at the top")
-    return {n: check_override(n, finite_number(place.at(n), x)) for n, x in given.items()}
+    return _values(place, given)
+
+
+def _values(place: Place, given: Any) -> dict[str, float]:
+    """Properties that are set, by name."""
+    return {n: check_override(n, finite_number(place.at(n), x)) for n, x in mapping(place, given).items()}
 
 
 def _sizing(

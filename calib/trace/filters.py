@@ -188,13 +188,13 @@ class BandLimited:
         delay, step = delay_of(self.bandwidth), 1.0 / (LOWPASS_STEPS * self.bandwidth)
         if delay * fastest < UNFELT * FILTER_SD_M:
             return filter_simulated(grid, stroke, force)
+        from scipy.signal import butter, lfilter  # takes long to import, and most records need none of it
+
         end = float(np.interp(stroke[-1], self.stroke, self.clock)) + max(stroke[-1] - self.stroke[-1], 0.0) / self._end
         time = np.arange(-delay - step, end + delay + 2.0 * step, step)
         way = np.interp(time, self.clock, self.stroke)
         way += np.minimum(time, 0.0) * self._begin + np.maximum(time - self.clock[-1], 0.0) * self._end
         there = np.interp(way, np.append(0.0, stroke), np.append(0.0, force), left=0.0)
-        from scipy.signal import butter, lfilter  # takes long to import
-
         felt = lfilter(*butter(LOWPASS_ORDER, self.bandwidth, fs=1.0 / step), there)
         seen = time <= end + step
         return filter_simulated(grid, way[seen], np.interp(time[seen] + delay, time, felt))

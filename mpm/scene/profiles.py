@@ -87,9 +87,9 @@ def spread(kind: str) -> float:
 
 def _radius(at: tuple[float, ...], size: tuple[float, ...]) -> np.ndarray:
     """Radius at the places of a table, smooth through given ones; round at both ends."""
-    v = places(ALONG)
     from scipy.interpolate import CubicSpline  # takes long to import
 
+    v = places(ALONG)
     squared = CubicSpline(at, np.square(size))(v)
     radius = np.sqrt(np.maximum(squared, 0.0))
     return np.asarray(radius / radius.max())
