@@ -11,8 +11,11 @@ import math
 from collections.abc import Iterable
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from calib.fit.surrogate import Surrogate
+from calib.problem.joint_objective import JointObjective, residual
+from calib.problem.objective import Objective
 from calib.problem.parameters import ParameterSet
 from calib.problem.scored_run import ScoredRun
 from mpm.arrays import FloatArray
@@ -35,6 +38,8 @@ GLOBAL_STARTS, GLOBAL_DESCENTS = 100, 5
 #: chi-square than the best run: about a 90 % region of one parameter, where curvature matters for the intervals. The
 #: last number is how many are drawn (docs/theory.md, "Measured choices").
 PROBE_SPREAD, PROBE_COST, PROBES = 1.5, 3.0, 200
+#: Largest joint scaling of a run's material, as a logarithm: a factor 20 either way.
+LARGEST_SCALE = 3.0
 
 
 def on_lattice(parameters: ParameterSet, unit: FloatArray, z: FloatArray) -> FloatArray:
@@ -82,6 +87,30 @@ def apart(runs: Iterable[ScoredRun], unit: FloatArray, most: int) -> list[Scored
         if len(found) < most and all(np.abs((run.z - other.z) / unit).max() > BASIN_DISTANCE for other in found):
             found.append(run)
     return found
+
+
+def best_scaled(objective: Objective | JointObjective, run: ScoredRun) -> tuple[float, FloatArray]:
+    """Where a run's line is best: the materials whose stress-like parameters are jointly scaled have its curve, scaled.
+
+    Args:
+        objective: Target, parameters and error model.
+        run: A finished run.
+
+    Returns:
+        Chi-square there [-], and internal coordinates (p,).
+    """
+    parameters = objective.parameters
+    along = parameters.stress_like()
+    curves = [part.curve for part in run.each]
+    ones = [1.0] * len(curves)
+
+    def cost(log_k: float) -> float:
+        z = parameters.clip(run.z + log_k * along)
+        rows = residual(objective, [math.exp(log_k) * curve for curve in curves], ones, z)
+        return float(rows @ rows)
+
+    found = minimize_scalar(cost, bounds=(-LARGEST_SCALE, LARGEST_SCALE), method="bounded")
+    return float(found.fun), run.z + float(found.x) * along
 
 
 def local_optimum(surrogate: Surrogate) -> FloatArray:

@@ -14,7 +14,9 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
+from calib.problem.parameters import ParameterSet
 from calib.problem.scored_run import ScoredRun
 from mpm.arrays import FloatArray
 
@@ -26,53 +28,87 @@ DAMPING_RANGE = (0.1, 30.0)
 """Range of the present damping [-]."""
 REFINED = 0.1
 """Part of the chi-square that a step must gain for the corrected Jacobian to be used for another one [-]."""
-LEAST_GAIN = 0.01
+LEAST_GAIN = 0.03
 """Part of the chi-square that a step along new differences must gain for the descent to go on [-]."""
 NEXT_TO_NOTHING = 1e-9
 """Added to the diagonal, for a parameter that is not felt."""
 
 
-def descend(
-    run: Callable[[Sequence[FloatArray]], list[ScoredRun]],
-    steps: FloatArray,
-    inwards: FloatArray,
-    start: ScoredRun,
-    most: float = math.inf,
-) -> ScoredRun:
-    """Follow a valley down.
+class Descent:
+    """A way down a valley, one set of differences at a time.
 
     Args:
         run: Runs points, internal coordinates [-] (p,) each, or looks them up; those that can be paid, in any order.
-        steps: Steps of the differences [-] (p,).
-        inwards: Point on whose side of the present one the differences are made [-] (p,).
+        parameters: What is fitted, with steps, bounds and priors. Differences are made on the side of the prior's
+            centre. A step along a parameter is at most one standard deviation of its prior long.
         start: Where it begins.
-        most: How often differences are made.
 
-    Returns:
-        The best run, after the last that brought a gain or could be paid.
+    Attributes:
+        best: The best run so far.
+        gained: What the last set of differences has taken off the chi-square [-].
+        over: Whether it has ended: the last set brought no gain, or could not be paid.
     """
-    best, damping, made = start, 1.0, 0
-    while made < most:
-        made += 1
-        signs = np.where(best.z > inwards, -1.0, 1.0)
-        sides = run([best.z + d for d in np.diag(signs * steps)])
-        if len(sides) < len(steps):
-            return min([best, *sides], key=_misfit)
+
+    def __init__(
+        self,
+        run: Callable[[Sequence[FloatArray]], list[ScoredRun]],
+        parameters: ParameterSet,
+        start: ScoredRun,
+    ) -> None:
+        self.run, self.parameters = run, parameters
+        self.best, self.gained, self.over = start, math.inf, False
+        self._damping = 1.0
+
+    def go_on(self) -> None:
+        """Make one set of differences, and step along them as long as that helps."""
+        begun = self.best.misfit
+        paid = self._follow()
+        self.gained = begun - self.best.misfit
+        self.over = not paid or self.gained <= LEAST_GAIN * begun
+
+    def _follow(self) -> bool:
+        """The same; False where a part of it could not be paid."""
+        best = self.best
+        signs = np.where(best.z > self.parameters.prior_mean, -1.0, 1.0)
+        sides = self.run([best.z + d for d in np.diag(signs * self.parameters.steps)])
+        self.best = min([best, *sides], key=_misfit)
+        if len(sides) < len(self.parameters):
+            return False
         jacobian = _differences(best, sides)
-        begun = best.misfit
         while True:
-            before, trials = best, _trials(best, jacobian, damping)
-            tried = run(trials)
-            best = min([best, *sides, *tried], key=_misfit)
+            trials = _trials(best, jacobian, self._damping, self.parameters)
+            tried = self.run(trials)
+            before, best = best, min([best, *sides, *tried], key=_misfit)
+            self.best = best
             jacobian = _corrected(jacobian, before, tried)
             if any(best is one for one in tried):
                 nearest = int(np.argmin([np.abs(trial - best.z).max() for trial in trials]))
-                damping = float(np.clip(damping * DAMPINGS[nearest] / USUAL_DAMPING, *DAMPING_RANGE))
+                self._damping = float(np.clip(self._damping * DAMPINGS[nearest] / USUAL_DAMPING, *DAMPING_RANGE))
             if not tried or before.misfit - best.misfit <= REFINED * before.misfit:
-                break
-        if not tried or begun - best.misfit <= LEAST_GAIN * begun:
-            break
-    return best
+                return bool(tried)
+
+
+def race(descents: Sequence[Descent]) -> list[ScoredRun]:
+    """Let several descents go on in turn, each as long as it may still win.
+
+    One drops out where its last gain, made once more, would leave it above the best of all: the valley that is lowest
+    after one set of differences need not be the deepest.
+
+    Args:
+        descents: The descents.
+
+    Returns:
+        The best run of each, in their order.
+
+    Source: racing, Maron and Moore 1994, Advances in Neural Information Processing Systems 6:59.
+    """
+    running = [one for one in descents if one.best.ok]
+    while running:
+        for one in running:
+            one.go_on()
+        least = min(_misfit(one.best) for one in descents)
+        running = [one for one in running if not one.over and one.best.misfit - one.gained <= least]
+    return [one.best for one in descents]
 
 
 def _misfit(run: ScoredRun) -> float:
@@ -87,11 +123,14 @@ def _differences(best: ScoredRun, sides: Sequence[ScoredRun]) -> FloatArray:
     return np.linalg.lstsq(moved, changed, rcond=None)[0].T
 
 
-def _trials(best: ScoredRun, jacobian: FloatArray, damping: float) -> list[FloatArray]:
-    """Steps of several dampings from the best point."""
-    normal, slope = jacobian.T @ jacobian, jacobian.T @ best.residual
-    diagonal = np.diag(np.diag(normal) + NEXT_TO_NOTHING)
-    return [best.z - np.linalg.solve(normal + k * damping * diagonal, slope) for k in DAMPINGS]
+def _trials(best: ScoredRun, jacobian: FloatArray, damping: float, parameters: ParameterSet) -> list[FloatArray]:
+    """Steps of several dampings from the best point. What a parameter at its bound cannot do is left to the others."""
+    scale = np.sqrt((jacobian**2).sum(axis=0) + NEXT_TO_NOTHING)
+    wanted = np.concatenate([-best.residual, np.zeros(len(scale))])
+    longest = parameters.prior_sd
+    room = np.maximum(parameters.lower - best.z, -longest), np.minimum(parameters.upper - best.z, longest)
+    rows = [np.vstack([jacobian, math.sqrt(k * damping) * np.diag(scale)]) for k in DAMPINGS]
+    return [best.z + lsq_linear(each, wanted, bounds=room, method="bvls").x for each in rows]
 
 
 def _corrected(jacobian: FloatArray, best: ScoredRun, tried: Sequence[ScoredRun]) -> FloatArray:

@@ -32,13 +32,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 from scipy.stats import chi2, qmc
 
 from calib.fit.acquisition import (
     BASIN_DISTANCE,
     apart,
     beside,
+    best_scaled,
     expected_gain,
     global_optimum,
     local_optimum,
@@ -47,11 +47,11 @@ from calib.fit.acquisition import (
     same_point,
 )
 from calib.fit.budget import longest_time_left, progress_of_all
-from calib.fit.descent import descend
+from calib.fit.descent import Descent, race
 from calib.fit.options import FitOptions
 from calib.fit.surrogate import Surrogate, coordinate_unit
 from calib.io.progress import Progress
-from calib.problem.joint_objective import JointObjective, residual
+from calib.problem.joint_objective import JointObjective
 from calib.problem.objective import EXPLAINED, Objective
 from calib.problem.scored_run import ScoredRun, none_ended
 from calib.simulation.evaluation import Evaluation, Evaluator
@@ -84,10 +84,10 @@ SCREENING_BUDGET = 0.15
 DESCENT_BUDGET = 0.7
 #: Coarse runs for each parameter that a further screening may take.
 DESCENT_RUNS = 12
-#: Best runs of such a design, each in a place of its own, from which it takes a step; the best of them is followed.
+#: Best runs of such a design, each in a place of its own, from which it goes down.
 REDESIGN_STARTS = 2
-#: Largest joint scaling of the design's materials, as a logarithm: a factor 20 either way.
-LARGEST_SCALE = 3.0
+#: Ends of valleys are run on fine cells up to so many times the least chi-square of them [-].
+ALIKE_ON_COARSE = 1.25
 
 
 class Search:
@@ -193,9 +193,9 @@ class Search:
         """Screen, or run the design; then further designs while every run breaks down."""
         first = [self.parameters.start, self.parameters.prior_mean, *self.objective.guesses]
         if self.coarse is not None:
-            points, first = self._screen(first, downhill=bool(self.objective.guesses)), []
-            begun = len(self.runs)
-            self._evaluate(points, "screened", most=max(2, self.options.batch))
+            points, count = self._screen(first, downhill=bool(self.objective.guesses))
+            begun, first = len(self.runs), []
+            self._evaluate(points, "screened", most=max(2, count))
             self._follow_lines(begun)
         if not self.finished:
             self._design(first)
@@ -206,27 +206,36 @@ class Search:
         if self.coarse is None:
             self._differences()
 
-    def _screen(self, given: list[FloatArray], *, downhill: bool = False) -> list[FloatArray]:
-        """Search on the coarse evaluator, by rounds or ``downhill``; where it expects the best point, and its runs."""
+    def _screen(self, given: list[FloatArray], *, downhill: bool = False) -> tuple[list[FloatArray], int]:
+        """Search on the coarse evaluator, by rounds or ``downhill``; where it expects the best point, the ends of the
+        valleys and its other runs, and how many of them to go on from."""
         self.screening = True
+        ends: list[ScoredRun] = []
         try:
             self._design(given)
             if not self.finished:
-                return []
+                return [], 0
             if downhill:
-                how = self._descended, self.parameters.steps, self.parameters.prior_mean
-                starts = self._descended(self.objective.guesses) if given else []
-                for start in starts or apart(self.finished, self.unit, REDESIGN_STARTS):
-                    if start.ok:
-                        descend(*how, start, most=1)
-                descend(*how, self.best)
+                starts = self._guessed() if given else apart(self.finished, self.unit, REDESIGN_STARTS)
+                ends = race([Descent(self._descended, self.parameters, start) for start in starts])
             else:
                 self._differences()
-                self._rounds()
+            self._rounds()
+            least = min([math.inf, *(run.misfit for run in ends)])
+            alike = [run for run in apart(ends, self.unit, len(ends)) if run.misfit <= ALIKE_ON_COARSE * least]
             best_first = sorted(self.finished, key=lambda run: run.misfit)
-            return [local_optimum(self.surrogate()), *(run.z for run in best_first)]
+            points = [local_optimum(self.surrogate()), *(run.z for run in (*alike, *best_first))]
+            return points, max(self.options.batch, len(alike) + 1)
         finally:
             self.screening, self.centre, self.hyper = False, None, None
+
+    def _guessed(self) -> list[ScoredRun]:
+        """The objective's guesses as runs, each where its line is best, and the best run where it lies elsewhere."""
+        runs = self._descended(self.objective.guesses)
+        lines = [(run, best_scaled(self.objective, run)[1]) for run in runs if run.ok]
+        self._descended([z for _, z in lines])
+        starts = [min((run, *self._descended([z])), key=lambda run: run.misfit) for run, z in lines]
+        return [*starts, *(run for run in apart([self.best, *starts], self.unit, 1) if run not in starts)]
 
     def _rescreen(self) -> bool:
         """Go down from another design and run what that finds; False where it cannot or need not be paid."""
@@ -246,10 +255,10 @@ class Search:
         other = Search(self.objective, self.fine, self.coarse, options, told, self.enough)
         other.screening_budget = options.budget
         try:
-            points = other._screen([], downhill=True)
+            points, count = other._screen([], downhill=True)
         finally:
             self.runs += other.runs
-        self._evaluate(points, "screened", most=self.options.batch)
+        self._evaluate(points, "screened", most=count)
         return True
 
     def _design(self, points: list[FloatArray]) -> None:
@@ -263,23 +272,10 @@ class Search:
 
         That is on coarse cells where some of these runs are coarse and any run has finished, else on fine ones.
         """
-        lines = sorted((self._best_scaled(run) for run in self.runs[first:] if run.ok), key=lambda line: line[0])
+        lines = [best_scaled(self.objective, run) for run in self.runs[first:] if run.ok]
+        lines.sort(key=lambda line: line[0])
         coarse = bool(self.finished) and any(run.coarse for run in self.runs[first:])
         self._evaluate([z for _, z in lines[: self.options.batch]], "scaled", coarse=coarse)
-
-    def _best_scaled(self, run: ScoredRun) -> tuple[float, FloatArray]:
-        """Least chi-square that jointly scaled stress-like parameters would give, and the point of it."""
-        along = self.parameters.stress_like()
-        curves = [part.curve for part in run.each]
-        ones = [1.0] * len(curves)
-
-        def cost(log_k: float) -> float:
-            z = self.parameters.clip(run.z + log_k * along)
-            rows = residual(self.objective, [math.exp(log_k) * curve for curve in curves], ones, z)
-            return float(rows @ rows)
-
-        found = minimize_scalar(cost, bounds=(-LARGEST_SCALE, LARGEST_SCALE), method="bounded")
-        return float(found.fun), run.z + float(found.x) * along
 
     def _differences(self) -> bool:
         """Step along each parameter from the best point; False where that was done or cannot be paid."""

@@ -10,12 +10,18 @@ each, and follows the best:
   a cut. That is a peak with a dip behind it. It tells two numbers: the force at which the cut starts, over the chord
   that the edge has met, and the dent under the edge. How much of the rest the edge bears it does not tell. So there is
   a start for either: a food that costs the edge nearly all of the force, and a stiffer one that costs it a quarter.
+- Where the board's suction is fitted, the stiffest of these on a board that hardly holds it. A suction that holds the
+  halves down has no more to do, and one that does not does nothing. Between the two there is a step, and beside it no
+  slope that a descent could follow.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from calib.material.properties import BOARD_SUCTION
 from calib.problem.layer_guess import EDGE_PART, FRICTION_PART, guess_at, layer_chords, layer_guesses
 from calib.problem.parameters import ParameterSet, is_shared
 from mpm.arrays import FloatArray
@@ -52,10 +58,19 @@ def trace_guesses(
         Internal coordinates, each (p,).
     """
     seen = layer_guesses(scene, parameters, stroke, curve) or _peak_guesses(scene, parameters, stroke, curve, noise_sd)
-    others = seen or (parameters.start,)
-    if "mu" not in parameters.names:
-        return others
-    return guess_at(parameters, {"mu": FRICTION_PART * parameters["mu"].value}), *others
+    found = seen or (parameters.start,)
+    if "mu" in parameters.names:
+        found = guess_at(parameters, {"mu": FRICTION_PART * parameters["mu"].value}), *found
+    if BOARD_SUCTION in parameters.names:
+        found = *found, _hardly_held(parameters, found)
+    return found
+
+
+def _hardly_held(parameters: ParameterSet, guesses: Sequence[FloatArray]) -> FloatArray:
+    """The stiffest of some starts on a board that hardly holds it: its suction is at the low end of its prior."""
+    values = [parameters.to_dict(z) for z in guesses]
+    stiffest = max(values, key=lambda one: one.get("E", 0.0))
+    return parameters.to_vector(stiffest | {BOARD_SUCTION: parameters[BOARD_SUCTION].prior_range[0]})
 
 
 def start_of_cut(curve: FloatArray, noise_sd: float) -> int | None:

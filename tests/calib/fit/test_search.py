@@ -334,7 +334,7 @@ def test_a_search_without_gain_ends(size: float, given_up: bool, monkeypatch: py
     """
     plain = goal(TRUTHS[0])
     objective = Objective(replace(plain.target, curve=plain.target.curve + size * np.sin(GRID / 0.0025)), FIVE)
-    options = FitOptions(seed=1)
+    options = FitOptions(seed=3)
 
     def ends() -> tuple[FitResult, float]:
         fake = Fake()

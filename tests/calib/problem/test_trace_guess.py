@@ -9,6 +9,7 @@ import pytest
 
 from calib.material.food import load_food
 from calib.material.knife import load_knife
+from calib.material.properties import BOARD_SUCTION
 from calib.material.scene import cut_scene
 from calib.problem.food_parameters import fit_parameters
 from calib.problem.layer_guess import EDGE_PART, FRICTION_PART, layer_chords
@@ -101,6 +102,15 @@ def test_a_search_begins_at_little_friction_too(names: tuple[str, ...], seen: in
     assert len(others) == seen
     if seen == 1:
         assert others[0] == pytest.approx(usual)
+
+
+def test_a_search_begins_on_a_board_that_hardly_holds_the_food_too() -> None:
+    """Where the suction is fitted, the stiffest start once more, with the suction at the low end of its prior."""
+    parameters = fit_parameters(APPLE, (*NAMES, BOARD_SUCTION))
+    *others, loose = (parameters.to_dict(z) for z in trace_guesses(SCENE, parameters, STROKE, made(), 0.1))
+    stiffest = max(others, key=lambda one: one["E"])
+    assert loose == pytest.approx(stiffest | {BOARD_SUCTION: APPLE.properties[BOARD_SUCTION].low})
+    assert loose[BOARD_SUCTION] < 0.1 * stiffest[BOARD_SUCTION]
 
 
 def test_a_search_begins_at_the_usual_food_where_no_friction_is_fitted() -> None:
