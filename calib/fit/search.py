@@ -230,12 +230,12 @@ class Search:
             self.screening, self.centre, self.hyper = False, None, None
 
     def _guessed(self) -> list[ScoredRun]:
-        """The objective's guesses as runs, each where its line is best, and the best run where it lies elsewhere."""
+        """The objective's guesses as runs, each where its line is best, and the best run where that is another."""
         runs = self._descended(self.objective.guesses)
         lines = [(run, best_scaled(self.objective, run)[1]) for run in runs if run.ok]
         self._descended([z for _, z in lines])
         starts = [min((run, *self._descended([z])), key=lambda run: run.misfit) for run, z in lines]
-        return [*starts, *(run for run in apart([self.best, *starts], self.unit, 1) if run not in starts)]
+        return starts if any(self.best is start for start in starts) else [*starts, self.best]
 
     def _rescreen(self) -> bool:
         """Go down from another design and run what that finds; False where it cannot or need not be paid."""
