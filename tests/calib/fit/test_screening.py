@@ -20,7 +20,7 @@ TRUTH = {"E": 3.0e5, "yield_stress": 4.0e4, "R": 500.0, "R_skin": 200.0, "mu": 0
 def test_a_descent_begins_where_the_line_of_its_guess_is_best() -> None:
     """A guess with half the force of the truth is taken at twice its stress-like values; the best run of the design is
     a start as well where it lies elsewhere."""
-    guess = FIVE.to_vector(TRUTH | {"mu": 0.23}) - np.log(2.0) * FIVE.stress_like()
+    guess = FIVE.to_vector(TRUTH | {"R_skin": 300.0}) - np.log(2.0) * FIVE.stress_like()
     objective = replace(goal(TRUTH), guesses=(guess,))
     fake = Fake(noisy=0.0)
     made = Search(objective, fake, fake, FitOptions(), None)
@@ -28,7 +28,7 @@ def test_a_descent_begins_where_the_line_of_its_guess_is_best() -> None:
     made._design([FIVE.start])
     (plain,) = made._descended([guess])
     first, *others = made._guessed()
-    assert first.misfit < 0.1 * plain.misfit
+    assert first.misfit < 0.5 * plain.misfit
     assert [made.best] == (others or [first])
     made._evaluate([FIVE.to_vector(TRUTH)], "design")
     assert made.best.misfit < first.misfit and made._guessed()[1] is made.best
