@@ -3,7 +3,7 @@
 A surrogate of fifteen parameters needs more runs than a screening has before it knows where a valley leads. One step
 along each parameter says so at once, and all these runs are made at a time. Steps of several dampings are tried in one
 batch; what they find corrects the Jacobian (Broyden 1965, Math. Comput. 19:577), and only where that no longer helps
-are differences made anew.
+are differences made anew. Several descents are raced, for a curve may be that of foods far apart.
 
 Source: More 1978, Lecture Notes in Mathematics 630:105, for the scaling and the damping.
 """

@@ -2,7 +2,7 @@
 
 0. Screening, where there is a coarse evaluator: steps 1 to 3 with it alone, within a part of the budget. Its curves
    stay in the surrogate, with an offset of their own, and the fine search starts at its best points. Where the
-   objective has guesses, a descent (:mod:`calib.fit.descent`) from them takes the place of 2 and 3.
+   objective has guesses, descents from them (:mod:`calib.fit.descent`) take the place of 2.
 1. Design: the given values, the centre of the prior and a scrambled Sobol sample of its 95 % box. Quasi-static forces
    scale with the stress-like parameters, so every run of the design stands for a whole line of materials; the best
    points of the best lines are run next.
@@ -13,11 +13,12 @@
    (:mod:`calib.fit.acquisition`). Where there is a coarse evaluator, the latter two are run on it first, and only
    points near the best one on the fine one.
 4. The end, when neither the surrogate nor the runs give a gain worth its noise. If the curve is still not explained
-   (chi-square above its 99 % quantile), another design is begun, with nothing of what is known, and from its best point
-   a descent on coarse cells. What that finds is run on fine cells, and rounds follow whose fine runs are made only
-   where the coarse ones promise a gain; at most so many times, or until nothing was gained for long. Without a coarse
-   evaluator, differences about the best point, and again 3 if they bring or promise a gain. The Jacobian is that of the
-   surrogate, in which the noise of single runs is averaged out: plain differences make every parameter look identified.
+   (chi-square above its 99 % quantile), another design is begun, with nothing of what is known, and from its best
+   points descents on coarse cells. What they find is run on fine cells, and rounds follow whose fine runs are made
+   only where the coarse ones promise a gain; at most so many times, or until nothing was gained for long. Without a
+   coarse evaluator, differences about the best point, and again 3 if they bring or promise a gain. The Jacobian is that
+   of the surrogate, in which the noise of single runs is averaged out: plain differences make every parameter look
+   identified.
 
 What these choices save on real and made-up cuts is in docs/theory.md, "Measured choices".
 
