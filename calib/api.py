@@ -15,7 +15,7 @@ from calib.calibration.result import SUMMARY, read_result, read_summary
 from calib.calibration.result import CalibrationResult as CalibrationResult
 from calib.errors import OutputError
 from calib.io.progress import Progress, ProgressBar
-from calib.io.wording import brief, in_arguments, speaking_of_arguments
+from calib.io.wording import as_arguments, brief, in_arguments, speaking_of_arguments
 from calib.material.food import FoodSpec
 from calib.material.scene import MID_LENGTH, Sizing
 from calib.outline.outline_file import OutlineFile
@@ -271,6 +271,23 @@ class Calibration:
             if isinstance(progress, bool):
                 progress = shown.enter_context(ProgressBar()) if progress else None
             return run(request, folder, pool, resume=resume, progress=progress, say=say)
+
+    def check(self, png: str | Path | None = None) -> str:
+        """How the trace is read and what would be fitted, as ``calibrate --check`` says it; nothing is simulated.
+
+        Args:
+            png: File into which the record is drawn as it was read, or None.
+
+        Returns:
+            A line for each of columns, tare, contact, stroke, specimen, cells and parameters, and the warnings.
+
+        Raises:
+            CutcalError: Anything wrong with the input, or a picture that cannot be written.
+        """
+        from calib.calibration.description import description
+
+        with speaking_of_arguments():
+            return as_arguments(description(self.request(), None if png is None else Path(png)))
 
     @staticmethod
     def load(out: str | Path) -> CalibrationResult:

@@ -5,9 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from matplotlib import image as plt_image
 
+from calib.io.wording import as_arguments
+from cutcal import Calibration
 from cutcal.main import main
+from mpm.scene.errors import CutcalError
 from tests.calib.made_cuts import made_cut, plain_rows, text_of
 from tests.calib.made_outlines import half_ellipsoid, mesh
 from tests.data_dir import ROOT
@@ -70,6 +74,21 @@ def test_check_draws_the_record_as_it_was_read(tmp_path: Path, capsys) -> None:
     for name, says in (("record.pdf", "is a PNG"), ("none/record.png", "cannot be written")):
         assert main([*check, str(tmp_path / name)]) == 1
         assert says in capsys.readouterr().err
+
+
+def test_python_says_the_same(tmp_path: Path, capsys) -> None:
+    """``Calibration.check`` gives the text of ``--check``, with arguments in place of options, and draws the record."""
+    made = Calibration("banana", TRACE, height=0.03, fit=["E", "R"])
+    said = made.check(tmp_path / "record.png")
+    assert (tmp_path / "record.png").read_bytes().startswith(b"\x89PNG")
+    argv = ["calibrate", "--food", "banana", "--trace", str(TRACE), "--height", "0.03", "--fit", "E,R"]
+    assert main([*argv, "--check", str(tmp_path / "record.png")]) == 0
+    assert said == as_arguments(capsys.readouterr().out.rstrip("\n"))
+    with pytest.raises(CutcalError, match=r"^check .*record.pdf: the picture of the record is a PNG"):
+        made.check(tmp_path / "record.pdf")
+    with pytest.raises(CutcalError, match="flat.csv"):
+        (tmp_path / "flat.csv").write_text("time_s,force_N\n" + "\n".join(f"{0.01 * k},25.{k % 2}" for k in range(400)))
+        Calibration("banana", tmp_path / "flat.csv").check()
 
 
 def test_one_of_several_cuts_is_chosen(tmp_path: Path, capsys) -> None:

@@ -110,17 +110,6 @@ def add_trace(p: argparse.ArgumentParser, *, required: bool = True) -> None:
     g.add_argument("--t-end", type=time, metavar="S", help="leave out what is later [s] (board contact)")
 
 
-def picture_of(text: str) -> Path | None:
-    """The file into which ``--check`` draws, None where none is named.
-
-    Raises:
-        CutcalError: It is no PNG.
-    """
-    if text and not text.lower().endswith(".png"):
-        raise CutcalError(f"--check {text}: the picture of the record is a PNG; name a file such as record.png")
-    return Path(text) if text else None
-
-
 def cut_number(text: str) -> int | str:
     """The number of a cut, or the word that says there is one.
 
@@ -189,9 +178,9 @@ def measured(args: argparse.Namespace, command: Sequence[str]) -> Request:
 
 def run(args: argparse.Namespace) -> int:
     """Calibrate; prints the verdict, or the summary as JSON."""
+    from calib.calibration.description import description
     from calib.calibration.result import to_document
     from calib.calibration.run import run as calibrate
-    from cutcal.commands.calibration.describe import description
 
     command = ["calibrate", *(a for a in sys.argv[1:] if a != "calibrate")]
     of_one = [name.replace("_", "-") for name in ("sample", "withdrawal", "start_from") if getattr(args, name)]
@@ -210,7 +199,7 @@ def run(args: argparse.Namespace) -> int:
             raise CutcalError("--all beside --cut; give one of them")
         return run_cuts(args, study_of_cuts(request))
     if args.check is not None:
-        print(description(request, picture_of(args.check)))
+        print(description(request, Path(args.check) if args.check else None))
         return 0
     out = Path(args.out or f"cutcal-{request.food.name}-{request.stem}")
 
@@ -257,10 +246,10 @@ def beside_study(args: argparse.Namespace) -> str:
 
 def run_cuts(args: argparse.Namespace, study: StudySpec) -> int:
     """Fit all cuts of one record together, or say how each of them is read."""
-    from cutcal.commands.calibration.describe import description
+    from calib.calibration.description import description
 
     if args.check is not None:
-        png = picture_of(args.check)
+        png = Path(args.check) if args.check else None
         pictures = {name: png and png.with_stem(f"{png.stem}-{name}") for name in study.requests}
         said = {name: description(request, pictures[name]) for name, request in study.requests.items()}
         print("\n\n".join(f"{name}\n{text}" for name, text in said.items()))

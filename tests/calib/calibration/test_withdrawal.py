@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from calib.calibration.description import description
 from calib.calibration.result import CalibrationResult, read_result
 from calib.calibration.run import run
 from calib.errors import MaterialError, OutputError, TraceError
@@ -21,7 +22,6 @@ from calib.problem.setup import set_up
 from calib.problem.withdrawal import BothWays
 from calib.trace.trace import Trace
 from calib.validation.not_shown import not_simulated
-from cutcal.commands.calibration.describe import description
 from cutcal.main import main
 from tests.calib.cheap import LOG, CheapPool
 from tests.calib.cheap import cut as cheap_cut

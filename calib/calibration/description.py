@@ -31,8 +31,10 @@ def description(request: Request, png: Path | None = None) -> str:
         A line for each of them.
 
     Raises:
-        CutcalError: Anything wrong with the input.
+        CutcalError: Anything wrong with the input, or a picture that is no PNG or cannot be written.
     """
+    if png is not None and png.suffix.lower() != ".png":
+        raise OutputError(f"--check {png}: the picture of the record is a PNG; name a file such as record.png")
     setup = set_up(request)
     c, scene = setup.curve, setup.fine
     trace, shape, knife = c.trace, scene.food.shape, scene.knife
