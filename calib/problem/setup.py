@@ -43,6 +43,7 @@ from calib.trace.cuts import single_cut
 from calib.trace.filters import BandLimited
 from calib.trace.stroke import board_stroke
 from mpm.scene import Knife, Motion, Scene
+from mpm.scene.errors import SceneError
 from mpm.scene.shapes import Shape
 
 FINE, COARSE, REPLICATED = "fine", "coarse", "again"
@@ -222,10 +223,13 @@ def _scenes(request: Request, curve: Conditioned) -> tuple[Scene, Scene, dict[st
     ranges = {"height": heights, "aspect": aspect_range(shape, knife, sizing)}
     sizes = {name: size for name, size in ranges.items() if size is not None}
     stroke, dx, seed = way_of(food, curve), request.dx, request.seed
-    fine, screening = (
-        windowed(cut_scene(food, shape, knife, stroke=stroke, dx=dx, seed=seed, coarse=coarse), heights)
-        for coarse in (False, True)
-    )
+    fine = windowed(cut_scene(food, shape, knife, stroke=stroke, dx=dx, seed=seed), heights)
+    try:
+        screening = windowed(cut_scene(food, shape, knife, stroke=stroke, dx=dx, seed=seed, coarse=True), heights)
+    except SceneError as error:
+        if dx is None:
+            raise
+        raise MaterialError(f"dx = {1e3 * dx:g} mm: a calibration screens on larger cells, and {error}") from None
     return fine, screening, sizes, assumed
 
 

@@ -76,6 +76,15 @@ def test_check_draws_the_record_as_it_was_read(tmp_path: Path, capsys) -> None:
         assert says in capsys.readouterr().err
 
 
+def test_cells_too_large_to_screen_on_are_told_from_those_that_were_asked_for(capsys) -> None:
+    """Cells of 8 mm would do for a cut of 33 mm; those of the screening are larger, and the error names both."""
+    argv = ["calibrate", "--food", "banana", "--trace", str(TRACE), "--check", "--dx"]
+    assert main([*argv, "8mm"]) == 1
+    assert "dx = 8 mm: a calibration screens on larger cells" in (said := capsys.readouterr().err)
+    assert "33 mm is under 4 cells of 10.6667 mm; use a smaller dx" in said and said.count("\n") == 1
+    assert main([*argv, "12mm"]) == 1 and "screens" not in capsys.readouterr().err
+
+
 def test_python_says_the_same(tmp_path: Path, capsys) -> None:
     """``Calibration.check`` gives the text of ``--check``, with arguments in place of options, and draws the record."""
     made = Calibration("banana", TRACE, height=0.03, fit=["E", "R"])
