@@ -1,8 +1,8 @@
 """Where a search begins: at foods that differ in what bears the force, and in how their cut starts.
 
 A curve may be that of an edge that pays for new surface, of faces that press the halves apart, or of faces that rub. A
-descent (:mod:`calib.fit.descent`) seldom leads from one to another. So it begins at several foods, goes one step from
-each, and follows the best:
+descent (:mod:`calib.fit.descent`) seldom leads from one to another. So several begin, each at another food, and go on
+as long as they may win:
 
 - The usual food, from the literature, and the same food with little friction. Friction multiplies what the other two
   bear, so that much of it hides them: a descent finds its way to much friction, and not back.
