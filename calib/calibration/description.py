@@ -33,8 +33,8 @@ def description(request: Request, png: Path | None = None) -> str:
     Raises:
         CutcalError: Anything wrong with the input, or a picture that is no PNG or cannot be written.
     """
-    if png is not None and png.suffix.lower() != ".png":
-        raise OutputError(f"--check {png}: the picture of the record is a PNG; name a file such as record.png")
+    if png is not None:
+        check_picture(png)
     setup = set_up(request)
     c, scene = setup.curve, setup.fine
     trace, shape, knife = c.trace, scene.food.shape, scene.knife
@@ -65,6 +65,16 @@ def description(request: Request, png: Path | None = None) -> str:
     words = [f"{name:12s}{text}" for name, text in lines]
     warned = [*c.warnings, *setup.assumptions, *notes(request.food)]
     return "\n".join([*words, *(f"note: {text}" for text in warned)])
+
+
+def check_picture(png: Path) -> None:
+    """Refuse a file for the picture of a record that is no PNG.
+
+    Raises:
+        OutputError: It is none.
+    """
+    if png.suffix.lower() != ".png":
+        raise OutputError(f"--check {png}: the picture of the record is a PNG; name a file such as record.png")
 
 
 def draw_record(request: Request, done: Conditioned, png: Path) -> None:

@@ -67,7 +67,7 @@ class Descent:
         self.over = not paid or self.gained <= LEAST_GAIN * begun
 
     def _follow(self) -> bool:
-        """The same; False where a part of it could not be paid."""
+        """The same; False where the differences, or none of the steps, could be paid."""
         best = self.best
         signs = np.where(best.z > self.parameters.prior_mean, -1.0, 1.0)
         sides = self.run([best.z + d for d in np.diag(signs * self.parameters.steps)])

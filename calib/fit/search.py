@@ -14,11 +14,11 @@
    points near the best one on the fine one.
 4. The end, when neither the surrogate nor the runs give a gain worth its noise. If the curve is still not explained
    (chi-square above its 99 % quantile), another design is begun, with nothing of what is known, and from its best
-   points descents on coarse cells. What they find is run on fine cells, and rounds follow whose fine runs are made
-   only where the coarse ones promise a gain; at most so many times, or until nothing was gained for long. Without a
-   coarse evaluator, differences about the best point, and again 3 if they bring or promise a gain. The Jacobian is that
-   of the surrogate, in which the noise of single runs is averaged out: plain differences make every parameter look
-   identified.
+   points descents and rounds on coarse cells. What they find is run on fine cells, and rounds follow whose fine runs
+   are made only where the coarse ones promise a gain; at most so many times, or until nothing was gained for long.
+   Without a coarse evaluator, differences about the best point, and again 3 if they bring or promise a gain. The
+   Jacobian is that of the surrogate, in which the noise of single runs is averaged out: plain differences make every
+   parameter look identified.
 
 What these choices save on real and made-up cuts is in docs/theory.md, "Measured choices".
 
@@ -208,8 +208,8 @@ class Search:
             self._differences()
 
     def _screen(self, given: list[FloatArray], *, downhill: bool = False) -> tuple[list[FloatArray], int]:
-        """Search on the coarse evaluator, by rounds or ``downhill``; where it expects the best point, the ends of the
-        valleys and its other runs, and how many of them to go on from."""
+        """Search on the coarse evaluator, before the rounds by differences or ``downhill``; where it expects the best
+        point, the best run, the ends of the valleys and all other runs, and how many of the first to go on from."""
         self.screening = True
         ends: list[ScoredRun] = []
         try:
@@ -222,8 +222,8 @@ class Search:
             else:
                 self._differences()
             self._rounds()
-            least = min([math.inf, *(run.misfit for run in ends)])
-            alike = [run for run in apart(ends, self.unit, len(ends)) if run.misfit <= ALIKE_ON_COARSE * least]
+            lowest = apart([self.best, *(run for run in ends if run.ok)], self.unit, len(ends) + 1)
+            alike = [run for run in lowest if run.misfit <= ALIKE_ON_COARSE * self.best.misfit]
             best_first = sorted(self.finished, key=lambda run: run.misfit)
             points = [local_optimum(self.surrogate()), *(run.z for run in (*alike, *best_first))]
             return points, max(self.options.batch, len(alike) + 1)
@@ -231,12 +231,15 @@ class Search:
             self.screening, self.centre, self.hyper = False, None, None
 
     def _guessed(self) -> list[ScoredRun]:
-        """The objective's guesses as runs, each where its line is best, and the best run where that is another."""
+        """The objective's guesses as runs, each where its line is best, and the best run; the best first."""
         runs = self._descended(self.objective.guesses)
         lines = [(run, best_scaled(self.objective, run)[1]) for run in runs if run.ok]
         self._descended([z for _, z in lines])
-        starts = [min((run, *self._descended([z])), key=lambda run: run.misfit) for run, z in lines]
-        return starts if any(self.best is start for start in starts) else [*starts, self.best]
+        tried = [(run, *(one for one in self._descended([z]) if one.ok)) for run, z in lines]
+        starts = [min(each, key=lambda run: run.misfit) for each in tried]
+        if all(self.best is not start for start in starts):
+            starts.append(self.best)
+        return sorted(starts, key=lambda run: run.misfit)
 
     def _rescreen(self) -> bool:
         """Go down from another design and run what that finds; False where it cannot or need not be paid."""

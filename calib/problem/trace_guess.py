@@ -10,9 +10,9 @@ as long as they may win:
   a cut. That is a peak with a dip behind it. It tells two numbers: the force at which the cut starts, over the chord
   that the edge has met, and the dent under the edge. How much of the rest the edge bears it does not tell. So there is
   a start for either: a food that costs the edge nearly all of the force, and a stiffer one that costs it a quarter.
-- Where the board's suction is fitted, the stiffest of these on a board that hardly holds it. A suction that holds the
-  halves down has no more to do, and one that does not does nothing. Between the two there is a step, and beside it no
-  slope that a descent could follow.
+- Where the board's suction is fitted, the stiffest of these on a board that hardly holds it. How firmly the halves of a
+  stiff food are held decides the second half of its force, so a food that is hardly held has a narrow valley of its
+  own, and no descent from a food that is held came to it.
 """
 
 from __future__ import annotations
@@ -59,11 +59,13 @@ def trace_guesses(
     """
     seen = layer_guesses(scene, parameters, stroke, curve) or _peak_guesses(scene, parameters, stroke, curve, noise_sd)
     found = seen or (parameters.start,)
-    if "mu" in parameters.names:
-        found = guess_at(parameters, {"mu": FRICTION_PART * parameters["mu"].value}), *found
-    if BOARD_SUCTION in parameters.names:
-        found = *found, _hardly_held(parameters, found)
-    return found
+    slippery = (
+        (guess_at(parameters, {"mu": FRICTION_PART * parameters["mu"].value}),) if "mu" in parameters.names else ()
+    )
+    held = *slippery, *found
+    # what every trace has comes first: a fit of several goes on from the first of each together, and so on
+    loose = (_hardly_held(parameters, held),) if BOARD_SUCTION in parameters.names else ()
+    return *slippery, *loose, *found
 
 
 def _hardly_held(parameters: ParameterSet, guesses: Sequence[FloatArray]) -> FloatArray:

@@ -246,10 +246,12 @@ def beside_study(args: argparse.Namespace) -> str:
 
 def run_cuts(args: argparse.Namespace, study: StudySpec) -> int:
     """Fit all cuts of one record together, or say how each of them is read."""
-    from calib.calibration.description import description
+    from calib.calibration.description import check_picture, description
 
     if args.check is not None:
         png = Path(args.check) if args.check else None
+        if png is not None:
+            check_picture(png)
         pictures = {name: png and png.with_stem(f"{png.stem}-{name}") for name in study.requests}
         said = {name: description(request, pictures[name]) for name, request in study.requests.items()}
         print("\n\n".join(f"{name}\n{text}" for name, text in said.items()))

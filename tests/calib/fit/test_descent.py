@@ -158,3 +158,19 @@ def test_no_step_is_longer_than_the_prior_is_wide() -> None:
     one = Descent(run, replace(space(3, 0.1), prior_sd=np.full(3, 0.5)), run([np.zeros(3)])[0])
     one.go_on()
     assert np.abs(asked).max() == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("part", "over"), [(0.02, True), (0.05, False)])
+def test_a_descent_ends_where_a_set_of_differences_hardly_gains(
+    part: float, over: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A set that takes 2 % off the chi-square is the last, one that takes 5 % is not."""
+
+    def follow(self: Descent) -> bool:
+        self.best = SimpleNamespace(misfit=(1.0 - part) * self.best.misfit, ok=True)
+        return True
+
+    monkeypatch.setattr(Descent, "_follow", follow)
+    one = descent(Runs(), 0.0)
+    one.go_on()
+    assert one.over is over and one.gained == pytest.approx(part * (COUNT - 1))
