@@ -115,3 +115,6 @@ def test_one_of_several_cuts_is_chosen(tmp_path: Path, capsys) -> None:
     said = capsys.readouterr().out
     assert "peak        11.8" in said and "peak        8.9" in said and "\ncut2\n" in said
     assert main([*check, "--all", "--cut", "1"]) == 1
+    for name in (".", "record.pdf"):
+        assert main([*check, name, "--all"]) == 1
+        assert f"--check {name}: the picture of the record is a PNG" in capsys.readouterr().err
