@@ -209,6 +209,8 @@ def with_profile_intervals(
 def _interval(interval: Interval, profile: Profile, explained: bool, beside: Sequence[float]) -> Interval:
     """The interval of a profile: what is not worse than the best run's value by more than the limit.
 
+    It ends at a hard bound where nothing has ended it before (:func:`_end`).
+
     The surrogate may put the optimum beside that value, and so may the unknown width and gain, which the search leaves
     alone. An interval about the optimum would end at the value that is reported, or before it.
     """
@@ -216,9 +218,9 @@ def _interval(interval: Interval, profile: Profile, explained: bool, beside: Seq
     low, high = parameter.to_internal(parameter.low), parameter.to_internal(parameter.high)
     at = parameter.to_internal(parameter.value)
     above = np.maximum(profile.rise - float(np.interp(at, profile.z, profile.rise)), 0.0)
-    ends = [profile.end(side, above) for side in (-1, 1)]
-    bottom = min(low if ends[0] is None else ends[0], at, *beside)
-    top = max(high if ends[1] is None else ends[1], at, *beside)
+    ends = [_end(profile, side, above, parameter) for side in (-1, 1)]
+    bottom = min(max(ends[0], low), at, *beside)
+    top = max(min(ends[1], high), at, *beside)
     bounded = [_bounds(profile.end(side, profile.data), side, parameter) for side in (-1, 1)]
     width = (top - bottom) / (2.0 * Z95 * parameter.prior_sd)
     verdict: Identifiability = "not_seen"
@@ -233,10 +235,25 @@ def _interval(interval: Interval, profile: Profile, explained: bool, beside: Seq
         interval,
         low95=parameter.from_internal(bottom),
         high95=parameter.from_internal(top),
-        clipped=None in ends,
+        clipped=ends[0] < low or ends[1] > high,
         width=width,
         verdict=verdict,
     )
+
+
+def _end(profile: Profile, side: int, above: FloatArray, parameter: Parameter) -> float:
+    """Internal coordinate at which a side of the interval ends, beyond the hard bound where nothing ends it before.
+
+    Where the profile was not walked that far the trace counts as flat from its last point on: the chi-square rises by
+    the parameter's own prior alone, which is a parabola about the prior's mean.
+    """
+    end = profile.end(side, above)
+    if end is not None:
+        return end
+    last = 0 if side < 0 else -1
+    mean, sd = parameter.prior_mean, parameter.prior_sd
+    own = ((float(profile.z[last]) - mean) / sd) ** 2
+    return mean + side * sd * math.sqrt(own + max(RISE - float(above[last]), 0.0))
 
 
 def _bounds(end: float | None, side: int, parameter: Parameter) -> bool:

@@ -175,6 +175,25 @@ def test_a_profile_goes_on_until_both_have_risen() -> None:
     assert end == pytest.approx(mean + sd * (2.5 - math.sqrt((at + RISE) / 2)), abs=0.05 * sd)
 
 
+@pytest.mark.parametrize("walked", [0.5, 1.5])
+def test_the_prior_ends_what_was_not_walked_to_its_end(
+    one_sided: tuple[Objective, FitResult, UncertaintyAnalysis], walked: float
+) -> None:
+    """The trace objects to nothing and the walk stops before the prior has: the interval is the prior's, not that
+    between the hard bounds; a bound that is nearer ends it, and only then is it clipped."""
+    uncertainty = one_sided[2].uncertainty
+    wide = Parameter("E", 2e4, 1.0, 1e9, "Pa", 1e4, 4e4)
+    near = replace(wide, high=3e4)
+    mean, sd = wide.prior_mean, wide.prior_sd
+    z = mean + sd * np.linspace(-walked, walked, 9)
+    profile = Profile("E", z, ((z - mean) / sd) ** 2, np.zeros(9), z[:, None], 0)
+    for parameter, high, clipped in ((wide, 4e4, False), (near, 3e4, True)):
+        item = replace(uncertainty.intervals[0], parameter=parameter)
+        (found,) = with_profile_intervals(replace(uncertainty, intervals=(item,)), [profile]).intervals
+        assert (found.low95, found.high95) == pytest.approx((1e4, high), rel=1e-6)
+        assert found.clipped is clipped and found.verdict == "not_seen"
+
+
 def test_an_interval_holds_the_best_value(one_sided: tuple[Objective, FitResult, UncertaintyAnalysis]) -> None:
     """Where the surrogate puts the optimum beside the best run, the interval reaches to that run's value."""
     analysis = one_sided[2]
