@@ -226,8 +226,9 @@ def _seven_numbers(found: PredictiveScore) -> str:
 
 def _conflict(found: PriorConflict) -> Verdict:
     """The line of values that the literature does not expect of the food."""
-    note = "probability of values as far out"
-    if found.furthest:
+    told = f"{found.directions} combination{'s' * (found.directions > 1)}" if found.directions else "no combination"
+    note = f"probability of values as far out; the trace tells {told}"
+    if found.directions and found.furthest:
         note += f"; furthest: {found.furthest}, by {abs(found.distance):.1f} sd"
     passed = bool(found.probability >= CONFLICT_LIMIT)
     return Verdict(CONFLICT_LINE, found.probability, CONFLICT_LIMIT, "fraction", passed, note)

@@ -17,7 +17,8 @@ HELD_WEAK = {"R": 0.92, "R_skin": 0.90, "E": 0.88, "yield_stress": 0.80, "initia
 more than ten (docs/pitfalls.md, how far to trust an interval)."""
 
 HARDLY_KNOWN = {
-    "not_seen": "The trace says nothing of {}: these values are the literature's.",
+    "not_seen": "The trace says nothing of {}: the intervals are the literature's, and the values are of one food of many that "
+    "draw the curve.",
     "one_sided": "The trace bounds {} on one side; where it leaves the other open, the end is the literature's or that "
     "of what is possible.",
     "weak": "The trace bounds {} on both sides, but not closely, or not surely.",
@@ -123,7 +124,7 @@ def _limits_of_simulation(food: FoodSpec, fracture: Mapping[str, float] | None) 
         if opening > OPENING_REMARKED * (edge + opening):
             part = quantity(opening / (edge + opening), "fraction")
             said.append(
-                f"The blade opens the food ahead of its edge: of R {part} went there, "
+                f"The blade opens the food ahead of its edge: of the energy of new surface {part} went there, "
                 "against the tensile strength, which then trades with R and the yield stress."
             )
     return [

@@ -27,8 +27,6 @@ from mpm.arrays import FloatArray
 from mpm.scene.shapes import Shape
 
 SIZES = ("length", "width", "height")
-HARDLY_KNOWN = 1e-9
-"""Least part of a prior's variance that a trace takes away from it: below, rounding decides [-]."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +36,9 @@ class PriorConflict:
     Attributes:
         probability: How probably the claimed food would lead to values as far from its literature [-].
         directions: Combinations of properties that the trace tells something of.
-        furthest: The property whose value alone is furthest away.
-        distance: How far, in standard deviations of what was to be expected [-], with its sign.
+        furthest: The property whose value is furthest away in these combinations.
+        distance: How far, in standard deviations of what was to be expected of it there [-], with its sign. Its square
+            is no more than T.
     """
 
     probability: float
@@ -62,14 +61,14 @@ def prior_conflict(parameters: ParameterSet, values: FloatArray, covariance: Flo
     root = parameters.prior_jacobian()
     left, axes = np.linalg.eigh(root @ covariance @ root.T)
     seen = left <= NOT_SEEN**2
-    size = float(np.sum((axes.T @ parameters.prior_residual(values))[seen] ** 2 / (1.0 - left[seen])))
+    away, taken = (axes.T @ parameters.prior_residual(values))[seen], 1.0 - left[seen]
+    size = float(np.sum(away**2 / taken))
     count = int(seen.sum())
-    sd = parameters.prior_sd
-    away = (values - parameters.prior_mean) / sd
-    taken = 1.0 - np.diag(covariance) / sd**2
-    alone = np.where(taken > HARDLY_KNOWN, away / np.sqrt(np.maximum(taken, HARDLY_KNOWN)), 0.0)
+    parts = np.linalg.solve(root, axes[:, seen])  # of the properties, by one unit of each combination
+    variance = parts**2 @ taken
     # of a property of which the trace says nothing, the little that it says is mostly the fit's own noise
-    alone = np.where(taken >= 1.0 - NOT_SEEN**2, alone, 0.0)
+    told = variance >= (1.0 - NOT_SEEN**2) * parameters.prior_sd**2
+    alone = np.where(told, parts @ away / np.sqrt(np.where(told, variance, 1.0)), 0.0)
     furthest = int(np.argmax(np.abs(alone)))
     names: Sequence[str] = parameters.names
     probability = float(chi2.sf(size, count)) if count else 1.0

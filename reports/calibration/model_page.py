@@ -22,12 +22,13 @@ LIMIT_SOURCES = {
     "uncertainty of the pull's level over the largest pull",
     "shape better than ramp and half sine": "the better of two curves without physics",
     "curve explained by the food": "a right food fails once in a hundred cuts",
-    "values those of the food": "the right food has values as far out once in a hundred cuts; sd are those of what was "
-    "to be expected",
+    "values those of the food": "the right food has values as far out once in a hundred cuts; an sd is that of what its "
+    "literature and such a trace lead to, and what the trace does not tell does not count",
     "specimen no larger than the food": "one whole food in a hundred is larger",
     "width of the 95 % band": "a band wider than a quarter of the peak either way predicts nothing of use",
     "interval score better than null models": "the better of two curves without physics [@Gneiting 2007]",
-    "food pressed away, not parted": "measured: below, the force follows the width of the process zone, not R",
+    "food pressed away, not parted": "measured: where more is pressed away, the force follows the width of the process "
+    "zone, not R",
     "momentum balance residual": "rounding in a sound run; more is a defect of the program",
     "kinetic over internal energy": "practice of explicit quasi-static analysis: 5 to 10 %",
     "energy lost by the discretisation": "as much as the peak may miss the trace",

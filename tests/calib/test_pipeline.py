@@ -387,7 +387,7 @@ def test_verdicts_fail_what_fails():
         "constant baseline",
         "The width is assumed.",
         "in-sample",
-        "of R 40.0\xa0% went there",
+        "of the energy of new surface 40.0\xa0% went there",
     ):
         assert any(word in text for text in said)
     small = limits("measured", "speed", "constant", lines, parameters, [], BANANA, {**fracture, "opening_J_m2": 4.0})

@@ -21,7 +21,7 @@ def test_a_value_that_the_trace_bounds_is_not_called_the_literatures() -> None:
     """Each verdict on a parameter has its own sentence; what is identified has none."""
     verdicts = {"E": "not_seen", "mu": "not_seen", "R": "weak", "R_skin": "one_sided", "yield_stress": "identified"}
     told = " ".join(said({name: fitted(verdict) for name, verdict in verdicts.items()}))
-    assert "The trace says nothing of E and mu: these values are the literature's." in told
+    assert "The trace says nothing of E and mu: the intervals are the literature's" in told
     assert "The trace bounds R on both sides" in told and "The trace bounds R_skin on one side" in told
     assert "yield_stress" not in told
     assert not any("The trace" in text for text in said({"R": fitted("identified")}))

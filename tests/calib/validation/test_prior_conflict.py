@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from calib.material.food import load_food
 from calib.material.scene import Sizing, specimen
@@ -24,6 +25,16 @@ SEEN = np.array([0.05, 0.1, 0.3, 1.0])
 def found(away: list[float]) -> PriorConflict:
     """The conflict of values so many prior standard deviations off, each known by itself."""
     return prior_conflict(FOOD, SD * np.array(away), np.diag((SD * SEEN) ** 2))
+
+
+def test_no_value_is_further_away_than_all_of_them() -> None:
+    """The distance of one property counts the combinations that T counts, so its square is no more than T."""
+    random = np.random.default_rng(5)
+    for _ in range(200):
+        slopes = random.standard_normal((3, 4)) * np.array([[5.0], [2.0], [0.3]])
+        covariance = np.linalg.inv(slopes.T @ slopes + np.eye(4))
+        conflict = prior_conflict(FOOD, SD * 2.0 * random.standard_normal(4), SD**2 * covariance)
+        assert conflict.distance**2 <= chi2.isf(conflict.probability, conflict.directions) * (1.0 + 1e-9)
 
 
 def test_a_food_of_the_literature_is_refused_as_often_as_said() -> None:
