@@ -33,10 +33,11 @@ NOT_STATED = "not stated"
 NOT_COUNTED = (
     "The parameters were fitted to this very trace, so that S - D is small by construction: it is an error after "
     "calibration, and a prediction of another cut (cutcal predict) is what validates.",
-    "u_input is the width of the specimen where nobody measured it; other sizes and properties that were put in have "
-    "no uncertainty here.",
-    "u_num takes each change (grid elsewhere, cells of two thirds, and twice that of half the speed) as one standard "
-    "uncertainty; it is no grid convergence index (cutcal converge has that).",
+    "u_input is the width of the specimen where nobody measured it and it is not fitted; other sizes and properties "
+    "that were put in have no uncertainty here.",
+    "u_num takes each change (grid elsewhere, cells of two thirds, and half the speed carried on to rest) as one "
+    "standard uncertainty. What half and twice of each constant of the method change is not in it: the verdict has "
+    "that. It is no grid convergence index (cutcal converge has that).",
 )
 
 

@@ -12,7 +12,7 @@ OPTIONAL_HERE = ("rho", "E", "nu", "yield_stress", "R", "R_initiation", "initiat
 """Properties that a food's own file may leave out; without skin_thickness it has no skin."""
 OF_ANOTHER = {
     "yield_stress": ("E", 0.1, 0.01, 1.0, "a tenth of E, from a hundredth of it to all"),
-    "R_initiation": ("R", 1.5, 1.0, 3.0, "1.5 R, up to three times the highest R"),
+    "R_initiation": ("R", 1.5, 1.0, 3.0, "1.5 times R, up to three times the highest R"),
 }
 """Defaults that follow another property: its name, factors on value, low and high, and the words of the source."""
 FLAG = "not given: {source}; give it, or fit it"

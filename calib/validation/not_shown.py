@@ -17,8 +17,8 @@ HELD_WEAK = {"R": 0.92, "R_skin": 0.90, "E": 0.88, "yield_stress": 0.80, "initia
 more than ten (docs/pitfalls.md, how far to trust an interval)."""
 
 HARDLY_KNOWN = {
-    "not_seen": "The trace says nothing of {}: the intervals are the literature's, and the values are of one food of many that "
-    "draw the curve.",
+    "not_seen": "The trace says nothing of {}: the intervals are the literature's, and the values are of one food "
+    "of many that draw the curve.",
     "one_sided": "The trace bounds {} on one side; where it leaves the other open, the end is the literature's or that "
     "of what is possible.",
     "weak": "The trace bounds {} on both sides, but not closely, or not surely.",

@@ -113,11 +113,37 @@ def quantity(
 def compared(value: float | None, unit: str) -> str:
     """A value beside one that it is compared with, such as the simulated peak beside the measured one.
 
-    >>> [compared(x, "N").replace(NBSP, " ") for x in (12.547, 12.87, 9.2834)]
-    ['12.55 N', '12.87 N', '9.28 N']
+    >>> [compared(x, "N").replace(NBSP, " ") for x in (12.547, 12.87, 9.2834, 46.134)]
+    ['12.55 N', '12.87 N', '9.28 N', '46.13 N']
     """
-    first = float(f"{abs(value):.0e}"[0]) if value and math.isfinite(value) else 1.0
+    first = float(f"{abs(value):e}"[0]) if value and math.isfinite(value) else 1.0
     return quantity(value, unit, digits=3 if 0.01 / first <= COMPARED_STEP else 4)
+
+
+def difference(first: float, second: float, unit: str) -> tuple[str, str, str]:
+    """Two values that are compared and the first less the second, in the unit and to the decimals of the second.
+
+    The difference is that of the two numbers as they are printed, so that a reader who computes it finds the same.
+
+    Args:
+        first: One value [SI unit].
+        second: The one that it is compared with [SI unit].
+        unit: SI unit, as of :func:`quantity`.
+
+    Returns:
+        Both values and the difference, with its sign.
+
+    >>> [text.replace(NBSP, " ") for text in difference(44.4356, 46.134, "N")]
+    ['44.44 N', '46.13 N', '−1.69 N']
+    """
+    factor, name = rung(unit, abs(second))
+    number = compared(second, unit).split(NBSP + name)[0] if name else compared(second, unit)
+    places = len(number.partition(".")[2])
+    printed = [round(value / factor, places) for value in (first, second)]
+    less = round(printed[0] - printed[1], places)
+    texts = [_grouped(x, places) for x in (*printed, less)]
+    texts[2] = ("+" if less > 0.0 else "") + texts[2]
+    return (_with_unit(texts[0], name), _with_unit(texts[1], name), _with_unit(texts[2], name))
 
 
 def interval(

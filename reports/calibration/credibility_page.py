@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from reports import ReportError
-from reports.base.format import breakable, compared, interval, quantity
+from reports.base.format import breakable, difference, interval, quantity
 from reports.base.labels import capital, in_words
 from reports.base.run_folder import REMEDY, Data, read_json
 
@@ -59,10 +59,10 @@ def _without_E(text: str) -> str:
 def _row(one: Mapping[str, Any], factor: float) -> list[str]:
     """Simulated and measured value, error, uncertainties, the interval of the model's error, and what follows."""
     unit, error, reach = one["unit"], one["error"], one["u_val"]
-    values = [compared(one["simulated"], unit), compared(one["measured"], unit), quantity(error, unit, signed=True)]
-    uncertain = [quantity(one[key], unit, digits=2) for key in UNCERTAINTIES]
+    values = difference(one["simulated"], one["measured"], unit)
+    uncertain = [quantity(one[key], unit, digits=2, like=one["measured"]) for key in UNCERTAINTIES]
     if reach is None:
         return [*values, *uncertain, "not known", "nothing: a repeated run broke down, or none was made"]
     within = abs(error) <= factor * reach
     said = "an error of the model is not shown" if within else "an error of the model is shown"
-    return [*values, *uncertain, interval(one["low"], one["high"], unit), said]
+    return [*values, *uncertain, interval(one["low"], one["high"], unit, like=one["measured"]), said]

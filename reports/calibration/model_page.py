@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
-from mpm.scene.material import PARTS_BEFORE_IT_FLOWS, REFERENCE_SPEED
-from reports.base.format import breakable, count, plain, quantity
+from mpm.scene.material import PARTS_BEFORE_IT_FLOWS, REFERENCE_SPEED, Material
+from mpm.scene.motion import SLOWED_FROM
+from reports.base.format import breakable, count, listed, plain, quantity
 from reports.base.run_folder import Data
 from reports.calibration import model_sketch
 
@@ -16,14 +17,14 @@ if TYPE_CHECKING:
 #: Where the limit of each line of the verdict comes from.
 LIMIT_SOURCES = {
     "peak force error": "what published work on simulated cutting quotes as agreement [@Koh 2026]",
-    "curve error (NRMSE)": "sensors of such traces are uncertain by 10 % and more",
-    "normalised-shape error": "sensors of such traces are uncertain by 10 % and more",
+    "curve error (NRMSE)": "chosen: less than sensors of such traces are uncertain by, which is 10 % and more",
+    "normalised-shape error": "chosen: less than sensors of such traces are uncertain by, which is 10 % and more",
     "curve error of the withdrawal (NRMSE)": "root of the sum of two squares: the limit of the curve error, and the "
     "uncertainty of the pull's level over the largest pull",
     "shape better than ramp and half sine": "the better of two curves without physics",
     "curve explained by the food": "a right food fails once in a hundred cuts",
-    "values those of the food": "the right food has values as far out once in a hundred cuts; an sd is that of what its "
-    "literature and such a trace lead to, and what the trace does not tell does not count",
+    "values those of the food": "the right food has values as far out once in a hundred cuts; an sd is that of what "
+    "its literature and such a trace lead to, and what the trace does not tell does not count",
     "specimen no larger than the food": "one whole food in a hundred is larger",
     "width of the 95 % band": "a band wider than a quarter of the peak either way predicts nothing of use",
     "interval score better than null models": "the better of two curves without physics [@Gneiting 2007]",
@@ -40,6 +41,8 @@ LIMIT_SOURCES = {
     "sensor's gain within its uncertainty": "three standard deviations of what the sensor leaves open",
     "parameters at a bound": "an answer at the end of what was allowed is none",
 }
+#: Nuisances of the way down, and those of them that the search leaves alone.
+OPEN, WIDENING = ("tare", "drift", "lag", "bandwidth", "gain", "width"), ("gain", "width")
 ABBREVIATIONS = (
     ("NRMSE", "root mean square difference of two curves over the measured peak"),
     ("Shape error", "the same with each curve over its own peak"),
@@ -242,13 +245,12 @@ def _known(result: CalibrationResult, name: str) -> str:
 def _conditions(result: CalibrationResult) -> list[list[str]]:
     """Letter of the sketch, and what holds there."""
     cut = result.cut
-    mach, real = quantity(cut.mach, "-"), cut.speed_real_m_s
-    speed = "" if real is None else f" (the real one: {quantity(real, 'm/s')})"
+    speed = _speed(result)
     up = "" if result.withdrawal is None else ", then up again at the same speed"
     gravity = _part(result, "numerics", "gravity")
     weight = "" if gravity is None else f", gravity of {quantity(gravity, '-')} m/s²"
     rows = [
-        ["A", f"blade: rigid, goes down at one speed, {mach} of that of pressure waves in the food{speed}{up}"],
+        ["A", f"blade: rigid, goes down at {speed}{up}"],
         ["B", "faces of the blade: contact and friction; their force is the *face part*"],
         ["C", "edge: its line force is the *edge part*"],
         ["D", "plane of the cut, whole at first: the crack runs here and nowhere else"],
@@ -261,15 +263,38 @@ def _conditions(result: CalibrationResult) -> list[list[str]]:
     return [*rows, ["G", "the grid, at its size; all other surfaces are free"]]
 
 
+def _speed(result: CalibrationResult) -> str:
+    """The simulated speed, and that of the trace."""
+    cut, trace = result.cut, result.conditioning
+    said = f"{quantity(cut.mach, '-')} of the speed of pressure waves in the food"
+    E, nu, rho = (_value(result, name) for name in ("E", "nu", "rho"))
+    if None not in (E, nu, rho) and cut.mach is not None:
+        at = cut.mach * Material(E=E, nu=nu, rho=rho).p_wave
+        real = cut.speed_real_m_s or trace.stroke_m / (trace.end_s - trace.onset_s)
+        said += f", {quantity(at, 'm/s', digits=2)}, where the trace has {quantity(real, 'm/s', digits=2)} on average"
+    end = _part(result, "motion", "end_speed")
+    if end is not None and end < 1.0:
+        below, least = (quantity(x, "fraction", digits=None) for x in (SLOWED_FROM, end))
+        said += f"; with less than {below} of the height left it goes down with what is left, to {least} at the end"
+    return said
+
+
 def _left_out(result: CalibrationResult) -> str:
     """How far a right model may be from the trace, part of its peak."""
     said = result.posterior.discrepancy
     return "3 % (unless its command says another one)" if said is None else quantity(said, "fraction", digits=None)
 
 
+def _some(names: list[str], what: str, one: str, many: str) -> str:
+    """A sentence about some nuisances."""
+    return f"{listed(names).capitalize()} {one if len(names) == 1 else many} {what}."
+
+
 def _objective(result: CalibrationResult) -> str:
-    words = "Tare, drift and lag are integrated out of the curve; gain and width widen the intervals."
-    open_ = f" {words}" if result.nuisances else ""
+    known = [n for n in result.nuisances if n in OPEN]
+    out, wide = ([n for n in known if (n in WIDENING) is kind] for kind in (False, True))
+    open_ = f" {_some(out, 'integrated out of the curve', 'is', 'are')}" if out else ""
+    open_ += f" {_some(wide, 'the intervals', 'widens', 'widen')}" if wide else ""
     tied = {"E", "yield_stress"} <= set(result.fitted)
     ratio = " Yield stress over E is known to a factor of 3." if tied else ""
     up = result.withdrawal is not None

@@ -64,7 +64,7 @@ def _simulations(history: SearchHistory) -> Data:
     known = {kind: kept[kind] for kind in KINDS if kind in kept} | {k: t for k, t in kept.items() if k not in KINDS}
     kinds = [f"{count(t.simulations)} {KINDS.get(kind, kind)}" for kind, t in known.items()]
     every, failed = history.every.simulations, history.every.failed
-    of_search = f"the search made {count(history.simulations)} of them"
+    of_search = f"{count(history.simulations)} of all were the search's, the others are for intervals and checks"
     return {
         "simulations": count(every),
         "failed": count(failed),

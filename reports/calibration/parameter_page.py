@@ -28,8 +28,8 @@ IDENTIFIABILITY = {
     "weak": "bounded on both sides, but not so well",
     "one_sided": "the trace bounds one side; the other is the literature's, or what is possible",
     "only_as_product": "known times the width of the specimen and the gain of the sensor, or times another parameter",
-    "not_seen": "the trace bounds neither side: the interval is the literature's, and the value is of one food of many that "
-    "draw the curve",
+    "not_seen": "the trace bounds neither side: the interval is the literature's, and the value is of one food of many "
+    "that draw the curve",
     "at_bound": "the fit ran into the end of what was allowed, and fails for it",
     "at_limit": "the best value is the end of what is possible, such as no friction: a result, no failure",
 }

@@ -7,6 +7,7 @@ Numbers and the sentences that depend on them are made here, once for both; the 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,7 +35,7 @@ from reports.web.calibration import calibration_page, write_page
 if TYPE_CHECKING:
     from calib.calibration.members import Members
     from calib.calibration.result import CalibrationResult
-    from calib.calibration.result_parts import Agreement, NullRating
+    from calib.calibration.result_parts import Agreement, FixedParameter, NullRating
     from calib.validation.acceptance import Verdict
 
 #: First page [mm]: what title, a line, a sentence of two lines and facts leave; a line of the table, one more line in
@@ -183,10 +184,17 @@ def _record(done: Finished) -> figures.ConditioningRecord:
     )
 
 
+def _used(result: CalibrationResult) -> Mapping[str, FixedParameter]:
+    """Values that were not fitted, but for what starts a cut in bare flesh where a skin starts it."""
+    fixed = result.fixed_parameters
+    skin = result.fitted.get("skin_thickness") or fixed.get("skin_thickness")
+    return {n: p for n, p in fixed.items() if n != "R_initiation" or skin is None or not skin.value}
+
+
 def _content(done: Finished) -> Data:
     """Everything the template prints, as text."""
     result, broken = done.result, failures.splits(done.runs, done.result.fitted)
-    fitted, fixed, correlations = result.fitted, result.fixed_parameters, result.posterior.correlations
+    fitted, fixed, correlations = result.fitted, _used(result), result.posterior.correlations
     content = {
         "food": result.food.replace("_", " ").capitalize(),
         "cutcal": result.software.versions.get("cutcal", ""),

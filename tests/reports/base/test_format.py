@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from reports.base import format as report_format
 from reports.base.format import (
     DASH,
     NBSP,
@@ -21,6 +23,20 @@ from reports.base.format import (
 )
 from reports.base.labels import shown
 from tests.reports.sample import spaced
+
+
+def test_pages_are_set_so_that_none_is_nearly_empty(tmp_path: Path) -> None:
+    """Lines that leave one over for a second page move together until they have one; lines that fill a page and a half
+    move apart until the second is filled. What has one page is left as it is."""
+    source = tmp_path / "lines.typ"
+    head = '#set page(paper: "a4", margin: (top: 24mm, bottom: 22mm))\n#let air = float(sys.inputs.air)\n'
+    for lines, pages, moved in ((52, 1, -1), (80, 2, 1), (20, 1, 0)):
+        body = f"#for k in range({lines}) [#block(above: 5mm * air - 10pt, below: 0mm, height: 10pt)[x]]"
+        source.write_text(head + body)
+        air = report_format._air(source, {})
+        fills = report_format.page_fills(source, air, {})
+        assert len(fills) == pages and np.sign(air - 1.0) == moved
+        assert lines == 20 or min(fills) >= 0.65
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ from calib.errors import OutputError
 from calib.problem.target import ErrorModel
 from calib.uncertainty.estimates import FittedNuisance
 from reports import ReportError
+from reports.base import format as report_format
 from reports.base.format import DASH
 from reports.calibration import measurement, report
 from tests.data_dir import ROOT
@@ -51,14 +52,25 @@ def content(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Content:
 # ---- the document
 
 
-@pytest.mark.parametrize(("kind", "count"), [("good", 8), ("reconstructed", 8), ("failed", 9), ("interrupted", 6)])
-def test_every_outcome_gives_a_pdf_of_the_planned_length(tmp_path: Path, kind: str, count: int) -> None:
-    """Sections follow one another without empty pages; the failed run's twelve warnings need one more."""
+@pytest.mark.parametrize(("kind", "count"), [("good", 8), ("reconstructed", 8), ("failed", 8), ("interrupted", 6)])
+def test_every_outcome_gives_a_pdf_of_the_planned_length(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, count: int
+) -> None:
+    """Sections follow one another, and no page has more than a third of its text area empty."""
+    filled, look = [], report_format.page_fills
+
+    def page_fills(*args: Any) -> list[float]:
+        found = look(*args)
+        filled.append(min(found))
+        return found
+
+    monkeypatch.setattr(report_format, "page_fills", page_fills)
     path = write_report(sample.write_run(tmp_path, kind))
     pdf = path.read_bytes()
     assert path == tmp_path / "report.pdf"
     assert pdf.startswith(b"%PDF") and len(pdf) < MOST_BYTES
     assert pages(pdf) == count
+    assert max(filled) >= 1.0 - (22.0 + (297.0 - 24.0 - 22.0) / 3.0) / 297.0  # margins of 24 and 22 mm
 
 
 def test_all_fonts_are_embedded(tmp_path: Path) -> None:
