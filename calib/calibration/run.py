@@ -101,6 +101,7 @@ def run(
         with EvaluationStore(out / STORE, setup.header, resume=resume, say=say) as store:
             clock = RunClock(progress, earlier_runs(out, pool.batch) if progress else [])
             work = _Calibration(setup, both, pool, store, out, say, clock)
+            clock.begin(options.budget)
             found = work.fitted(options)
             calibrated = work.repeated(found)
         add_conditioning(out / STORE, setup.curve)
@@ -166,7 +167,7 @@ class _Calibration:
         if setup.request.sample:
             return self._sampled(evaluators)
         stages = _Stages(self.clock, self.say)
-        listener = Listener(self.clock.search, stages.say, self._begin_longest_check, self.say, stages.made)
+        listener = Listener(self.clock.search, stages.say, self._searched, self.say, stages.made)
         asked = [name for name in TOLD_APART if self.both is not None and name in self._fitted]
         fit, analysis = fit_with_uncertainty(problem.objective, evaluators, options, listener, asked)
         nested = () if analysis is None else nested_models(problem.objective, analysis.result, asked)
@@ -182,6 +183,11 @@ class _Calibration:
     def _fitted(self) -> tuple[str, ...]:
         """Names of what is fitted."""
         return self.setup.objective.parameters.names
+
+    def _searched(self, fit: FitResult) -> None:
+        """The search has ended."""
+        self.clock.analysis()
+        self._begin_longest_check(fit)
 
     def _begin_longest_check(self, fit: FitResult) -> None:
         """Begin the longest of the last simulations, beside those of the intervals."""

@@ -23,8 +23,12 @@ five, the literature's values and the record."""
 INTERVAL_RUNS = 60.0
 """Time of the intervals at most, in default simulations of a worker [-]: both ends of nine parameters in three rounds
 are 54 of them, and as many coarse ones."""
+CLOSING_S = 8.0
+"""Time that figures and report take [s]: 4 on two quiet cores, 15 on busy ones."""
 SLOWER = 2.0
 """How much slower than the simulations so far the rest may be: another job may take the machine [-]."""
+MOST_CLOSING_S = SLOWER * CLOSING_S
+"""Time that they take at most [s]."""
 ALMOST = 0.99
 """Part of a bar that is shown at most while something is left to do [-]."""
 MOST_READ = 8
@@ -87,7 +91,17 @@ class RunClock:
         self._each = math.nan
         self._part = 0.0
         self._more = self._round = 0  # simulations of the intervals in earlier rounds, and in this one
+        self._lasting = 0  # simulations among the last that are done
         self._searched = self._last_began = math.nan  # when the search has ended, and the last simulations have begun
+
+    def begin(self, budget: float) -> None:
+        """The first simulations have begun: nothing tells yet how long they take.
+
+        Args:
+            budget: Budget of the search, in simulations on the fine grid [-].
+        """
+        words = "compiling for the first simulations"
+        self._tell(Progress(0, 0.0, budget, 0, math.inf, math.nan, words), math.nan, math.nan)
 
     def search(self, p: Progress) -> None:
         """A simulation of the search is done."""
@@ -95,7 +109,11 @@ class RunClock:
         if math.isfinite(p.eta_s) and rest > 0.0:
             self._each = p.eta_s / rest
         self._last = p
-        self._tell(p, self._typically(), p.eta_s + (INTERVAL_RUNS + LAST_RUNS) * self._each)
+        self._tell(p, self._typically(), p.eta_s + (INTERVAL_RUNS + LAST_RUNS) * self._each + MOST_CLOSING_S)
+
+    def analysis(self) -> None:
+        """The search has ended, and what the trace bounds is worked out without simulations."""
+        self.intervals("profiles of the parameters")
 
     def intervals(self, words: str, done: int = 0) -> None:
         """A round of the intervals has begun, or one of its simulations is done.
@@ -109,7 +127,7 @@ class RunClock:
         if math.isnan(self._searched):
             self._searched = self._now()
         rest = max(INTERVAL_RUNS * self._each - (self._now() - self._searched), 0.0)
-        self._stage(words, self._typically(), rest + LAST_RUNS * self._each)
+        self._stage(words, self._typically(), rest + LAST_RUNS * self._each + MOST_CLOSING_S)
 
     def last(self, words: str, done: int, whole: int) -> None:
         """The last simulations have begun, or one of them is done.
@@ -121,22 +139,24 @@ class RunClock:
         """
         if not done:
             self._last_began = self._now()
+            self._more, self._round = self._more + self._round + self._lasting, 0
+        self._lasting = done
         expected = LAST_RUNS * self._each * (1.0 - done / whole)
-        if done == whole:  # nothing tells how long figures and report take
-            self._part = ALMOST
-            self._stage(words, math.nan, math.nan)
+        if done == whole:
+            self._stage(words, CLOSING_S, MOST_CLOSING_S)
             return
         took = self._now() - self._last_began
         longest = took * (whole - done) / done if done else expected  # were they all as long: the longest come first
-        self._stage(words, min(longest, max(expected, took)), max(expected, longest) * SLOWER)
+        usual = min(longest, max(expected, took))
+        self._stage(words, usual + CLOSING_S, max(expected, longest) * SLOWER + MOST_CLOSING_S)
 
     def _typically(self) -> float:
-        """Time left in a typical run [s]: never less than the last simulations take."""
-        return max(self._typical * self._each - (self._now() - self._began), LAST_RUNS * self._each)
+        """Time left in a typical run [s]: never less than the last simulations and the report take."""
+        return max(self._typical * self._each - (self._now() - self._began), LAST_RUNS * self._each + CLOSING_S)
 
     def _stage(self, words: str, typical: float, most: float) -> None:
         if self._last is not None:
-            made = self._last.done + self._more + self._round
+            made = self._last.done + self._more + self._round + self._lasting
             self._tell(replace(self._last, stage=words, done=made), typical, most)
 
     def _tell(self, p: Progress, typical: float, most: float) -> None:

@@ -10,7 +10,16 @@ from pathlib import Path
 import h5py
 import pytest
 
-from calib.calibration.run_clock import FIRST_GUESS, INTERVAL_RUNS, LAST_RUNS, SLOWER, RunClock, earlier_runs
+from calib.calibration.run_clock import (
+    CLOSING_S,
+    FIRST_GUESS,
+    INTERVAL_RUNS,
+    LAST_RUNS,
+    MOST_CLOSING_S,
+    SLOWER,
+    RunClock,
+    earlier_runs,
+)
 from calib.io.progress import Progress
 
 TEXT = h5py.string_dtype()
@@ -52,24 +61,28 @@ def test_one_bar_from_the_first_simulation_to_the_last() -> None:
     seen: list[Progress] = []
     now = [0.0]
     clock = RunClock(seen.append, [80.0, 70.0, 90.0], lambda: now[0])
+    clock.begin(100.0)
+    assert seen[-1].line() == "0 simulations, 0 of a budget of 100, chi2 -, compiling for the first simulations"
     for k in range(1, 31):
         now[0] = 2.0 * k
         clock.search(Progress(k, float(k), 100.0, 0, 9.0, 2.0 * (100.0 - k), "round"))
     assert seen[-1].typical_s == pytest.approx(160.0 - 60.0)
-    assert seen[-1].eta_s == pytest.approx(2.0 * (70.0 + INTERVAL_RUNS + LAST_RUNS))
+    assert seen[-1].eta_s == pytest.approx(2.0 * (70.0 + INTERVAL_RUNS + LAST_RUNS) + MOST_CLOSING_S)
+    clock.analysis()
+    assert seen[-1].stage == "profiles of the parameters" and seen[-1].done == 30
     clock.intervals("intervals, round 1")
     for k in range(1, 4):
         now[0] += 10.0
         clock.intervals(f"intervals, round 1, {k} of 3")
-        assert seen[-1].typical_s == pytest.approx(max(160.0 - now[0], 2.0 * LAST_RUNS))
-        assert seen[-1].eta_s == pytest.approx(2.0 * (INTERVAL_RUNS + LAST_RUNS) - 10.0 * k)
+        assert seen[-1].typical_s == pytest.approx(max(160.0 - now[0], 2.0 * LAST_RUNS + CLOSING_S))
+        assert seen[-1].eta_s == pytest.approx(2.0 * (INTERVAL_RUNS + LAST_RUNS) - 10.0 * k + MOST_CLOSING_S)
     for k in range(5):
         clock.last(f"last simulations, {k} of 4", k, 4)
         now[0] += 20.0
     parts = [p.part for p in seen]
     assert all(a <= b for a, b in zip(parts, parts[1:], strict=False))  # type: ignore[operator]
-    assert parts[-1] == pytest.approx(0.99) and seen[-1].stage == "last simulations, 4 of 4"
-    assert "left" not in seen[-1].line()  # what nobody knows
+    assert parts[-1] < 1.0 and (seen[-1].stage, seen[-1].done) == ("last simulations, 4 of 4", 34)
+    assert (seen[-1].typical_s, seen[-1].eta_s) == (CLOSING_S, MOST_CLOSING_S)
 
 
 def test_simulations_of_the_intervals_are_counted() -> None:
@@ -81,9 +94,11 @@ def test_simulations_of_the_intervals_are_counted() -> None:
         clock.intervals(words)
         for k in range(rounds):
             clock.intervals(f"{words}, {k + 1} of {rounds}", k + 1)
-    clock.last("last simulations", 0, 4)
-    assert [p.done for p in seen] == [30, 30, 31, 32, 33, 33, 34, 35, 35]
-    assert seen[-1].line().startswith("35 simulations, 30 of a budget of 100")
+    for whole in (2, 1):
+        for k in range(whole + 1):
+            clock.last("last simulations", k, whole)
+    assert [p.done for p in seen] == [30, 30, 31, 32, 33, 33, 34, 35, 35, 36, 37, 37, 38]
+    assert seen[-1].line().startswith("38 simulations, 30 of a budget of 100")
 
 
 def test_the_last_simulations_tell_their_own_time() -> None:
@@ -94,13 +109,19 @@ def test_the_last_simulations_tell_their_own_time() -> None:
     clock = RunClock(seen.append, [80.0], lambda: now[0])
     clock.search(Progress(1, 1.0, 100.0, 0, 9.0, 99.0, "round"))
     clock.last("last simulations", 0, 4)
-    assert (seen[-1].typical_s, seen[-1].eta_s) == pytest.approx((LAST_RUNS, SLOWER * LAST_RUNS))
+    assert (seen[-1].typical_s, seen[-1].eta_s) == pytest.approx(
+        (LAST_RUNS + CLOSING_S, SLOWER * LAST_RUNS + MOST_CLOSING_S)
+    )
     now[0] += LAST_RUNS
     clock.last("last simulations, 1 of 4", 1, 4)
-    assert (seen[-1].typical_s, seen[-1].eta_s) == pytest.approx((LAST_RUNS, SLOWER * 3.0 * LAST_RUNS))
+    assert (seen[-1].typical_s, seen[-1].eta_s) == pytest.approx(
+        (LAST_RUNS + CLOSING_S, SLOWER * 3.0 * LAST_RUNS + MOST_CLOSING_S)
+    )
     now[0] += 0.2 * LAST_RUNS
     clock.last("last simulations, 3 of 4", 3, 4)
-    assert (seen[-1].typical_s, seen[-1].eta_s) == pytest.approx((0.4 * LAST_RUNS, SLOWER * 0.4 * LAST_RUNS))
+    assert (seen[-1].typical_s, seen[-1].eta_s) == pytest.approx(
+        (0.4 * LAST_RUNS + CLOSING_S, SLOWER * 0.4 * LAST_RUNS + MOST_CLOSING_S)
+    )
 
 
 def test_nothing_is_said_of_a_time_that_is_not_known() -> None:
