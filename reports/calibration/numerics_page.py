@@ -25,6 +25,13 @@ KINDS = {
 }
 #: Why a simulation broke down, in words; another reason is told as the solver has it.
 REASONS = {**BREAKDOWNS, "worker_died": "its process was killed"}
+#: Why a search ended.
+ENDS = {
+    "converged": "no gain was in sight",
+    "stalled": "gains were promised and none came",
+    "budget": "its budget was spent",
+    "interrupted": "it was stopped",
+}
 #: Part of the simulations from which on the first page says that they broke down [-].
 MANY_FAILED = 0.1
 #: The line of the first page that has the energy that no law took.
@@ -45,7 +52,7 @@ def numerics(result: CalibrationResult) -> Data:
         "kinetic": quantity(cut.ke_over_ie, "fraction"), "ripple": quantity(ripple, "N"),
         "ripple_part": quantity(part, "fraction", digits=2), "wall": duration(result.wall_s),
         **_energy(result),
-        **_simulations(history),
+        **_simulations(history, result.search),
         "counters": cut.counters,
     }  # fmt: skip
 
@@ -58,13 +65,22 @@ def broke_down(history: SearchHistory) -> str:
     return f" {count(failed)} of {count(every)} simulations broke down: where they lie the fit is blind."
 
 
-def _simulations(history: SearchHistory) -> Data:
-    """How many simulations there are and failed, and of which kinds; of older runs those of the search alone."""
+def _simulations(history: SearchHistory, search: str | None) -> Data:
+    """How many simulations there are and failed, and of which kinds; of older runs those of the search alone.
+
+    Args:
+        history: The simulations.
+        search: How the search ended.
+
+    Returns:
+        Texts by name.
+    """
     kept = history.kept
     known = {kind: kept[kind] for kind in KINDS if kind in kept} | {k: t for k, t in kept.items() if k not in KINDS}
     kinds = [f"{count(t.simulations)} {KINDS.get(kind, kind)}" for kind, t in known.items()]
     every, failed = history.every.simulations, history.every.failed
-    of_search = f"{count(history.simulations)} of all were the search's, the others are for intervals and checks"
+    end = "" if search not in ENDS else f", which ended as {ENDS[search]}"
+    of_search = f"{count(history.simulations)} of all were the search's{end}; the others are for intervals and checks"
     return {
         "simulations": count(every),
         "failed": count(failed),

@@ -37,7 +37,7 @@ from mpm.scene.shapes import Shape
 from reports.base.figures import BLUE
 from reports.base.format import quantity
 from reports.base.labels import capital, in_words, source_in_words
-from reports.calibration import cut_figure, model_page, model_sketch, parameter_page, report
+from reports.calibration import cut_figure, model_page, model_sketch, numerics_page, parameter_page, report
 from tests.reports import sample
 from tests.reports.sample import spaced
 
@@ -268,6 +268,8 @@ def test_simulations_add_up(text: str, tmp_path: Path) -> None:
     run = sample.write_run(tmp_path)
     stored = json.loads((run / "summary.json").read_text())["simulations"]
     assert int(total) == stored
+    said = numerics_page._simulations(read_result(run).history, "budget")["kinds"]
+    assert "of all were the search's, which ended as its budget was spent; the others" in said
 
 
 def test_the_figure_of_failures_counts_what_the_heading_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
