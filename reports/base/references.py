@@ -38,6 +38,7 @@ REFERENCES: dict[str, str] = {
     "Koh 2026": "Koh, H., Song, C.-Y., Choi, Y., Viveiros, M., Hyde, D., Kim, H. (2026). CulinaryCut-VLAP: a "
     "vision-language-action-physics framework for food cutting via a force-aware material point method. "
     "arXiv:2601.06451",
+    "Dawood 2026": "Dawood et al. (2026). Hyperelastic characterisation of silicone tissue phantoms. Data, CC BY 4.0.",
     "Gneiting 2007": "Gneiting, T., Raftery, A. E. (2007). Strictly proper scoring rules, prediction, and estimation. "
     "J. Am. Stat. Assoc. 102:359-378. doi:10.1198/016214506000001437",
     "ISO 18571": "ISO/TS 18571 (2014). Road vehicles: objective rating metric for non-ambiguous signals.",

@@ -13,7 +13,7 @@ from reports import ReportError
 
 HELP = "write report.pdf and report.html of a finished run again"
 DESCRIPTION = """Write report.pdf and report.html again from the files that a calibration, a
-study of several cuts, converge, verify, stress or bench wrote."""
+study of several cuts, compress, converge, verify, stress or bench wrote."""
 EPILOG = "examples:\n  cutcal report runs/banana\n  cutcal report runs/banana --context context.yaml"
 
 
@@ -58,6 +58,7 @@ def writer(folder: Path) -> Callable[[Path], Path]:
         ReportError: The folder is missing, or holds no finished run.
     """
     from calib.calibration import report as calibration
+    from calib.compression import report as compression
     from calib.material.properties import MEANINGS
     from reports.multi_specimen import report as multi_specimen
     from studies.convergence import report as convergence
@@ -70,6 +71,7 @@ def writer(folder: Path) -> Callable[[Path], Path]:
         "verify.json": verification.write_report,
         "stress.json": stability.write_report,
         "bench.json": bench.write_report,
+        "compress.json": compression.write_report,
     }
     for name, write in found.items():
         if (folder / name).exists():
