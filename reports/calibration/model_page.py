@@ -6,7 +6,8 @@ from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
 from mpm.scene.material import PARTS_BEFORE_IT_FLOWS, REFERENCE_SPEED
-from reports.base.format import breakable, count, plain, quantity
+from reports.base.format import count, plain, quantity
+from reports.base.references import of_foods
 from reports.base.run_folder import Data
 from reports.calibration import model_sketch
 
@@ -72,7 +73,7 @@ def model(result: CalibrationResult) -> Data:
         "objective": _objective(result),
         "limit_sources": _limit_sources(names),
         "abbreviations": [[name, text + more.get(name, "")] for name, text in ABBREVIATIONS],
-        "food_references": [[breakable(name), breakable(text)] for name, text in result.references.items()],
+        "food_references": of_foods(result.references),
     }
 
 
