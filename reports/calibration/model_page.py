@@ -51,6 +51,12 @@ ABBREVIATIONS = (
     ("Sprague–Geers M, P, C", "errors of magnitude and phase, and both combined [@Schwer 2007]"),
     ("95 % band, interval", "of the posterior: literature's ranges and trace together, unless *trace alone* is said"),
     ("±", "one standard uncertainty"),
+    (
+        "Kind of source",
+        "of a literature value, not of a fitted one: *measured*, on this food in a test of the kind that is meant; "
+        "*proxy*, another food, another test, a derived or a second-hand value; *assumed*, nobody's measurement; "
+        "*paper, Table 2*, of the CulinaryCut paper [@Koh 2026], no better value found",
+    ),
 )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 from calib.io.schema import tag
@@ -59,8 +58,8 @@ def writer(folder: Path) -> Callable[[Path], Path]:
     """
     from calib.calibration import report as calibration
     from calib.compression import report as compression
-    from calib.material.properties import MEANINGS
-    from reports.multi_specimen import report as multi_specimen
+    from calib.multi_specimen import report as multi_specimen
+    from reports.multi_specimen.report import is_study
     from studies.convergence import report as convergence
     from studies.speed import report as bench
     from studies.stability import report as stability
@@ -82,5 +81,4 @@ def writer(folder: Path) -> Callable[[Path], Path]:
     if not summary.exists():
         names = ", ".join(("summary.json", *found))
         raise ReportError(f"{folder}: holds none of {names}; give the --out of a finished run")
-    study = partial(multi_specimen.write_report, meanings=MEANINGS)
-    return study if multi_specimen.is_study(summary) else calibration.write_report
+    return multi_specimen.write_report if is_study(summary) else calibration.write_report
