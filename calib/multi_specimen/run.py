@@ -143,7 +143,7 @@ class Finished:
             out[p.name] = StudyParameter.of_study(found, known, shared=is_shared(p.name))
         return out
 
-    def _correlations(self) -> dict[str, float | None] | None:
+    def _correlations(self) -> dict[str, float] | None:
         """Posterior correlation of each pair of parameters; None where the fit ended too early."""
         names, analysis = self.fit.result.parameters.names, self.fit.analysis
         if analysis is None:

@@ -86,7 +86,16 @@ def shown_cut(s: Data, curves: Iterable[str]) -> str | None:
 
 
 def sketch(s: Data, curves: Iterable[str], known: Known) -> bytes | None:
-    """The sketch of the cut that is shown; None where there is none."""
+    """The sketch of the cut that is shown.
+
+    Args:
+        s: ``summary.json``.
+        curves: Names of the cuts, in their order.
+        known: What the folder says of food and records.
+
+    Returns:
+        An SVG document; None where no document says what was simulated.
+    """
     shown = shown_cut(s, curves)
     return None if shown is None else model_page.sketch(as_calibration(s, shown, known, lambda sources: {}))
 

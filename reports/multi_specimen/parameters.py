@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -46,13 +47,14 @@ def parameter(name: str, p: Data, meanings: Mapping[str, str]) -> list[str]:
     return [*cells, breakable(cut), "outside its prior" if row["outside"] else ""]
 
 
-def _typed(p: Data) -> SimpleNamespace:
+def _typed(p: Data) -> Any:
+    """A parameter of the document with attributes, as a calibration's pages read it."""
     return SimpleNamespace(**{"status": "", "source": "", **p})
 
 
 def legend(s: Data) -> list[list[str]]:
     """The verdicts on identifiability that occur, and what they mean."""
-    return parameter_page.legend({name: SimpleNamespace(**p) for name, p in s["parameters"].items()})
+    return parameter_page.legend({name: _typed(p) for name, p in s["parameters"].items()})
 
 
 def correlations(s: Data) -> tuple[list[str], np.ndarray]:
@@ -61,11 +63,17 @@ def correlations(s: Data) -> tuple[list[str], np.ndarray]:
 
 
 def fixed(s: Data, known: Known, meanings: Mapping[str, str]) -> list[list[str]]:
-    """Lines of the table of values that were not fitted: name, meaning, value, kind and text of the source."""
-    return [
-        parameter_page.fixed(name, SimpleNamespace(**p), meanings.get(name, ""))
-        for name, p in not_fitted(s, known).items()
-    ]
+    """Lines of the table of values that were not fitted.
+
+    Args:
+        s: ``summary.json``.
+        known: What the folder says of food and records.
+        meanings: What each property is, in words.
+
+    Returns:
+        Name, meaning, value, kind and text of the source of each.
+    """
+    return [parameter_page.fixed(name, _typed(p), meanings.get(name, "")) for name, p in not_fitted(s, known).items()]
 
 
 def priors(s: Data, known: Known) -> list[list[str]]:

@@ -19,6 +19,7 @@ from reports.web.parts import assets, chart, limits_section, mark, pairs, stampe
 
 FORCES = "Measured, simulated and predicted force over stroke with the 95 % band, and the residual below"
 HEAD = ("Cut", "NRMSE", "Shape", "ISO rating", "Peak", "Work", "In band", "Band width", "Factor", "Verdict")
+ONE_SD = "±: one standard uncertainty, before and after; of a factor that of its logarithm, times the factor."
 PREDICTED, FITTED = "predicted from the other cuts", "simulated, fitted to it too"
 WORDS = (
     "Shape: difference of the curves over their own peaks. ISO rating: overall rating in the manner of ISO/TS 18571, "
@@ -107,8 +108,8 @@ def _verdict(c: Data) -> Markup:
         said = " ".join(text for text in (limits, *c[f"{key}_notes"]) if text)
         parts.append(element("p", said, class_="note") if rows and said else Markup(""))
     words = element("p", f"{WORDS} {c['chi_square']}", class_="note")
-    said = [element("p", element("strong", text)) for text in c["conflicts"]]
-    return element("section", element("p", c["sentence"]), *said, *parts, words, id="verdict")
+    conflicts = [element("p", element("strong", text)) for text in c["conflicts"]]
+    return element("section", element("p", c["sentence"]), *conflicts, *parts, words, id="verdict")
 
 
 def _forces(
@@ -209,11 +210,18 @@ def _parameters(c: Data) -> Markup:
             ]
     if not parts:
         parts = [element("p", "No parameter was fitted.")]
+    if c["legend"]:
+        parts += [element("p", "; ".join(f"{word}: {text}" for word, text in c["legend"]) + ".", class_="note")]
+    if c["fixed"]:
+        title, columns = "Values that were not fitted", ("Property", "Value", "Kind of source", "Source")
+        rows = [[joined([element("code", row[0]), element("small", row[1])]), *row[2:]] for row in c["fixed"]]
+        parts += [element("h3", title), table(columns, rows, (1,), label=title)]
     if c["left_open"]:
         known_before = ("Cut", "Quantity", "What it is", "Known before", "What the fit says", "Within 3 sd")
         open_ = [[*row[:5], mark_of(row[5])] for row in c["left_open"]]
         parts += [element("h3", "What the measurements leave open")]
         parts += [table(known_before, open_, (3, 4), label="What the measurements leave open")]
+        parts += [element("p", ONE_SD, class_="note")]
     if c["checks"]:
         parts += [element("h3", "What numerical choices change")]
         parts += [table(("Cut", "Choice", "Peak", "Work"), c["checks"], (2, 3), label="Numerical checks")]

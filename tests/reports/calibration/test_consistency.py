@@ -293,9 +293,9 @@ def test_looks_of_the_cut_share_their_scale() -> None:
     assert all("von Mises stress [kPa]" in look and "across the blade [mm]" in look for look in looks)
     scales = [re.findall(r"<!-- ([\d.]+) -->", look.split("across the blade [mm]")[1]) for look in looks]
     assert scales[0][-1] == "9" and all(scale[-5:] == scales[0][-5:] for scale in scales)
-    figure = Figure()
-    cut_figure.glance(section, knife, 0.033, section.stroke, force)(figure.subplots())
-    assert figure.axes[1].get_ylim() == pytest.approx((0.0, 9.0), rel=0.1)
+    axes = Figure().subplots()
+    cut_figure.glance(section, knife, 0.033, section.stroke, force)(axes)
+    assert axes.child_axes[0].get_ylim() == pytest.approx((0.0, 9.0), rel=0.1)
 
 
 def test_every_limit_has_its_reason() -> None:

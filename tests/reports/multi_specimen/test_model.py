@@ -21,6 +21,7 @@ from reports.calibration import cut_figure
 from reports.multi_specimen import verdicts
 from reports.multi_specimen.model import HELD_SOURCES
 from reports.multi_specimen.report import content, read_study
+from reports.web.study import study_page
 from tests.reports import sample
 from tests.reports import study_sample as study
 from tests.reports.base.test_figures import looked_at
@@ -77,6 +78,8 @@ def test_the_pdf_alone_has_all_values(tmp_path: Path) -> None:
     assert fixed["nu"][1:] == ["0.350", "paper, Table 2", "CulinaryCut Table 2"]
     assert {"rho", "strength_ratio", "loss_factor", "board_friction"} <= set(fixed)
     assert not {"E", "R", "R_skin", "mu", "yield_stress"} & set(fixed)
+    page = study_page(got, read_study(tmp_path / "whole").curves, [study.HELD], {})
+    assert "strength_ratio" in page and "Values that were not fitted" in page and "only as a product" in page
     references = dict(got["model"]["food_references"])
     assert references["Kachru 1995"].startswith("Kachru, R. P.") and "Muscadine" in references
     linked = references["CulinaryCut"]
